@@ -8,8 +8,7 @@ atlas; the prediction is compared with every second week of the other atlas. The
 `--write` also writes as YAML: for each start, start week, horizon (GW) and model, the columns of
 `results/study/prediction.csv` listed in `NUMBERS`, and of runs the differences of folding and depth. With several
 `--start-weeks`, rows of all are written. Rows of other starts and start weeks in the file are kept; so are those of
-another `--protocol`, a name for settings that differ from the default ones, which are not used for intervals. `held`
-counts how often intervals by the other starts contain the errors of each start.
+another `--protocol`, a name for settings that differ from the default ones, which are not used for intervals.
 
 `--surfaces` predicts the same start brain once more from its pial surfaces, and from its pial and white surfaces, which
 gyriflow made from its labels; rows then have `given`.
@@ -28,7 +27,7 @@ import numpy as np
 import yaml
 from common import run_workflow
 
-from gyriflow.compare.accuracy import DEFAULT_PROTOCOL, held_intervals, log_value
+from gyriflow.compare.accuracy import DEFAULT_PROTOCOL, log_value
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.settings.terms import SIDES
@@ -162,7 +161,7 @@ def main() -> None:
     if arguments.write:
         text = yaml.safe_dump(result, sort_keys=False, width=10_000, default_flow_style=None, allow_unicode=True)
         write_text(arguments.write, HEAD + text)
-    print(json.dumps(result | {"held": held_intervals(found).to_dict("records")}))
+    print(json.dumps(result))
 
 
 if __name__ == "__main__":

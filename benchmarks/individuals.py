@@ -14,11 +14,8 @@ DIFFERENCE_SMOOTHING_MM and FADING_GW, the predicted shape before a body follows
 or `0 mm` without fading. The values with the best r on the individuals with odd seeds are reported on those with even
 seeds. The map of an individual depends on its kind and seed only.
 
-With `--intervals` the predictions are run, and it is counted how often the tested intervals (`norms/predictions.yaml`)
-contain the later brains' area, volume, gyrification index and depth.
-
 The last line is one JSON object: `rows` with `grown_by`, `persistence`, `individual`, `horizon` (GW), `model`,
-`distance_mm`, `r_shape_index`; with `--intervals` also `held`, by metric and persistence.
+`distance_mm`, `r_shape_index`.
 """
 
 import argparse
@@ -34,7 +31,6 @@ import pandas as pd
 from common import print_rows, r_shape_index, run_workflow
 from scipy.ndimage import map_coordinates
 
-from gyriflow.compare.accuracy import QUANTITIES, error_in_tests, log_errors, log_value
 from gyriflow.compare.comparison import aligned_distances
 from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
@@ -42,18 +38,15 @@ from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh
 from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, expected_positions
 from gyriflow.growth.series_shapes import follow_series
-from gyriflow.io.files import read_table
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_keys
 from gyriflow.shipped import ATLASES
-from gyriflow.study.paths import MESH, PIAL, PREDICTION_TESTS, REGISTERED
-from gyriflow.units import week_tag
+from gyriflow.study.paths import MESH, PIAL, REGISTERED
 
 WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
-METRICS = "results/{place}/metrics.csv"
 MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
 KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
@@ -149,27 +142,6 @@ def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int]) -> list
     return rows
 
 
-def held_by_tests(folder: Path, individuals: Sequence[str], weeks: Sequence[int]) -> pd.DataFrame:
-    """Return for each metric and persistence how many later brains the tested intervals of predictions contain."""
-    tests, rows = read_keys(PREDICTION_TESTS)["rows"], []
-
-    def metrics(place: str) -> pd.Series:
-        table = read_table(folder / METRICS.format(place=place))
-        return table[table["hemisphere"] == "whole"].set_index("metric")["value"]
-
-    for name, week in product(individuals, weeks[1:]):
-        predicted = metrics(f"runs/expected/{name}-kept-{weeks[0]}/metrics/week-{week_tag(week)}")
-        for persistence, metric in product(KEPT_GW, QUANTITIES):
-            observed = metrics(f"brains/{name}-{persistence}-{week}/metrics")
-            error = log_value(metric, predicted[metric]) - log_value(metric, observed[metric])
-            tested = error_in_tests(log_errors(tests, metric), week, week - weeks[0])
-            rows.append({"metric": metric, "persistence": persistence, "error": error, "held": tested.holds(error)})
-    shares = pd.DataFrame(rows).groupby(["metric", "persistence"])
-    return shares.agg(
-        brains=("held", "size"), held=("held", "sum"), mean_error=("error", "mean"), sd=("error", "std")
-    ).reset_index()
-
-
 def print_chosen(scores: pd.DataFrame) -> None:
     """Print the values that are best for odd seeds, and their scores for even seeds."""
     odd = scores["individual"].str.split("-").str[-1].astype(int) % 2 == 1
@@ -218,10 +190,6 @@ def run_study(folder: Path, atlas: str, files: Path, arguments: argparse.Namespa
     made += [MESH["mesh"].format(brain=brain) for brain in starts]
     pairs = [*((brain, chain[0]) for brain in starts), *pairwise(chain)]
     made += [REGISTERED.format(earlier=earlier, later=later) for earlier, later in pairs]
-    if arguments.intervals:
-        later = [f"brains/{brain['id']}" for brain in brains if brain["week"] > start]
-        places = [f"runs/expected/{brain}/metrics/week-{week_tag(week)}" for brain in starts for week in weeks[1:]]
-        made += [METRICS.format(place=place) for place in [*places, *(f"{brain}/metrics" for brain in later)]]
     run_workflow(folder, config, arguments.cores, *made)
 
 
@@ -241,21 +209,17 @@ def main() -> None:
     parser.add_argument(
         "--weeks", type=int, nargs="+", default=[22, 26, 30], help="week of the start brains, and later weeks"
     )
-    parser.add_argument("--intervals", action="store_true", help="count how often tested intervals hold")
     parser.add_argument("--cores", type=int, default=2)
     arguments = parser.parse_args()
-    weeks, rows, held = sorted(arguments.weeks), [], []
+    weeks, rows = sorted(arguments.weeks), []
     for atlas, files in arguments.atlas:
         folder = arguments.folder.resolve() / atlas
         run_study(folder, atlas, Path(files).resolve(), arguments)
         score = partial(scores_of, folder, atlas=atlas, weeks=weeks)
         with ProcessPoolExecutor(arguments.cores) as pool:
             rows += [row for found in pool.map(score, arguments.individuals) for row in found]
-        if arguments.intervals:
-            held.append(held_by_tests(folder, arguments.individuals, weeks).assign(grown_by=atlas))
-            print(held[-1].to_string(index=False, float_format="%.3f"))
     print_chosen(pd.DataFrame(rows))
-    print_rows(rows, held=pd.concat(held).to_dict("records") if held else [])
+    print_rows(rows)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 import posixpath
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +28,9 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages that lie elsewhere in the checkout, and that of `tests/faults.yaml`."""
+    """Add the pages that lie elsewhere in the checkout."""
     for source, page in PAGES.items():
         files.append(File.generated(config, page, content=(CHECKOUT / source).read_text(encoding="utf-8")))
-    sys.path.insert(0, str(CHECKOUT / "tests"))
-    from reliability import page_of
-
-    files.append(File.generated(config, "reliability.md", content=page_of()))
     return files
 
 

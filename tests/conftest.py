@@ -1,11 +1,10 @@
-"""Fixtures and options of all tests, and their distribution to workers."""
+"""Fixtures of all tests, and their distribution to workers."""
 
 import logging
 import os
 from pathlib import Path
 
 import pytest
-from reliability import Collector
 from xdist.scheduler import LoadScopeScheduling
 
 # dolfinx, PETSc and MPI in the order that their wheels need
@@ -30,17 +29,6 @@ class Sets(LoadScopeScheduling):
 def default_logging_level():
     """Start each test at the default level, which scripts run in this process lower."""
     logging.getLogger().setLevel(logging.WARNING)
-
-
-def pytest_addoption(parser):
-    parser.addoption(
-        "--reliability", metavar="PAGE", help="write the page of faults, promises and their tests' outcomes"
-    )
-
-
-def pytest_configure(config):
-    page = config.getoption("--reliability")
-    config.pluginmanager.register(Collector(Path(page) if page else None), "reliability")
 
 
 def pytest_collection_modifyitems(items):

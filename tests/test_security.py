@@ -4,8 +4,6 @@ import ast
 import re
 from pathlib import Path
 
-import pytest
-
 CHECKOUT = Path(__file__).parents[1]
 SOURCES = sorted([*(CHECKOUT / "src").rglob("*.py"), *(CHECKOUT / "workflow").rglob("*.py")])
 RULES = sorted([*(CHECKOUT / "workflow" / "rules").glob("*.smk"), CHECKOUT / "Snakefile"])
@@ -38,8 +36,6 @@ def dangers(source):
     return found
 
 
-@pytest.mark.fault(58)
-@pytest.mark.promise(12)
 def test_no_source_makes_code_of_data():
     assert len(SOURCES) > 150
     assert {str(path.relative_to(CHECKOUT)): found for path in SOURCES if (found := dangers(path.read_text()))} == {}
@@ -64,7 +60,6 @@ def test_dangers_are_seen_and_what_only_looks_like_one_is_not():
     assert dangers("model.eval()\nre.compile(x)\nnp.load(p, allow_pickle=False)\npickles = 1") == []
 
 
-@pytest.mark.fault(57)
 def test_shell_commands_of_rules_quote_what_they_are_given():
     """Values in the text of a shell command are quoted (`:q`), but for numbers and the MPI launcher of a profile."""
     places = []

@@ -42,7 +42,7 @@ def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> NonlinearP
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, zone_of(mesh.vertices[facets].mean(axis=1)), np.ones(len(mesh.vertices)), 0.0, (-3.2, 3.2))
     domain = Domain(comm, mesh)
-    problem = NonlinearProblem(domain, zones, NeoHookean(0.45), penalty_pa_per_m=5e5)
+    problem = NonlinearProblem(domain, zones, NeoHookean(0.45), has_planes=True)
     x = 0 if uniform else domain.local(domain.positions)[:, 2] / (SIDE_MM * 1e-3)
     ones, cells = np.ones(len(domain.vertex_of_node)), len(domain.cells)
     to_points = problem.points.interpolation.T

@@ -17,7 +17,6 @@ from gyriflow.settings.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
 
 COMM = MPI.COMM_WORLD
 MATERIAL = NeoHookean(poisson_ratio=0.45)
-PENALTY_PA_PER_M = 5e5
 
 
 def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
@@ -80,7 +79,7 @@ class EvenGrowth(StepGrowth):
 def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, comm=COMM):
     """Return a problem with layers that are uniform, or nodal functions of the position in m."""
     domain = Domain(comm, mesh)
-    problem = NonlinearProblem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M)
+    problem = NonlinearProblem(domain, zones, MATERIAL, has_planes=True)
     x = domain.local(domain.positions)
 
     def nodal(value):

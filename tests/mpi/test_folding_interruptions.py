@@ -29,8 +29,6 @@ pytestmark = pytest.mark.slow
 MANY_STEPS = 4000.0
 
 
-@pytest.mark.fault(33, 35)
-@pytest.mark.promise(11)
 def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp_path, monkeypatch):
     path, axes = tmp_path / "curved.xdmf", (20.0, 26.0, 18.0)
     write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, axes), ellipsoid(axes)))
@@ -78,8 +76,6 @@ def killed_after(step, arguments):
     return "".join(printed)
 
 
-@pytest.mark.fault(33, 35)
-@pytest.mark.promise(3, 11)
 @pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 1)])
 def test_a_killed_run_resumes_and_ends_like_an_uninterrupted_one(mesh, long_run, tmp_path, first, then):
     out = tmp_path / "out"
@@ -96,8 +92,6 @@ def test_a_killed_run_resumes_and_ends_like_an_uninterrupted_one(mesh, long_run,
     assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(long_run / "steps.csv"))
 
 
-@pytest.mark.fault(34)
-@pytest.mark.promise(4)
 def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run, tmp_path):
     out = tmp_path / "out"
     killed_after(2, command(mesh, out, step_s=MANY_STEPS))
@@ -113,8 +107,6 @@ def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run,
     assert np.linalg.norm(resumed - one, axis=1).max() <= 1e-3
 
 
-@pytest.mark.fault(32)
-@pytest.mark.promise(5)
 def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_path, monkeypatch, capsys):
     brain = read_tetrahedral_mesh(mesh)
     weeks = WEEK | {"output_weeks": [21.0, 21.25, 21.5], "ranks": 1}
@@ -133,7 +125,6 @@ def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_pat
     assert pd.read_csv(tmp_path / "steps.csv")["week"].iloc[-1] == pytest.approx(21.25)
 
 
-@pytest.mark.fault(55)
 def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tmp_path, monkeypatch):
     brain = read_tetrahedral_mesh(mesh)
     parameters = parameters_from(WEEK)

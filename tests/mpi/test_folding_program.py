@@ -100,14 +100,12 @@ def test_too_little_shared_memory_is_named(mesh, tmp_path):
     assert ended.stderr == log.read_text() == Facts("/dev/shm", "6 MB", "--shm-size")
 
 
-@pytest.mark.fault(30, 38)
 def test_memory_and_a_shortened_step_are_reported_before_the_solve(default_run):
     before, _, _ = default_run[1].partition("step    1")
     assert Facts(3072, 2187, 2, "556 MiB") in before.splitlines()
     assert Facts("step_s", 43200, 21, 21.25) in before.splitlines()
 
 
-@pytest.mark.fault(29)
 def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
     done = fold(mesh, tmp_path / "out", 2, growth_rate_per_s=0.0)
     assert done.returncode == 0
@@ -115,7 +113,6 @@ def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
     assert (read_field(frames, 21.5, "displacement_mm") == 0).all()
 
 
-@pytest.mark.fault(32)
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_path):
     hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "program": IMPATIENT}
     done = fold(mesh, tmp_path / "out", end_week=21.4, output_weeks=[21.0, 21.4], **hard)
@@ -128,7 +125,6 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_p
     assert (steps["min_J"] > 0).all()
 
 
-@pytest.mark.fault(32)
 def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_halvings": 0}, "program": IMPATIENT}
     done = fold(mesh, tmp_path / "out", 2, **hard)
@@ -164,7 +160,6 @@ def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_p
     assert done.stderr.count("thickness_mm") == 1
 
 
-@pytest.mark.fault(37)
 def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):
     out = tmp_path / "out"
     slow = command(mesh, out, end_week=30.0, output_weeks=[21.0, 30.0], step_s=3600)
@@ -184,8 +179,6 @@ runpy.run_module("gyriflow.folding", run_name="__main__")
 """
 
 
-@pytest.mark.fault(36)
-@pytest.mark.promise(2)
 def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, default_run, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(default_run[0], out)
@@ -198,7 +191,6 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, defaul
     assert not [path for path in out.rglob("*") if path.is_file() and path.parent != out]
 
 
-@pytest.mark.fault(36)
 def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
     brain, parameters = ellipsoid_mesh(4, (20.0, 26.0, 18.0)), parameters_from(WEEK)
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=10**9))
@@ -208,7 +200,6 @@ def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
         require_space(tmp_path, brain, parameters)
 
 
-@pytest.mark.fault(28)
 def test_bad_parameters_end_in_code_two(mesh, tmp_path):
     done = fold(mesh, tmp_path / "out", 2, thicknes_mm=1.0)
     assert (done.returncode, done.stderr) == (2, Facts("thicknes_mm", "thickness_mm"))

@@ -69,7 +69,6 @@ def test_an_unknown_error_keeps_its_traceback(exit_file, tmp_path):
     assert "ZeroDivisionError" in log.read_text()
 
 
-@pytest.mark.fault(38)
 def test_memory_that_ran_out_is_said_with_the_input(exit_file, tmp_path, capsys):
     with pytest.raises(SystemExit) as end, step(str(tmp_path / "log"), "a.nii"):
         raise MemoryError("Unable to allocate 9.1 GiB")
@@ -77,7 +76,6 @@ def test_memory_that_ran_out_is_said_with_the_input(exit_file, tmp_path, capsys)
     assert capsys.readouterr().err == Facts("gyriflow: a.nii:", "Unable to allocate 9.1 GiB")
 
 
-@pytest.mark.fault(38)
 def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path):
     log = tmp_path / "log"
     log.write_text("before\n")

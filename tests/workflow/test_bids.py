@@ -23,7 +23,6 @@ EXPECTED = {
 }
 
 
-@pytest.mark.fault(82)
 def test_the_files_of_a_participant_are_those_that_the_docs_list(tmp_path):
     make_tree(
         tmp_path / "data",

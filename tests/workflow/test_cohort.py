@@ -61,13 +61,11 @@ def cohort(checkout_copy, tmp_path_factory):
     )
 
 
-@pytest.mark.fault(54)
 def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(cohort):
     assert cohort.refusal.returncode == 2
     assert cohort.refusal.stderr == Facts("sub-04: week:", "n/a")
 
 
-@pytest.mark.fault(54)
 def test_a_failed_subject_holds_up_no_other_and_the_call_ends_in_its_code(cohort):
     assert cohort.outcome.returncode == 2, cohort.outcome.stderr
     assert "Traceback" not in cohort.outcome.stderr

@@ -52,8 +52,6 @@ def started(workflow, until):
     return process
 
 
-@pytest.mark.fault(33, 38)
-@pytest.mark.promise(3)
 @pytest.mark.extended
 def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on_with_the_same_command(workflow):
     # an ellipsoid's
@@ -87,7 +85,6 @@ def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on
 FOREIGN = "import pathlib, sys; pathlib.Path('{0}.ran').touch(); sys.exit('{0}')"
 
 
-@pytest.mark.fault(78)
 def test_nothing_of_the_working_directory_is_run_by_a_study(workflow):
     workflow.count_ellipsoid_as_meshed(STUDY | {"folding": STUDY["folding"] | {"end_week": 21.02}}, cells=10)
     for name in ("random", "click", "numpy", "nibabel", "mpi4py"):
@@ -109,7 +106,6 @@ rule slow:
 """
 
 
-@pytest.mark.fault(78)
 @pytest.mark.parametrize(("name", "send"), [("SIGTERM", os.kill), ("SIGTERM", os.killpg), ("SIGHUP", os.kill)])
 def test_a_signal_to_the_launcher_stops_its_jobs(workflow, name, send):
     (workflow.directory / "stubborn.smk").write_text(STUBBORN)

@@ -48,7 +48,6 @@ def stale(directory):
     return lock
 
 
-@pytest.mark.fault(33)
 def test_a_stale_lock_is_cleared(tmp_path, capsys):
     lock = stale(tmp_path)
     clear_stale_lock(tmp_path)
@@ -56,8 +55,6 @@ def test_a_stale_lock_is_cleared(tmp_path, capsys):
     assert capsys.readouterr().err == Facts("gyriflow:", "lock")
 
 
-@pytest.mark.fault(37)
-@pytest.mark.promise(10)
 def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_look(workflow):
     lock = stale(workflow.directory)
     holder = subprocess.Popen(
@@ -76,8 +73,6 @@ def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_l
         holder.communicate("\n")
 
 
-@pytest.mark.fault(74)
-@pytest.mark.promise(10)
 def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(tmp_path, monkeypatch, capsys):
     def no_locks(*_):
         raise OSError(errno.ENOLCK, "No locks available")
@@ -94,7 +89,6 @@ def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(tmp_pat
     assert warned.count("\n") == 1
 
 
-@pytest.mark.fault(36)
 def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
     (workflow.directory / "file").touch()
     outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")
@@ -138,7 +132,6 @@ def gyriflow(workflow, *arguments):
     return ran(*command, cwd=workflow.directory, env=workflow.environment)
 
 
-@pytest.mark.fault(27)
 def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
     outcome = gyriflow(workflow, "run", workflow.write("study.yaml", SMALL_STUDY), "--stage", "metrcs")
     assert outcome.returncode == 2

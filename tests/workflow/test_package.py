@@ -26,7 +26,7 @@ def wheel(tmp_path_factory):
     return found
 
 
-FOLD = "dolfinx dolfinx_solver petsc4py slepc4py mpi4py ipctk SimpleITK picsl_greedy sklearn pytetwild"
+FOLD = "dolfinx dolfinx_solver petsc4py slepc4py mpi4py ipctk SimpleITK picsl_greedy optuna pytetwild"
 
 
 def installed(wheel, folder, without=""):

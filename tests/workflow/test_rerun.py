@@ -79,7 +79,6 @@ SETTINGS = {
 }
 
 
-@pytest.mark.fault(39)
 @pytest.mark.parametrize("change", SETTINGS)
 def test_exactly_what_depends_on_a_change_of_the_configuration_runs_again(finished, change):
     values, expected = SETTINGS[change]
@@ -100,7 +99,6 @@ CODE = {
 }
 
 
-@pytest.mark.fault(39)
 @pytest.mark.parametrize("change", CODE)
 def test_a_change_of_code_runs_again_what_uses_it(finished, change):
     names, expected = CODE[change]
@@ -108,8 +106,6 @@ def test_a_change_of_code_runs_again_what_uses_it(finished, change):
         assert planned(finished, "--configfile", "study.yaml") == expected
 
 
-@pytest.mark.fault(39)
-@pytest.mark.promise(6)
 def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(finished):
     assert finished.jobs("--configfile", "study.yaml") == {}
     labels = "phantom-22.nii.gz"

@@ -31,7 +31,6 @@ def study(folder: Path, url: str) -> dict:
     return {"atlas": "atlas.yaml", "start": "far-21", "folding": {"end_week": 22}}
 
 
-@pytest.mark.promise(8)
 def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workflow, server):
     name = workflow.write("study.yaml", study(workflow.directory, server.url))
     folder = workflow.directory / "resources" / "atlases" / "far"
@@ -66,7 +65,6 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
     assert server.asked == []
 
 
-@pytest.mark.promise(7)
 def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
     raw = study(workflow.directory, server.url)
     raw["atlas"] = {"name": "atlas.yaml", "folder": "mine"}

@@ -351,7 +351,6 @@ def test_two_at_once_make_one_environment(outside, tmp_path):
     assert sum("pip install" in line for line in (tmp_path / "record").read_text().splitlines()) == 1
 
 
-@pytest.mark.fault(74)
 def test_an_environment_is_made_without_locks(outside, tmp_path):
     write_program(tmp_path / "programs", "flock", "#!/bin/sh\nexit 71\n")
     done = run("tool", "1", env=outside)

@@ -31,7 +31,6 @@ def ellipsoids(first_week, *semi_axes_mm):
     return {"brains": brains, "folding": STUDY["folding"] | {"end_week": weeks[1]}}
 
 
-@pytest.mark.fault(55)
 @pytest.mark.slow
 @pytest.mark.extended
 def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
@@ -88,8 +87,9 @@ def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(wor
         expected = np.hypot(area(folded) / area(real) - 1, signed_volume(folded) / signed_volume(real) - 1)
         assert row["size"] == pytest.approx(expected, rel=1e-6)
         assert row["score"] == pytest.approx(row["size"] + 0.1 * row["surface_distance"])
-    # the more growth, the larger: the least score is not at the lowest rate, and the optimum is near the best run
+    # the more growth, the larger: the least score is not at the lowest rate
     (best,) = pd.read_csv(results / "study/calibration/optimum.csv").to_dict("records")
     assert (best["parameter"], best["lowest"], best["highest"]) == ("growth_rate_per_s", 0.5e-7, 4.0e-7)
-    assert best["score"] <= runs["score"].min() + 2 * best["score_sd"] + 1e-3
+    assert best["score"] == runs["score"].min()
+    assert best["value"] == runs.set_index("run").loc[best["run"], "growth_rate_per_s"]
     assert (results / "study/calibration/calibration.png").exists()

@@ -38,7 +38,6 @@ def on_a_terminal(workflow, *arguments):
 
 
 @pytest.mark.slow
-@pytest.mark.fault(57)
 def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(checkout_copy, tmp_path):
     workflow = Workflow(checkout_copy, tmp_path / FOLDER)
     workflow.directory.mkdir()

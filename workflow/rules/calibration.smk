@@ -88,7 +88,6 @@ rule calibration_tables:
         optimum=f"{CALIBRATION}/optimum.csv",
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
-        seed=lambda w: CONFIG.calibrate.seed,
         weights=lambda w: CONFIG.calibrate.score,
     script:
         "../scripts/calibration_tables.py"

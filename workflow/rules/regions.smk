@@ -1,6 +1,5 @@
 # Regions of the cortex: given on some brains, carried to others by registration, to simulated brains with the tissue.
 # Maps of all brains are also written at the vertices of the template.
-from gyriflow.settings.atlas import SULCI
 
 
 rule given_regions:
@@ -43,23 +42,6 @@ rule carried_regions:
         posed=lambda w: study.series.posed(*region_pair(w)),
     script:
         "../scripts/carried_regions.py"
-
-
-rule named_sulci:
-    input:
-        **POSED_SIDES,
-        volume=lambda w: brain_of(w).registered.path,
-        drawing=SULCI / "sulci.yaml",
-        drawn=SULCI / "sulci.nii.gz",
-    output:
-        **region_files(f"{BRAIN}/metrics"),
-    wildcard_constraints:
-        brain=brains_with(regions_from="named"),
-    params:
-        labels=lambda w: brain_of(w).registered,
-        posed=lambda w: brain_of(w).labels is None,
-    script:
-        "../scripts/named_sulci.py"
 
 
 rule simulated_regions:

@@ -1,6 +1,6 @@
-"""Choose the parameters of a round's runs: first spread over the bounds, later where improvement is expected."""
+"""Choose the parameters of a round's runs: first spread over the bounds, later near the best."""
 
-from gyriflow.compare.calibration import fit_surrogate, propose_runs, require_bands, sobol_design
+from gyriflow.compare.calibration import first_round, next_round, require_bands
 from gyriflow.io.files import read_table, read_tables, write_table
 from gyriflow.step import step
 
@@ -10,8 +10,8 @@ with step(snakemake.log[0], *spectra):
         require_bands(read_table(path), params.score, path)
     count = len(params.runs)
     if earlier:
-        design = propose_runs(fit_surrogate(read_tables(earlier), params.bounds, params.seed), count)
+        design = next_round(read_tables(earlier), params.bounds, count, params.seed)
     else:
-        design = sobol_design(params.bounds, count, params.seed)
+        design = first_round(params.bounds, count, params.seed)
     design.insert(0, "run", params.runs)
     write_table(snakemake.output[0], design)

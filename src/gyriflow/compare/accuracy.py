@@ -1,10 +1,7 @@
-"""Errors of predictions in tests, and the intervals that follow from them and from the members of an ensemble.
-
-The unit of tests is the start brain.
-"""
+"""Errors of predictions in tests, and intervals from these errors and the members of an ensemble."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,8 +17,10 @@ QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
 """The metrics of whole brains that have intervals."""
 FOLDING, SMOOTH = "gyrification_index", 0.02
 """The metric whose logarithm is that of the folding, its value − 1 + `SMOOTH`: a smooth brain has about 1."""
-LEVEL, MIN_STARTS = 0.9, 9
-"""Coverage of intervals if at least this number of starts was tested."""
+LEVEL = 0.9
+"""Share of further members of an ensemble that its interval contains."""
+MIN_STARTS_FOR_BIAS = 4
+"""Start brains from which on the mean error in tests is corrected: the mean of fewer is mostly chance."""
 DEFAULT_PROTOCOL = "default"
 """The protocol of tests that count: the default settings."""
 ATLAS_MARGIN = 0.02
@@ -33,24 +32,18 @@ SULCUS, GYRUS = -0.375, 0.375
 
 @dataclass(frozen=True)
 class ErrorInTests:
-    """The error of a prediction by tests of `starts` start brains, as logarithm of predicted over observed.
+    """The error of a prediction in tests, as logarithm of predicted over observed.
 
-    `largest` is half the width of the interval: the largest error of these starts, about `bias`, their mean error, if
-    it is larger than its own error (`is_corrected`). `coverage` is the share of starts that such an interval contains
-    at most, by counting: k/(k + 1) for the largest error of k starts, `LEVEL` from `MIN_STARTS` on. `is_beyond`: no
-    test went as far, in weeks predicted or in horizon.
+    `tests` is the number of tests, of `starts` start brains. `bias` is their mean error, each start brain counted once,
+    and 0 for fewer than `MIN_STARTS_FOR_BIAS` of them; `largest` the largest error about it. `is_beyond`: no test went
+    as far, in weeks predicted or in horizon.
     """
 
+    tests: int
     starts: int
     largest: float
     bias: float
-    is_corrected: bool
-    coverage: float
     is_beyond: bool
-
-    def holds(self, error: float) -> bool:
-        """Return whether the interval contains a brain that was predicted with an error, as logarithm."""
-        return abs(error - self.bias * self.is_corrected) <= self.largest
 
 
 def log_value(metric: str, value: Any) -> Any:
@@ -81,87 +74,48 @@ def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorIn
     """Return the tested error of a prediction of a week over a horizon, from `log_errors`; None without tests.
 
     The tests that count are those of this week and of earlier ones, over this horizon and shorter ones, or over the
-    shortest horizon that a week was tested with; weeks between tested ones are rounded up. The interval is never
-    narrower for a later week or a longer horizon.
+    shortest horizon that a week was tested with; weeks between tested ones are rounded up.
     """
     if errors.empty:
         return None
-    weeks, horizons = (np.unique(errors[name]) for name in ("week", "horizon"))
-    week_limit = weeks[np.searchsorted(weeks[:-1], week - 1e-6)]
-    horizon_limit = horizons[np.searchsorted(horizons[:-1], horizon - 1e-6)]
-    shortest = errors.groupby("week")["horizon"].transform("min")
-    smaller = [
-        _counted(
-            errors[(errors["week"] <= earlier) & (errors["horizon"] <= np.maximum(shorter, shortest))], earlier, shorter
-        )
-        for earlier in weeks[weeks <= week_limit]
-        for shorter in horizons[horizons <= horizon_limit]
-    ]
-    is_beyond = bool(week > weeks[-1] + 1e-6 or horizon > horizons[-1] + 1e-6)
-    return replace(smaller[-1], largest=max(found.largest for found in smaller), is_beyond=is_beyond)
-
-
-def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
-    starts, number_of = np.unique(counted["start"].to_numpy(dtype=str), return_inverse=True)
-    errors = [counted["error"].to_numpy()[number_of == number] for number in range(len(starts))]
-    means = np.array([values.mean() for values in errors])
-    bias, is_corrected = _bias(means)
-    # a start that was not tested as far does not count for the coverage
-    is_as_far = (counted["week"] >= week) | (counted["horizon"] >= horizon)
-    count = len(np.unique(number_of[is_as_far.to_numpy()]))
-    # the largest error of each start, about the bias of the others if bias is corrected
-    largest = []
-    for number, values in enumerate(errors):
-        others, others_corrected = _bias(np.delete(means, number))
-        largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
-    rank, coverage = len(largest), count / (count + 1)
-    if count >= MIN_STARTS:
-        rank, coverage = min(rank, int(np.ceil(round((rank + 1) * LEVEL, 6)))), LEVEL
-    return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, coverage, is_beyond=False)
-
-
-def _bias(means: Floats) -> tuple[float, bool]:
-    """Return the mean of the starts' errors, and whether it is larger than its standard error, of Student's t."""
-    if len(means) < 2:
-        return float(means.mean()) if len(means) else 0.0, False
-    error = t.ppf(0.84, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means))
-    return float(means.mean()), bool(abs(means.mean()) > error)
+    weeks = np.unique(errors["week"])
+    horizons = np.unique(errors["horizon"])
+    last_week = weeks[np.searchsorted(weeks[:-1], week - 1e-6)]
+    longest = horizons[np.searchsorted(horizons[:-1], horizon - 1e-6)]
+    shortest_of_week = errors.groupby("week")["horizon"].transform("min")
+    is_earlier = errors["week"] <= last_week
+    is_shorter = errors["horizon"] <= np.maximum(longest, shortest_of_week)
+    counted = errors[is_earlier & is_shorter]
+    means = counted.groupby("start")["error"].mean()
+    bias = float(means.mean()) if len(means) >= MIN_STARTS_FOR_BIAS else 0.0
+    return ErrorInTests(
+        tests=len(counted),
+        starts=len(means),
+        largest=float((counted["error"] - bias).abs().max()),
+        bias=bias,
+        is_beyond=bool(week > weeks[-1] + 1e-6 or horizon > horizons[-1] + 1e-6),
+    )
 
 
 def error_words(metric: str, tested: ErrorInTests) -> str:
-    """Describe a tested error, such as "largest error of 2 start brains, −10 to +11 %: holds for 2 of 3 at most"."""
-    low, high = (f"{np.expm1(sign * tested.largest):+.0%}".replace("-", "−") for sign in (-1, 1))
-    ends = f"± {high[1:-1]}" if low[1:] == high[1:] else f"{low[:-1]} to {high[:-1]}"
-    is_few = tested.starts < MIN_STARTS
-    words = "largest error" if is_few else f"{100 * LEVEL:.0f} %"
-    words += f" of {tested.starts} start brain{'s' if tested.starts > 1 else ''}, {ends} %"
-    words += " of the folding" if metric == FOLDING else ""
-    words += f": holds for {tested.starts} of {tested.starts + 1} at most" if is_few else ""
-    if tested.is_corrected:
-        words += f", about the prediction less the mean error of {100 * np.expm1(tested.bias):+.0f} %".replace("-", "−")
-    return words + ("; no test went as far" if tested.is_beyond else "")
+    """Describe a tested error, such as "largest error in 6 tests of 2 start brains: −10 to +11 %"."""
+    low = _percent(-tested.largest)
+    high = _percent(tested.largest)
+    ends = f"± {high[1:]}" if low[1:] == high[1:] else f"{low} to {high}"
+    plural = "s" if tested.starts > 1 else ""
+    tests = "1 test" if tested.tests == 1 else f"{tested.tests} tests"
+    words = f"largest error in {tests} of {tested.starts} start brain{plural}: {ends} %"
+    if metric == FOLDING:
+        words += " of the folding"
+    if tested.bias:
+        words += f", about the prediction less the mean error of {_percent(tested.bias)} %"
+    if tested.is_beyond:
+        words += "; no test went as far"
+    return words
 
 
-def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """Leave out each start in turn, and count how often intervals by the other starts contain its errors.
-
-    Columns metric, start, tests (weeks with an observed brain), held (those within), at_most (share expected at most,
-    by counting).
-    """
-    rows = []
-    for metric in QUANTITIES:
-        errors = log_errors(tests, metric)
-        for start, own in errors.groupby("start"):
-            others = errors[errors["start"] != start]
-            tested = [
-                (error, interval)
-                for week, horizon, error in own[["week", "horizon", "error"]].to_numpy(dtype=float)
-                if (interval := error_in_tests(others, week, horizon))
-            ]
-            held = sum(interval.holds(error) for error, interval in tested)
-            if tested:
-                rows.append((metric, start, len(tested), held, max(interval.coverage for _, interval in tested)))
-    return pd.DataFrame(rows, columns=["metric", "start", "tests", "held", "at_most"])
+def _percent(error: float) -> str:
+    return f"{100 * np.expm1(error):+.0f}".replace("-", "−")
 
 
 def atlas_advantage(tests: Sequence[Mapping[str, Any]], horizon: float) -> tuple[float, float, float] | None:
@@ -183,14 +137,13 @@ def atlas_advantage(tests: Sequence[Mapping[str, Any]], horizon: float) -> tuple
 def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week: float) -> dict[str, Any]:
     """Describe the errors of tests for the report of a prediction of a week.
 
-    Returns errors (by metric, the words of its tested error), held (by metric, how often intervals held when each start
-    was left out), advantage (a sentence where the atlas' own brain was better, or "") and starts (the tested brains).
+    Returns errors (by metric, the words of its tested error), advantage (a sentence where the atlas' own brain was
+    better, or "") and starts (the tested brains).
     """
     horizon, errors = week - start_week, {}
     for metric in QUANTITIES:
         found = error_in_tests(log_errors(tests, metric), week, horizon)
         errors[metric] = "not tested" if found is None else error_words(metric, found)
-    held = held_intervals(tests).groupby("metric").agg(tests=("tests", "sum"), held=("held", "sum"))
     advantage = ""
     if better := atlas_advantage(tests, horizon):
         tested, run, atlas = better
@@ -200,13 +153,12 @@ def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week
             "or changed by then, or the start, an average, had few of them. For the places of folds, use the atlas' "
             "own brain, which is stored with the prediction."
         )
-    held_words = {str(row.Index).replace("_", " "): f"{row.held} of {row.tests}" for row in held.itertuples()}
     tested_brains = pd.DataFrame(tests)[["start", "start_week"]].drop_duplicates().itertuples(index=False)
     starts = [f"{brain} {at:g} GW" for brain, at in tested_brains]
-    return {"errors": errors, "held": held_words, "advantage": advantage, "starts": starts}
+    return {"errors": errors, "advantage": advantage, "starts": starts}
 
 
-UNTESTED = ErrorInTests(starts=0, largest=0.0, bias=0.0, is_corrected=False, coverage=LEVEL, is_beyond=False)
+UNTESTED = ErrorInTests(tests=0, starts=0, largest=0.0, bias=0.0, is_beyond=False)
 """The intervals of a run without tests are those of its members."""
 
 
@@ -233,34 +185,47 @@ def interval_table(
     observed brains of its weeks, which may be empty. `tests` are the rows of `norms/predictions.yaml`, empty unless the
     run is a prediction.
 
-    The spread of the members and the largest error of the tests are added in logarithms, as √(spread² + error²), about
-    the mean of the members less the bias of the tests if that is corrected. Those of later weeks are never narrower.
+    The spread of the members, for `LEVEL` of further members, and the largest error of the tests are added in
+    logarithms, as √(spread² + error²), about the mean of the members less the bias of the tests. Intervals of later
+    weeks are never narrower.
 
     Columns week, metric, unit, run (its value), members (number of values; one that did not reach a week has none),
-    mean, sd (NaN for one), tested_starts, largest_error, bias (fractions, of `accuracy.error_in_tests`; NaN without
-    tests), is_corrected, coverage (share of brains in the interval: at most this much by `tested_starts`, or `LEVEL` of
-    further members without tests), low, high, observed (NaN without a brain) and contains_observed.
+    mean, sd (NaN for one), tests, tested_starts, largest_error, bias (fractions, of `error_in_tests`; NaN without
+    tests), low, high, observed (NaN without a brain) and contains_observed.
     """
     keys, names = ["week", "metric"], metrics_shown(Shown.INTERVALS)
     own, varied, brains = (
         table[(table["hemisphere"] == "whole") & table["metric"].isin(names)] for table in (run, members, observed)
     )
-    rows, start = [], own["week"].min()
+    rows = []
+    start = own["week"].min()
     for metric, table in varied.groupby("metric"):
-        errors, widest = log_errors(tests, str(metric)), 0.0
+        errors = log_errors(tests, str(metric))
+        widest = 0.0
         for at, group in table.groupby("week")["value"]:
             week = float(str(at))
-            tested = (error_in_tests(errors, week, week - start) if week > start else None) or UNTESTED
+            tested = UNTESTED
+            if week > start:
+                tested = error_in_tests(errors, week, week - start) or UNTESTED
             logs = log_value(str(metric), group.to_numpy(dtype=float))
-            half = np.hypot(spread_of_members(logs, tested.coverage), tested.largest)
+            half = np.hypot(spread_of_members(logs, LEVEL), tested.largest)
             widest = max(widest, half) if np.isfinite(half) else half
-            middle = logs.mean() - tested.bias * tested.is_corrected
-            row = {"week": week, "metric": metric, "members": len(group), "mean": group.mean(), "sd": group.std()}
-            largest, bias = np.expm1([tested.largest, tested.bias]) if tested.starts else (np.nan, np.nan)
-            row |= {"tested_starts": tested.starts, "largest_error": largest, "bias": bias}
-            row |= {"is_corrected": tested.is_corrected, "coverage": tested.coverage}
-            low, high = (from_log(str(metric), middle + sign * widest) for sign in (-1, 1))
-            rows.append(row | {"low": low, "high": high})
+            middle = logs.mean() - tested.bias
+            rows.append(
+                {
+                    "week": week,
+                    "metric": metric,
+                    "members": len(group),
+                    "mean": group.mean(),
+                    "sd": group.std(),
+                    "tests": tested.tests,
+                    "tested_starts": tested.starts,
+                    "largest_error": np.expm1(tested.largest) if tested.tests else np.nan,
+                    "bias": np.expm1(tested.bias) if tested.tests else np.nan,
+                    "low": from_log(str(metric), middle - widest),
+                    "high": from_log(str(metric), middle + widest),
+                }
+            )
     table = own[[*keys, "unit", "value"]].rename(columns={"value": "run"}).merge(pd.DataFrame(rows), "left", keys)
     table = table.merge(brains.groupby(keys)["value"].first().rename("observed").reset_index(), "left", keys)
     inside = table["observed"].between(table["low"], table["high"]).astype("boolean")

@@ -1,55 +1,114 @@
-"""Calibration: choose the parameters of the next runs, score the runs, and minimise a surrogate of the score."""
+"""Calibration: choose the parameters of the next runs, score the runs, and find the best."""
 
-import warnings
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import optuna
 import pandas as pd
-from scipy.optimize import minimize
-from scipy.stats import norm, qmc
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+from optuna.distributions import BaseDistribution, FloatDistribution
+from optuna.trial import FrozenTrial, TrialState, create_trial
+from scipy.stats import qmc
 
 from ..errors import InputError
-from ..geometry.triangles import Floats, TriangleMesh
+from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
 from ..settings.terms import AMPLITUDE, FOLD_BANDS, MEASURED, PROXIES, SPECTRAL_SCORES, STIFFNESS_RATIO, Score
 from .comparison import Group, ObservedBrain, compare
 
+Bounds = Mapping[str, Sequence[float]]
+"""The lowest and the highest value of each parameter."""
 DIGITS = 6
 """Significant digits of calibrated values."""
-N_CANDIDATES = 1024
-"""Points of a Sobol sequence at which the surrogate is evaluated."""
-MIN_SPACING = 0.02
-"""Smallest distance in the unit box between a new run and any other run."""
+AT_BOUND = 0.01
+"""Distance from a bound, as a share of the range, below which a value counts as at the bound."""
 
 
-def sobol_design(bounds: Mapping[str, Sequence[float]], count: int, seed: int) -> pd.DataFrame:
+def first_round(bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
     """Spread `count` rows of values evenly over the bounds, by a scrambled Sobol sequence (Sobol 1967; Owen 1998).
 
     The same seed gives the same rows.
     """
     # the sequence is balanced over powers of two
     power = int(np.ceil(np.log2(max(count, 2))))
-    points = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed)).random_base2(power)[:count]
-    return from_unit_box(points, bounds)
-
-
-def from_unit_box(points: Floats, bounds: Mapping[str, Sequence[float]]) -> pd.DataFrame:
-    """Scale (n, d) points of the unit box to values between the bounds, in columns of the parameters' names."""
+    sequence = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed))
+    points = sequence.random_base2(power)[:count]
     low, high = np.transpose(list(bounds.values()))
-    values = low + points * (high - low)
-    return pd.DataFrame(values, columns=list(bounds)).map(lambda value: float(f"{value:.{DIGITS}g}"))
+    return _rounded(pd.DataFrame(low + points * (high - low), columns=list(bounds)), bounds)
 
 
-def to_unit_box(values: pd.DataFrame, bounds: Mapping[str, Sequence[float]]) -> Floats:
-    """Scale rows of values to (n, d) points of the unit box."""
+def next_round(runs: pd.DataFrame, bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
+    """Choose the values of the next `count` runs from all earlier ones.
+
+    By optuna's tree-structured Parzen estimator (Bergstra et al. 2011), which compares the density of the best runs
+    with that of the others, and counts runs that it has proposed as bad until they are scored (constant liar).
+
+    `runs` has columns of the parameters, score (NaN if diverged) and cause. The same runs and seed give the same rows.
+    InputError if no run has a score.
+    """
+    require_finished(runs)
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    # another seed each round, or the same places would be drawn again
+    sampler = optuna.samplers.TPESampler(seed=seed + len(runs), n_startup_trials=1)
+    search = optuna.create_study(sampler=sampler)
+    distributions: dict[str, BaseDistribution] = {}
+    for name, (low, high) in bounds.items():
+        distributions[name] = FloatDistribution(low, high)
+    for run in runs.to_dict("records"):
+        search.add_trial(_trial(run, distributions))
+    proposed = []
+    for _ in range(count):
+        proposed.append(search.ask(distributions).params)
+    return _rounded(pd.DataFrame(proposed, columns=list(bounds)), bounds)
+
+
+def _trial(run: Mapping[Any, Any], distributions: dict[str, BaseDistribution]) -> FrozenTrial:
+    """Return a run as optuna's trial: finished, or pruned, which counts as worse than all finished ones."""
+    parameters = {name: run[name] for name in distributions}
+    if np.isnan(run["score"]):
+        return create_trial(state=TrialState.PRUNED, params=parameters, distributions=distributions)
+    return create_trial(value=run["score"], params=parameters, distributions=distributions)
+
+
+def _rounded(values: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
+    """Round values to `DIGITS` significant digits within the bounds."""
     low, high = np.transpose(list(bounds.values()))
-    return np.asarray((values[list(bounds)].to_numpy(dtype=float) - low) / (high - low))
+    rounded = values.map(lambda value: float(f"{value:.{DIGITS}g}"))
+    return rounded.clip(low, high, axis=1)
+
+
+def require_finished(runs: pd.DataFrame) -> None:
+    """Raise InputError if none of the runs (columns score, NaN if diverged, and cause) has a score."""
+    if runs["score"].notna().any():
+        return
+    causes = "; ".join(dict.fromkeys(runs["cause"].dropna().astype(str)))
+    raise InputError(
+        "no run of the calibration has finished",
+        found=f"0 of {len(runs)} runs with a score; {causes}",
+        expected="one or more",
+        remedy="Narrow the bounds of calibrate.parameters around values with which calibrate.base finishes, or "
+        "start with more runs (calibrate.rounds).",
+    )
+
+
+def find_optimum(runs: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
+    """Return the parameters of the run with the least score: a row per parameter.
+
+    `runs` has columns of run, the parameters, score (NaN if diverged) and cause. Returns columns parameter, value,
+    lowest and highest (the bounds), at_bound (whether the value is within 1 % of a bound), run and score. InputError
+    if no run has a score.
+    """
+    require_finished(runs)
+    best = runs.iloc[int(np.nanargmin(runs["score"].to_numpy(dtype=float)))]
+    rows = []
+    for name, (low, high) in bounds.items():
+        value = best[name]
+        margin = AT_BOUND * (high - low)
+        is_at_bound = value < low + margin or value > high - margin
+        row = {"parameter": name, "value": value, "lowest": low, "highest": high, "at_bound": is_at_bound}
+        rows.append(row | {"run": best["run"], "score": best["score"]})
+    return pd.DataFrame(rows)
 
 
 def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], week: float) -> dict[str, Any]:
@@ -164,112 +223,3 @@ def run_score(
     score = sum(weight * means[name] for name, weight in weights.items())
     outcome = {"outcome": "diverged" if causes else "finished", "cause": "; ".join(causes)}
     return {"score": score, **means, **outcome}
-
-
-@dataclass(frozen=True, eq=False)
-class Surrogate:
-    """A Gaussian process that predicts the score of a run from its parameters.
-
-    It is fitted to n runs at `points` (n, d) of the unit box, whose sides are the `bounds` of
-    each parameter, with `scores` (n,); a diverged run gets a score worse than all others. The kernel is
-    Matérn's (ν = 5/2), with a length for each parameter, plus noise. `seed` determines the candidates for the next
-    runs.
-    """
-
-    process: GaussianProcessRegressor
-    bounds: Mapping[str, Sequence[float]]
-    points: Floats
-    scores: Floats
-    seed: int
-
-
-def fit_surrogate(runs: pd.DataFrame, bounds: Mapping[str, Sequence[float]], seed: int) -> Surrogate:
-    """Fit the surrogate to the runs of a calibration: columns of the parameters, score (NaN if diverged) and cause.
-
-    InputError if fewer than two runs have a score.
-    """
-    points, scores = to_unit_box(runs, bounds), np.asarray(runs["score"], dtype=float)
-    finished = scores[np.isfinite(scores)]
-    if len(finished) < 2:
-        causes = "; ".join(dict.fromkeys(runs["cause"].dropna().astype(str)))
-        raise InputError(
-            "too few runs of the calibration have finished to choose the next ones",
-            found=f"{len(finished)} of {len(runs)} runs with a score; {causes}",
-            expected="two or more",
-            remedy="Narrow the bounds of calibrate.parameters around values with which calibrate.base finishes, or "
-            "start with more runs (calibrate.rounds).",
-        )
-    # a diverged run scores as far above the worst as the worst is above the best: not too steep for the surrogate
-    scores = np.where(np.isfinite(scores), scores, 2 * finished.max() - finished.min())
-    kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern([0.5] * len(bounds), (0.05, 20.0), nu=2.5)
-    process = GaussianProcessRegressor(
-        kernel + WhiteKernel(1e-4, (1e-8, 0.3)), normalize_y=True, n_restarts_optimizer=8, random_state=seed
-    )
-    with warnings.catch_warnings():
-        # the length of a parameter without effect ends at its bound
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        process.fit(points, scores)
-    return Surrogate(process, bounds, points, scores, seed)
-
-
-def propose_runs(surrogate: Surrogate, count: int) -> pd.DataFrame:
-    """Choose the values of the next `count` runs, those with the largest expected improvement of the score.
-
-    Each is added with its expected score before the next is chosen, so that they do not cluster (the kriging believer
-    of Ginsbourger, Le Riche and Carraro 2010).
-    """
-    process, points, scores = surrogate.process, surrogate.points, surrogate.scores
-    candidates, proposed = _candidates(surrogate), []
-    for _ in range(count):
-        free = np.linalg.norm(candidates[:, None] - points[None], axis=2).min(axis=1) >= MIN_SPACING
-        candidates = candidates[free] if free.any() else candidates
-        best = candidates[int(expected_improvement(process, candidates, float(scores.min())).argmax())]
-        proposed.append(best)
-        points, scores = np.vstack([points, best]), np.append(scores, process.predict(best[None]))
-        believer = GaussianProcessRegressor(surrogate.process.kernel_, optimizer=None, normalize_y=True)
-        process = believer.fit(points, scores)
-    return from_unit_box(np.array(proposed), surrogate.bounds)
-
-
-def expected_improvement(process: GaussianProcessRegressor, points: Floats, best: float) -> Floats:
-    """Return the (n,) expected improvements of (n, d) points over the best score (Jones, Schonlau and Welch 1998)."""
-    mean, sd = process.predict(points, return_std=True)
-    sd = np.maximum(sd, 1e-12)
-    gain = best - mean
-    return np.asarray(gain * norm.cdf(gain / sd) + sd * norm.pdf(gain / sd))
-
-
-def find_optimum(surrogate: Surrogate) -> pd.DataFrame:
-    """Find the minimum of the surrogate: a row per parameter.
-
-    Columns parameter, value, lowest and highest (the bounds), at_bound (whether the value is within 1 % of a bound),
-    score and score_sd (mean and standard deviation of the surrogate at the minimum).
-    """
-    process, candidates = surrogate.process, _candidates(surrogate)
-    box = [(0.0, 1.0)] * candidates.shape[1]
-    starts = candidates[np.argsort(process.predict(candidates))[:5]]
-    minima = [minimize(lambda x: float(process.predict(x[None])[0]), start, bounds=box) for start in starts]
-    best = min(minima, key=lambda minimum: minimum.fun).x
-    mean, sd = process.predict(best[None], return_std=True)
-    lowest, highest = zip(*surrogate.bounds.values(), strict=True)
-    return pd.DataFrame(
-        {
-            "parameter": list(surrogate.bounds),
-            "value": from_unit_box(best[None], surrogate.bounds).iloc[0].to_numpy(),
-            "lowest": lowest,
-            "highest": highest,
-            "at_bound": (best < 0.01) | (best > 0.99),
-            "score": float(mean[0]),
-            "score_sd": float(sd[0]),
-        }
-    )
-
-
-def _candidates(surrogate: Surrogate) -> Floats:
-    rng = np.random.default_rng(surrogate.seed)
-    dimension = len(surrogate.bounds)
-    spread = qmc.Sobol(dimension, rng=rng).random(N_CANDIDATES)
-    best = surrogate.points[surrogate.scores.argmin()]
-    # further candidates near the best run, half as many
-    near = np.clip(best + 0.1 * rng.standard_normal((N_CANDIDATES // 2, dimension)), 0, 1)
-    return np.vstack([spread, near])

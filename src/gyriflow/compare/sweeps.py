@@ -156,7 +156,6 @@ def member_row(
         **labels,
         **values,
         **{key: params.get(key) for key in PARAMETERS},
-        "contact.penalty_pa_per_m": params.get("contact", {}).get("penalty_pa_per_m"),
         "elements_through_cortex": elements,
         "resolution": "ok" if is_resolved else "not resolved by the mesh",
         "outcome": "finished" if summary.get("diverged") is None else "diverged",

@@ -22,6 +22,8 @@ from .points import IntegrationPoints
 from .tangent import ElasticMatrix, LaggedTangent, Residual, RigidMotions, Tangent
 from .zones import Zones
 
+PLANE_PENALTY_PA_PER_M = 5.0e5
+"""Pressure of the fissure's planes per depth of penetration, ε_N of the FetalFoldSim paper, whose contact they are."""
 FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""
 
@@ -45,13 +47,13 @@ class NonlinearProblem:
     Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the mesh as it is placed. All else
     that differs between steps is set by `set_step`.
 
-    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0.
+    With `has_planes`, planes at the fissure press back by `PLANE_PENALTY_PA_PER_M`.
 
     Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
     `points` of each element.
     """
 
-    def __init__(self, domain: Domain, zones: Zones, material: Material, *, penalty_pa_per_m: float = 0.0) -> None:
+    def __init__(self, domain: Domain, zones: Zones, material: Material, *, has_planes: bool = False) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
         # the coefficient of compiled forms; each evaluation sets it
@@ -74,7 +76,7 @@ class NonlinearProblem:
             self._linear, energy = LinearElements(domain, material), 0
         else:
             energy = material.energy_density(Fe, *moduli) * self._volume_measure()
-        self._energy = energy + self._plane_energy(zones, penalty_pa_per_m) if penalty_pa_per_m else energy
+        self._energy = energy + self._plane_energy(zones) if has_planes else energy
 
         (coupling,) = self._compiled(
             ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * self._volume_measure()
@@ -94,12 +96,12 @@ class NonlinearProblem:
         rule = [tuple(tuple(row) for row in self._rule[0]), tuple(self._rule[1])]
         return ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True)))
 
-    def _plane_energy(self, zones: Zones, penalty_pa_per_m: float) -> ufl.Form | int:
+    def _plane_energy(self, zones: Zones) -> ufl.Form | int:
         """Return ε/2 ⟨penetration⟩² per area: the left hemisphere stays below its plane, the right one above."""
         if not len(zones.vertices_of(LEFT_CONTACT, RIGHT_CONTACT)):
             return 0
         mesh = self.domain.mesh
-        penalty = dolfinx.fem.Constant(mesh, penalty_pa_per_m)
+        penalty = dolfinx.fem.Constant(mesh, PLANE_PENALTY_PA_PER_M)
         left, right = (dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm)
         tags = self.domain.local_facets(zones.facets, zones.facet_zone)
         ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[self.domain.order]})

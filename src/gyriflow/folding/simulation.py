@@ -74,7 +74,7 @@ class Folding:
             self.domain,
             zones,
             MATERIALS[p.material](p.poisson_ratio),
-            penalty_pa_per_m=p.contact.penalty_pa_per_m if p.contact.kind == "planes" else 0.0,
+            has_planes=p.contact.kind == "planes",
         )
         # of all weeks, so that it does not depend on the end of the run
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, *WEEK_RANGE)[1]

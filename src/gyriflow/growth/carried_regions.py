@@ -1,4 +1,4 @@
-"""Regions of the cortex: from volumes or surfaces to the vertices of a brain, and from brain to brain."""
+"""Regions of the cortex: from volumes or surfaces to the vertices of a brain."""
 
 import logging
 from collections.abc import Mapping
@@ -8,16 +8,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..geometry.deformations import Deformation, carry, transform_points
 from ..geometry.matching import labels_at, match_points
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
 from ..settings.terms import NO_REGION
-from .registration import Channels, measure_quality, register, require_good
 
 log = logging.getLogger(__name__)
 
-PLACES_MM = 1.2
-"""Voxel size of the registration that carries named sulci: accurate enough, four times as fast as 0.8 mm."""
 REACH_MM = 4.0
 """Largest distance of a voxel from the pial vertices to which it gives its region."""
 MIN_NEAR, USUAL_NEAR = 0.5, 0.8
@@ -86,34 +82,6 @@ def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.intege
         text = "only %.0f %% of the regions and the pial surface are within %g mm of each other: are they in one space?"
         log.warning(text, 100 * share, REACH_MM)
     return by_side
-
-
-def register_to_drawn_sulci(brain: Channels, drawn: Channels, *, threads: int = 1) -> Deformation | None:
-    """Register a brain to the one on which sulci are drawn; return None, with a warning, if it fails.
-
-    The overlap of the cortex, which is thin in early weeks, does not count: only that of the cerebrum, and folding.
-    """
-    try:
-        deformation = register(brain, drawn, threads=threads).deformation
-        quality = measure_quality(brain, drawn, deformation) | {"dice_cortex": float("nan")}
-        require_good(quality, pair="with the brain of the named sulci")
-    except InputError as error:
-        # a study can go on without regions of this brain
-        log.warning("no named sulci: %s", error)
-        return None
-    return deformation
-
-
-def regions_by_deformation(points: Floats, between: Deformation, regions: NDArray[np.integer], affine: Floats) -> Ints:
-    """Return the regions of (n, 3) points in mm: those of the voxels to which a deformation carries them.
-
-    `regions` (i, j, k) and `affine` (4, 4) belong to the brain that the deformation leads to; 0 outside the volume.
-    """
-    index = np.rint(transform_points(carry(between, points), np.linalg.inv(affine))).astype(int)
-    inside = np.all((index >= 0) & (index < regions.shape), axis=1)
-    carried = np.full(len(points), NO_REGION, dtype=np.int64)
-    carried[inside] = regions[tuple(index[inside].T)]
-    return carried
 
 
 def regions_from_surface(target: TriangleMesh, surface: TriangleMesh, regions: NDArray[np.integer]) -> Ints:

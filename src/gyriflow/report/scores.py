@@ -147,7 +147,7 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
 
 @styled
 def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str]) -> Figure:
-    """Draw a panel for each parameter, with the scores of the runs and the optimum of the surrogate.
+    """Draw a panel for each parameter, with the scores of the runs and the optimum.
 
     `runs` has the columns of the parameters, round, score (NaN: diverged); `optimum` parameter, value. `score` are the
     terms of the score.

@@ -50,7 +50,6 @@ SECONDS_PER_STAGE = {
     "brain_figures": 6.5,
     "folding_figures": 13.0,
     "growth_found_figures": 5.0,
-    "named_sulci": 6.0,
     "prepare": 2.0,
     "prepare_with_maps": 4.0,
     "prepared_surfaces": 9.0,

@@ -1,4 +1,4 @@
-"""Requirements of jobs besides the base packages: the extra `fold`, a C compiler, and libraries of the system.
+"""Requirements of jobs besides the base packages: the extras, a C compiler, and libraries of the system.
 
 `python -m gyriflow.running.requirements` prints the Debian packages that this machine lacks; `./run` installs them.
 """
@@ -17,8 +17,15 @@ from ..errors import InputError
 from ..folding.compiler import has_compiler
 from ..shipped import SHIPPED
 
-FOLD_PACKAGES = ("dolfinx", "ipctk", "picsl_greedy", "pytetwild", "SimpleITK", "sklearn")
-"""The modules of the extra `fold`."""
+EXTRAS = {
+    "dolfinx": "fold",
+    "ipctk": "fold",
+    "picsl_greedy": "fold",
+    "pytetwild": "fold",
+    "SimpleITK": "fold",
+    "optuna": "calibrate",
+}
+"""The extra of each module that is not among the base packages."""
 LIBRARIES = {"libGL.so.1": "libgl1", "libEGL.so.1": "libegl1", "libOpenGL.so.0": "libopengl0"}
 """Libraries that pymeshlab and VTK load on Linux, with their Debian packages."""
 SOLVER = PACKAGE / "folding" / "__main__.py"
@@ -38,11 +45,13 @@ def require_for(programs: Mapping[str, Path]) -> None:
                 missing.setdefault(package, name)
     if missing:
         package, rule = next(iter(missing.items()))
-        remedy = 'Install the extra "fold": pip install "gyriflow[fold]"'
+        extras = sorted({EXTRAS[name] for name in missing})
+        remedy = f'Install what is missing: pip install "gyriflow[{",".join(extras)}]"'
         if "dolfinx" in missing and not has_dolfinx_wheels():
             where = "in WSL, use" if sys.platform == "win32" else "use"
             remedy = f"PyPI has no dolfinx with PETSc for this system: {where} conda, {CONDA}"
-        problem = f"simulations and registrations need packages that are not installed ({', '.join(missing)})"
+        names = ", ".join(missing)
+        problem = f"simulations, registrations and calibrations need packages that are not installed ({names})"
         raise InputError(problem, found=f"step {rule}, which imports {package}", remedy=remedy)
     lacking = missing_libraries()
     if lacking:
@@ -56,12 +65,12 @@ def require_for(programs: Mapping[str, Path]) -> None:
 
 
 def packages_behind(program: Path) -> list[str]:
-    """Return the packages of the extra `fold` that a program or the modules behind it import."""
+    """Return the packages of the extras that a program or the modules behind it import."""
     imported: set[str] = set()
     for source in {program, *modules_behind(program)}:
         if source.suffix == ".py":
             imported.update(IMPORT.findall(source.read_text()))
-    return [name for name in FOLD_PACKAGES if name in imported]
+    return [name for name in EXTRAS if name in imported]
 
 
 def is_installed(package: str) -> bool:

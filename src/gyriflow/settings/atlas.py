@@ -13,8 +13,6 @@ from .base import KeyProblem, Settings, did_you_mean, located, not_a_path, refus
 from .terms import AffineSource, Coordinates
 from .weeks import AnyWeek
 
-SULCI = ATLASES / "spina-bifida"
-"""The folder of the brain that named sulci are drawn on: how in `sulci.yaml`, by voxel in `sulci.nii.gz`."""
 DOWNLOADS = Path("resources", "atlases")
 """Folder in the working directory for the files of atlases whose section names no other."""
 

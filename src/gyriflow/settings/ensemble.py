@@ -16,6 +16,10 @@ FADING_RANGE_GW = (1.0, 16.0)
 """Time constants with which finer individual differences fade."""
 
 
+AGE_SD_GW = 0.3
+"""Error of the start brain's age (SD): two days, as of dating by ultrasound in the first trimester."""
+
+
 @dataclass(frozen=True)
 class Variation:
     """The inputs of a member of an ensemble that differ from those of its run.
@@ -45,8 +49,6 @@ class Ensemble(Settings):
 
     members: int = Field(8, ge=3, le=64)
     """Number of members."""
-    age_sd_gw: float = Field(0.3, ge=0, le=2)
-    """Standard deviation of the error of the start brain's age. [GW]"""
     seed: int = Field(0, ge=0)
     """Seed of the variations."""
 
@@ -62,7 +64,7 @@ class Ensemble(Settings):
                 number=number,
                 seed=self.seed * n + number + 1,
                 registration_smoothing=round(float(smoothing), 2),
-                age_shift_gw=round(self.age_sd_gw * NormalDist().inv_cdf(float(age)), 2),
+                age_shift_gw=round(AGE_SD_GW * NormalDist().inv_cdf(float(age)), 2),
                 difference_smoothing_mm=float(difference),
                 fading_gw=float(fading),
             )

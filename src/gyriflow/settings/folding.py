@@ -48,8 +48,6 @@ class Contact(Settings):
     kind: Literal["global", "planes", "none"] = "global"
     """`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's
     plane, but folds may cross each other (the paper); `none`: no contact."""
-    penalty_pa_per_m: float = Field(5.0e5, gt=0, le=1e9)
-    """With `planes`, pressure per depth of penetration, ε_N of the FetalFoldSim paper. [Pa/m]"""
 
 
 class NoGrowth(Settings):

@@ -53,7 +53,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
-        "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5},
+        "contact": {"kind": "planes"},
         "no_growth": {"kind": "ellipsoid", "shift": [0.05, -0.15], "semi_axes": [0.35, 0.40, 0.50]},
     },
     # growth towards the shapes that were measured on the brain's own series
@@ -261,8 +261,9 @@ class SweepSettings(ComparisonSettings):
 class CalibrationSettings(ComparisonSettings):
     """A search for the parameters whose brain is most similar to the observed one of a week.
 
-    The first round is a scrambled Sobol sequence within the bounds. Later rounds are placed where a Gaussian process
-    fitted to the scores has the largest expected improvement. Runs that diverge count as worse than all others.
+    The first round is a scrambled Sobol sequence within the bounds. Later rounds are placed by optuna's tree-structured
+    Parzen estimator, where the best runs are dense. Runs that diverge count as worse than all others. The optimum is
+    the run with the least score.
     """
 
     parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
@@ -274,7 +275,7 @@ class CalibrationSettings(ComparisonSettings):
     rounds: tuple[Annotated[int, Field(ge=1, le=MAX_RUNS)], ...] = (12, 4, 4, 4)
     """Number of runs in each round: at least 3 in the first, at most 40 in all."""
     seed: int = Field(0, ge=0)
-    """Seed of the sequence and of the Gaussian process."""
+    """Seed of the sequence and of the estimator."""
 
     def problems(self) -> Iterator[KeyProblem]:
         if not 1 <= len(self.parameters) <= MAX_PARAMETERS:

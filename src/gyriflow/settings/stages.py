@@ -50,7 +50,6 @@ class MeshSettings(Settings):
 
 
 Modes = Annotated[LastBand | Annotated[int, Field(ge=2, le=20000)], FirstIf(str)]
-Regions = Annotated[Literal["named_sulci"] | dict[str, GivenRegions], FirstIf(str)]
 
 
 class MetricsSettings(Settings):
@@ -71,12 +70,9 @@ class MetricsSettings(Settings):
     norms: InputFile | None = None
     """Norms of another study's cohort, its `results/study/norms.json`, instead of those of the observed brains. They
     must be made with the same settings."""
-    colour_by: str | None = None
-    """Covariate that is shown by colour in charts of measured brains. `null`: the first with 2 to 6 values and fewer
-    values than subjects."""
-    regions: Regions = Field({})
-    """Regions of the cortex by the id of the brain on which they are given; or `named_sulci`, drawn on a brain of the
-    spina bifida atlas. They are carried to other observed brains by registration, to simulated ones by the tissue."""
+    regions: dict[str, GivenRegions] = Field({})
+    """Regions of the cortex by the id of the brain on which they are given. They are carried to other observed brains
+    by registration, to simulated ones by the tissue."""
     white_surfaces: Literal["given", "all"] = "given"
     """White surfaces that are measured: the given ones, or `all`, with the inner borders of cortex labels too."""
     template: str | None = None

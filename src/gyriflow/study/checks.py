@@ -31,7 +31,7 @@ from ..settings.runs import (
     starts_of,
     variants,
 )
-from ..settings.terms import AMPLITUDE, MAX_COLOURS, MEASURED, STIFFNESS_RATIO
+from ..settings.terms import AMPLITUDE, MEASURED, STIFFNESS_RATIO
 from ..settings.varying import Varying
 from ..version import RELEASE
 from .atlases import used_atlases
@@ -238,21 +238,14 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
     if settings.norms is not None:
         for problem in _norms_problems(settings.norms, norm_settings(config)):
             yield KeyProblem(problem, ("metrics", "norms"))
-    values = {brain.covariates.get(settings.colour_by or "") for brain in config.brains} - {None}
-    if settings.colour_by and not 1 < len(values) <= MAX_COLOURS:
-        yield KeyProblem(
-            f"found {len(values)} values of {settings.colour_by!r}; colours can show 2 to {MAX_COLOURS}",
-            ("metrics", "colour_by"),
-        )
-    with_regions = settings.regions if isinstance(settings.regions, dict) else {}
-    yield from _unknown(with_regions, config, ("metrics", "regions"))
-    names = [name for given in with_regions.values() for name in given.names.values()]
+    yield from _unknown(settings.regions, config, ("metrics", "regions"))
+    names = [name for given in settings.regions.values() for name in given.names.values()]
     for first, second in merged_names(names, column_part):
         text = f"found {first!r} and {second!r}, which are one column of metrics_wide.csv; rename one"
         yield KeyProblem(text, ("metrics", "regions"))
     yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
     # regions are carried, and their asymmetry measured, on both hemispheres together
-    if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:
+    if wrong := [brain.id for brain in config.brains if brain.id in settings.regions and brain.hemisphere is not None]:
         yield KeyProblem(
             f"found {', '.join(wrong)} with one hemisphere; expected brains with both", ("metrics", "regions")
         )

@@ -200,13 +200,21 @@ def _chart_options(study: Study) -> dict[str, Any]:
 
 
 def _groups(study: Study) -> dict[str, str]:
-    """Return the group of each observed brain, its value of the covariate that colours show."""
-    brains, colour_by = study.brains.values(), study.config.metrics.colour_by
+    """Return the group of each observed brain: its value of the covariate that colours show.
+
+    That is the first covariate with 2 to `MAX_COLOURS` values and fewer values than subjects.
+    """
+    brains = study.brains.values()
     covariates = dict.fromkeys(name for brain in brains for name in brain.config.covariates)
-    for name in [colour_by] if colour_by else covariates:
-        values = {brain.id: of[name] for brain in brains if name in (of := brain.config.covariates)}
-        subjects = {study.brains[brain].subject for brain in values}
-        if 1 < len(set(values.values())) <= MAX_COLOURS and (colour_by or len(set(values.values())) < len(subjects)):
+    for name in covariates:
+        values = {}
+        subjects = set()
+        for brain in brains:
+            if name in brain.config.covariates:
+                values[brain.id] = brain.config.covariates[name]
+                subjects.add(brain.subject)
+        count = len(set(values.values()))
+        if 1 < count <= MAX_COLOURS and count < len(subjects):
             return {brain: f"{name}: {value}" for brain, value in values.items()}
     return {}
 

@@ -75,7 +75,7 @@ class Brain:
 
     `labels` is None if it is defined by surfaces. `has_thickness`, `has_white`: there are results for its cortical
     thickness and its white surfaces, from labels or from white surfaces of the configuration. `regions_from` is the
-    source of its regions: given for this brain, carried from another brain, or named sulci. `checksums` has
+    source of its regions: given for this brain, carried from another brain, or None without regions. `checksums` has
     atlas and SHA-256 of its files that belong to an atlas, by path.
     """
 
@@ -83,7 +83,7 @@ class Brain:
     labels: LabelSource | None
     has_thickness: bool
     has_white: bool
-    regions_from: Literal["given", "carried", "named"] | None
+    regions_from: Literal["given", "carried"] | None
     checksums: Mapping[str, tuple[str, str]]
 
     @property

@@ -89,15 +89,12 @@ def _brain(
         labels = LabelSource(volume, settings.affine_from, label_scheme(config, settings))
     has_thickness = bool(settings.white_files) or (labels is not None and bool(labels.scheme.cortex))
     is_whole = len(settings.sides) == len(SIDES)
-    regions = config.metrics.regions
-    with_regions = [name for name in regions if name not in refused] if isinstance(regions, dict) else []
-    regions_from: Literal["given", "carried", "named"] | None = None
+    with_regions = [name for name in config.metrics.regions if name not in refused]
+    regions_from: Literal["given", "carried"] | None = None
     if is_whole and settings.id in with_regions:
         regions_from = "given"
     elif is_whole and with_regions and settings.source != "shape":
         regions_from = "carried"
-    elif is_whole and regions == "named_sulci" and not settings.synthetic:
-        regions_from = "named"
     return Brain(
         config=settings,
         labels=labels,

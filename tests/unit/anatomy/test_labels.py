@@ -45,7 +45,6 @@ def test_schemes_name_only_labels_that_they_have(scheme):
     assert len(scheme.left) == len(scheme.right)
 
 
-@pytest.mark.fault(7, 8)
 @pytest.mark.parametrize(
     ("labels", "facts"),
     [
@@ -67,7 +66,6 @@ def test_transient_zones_stand_for_white_matter():
     assert cerebrum_mask(labels, SCHEMES["crl"]).all()
 
 
-@pytest.mark.fault(44)
 def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
     labels = np.full((9, 9, 9), 1)
     labels[2:7, 2:7, 2:7] = 5
@@ -81,7 +79,6 @@ def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
     assert require_cortex_outside(brain, ATLAS) == 1.0
 
 
-@pytest.mark.fault(42)
 def test_labels_of_the_left_on_the_right_are_refused():
     scheme = SCHEMES["dhcp-19"]
     labels = np.zeros((4, 1, 1), dtype=int)
@@ -293,7 +290,6 @@ FETA = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])
 """The numbers of FeTA for those of the spina bifida atlas."""
 
 
-@pytest.mark.fault(67)
 @pytest.mark.parametrize(("left", "right"), [(10, 0), (0, 10), (11, 0), (0, 11), (10, 10)])
 def test_numbers_that_occur_in_a_scheme_of_sides_by_accident_contradict_it(left, right):
     path = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA22_notoperated" / "parcellation.nii.gz"

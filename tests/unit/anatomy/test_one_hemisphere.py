@@ -51,7 +51,6 @@ def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
         from_surface(cerebrum_surface(*brain), "left", coordinates="auto", **QUICK)
 
 
-@pytest.mark.fault(41)
 def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):
     labels, affine = odd_brains.add_sides(*brain), brain[1]
     left = odd_brains.one_hemisphere(labels, affine, "left")

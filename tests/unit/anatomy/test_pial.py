@@ -85,7 +85,6 @@ def test_phantom_surface_is_sound_and_of_the_masks_volume(phantom):
     assert report["rotation_deg"] < 1.0
 
 
-@pytest.mark.fault(1)
 def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):
     labels, affine = volume
     oblique = rigid(20, -30, 10)
@@ -117,7 +116,6 @@ def test_sulci_that_stay_fused_are_warned_of_at_ages_at_which_labels_close_them(
         assert len([warning for warning in surface.report["warnings"] if "not opened" in warning]) == number
 
 
-@pytest.mark.fault(3)
 def test_storage_order_makes_no_difference(volume, phantom):
     labels, affine = volume
     reversed_ = affine @ np.diag([1.0, -1.0, 1.0, 1.0])
@@ -127,7 +125,6 @@ def test_storage_order_makes_no_difference(volume, phantom):
     assert same.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.1)
 
 
-@pytest.mark.fault(4)
 @pytest.mark.parametrize(
     # with the wrong unit of a header that may give the same size, if any
     ("factor", "units"), [(1e-3, ["metres", "header says micrometres"]), (1e3, ["micrometres", "header says metres"]),
@@ -175,7 +172,6 @@ def test_a_wrong_edge_of_the_voxels_is_told_by_the_brains_proportions(axis, fact
     assert proportion_warnings(extents)[0] == Facts(*facts)
 
 
-@pytest.mark.fault(4)
 def test_a_surface_in_voxel_indices_is_told(phantom):
     assert Facts("%", 24) not in phantom.report["warnings"]
     # voxels of 0.7 mm
@@ -240,7 +236,6 @@ def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain():
                 assert np.abs(end(found.vertices, axis=0) - end(points, axis=0)).max() < 1.5, source
 
 
-@pytest.mark.fault(9)
 def test_swapped_hemispheres_are_refused(halves):
     with pytest.raises(InputError, check=Facts("ras", 15, -6.3)):
         from_hemispheres(*reversed(halves), week=24.0)
@@ -248,7 +243,6 @@ def test_swapped_hemispheres_are_refused(halves):
         from_hemispheres(*halves, week=24.0, coordinates="lps")
 
 
-@pytest.mark.fault(14)
 @pytest.mark.parametrize(("change", "bound"), [(scaling(1.06), "15 %"), (rigid(60, 0, 0), "1.3 mm")])
 def test_hemispheres_of_different_weeks_and_in_different_poses_are_refused(halves, change, bound):
     centre = halves[1].vertices.mean(axis=0)
@@ -281,7 +275,6 @@ def test_pial_surface_that_cuts_itself_is_made_anew(phantom):
     assert signed_volume(surface.whole) == pytest.approx(signed_volume(tangled), rel=0.03)
 
 
-@pytest.mark.fault(70)
 @pytest.mark.parametrize("has_common_vertices", [True, False])
 def test_hemispheres_that_share_their_medial_wall_in_one_file_are_moved_apart(has_common_vertices):
     *open_halves, wall = shapes.cut_ellipsoid()
@@ -296,7 +289,6 @@ def test_hemispheres_that_share_their_medial_wall_in_one_file_are_moved_apart(ha
     assert Facts("0.5 mm") in surface.report["warnings"]
 
 
-@pytest.mark.fault(17, 71)
 @pytest.mark.parametrize("source", ["hemisphere", "hemispheres", "pial"])
 def test_an_open_medial_wall_is_capped_and_the_cap_left_out(source):
     left, right, _ = shapes.cut_ellipsoid()
@@ -319,7 +311,6 @@ def test_an_open_medial_wall_is_capped_and_the_cap_left_out(source):
     assert metrics.loc[("whole", "area"), "value"] == pytest.approx(surface.report["area_cm2"]["whole"])
 
 
-@pytest.mark.fault(17, 72)
 def test_a_wide_hole_elsewhere_is_refused_with_its_size():
     left, right, wall = shapes.cut_ellipsoid()
     closed = merged(left, wall)

@@ -145,7 +145,6 @@ def test_the_axes_of_a_file_are_named():
     assert axes_of_file(slight) == "RAS"
 
 
-@pytest.mark.fault(9)
 @pytest.mark.parametrize(
     ("axes", "is_exchanged", "facts"),
     [
@@ -194,7 +193,6 @@ def test_a_hemisphere_of_the_other_shape_is_mirrored_or_of_the_other_side(halves
 
 
 @pytest.mark.slow
-@pytest.mark.fault(9, 10)
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no example hemispheres in {DATA}")
 def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
     truth = json.loads((DATA / "truth.json").read_text())
@@ -285,7 +283,6 @@ def pose_when_turned(brain, degrees):
     return pose_of_labels(brain[0], rigid(*degrees) @ brain[1], SCHEMES["spina-bifida-atlas"])
 
 
-@pytest.mark.fault(49)
 @pytest.mark.parametrize("degrees", TURNS)
 def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
     pose = pose_when_turned(brain, degrees)
@@ -355,7 +352,6 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
     assert turned.warnings[0] == Facts("180°") != Facts("left")
 
 
-@pytest.mark.fault(10)
 @pytest.mark.parametrize(
     ("turn", "most_deg", "warnings"),
     [(np.eye(4), 1e-6, []), (LPS, 1e-6, [Facts("LPS")]), (rigid(100, 40, -70), 5.0, [Facts("°")])],
@@ -382,7 +378,6 @@ def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, path
     assert pose.warnings[0] == Facts("RAS+", "coordinates")
 
 
-@pytest.mark.fault(9, 10)
 def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted():
     left, right = atlas_halves()
     assert hemisphere_warnings(left, right, "ras") == []

@@ -31,7 +31,6 @@ def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
     return sphere(radius, centre=centre)
 
 
-@pytest.mark.fault(17)
 def test_small_hole_is_closed_and_reported():
     whole = ball()
     near = np.linalg.norm(whole.vertices[whole.faces].mean(axis=1) - [0, 0, RADIUS], axis=1) < 1.2
@@ -42,7 +41,6 @@ def test_small_hole_is_closed_and_reported():
     assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.01)
 
 
-@pytest.mark.fault(17)
 def test_large_hole_is_refused_with_its_size():
     whole = ball()
     mesh, _ = submesh(whole, whole.vertices[whole.faces][:, :, 2].max(axis=1) < 8.0)
@@ -86,30 +84,11 @@ SOME_TURNED = np.concatenate([WHOLE.faces[:100], WHOLE.faces[100:300, ::-1], WHO
 @pytest.mark.parametrize(
     ("vertices", "faces", "counts"),
     [
-        pytest.param(
-            WHOLE.vertices,
-            WHOLE.faces[:, ::-1],
-            {"faces_turned_to_agree": 0, "pieces_turned_outward": 1},
-            marks=pytest.mark.fault(19),
-        ),
-        pytest.param(
-            WHOLE.vertices,
-            SOME_TURNED,
-            {"faces_turned_to_agree": 200, "pieces_turned_outward": 0},
-            marks=pytest.mark.fault(19),
-        ),
-        pytest.param(
-            *SOUP,
-            {"duplicate_vertices_joined": 3 * COUNT - len(WHOLE.vertices), "faces_that_cut_others": 0},
-            marks=pytest.mark.fault(22),
-        ),
-        pytest.param(
-            WHOLE.vertices,
-            TWICE,
-            {"double_faces_removed": 5, "degenerate_faces_removed": 1},
-            marks=pytest.mark.fault(22),
-        ),
-        pytest.param(*WITH_FIN, {"non_manifold_edges_opened": 1}, marks=pytest.mark.fault(18)),
+        pytest.param(WHOLE.vertices, WHOLE.faces[:, ::-1], {"faces_turned_to_agree": 0, "pieces_turned_outward": 1}),
+        pytest.param(WHOLE.vertices, SOME_TURNED, {"faces_turned_to_agree": 200, "pieces_turned_outward": 0}),
+        pytest.param(*SOUP, {"duplicate_vertices_joined": 3 * COUNT - len(WHOLE.vertices), "faces_that_cut_others": 0}),
+        pytest.param(WHOLE.vertices, TWICE, {"double_faces_removed": 5, "degenerate_faces_removed": 1}),
+        pytest.param(*WITH_FIN, {"non_manifold_edges_opened": 1}),
     ],
     ids=["all inside out", "some inside out", "separate triangles", "degenerate and double faces", "a fin"],
 )
@@ -121,7 +100,6 @@ def test_what_is_wrong_with_triangles_is_repaired_and_counted(vertices, faces, c
     assert counts.items() <= report.items()
 
 
-@pytest.mark.fault(21)
 def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
     mesh, report, _ = clean(
         merged(ball((-11, 0, 0)), ball((11, 0, 0), 9.5), ball((0, 30, 0), 1.0), flipped(ball((-11, 0, 0), 7.0))), 3.0
@@ -141,7 +119,6 @@ NEIGHBOURS = {
 }
 
 
-@pytest.mark.fault(70)
 @pytest.mark.parametrize("shared", NEIGHBOURS)
 @pytest.mark.parametrize("kind", ["vertices of their own", "vertices in common", "one inside out", "all inside out"])
 def test_closed_pieces_that_share_a_wall_are_separated(shared, kind):
@@ -175,7 +152,6 @@ def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
     assert cutting == 0
 
 
-@pytest.mark.fault(20)
 def test_overlapping_balls_are_made_one_surface():
     both = merged(ball((-6, 0, 0)), ball((6, 0, 0)))
     crossing = self_intersecting_faces(both).sum()
@@ -198,7 +174,6 @@ def test_a_large_filled_gap_is_warned_of():
     assert [warning for warning in surface.warnings if "handles" in warning] == [Facts("364 mm³")]
 
 
-@pytest.mark.fault(21)
 def test_handle_of_a_torus_is_closed_when_remade():
     mesh, _, _ = clean(torus(10.0, 7.5, 60, 40), 3.0)
     assert euler_number(mesh) == 0

@@ -260,7 +260,6 @@ def test_as_many_elements_as_needed_are_never_called_too_few(edge_mm):
     assert ("fewer than the 2 needed" in text) == (found < 2)
 
 
-@pytest.mark.fault(84)
 @pytest.mark.parametrize(
     ("edge_mm", "facts"),
     [(0.47, ["2 linear", "32 %", "4 %", "mesh.order: 2"]), (0.235, ["4 linear", "13 %"]), (0.12, None)],
@@ -290,14 +289,12 @@ def test_the_exit_code_of_an_earlier_process_with_the_same_number_does_not_count
     assert plan(config, tmp_path / "new", ["surface"])
 
 
-@pytest.mark.fault(75)
 @pytest.mark.parametrize("directory", ["", "/proc/self", "a.yaml/below"])
 def test_a_look_needs_no_folder_to_write_in(tmp_path, config, directory):
     (tmp_path / ".snakemake").touch()
     assert plan(config, tmp_path / directory, ["surface"])
 
 
-@pytest.mark.fault(77)
 def test_a_study_is_checked_from_its_working_directory(tmp_path):
     folder = tmp_path / "l'étude 100% {wk} #1"
     folder.mkdir()

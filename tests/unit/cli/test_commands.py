@@ -291,7 +291,6 @@ def test_a_brain_is_predicted_from_its_surfaces(predicted_from, surfaces, tmp_pa
     assert [group["ids"] for group in study.filled] == [[entry["id"]]]
 
 
-@pytest.mark.fault(87)
 @pytest.mark.parametrize(
     ("given", "facts"),
     [
@@ -331,7 +330,6 @@ def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(monke
     assert os.environ["XDG_CACHE_HOME"] == expected
 
 
-@pytest.mark.fault(36)
 @pytest.mark.parametrize(
     ("code", "recorded", "free", "expected"),
     [(0, None, 0, 0), (1, None, 2**20, 5), (1, 1, 2**20, 5), (1, 2, 2**20, 2), (1, None, 2**30, 1), (1, 3, 2**30, 3)],

@@ -84,7 +84,6 @@ KEEP_ONE = Facts("2 files", "keep one")
     ],
     ids=["FeTA", "dHCP", "fetpype", "NiBabies", "FreeSurfer", "Infant FreeSurfer", "HCP", "git-annex"],
 )  # fmt: skip
-@pytest.mark.fault(81)
 def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
     assert brains(make_tree(tmp_path, **contents)) == expected
 
@@ -92,7 +91,6 @@ def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
 WEEK = "sub-01_week24"
 
 
-@pytest.mark.fault(82)
 @pytest.mark.parametrize(
     ("contents", "cause"),
     [
@@ -139,7 +137,6 @@ def test_a_resampled_surface_is_used_with_a_warning(tmp_path):
     assert (len(brain.warnings), brain.problem) == (1, "")
 
 
-@pytest.mark.fault(83)
 def test_closed_surfaces_of_whole_brains_are_recognised(tmp_path):
     brain = cerebrum_surface(*phantom(24.0, 2.0))
     write_surface(tmp_path / "24.stl", brain)
@@ -154,7 +151,6 @@ def test_closed_surfaces_of_whole_brains_are_recognised(tmp_path):
     assert recognise(tmp_path).unused == {"nut.stl": Facts("mL", 15, 700)}
 
 
-@pytest.mark.fault(81)
 @pytest.mark.parametrize(
     "contents",
     [
@@ -173,7 +169,6 @@ def test_what_belongs_to_a_scan_is_found_and_nothing_else(tmp_path, contents):
     assert len(first.entry.get("hemispheres", ())) in (0, 2)
 
 
-@pytest.mark.fault(82)
 @pytest.mark.parametrize(
     ("contents", "facts"),
     [
@@ -186,7 +181,6 @@ def test_what_is_not_of_one_scan_is_refused(tmp_path, contents, facts):
     assert all(brain.problem == Facts(*facts[-2:]) for brain in recognise(make_tree(tmp_path, **contents)).brains)
 
 
-@pytest.mark.fault(82)
 def test_links_to_folders_that_are_not_there_are_scans_that_cannot_be_read(tmp_path):
     make_tree(tmp_path, labels=["sub-01_week24_dseg.nii.gz"])
     (tmp_path / "sub-02").symlink_to("nowhere")

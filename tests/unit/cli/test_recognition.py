@@ -285,7 +285,6 @@ def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     assert {brain["scheme"] for brain in app("group")[1]["brains"]} == {"feta-7"}
 
 
-@pytest.mark.fault(82)
 def test_scans_that_cannot_be_used_are_counted_and_the_others_go_on(app, tmp_path):
     make_tree(
         tmp_path / "data",
@@ -306,7 +305,6 @@ def test_scans_that_cannot_be_used_are_counted_and_the_others_go_on(app, tmp_pat
     assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-1", "sub-01_ses-2"]
 
 
-@pytest.mark.fault(82)
 def test_folders_that_cannot_be_read_are_named(app, tmp_path, monkeypatch):
     make_tree(tmp_path / "data", labels=["sub-02/anat/sub-02_dseg.nii.gz", "case-7/week23_dseg.nii.gz"])
     scandir = os.scandir

@@ -7,8 +7,6 @@ from scan_trees import make_tree
 from gyriflow.cli.recognition import UNSET, recognise
 from gyriflow.errors import InputError
 
-pytestmark = pytest.mark.fault(80)
-
 FIRST, SECOND = (f"sub-01/ses-{session}/anat/sub-01_ses-{session}_dseg.nii.gz" for session in (1, 2))
 TABLE, SESSIONS, SIDECAR = "participants.tsv", "sub-01/sub-01_sessions.tsv", "participants.json"
 LONE = "sub-01/anat/sub-01_dseg.nii.gz"

@@ -36,7 +36,6 @@ def drawn(values):
     return mean + sd * np.append(0.0, np.random.default_rng(0).normal(size=2000))
 
 
-@pytest.mark.fault(85)
 def test_a_gain_over_the_start_has_the_interval_of_its_samples():
     row = gain_columns(drawn((0.45, 0.05)), drawn((0.3, 0.0)), drawn((0.7, 0.05)))
     assert [row[name] for name in ("r", "r_start", "r_adjacent", "gain")] == pytest.approx([0.45, 0.3, 0.7, 0.15])

@@ -198,7 +198,6 @@ def test_the_nearest_run_has_the_second_nearest_and_flags():
         assert nearest_runs(noisy, MEMBERS, ["thickness_mm"])["flag"].tolist() == [flag]
 
 
-@pytest.mark.fault(86)
 def test_a_band_that_no_run_resolves_has_no_nearest_run():
     coarse = compared(t1=float("nan"), t2=float("nan")).assign(flag="not resolved")
     (row,) = nearest_runs(coarse, MEMBERS, ["thickness_mm"]).to_dict("records")

@@ -50,7 +50,6 @@ def test_a_checkpoint_comes_back_as_it_was(tmp_path):
     assert read.rows == state.rows
 
 
-@pytest.mark.fault(34, 62)
 @BOUNDED
 @given(data=st.data())
 def test_a_checkpoint_with_any_damage_is_whole_or_not_used(tmp_path, data):
@@ -77,7 +76,6 @@ def test_the_key_depends_on_mesh_and_parameters_but_not_on_ranks():
     assert run_key(mesh, mapped, thin) != run_key(mesh, mapped, thick)
 
 
-@pytest.mark.fault(34)
 @pytest.mark.parametrize("name", ["newton.py", "products.c"])
 def test_a_checkpoint_is_not_used_after_the_source_has_changed(name, tmp_path, monkeypatch):
     mesh, parameters = box_mesh((1, 1, 1), (1.0, 1.0, 1.0)), parameters_from(VALUES)

@@ -11,7 +11,6 @@ from gyriflow.folding.compilation import form_compiler, pointer
 from gyriflow.folding.products import PartMotions, multiply_blocks
 
 
-@pytest.mark.fault(79)
 def test_ranks_on_different_processors_share_code_that_all_can_execute(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folders = {}

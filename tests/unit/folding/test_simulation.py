@@ -29,7 +29,6 @@ from gyriflow.settings.folding import parameters_from
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 
 
-@pytest.mark.fault(30)
 @pytest.mark.parametrize(
     ("step_s", "weeks", "shortened"),
     [
@@ -68,7 +67,6 @@ def steps_to(stepper, until_s):
     return [row["dt_s"] for row in state.rows]
 
 
-@pytest.mark.fault(32)
 def test_a_failing_step_is_halved_and_grows_back():
     # nothing longer than 11 000 s works before 60 000 s
     lengths = steps_to(Stepper(lambda time_s: 11_000.0 if time_s < 60_000 else 1e9), 604_800.0)
@@ -79,7 +77,6 @@ def test_a_failing_step_is_halved_and_grows_back():
     assert lengths[first + STEPS_BEFORE_DOUBLING] == 43_200
 
 
-@pytest.mark.fault(32)
 def test_where_the_smallest_step_fails_the_place_is_named():
     stepper = Stepper(lambda time_s: 1.0, solver={"max_halvings": 2})
     stepper.solver = SimpleNamespace(worst_places=lambda: "at [1.0, 2.0, 3.0] mm")
@@ -112,7 +109,6 @@ def rows(*through):
     return [{"week": 21.0 + i, "elements_through_cortex": value} for i, value in enumerate(through)]
 
 
-@pytest.mark.fault(25)
 def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
     assert resolution_warning(rows(2.3, 2.1), 1) == ""
     assert resolution_warning(rows(2.3, 2.1, 1.9), 1) == Facts("GW 23.00", 2)
@@ -146,7 +142,6 @@ def test_a_step_above_its_tolerance_gives_a_warning():
     assert unconverged_warning(row | {"converged": False}) == Facts(7, "3.0e-06")
 
 
-@pytest.mark.fault(38)
 @pytest.mark.parametrize(
     ("order", "tets", "ranks", "contact", "measured"),
     [

@@ -111,14 +111,12 @@ def test_the_sides_of_a_box_slide_in_their_planes():
     assert (zones.growth == 1).all()
 
 
-@pytest.mark.fault(26)
 def test_a_brain_without_clamped_facets_is_refused(brain):
     zones = find_zones(brain, no_growth={"semi_axes": (0.1, 0.1, 0.1)})
     with pytest.raises(InputError, check=Facts("folding.no_growth", "folding.support")):
         refuse_impossible(brain, zones)
 
 
-@pytest.mark.fault(26)
 def test_a_floating_part_is_refused(brain):
     far = box_mesh((2, 2, 2), (2.0, 2.0, 2.0))
     both = TetrahedralMesh(

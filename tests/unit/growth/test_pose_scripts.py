@@ -15,7 +15,6 @@ from gyriflow.geometry.deformations import Deformation, between_moved, carry, tr
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, corners, merged, submesh, transformed
-from gyriflow.growth import carried_regions
 from gyriflow.io.files import write_json
 from gyriflow.io.registrations import (
     WeeklyShapes,
@@ -33,7 +32,6 @@ from gyriflow.io.surfaces import (
 )
 from gyriflow.io.tetmeshes import Regions, write_regions, write_tetrahedral_mesh
 from gyriflow.io.volumes import LabelSource, LabelVolume, write_label_volume
-from gyriflow.io.yaml_files import write_yaml
 from gyriflow.settings.ensemble import Variation
 from gyriflow.settings.schemes import LabelScheme
 from gyriflow.settings.terms import LEFT, RIGHT, SIDES
@@ -242,40 +240,3 @@ def test_regions_move_with_the_tissue_of_their_own_side(tmp_path):
         z = mesh.vertices[kept, 2]
         clear = np.abs(z) > 1.5
         assert np.array_equal(found[clear], np.where(z[clear] > 0, 1, 2) + more)
-
-
-@pytest.mark.parametrize("is_posed", [False, True])
-def test_drawn_sulci_are_carried_from_the_files_of_the_brain(tmp_path, monkeypatch, is_posed):
-    """The registration, here a shift, leads from the brain's labels to the drawing, in which two halves are drawn."""
-    shift = np.array([30.0, -20.0, 10.0])
-    labels = write_ball(tmp_path / "labels.nii.gz", np.array([24.0, 24.0, 24.0]), np.zeros(3), 3.0)
-    write_ball(tmp_path / "atlas.nii.gz", np.array([24.0, 24.0, 24.0]), shift, 3.0)
-    affine = scaling(1.0, shift - 45.0)
-    y = transform_points(np.indices((90, 90, 90)).reshape(3, -1).T, affine)[:, 1].reshape(90, 90, 90)
-    write_label_volume(tmp_path / "drawn.nii.gz", LabelVolume(np.where(y > shift[1], 1, 2), affine))
-    drawing = {"labels": "atlas.nii.gz", "scheme": "binary", "sulci": [{"name": "front"}, {"name": "back"}]}
-    write_yaml(tmp_path / "drawing.yaml", drawing)
-    world = FAR[0]
-    to_drawing = scaling(1.0, shift) if not is_posed else scaling(1.0, shift) @ np.linalg.inv(world)
-    between = Deformation(to_drawing, np.zeros((2, 2, 2, 3)), np.eye(4))
-    given = []
-
-    def register(brain, drawn, *, threads):
-        given.extend(transform_points(np.argwhere(one.tissue > 0.5), one.affine).mean(axis=0) for one in (brain, drawn))
-        return between
-
-    monkeypatch.setattr(carried_regions, "register_to_drawn_sulci", register)
-    write_json(tmp_path / "surface.json", {"pose": Pose(world).plain()})
-    inputs = {"volume": "labels.nii.gz", "drawing": "drawing.yaml", "drawn": "drawn.nii.gz", "report": "surface.json"}
-    for side, sign in zip(SIDES, (-1, 1), strict=True):
-        write_surface(tmp_path / f"{side}.gii", transformed(hemisphere(sign), world))
-        inputs[side] = f"{side}.gii"
-    outputs = {f"{side}_regions": f"{side}.label.gii" for side in SIDES}
-    run_script("named_sulci.py", tmp_path, inputs, outputs, {"labels": labels, "posed": is_posed}, threads=1)
-    assert np.stack(given) == pytest.approx(np.stack([np.zeros(3), shift]), abs=1.0)
-    for side, sign in zip(SIDES, (-1, 1), strict=True):
-        found, names = read_vertex_labels(tmp_path / f"{side}.label.gii")
-        y = hemisphere(sign).vertices[:, 1]
-        clear = np.abs(y) > 1.0
-        assert np.array_equal(found[clear], np.where(y[clear] > 0, 1, 2))
-        assert names == {1: "front", 2: "back"}

@@ -65,7 +65,6 @@ def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
 BROKEN, OTHER = [150_000] * downloads.TRIES, "0" * 64
 
 
-@pytest.mark.fault(40)
 @pytest.mark.parametrize(
     ("name", "content", "broken", "known", "facts"),
     [
@@ -85,7 +84,6 @@ def test_what_is_not_the_file_is_refused_and_nothing_is_kept(tmp_path, server, n
     assert files_in(tmp_path) == {}
 
 
-@pytest.mark.fault(40)
 def test_without_a_network_nothing_is_kept(tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -32,7 +32,6 @@ from gyriflow.settings.base import folder_of, located
 from gyriflow.study.loading import load
 
 
-@pytest.mark.promise(1)
 def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
     path = tmp_path / "new" / "a.surf.gii"
     with atomic_write(path) as temporary:
@@ -45,7 +44,6 @@ def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
-@pytest.mark.promise(2)
 def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("earlier")
@@ -61,7 +59,6 @@ def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.fault(36)
 def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
     path = tmp_path / "a.csv"
     with pytest.raises(StorageError, check=Facts(path, "No space left on device")) as caught, atomic_write(path):
@@ -181,7 +178,6 @@ def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monk
     assert (second[str(one)][0], second[str(other)]) == ("new", first[str(other)])
 
 
-@pytest.mark.fault(65)
 @pytest.mark.parametrize(
     ("name", "behind", "text"),
     [
@@ -211,7 +207,6 @@ ABSENT = {
 }
 
 
-@pytest.mark.fault(66)
 @pytest.mark.parametrize(("content", "command"), ABSENT.items(), ids=["link", "pointer", "LFS"])
 @pytest.mark.parametrize(
     ("name", "read"),
@@ -237,7 +232,6 @@ def test_content_that_is_not_here_is_named_with_the_command_that_gets_it(tmp_pat
         assert refusal({"brains": [{"id": "a", "week": 21, "pial": str(path)}]}) == Facts(f"datalad get {path}")
 
 
-@pytest.mark.fault(66)
 def test_a_link_to_a_key_is_read_as_its_own_name_says(tmp_path):
     key, link = tmp_path / ".git" / "annex" / "objects" / "K" / "K", tmp_path / "a.surf.gii"
     write_surface(tmp_path / "b.surf.gii", sphere(10, 1))

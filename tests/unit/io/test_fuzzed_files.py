@@ -31,8 +31,6 @@ from gyriflow.io.tetmeshes import read_maps, write_maps
 from gyriflow.io.volumes import LabelVolume, read_label_volume, read_volume_map
 from gyriflow.io.yaml_files import read_yaml
 
-pytestmark = pytest.mark.fault(12, 13, 62)
-
 LABELS = np.random.default_rng(3).integers(0, 9, (5, 6, 7)).astype(np.int16)
 BALL = sphere(20.0, 1)
 TEXTS = {
@@ -100,7 +98,6 @@ def test_damaged_files_give_something_sound_or_are_refused(tmp_path, wholes, nam
         assert all(isinstance(value, str) for row in found for value in row.values())
 
 
-@pytest.mark.fault(60)
 @pytest.mark.parametrize("suffix", ["nii", "nii.gz", "mgz"])
 def test_a_header_that_asks_for_more_than_its_file_has_takes_no_memory(tmp_path, suffix):
     kind = nib.MGHImage if suffix == "mgz" else nib.Nifti1Image

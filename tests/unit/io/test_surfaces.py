@@ -58,7 +58,6 @@ def in_spaces(path, ball, *systems):
     return path
 
 
-@pytest.mark.fault(11)
 @pytest.mark.parametrize("to", [SCANNER, ALIGNED])
 def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
     back, space, _ = surface_space_structure(in_spaces(tmp_path / "a.gii", ball, (U, to, TURN)))
@@ -66,7 +65,6 @@ def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
     assert space == f"NIFTI_XFORM_{NAMES[to]}"
 
 
-@pytest.mark.fault(50)
 @pytest.mark.parametrize(
     ("systems", "facts", "expected"),
     [
@@ -132,7 +130,6 @@ def test_freesurfer_surface_is_brought_to_scanner_space(tmp_path, ball):
     assert (space, structure) == ("NIFTI_XFORM_SCANNER_ANAT", "CortexLeft")
 
 
-@pytest.mark.fault(9)
 def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
     write_surface(tmp_path / "a.surf.gii", ball, "CortexRight")
     write_geometry(tmp_path / "rh.pial", ball.vertices, ball.faces, volume_info=volume())
@@ -227,7 +224,6 @@ def test_a_file_that_crashes_vtk_is_refused(tmp_path, ball):
         read_surface(tmp_path / "a.vtk")
 
 
-@pytest.mark.fault(13)
 def test_vertices_that_are_no_places_and_faces_beyond_the_vertices_are_refused(tmp_path, ball):
     vertices = ball.vertices.copy()
     vertices[3:5, 1] = np.nan

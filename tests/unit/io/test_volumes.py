@@ -43,7 +43,6 @@ def storage_orders():
             yield "".join(ends)
 
 
-@pytest.mark.fault(3)
 @pytest.mark.parametrize("pose", [np.eye(4), rigid(20, -15, 25, shift=(40, 200, -90))], ids=["straight", "tilted"])
 def test_storage_order_changes_neither_array_nor_place(tmp_path, labels, pose):
     path, affine = tmp_path / "a.nii", pose @ AFFINE
@@ -62,7 +61,6 @@ def test_storage_order_changes_neither_array_nor_place(tmp_path, labels, pose):
     assert all(np.array_equal(each, found[0]) for each in found)
 
 
-@pytest.mark.fault(4)
 @pytest.mark.parametrize(("unit", "per_mm"), [("mm", 1.0), ("meter", 1e-3), ("micron", 1e3)])
 def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
     stored = np.diag([per_mm] * 3 + [1.0]) @ AFFINE
@@ -70,7 +68,6 @@ def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
     assert volume.affine == pytest.approx(AFFINE, rel=1e-5)
 
 
-@pytest.mark.fault(53)
 def test_labels_of_freesurfer_volumes_are_read(tmp_path, labels):
     nib.save(nib.MGHImage(labels.astype(np.int32), AFFINE.astype(np.float32)), tmp_path / "aseg.mgz")
     volume = read_label_volume(tmp_path / "aseg.mgz")
@@ -78,7 +75,6 @@ def test_labels_of_freesurfer_volumes_are_read(tmp_path, labels):
     assert volume.affine == pytest.approx(AFFINE, abs=1e-4)
 
 
-@pytest.mark.fault(2)
 def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     other = AFFINE.copy()
     other[0, 3] = 33.0
@@ -90,7 +86,6 @@ def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     assert read_label_volume(path, "sform").affine[0, 3] == pytest.approx(-10.0)
 
 
-@pytest.mark.fault(2)
 def test_a_broken_qform_is_not_read_where_the_sform_holds(tmp_path, labels):
     path = saved(tmp_path / "a.nii", labels)
     image = nib.load(path)
@@ -137,7 +132,6 @@ def with_slope(path, labels, slope, kind):
     nib.save(image, path)
 
 
-@pytest.mark.fault(63)
 @pytest.mark.parametrize(
     ("name", "make", "off"),
     [
@@ -155,7 +149,6 @@ def test_labels_that_their_storage_moved_are_rounded_with_a_warning(tmp_path, la
     assert warnings == ([] if off is None else [Facts(tmp_path / name, off)])
 
 
-@pytest.mark.fault(64)
 @pytest.mark.parametrize(("name", "flips"), [("a.nii.gz", 150), ("a.img.gz", 20), ("a.hdr.gz", 20), ("a.mgz", 20)])
 def test_a_flipped_bit_of_a_compressed_volume_changes_no_label(tmp_path, name, flips):
     shipped = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
@@ -188,7 +181,6 @@ def test_further_members_and_bytes_of_gzip_are_taken_as_gzip_does(tmp_path, labe
     assert [record.getMessage() for record in caplog.records] == [Facts(tmp_path / "b.nii.gz")]
 
 
-@pytest.mark.fault(6, 13, 43)
 @pytest.mark.parametrize(
     ("name", "make", "facts"),
     [
@@ -243,7 +235,6 @@ def test_files_of_other_formats_are_named_with_what_to_do(tmp_path, name):
         read_label_volume(tmp_path / name)
 
 
-@pytest.mark.fault(1)
 def test_a_volume_of_numbers_keeps_fractions_nan_and_its_oblique_affine(tmp_path):
     values = np.random.default_rng(0).normal(size=(4, 5, 6)).astype(np.float32)
     values[0, 0, 0] = np.nan

@@ -135,7 +135,6 @@ def test_the_outermost_voxels_are_covered_to_their_rim():
         volume_map_on_mesh(np.array([[0.0, 0, 0], [0, 0, -1.2]]), data, np.eye(4), "a.nii")
 
 
-@pytest.mark.fault(69)
 @pytest.mark.parametrize("nothing", [np.nan, np.inf])
 def test_vertices_without_a_number_are_counted(ball, nothing):
     data, affine = np.ones((50, 50, 50)), scaling(1.0, -24.5)

@@ -158,7 +158,6 @@ DYING = ("os.write(1, b'99 % of the elements are inverted')", "os.kill(os.getpid
 HANGING = ("os.write(2, b'thinking')", "time.sleep(600)")
 
 
-@pytest.mark.promise(12)
 @pytest.mark.parametrize("mesher", MESHERS)
 def test_the_folder_of_a_mesher_is_its_users_only(stand_in, mesher):
     stand_in(mesher, "mode = os.stat('.').st_mode & 0o777", "os.write(1, f'mode {mode:o}'.encode())", DYING[1])
@@ -170,7 +169,6 @@ def test_the_folder_of_a_mesher_is_its_users_only(stand_in, mesher):
         os.umask(before)
 
 
-@pytest.mark.fault(24)
 @pytest.mark.parametrize("mesher", MESHERS)
 def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesher):
     stand_in(mesher, *HANGING)
@@ -203,7 +201,6 @@ def mesh_in(folder, mesher, gates=GATES):
     return code, [name for name, file in OUTPUTS.items() if (folder / file).exists()]
 
 
-@pytest.mark.fault(24)
 @pytest.mark.parametrize("mesher", MESHERS)
 def test_the_step_of_a_mesher_that_dies_ends_in_three_with_all_that_it_printed_in_the_log(
     stand_in, tmp_path, capsys, mesher
@@ -218,8 +215,6 @@ def test_the_step_of_a_mesher_that_dies_ends_in_three_with_all_that_it_printed_i
     assert f"{mesher}: 99 % of the elements are inverted\n" in log
 
 
-@pytest.mark.fault(23)
-@pytest.mark.promise(9)
 def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_attempt(tmp_path, capsys):
     refused, coarse = tmp_path / "refused", GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.1}
     strict = {"min_radius_ratio": 0.99, "max_surface_distance_mm": 1e-3}

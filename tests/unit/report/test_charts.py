@@ -317,7 +317,6 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
 
 
-@pytest.mark.fault(73)
 def test_brains_without_rates_have_areas_and_volumes_only():
     assert len(growth_chart(AREAS, RATES[:0]).axes) == 2
     figure = growth_chart(pd.concat([AREAS.assign(series="others"), AREAS]), RATES)

@@ -8,8 +8,6 @@ import pytest
 
 from gyriflow.running.machine import available_cores, available_memory_mib
 
-pytestmark = pytest.mark.fault(76)
-
 
 @pytest.fixture
 def in_job(monkeypatch):

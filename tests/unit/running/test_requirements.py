@@ -25,6 +25,7 @@ def test_simulations_and_registrations_need_the_extra():
     assert "ipctk" in packages_behind(requirements.SOLVER)
     assert packages_behind(SCRIPTS / "register.py") == ["picsl_greedy", "SimpleITK"]
     assert "pytetwild" in packages_behind(SCRIPTS / "tetrahedralise.py")
+    assert packages_behind(SCRIPTS / "calibration_design.py") == ["optuna"]
 
 
 def test_a_missing_package_is_named_with_its_step_and_extra(monkeypatch):
@@ -34,6 +35,10 @@ def test_a_missing_package_is_named_with_its_step_and_extra(monkeypatch):
     monkeypatch.setattr(requirements, "has_dolfinx_wheels", lambda: True)
     with pytest.raises(InputError, check=Facts("ipctk", "simulate", "gyriflow[fold]")):
         require_for(measured | {"simulate": requirements.SOLVER})
+    monkeypatch.setattr(requirements, "is_installed", lambda name: name not in ("ipctk", "optuna"))
+    calibrated = {"simulate": requirements.SOLVER, "design": SCRIPTS / "calibration_design.py"}
+    with pytest.raises(InputError, check=Facts("ipctk", "optuna", "gyriflow[calibrate,fold]")):
+        require_for(calibrated)
 
 
 def test_where_pypi_has_no_dolfinx_conda_is_named(monkeypatch):
@@ -101,7 +106,7 @@ def test_ziglang_serves_where_there_is_no_compiler(monkeypatch, tmp_path):
 MEASURING = """
 import sys
 SOLVER = ("dolfinx", "dolfinx_solver", "petsc4py", "slepc4py", "mpi4py")
-for name in (*SOLVER, "ipctk", "SimpleITK", "picsl_greedy", "sklearn", "pytetwild"):
+for name in (*SOLVER, "ipctk", "SimpleITK", "picsl_greedy", "optuna", "pytetwild"):
     sys.modules[name] = None
 import trimesh
 from gyriflow.geometry.triangles import TriangleMesh

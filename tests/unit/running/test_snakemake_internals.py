@@ -92,7 +92,6 @@ def reruns(folder):
     return "rule copy" in dry.stdout + dry.stderr
 
 
-@pytest.mark.fault(68)
 def test_inputs_are_known_by_their_content_wherever_they_and_the_study_are(study, tmp_path):
     os.utime(tmp_path / "given", (2e9, 2e9))
     (tmp_path / "given").rename(tmp_path / "an other")
@@ -106,7 +105,6 @@ def test_inputs_are_known_by_their_content_wherever_they_and_the_study_are(study
         assert reruns(tmp_path / "moved")
 
 
-@pytest.mark.fault(68)
 def test_jobs_run_again_after_a_change_of_their_code_not_of_its_date(study):
     script = study / "scripts" / "copy.py"
     os.utime(script, (2e9, 2e9))

@@ -115,7 +115,6 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
     assert run.state["failed"] == [{"job": "pial_from_labels a", "cause": "a.nii: is no image", "logs": [str(log)]}]
 
 
-@pytest.mark.fault(38)
 @pytest.mark.parametrize(
     ("message", "facts", "code"),
     [

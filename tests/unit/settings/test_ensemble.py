@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gyriflow.settings.ensemble import DIFFERENCE_RANGE_MM, FADING_RANGE_GW, SMOOTHING_RANGE, Ensemble
+from gyriflow.settings.ensemble import AGE_SD_GW, DIFFERENCE_RANGE_MM, FADING_RANGE_GW, SMOOTHING_RANGE, Ensemble
 
 INPUTS = ("age_shift_gw", "registration_smoothing", "difference_smoothing_mm", "fading_gw")
 
@@ -24,10 +24,10 @@ def test_members_differ_in_each_input_by_itself():
 
 
 def test_each_input_fills_its_range():
-    shifts, *factors = values_of(Ensemble(members=64, age_sd_gw=0.4)).T
+    shifts, *factors = values_of(Ensemble(members=64)).T
     # quantiles of a normal distribution, to two decimals
     assert shifts.mean() == pytest.approx(0.0, abs=0.02)
-    assert shifts.std() == pytest.approx(0.4, rel=0.06)
+    assert shifts.std() == pytest.approx(AGE_SD_GW, rel=0.06)
     for values, (low, high) in zip(factors, (SMOOTHING_RANGE, DIFFERENCE_RANGE_MM, FADING_RANGE_GW), strict=True):
         # a quarter of the members in each quarter of the range, by its logarithm
         place = np.log(values / low) / np.log(high / low)

@@ -51,7 +51,6 @@ def test_values_are_checked_over_all_weeks_and_places():
         require_maps(mapped, {"thickness_mm": np.array([1.0, 0.0, 1.0])}, 3)
 
 
-@pytest.mark.fault(69)
 def test_a_missing_or_unfitting_map_is_refused():
     mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
     with pytest.raises(InputError, check=Facts("thickness_mm", "--maps")):

@@ -152,7 +152,6 @@ def test_two_files_of_one_name_and_a_file_in_the_place_of_the_folder_are_refused
     assert found == [Facts("atlas.folder:", tmp_path / "file")]
 
 
-@pytest.mark.fault(16)
 def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
     touched(tmp_path / "mine", *surfaces("21.5"))
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 21.5]}

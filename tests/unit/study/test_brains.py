@@ -72,7 +72,6 @@ def test_what_is_wrong_with_a_brain_is_said(folder, brain, key, facts):
     assert problems(one(**brain), folder) == [Facts(f"brains[0]{key}:", *facts)]
 
 
-@pytest.mark.fault(31)
 def test_ids_are_unique_and_no_folder_of_the_results():
     brains = [{"id": name, "week": 22, **LABELLED} for name in ("a", "study", "A", "a")]
     assert problems(study(brains=brains)) == [
@@ -95,7 +94,6 @@ def test_one_scan_of_a_subject_is_of_each_week():
     assert problems(study(scans, folding={"end_week": 25})) == [Facts("brains:", 2, "one", 24)]
 
 
-@pytest.mark.fault(15)
 def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
     touched(tmp_path, "week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz")
     assert problems(one(labels="week30_labels.nii.gz", scheme="binary"), tmp_path) == [

@@ -19,7 +19,6 @@ from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
 
-@pytest.mark.fault(27)
 def test_all_mistakes_are_named_at_once():
     wrong = study(folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}, metric={}, start="a")
     assert problems(wrong) == [
@@ -70,7 +69,6 @@ def test_a_folder_of_an_atlas_is_not_made_of_a_variable_or_an_address():
         assert refusal(study(atlas=section)) == Facts("atlas.folder:", folder)
 
 
-@pytest.mark.fault(28, 29)
 @pytest.mark.parametrize(
     ("folding", "key", "facts"),
     [

