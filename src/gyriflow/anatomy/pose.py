@@ -185,11 +185,11 @@ def _wrong_sides(shapes: list[PosedShape], found: str) -> InputError:
     mirrored_axes = mirrored.pop() if len(mirrored) == 1 else ""
     if axes and axes.lower() not in CONVENTIONS:
         return InputError(
-            "the coordinates of the hemispheres seem to be mirrored",
-            found=f"the axes {mirrored_axes} (or {axes}, and exchanged files); {found}",
+            "the coordinates of the hemispheres seem to be mirrored, unless the files are exchanged in unusual axes",
+            found=f"the axes {mirrored_axes} if mirrored, {axes} if exchanged; {found}",
             expected="the axes RAS or LPS, and more than 1",
-            remedy="Export the surfaces in RAS or LPS. Do not swap `left` and `right`: the left hemisphere would be "
-            "measured as the right one.",
+            remedy="Export the surfaces in RAS or LPS, which shows which it is. Do not swap `left` and `right` before: "
+            "the left one of mirrored hemispheres would be measured as the right one.",
         )
     if axes:
         found += f"; the axes {axes} if they are exchanged, {mirrored_axes} if mirrored"

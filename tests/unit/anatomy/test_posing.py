@@ -153,16 +153,16 @@ def test_the_axes_of_a_file_are_named():
         ("LAS", False, ["exchanged", "RAS", "LAS", "swap", "do not swap"]),
         ("RPS", False, ["exchanged", "LPS", "RPS", "swap", "do not swap"]),
         # as of BrainVISA, and of an array in the order z, y, x
-        ("LPI", False, ["mirrored", "LPI", "Do not swap"]),
-        ("SAR", False, ["mirrored", "SAR", "Do not swap"]),
+        ("LPI", False, ["mirrored", "LPI", "RPI", "Do not swap"]),
+        ("SAR", False, ["mirrored", "SAR", "SAL", "Do not swap"]),
     ],
 )
 def test_mirrored_hemispheres_are_told_from_exchanged_ones_or_both_are_named(halves, axes, is_exchanged, facts):
     files = [linear(half, AXES[axes]) for half in halves]
     with pytest.raises(InputError, check=Facts(*facts)) as caught:
         pose_of_pair(*(files[::-1] if is_exchanged else files))
-    # nobody is told to swap whose files are not exchanged
-    assert ("If the files are exchanged, swap" in str(caught.value)) == ("exchanged" in facts)
+    # nobody is told to swap where mirrored coordinates are more likely
+    assert ("If the files are exchanged, swap" in str(caught.value)) == ("swap" in facts)
 
 
 def test_of_unusual_axes_it_is_said_that_they_may_be_mirrored(halves):
@@ -208,8 +208,8 @@ def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
         for pair, axes in ((halves[::-1], turn), (halves, -turn)):
             with pytest.raises(InputError, check=Facts("mirrored")) as caught:
                 pose_of_pair(*(linear(half, axes) for half in pair))
-            is_told = "exchanged, or" not in str(caught.value)
-            # what is exchanged in these axes is mirrored in those that its mirror image has
+            is_told = "Do not swap" in str(caught.value)
+            # what is exchanged in these axes is mirrored in those of its mirror image
             exchanged = named if axes is turn else axes_of_file(AXES["LAS"] @ axes.T)
             assert is_told == (exchanged not in ("RAS", "LPS"))
 
