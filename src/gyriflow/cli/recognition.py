@@ -398,7 +398,7 @@ def _complete(
     if names := [f"{entity}-{label}" for entity in labels for label in labels[entity] if len(labels[entity]) > 1]:
         brain.problem = f"its path names several scans: found {', '.join(names)}; expected one"
     elif not all(re.fullmatch("[A-Za-z0-9-]+", label) for label in (*labels["sub"], *labels["ses"])):
-        brain.problem = f"has other characters than letters and digits in {scan}"
+        brain.problem = f"has other characters than letters and digits in {_scan_name(brain.file)}"
     elif brain.space and brain.space != RESAMPLED:
         brain.is_template = any(TEMPLATE_FOLDER.fullmatch(part) for part in brain.file.parts)
         brain.problem = f"is in the space {brain.space}; expected the subject's own"

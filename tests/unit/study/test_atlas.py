@@ -96,7 +96,7 @@ def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_
         *dhcp,
     ]
     twice = problems(study([*atlas, "dhcp-surface"], "own", brains=own), tmp_path)
-    assert twice == [Facts("brains:", 2, name) for name in dhcp]
+    assert twice == [*(Facts("brains:", 2, name) for name in dhcp[:3]), Facts(len(dhcp) - 3)]
 
 
 # files in a folder
