@@ -22,9 +22,6 @@ JOINING_GW = 1.0
 """Time within which a brain that does not start on its curves joins them."""
 MAX_RATE_PER_S = 1e-5
 """Largest rate that is set, the upper bound of prescribed rates."""
-MAX_CONTRAST = 5.0
-"""Largest difference between the rate of the cortex and the mean rate, as a multiple of growth. On a ball tangential
-growth adds no area, so that feedback alone would raise it without limit."""
 CURVE_TOL = 0.005
 """Relative tolerance within which a curve counts as followed."""
 
@@ -85,8 +82,8 @@ def steered_rates(required: Floats, gain: Floats, bounds: tuple[float, float]) -
             "growth by sizes finds no rates", found="tissue that does not grow", expected="a growing core"
         )
     mean, ideal = required[1] / (cortex_volume + core_volume), required[0] / max(gain[0, 0], 1e-9)
-    contrast = MAX_CONTRAST * (abs(mean) + abs(ideal))
-    cortex = np.clip(np.clip(ideal, mean - contrast, mean + contrast), *bounds)
+    # on a ball tangential growth adds no area: feedback raises it until the core no longer grows
+    cortex = np.clip(ideal, *bounds)
     core = np.clip((required[1] - cortex_volume * cortex) / core_volume, *bounds)
     # the cortex makes up for a core at its bound
     cortex = np.clip((required[1] - core_volume * core) / cortex_volume, *bounds)

@@ -17,6 +17,7 @@ from gyriflow.folding.steering import SteeredStep, blended, free_growth, missed_
 from gyriflow.folding.stretches import packed, unpacked
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import quadratic
+from gyriflow.geometry.triangles import TriangleMesh, face_areas
 from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 
@@ -31,7 +32,8 @@ def test_a_brain_off_the_curve_comes_onto_it_within_a_week():
     assert blended(CURVE, 100.0, 21.0, 23.0) == pytest.approx(math.sqrt(110 * 121))
     assert blended(CURVE, 90.0, 21.0, 21.0) == pytest.approx(90.0)
     assert blended(CURVE, 90.0, 21.0, 21.5) == pytest.approx(math.sqrt(100 * 110) * math.sqrt(0.9))
-    assert blended(CURVE, 90.0, 21.0, 22.0) == pytest.approx(110.0)
+    for week, expected in ((22.0, 110.0), (23.0, math.sqrt(110 * 121)), (24.0, 121.0)):
+        assert blended(CURVE, 90.0, 21.0, week) == pytest.approx(expected)
 
 
 def test_a_curve_that_is_missed_is_named_with_how_far():
@@ -41,19 +43,63 @@ def test_a_curve_that_is_missed_is_named_with_how_far():
     assert missed_curves({"week": 23.0, "area_cm2": 99.0, "volume_ml": 50.0}) == ""
 
 
-def test_a_run_begins_with_the_rates_that_lead_to_its_curves():
+def grown_by_sizes(area_ratio, volume_ratio, correction=None, **changes):
+    """Return the first step of an ellipsoid whose area and volume grow by ratios in a week, and what it was made of."""
     mesh = ellipsoid_mesh(12, SEMI_AXES)
-    plain = parameters_from(RUN | GROWING)
+    values = RUN | GROWING | changes
+    plain = parameters_from(values)
     inputs = GrowthInputs(mesh, zones_of_run(mesh, plain, GAP_MM), {})
     start = inputs.size(mesh.vertices)
     area, volume = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
-    curves = {"area_cm2": {21.0: area, 22.0: 1.13 * area}, "volume_ml": {21.0: volume, 22.0: 1.2 * volume}}
-    p = parameters_from(RUN | GROWING | {"growth": {"model": "sizes", **curves}})
-    first = StepStart(mesh.vertices, 0.0, p.step_s)
-    step = growth_model(p, inputs)(first)
-    assert step.free_rates * SECONDS_PER_GW == pytest.approx([math.log(1.13), math.log(1.2)], rel=1e-6)
+    areas, volumes = {21.0: area, 22.0: area_ratio * area}, {21.0: volume, 22.0: volume_ratio * volume}
+    p = parameters_from(values | {"growth": {"model": "sizes", "area_cm2": areas, "volume_ml": volumes}})
+    first = StepStart(mesh.vertices, 0.0, p.step_s, correction)
+    return growth_model(p, inputs)(first), growth_model(plain, inputs)(first), plain
+
+
+@pytest.mark.parametrize("radial_rate_per_s", [0.0, 2e-8])
+@pytest.mark.parametrize("missing", [(0.0, 0.0), (-0.02, 0.01)])
+def test_a_run_begins_with_the_rates_that_lead_to_its_curves(radial_rate_per_s, missing):
+    """Radial growth adds to the volume, and what the last step missed is made up for."""
+    radial = {"radial_growth_rate_per_s": radial_rate_per_s}
+    correction = np.array(missing) / SECONDS_PER_GW
+    step, by_rates, plain = grown_by_sizes(1.13, 1.2, tuple(correction), **radial)
+    expected = np.array([math.log(1.13), math.log(1.2)]) - missing
+    assert step.free_rates * SECONDS_PER_GW == pytest.approx(expected, rel=1e-6)
+    assert not step.limited
     # a prescribed growth is the run's own
-    assert growth_model(plain, inputs)(first).parameters == plain
+    assert by_rates.parameters == plain
+
+
+def test_no_rate_is_above_that_which_may_be_prescribed():
+    step, *_ = grown_by_sizes(1e9, 1e12)
+    assert step.parameters.growth_rate_per_s == pytest.approx(1e-5)
+    assert step.parameters.core_growth_rate_per_s == pytest.approx(1e-5)
+    assert step.limited
+
+
+def test_growth_of_the_surface_is_a_mean_over_area_where_a_part_does_not_grow():
+    # triangles and elements of unequal size
+    mesh = ellipsoid_mesh(10, (20.0, 44.0, 12.0))
+    p = parameters_from(RUN | {"support": "free", "thickness_mm": 2.0})
+    inputs = GrowthInputs(mesh, zones_of_run(mesh, p, GAP_MM), {})
+    faces = inputs.zones.measured_facets
+    growing, areas = inputs.zones.growth[faces].mean(axis=1), face_areas(TriangleMesh(mesh.vertices, faces))
+    share = float(np.average(growing, weights=areas))
+    assert 0.1 < share < 0.95
+    assert abs(share - growing.mean()) > 0.01
+    made, _ = free_growth(p, mesh.vertices, inputs, 21)
+    assert made[0, 0] == pytest.approx(2 * share)
+
+
+def test_growth_reaches_as_deep_as_the_cortex_is_thick_at_its_thickest():
+    mesh = ellipsoid_mesh(12, SEMI_AXES)
+    found = []
+    for map_mm in (np.full(len(mesh.vertices), 4.0), np.where(np.arange(len(mesh.vertices)) == 0, 0.5, 4.0)):
+        p = parameters_from(RUN | GROWING | {"thickness_mm": {"map": "thickness_mm"}})
+        inputs = GrowthInputs(mesh, zones_of_run(mesh, p, GAP_MM), {"thickness_mm": map_mm})
+        found.append(free_growth(p, mesh.vertices, inputs, 21)[0][1, 0])
+    assert found[1] == pytest.approx(found[0], rel=0.005)
 
 
 def test_free_growth_of_a_body_is_known():
@@ -101,6 +147,11 @@ def test_bounds_leave_the_volume_on_its_curve():
     # less area than the volume makes: the core grows by itself
     assert steered_rates(np.array([-0.02, 0.035]), MADE, BOUNDS) == (0.0, pytest.approx(0.02), True)
     assert steered_rates(np.array([-0.01, -0.02]), MADE, BOUNDS) == (0.0, 0.0, True)
+    # more of both than the bounds allow
+    assert steered_rates(np.array([10.0, 10.0]), MADE, BOUNDS) == (1.0, 1.0, True)
+    # a surface that hardly gains by growth of the cortex, as a ball's
+    rates = steered_rates(np.array([0.05, 0.06]), MADE * [[1e-9, 1], [1, 1]], BOUNDS)
+    assert rates == (pytest.approx(0.05), 0.0, True)
     singular = MADE * [[1, 1], [1, 0]]
     with pytest.raises(SolverError):
         steered_rates(np.array([0.01, 0.02]), singular, BOUNDS)

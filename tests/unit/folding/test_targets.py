@@ -1,16 +1,32 @@
 """Growth of a step towards shapes: what the path gives, and what feedback makes up for."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from facts import Facts
 from shapes import box_mesh, ellipsoid_mesh
 from verification_cases.growth_maps import WavyBox, errors_of_map
 
+from gyriflow.errors import InputError
 from gyriflow.folding.growth import GrowthInputs, StepStart
-from gyriflow.folding.targets import FEEDBACK_FROM_MM, FEEDBACK_GW, FEEDBACK_SMOOTHING_MM, growth_on_path
+from gyriflow.folding.targets import (
+    FEEDBACK_FROM_MM,
+    FEEDBACK_GW,
+    FEEDBACK_SMOOTHING_MM,
+    TargetGrowth,
+    growth_on_path,
+    missed_targets,
+    path_of_run,
+    shapes_of_run,
+    shrinkage_note,
+)
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.diffusion import vertex_sizes
+from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.paths import path_through
+from gyriflow.geometry.tetrahedra import grid
 from gyriflow.settings.folding import parameters_from
 
 DAY_S, DAY_GW = 86_400.0, 1 / 7
@@ -81,3 +97,73 @@ def test_a_map_of_growth_has_the_error_of_its_elements():
         assert fine[name] < 0.6 * coarse[name]
         assert fine[name] < 2.5 / fine["per_wave"]
     assert coarse["slope"] < fine["slope"] < 1.01
+
+
+UNEVEN = grid([np.array([-8, -7, -6, -5, 0, 5, 10.0]), np.linspace(-6, 6, 5), np.linspace(-5, 5, 5)])
+"""A box whose elements on the right are five times as long as those on the left."""
+
+
+def test_a_misfit_and_the_motion_before_it_are_means_over_volume():
+    # half a millimetre on the left, where most vertices are
+    p = parameters_from(RUN)
+    inputs = GrowthInputs(UNEVEN, zones_of_run(UNEVEN, p), {})
+    path = path_through([21.0, 23.0], [UNEVEN.vertices, UNEVEN.vertices], UNEVEN)
+    off = UNEVEN.vertices + np.where(UNEVEN.vertices[:, :1] < -4.5, [0.0, 0.0, 0.5], 0.0)
+    found = growth_on_path(p, inputs, path, StepStart(off, 0.0, DAY_S)).misfit_mm
+    sizes, even = vertex_sizes(off, UNEVEN.tets), np.ones(len(off))
+
+    def misfit(aligned_by, weights):
+        left = without_rigid_motion(off, UNEVEN.vertices, aligned_by)
+        return np.sqrt(np.average((left**2).sum(axis=1), weights=weights))
+
+    assert found == pytest.approx(misfit(sizes, sizes), rel=0.01)
+    assert abs(found / misfit(even, sizes) - 1) > 0.03
+    assert abs(found / misfit(sizes, even) - 1) > 0.03
+
+
+def test_a_path_ends_with_its_last_shape_though_the_step_goes_on():
+    p = parameters_from(RUN)
+    inputs = GrowthInputs(BODY, zones_of_run(BODY, p), {})
+    path = path_through([21.0, 23.0], [BODY.vertices, 1.1 * BODY.vertices], BODY)
+    time_s = 13.5 * DAY_S
+    growth = growth_on_path(p, inputs, path, StepStart(path(21.0 + 13.5 * DAY_GW), time_s, DAY_S))
+    assert growth.goal_mm == pytest.approx(1.1 * BODY.vertices, abs=1e-3)
+
+
+def test_an_element_at_most_doubles_in_a_step_and_does_not_grow_where_its_goal_inverts_it():
+    p = parameters_from(RUN)
+    tets = np.array([[0, 1, 2, 3], [0, 1, 2, 3], [0, 1, 2, 3]]) + 4 * np.arange(3)[:, None]
+    single = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    goals = np.concatenate([single * [1.5, 1.0, 1.0], single * [3.0, 1.0, 1.0], single * [1.0, 1.0, -1.2]])
+    start = StepStart(np.concatenate([single] * 3), 0.0, DAY_S)
+    counted = []
+    growth = TargetGrowth(p, start, goals, 0.0, 0, lambda count: counted.append(count) or count)
+    points = SimpleNamespace(gradients=SLOPES[None])
+    elements = SimpleNamespace(vertices=np.arange(12), cells=tets, points=points)
+    tissue = SimpleNamespace(elements=elements, growing=np.ones(12), at_points=lambda values: values[tets[:, :1]])
+    inverse = growth.inverse(tissue)[:, 0]
+    for found, stretch in zip(inverse, (1.5, np.exp(0.7), 1.0), strict=True):
+        assert found == pytest.approx(np.diag([1 / stretch, 1.0, 1.0]))
+    assert (growth.held, counted) == ([2], [2])
+
+
+def test_a_run_off_its_path_tells_how_far_and_how_many_elements_were_held_in_any_step():
+    row = {"week": 23.0, "to_path_mm": 0.15, "held_elements": 0}
+    assert missed_targets([row]) == missed_targets([]) == missed_targets([{"week": 22.0}]) == []
+    assert missed_targets([row | {"to_path_mm": 0.25}]) == [Facts("GW 23", "0.25 mm")]
+    assert missed_targets([row | {"held_elements": 7}, row]) == [Facts("GW 23", 7)]
+    steps = [{"shrinking_elements": 3, "min_J": 0.4}, {"shrinking_elements": 0, "min_J": 0.9}]
+    assert shrinkage_note(steps) == Facts(3, "10%", "0.40")
+    assert shrinkage_note(steps[1:]) == ""
+
+
+def test_shapes_of_a_run_are_those_after_its_start_and_reach_to_its_end():
+    shape = dict(zip(("target_x", "target_y", "target_z"), (1.1 * BODY.vertices).T, strict=True))
+    p = parameters_from(RUN | {"targets": {21.0: "earlier", 23.0: "target"}})
+    weeks, shapes = shapes_of_run(p, shape, BODY.vertices)
+    assert weeks == [21.0, 23.0]
+    assert shapes[1] == pytest.approx(1.1 * BODY.vertices)
+    short = parameters_from(RUN | {"targets": {22.9: "target"}})
+    inputs = GrowthInputs(BODY, zones_of_run(BODY, short), shape)
+    with pytest.raises(InputError, check=Facts("22.9 GW", "23 GW")):
+        path_of_run(short, inputs)

@@ -85,6 +85,16 @@ def test_the_other_wall_is_not_matched():
     assert match_points(point, -normal, mesh).distance_mm == pytest.approx([0.2])
 
 
+@pytest.mark.parametrize(("degrees", "agrees"), [(55, True), (65, False)])
+def test_normals_agree_up_to_60_degrees(degrees, agrees):
+    mesh = box((10, 10, 10), subdivisions=2)
+    normal = rigid(0, degrees, 0)[:3, :3] @ [0.0, 0.0, 1.0]
+    # above the middle of the upper wall; no wall but the right one agrees more, 5 mm away
+    match = match_points(np.array([[0.3, 0.4, 5.5]]), normal[None], mesh)
+    assert match.agrees.all()
+    assert (match.distance_mm[0] < 1.0) == agrees
+
+
 def test_the_tissue_below_tells_the_wall():
     mesh = walls()
     inner = mesh.vertices - 2.0 * vertex_normals(mesh)

@@ -6,9 +6,10 @@ from shapes import box_mesh, ellipsoid_mesh, rigid
 
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.jacobians import inverted_on_the_way
 from gyriflow.geometry.paths import limited_velocities, merged_shapes, path_through
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, quadratic, volumes_between
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic, volumes_between
 
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
 
@@ -96,6 +97,23 @@ def test_an_element_inverted_in_the_middle_of_a_straight_way_is_found():
         assert inverted_on_the_way(before, turned_part, tet).tolist() == [False]
     assert inverted_on_the_way(before, before * [1, 1, -1], tet).tolist() == [True]
     assert inverted_on_the_way(before, before * [0.1, 0.1, 0.1], tet).tolist() == [False]
+
+
+def test_each_shape_is_aligned_with_the_one_before_by_volume():
+    """A box that is bent to and fro: elements on the right are five times as long, and move on."""
+    mesh = grid([np.array([-8, -7, -6, -5, 0, 5, 10.0]), np.linspace(-6, 6, 5), np.linspace(-5, 5, 5)])
+    sizes = vertex_sizes(mesh.vertices, mesh.tets)
+    x = mesh.vertices[:, :1]
+    bends = [np.zeros_like(x), np.where(x < -4.5, 1.0, 0.0), 0.01 * x**2]
+    shapes = [
+        transform_points(mesh.vertices + bend * [0.0, 0.0, 1.0], rigid(0, 10 * number, 20, shift=(number, 0.0, 5.0)))
+        for number, bend in enumerate(bends)
+    ]
+    path = path_through([21.0, 22.0, 23.0], shapes, mesh)
+    for week in (21.0, 22.0):
+        before, after = path(week), path(week + 1.0)
+        # nothing is left of a motion from shape to shape
+        assert without_rigid_motion(before, after, sizes) == pytest.approx(after - before, abs=1e-6)
 
 
 @pytest.mark.parametrize("order", [1, 2])
