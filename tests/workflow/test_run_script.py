@@ -310,7 +310,7 @@ def test_signals_reach_the_command(outside):
 
 
 def test_no_process_stays_between_run_and_the_command(outside):
-    process = start("bash", "-c", "echo $$ $PPID; read", env=outside)
+    process = start("bash", "-c", "echo $$ $PPID; exec sleep 60", env=outside)
     own, parent = map(int, process.stdout.readline().split())
     # the command has taken the place of the script, so signals to it are its own
     assert (own, parent) == (process.pid, os.getpid())
