@@ -26,7 +26,14 @@ EXTRAS = {
     "optuna": "calibrate",
 }
 """The extra of each module that is not among the base packages."""
-LIBRARIES = {"libGL.so.1": "libgl1", "libEGL.so.1": "libegl1", "libOpenGL.so.0": "libopengl0"}
+LIBRARIES = {
+    "libGL.so.1": "libgl1",
+    "libEGL.so.1": "libegl1",
+    "libOpenGL.so.0": "libopengl0",
+    "libcom_err.so.2": "libcom-err2",
+    "libgmp.so.10": "libgmp10",
+    "libp11-kit.so.0": "libp11-kit0",
+}
 """Libraries that pymeshlab and VTK load on Linux, with their Debian packages."""
 SOLVER = PACKAGE / "folding" / "__main__.py"
 CONDA = f"conda env create -f {SHIPPED / 'envs' / 'gyriflow.yaml'}"
