@@ -1,8 +1,9 @@
 """Compare how well atlases predict the sizes of other brains at stated ages and at ages
 by size.
 
-    ./run python benchmarks/atlas_sizes.py --atlas crl 'FOLDER/HarvardSTA{week}_Study1/parcellation.nii.gz' \\
-        --atlas chinese 'FOLDER/Chinese{week}_Study1/parcellation.nii.gz' --weeks 21 38 --labels 1 2 5 6 8
+    ./run python benchmarks/atlas_sizes.py --weeks 21 38 --labels 1 2 5 6 8 \\
+        --atlas crl 'FOLDER/HarvardSTA{week}_Study1/parcellation.nii.gz' \\
+        --atlas chinese 'FOLDER/Chinese{week}_Study1/parcellation.nii.gz'
 
 Volumes are those of the given labels. For each pair of atlases, all starts and all
 later weeks up to twelve weeks on, the start's volume times the growth of the other

@@ -2,7 +2,8 @@
 the time step.
 
     ./run python benchmarks/convergence.py --folder FOLDER
-    ./run python benchmarks/convergence.py --folder FOLDER --only quadratic-1.41-1-days --end-week 32
+    ./run python benchmarks/convergence.py --folder FOLDER \\
+        --only quadratic-1.41-1-days --end-week 32
 
 The left half of the shipped atlas brain of 21 GW is folded with the paper's thickness,
 stiffness and growth, the same everywhere, free and in contact with itself, until its

@@ -10,7 +10,8 @@ by hulls, mean distance of the observed surface from this one after rigid alignm
 (mm), r of the shape index (scaled to the observed volume), and crossing faces. The last
 line is one JSON object.
 
-    ./run python benchmarks/explained.py FOLDER RUN BRAIN OBSERVED --companions [--uniform RUN] [--smoothing 5 3]
+    ./run python benchmarks/explained.py FOLDER RUN BRAIN OBSERVED --companions \\
+        [--uniform RUN] [--smoothing 5 3]
 
 compares the run with five companions instead, which an explanation has to beat. For
 each week: r of the shape index and mean distance of the observed surface (mm), after

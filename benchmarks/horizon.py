@@ -1,7 +1,8 @@
 """Measure the accuracy of predictions: brains of one normal atlas, folded with the
 growth of another.
 
-    ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE --write norms/predictions.yaml
+    ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE \\
+        --write norms/predictions.yaml
 
 CRL and CHINESE are the folders with the labels of these two atlases, which are not part
 of gyriflow. Each start brain has its own study in FOLDER; the same command continues
@@ -18,8 +19,8 @@ for intervals.
 its pial and white surfaces, which gyriflow made from its labels; rows then have
 `given`.
 
-    ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE --starts chinese --start-weeks 24 \\
-        --end-week 30 --surfaces
+    ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE \\
+        --starts chinese --start-weeks 24 --end-week 30 --surfaces
 """
 
 import argparse
@@ -59,9 +60,10 @@ MEASURED, SIMULATED = (
     for folder in (f"{BRAIN}/metrics", f"{FOLDED}/metrics/{WEEK}")
 )
 HEAD = """\
-# Accuracy of predictions for brains with a later scan, by start brain and horizon (weeks): distance between the
-# surfaces, r of the shape index, and differences of area, volume, folding (gyrification index - 0.98) and mean sulcal
-# depth as fractions of the observed brain's. By benchmarks/horizon.py.
+# Accuracy of predictions for brains with a later scan, by start brain and horizon
+# (weeks): distance between the surfaces, r of the shape index, and differences of area,
+# volume, folding (gyrification index - 0.98) and mean sulcal depth as fractions of the
+# observed brain's. By benchmarks/horizon.py.
 """
 NOTE = (
     "Volumes of both atlases jump between 24 and 25 GW, and no smooth curve of size"

@@ -1,7 +1,8 @@
 """Find how large an individual difference must be for a prediction to be better than
 the atlas' brain of that week.
 
-    ./run python benchmarks/individuals.py FOLDER --atlas crl CRL --atlas chinese CHINESE --accept-licence
+    ./run python benchmarks/individuals.py FOLDER --accept-licence \\
+        --atlas crl CRL --atlas chinese CHINESE
 
 CRL and CHINESE are the folders of atlases' files. The individuals are synthetic: an
 atlas' labels, deformed by random smooth maps. At the start, `shape` has waves of 40 to

@@ -1,7 +1,8 @@
 """Count warnings of misplaced cortex for unchanged label volumes, and for the same
 volumes with faults.
 
-    ./run python benchmarks/misplaced_cortex.py --weeks 21 38 --atlas cc0 'FOLDER/week{week}_labels.nii.gz' \\
+    ./run python benchmarks/misplaced_cortex.py --weeks 21 38 \\
+        --atlas cc0 'FOLDER/week{week}_labels.nii.gz' \\
         --atlas crl 'FOLDER/HarvardSTA{week}_Study1/parcellation.nii.gz'
 
 Without --atlas, the volumes of the shipped atlas are taken. Labels are those of the

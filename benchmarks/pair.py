@@ -2,7 +2,8 @@
 time steps.
 
     git worktree add ../before 864ee12
-    ./run python benchmarks/pair.py MESH PARAMS --maps MAPS --end-week 22 --out FOLDER --before ../before
+    ./run python benchmarks/pair.py MESH PARAMS --maps MAPS --end-week 22 \\
+        --out FOLDER --before ../before
     ./run python benchmarks/pair.py MESH PARAMS --out FOLDER --tolerances 1e-6 1e-4
     ./run python benchmarks/pair.py MESH PARAMS --out FOLDER --steps 0.5 1
 

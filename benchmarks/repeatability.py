@@ -1,7 +1,8 @@
 """Measure one brain again and again, turned and resampled on another grid of voxels:
 the noise of each number.
 
-    ./run python benchmarks/repeatability.py [--labels FILE --scheme NAME --week W] [--record norms/repeatability.yaml]
+    ./run python benchmarks/repeatability.py [--labels FILE --scheme NAME --week W] \\
+        [--record norms/repeatability.yaml]
 
 The labels, by default of the shipped brain of 29 GW, are resampled at the nearest
 voxel, turned and shifted, and measured as any brain. Printed are the coefficient of

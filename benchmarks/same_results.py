@@ -2,7 +2,8 @@
 leaves its results equal.
 
     ./run python benchmarks/same_results.py BEFORE --run ../before --hemispheres FOLDER
-    ./run python benchmarks/same_results.py BEFORE AFTER --run --hemispheres FOLDER --renamed nearest.csv=closest.csv
+    ./run python benchmarks/same_results.py BEFORE AFTER --run --hemispheres FOLDER \\
+        --renamed nearest.csv=closest.csv
 
 `--run` first runs the studies of `benchmarks/regression` on one core, in a checkout
 (default: this one), into the last folder named. FOLDER holds

@@ -1,9 +1,12 @@
 """Measure the fit of a brain's mesh to the later brains of its series, week by week:
 time, misfit, and elements.
 
-    ./run python benchmarks/series_fit.py FOLDER crl-{week:g} --weeks 23 24 25 --mesh path
-    ./run python benchmarks/series_fit.py FOLDER crl-{week:g} --weeks 23 24 25 --states STATES
-    ./run python benchmarks/series_fit.py FOLDER crl-{week:g} --weeks 23 24 25 --earlier STATES --begin 25
+    ./run python benchmarks/series_fit.py FOLDER crl-{week:g} --weeks 23 24 25 \\
+        --mesh path
+    ./run python benchmarks/series_fit.py FOLDER crl-{week:g} --weeks 23 24 25 \\
+        --states STATES
+    ./run python benchmarks/series_fit.py FOLDER crl-{week:g} --weeks 23 24 25 \\
+        --earlier STATES --begin 25
 
 FOLDER is that of a study with the surfaces and registrations of the brains, and with
 the mesh of the first: that of its simulations, or that of an atlas' path. The weeks

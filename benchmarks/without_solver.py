@@ -2,7 +2,8 @@
 ./run, and compare all numbers.
 
     python3 -m venv plain && plain/bin/pip install .
-    ./run python benchmarks/without_solver.py plain/bin/gyriflow --data ../shared/data --out FOLDER
+    ./run python benchmarks/without_solver.py plain/bin/gyriflow \\
+        --data ../shared/data --out FOLDER
 
 `--checkout` is the checkout whose ./run has the solver (default: this one). In
 622a1dfd, the last commit with the tree of Debian's dolfinx 0.9, modes are computed by

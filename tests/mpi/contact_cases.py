@@ -81,7 +81,7 @@ def test_forces_have_no_sum_and_no_moment():
 @pytest.mark.parametrize(
     "upper", [pytest.param((5, 5, 3), marks=pytest.mark.one_rank), (4, 3, 3)]
 )
-def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance(
+def test_pressed_blocks_have_the_analytic_pressure_and_their_gap_follows_the_distance(
     upper,
 ):
     growth, gaps = 0.2, []

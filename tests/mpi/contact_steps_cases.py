@@ -204,7 +204,7 @@ def test_stress_is_a_rate_where_it_is_forgotten_and_whole_where_it_is_kept(memor
 
 @pytest.mark.slow
 @pytest.mark.one_rank
-def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_the_step():
+def test_forgotten_stress_is_written_as_a_rate_that_does_not_depend_on_the_step():
     rates = []
     for step_s in (86400.0, 43200.0, 21600.0):
         folding, state = pressed(step_s)
@@ -293,7 +293,7 @@ def vertices_pulled_near(gap, count, growth_rate_per_s=0.0):
 
 @pytest.mark.parametrize("count", [1, 2])
 @pytest.mark.parametrize(("gap", "distance_mm"), [(0.5, 0.14), (0.12, 0.03)])
-def test_few_vertices_at_a_hundredth_of_a_mm_are_pressed_apart_and_do_not_set_the_contact_distance(
+def test_a_few_vertices_that_nearly_touch_are_pressed_apart_and_set_no_contact_distance(
     count, gap, distance_mm
 ):
     folding, state = vertices_pulled_near(gap, count)

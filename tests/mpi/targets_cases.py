@@ -295,7 +295,7 @@ def test_elements_that_shrink_fast_are_counted_by_the_day():
 
 
 @pytest.mark.one_rank
-def test_a_known_growth_of_a_body_that_bends_and_twists_is_found_in_the_axes_of_the_tissue():
+def test_known_growth_of_a_body_that_bends_and_twists_is_found_in_the_tissue_s_axes():
     mesh = ellipsoid_mesh(16, (20.0, 24.0, 18.0))
     pieces = linear_pieces(mesh)
 

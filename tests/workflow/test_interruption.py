@@ -60,7 +60,7 @@ def started(workflow, until):
 
 
 @pytest.mark.extended
-def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on_with_the_same_command(
+def test_a_killed_rank_is_reported_as_memory_and_an_interrupted_folding_resumes(
     workflow,
 ):
     # an ellipsoid's
@@ -123,7 +123,9 @@ def test_nothing_of_the_working_directory_is_run_by_a_study(workflow):
 STUBBORN = """
 rule slow:
     output: "slow.txt"
-    shell: "mpiexec -n 2 sleep 600 & (trap '' TERM INT HUP; touch begun; sleep 600); wait"
+    shell:
+        "mpiexec -n 2 sleep 600 &"
+        " (trap '' TERM INT HUP; touch begun; sleep 600); wait"
 """
 
 

@@ -19,7 +19,8 @@ ROOT = Path(__file__).parents[2]
 RUN = ROOT / "run"
 
 PYTHON = r"""#!/bin/bash
-# stands in for Python: notes its arguments, makes a venv that holds itself and one program
+# stands in for Python: notes its arguments, makes a venv that holds itself and one
+# program
 echo "$*" >> "$RECORD"
 case "$*" in
     "-m venv "*)
@@ -29,14 +30,18 @@ case "$*" in
         printf '#!/bin/sh\necho "from the environment: $*"\n' > "$3/bin/tool"
         chmod +x "$3/bin/tool" ;;
     *"pip install"*)
-        if [ -e "$RECORD.fails" ]; then echo "ConnectionError: no such thing"; exit 1; fi
+        if [ -e "$RECORD.fails" ]; then
+            echo "ConnectionError: no such thing"
+            exit 1
+        fi
         sleep "${SECONDS_TO_CREATE:-0}"
         while [ -e "$RECORD.wait" ]; do sleep 0.05; done ;;
 esac
 """
 
 CONDA = r"""#!/bin/bash
-# stands in for conda or micromamba: notes its arguments, makes an environment that holds one program
+# stands in for conda or micromamba: notes its arguments, makes an environment that
+# holds one program
 echo "$*" >> "$RECORD"
 case "$*" in
     *hook*)
@@ -135,8 +140,7 @@ def running(word):
     ]
 
 
-# --- inside an environment
-# -----------------------------------------------------------------------------------
+# --- inside an environment ---------------------------------------------------------
 
 
 def test_arguments_and_exit_code_are_handed_on():
@@ -251,8 +255,7 @@ def test_ranks_under_mpiexec_are_of_one_run():
     assert done.stdout == "2\n2\n", done.stderr
 
 
-# --- the set-up
-# ----------------------------------------------------------------------------------------------
+# --- the set-up --------------------------------------------------------------------
 
 
 def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp_path):

@@ -245,10 +245,9 @@ def _why(reason: str, directory: Path) -> str:
     """Return Snakemake's reason to run a job in words, the first of several."""
     changed, _, files = reason.partition("Updated input files: ")
     if not changed and files.startswith("/"):
-        return (
-            "changed input"
-            f" {', '.join(Path(file).name for file in files.partition(';')[0].split(', '))}"
-        )
+        paths = files.partition(";")[0].split(", ")
+        names = [Path(path).name for path in paths]
+        return f"changed input {', '.join(names)}"
     if reason.startswith("Params have changed"):
         if not CODE_ONLY.search(reason):
             return "changed settings"

@@ -202,12 +202,12 @@ def main() -> None:
 
     \b
     A study, from its data to its report:
-      gyriflow init my-data         write my-data/gyriflow.yaml for the files there
+      gyriflow init my-data    write my-data/gyriflow.yaml for the files there
       cd my-data
-      gyriflow check                check the files; show what will run and how long it takes
-      gyriflow run                  run it; after an interruption, run it again to resume
-      gyriflow status               show the progress (from another terminal)
-      gyriflow view                 open the report
+      gyriflow check           check the files; show what will run and how long it takes
+      gyriflow run             run it; after an interruption, run it again to resume
+      gyriflow status          show the progress (from another terminal)
+      gyriflow view            open the report
 
     \b
     Metrics without simulations, of a folder or a configuration:

@@ -84,7 +84,8 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
 def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, Any]:
     """Return the cffi interface and the library of C code, compiled unless cached;
     collective over the ranks."""
-    name = f"gyriflow_{hashlib.sha256(repr((code, COMPILER_ARGUMENTS)).encode()).hexdigest()[:16]}"
+    content = repr((code, COMPILER_ARGUMENTS)).encode()
+    name = f"gyriflow_{hashlib.sha256(content).hexdigest()[:16]}"
     interface = cffi.FFI()
     interface.cdef(declarations)
     with form_compiler(comm) as options:

@@ -14,8 +14,10 @@ from ..mechanics.materials import Material, energy_code
 from .compilation import compiled, pointer
 from .domain import Domain
 
-DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u, void *H,
-                                 void *weight, void *forces, void *places, void *blocks);"""
+DECLARATION = """
+double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u,
+                void *H, void *weight, void *forces, void *places, void *blocks);
+"""
 
 
 class LinearElements:

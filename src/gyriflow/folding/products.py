@@ -18,12 +18,15 @@ from numpy.typing import NDArray
 from ..geometry.triangles import Floats, Ints
 from .compilation import compiled, pointer
 
-DECLARATION = """void to_single_blocks(long count, void *entries, void *values, void *blocks);
-                 void to_single_vectors(long count, void *x, void *single);
-                 void multiply(long owned, void *ends, void *columns, void *blocks, void *x, void *sums, void *y);
-                 void restrict_to_parts(long count, void *part, void *arms, void *x, void *loads);
-                 void add_motions(long count, void *part, void *arms, void *motions, void *y);
-                 void multiply_blocks(long count, void *blocks, void *x, void *y);"""
+DECLARATION = """
+void to_single_blocks(long count, void *entries, void *values, void *blocks);
+void to_single_vectors(long count, void *x, void *single);
+void multiply(long owned, void *ends, void *columns, void *blocks, void *x, void *sums,
+              void *y);
+void restrict_to_parts(long count, void *part, void *arms, void *x, void *loads);
+void add_motions(long count, void *part, void *arms, void *motions, void *y);
+void multiply_blocks(long count, void *blocks, void *x, void *y);
+"""
 
 
 @cache

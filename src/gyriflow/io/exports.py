@@ -32,7 +32,8 @@ BIDS_VERSION = "1.10.0"
 OF_STUDY = ("participants", "metrics_wide", "metrics_long")
 """Tables of all subjects."""
 IGNORED = """\
-# BIDS has no names for surfaces and the maps on them yet: these are those that its proposal BEP011 has for them
+# BIDS has no names for surfaces and the maps on them yet: these are those that its
+# proposal BEP011 has for them
 *.surf.gii
 *.shape.gii
 {kinds}
@@ -47,15 +48,18 @@ figures
 README = """\
 # gyriflow derivatives
 
-Pial surfaces of fetal brains, maps of folding on them, and simulated brains of later weeks, made by gyriflow {version}.
+Pial surfaces of fetal brains, maps of folding on them, and simulated brains of later
+weeks, made by gyriflow {version}.
 
-- `*_pial.surf.gii`: surfaces, in the world coordinates (RAS+ mm) of the input's volumes; `*_curv.shape.gii` and others:
-  a map with a value at each of their vertices, described with its unit in the file `.json` of its name. Those of a
-  `space-` are at the vertices of the pial surfaces of that subject and session.
-- `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each. `*_dseg.nii.gz` are their labels
-  in the grid of the start's: `dseg.tsv`.
-- `participants.tsv` and `sessions.tsv`: gestational ages in weeks. `metrics_wide.tsv` has a row for each brain,
-  `metrics_long.tsv` one for each number; `metrics_wide.json` has units.
+- `*_pial.surf.gii`: surfaces, in the world coordinates (RAS+ mm) of the input's
+  volumes; `*_curv.shape.gii` and others: a map with a value at each of their vertices,
+  described with its unit in the file `.json` of its name. Those of a `space-` are at
+  the vertices of the pial surfaces of that subject and session.
+- `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each.
+  `*_dseg.nii.gz` are their labels in the grid of the start's: `dseg.tsv`.
+- `participants.tsv` and `sessions.tsv`: gestational ages in weeks. `metrics_wide.tsv`
+  has a row for each brain, `metrics_long.tsv` one for each number; `metrics_wide.json`
+  has units.
 """
 PEOPLE = {
     "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
@@ -265,10 +269,9 @@ def _write_surfaces(
                 named, transformed(read_surface(path), back), STRUCTURES[side], layer
             )
     for side, path in brain.regions.items():
-        _copy(
-            path,
-            f"{prefix}_hemi-{side[0].upper()}{simulated or '_desc-regions'}_dseg.label.gii",
-        )
+        desc = simulated or "_desc-regions"
+        named = f"{prefix}_hemi-{side[0].upper()}{desc}_dseg.label.gii"
+        _copy(path, named)
     return {
         kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"}
         for kind in kinds

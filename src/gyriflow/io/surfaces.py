@@ -175,7 +175,8 @@ def write_surface(
     suffix of `path`."""
     suffix = Path(path).suffix.lower()
     if suffix in (".stl", ".ply", ".obj", ".off"):
-        import trimesh  # takes a second, as pyvista does below, which most readers need not wait for
+        # takes a second, as pyvista does below, which most readers need not wait for
+        import trimesh
 
         body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
         with atomic_write(path) as temporary:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 LEGACY_SURFACE = re.compile(
-    rb"# vtk"
-    rb" DataFile[^\n]*\n[^\n]*\n\s*BINARY\s+DATASET\s+POLYDATA\s+POINTS\s+(\d+)\s+(float|double)\s*?\n"
+    rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*BINARY\s+DATASET\s+POLYDATA"
+    rb"\s+POINTS\s+(\d+)\s+(float|double)\s*?\n"
 )
 LEGACY_POLYGONS = re.compile(rb"\s*POLYGONS\s+(\d+)\s+(\d+)\s*?\n")
 

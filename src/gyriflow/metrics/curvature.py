@@ -157,10 +157,10 @@ def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]
     larger principal curvature.
 
     intrinsic_curvature_index is 1/4π ∫ max(K, 0) dA, 1 for all convex surfaces, and
-    folding_index 1/4π ∫ |k₁|(|k₁| −
-    |k₂|) dA, 0 for a sphere (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102). mean_curvature_norm is the L² norm
-    1/4π ∫ H² dA and gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1
-    for a sphere (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
+    folding_index 1/4π ∫ |k₁|(|k₁| − |k₂|) dA, 0 for a sphere (Van Essen and Drury 1997,
+    J. Neurosci. 17, 7079-7102). mean_curvature_norm is the L² norm 1/4π ∫ H² dA and
+    gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1 for a sphere
+    (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
     """
     smaller, larger = np.sort(np.abs([curvature.maximum, curvature.minimum]), axis=0)
     integrals = {

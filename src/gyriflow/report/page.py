@@ -486,10 +486,8 @@ def quality_verdict(quality: pd.DataFrame) -> str:
         for name in VERDICTS
     }
     brains = f"{len(quality)} brain{'s' if len(quality) > 1 else ''}"
-    return (
-        f"{brains}:"
-        f" {', '.join(f'{counts[name]} {word}' for name, word in words.items() if name in counts)}."
-    )
+    parts = [f"{counts[name]} {word}" for name, word in words.items() if name in counts]
+    return f"{brains}: {', '.join(parts)}."
 
 
 def verdict(
@@ -522,10 +520,9 @@ def verdict(
         *doubts,
         *warnings["message"],
     ]
-    return (
-        f"{sentence}"
-        f" {f'Worst warning: {worst[0].rstrip(".")}.' if worst else 'There were no warnings.'}"
-    )
+    if not worst:
+        return f"{sentence} There were no warnings."
+    return f"{sentence} Worst warning: {worst[0].rstrip('.')}."
 
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:

@@ -36,11 +36,11 @@ class GrowthModel:
     rates
         Growth rates of `folding` that it uses.
     measured
-        What it follows of measured brains; a run that follows the observed brains themselves is `explained`, all others
-        are `predicted`.
+        What it follows of measured brains; a run that follows the observed brains
+        themselves is `explained`, all others are `predicted`.
     sentence
-        Returns its sentence of the methods text for a run (with `parameters` and `growth_of`), given how numbers are
-        written.
+        Returns its sentence of the methods text for a run (with `parameters` and
+        `growth_of`), given how numbers are written.
     has_layers
         Whether cortex and core grow at rates of their own, so that folds depend on the
         elements through the cortex.

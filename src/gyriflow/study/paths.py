@@ -100,8 +100,9 @@ THICKNESS = {
 }
 FILLED_LABELS = f"{BRAIN}/surface/filled.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
-REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
-VARIED_REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}/smoothing-{{smoothing}}.seed-{{seed}}.h5"
+REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}"
+REGISTERED = f"{REGISTRATION}.h5"
+VARIED_REGISTRATION = f"{REGISTRATION}/smoothing-{{smoothing}}.seed-{{seed}}.h5"
 """A registration with a factor of its smoothing, and labels perturbed with a seed (0:
 unchanged)."""
 MESH = {

@@ -61,7 +61,7 @@ def test_cortex_and_inside_have_the_volumes_between_and_within_known_surfaces(
     assert cortex == pytest.approx(volume_ml(whole) - volume_ml(white), rel=0.04)
 
 
-def test_halves_are_joined_at_the_midline_where_they_nearly_touch_and_caps_have_no_cortex():
+def test_halves_that_nearly_touch_are_joined_at_the_midline_and_caps_have_no_cortex():
     whole = octasphere(20.0, 4)
     halves = [TriangleMesh(part.vertices, part.faces) for part in split(whole, 0.0)]
     caps = [

@@ -39,7 +39,7 @@ def ellipsoid_area(a, b, c):
     )
 
 
-def test_an_ellipsoid_has_the_analytic_volume_and_area_and_even_triangles_that_look_outwards():
+def test_an_ellipsoid_has_the_analytic_size_and_even_triangles_that_look_outwards():
     volume = 4 / 3 * np.pi * np.prod(AXES)
     coarse, mesh = (
         shape_surface(AXES, edge_length_mm=edge_mm, noise_mm=0.0)
@@ -60,7 +60,7 @@ def test_an_ellipsoid_has_the_analytic_volume_and_area_and_even_triangles_that_l
     assert np.einsum("ij,ij->i", normals, face_normals(mesh)).min() > 0.9
 
 
-def test_bumps_have_the_height_asked_for_and_the_pattern_of_their_seed_at_any_edge_length():
+def test_bumps_have_the_given_height_and_the_pattern_of_their_seed_at_any_edge_length():
     def heights(edge_mm, seed):
         mesh = shape_surface(
             (40.0, 40.0, 40.0), edge_length_mm=edge_mm, noise_mm=0.2, seed=seed

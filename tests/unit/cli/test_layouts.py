@@ -32,8 +32,10 @@ NIBABIES = "derivatives/nibabies/sub-01/ses-1/anat/sub-01_ses-1"
 DHCP = "derivatives/dhcp/sub-CC00856XX15/ses-3530/anat/sub-CC00856XX15_ses-3530"
 HCP = "100307/{}/100307.@.{}"
 
-
-FETPYPE = "derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"
+FETPYPE = (
+    "derivatives/nesvor_bounti/sub-01/ses-01/anat"
+    "/sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"
+)
 TABLE = "participants.tsv"
 KEEP_ONE = Facts("2 files", "keep one")
 

@@ -46,7 +46,7 @@ def metrics(week, area, hemisphere="whole"):
     )
 
 
-def test_intervals_are_of_the_members_that_reached_a_week_and_say_whether_they_contain_the_observed():
+def test_intervals_of_members_that_reached_a_week_say_if_they_contain_the_observed():
     run = pd.concat([metrics(24.0, 100), metrics(26.0, 120), metrics(28.0, 140)])
     members = pd.concat(
         [

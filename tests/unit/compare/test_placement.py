@@ -213,7 +213,7 @@ def test_sides_are_drawn_together_where_the_brain_is_its_mirror_image():
     assert apart.basis[1].shape[1] == pytest.approx(2 * both.basis[1].shape[1], rel=0.1)
 
 
-def test_intervals_of_symmetric_brains_are_root_two_wider_than_if_sides_were_drawn_by_themselves(
+def test_intervals_of_symmetric_brains_are_root_two_wider_than_with_independent_sides(
     monkeypatch,
 ):
     brain = two_sided(SMOOTH)

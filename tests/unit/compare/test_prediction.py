@@ -98,7 +98,7 @@ def test_simple_predictions_have_the_volume_of_the_target_or_are_taken_as_they_a
     assert np.ptp(np.linalg.norm(own.vertices, axis=1)) > 1.0
 
 
-def test_each_week_and_model_is_compared_with_the_observed_brain_and_baselines_of_its_week():
+def test_each_week_and_model_is_compared_with_its_observed_brain_and_baselines():
     first, second = REAL, bumpy(2)
     larger = TriangleMesh(1.05 * second.vertices, second.faces)
     target = TriangleMesh(1.02 * second.vertices, second.faces)

@@ -163,7 +163,7 @@ def flattened(mesh, share, place=(8.0, 8.0, 5.0)):
 @pytest.mark.parametrize(
     ("share", "is_changed"), [(0.7, False), (0.85, True), (1.1, True)]
 )
-def test_a_displacement_is_smoothed_around_elements_that_lose_most_of_their_volume_and_nowhere_else(
+def test_a_displacement_is_smoothed_only_around_elements_that_lose_most_of_their_volume(
     share, is_changed
 ):
     body, shift, place = ElasticFit(SMALL), np.array([0.3, -0.2, 0.1]), [2.8, 2.8, 1.75]
@@ -185,7 +185,7 @@ def test_a_displacement_is_smoothed_around_elements_that_lose_most_of_their_volu
     assert np.linalg.norm(found - SMALL.vertices - shift, axis=1)[others].max() < 0.5
 
 
-def test_only_elements_that_lose_half_their_volume_are_elastic_and_by_a_limited_stretch():
+def test_only_elements_that_lose_half_their_volume_stretch_and_by_a_limited_amount():
     body = ElasticFit(BALL)
     for share, largest in ((0.35, 0.0), (0.99, 0.5)):
         body.positions_mm = flattened(BALL, share)

@@ -155,7 +155,7 @@ def test_free_growth_of_a_body_is_known():
 
 @pytest.mark.parametrize("share", [0.25, 0.5, 1.0])
 @pytest.mark.parametrize("days", [0.5, 1.0])
-def test_curves_that_bend_are_met_at_output_weeks_by_a_body_that_realises_a_part_of_growth(
+def test_bending_curves_are_met_at_output_weeks_by_a_body_that_realises_part_of_growth(
     share, days
 ):
     """The area of the body grows by two thirds of its volume, and by a share of what
@@ -219,7 +219,7 @@ def test_bounds_leave_the_volume_on_its_curve():
         steered_rates(np.array([0.01, 0.02]), singular, BOUNDS)
 
 
-def test_growth_in_any_direction_is_shown_along_the_surface_across_it_and_by_its_direction():
+def test_growth_is_shown_along_the_surface_across_it_and_by_its_direction():
     # two vertices: one with a normal along z, one with another turned by 40° about x
     turn = rigid(40, 0, 0)[:3, :3]
     first = np.array([[0.02, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, -0.3]])

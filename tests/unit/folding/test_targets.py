@@ -166,7 +166,7 @@ def test_a_path_ends_with_its_last_shape_though_the_step_goes_on():
     assert growth.goal_mm == pytest.approx(1.1 * BODY.vertices, abs=1e-3)
 
 
-def test_an_element_at_most_doubles_in_a_step_and_does_not_grow_where_its_goal_inverts_it():
+def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goal():
     p = parameters_from(RUN)
     tets = (
         np.array([[0, 1, 2, 3], [0, 1, 2, 3], [0, 1, 2, 3]]) + 4 * np.arange(3)[:, None]

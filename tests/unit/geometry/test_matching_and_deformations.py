@@ -155,7 +155,7 @@ def test_diffusion_on_a_sphere_damps_a_harmonic_as_the_heat_equation_does():
     assert smooth[:, 1] == pytest.approx(np.ones(len(z)))
 
 
-def test_diffusion_in_a_bar_spreads_with_the_variance_of_the_gaussian_and_keeps_the_integral():
+def test_diffusion_in_a_bar_has_the_variance_of_the_gaussian_and_keeps_the_integral():
     bar = box_mesh((80, 2, 2), (80.0, 2.0, 2.0))
     peak = (np.abs(bar.vertices[:, 0]) < 0.1).astype(float)
     mass = vertex_sizes(bar.vertices, bar.tets)

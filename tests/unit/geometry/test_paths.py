@@ -182,7 +182,7 @@ def test_the_check_agrees_with_many_points_on_the_way(order):
     )
 
 
-def test_near_an_element_that_would_be_inverted_the_path_is_straight_and_elsewhere_smooth():
+def test_a_path_is_smooth_but_straight_near_an_element_that_would_be_inverted():
     # on the left a layer comes close to the next, fast, before that one moves on; the
     # right end moves late
     mesh = box_mesh((8, 8, 8), (32.0, 32.0, 32.0))

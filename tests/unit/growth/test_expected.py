@@ -362,7 +362,7 @@ def uneven(places, week):
     return (places * (1 + np.array([0.08, 0.12, 0.1]) * (week - 22))) @ turn.T
 
 
-def test_points_keep_their_places_in_an_atlas_that_grows_and_turns_inside_and_outside_of_it():
+def test_points_inside_and_outside_an_atlas_that_grows_and_turns_keep_their_places():
     path = path_of(WEEKS, uneven)
     rng = np.random.default_rng(4)
     points = rng.normal(size=(500, 3))
@@ -392,7 +392,7 @@ def test_ages_are_those_of_all_weeks_of_the_atlas_and_of_its_brains_alone():
     assert path.knots(ages) == pytest.approx(weeks, abs=0.02)
 
 
-def test_an_atlas_resampled_by_size_has_the_volumes_of_its_curve_as_multiples_of_the_mesh():
+def test_an_atlas_resampled_by_size_gives_a_mesh_the_relative_volumes_of_its_curve():
     weeks = np.array([21.0, 22.0, 23.0, 24.0, 25.0])
     # the brain called 23 is as large as one of 22.4
     path = path_of(
@@ -432,7 +432,7 @@ def prediction():
     return predict
 
 
-def test_a_prediction_at_a_week_does_not_depend_on_where_it_ends_or_on_what_else_is_predicted(
+def test_a_prediction_at_a_week_does_not_depend_on_the_end_week_or_further_weeks(
     prediction,
 ):
     _, whole = prediction(26.0)
@@ -487,7 +487,7 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
     assert (cell_sizes(found.positions[3], start.tets) > 0).all()
 
 
-def test_a_brain_is_placed_inside_the_atlas_with_its_boundary_on_the_atlas_and_no_inverted_element():
+def test_a_brain_is_placed_with_its_boundary_on_the_atlas_and_no_inverted_element():
     atlas = ellipsoid_mesh(12, (20.0, 22.0, 20.0))
     places = place_in_atlas(BALL, shift_map(1.0), atlas, ElasticFit)
     boundary, used = boundary_surface(BALL)

@@ -268,7 +268,7 @@ def test_a_given_table_shrinks_only_where_that_is_allowed():
     assert followed_sizes(growth, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
 
 
-def test_parameters_of_a_run_have_the_sizes_that_it_follows_and_the_shapes_that_it_grows_towards():
+def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_towards():
     weeks, surface = [21.0, 22.0], {"fissure_x_mm": 0.5, "side": "left"}
     settings = {
         "growth": MEASURED | {"thickness_mm": "measured"},

@@ -162,7 +162,7 @@ def test_stops_that_round_to_a_week_are_no_stops():
     assert shapes[0].positions == pytest.approx(2 * BALL.vertices)
 
 
-def test_the_tissue_below_is_that_of_the_observed_surface_and_of_the_body_at_the_start():
+def test_tissue_below_is_that_of_the_observed_surface_and_of_the_body_at_the_start():
     """A body's own normals are rough: their errors would add up from week to week."""
     shift = Deformation(
         rigid(shift=(5.0, 0.0, 0.0)), np.zeros((9, 9, 9, 3)), scaling(15.0, -60.0)

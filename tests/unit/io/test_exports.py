@@ -130,10 +130,10 @@ def test_bids_derivatives(tmp_path, brain):
     )
     assert regions == {1: "frontal"}
     wide = (folder / "metrics_wide.tsv").read_text()
-    assert (
-        wide
-        == "participant_id\tsession_id\tbrain\tarea\tdepth\nsub-case1\tn/a\tcase_1\t3.5\tn/a\n"
-    )
+    assert wide.splitlines() == [
+        "participant_id\tsession_id\tbrain\tarea\tdepth",
+        "sub-case1\tn/a\tcase_1\t3.5\tn/a",
+    ]
     assert (folder / "descriptions.tsv").read_text().splitlines()[1] == Facts(
         "desc-runagw2400\t", "run-a", 24
     )

@@ -54,9 +54,11 @@ def in_spaces(path, ball, *systems):
     space, space, matrix)."""
     gifti(path, ball.vertices, ball.faces)
     blocks = "".join(
-        f"<CoordinateSystemTransformMatrix><DataSpace><![CDATA[NIFTI_XFORM_{NAMES[data]}]]></DataSpace>"
+        "<CoordinateSystemTransformMatrix>"
+        f"<DataSpace><![CDATA[NIFTI_XFORM_{NAMES[data]}]]></DataSpace>"
         f"<TransformedSpace><![CDATA[NIFTI_XFORM_{NAMES[to]}]]></TransformedSpace>"
-        f"<MatrixData>{' '.join(map(str, matrix.ravel()))}</MatrixData></CoordinateSystemTransformMatrix>"
+        f"<MatrixData>{' '.join(map(str, matrix.ravel()))}</MatrixData>"
+        "</CoordinateSystemTransformMatrix>"
         for data, to, matrix in systems
     )
     head, points, *rest = path.read_text().split("<DataArray")

@@ -284,7 +284,7 @@ def mesh_in(folder, mesher, gates=GATES):
 
 
 @pytest.mark.parametrize("mesher", MESHERS)
-def test_the_step_of_a_mesher_that_dies_ends_in_three_with_all_that_it_printed_in_the_log(
+def test_the_step_of_a_mesher_that_dies_exits_with_three_and_logs_all_that_it_printed(
     stand_in, tmp_path, capsys, mesher
 ):
     stand_in(

@@ -42,7 +42,7 @@ def torus_and_angle() -> tuple[TriangleMesh, np.ndarray]:
     ("edge_mm", "noise_mm", "bound"),
     [(0.8, 0.0, 0.06), (1.2, 0.0, 0.06), (0.8, 0.05, 0.1)],
 )
-def test_irregular_triangles_of_any_density_give_the_same_curvature_and_noise_is_averaged_out(
+def test_irregular_triangles_of_any_density_give_equal_curvature_and_average_noise_out(
     edge_mm, noise_mm, bound
 ):
     large, small = 14.0, 5.0

@@ -279,9 +279,7 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
         )
 
 
-def test_folds_of_one_wavelength_are_one_band_of_mean_curvature_but_not_of_shape_index() -> (
-    None
-):
+def test_one_wavelength_is_one_band_of_mean_curvature_but_not_of_shape_index() -> None:
     ball = sphere(1.0, 4)
     x, y, _ = ball.vertices.T
     # a harmonic of degree 8, in the middle of B3; B4 has the degrees 11 to 22

@@ -26,7 +26,7 @@ RECORD = {
 MEAN = np.sqrt(2) * np.sqrt(2 / np.pi)
 
 
-def test_noise_of_a_change_is_relative_but_for_signed_metrics_and_not_known_for_regions() -> (
+def test_noise_of_a_change_is_absolute_for_signed_metrics_and_none_for_regions() -> (
     None
 ):
     rows = [

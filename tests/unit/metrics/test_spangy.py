@@ -333,7 +333,7 @@ def uneven(subdivisions: int) -> TriangleMesh:
 
 
 @pytest.mark.parametrize("subdivisions", [4, 5])
-def test_power_of_a_wave_is_its_square_over_the_surface_on_uneven_vertices_and_on_a_copy(
+def test_power_of_a_wave_is_its_squared_integral_on_uneven_vertices_and_on_a_copy(
     subdivisions,
 ) -> None:
     mesh = uneven(subdivisions)

@@ -684,7 +684,7 @@ def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
     assert shown == {False: [0.8, 1.5, 2.25], True: [6.0]}
 
 
-def test_what_a_publication_found_nearest_is_a_line_in_the_panel_of_its_measure_and_week():
+def test_a_published_nearest_value_is_a_line_in_the_panel_of_its_measure_and_week():
     names = ("area", "shape_index_relative_power_B4_weyl")
     rows = [distances({0.8: 2.0, 2.25: 1.0}).assign(measure=name) for name in names]
     found = {

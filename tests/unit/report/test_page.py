@@ -310,7 +310,7 @@ def foretold(weeks: float) -> dict:
     }
 
 
-def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_where_it_is():
+def test_the_report_of_a_prediction_says_what_it_is_how_accurate_and_in_which_files():
     figures = shown("predicted_figure", "weekly_figure", caption="of *all*")
     metrics = pd.concat(
         [METRICS, METRICS[1:2].assign(run="thin", week=29.5, value=210.5)]
@@ -374,7 +374,7 @@ def test_a_prediction_beyond_those_that_were_tried_says_so():
     )
 
 
-def test_the_shipped_worth_of_predictions_is_of_two_starts_or_more_at_each_horizon_beside_simpler_ways():
+def test_shipped_accuracy_has_all_baselines_and_at_least_two_starts_at_each_horizon():
     rows = pd.DataFrame(ACCURACY["rows"])
     assert (rows.groupby("horizon")["start"].nunique() >= 2).all()
     assert not rows.duplicated(["start", "start_week", "horizon", "model"]).any()

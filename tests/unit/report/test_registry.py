@@ -140,7 +140,7 @@ def test_every_function_of_figures_has_the_name_of_an_entry():
     }
 
 
-def test_figures_give_their_function_what_it_takes_and_have_names_for_their_words_and_files():
+def test_figures_give_their_function_its_arguments_and_fill_in_texts_and_file_names():
     found = [figure for study in examples() for figure in study]
     assert {figure.kind.name for figure in found} == {kind.name for kind in KINDS}
     for figure in found:
@@ -185,7 +185,7 @@ def test_the_paper_stands_in_its_own_figures_alone():
     assert published < set(target_files(registry(), "paper"))
 
 
-def test_runs_that_start_alike_have_one_figure_of_their_zones_which_the_paper_alone_asks_for():
+def test_runs_that_start_alike_have_one_figure_of_zones_which_only_the_paper_asks_for():
     figures = registry()
     zones = [
         "results/runs/thin/a/figures/zones.png",

@@ -35,7 +35,7 @@ def metrics(*rows):
     )
 
 
-def test_metrics_of_the_last_common_week_stand_with_the_difference_from_the_measured_brain():
+def test_metrics_of_the_last_common_week_have_a_difference_from_the_measured_brain():
     table = metrics_table(
         metrics(
             ("thin", 22.0, "area", 110.0),
@@ -65,7 +65,7 @@ def test_metrics_of_the_last_common_week_stand_with_the_difference_from_the_meas
     assert table.loc["pial area (cm²)"].tolist()[-2:] == [120.0, "–"]
 
 
-def test_a_predicted_brain_stands_between_its_start_and_the_atlas_own_of_the_nearest_week():
+def test_a_predicted_brain_is_between_its_start_and_the_atlas_brain_nearest_in_week():
     rows = [
         *(
             ("s", "real", 22.4, "area", 100.0),
@@ -187,7 +187,7 @@ def test_runs_table_puts_what_differs_first():
     assert table.loc["contact gap (mm)", "thin"] == "2"
 
 
-def test_parameters_that_one_run_lacks_and_another_leaves_off_are_no_difference_and_curves_have_their_ends():
+def test_an_absent_parameter_equals_one_that_is_off_and_curves_have_their_ends():
     growth = {
         "thickness_mm": None,
         "area_cm2": {"21.0": 89.9166, "23.0": 100.0, "25.25": 143.2723},
@@ -245,7 +245,7 @@ def test_html_is_escaped_and_marks_numbers_and_verdicts():
     assert "<th>brain</th>" in html_table(table.rename_axis("brain"))
 
 
-def test_a_number_of_a_metric_has_its_digits_and_a_metric_that_may_be_negative_no_difference_in_percent():
+def test_metrics_have_their_digits_and_signed_metrics_have_no_difference_in_percent():
     assert [METRICS["area"].text(value) for value in (144.94, 0.00123456, -2.5)] == [
         "144.9",
         "0.001235",

@@ -56,12 +56,14 @@ rule after:
 rerun_on_code_changes(workflow.rules, Path("scripts").absolute())
 know_inputs_by_content(contents, ["content-1"], [])
 remove_stale(workflow.rules, ".")
-print(usage_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
+codes = [getattr(rule.params, "code", None) for rule in workflow.rules]
+print(usage_patterns(workflow.rules), codes)
 """
-SCRIPT = (
-    "import shutil\nfrom gyriflow.units import"
-    " ML_PER_MM3\nshutil.copy(snakemake.input[0], snakemake.output[0])\n"
-)
+SCRIPT = """
+import shutil
+from gyriflow.units import ML_PER_MM3
+shutil.copy(snakemake.input[0], snakemake.output[0])
+"""
 
 
 @pytest.fixture

@@ -173,7 +173,7 @@ def test_what_has_ended_a_program_from_outside_is_told(
     assert recorded_exit_code(run.folder / "code") == code
 
 
-def test_a_step_without_a_message_is_told_with_where_its_own_is_not_by_the_shell_command(
+def test_a_failed_step_without_a_message_names_its_log_and_not_the_shell_command(
     run,
 ):
     run.fail(
@@ -185,7 +185,7 @@ def test_a_step_without_a_message_is_told_with_where_its_own_is_not_by_the_shell
     assert "python" not in run.lines[0]
 
 
-def test_a_hundred_jobs_with_one_warning_and_one_cause_are_three_lines_each_and_a_number(
+def test_a_hundred_equal_warnings_and_failures_are_three_lines_each_and_a_number(
     run,
 ):
     for number in range(100):

@@ -579,7 +579,7 @@ def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
     assert study(brains).simulations["reference", "own22.4"].weeks == (22.4, 23.4, 24)
 
 
-def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_their_files(
+def test_brains_correspond_by_masks_in_their_poses_and_else_in_coordinates_of_files(
     of_two, files
 ):
     start = {
@@ -600,7 +600,7 @@ def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_the
 
 
 @pytest.mark.parametrize("surfaces", ["start", "atlas", "both"])
-def test_brains_without_labels_are_filled_with_a_cortex_that_is_their_own_or_measured_on_a_similar_brain(
+def test_brains_without_labels_are_filled_with_their_own_cortex_or_a_similar_brain_s(
     of_two, files, surfaces
 ):
     names = {

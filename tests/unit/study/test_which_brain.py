@@ -41,7 +41,7 @@ def test_the_adjacent_brain_is_the_latest_before_the_week_that_runs_are_compared
     ]
 
 
-def test_the_observed_brain_of_a_week_is_the_subject_s_own_or_else_the_first_and_never_a_shape():
+def test_the_observed_brain_is_the_subject_s_own_or_else_the_first_and_never_a_shape():
     brains = [
         brain("start", 21, subject="s"),
         sphere("ball", 22),
@@ -281,7 +281,7 @@ def test_a_second_hemisphere_is_of_another_series_norm_and_template(side):
 
 
 @pytest.mark.parametrize(("weeks", "similar"), [((22, 26), "x"), ((21, 23.4), "y")])
-def test_thickness_is_that_of_the_brain_with_labels_nearest_in_week_or_else_with_white_surfaces(
+def test_thickness_is_of_the_brain_nearest_in_week_with_labels_or_else_white_surfaces(
     weeks, similar
 ):
     pial = {"pial": __file__}
