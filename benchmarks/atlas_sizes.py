@@ -1,11 +1,14 @@
-"""Compare how well atlases predict the sizes of other brains at stated ages and at ages by size.
+"""Compare how well atlases predict the sizes of other brains at stated ages and at ages
+by size.
 
-    ./run python benchmarks/atlas_sizes.py --atlas crl 'FOLDER/HarvardSTA{week}_Study1/parcellation.nii.gz' \\
-        --atlas chinese 'FOLDER/Chinese{week}_Study1/parcellation.nii.gz' --weeks 21 38 --labels 1 2 5 6 8
+    ./run python benchmarks/atlas_sizes.py --weeks 21 38 --labels 1 2 5 6 8 \\
+        --atlas crl 'FOLDER/HarvardSTA{week}_Study1/parcellation.nii.gz' \\
+        --atlas chinese 'FOLDER/Chinese{week}_Study1/parcellation.nii.gz'
 
-Volumes are those of the given labels. For each pair of atlases, all starts and all later weeks up to twelve weeks on,
-the start's volume times the growth of the other atlas is compared with the volume observed: mean and largest absolute
-error, and mean error, as fractions. The last line is one JSON object.
+Volumes are those of the given labels. For each pair of atlases, all starts and all
+later weeks up to twelve weeks on, the start's volume times the growth of the other
+atlas is compared with the volume observed: mean and largest absolute error, and mean
+error, as fractions. The last line is one JSON object.
 """
 
 import argparse
@@ -22,38 +25,64 @@ MAX_WEEKS = 12
 
 
 def volumes(pattern: str, weeks: range, labels: list[int]) -> dict[int, float]:
-    """Return the volumes in mL of some labels, by week, in the files that a pattern with {week} names."""
+    """Return the volumes in mL of some labels, by week, in the files that a pattern
+    with {week} names."""
     found = {}
     for week in weeks:
         path = Path(pattern.format(week=week))
         if path.exists():
             volume = read_label_volume(path)
-            found[week] = np.isin(volume.labels, labels).sum() * abs(np.linalg.det(volume.affine[:3, :3])) / 1000
+            found[week] = (
+                np.isin(volume.labels, labels).sum()
+                * abs(np.linalg.det(volume.affine[:3, :3]))
+                / 1000
+            )
     return found
 
 
 def errors(sizes: dict[int, float], observed: dict[int, float]) -> dict[str, float]:
     """Return the errors of volumes predicted by the growth of an atlas' sizes."""
-    pairs = [(a, b) for a in observed for b in observed if 0 < b - a <= MAX_WEEKS and {a, b} <= set(sizes)]
-    ratios = np.array([observed[a] * sizes[b] / sizes[a] / observed[b] - 1 for a, b in pairs])
-    values = {"mean_absolute": np.abs(ratios).mean(), "largest": np.abs(ratios).max(), "mean": ratios.mean()}
-    return {"pairs": len(pairs)} | {name: round(float(value), 3) for name, value in values.items()}
+    pairs = [
+        (a, b)
+        for a in observed
+        for b in observed
+        if 0 < b - a <= MAX_WEEKS and {a, b} <= set(sizes)
+    ]
+    ratios = np.array(
+        [observed[a] * sizes[b] / sizes[a] / observed[b] - 1 for a, b in pairs]
+    )
+    values = {
+        "mean_absolute": np.abs(ratios).mean(),
+        "largest": np.abs(ratios).max(),
+        "mean": ratios.mean(),
+    }
+    return {"pairs": len(pairs)} | {
+        name: round(float(value), 3) for name, value in values.items()
+    }
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--atlas", nargs=2, action="append", required=True, metavar=("NAME", "PATTERN"))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--atlas", nargs=2, action="append", required=True, metavar=("NAME", "PATTERN")
+    )
     parser.add_argument("--weeks", type=int, nargs=2, required=True)
     parser.add_argument("--labels", type=int, nargs="+", required=True)
     arguments = parser.parse_args()
     weeks = range(arguments.weeks[0], arguments.weeks[1] + 1)
-    stated = {name: volumes(pattern, weeks, arguments.labels) for name, pattern in arguments.atlas}
+    stated = {
+        name: volumes(pattern, weeks, arguments.labels)
+        for name, pattern in arguments.atlas
+    }
     by_size = {}
     for name, sizes in stated.items():
         ages = ages_by_size(list(sizes), list(sizes.values()))
         by_size[name] = {week: ages.volume(week) for week in sizes}
     rows = [
-        {"growth": grown_by, "brains": brains, "ages": ages} | errors(sizes[grown_by], stated[brains])
+        {"growth": grown_by, "brains": brains, "ages": ages}
+        | errors(sizes[grown_by], stated[brains])
         for grown_by, brains in permutations(stated, 2)
         if len(set(stated[grown_by]) & set(stated[brains])) > 1
         for ages, sizes in {"stated": stated, "by_size": by_size}.items()

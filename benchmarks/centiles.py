@@ -1,10 +1,13 @@
-"""Measure how many new normal subjects norms call extreme, in cohorts drawn from known curves.
+"""Measure how many new normal subjects norms call extreme, in cohorts drawn from known
+curves.
 
-Of new subjects in the first, an inner and the last week of a norm, 5 % should be below the 5th centile, 5 % above the
-95th and 1 % below the 1st. Prints these shares in per cent by case and number of subjects, then one line of JSON.
+Of new subjects in the first, an inner and the last week of a norm, 5 % should be below
+the 5th centile, 5 % above the 95th and 1 % below the 1st. Prints these shares in per
+cent by case and number of subjects, then one line of JSON.
 
---members scores the subjects of the norms themselves instead, as `measured_scores` does: each against the others. Their
-thirds of the weeks take the place of the three weeks.
+--members scores the subjects of the norms themselves instead, as `measured_scores`
+does: each against the others. Their thirds of the weeks take the place of the three
+weeks.
 """
 
 import argparse
@@ -30,7 +33,8 @@ PLACES = {"first": 0.0, "inner": 0.5, "last": 1.0}
 
 
 def volume(weeks: Floats) -> Floats:
-    """Return a mean volume in mL that grows by Gompertz' law, by 17 % in the first week and 3 % in the last."""
+    """Return a mean volume in mL that grows by Gompertz' law, by 17 % in the first week
+    and 3 % in the last."""
     return 400 * np.exp(-np.exp((25 - weeks) / 9))
 
 
@@ -56,7 +60,8 @@ def uneven_weeks(random: np.random.Generator, subjects: int) -> Floats:
 
 @dataclass(frozen=True)
 class Case:
-    """Values of subjects by week and z, their weeks, and the smallest number of subjects that is asked for."""
+    """Values of subjects by week and z, their weeks, and the smallest number of
+    subjects that is asked for."""
 
     values: Callable[[Floats, Floats], Floats]
     weeks: Callable[[np.random.Generator, int], Floats] = any_week
@@ -73,37 +78,63 @@ CASES = {
     "constant CV": Case(_constant_cv),
     "constant SD": Case(lambda weeks, z: volume(weeks) + 8 * z),
     "spread grows tenfold": Case(
-        lambda weeks, z: 1.02 + 0.5 * sigmoid(weeks) + (0.005 + 0.045 * sigmoid(weeks)) * z, min_subjects=30
+        lambda weeks, z: (
+            1.02 + 0.5 * sigmoid(weeks) + (0.005 + 0.045 * sigmoid(weeks)) * z
+        ),
+        min_subjects=30,
     ),
     "skewed": Case(lambda weeks, z: volume(weeks) * np.exp(0.25 * z)),
-    "signed": Case(lambda weeks, z: 0.1 * (weeks - 29) + (0.5 + 0.05 * (weeks - FIRST)) * z, is_positive=False),
+    "signed": Case(
+        lambda weeks, z: 0.1 * (weeks - 29) + (0.5 + 0.05 * (weeks - FIRST)) * z,
+        is_positive=False,
+    ),
     "whole weeks": Case(_constant_cv, whole_weeks),
     "uneven weeks": Case(_constant_cv, uneven_weeks),
     "two scans": Case(_constant_cv, scans=2),
 }
-"""The cases. Of two scans of a subject, one is any time after the other, and z correlates by 0.8."""
+"""The cases. Of two scans of a subject, one is any time after the other, and z
+correlates by 0.8."""
 
 
-def drawn(case: Case, subjects: int, random: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """Return the weeks, the values and the subjects' numbers of the scans of a cohort."""
+def drawn(
+    case: Case, subjects: int, random: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """Return the weeks, the values and the subjects' numbers of the scans of a
+    cohort."""
     weeks = np.concatenate([case.weeks(random, subjects) for _ in range(case.scans)])
-    own, scan = random.standard_normal((2, subjects)), random.standard_normal(len(weeks))
-    z = np.sqrt(0.8) * np.tile(own[0], case.scans) + np.sqrt(0.2) * scan if case.scans > 1 else own[0]
+    own, scan = (
+        random.standard_normal((2, subjects)),
+        random.standard_normal(len(weeks)),
+    )
+    z = (
+        np.sqrt(0.8) * np.tile(own[0], case.scans) + np.sqrt(0.2) * scan
+        if case.scans > 1
+        else own[0]
+    )
     return weeks, case.values(weeks, z), np.tile(np.arange(subjects), case.scans)
 
 
 def shares(z: Floats) -> Floats:
-    """Return the shares of scores in per cent below the 5th centile, above the 95th and below the 1st."""
+    """Return the shares of scores in per cent below the 5th centile, above the 95th and
+    below the 1st."""
     z = z[np.isfinite(z)]
-    return 100 * np.array([(z <= LIMITS[0]).mean(), (z >= LIMITS[1]).mean(), (z <= LIMITS[2]).mean()])
+    return 100 * np.array(
+        [(z <= LIMITS[0]).mean(), (z >= LIMITS[1]).mean(), (z <= LIMITS[2]).mean()]
+    )
 
 
-def new_subjects(case: Case, subjects: int, cohorts: int, seed: int, beyond: float = 0.0) -> dict[str, list[float]]:
+def new_subjects(
+    case: Case, subjects: int, cohorts: int, seed: int, beyond: float = 0.0
+) -> dict[str, list[float]]:
     """Return the `shares` of new subjects at the places of the norm, mean of cohorts.
 
-    With `beyond`, they are so many weeks before the first and after the last week of the norm.
+    With `beyond`, they are so many weeks before the first and after the last week of
+    the norm.
     """
-    random, found = np.random.default_rng((seed, subjects)), {name: [] for name in PLACES}
+    random, found = (
+        np.random.default_rng((seed, subjects)),
+        {name: [] for name in PLACES},
+    )
     for _ in range(cohorts):
         weeks, values, numbers = drawn(case, subjects, random)
         norm = fit_norm(weeks, values, numbers, is_positive=case.is_positive)
@@ -111,33 +142,62 @@ def new_subjects(case: Case, subjects: int, cohorts: int, seed: int, beyond: flo
             week = weeks.min() + place * np.ptp(weeks) + beyond * np.sign(place - 0.5)
             at = np.full(len(SUBJECT_Z), week)
             found[name].append(shares(norm.scores(at, case.values(at, SUBJECT_Z))[0]))
-    return {name: np.mean(each, axis=0).round(1).tolist() for name, each in found.items()}
+    return {
+        name: np.mean(each, axis=0).round(1).tolist() for name, each in found.items()
+    }
 
 
-def members(case: Case, subjects: int, cohorts: int, seed: int) -> dict[str, list[float]]:
-    """Return the `shares` of the norms' own subjects, each against the others, by third of the weeks."""
+def members(
+    case: Case, subjects: int, cohorts: int, seed: int
+) -> dict[str, list[float]]:
+    """Return the `shares` of the norms' own subjects, each against the others, by third
+    of the weeks."""
     random, found = np.random.default_rng((seed, subjects)), []
     for _ in range(cohorts):
         weeks, values, numbers = drawn(case, subjects, random)
         names = [f"s{scan}" for scan in range(len(weeks))]
-        metric, unit = ("area", "cm2") if case.is_positive else ("mean_shape_index", "1")
-        table = pd.DataFrame({"subject": names, "run": MEASURED, "week": weeks, "hemisphere": "whole"})
-        table = table.assign(metric=metric, value=values, unit=unit, person=[f"p{number}" for number in numbers])
-        found.append(measured_scores(table, names, cohort_norms(table, names))[["week", "z"]])
+        metric, unit = (
+            ("area", "cm2") if case.is_positive else ("mean_shape_index", "1")
+        )
+        table = pd.DataFrame(
+            {"subject": names, "run": MEASURED, "week": weeks, "hemisphere": "whole"}
+        )
+        table = table.assign(
+            metric=metric,
+            value=values,
+            unit=unit,
+            person=[f"p{number}" for number in numbers],
+        )
+        found.append(
+            measured_scores(table, names, cohort_norms(table, names))[["week", "z"]]
+        )
     scores = pd.concat(found)
     third = ((scores["week"] - FIRST) / (LAST - FIRST) * 3).astype(int).clip(0, 2)
-    return {name: shares(scores.loc[third == k, "z"].to_numpy()).round(1).tolist() for k, name in enumerate(PLACES)}
+    return {
+        name: shares(scores.loc[third == k, "z"].to_numpy()).round(1).tolist()
+        for k, name in enumerate(PLACES)
+    }
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--cohorts", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--sizes", type=int, nargs="+", default=SIZES, metavar="N")
-    parser.add_argument("--cases", nargs="+", default=list(CASES), choices=CASES, metavar="CASE")
-    parser.add_argument("--members", action="store_true", help="score the subjects of the norms")
     parser.add_argument(
-        "--beyond", type=float, default=0.0, metavar="GW", help="weeks before the first and after the last week"
+        "--cases", nargs="+", default=list(CASES), choices=CASES, metavar="CASE"
+    )
+    parser.add_argument(
+        "--members", action="store_true", help="score the subjects of the norms"
+    )
+    parser.add_argument(
+        "--beyond",
+        type=float,
+        default=0.0,
+        metavar="GW",
+        help="weeks before the first and after the last week",
     )
     options = parser.parse_args()
     result: dict[str, dict[int, dict[str, list[float]]]] = {}
@@ -145,12 +205,24 @@ def main() -> None:
         case = CASES[name]
         for subjects in (size for size in options.sizes if size >= case.min_subjects):
             arguments = (case, subjects, options.cohorts, options.seed)
-            found = members(*arguments) if options.members else new_subjects(*arguments, options.beyond)
+            found = (
+                members(*arguments)
+                if options.members
+                else new_subjects(*arguments, options.beyond)
+            )
             result.setdefault(name, {})[subjects] = found
             below, above, first = zip(*found.values(), strict=True)
-            wrong = sum(abs(share - 5) > 2.5 for share in (*below, *above)) + sum(share > 2.5 for share in first)
-            parts = ("  ".join(f"{share:5.1f}" for share in part) for part in (below, above, first))
-            print(f"{name:22}{subjects:4}  " + "  |".join(parts) + f"  {'*' * wrong}", flush=True)
+            wrong = sum(abs(share - 5) > 2.5 for share in (*below, *above)) + sum(
+                share > 2.5 for share in first
+            )
+            parts = (
+                "  ".join(f"{share:5.1f}" for share in part)
+                for part in (below, above, first)
+            )
+            print(
+                f"{name:22}{subjects:4}  " + "  |".join(parts) + f"  {'*' * wrong}",
+                flush=True,
+            )
     print(json.dumps({"cohorts": options.cohorts, "shares": result}))
 
 

@@ -1,18 +1,23 @@
-"""Measure how the folds of a brain depend on the mesh, the order of the elements and the time step.
+"""Measure how the folds of a brain depend on the mesh, the order of the elements and
+the time step.
 
     ./run python benchmarks/convergence.py --folder FOLDER
-    ./run python benchmarks/convergence.py --folder FOLDER --only quadratic-1.41-1-days --end-week 32
+    ./run python benchmarks/convergence.py --folder FOLDER \\
+        --only quadratic-1.41-1-days --end-week 32
 
-The left half of the shipped atlas brain of 21 GW is folded with the paper's thickness, stiffness and growth, the same
-everywhere, free and in contact with itself, until its gyrification index is 1.3. Resolution is the number of node
-distances per cortical thickness. Four meshes of quadratic elements and one of linear elements are folded with time
-steps of a day, one of the quadratic ones also with two days. Every run carries the same surface, which
-is measured and compared with that of the finest run at the same material points.
+The left half of the shipped atlas brain of 21 GW is folded with the paper's thickness,
+stiffness and growth, the same everywhere, free and in contact with itself, until its
+gyrification index is 1.3. Resolution is the number of node distances per cortical
+thickness. Four meshes of quadratic elements and one of linear elements are folded with
+time steps of a day, one of the quadratic ones also with two days. Every run carries the
+same surface, which is measured and compared with that of the finest run at the same
+material points.
 
-Runs are done one after another on one rank; finished runs in FOLDER are not repeated. Each run prints a JSON line. The
-last line is one JSON object with `runs`, the values of the finest one and the differences from it (`against_finest`).
-With `--only` some runs are done and nothing is compared: to another `--end-week`, or with another rate of growth of the
-core (`--core-growth`). Give such runs a folder of their own.
+Runs are done one after another on one rank; finished runs in FOLDER are not repeated.
+Each run prints a JSON line. The last line is one JSON object with `runs`, the values of
+the finest one and the differences from it (`against_finest`). With `--only` some runs
+are done and nothing is compared: to another `--end-week`, or with another rate of
+growth of the core (`--core-growth`). Give such runs a folder of their own.
 """
 
 import argparse
@@ -33,10 +38,25 @@ from gyriflow.anatomy.pose import pose_of_hemisphere
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.compare.placement import correlation
 from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
-from gyriflow.geometry.matching import match_points, nearest_on, surface_distance, values_at
+from gyriflow.geometry.matching import (
+    match_points,
+    nearest_on,
+    surface_distance,
+    values_at,
+)
 from gyriflow.geometry.remeshing import remesh
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, finer_surface
-from gyriflow.geometry.triangles import Floats, TriangleMesh, transformed, vertex_areas, vertex_normals
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    finer_surface,
+)
+from gyriflow.geometry.triangles import (
+    Floats,
+    TriangleMesh,
+    transformed,
+    vertex_areas,
+    vertex_normals,
+)
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
@@ -47,7 +67,9 @@ from gyriflow.metrics.measure import folding_metrics, measure_folds, size_metric
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM
 from gyriflow.shipped import ATLASES
 
-LABELS = ATLASES / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
+LABELS = (
+    ATLASES / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
+)
 START_WEEK, END_WEEK, OUTPUTS_A_WEEK = 21.0, 30.0, 2
 CORE_GROWTH_PER_S = 0.8e-7
 END_GI = 1.3
@@ -55,7 +77,8 @@ END_GI = 1.3
 SURFACE_EDGE_MM = 0.6
 """Edge length of the surface that all meshes are made from."""
 MEASURED_EDGE_MM = 1.0
-"""Edge length of the surface that every run carries and that is measured, as in a study."""
+"""Edge length of the surface that every run carries and that is measured, as in a
+study."""
 CORE_FACTOR = 1.6
 """Node distance inside over that at the surface: meshes differ only in scale."""
 ORDERS = {1: "linear", 2: "quadratic"}
@@ -73,26 +96,48 @@ PARAMETERS = {
     "no_growth": {"kind": "none"},
     "fields": ["displacement"],
 }
-COMPARED = "area", "gyrification_index", "mean_curvedness", "mean_sulcal_depth", "sulcal_depth_95", "folding_index"
+COMPARED = (
+    "area",
+    "gyrification_index",
+    "mean_curvedness",
+    "mean_sulcal_depth",
+    "sulcal_depth_95",
+    "folding_index",
+)
 
 
 @cache
 def start_surface() -> TriangleMesh:
     """Return the surface of the hemisphere, closed and outward, in RAS+ mm."""
     volume, scheme = read_label_volume(LABELS), SCHEMES["spina-bifida-atlas"]
-    places = np.stack(np.indices(volume.labels.shape), axis=-1) @ volume.affine[:3, :3].T + volume.affine[:3, 3]
+    places = (
+        np.stack(np.indices(volume.labels.shape), axis=-1) @ volume.affine[:3, :3].T
+        + volume.affine[:3, 3]
+    )
     x = places[..., 0]
     cerebrum_x = x[np.isin(volume.labels, scheme.cerebrum)]
     # shifted by half a voxel, since the middle lies on voxel centres
-    left = np.where(x < (cerebrum_x.min() + cerebrum_x.max()) / 2 - volume.affine[0, 0] / 2, volume.labels, 0)
+    left = np.where(
+        x < (cerebrum_x.min() + cerebrum_x.max()) / 2 - volume.affine[0, 0] / 2,
+        volume.labels,
+        0,
+    )
     cerebrum = read_cerebrum(left, volume.affine, scheme, 0.0)
-    mesh = surface_of_mask(smooth_mask(cerebrum.mask), cerebrum.affine, cerebrum.volume_mm3, SURFACE_EDGE_MM).mesh
-    return transformed(mesh, pose_of_hemisphere(mesh, "left", "auto", of_volume=True).of_file())
+    mesh = surface_of_mask(
+        smooth_mask(cerebrum.mask),
+        cerebrum.affine,
+        cerebrum.volume_mm3,
+        SURFACE_EDGE_MM,
+    ).mesh
+    return transformed(
+        mesh, pose_of_hemisphere(mesh, "left", "auto", of_volume=True).of_file()
+    )
 
 
 @dataclass(frozen=True)
 class Case:
-    """A run: element order, node distances per cortical thickness, and the time step in days."""
+    """A run: element order, node distances per cortical thickness, and the time step in
+    days."""
 
     order: int
     nodes: float
@@ -108,7 +153,14 @@ class Case:
 
 
 FINEST = Case(2, 2.83)
-CASES = (FINEST, Case(2, 1.41), Case(2, 2.0), Case(1, 2.0), Case(2, 2.0, 2.0), Case(2, 2.4))
+CASES = (
+    FINEST,
+    Case(2, 1.41),
+    Case(2, 2.0),
+    Case(1, 2.0),
+    Case(2, 2.0, 2.0),
+    Case(2, 2.4),
+)
 
 
 def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
@@ -127,7 +179,8 @@ def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
 
 @dataclass(frozen=True, eq=False)
 class CarriedSurface:
-    """The measured surface moved by a run, its shape index at the vertices, and its metrics."""
+    """The measured surface moved by a run, its shape index at the vertices, and its
+    metrics."""
 
     surface: TriangleMesh
     shape_index: Floats
@@ -144,12 +197,18 @@ def carry_surface(frames: Path, week: float) -> CarriedSurface:
     """Return the measured surface as a run moved it until a week, with its metrics."""
     start = TetrahedralMesh(read_positions(frames, START_WEEK), read_tets(frames))
     boundary, nodes = boundary_surface(start)
-    before, after, faces = boundary.vertices, read_positions(frames, week)[nodes], boundary.faces.astype(np.int64)
+    before, after, faces = (
+        boundary.vertices,
+        read_positions(frames, week)[nodes],
+        boundary.faces.astype(np.int64),
+    )
     if start.order == 2:
         matrix, faces = finer_surface(faces)
         before, after = matrix @ before, matrix @ after
     mesh = measured_surface()
-    match = match_points(mesh.vertices, vertex_normals(mesh), TriangleMesh(before, faces))
+    match = match_points(
+        mesh.vertices, vertex_normals(mesh), TriangleMesh(before, faces)
+    )
     surface = TriangleMesh(mesh.vertices + values_at(match, after - before), mesh.faces)
     side = measure_folds(surface, CURVATURE_RADIUS_MM)
     metrics = size_metrics(surface) | folding_metrics([side])
@@ -166,20 +225,31 @@ def mesh_file(folder: Path, case: Case) -> Path:
 
 
 def fold(mesh: Path, out: Path, parameters: dict[str, Any]) -> dict[str, Any]:
-    """Run a simulation on one rank unless it is finished, and return its summary. Interrupted runs are resumed."""
+    """Run a simulation on one rank unless it is finished, and return its summary.
+    Interrupted runs are resumed."""
     if not (out / "summary.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         write_yaml(out / "params.yaml", parameters)
-        program = [sys.executable, "-m", "gyriflow.folding", str(mesh), "--params", str(out / "params.yaml")]
+        program = [
+            sys.executable,
+            "-m",
+            "gyriflow.folding",
+            str(mesh),
+            "--params",
+            str(out / "params.yaml"),
+        ]
         with (out / "log").open("w") as log:
-            done = subprocess.run([*program, "--out", str(out)], stdout=log, stderr=log, check=False)
+            done = subprocess.run(
+                [*program, "--out", str(out)], stdout=log, stderr=log, check=False
+            )
         if done.returncode != 0:
             raise SystemExit(f"{out} failed: see its log")
     return read_json(out / "summary.json")
 
 
 def parameters_until(end_week: float, core_growth_per_s: float) -> dict[str, Any]:
-    """Return the parameters of runs to a week, with the growth of the core, without a time step."""
+    """Return the parameters of runs to a week, with the growth of the core, without a
+    time step."""
     n_outputs = int((end_week - START_WEEK) * OUTPUTS_A_WEEK) + 1
     weeks = np.linspace(START_WEEK, end_week, n_outputs).tolist()
     return PARAMETERS | {
@@ -189,26 +259,48 @@ def parameters_until(end_week: float, core_growth_per_s: float) -> dict[str, Any
     }
 
 
-def runs_of_cases(folder: Path, cases: Sequence[Case], parameters: dict[str, Any]) -> list[dict[str, Any]]:
+def runs_of_cases(
+    folder: Path, cases: Sequence[Case], parameters: dict[str, Any]
+) -> list[dict[str, Any]]:
     """Fold all cases, and return the size and cost of each run."""
     rows = []
     for case in cases:
         mesh = mesh_file(folder / "meshes", case)
-        summary = fold(mesh, folder / "runs" / case.name, parameters | {"step_s": case.step_days * DAY_S})
+        summary = fold(
+            mesh,
+            folder / "runs" / case.name,
+            parameters | {"step_s": case.step_days * DAY_S},
+        )
         nodes = len(read_tetrahedral_mesh(mesh).vertices)
-        rows.append({"run": case.name, "nodes": nodes, **{key: summary[key] for key in summary if key != "weeks"}})
+        rows.append(
+            {
+                "run": case.name,
+                "nodes": nodes,
+                **{key: summary[key] for key in summary if key != "weeks"},
+            }
+        )
         print(json.dumps(rows[-1]), flush=True)
     return rows
 
 
-def difference(run: CarriedSurface, reference: CarriedSurface, start: CarriedSurface) -> dict[str, float]:
-    """Return how a run differs from a reference: material points and surfaces (mm), shape index, metrics (relative)."""
+def difference(
+    run: CarriedSurface, reference: CarriedSurface, start: CarriedSurface
+) -> dict[str, float]:
+    """Return how a run differs from a reference: material points and surfaces (mm),
+    shape index, metrics (relative)."""
     areas = vertex_areas(reference.surface)
     gaps = without_rigid_motion(reference.surface.vertices, run.surface.vertices, areas)
-    displacements = without_rigid_motion(start.surface.vertices, reference.surface.vertices, areas)
-    aligned = transformed(run.surface, rigid_fit(run.surface.vertices, reference.surface.vertices, areas))
+    displacements = without_rigid_motion(
+        start.surface.vertices, reference.surface.vertices, areas
+    )
+    aligned = transformed(
+        run.surface, rigid_fit(run.surface.vertices, reference.surface.vertices, areas)
+    )
     pairs = ((aligned, reference.surface), (reference.surface, aligned))
-    distances = [(nearest_on(source.vertices, target)[0], vertex_areas(source)) for source, target in pairs]
+    distances = [
+        (nearest_on(source.vertices, target)[0], vertex_areas(source))
+        for source, target in pairs
+    ]
     distance, distance95 = surface_distance(distances)
 
     def rms(vectors: Floats) -> float:
@@ -226,25 +318,46 @@ def difference(run: CarriedSurface, reference: CarriedSurface, start: CarriedSur
 
 
 def against_finest(folder: Path) -> dict[str, Any]:
-    """Return how all runs differ from the finest one, in the first week when that reaches `END_GI`."""
+    """Return how all runs differ from the finest one, in the first week when that
+    reaches `END_GI`."""
     frames = {case: folder / "runs" / case.name / "frames.h5" for case in CASES}
     start = carry_surface(frames[FINEST], START_WEEK)
     for week in read_weeks(frames[FINEST]):
         exact = carry_surface(frames[FINEST], week)
         if exact.values["gyrification_index"] >= END_GI:
             break
-    values = {"week": week} | {name: exact.values[name] for name in (*COMPARED, "crossing_faces")}
-    cases = [case for case in CASES if case is not FINEST and week in read_weeks(frames[case])]
-    rows = [{"run": case.name} | difference(carry_surface(frames[case], week), exact, start) for case in cases]
+    values = {"week": week} | {
+        name: exact.values[name] for name in (*COMPARED, "crossing_faces")
+    }
+    cases = [
+        case
+        for case in CASES
+        if case is not FINEST and week in read_weeks(frames[case])
+    ]
+    rows = [
+        {"run": case.name} | difference(carry_surface(frames[case], week), exact, start)
+        for case in cases
+    ]
     return {"finest": {"run": FINEST.name} | values, "against_finest": rows}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, required=True, help="folder of meshes and runs")
-    parser.add_argument("--only", nargs="+", choices=[case.name for case in CASES], help="runs that are done")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--folder", type=Path, required=True, help="folder of meshes and runs"
+    )
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=[case.name for case in CASES],
+        help="runs that are done",
+    )
     parser.add_argument("--end-week", type=float, default=END_WEEK)
-    parser.add_argument("--core-growth", type=float, default=CORE_GROWTH_PER_S, help="rate (1/s)")
+    parser.add_argument(
+        "--core-growth", type=float, default=CORE_GROWTH_PER_S, help="rate (1/s)"
+    )
     arguments = parser.parse_args()
     folder = arguments.folder
     parameters = parameters_until(arguments.end_week, arguments.core_growth)

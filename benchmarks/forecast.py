@@ -1,10 +1,12 @@
-"""Compare the forecast of `gyriflow check` with the time that the steps of a finished study took.
+"""Compare the forecast of `gyriflow check` with the time that the steps of a finished
+study took.
 
     ./run python benchmarks/forecast.py CONFIG [FOLDER]
 
-CONFIG is the study's configuration, FOLDER its working directory (by default that of CONFIG). For each stage: jobs, and
-the processor time of all of them as forecast and as the steps have recorded it (s), with child processes and all ranks.
-The last line is one JSON object, with `ratio`: the forecast of all steps over what they took.
+CONFIG is the study's configuration, FOLDER its working directory (by default that of
+CONFIG). For each stage: jobs, and the processor time of all of them as forecast and as
+the steps have recorded it (s), with child processes and all ranks. The last line is one
+JSON object, with `ratio`: the forecast of all steps over what they took.
 """
 
 import argparse
@@ -29,7 +31,8 @@ PLACE = re.compile(
     r"results/(?:brains/(?P<brain>[^/]+)|runs/(?P<run>[^/]+)/(?P<start>[^/]+)|study|report)/"
     r"(?:metrics/)?(?:week-(?P<week>[^/]+)/)?(?:.*/)?benchmarks/(?P<name>.+)\.tsv"
 )
-"""The record of a step: the brain, or the run and its start brain, the week, and the rule with further wildcards."""
+"""The record of a step: the brain, or the run and its start brain, the week, and the
+rule with further wildcards."""
 
 
 class Step(NamedTuple):
@@ -56,7 +59,11 @@ def finished_steps(study: Study) -> Iterator[Step]:
             wildcards |= pair_in(names, study)
         if rule == "targets":
             wildcards["origin"] = names
-            rule = "predicted_targets" if study.chains[wildcards["brain"], names].path else rule
+            rule = (
+                "predicted_targets"
+                if study.chains[wildcards["brain"], names].path
+                else rule
+            )
         cpu_s = float(pd.read_csv(path, sep="\t")["cpu_s"].iloc[0])
         yield Step(rule, wildcards, cpu_s)
 
@@ -71,7 +78,9 @@ def pair_in(names: str, study: Study) -> dict[str, str]:
 
 def main() -> None:
     """Print the table and the JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("config", type=Path)
     parser.add_argument("folder", type=Path, nargs="?")
     arguments = parser.parse_args()
@@ -81,14 +90,25 @@ def main() -> None:
         rows = []
         for step in finished_steps(study):
             forecast_s = job_seconds(study, step.rule, step.wildcards)
-            rows.append({"stage": step.rule, "jobs": 1, "forecast_s": forecast_s, "taken_s": step.cpu_s})
+            rows.append(
+                {
+                    "stage": step.rule,
+                    "jobs": 1,
+                    "forecast_s": forecast_s,
+                    "taken_s": step.cpu_s,
+                }
+            )
     table = pd.DataFrame(rows).groupby("stage", as_index=False).sum()
     table["ratio"] = table["forecast_s"] / table["taken_s"]
     table = table.sort_values("taken_s", ascending=False)
     whole = table[["jobs", "forecast_s", "taken_s"]].sum()
     ratio = whole["forecast_s"] / whole["taken_s"]
     print(table.to_string(index=False, float_format="%.3g"))
-    print(json.dumps({"stages": table.to_dict("records"), **whole.to_dict(), "ratio": ratio}))
+    print(
+        json.dumps(
+            {"stages": table.to_dict("records"), **whole.to_dict(), "ratio": ratio}
+        )
+    )
 
 
 if __name__ == "__main__":

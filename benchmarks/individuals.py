@@ -1,21 +1,26 @@
-"""Find how large an individual difference must be for a prediction to be better than the atlas' brain of that week.
+"""Find how large an individual difference must be for a prediction to be better than
+the atlas' brain of that week.
 
-    ./run python benchmarks/individuals.py FOLDER --atlas crl CRL --atlas chinese CHINESE --accept-licence
+    ./run python benchmarks/individuals.py FOLDER --accept-licence \\
+        --atlas crl CRL --atlas chinese CHINESE
 
-CRL and CHINESE are the folders of atlases' files. The individuals are synthetic: an atlas' labels, deformed by random
-smooth maps. At the start, `shape` has waves of 40 to 60 mm and `sulci` of 15 to 25 mm; their size is the root mean
-square displacement (mm) in the start brain's cerebrum. Maps follow the brain's centre and its lengths along three axes
-over the weeks, so the individual difference is `kept`; or it is `fading` as e^(−weeks/8), and another one of the same
-size replaces it.
+CRL and CHINESE are the folders of atlases' files. The individuals are synthetic: an
+atlas' labels, deformed by random smooth maps. At the start, `shape` has waves of 40 to
+60 mm and `sulci` of 15 to 25 mm; their size is the root mean square displacement (mm)
+in the start brain's cerebrum. Maps follow the brain's centre and its lengths along
+three axes over the weeks, so the individual difference is `kept`; or it is `fading` as
+e^(−weeks/8), and another one of the same size replaces it.
 
-The start brains are predicted with the growth of their atlas, without the synthetic later brains, and rigidly aligned
-with these. Models are the `atlas`' own brain of the week scaled to the predicted volume and, for values of
-DIFFERENCE_SMOOTHING_MM and FADING_GW, the predicted shape before a body follows it, at stated weeks: e.g. `8 mm 1 GW`,
-or `0 mm` without fading. The values with the best r on the individuals with odd seeds are reported on those with even
-seeds. The map of an individual depends on its kind and seed only.
+The start brains are predicted with the growth of their atlas, without the synthetic
+later brains, and rigidly aligned with these. Models are the `atlas`' own brain of the
+week scaled to the predicted volume and, for values of DIFFERENCE_SMOOTHING_MM and
+FADING_GW, the predicted shape before a body follows it, at stated weeks: e.g. `8 mm 1
+GW`, or `0 mm` without fading. The values with the best r on the individuals with odd
+seeds are reported on those with even seeds. The map of an individual depends on its
+kind and seed only.
 
-The last line is one JSON object: `rows` with `grown_by`, `persistence`, `individual`, `horizon` (GW), `model`,
-`distance_mm`, `r_shape_index`.
+The last line is one JSON object: `rows` with `grown_by`, `persistence`, `individual`,
+`horizon` (GW), `model`, `distance_mm`, `r_shape_index`.
 """
 
 import argparse
@@ -36,7 +41,11 @@ from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh
-from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, expected_positions
+from gyriflow.growth.expected import (
+    DIFFERENCE_SMOOTHING_MM,
+    FADING_GW,
+    expected_positions,
+)
 from gyriflow.growth.series_shapes import follow_series
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
@@ -51,44 +60,88 @@ MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
 KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
 FULL, DEFAULT = "0 mm", f"{DIFFERENCE_SMOOTHING_MM:g} mm {FADING_GW:g} GW"
-MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
+MESH_SETTINGS = {
+    "order": 1,
+    "mesher": "tetgen",
+    "surface_edge_mm": 1.3,
+    "core_edge_mm": 3,
+}
 # a coarse mesh of a detailed surface has flat elements
 MESH_SETTINGS |= {"max_surface_distance_mm": 0.5}
-INDIVIDUALS = ["shape-1-1", "sulci-1-2", "shape-2-2", "sulci-2-1", "shape-4-1", "shape-4-2"]
+INDIVIDUALS = [
+    "shape-1-1",
+    "sulci-1-2",
+    "shape-2-2",
+    "sulci-2-1",
+    "shape-4-1",
+    "shape-4-2",
+]
 
 
 def velocity(kind: str, seed: int, points: Floats) -> Floats:
     """Return a random smooth field at (n, 3) points in mm, (n, 3)."""
     random = np.random.default_rng([seed, list(WAVES_MM).index(kind)])
     waves = random.normal(size=(3, MODES))
-    waves *= 2 * np.pi / random.uniform(*WAVES_MM[kind], MODES) / np.linalg.norm(waves, axis=0)
-    return np.asarray(np.cos(points @ waves + random.uniform(0, 2 * np.pi, MODES)) @ random.normal(size=(MODES, 3)))
+    waves *= (
+        2
+        * np.pi
+        / random.uniform(*WAVES_MM[kind], MODES)
+        / np.linalg.norm(waves, axis=0)
+    )
+    return np.asarray(
+        np.cos(points @ waves + random.uniform(0, 2 * np.pi, MODES))
+        @ random.normal(size=(MODES, 3))
+    )
 
 
 def cerebrum_of(volume: LabelVolume, scheme: str) -> tuple[Floats, Floats, Floats]:
-    """Return the cerebrum's centre, its standard deviations along the axes, and its (n, 3) centred voxels, in mm."""
-    points = transform_points(np.argwhere(np.isin(volume.labels, SCHEMES[scheme].cerebrum)), volume.affine)
+    """Return the cerebrum's centre, its standard deviations along the axes, and its (n,
+    3) centred voxels, in mm."""
+    points = transform_points(
+        np.argwhere(np.isin(volume.labels, SCHEMES[scheme].cerebrum)), volume.affine
+    )
     return points.mean(axis=0), points.std(axis=0), points - points.mean(axis=0)
 
 
-def deformed(volume: LabelVolume, start: LabelVolume, scheme: str, name: str, share: float) -> LabelVolume:
-    """Return the labels of an individual KIND-SIZE-SEED with a share of its individual difference at the start."""
+def deformed(
+    volume: LabelVolume, start: LabelVolume, scheme: str, name: str, share: float
+) -> LabelVolume:
+    """Return the labels of an individual KIND-SIZE-SEED with a share of its individual
+    difference at the start."""
     kind, size, seed = name.split("-")
-    (centre, lengths, _), (_, start_lengths, cerebrum) = cerebrum_of(volume, scheme), cerebrum_of(start, scheme)
+    (centre, lengths, _), (_, start_lengths, cerebrum) = (
+        cerebrum_of(volume, scheme),
+        cerebrum_of(start, scheme),
+    )
     parts = []
     for part, number in ((share, int(seed)), (np.sqrt(1 - share**2), int(seed) + 1000)):
         rms = np.sqrt((velocity(kind, number, cerebrum[::20]) ** 2).sum(axis=1).mean())
         parts.append((part * float(size) / rms / FLOW_STEPS, number))
     labels, affine = np.pad(volume.labels, PAD), volume.affine.copy()
     affine[:3, 3] -= affine[:3, :3].sum(axis=1) * PAD
-    grid = np.stack(np.meshgrid(*(np.arange(0, n + COARSE, COARSE) for n in labels.shape), indexing="ij"))
-    points = began = (transform_points(grid.reshape(3, -1).T, affine) - centre) * start_lengths / lengths
+    grid = np.stack(
+        np.meshgrid(
+            *(np.arange(0, n + COARSE, COARSE) for n in labels.shape), indexing="ij"
+        )
+    )
+    points = began = (
+        (transform_points(grid.reshape(3, -1).T, affine) - centre)
+        * start_lengths
+        / lengths
+    )
     # a flow is one-to-one at any size
     for _ in range(FLOW_STEPS):
-        points = points + sum(factor * velocity(kind, number, points) for factor, number in parts if factor)
+        points = points + sum(
+            factor * velocity(kind, number, points)
+            for factor, number in parts
+            if factor
+        )
     moved = (points - began) * lengths / start_lengths @ np.linalg.inv(affine[:3, :3]).T
     index = np.indices(labels.shape, dtype=np.float64)
-    index += [map_coordinates(axis.reshape(grid.shape[1:]), index / COARSE, order=1) for axis in moved.T]
+    index += [
+        map_coordinates(axis.reshape(grid.shape[1:]), index / COARSE, order=1)
+        for axis in moved.T
+    ]
     largest, result = np.zeros(labels.shape, np.float32), np.zeros_like(labels)
     for label in np.unique(labels):
         weight = map_coordinates((labels == label).astype(np.float32), index, order=1)
@@ -96,20 +149,34 @@ def deformed(volume: LabelVolume, start: LabelVolume, scheme: str, name: str, sh
     return LabelVolume(result, affine)
 
 
-def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float, dict[str, TriangleMesh]]:
+def targets_of(
+    folder: Path, brain: str, atlas: dict[float, str]
+) -> dict[float, dict[str, TriangleMesh]]:
     """Return the targets of a start brain along the brains of an atlas, by week."""
     chain = [brain, *atlas.values()]
     mesh = read_tetrahedral_mesh(folder / MESH["mesh"].format(brain=brain))
-    poses = [read_pose(folder / PIAL["report"].format(brain=name)).world for name in chain]
-    registered = [folder / REGISTERED.format(earlier=earlier, later=later) for earlier, later in pairwise(chain)]
-    pairs = [
-        between_moved(read_correspondence(file), *pair) for file, pair in zip(registered, pairwise(poses), strict=True)
+    poses = [
+        read_pose(folder / PIAL["report"].format(brain=name)).world for name in chain
     ]
-    surfaces = [read_surface(folder / PIAL["whole"].format(brain=name)) for name in chain[1:]]
+    registered = [
+        folder / REGISTERED.format(earlier=earlier, later=later)
+        for earlier, later in pairwise(chain)
+    ]
+    pairs = [
+        between_moved(read_correspondence(file), *pair)
+        for file, pair in zip(registered, pairwise(poses), strict=True)
+    ]
+    surfaces = [
+        read_surface(folder / PIAL["whole"].format(brain=name)) for name in chain[1:]
+    ]
     weeks, start = sorted(atlas), min(atlas)
-    carried = follow_series(mesh, [start, *weeks], pairs, surfaces, open_sulci=True).positions[1:]
+    carried = follow_series(
+        mesh, [start, *weeks], pairs, surfaces, open_sulci=True
+    ).positions[1:]
     places = {
-        smoothing: expected_positions(mesh, start, carried, weeks, weeks[1:], smoothing_mm=smoothing)
+        smoothing: expected_positions(
+            mesh, start, carried, weeks, weeks[1:], smoothing_mm=smoothing
+        )
         for smoothing in (0.0, *dict(GRID))
     }
     (boundary, used), unsmoothed = boundary_surface(mesh), places[0.0]
@@ -118,27 +185,57 @@ def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float,
         shapes = {FULL: unsmoothed[number]}
         for smoothing, fading in GRID if week > start else []:
             # linear in the faded part of the finer differences
-            faded, faded_by_default = (-np.expm1((start - week) / time) for time in (fading, FADING_GW))
+            faded, faded_by_default = (
+                -np.expm1((start - week) / time) for time in (fading, FADING_GW)
+            )
             change = places[smoothing][number] - unsmoothed[number]
-            shapes[f"{smoothing:g} mm {fading:g} GW"] = unsmoothed[number] + faded / faded_by_default * change
-        result[week] = {name: TriangleMesh(points[used], boundary.faces) for name, points in shapes.items()}
+            shapes[f"{smoothing:g} mm {fading:g} GW"] = (
+                unsmoothed[number] + faded / faded_by_default * change
+            )
+        result[week] = {
+            name: TriangleMesh(points[used], boundary.faces)
+            for name, points in shapes.items()
+        }
     return result
 
 
-def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int]) -> list[dict[str, Any]]:
-    """Return the distances and correlations of all models of an individual, with both persistences."""
+def scores_of(
+    folder: Path, name: str, atlas: str, weeks: Sequence[int]
+) -> list[dict[str, Any]]:
+    """Return the distances and correlations of all models of an individual, with both
+    persistences."""
     start, rows = weeks[0], []
     brain = f"{name}-kept-{start}"
-    targets = targets_of(folder, brain, {float(week): f"{atlas}-{week}" for week in range(start, weeks[-1] + 1)})
+    targets = targets_of(
+        folder,
+        brain,
+        {float(week): f"{atlas}-{week}" for week in range(start, weeks[-1] + 1)},
+    )
     for persistence, week in product(KEPT_GW, weeks[1:]):
-        observed = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{persistence}-{week}"))
-        atlas_brain = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
-        models = targets[week] | {"atlas": scale_to_volume(atlas_brain, targets[week][DEFAULT])}
+        observed = read_surface(
+            folder / PIAL["whole"].format(brain=f"{name}-{persistence}-{week}")
+        )
+        atlas_brain = read_surface(
+            folder / PIAL["whole"].format(brain=f"{atlas}-{week}")
+        )
+        models = targets[week] | {
+            "atlas": scale_to_volume(atlas_brain, targets[week][DEFAULT])
+        }
         folds = prepare_for_comparison(observed, observed)
         for model, surface in models.items():
-            row = {"grown_by": atlas, "persistence": persistence, "individual": name, "horizon": week - start}
-            row |= {"model": model, "distance_mm": aligned_distances(surface, observed)["distance_mm"]}
-            rows.append(row | {"r_shape_index": r_shape_index(surface, observed, folds)})
+            row = {
+                "grown_by": atlas,
+                "persistence": persistence,
+                "individual": name,
+                "horizon": week - start,
+            }
+            row |= {
+                "model": model,
+                "distance_mm": aligned_distances(surface, observed)["distance_mm"],
+            }
+            rows.append(
+                row | {"r_shape_index": r_shape_index(surface, observed, folds)}
+            )
     return rows
 
 
@@ -151,7 +248,11 @@ def print_chosen(scores: pd.DataFrame) -> None:
     grid = scores["model"].str.endswith(" GW")
     means = scores[odd & grid].groupby("model")[["r_shape_index", "distance_mm"]].mean()
     best = means["r_shape_index"].idxmax()
-    print(f"best r of shape index for odd seeds: {best}", means.to_string(float_format="%.3f"), sep="\n")
+    print(
+        f"best r of shape index for odd seeds: {best}",
+        means.to_string(float_format="%.3f"),
+        sep="\n",
+    )
     even_scores = scores[~odd & scores["model"].isin([best, DEFAULT, "atlas"])]
     print("for even seeds:")
     rows = ["grown_by", "persistence", "individual", "horizon"]
@@ -159,42 +260,80 @@ def print_chosen(scores: pd.DataFrame) -> None:
     print(table.to_string(float_format="%.3f"))
 
 
-def run_study(folder: Path, atlas: str, files: Path, arguments: argparse.Namespace) -> None:
-    """Deform an atlas' labels into individuals, and run the workflow for the files that are compared."""
-    weeks, series = sorted(arguments.weeks), read_keys(ATLASES / atlas / "atlas.yaml")["series"]["normative"]
-    start, scheme, growing = weeks[0], series["scheme"], list(range(weeks[0], weeks[-1] + 1))
+def run_study(
+    folder: Path, atlas: str, files: Path, arguments: argparse.Namespace
+) -> None:
+    """Deform an atlas' labels into individuals, and run the workflow for the files that
+    are compared."""
+    weeks, series = (
+        sorted(arguments.weeks),
+        read_keys(ATLASES / atlas / "atlas.yaml")["series"]["normative"],
+    )
+    start, scheme, growing = (
+        weeks[0],
+        series["scheme"],
+        list(range(weeks[0], weeks[-1] + 1)),
+    )
     folder.mkdir(parents=True, exist_ok=True)
-    paths = {week: files / series["files"]["labels"].format(week=week) for week in weeks}
-    volumes = {week: read_label_volume(path, cropped=True) for week, path in paths.items()}
+    paths = {
+        week: files / series["files"]["labels"].format(week=week) for week in weeks
+    }
+    volumes = {
+        week: read_label_volume(path, cropped=True) for week, path in paths.items()
+    }
     brains = []
     for name, persistence, week in product(arguments.individuals, KEPT_GW, weeks):
         if persistence == "kept" or week > start:
             path = folder / f"{name}-{persistence}-{week}.nii.gz"
             share = float(np.exp((start - week) / KEPT_GW[persistence]))
             if not path.exists():
-                write_label_volume(path, deformed(volumes[week], volumes[start], scheme, name, share))
-            brain = {"id": path.name[:-7], "week": week, "subject": f"{name}-{persistence}", "population": "synthetic"}
+                write_label_volume(
+                    path, deformed(volumes[week], volumes[start], scheme, name, share)
+                )
+            brain = {
+                "id": path.name[:-7],
+                "week": week,
+                "subject": f"{name}-{persistence}",
+                "population": "synthetic",
+            }
             brains.append(brain | {"labels": str(path), "scheme": scheme})
     starts = [f"{name}-kept-{start}" for name in arguments.individuals]
     accepted, chain = arguments.accept_licence, [f"{atlas}-{week}" for week in growing]
     config = {
-        "atlas": {"name": atlas, "folder": str(files), "weeks": growing, "accept_licence": accepted},
+        "atlas": {
+            "name": atlas,
+            "folder": str(files),
+            "weeks": growing,
+            "accept_licence": accepted,
+        },
         "brains": brains,
         "growth": {"brains": {"atlas": chain}},
         "start": starts,
         "mesh": MESH_SETTINGS,
-        "folding": {"preset": "expected", "end_week": weeks[-1], "output_every_gw": 4, "ranks": 1},
+        "folding": {
+            "preset": "expected",
+            "end_week": weeks[-1],
+            "output_every_gw": 4,
+            "ranks": 1,
+        },
         "runs": {"expected": {}},
     }
-    made = [PIAL["whole"].format(brain=brain) for brain in [*chain, *(brain["id"] for brain in brains)]]
+    made = [
+        PIAL["whole"].format(brain=brain)
+        for brain in [*chain, *(brain["id"] for brain in brains)]
+    ]
     made += [MESH["mesh"].format(brain=brain) for brain in starts]
     pairs = [*((brain, chain[0]) for brain in starts), *pairwise(chain)]
-    made += [REGISTERED.format(earlier=earlier, later=later) for earlier, later in pairs]
+    made += [
+        REGISTERED.format(earlier=earlier, later=later) for earlier, later in pairs
+    ]
     run_workflow(folder, config, arguments.cores, *made)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument(
         "--atlas",
@@ -204,10 +343,20 @@ def main() -> None:
         metavar=("NAME", "FILES"),
         help="atlas with a normative series",
     )
-    parser.add_argument("--accept-licence", action="store_true", help="accept the licences of the atlases")
-    parser.add_argument("--individuals", nargs="+", metavar="KIND-SIZE-SEED", default=INDIVIDUALS)
     parser.add_argument(
-        "--weeks", type=int, nargs="+", default=[22, 26, 30], help="week of the start brains, and later weeks"
+        "--accept-licence",
+        action="store_true",
+        help="accept the licences of the atlases",
+    )
+    parser.add_argument(
+        "--individuals", nargs="+", metavar="KIND-SIZE-SEED", default=INDIVIDUALS
+    )
+    parser.add_argument(
+        "--weeks",
+        type=int,
+        nargs="+",
+        default=[22, 26, 30],
+        help="week of the start brains, and later weeks",
     )
     parser.add_argument("--cores", type=int, default=2)
     arguments = parser.parse_args()
@@ -217,7 +366,9 @@ def main() -> None:
         run_study(folder, atlas, Path(files).resolve(), arguments)
         score = partial(scores_of, folder, atlas=atlas, weeks=weeks)
         with ProcessPoolExecutor(arguments.cores) as pool:
-            rows += [row for found in pool.map(score, arguments.individuals) for row in found]
+            rows += [
+                row for found in pool.map(score, arguments.individuals) for row in found
+            ]
     print_chosen(pd.DataFrame(rows))
     print_rows(rows)
 

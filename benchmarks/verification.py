@@ -1,9 +1,11 @@
-"""Verify the folding solver on cases with known answers; makes the numbers of docs/verification.md.
+"""Verify the folding solver on cases with known answers; makes the numbers of
+docs/verification.md.
 
     ./run python benchmarks/verification.py --figures docs/images
 
-Cases and literature: docs/verification.md. The solver runs on two MPI ranks; part `ranks` compares one, two and three.
-Each part prints its results; the last line is one JSON object with all of them.
+Cases and literature: docs/verification.md. The solver runs on two MPI ranks; part
+`ranks` compares one, two and three. Each part prints its results; the last line is one
+JSON object with all of them.
 """
 
 import argparse
@@ -44,8 +46,12 @@ CONTACT_DISTANCES = ((0.05, 0.1), (0.1, 0.2), (0.2, 0.4), (0.4, 0.8))
 """Contact distance as a multiple of the mean edge, at most of a short edge."""
 CONTACT_SLABS = ((4, 1, 0.02), (1, 2, 0.02), (1.5, 2, 0.04), (1.5, 2, 0.02))
 """Cells, order and growth of a step."""
-MAPS = {"box of 30 mm": (30.0, 37.7, (10, 16, 24)), "folds of 10 mm": (20.0, 10.0, (10, 16, 20, 24, 30))}
-"""Side of a box and mean length of its waves in mm, and numbers of intervals between nodes along a side."""
+MAPS = {
+    "box of 30 mm": (30.0, 37.7, (10, 16, 24)),
+    "folds of 10 mm": (20.0, 10.0, (10, 16, 20, 24, 30)),
+}
+"""Side of a box and mean length of its waves in mm, and numbers of intervals between
+nodes along a side."""
 RANKS = (1, 2, 3)
 SERIAL = ("theory", "elements", "deep", "contact_distance", "maps")
 """Parts that run on one rank."""
@@ -56,7 +62,10 @@ def consistency() -> dict:
     from verification_cases.consistency import patch_residual, slopes_of_remainders
 
     return {
-        name: {"patch_residual": patch_residual(order=order), "slopes": slopes_of_remainders(order=order)}
+        name: {
+            "patch_residual": patch_residual(order=order),
+            "slopes": slopes_of_remainders(order=order),
+        }
         for order, name in ORDERS.items()
     }
 
@@ -67,7 +76,9 @@ def manufactured() -> dict:
     found: dict = {name: {} for name in ORDERS.values()}
     for order, name in ORDERS.items():
         for case in CASES:
-            errors = [solved(case, cells, order=order) for cells in MANUFACTURED_CELLS[order]]
+            errors = [
+                solved(case, cells, order=order) for cells in MANUFACTURED_CELLS[order]
+            ]
             found[name][case] = {
                 "displacement_errors": [error.displacement for error in errors],
                 "gradient_errors": [error.gradient for error in errors],
@@ -77,7 +88,8 @@ def manufactured() -> dict:
 
 
 def elements() -> list[dict]:
-    """Measure error and cost of the fastest wave by element, mesh and Poisson's ratio, at the reference contrast."""
+    """Measure error and cost of the fastest wave by element, mesh and Poisson's ratio,
+    at the reference contrast."""
     from verification_cases.slab import Waved, fastest_wave
 
     found = []
@@ -85,7 +97,13 @@ def elements() -> list[dict]:
         for cells in counts:
             # nearly incompressible tissue on the coarsest meshes only
             for poisson_ratio in POISSON_RATIOS[: 4 if cells == counts[0] else 2]:
-                case = Waved(CONTRASTS[0], RATE_GROWTH, 1, poisson_ratio=poisson_ratio, order=order)
+                case = Waved(
+                    CONTRASTS[0],
+                    RATE_GROWTH,
+                    1,
+                    poisson_ratio=poisson_ratio,
+                    order=order,
+                )
                 found.append(fastest_wave(case, cells))
     return found
 
@@ -99,12 +117,21 @@ def symmetry() -> dict:
         "forgotten_with_ties": (block(6), {}),
         "quadratic_remembered": (rounded(hemisphere(4)), {"stress_memory_gw": 1.0}),
     }
-    return {name: asdict(folded(half, 6, **changes)[1]) for name, (half, changes) in runs.items()}
+    return {
+        name: asdict(folded(half, 6, **changes)[1])
+        for name, (half, changes) in runs.items()
+    }
 
 
 def ranks() -> dict:
-    """Return the displacement of all vertices (m) after four steps, with tight tolerances and with those of a run."""
-    from verification_cases.mirrored import folded, hemisphere, reflected_and_merged, rounded
+    """Return the displacement of all vertices (m) after four steps, with tight
+    tolerances and with those of a run."""
+    from verification_cases.mirrored import (
+        folded,
+        hemisphere,
+        reflected_and_merged,
+        rounded,
+    )
 
     linear, quadratic = hemisphere(8), rounded(hemisphere(4))
     runs = {
@@ -114,16 +141,23 @@ def ranks() -> dict:
         "quadratic_usual": (quadratic, {"solver": {}}),
     }
     return {
-        name: folded(half, 4, stress_memory_gw=1.0, **changes)[0].positions - 1e-3 * reflected_and_merged(half).vertices
+        name: folded(half, 4, stress_memory_gw=1.0, **changes)[0].positions
+        - 1e-3 * reflected_and_merged(half).vertices
         for name, (half, changes) in runs.items()
     }
 
 
 def theory() -> dict:
-    """Compare the linearised theory with limits known in closed form, and measure the effect of longer steps."""
+    """Compare the linearised theory with limits known in closed form, and measure the
+    effect of longer steps."""
     from scipy.optimize import minimize_scalar
     from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
-    from verification_cases.modes import Slab, amplifications, critical_growth, growth_rates
+    from verification_cases.modes import (
+        Slab,
+        amplifications,
+        critical_growth,
+        growth_rates,
+    )
 
     cortex = Slab(1.0, depth=8.0, thickness=np.inf)
     rates = growth_rates(cortex, 2 * np.pi / np.array([0.5, 1.0, 2.0]))
@@ -132,7 +166,12 @@ def theory() -> dict:
         slab = Slab(contrast, depth=40 * (contrast / 3) ** (1 / 3))
         film = thin_film(slab)
         start = [0.8 * film.wavelength, 1.2 * film.wavelength]
-        best = minimize_scalar(lambda length, slab=slab: -growth_rates(slab, np.array([2 * np.pi / length]))[0], start)
+        best = minimize_scalar(
+            lambda length, slab=slab: (
+                -growth_rates(slab, np.array([2 * np.pi / length]))[0]
+            ),
+            start,
+        )
         found[f"thin_film_{contrast:g}"] = {
             "known_wavelength": film.wavelength,
             "found_wavelength": best.x,
@@ -140,18 +179,37 @@ def theory() -> dict:
             "found_rate": -best.fun,
         }
     film, slab = thin_film(Slab(1e3)), Slab(1e3, depth=200.0, memory=np.inf)
-    critical = critical_growth(slab, 2 * np.pi / np.array([film.wavelength]), film.critical_growth / 100, 1.0)
-    found["critical_growth_1000"] = {"known": film.critical_growth, "found": critical[0]}
-    half_space = Slab(1.0, 0.4999, depth=6.0, memory=np.inf, thickness=np.inf, finest=0.04)
+    critical = critical_growth(
+        slab, 2 * np.pi / np.array([film.wavelength]), film.critical_growth / 100, 1.0
+    )
+    found["critical_growth_1000"] = {
+        "known": film.critical_growth,
+        "found": critical[0],
+    }
+    half_space = Slab(
+        1.0, 0.4999, depth=6.0, memory=np.inf, thickness=np.inf, finest=0.04
+    )
     critical = critical_growth(half_space, 2 * np.pi / np.array([1.0]), 0.002, 1.0)
-    found["half_space_stretch"] = {"known": BIOT_STRETCH, "found": 1 / (1 + critical[0])}
+    found["half_space_stretch"] = {
+        "known": BIOT_STRETCH,
+        "found": 1 / (1 + critical[0]),
+    }
 
     def log_height(steps: int) -> float:
         waves = np.array([2 * np.pi / 7.07])
-        return float(np.log(amplifications(Slab(CONTRASTS[0]), waves, TWO_WEEKS / steps, steps)[-1, 0]))
+        return float(
+            np.log(
+                amplifications(Slab(CONTRASTS[0]), waves, TWO_WEEKS / steps, steps)[
+                    -1, 0
+                ]
+            )
+        )
 
     exact = 2 * log_height(448) - log_height(224)
-    found["steps"] = {name: log_height(steps) / exact - 1 for name, steps in STEPS_IN_TWO_WEEKS.items()}
+    found["steps"] = {
+        name: log_height(steps) / exact - 1
+        for name, steps in STEPS_IN_TWO_WEEKS.items()
+    }
     return found
 
 
@@ -160,7 +218,11 @@ def rates() -> dict:
     for contrast in CONTRASTS:
         lengths, *heights = waves_on_slab(SLAB_CELLS, contrast, RATE_GROWTH, 1)
         expected, *simulated = (np.log(height[1]) / RATE_GROWTH for height in heights)
-        found[f"{contrast:g}"] = {"lengths": lengths, "expected": expected, "measured": simulated}
+        found[f"{contrast:g}"] = {
+            "lengths": lengths,
+            "expected": expected,
+            "measured": simulated,
+        }
     return found
 
 
@@ -168,30 +230,46 @@ def memory() -> dict:
     found = {}
     for tau in MEMORIES:
         cells = SLAB_CELLS if np.isinf(tau) else SLAB_CELLS[2:3]
-        lengths, expected, *simulated = waves_on_slab(cells, MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS, tau)
-        found[f"{tau:g}"] = {"lengths": lengths, "expected": expected, "measured": simulated}
+        lengths, expected, *simulated = waves_on_slab(
+            cells, MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS, tau
+        )
+        found[f"{tau:g}"] = {
+            "lengths": lengths,
+            "expected": expected,
+            "measured": simulated,
+        }
     return found
 
 
 def waves_on_slab(counts: tuple[int, ...], *case: float) -> list[np.ndarray]:
-    """Return wavelengths in mm, and relative heights after each step by theory and by meshes of these cells."""
+    """Return wavelengths in mm, and relative heights after each step by theory and by
+    meshes of these cells."""
     from verification_cases.slab import Waved, amplified
 
     waved = Waved(*case)
-    return [waved.lengths_mm, waved.expected(), *(amplified(waved, cells) for cells in counts)]
+    return [
+        waved.lengths_mm,
+        waved.expected(),
+        *(amplified(waved, cells) for cells in counts),
+    ]
 
 
 def deep() -> list[dict]:
-    """Fold a slab until its banks press on each other: growth, depth and pressure at area ratios, and crossings."""
+    """Fold a slab until its banks press on each other: growth, depth and pressure at
+    area ratios, and crossings."""
     found = []
     for memory_gw in DEEP_MEMORIES_GW:
         for order, counts in DEEP_CELLS.items():
             for growth in DEEP_GROWTH:
-                found += [deep_fold(cells, order, growth, memory_gw) for cells in counts]
+                found += [
+                    deep_fold(cells, order, growth, memory_gw) for cells in counts
+                ]
     return found
 
 
-def deep_fold(cells: float, order: int, growth_of_step: float, memory_gw: float = 0.0) -> dict:
+def deep_fold(
+    cells: float, order: int, growth_of_step: float, memory_gw: float = 0.0
+) -> dict:
     """Return what a slab has at each area ratio, and the CPU seconds of its run."""
     from verification_cases.deep_folds import Slab, at_ratio, folded
 
@@ -209,12 +287,17 @@ def deep_fold(cells: float, order: int, growth_of_step: float, memory_gw: float 
     }
     for area_ratio in DEEP_AREA_RATIOS:
         growth, depth_mm, pressure_pa = at_ratio(folds, area_ratio)
-        row[f"at_{area_ratio:g}"] = {"growth": growth, "depth_mm": depth_mm, "pressure_pa": pressure_pa}
+        row[f"at_{area_ratio:g}"] = {
+            "growth": growth,
+            "depth_mm": depth_mm,
+            "pressure_pa": pressure_pa,
+        }
     return row
 
 
 def contact_distance() -> list[dict]:
-    """Fold slabs with other contact distances than the default: it is to be so small that it does not matter."""
+    """Fold slabs with other contact distances than the default: it is to be so small
+    that it does not matter."""
     from gyriflow.folding import contact
 
     found = []
@@ -222,12 +305,19 @@ def contact_distance() -> list[dict]:
         contact.DISTANCE_PER_MEAN_EDGE = per_mean_edge
         contact.DISTANCE_PER_SHORT_EDGE = per_short_edge
         for slab in CONTACT_SLABS:
-            found.append({"per_mean_edge": per_mean_edge, "per_short_edge": per_short_edge, **deep_fold(*slab)})
+            found.append(
+                {
+                    "per_mean_edge": per_mean_edge,
+                    "per_short_edge": per_short_edge,
+                    **deep_fold(*slab),
+                }
+            )
     return found
 
 
 def maps() -> dict:
-    """Compare maps of growth towards shapes, on meshes of both orders, with the growth of the continuous shape."""
+    """Compare maps of growth towards shapes, on meshes of both orders, with the growth
+    of the continuous shape."""
     from verification_cases.growth_maps import WavyBox, errors_of_map
 
     found: dict = {}
@@ -262,7 +352,13 @@ def run(part: str, ranks: int) -> dict:
         file = Path(folder) / "found.json"
         program = [sys.executable, __file__, "--inside-mpi", part, "--into", str(file)]
         command = ["mpiexec", "-n", str(ranks), *program]
-        done = subprocess.run(command, env=os.environ | ONE_THREAD, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            command,
+            env=os.environ | ONE_THREAD,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         if done.returncode != 0:
             raise SystemExit(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
         return json.loads(file.read_text())
@@ -278,13 +374,17 @@ def inside_mpi(part: str, into: Path) -> None:
 
 
 def differences_between_ranks() -> dict:
-    """Return the largest difference of a vertex between two numbers of ranks, over the largest displacement."""
+    """Return the largest difference of a vertex between two numbers of ranks, over the
+    largest displacement."""
     runs = [run("ranks", count) for count in RANKS]
     found = {}
     for name in runs[0]:
         serial, *parallel = (np.array(result[name]) for result in runs)
         largest = np.linalg.norm(serial, axis=1).max()
-        found[name] = [float(np.linalg.norm(moved - serial, axis=1).max() / largest) for moved in parallel]
+        found[name] = [
+            float(np.linalg.norm(moved - serial, axis=1).max() / largest)
+            for moved in parallel
+        ]
     return found
 
 
@@ -293,22 +393,39 @@ def main(only: list[str], figures: Path | None) -> None:
 
     found: dict = {}
     for part in only:
-        found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part in SERIAL else 2)
+        found[part] = (
+            differences_between_ranks()
+            if part == "ranks"
+            else run(part, 1 if part in SERIAL else 2)
+        )
         print(json.dumps(plain({part: found[part]})), flush=True)
     if figures and "rates" in found:
         figures.mkdir(parents=True, exist_ok=True)
         draw(found["rates"], SLAB_CELLS, figures)
     if "rates" in found:
-        found["rates"] = {contrast: rates_of(float(contrast), case) for contrast, case in found["rates"].items()}
+        found["rates"] = {
+            contrast: rates_of(float(contrast), case)
+            for contrast, case in found["rates"].items()
+        }
     if "memory" in found:
-        found["memory"] = {tau: memory_of(case) for tau, case in found["memory"].items()}
+        found["memory"] = {
+            tau: memory_of(case) for tau, case in found["memory"].items()
+        }
     print(json.dumps(plain(found)), flush=True)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--figures", type=Path, help="folder for the picture (PNG)")
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts to run instead of all")
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=PARTS,
+        default=list(PARTS),
+        help="parts to run instead of all",
+    )
     parser.add_argument("--inside-mpi", choices=PARTS, help=argparse.SUPPRESS)
     parser.add_argument("--into", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()

@@ -1,11 +1,13 @@
-"""Find the packages of `pip install gyriflow` that have no wheel for a system, without installing any.
+"""Find the packages of `pip install gyriflow` that have no wheel for a system, without
+installing any.
 
     pip install uv
     ./run python benchmarks/wheels.py
 
-uv resolves the requirements of `pyproject.toml`, and what they need in turn, with the wheels that the package index
-has for each system and version of Python. `measuring` are the dependencies alone, `fold` those with the extra, whose
-markers are ignored. The last line is one JSON object.
+uv resolves the requirements of `pyproject.toml`, and what they need in turn, with the
+wheels that the package index has for each system and version of Python. `measuring` are
+the dependencies alone, `fold` those with the extra, whose markers are ignored. The last
+line is one JSON object.
 """
 
 import re
@@ -26,28 +28,68 @@ PLATFORMS = {
     "Windows, x86_64": "x86_64-pc-windows-msvc",
 }
 PYTHONS = ("3.12", "3.13", "3.14")
-SOURCE_ONLY = ("connection-pool",)  # needed by Snakemake; the package index has no wheel
-WITHOUT_WHEEL = re.compile(r"([\w.-]+)(?:[<>=!~][^ ]*)? ha(?:s|ve) no (?:usable )?wheels")
+SOURCE_ONLY = (
+    "connection-pool",
+)  # needed by Snakemake; the package index has no wheel
+WITHOUT_WHEEL = re.compile(
+    r"([\w.-]+)(?:[<>=!~][^ ]*)? ha(?:s|ve) no (?:usable )?wheels"
+)
 
 
 def build_pure_wheels(folder: Path) -> None:
-    """Build wheels of the packages that have none; ValueError if one is not of Python alone."""
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(folder)]
+    """Build wheels of the packages that have none; ValueError if one is not of Python
+    alone."""
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--wheel-dir",
+        str(folder),
+    ]
     subprocess.run([*command, *SOURCE_ONLY], check=True)
     for wheel in folder.glob("*.whl"):
         if not wheel.stem.endswith("-none-any"):
             raise ValueError(f"{wheel.name} is not for every system")
 
 
-def find_missing(requirements: list[str], platform: str, python: str, wheels: Path) -> list[str]:
-    """Return the packages without a wheel that requirements need; wheels in a folder count as those of the index."""
+def find_missing(
+    requirements: list[str], platform: str, python: str, wheels: Path
+) -> list[str]:
+    """Return the packages without a wheel that requirements need; wheels in a folder
+    count as those of the index."""
     missing: list[str] = []
     excluded = wheels / "excluded.txt"
-    command = ["uv", "pip", "compile", "-", "--quiet", "--only-binary", ":all:", "--find-links", str(wheels)]
-    command += ["--python-platform", platform, "--python-version", python, "--excludes", str(excluded)]
+    command = [
+        "uv",
+        "pip",
+        "compile",
+        "-",
+        "--quiet",
+        "--only-binary",
+        ":all:",
+        "--find-links",
+        str(wheels),
+    ]
+    command += [
+        "--python-platform",
+        platform,
+        "--python-version",
+        python,
+        "--excludes",
+        str(excluded),
+    ]
     while True:
         excluded.write_text("\n".join(missing))
-        outcome = subprocess.run(command, input="\n".join(requirements), capture_output=True, text=True, check=False)
+        outcome = subprocess.run(
+            command,
+            input="\n".join(requirements),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         if outcome.returncode == 0:
             return sorted(missing)
         names = WITHOUT_WHEEL.findall(outcome.stderr)
@@ -57,7 +99,9 @@ def find_missing(requirements: list[str], platform: str, python: str, wheels: Pa
 
 
 def main() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
+        "project"
+    ]
     measuring = project["dependencies"]
     fold = list(measuring)
     for requirement in project["optional-dependencies"]["fold"]:

@@ -1,16 +1,21 @@
-"""Measure brains by an installed gyriflow without the solver and in the environment of ./run, and compare all numbers.
+"""Measure brains by an installed gyriflow without the solver and in the environment of
+./run, and compare all numbers.
 
     python3 -m venv plain && plain/bin/pip install .
-    ./run python benchmarks/without_solver.py plain/bin/gyriflow --data ../shared/data --out FOLDER
+    ./run python benchmarks/without_solver.py plain/bin/gyriflow \\
+        --data ../shared/data --out FOLDER
 
-`--checkout` is the checkout whose ./run has the solver (default: this one). In 622a1dfd, the last commit with the tree
-of Debian's dolfinx 0.9, modes are computed by SLEPc.
+`--checkout` is the checkout whose ./run has the solver (default: this one). In
+622a1dfd, the last commit with the tree of Debian's dolfinx 0.9, modes are computed by
+SLEPc.
 
-DATA holds `spina_bifida_atlas/week{21,34}_labels.nii.gz` and `hemispheres/fetal.week21.{left,right}.pial.surf.gii`.
-Each brain is a study of its own, measured on one core to the report. The last line is one JSON object: for each brain
-the CPU seconds of all processes, the memory of the largest one, and the largest relative difference of the results, as
-`same_results.py` compares them; `coefficients.csv` is left out, as the sign of a mode is arbitrary. The exit code is 1
-if a difference is above 1e-6 or a file is missing.
+DATA holds `spina_bifida_atlas/week{21,34}_labels.nii.gz` and
+`hemispheres/fetal.week21.{left,right}.pial.surf.gii`. Each brain is a study of its own,
+measured on one core to the report. The last line is one JSON object: for each brain the
+CPU seconds of all processes, the memory of the largest one, and the largest relative
+difference of the results, as `same_results.py` compares them; `coefficients.csv` is
+left out, as the sign of a mode is arbitrary. The exit code is 1 if a difference is
+above 1e-6 or a file is missing.
 """
 
 import argparse
@@ -36,20 +41,31 @@ def studies(data: Path) -> dict[str, dict[str, Any]]:
     brains: dict[str, dict[str, Any]] = {}
     for week in (21, 34):
         labels = str(data / "spina_bifida_atlas" / f"week{week}_labels.nii.gz")
-        brains[f"labels-{week}"] = {"week": week, "labels": labels, "scheme": "spina-bifida-atlas"}
+        brains[f"labels-{week}"] = {
+            "week": week,
+            "labels": labels,
+            "scheme": "spina-bifida-atlas",
+        }
     hemispheres = {}
     for side in ("left", "right"):
-        hemispheres[side] = str(data / "hemispheres" / f"fetal.week21.{side}.pial.surf.gii")
+        hemispheres[side] = str(
+            data / "hemispheres" / f"fetal.week21.{side}.pial.surf.gii"
+        )
     brains["surfaces-21"] = {"week": 21, "hemispheres": hemispheres}
     return brains
 
 
-def measure(program: list[str], folder: Path, brain: dict[str, Any]) -> tuple[float, float]:
-    """Measure a brain in a new folder; return the CPU seconds and the memory of the largest process in MiB."""
+def measure(
+    program: list[str], folder: Path, brain: dict[str, Any]
+) -> tuple[float, float]:
+    """Measure a brain in a new folder; return the CPU seconds and the memory of the
+    largest process in MiB."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     write_yaml(folder / "study.yaml", {"brains": [{"id": "brain", **brain}]})
-    environment = {name: value for name, value in os.environ.items() if name not in OWN_VARIABLES}
+    environment = {
+        name: value for name, value in os.environ.items() if name not in OWN_VARIABLES
+    }
     command = [*program, "measure", "study.yaml", "--cores", "1"]
     process = Popen(command, cwd=folder, env=environment, stdout=sys.stderr)
     _, status, usage = os.wait4(process.pid, 0)
@@ -59,8 +75,12 @@ def measure(program: list[str], folder: Path, brain: dict[str, Any]) -> tuple[fl
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("program", type=Path, help="gyriflow of a venv without the extra fold")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "program", type=Path, help="gyriflow of a venv without the extra fold"
+    )
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--checkout", type=Path, default=ROOT)
@@ -74,12 +94,16 @@ def main() -> None:
         with_solver = arguments.out.resolve() / name / "with"
         cpu_without, memory_without = measure(plain, without / "study", brain)
         cpu_with, memory_with = measure(checkout, with_solver / "study", brain)
-        differences, summary = compare(with_solver, without, {}, IGNORED | {"coefficients.csv"})
+        differences, summary = compare(
+            with_solver, without, {}, IGNORED | {"coefficients.csv"}
+        )
         print(*differences, sep="\n", file=sys.stderr)
         largest = summary["largest_relative_difference"]
         has_all_files = not summary["only_before"] and not summary["only_after"]
         has_equal_texts = not any(": inf" in line for line in differences)
-        is_equal = is_equal and largest <= MAX_DIFFERENCE and has_all_files and has_equal_texts
+        is_equal = (
+            is_equal and largest <= MAX_DIFFERENCE and has_all_files and has_equal_texts
+        )
         row = {"brain": name, "files": summary["files"], "largest_difference": largest}
         row |= {"cpu_s_without": cpu_without, "cpu_s_with": cpu_with}
         row |= {"MiB_without": memory_without, "MiB_with": memory_with}

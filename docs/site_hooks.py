@@ -1,4 +1,5 @@
-"""What the site adds to docs: pages that lie elsewhere in the checkout, and links to files that are no pages."""
+"""What the site adds to docs: pages that lie elsewhere in the checkout, and links to
+files that are no pages."""
 
 import posixpath
 import re
@@ -30,12 +31,17 @@ def on_config(config: Any) -> Any:
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages that lie elsewhere in the checkout."""
     for source, page in PAGES.items():
-        files.append(File.generated(config, page, content=(CHECKOUT / source).read_text(encoding="utf-8")))
+        files.append(
+            File.generated(
+                config, page, content=(CHECKOUT / source).read_text(encoding="utf-8")
+            )
+        )
     return files
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Make links to files that are no pages of the site into their names, and mend those between pages."""
+    """Make links to files that are no pages of the site into their names, and mend
+    those between pages."""
     sources = {site: source for source, site in PAGES.items()}
     here = sources.get(page.file.src_uri, f"docs/{page.file.src_uri}")
 
@@ -46,7 +52,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
             raise PluginError(f"{here}: {link} leads nowhere")
         if path not in PAGES and not path.startswith("docs/"):
             return f"{text} (`{path}`)" if path not in text else f"`{text}`"
-        to = posixpath.relpath(PAGES.get(path, path.removeprefix("docs/")), posixpath.dirname(page.file.src_uri) or ".")
+        to = posixpath.relpath(
+            PAGES.get(path, path.removeprefix("docs/")),
+            posixpath.dirname(page.file.src_uri) or ".",
+        )
         return f"[{text}]({to}{anchor})"
 
     return LINK.sub(mended, markdown)

@@ -1,4 +1,5 @@
-"""A brain of the shipped atlas, of a week that is not in the template: its labels, its surface and its hemispheres."""
+"""A brain of the shipped atlas, of a week that is not in the template: its labels, its
+surface and its hemispheres."""
 
 from functools import cache
 
@@ -15,8 +16,15 @@ WEEK = 24.0
 
 @cache
 def atlas_labels(week: float = WEEK) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (i, j, k) labels of an unoperated week in voxels of 1.6 mm, and their (4, 4) affine."""
-    path = SHIPPED / "atlases" / "spina-bifida" / f"fetal_SB_atlas_GA{week:g}_notoperated" / "parcellation.nii.gz"
+    """Return the (i, j, k) labels of an unoperated week in voxels of 1.6 mm, and their
+    (4, 4) affine."""
+    path = (
+        SHIPPED
+        / "atlases"
+        / "spina-bifida"
+        / f"fetal_SB_atlas_GA{week:g}_notoperated"
+        / "parcellation.nii.gz"
+    )
     volume = read_label_volume(path)
     return volume.labels[::2, ::2, ::2], volume.affine @ np.diag([2.0, 2.0, 2.0, 1.0])
 
@@ -30,7 +38,8 @@ def atlas_brain() -> TriangleMesh:
 
 @cache
 def atlas_halves() -> tuple[TriangleMesh, TriangleMesh]:
-    """Return the closed surfaces of the left and the right hemisphere, cut apart beside x = 0, in RAS+."""
+    """Return the closed surfaces of the left and the right hemisphere, cut apart beside
+    x = 0, in RAS+."""
     mask, affine, x = _cerebrum()
     left, right = (mask_surface(mask & side, affine) for side in (x < -0.5, x > 0.5))
     return left, right

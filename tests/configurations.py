@@ -15,12 +15,20 @@ LABELLED = {"labels": __file__, "scheme": "spina-bifida-atlas"}
 
 def labelled(*weeks, names="abcdefgh"):
     """Return brains of labels, of some weeks, that are called a, b, ..."""
-    return [{"id": name, "week": week, **LABELLED} for name, week in zip(names, weeks, strict=False)]
+    return [
+        {"id": name, "week": week, **LABELLED}
+        for name, week in zip(names, weeks, strict=False)
+    ]
 
 
 def study(brains=None, **changes):
-    """Return a valid configuration, of two brains if no brains are given, with changes on its top level."""
-    return {"brains": brains or labelled(21, 22.5), "start": "a", "folding": {"end_week": 24}} | changes
+    """Return a valid configuration, of two brains if no brains are given, with changes
+    on its top level."""
+    return {
+        "brains": brains or labelled(21, 22.5),
+        "start": "a",
+        "folding": {"end_week": 24},
+    } | changes
 
 
 def resolved(brains=None, refused=(), **changes):
@@ -41,18 +49,32 @@ def touched(folder, *names):
 
 
 def both_kinds(folder, weeks):
-    """Return a configuration with labels and a closed surface of each of some weeks, the labels first."""
+    """Return a configuration with labels and a closed surface of each of some weeks,
+    the labels first."""
     touched(folder, "pial.surf.gii")
     made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
-    given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
+    given = [
+        {"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks
+    ]
     return study([*made, *given], start="s21")
 
 
 def write_atlas(folder, /, series=None, **changes):
-    """Write the description of an atlas of two weeks, with changes on its top level or in its series."""
-    one = {"population": "sheep", "scheme": "binary", "files": {"labels": "w{week}.nii.gz"}, "weeks": [21, 22]}
+    """Write the description of an atlas of two weeks, with changes on its top level or
+    in its series."""
+    one = {
+        "population": "sheep",
+        "scheme": "binary",
+        "files": {"labels": "w{week}.nii.gz"},
+        "weeks": [21, 22],
+    }
     licence = {"name": "CC0", "terms": "Do what you like."}
-    atlas = {"name": "mine", "title": "An atlas", "licence": licence, "series": {"all": one | (series or {})}}
+    atlas = {
+        "name": "mine",
+        "title": "An atlas",
+        "licence": licence,
+        "series": {"all": one | (series or {})},
+    }
     (folder / "atlas.yaml").write_text(yaml.safe_dump(atlas | changes))
     return folder / "atlas.yaml"
 
@@ -65,7 +87,8 @@ def refusal(raw, folder="."):
 
 
 def problems(raw, folder="."):
-    """Return the lines of that message, a problem each; none where the configuration is valid."""
+    """Return the lines of that message, a problem each; none where the configuration is
+    valid."""
     try:
         load(raw, folder)
     except InputError as error:

@@ -11,13 +11,15 @@ from xdist.scheduler import LoadScopeScheduling
 import gyriflow.folding  # noqa: F401
 
 LONGEST_FIRST = ("tests/mpi/", "tests/mpi/test_ranks.py", "tests/workflow/", "tests/")
-"""Cases on several ranks come after the same on one, which compile their forms while no other rank waits for them."""
+"""Cases on several ranks come after the same on one, which compile their forms while no
+other rank waits for them."""
 MOST_WORKERS = 8
 """Some tests start three ranks, or a workflow of two cores, of their own."""
 
 
 class Sets(LoadScopeScheduling):
-    """Deals out files, whose tests share what takes long to set up, and what else is not to be parted."""
+    """Deals out files, whose tests share what takes long to set up, and what else is
+    not to be parted."""
 
     def _split_scope(self, nodeid):
         file, _, _ = nodeid.partition("::")
@@ -44,7 +46,8 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_xdist_auto_num_workers(config):
-    """Return a worker a core; none for a single file, which takes less long than workers to start."""
+    """Return a worker a core; none for a single file, which takes less long than
+    workers to start."""
     single = len(config.args) == 1 and Path(config.args[0].partition("::")[0]).is_file()
     return 0 if single else min(len(os.sched_getaffinity(0)), MOST_WORKERS)
 

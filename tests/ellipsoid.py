@@ -1,4 +1,5 @@
-"""An ellipsoid in the place of a brain: its semi-axes in mm, and the parameters of its run."""
+"""An ellipsoid in the place of a brain: its semi-axes in mm, and the parameters of its
+run."""
 
 SEMI_AXES = (20.0, 26.0, 18.0)
 RUN = {

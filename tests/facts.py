@@ -4,7 +4,8 @@ import re
 
 
 class Facts:
-    """Equal to each text that gives all these facts as whole names and numbers; as a check, it passes such errors.
+    """Equal to each text that gives all these facts as whole names and numbers; as a
+    check, it passes such errors.
 
     A key or a file is not found in a longer one, nor 5 in 2.5; 24 is found in 24.00.
     """
@@ -31,5 +32,8 @@ def pattern(fact: object) -> str:
     ends = r"(?!\w)(?!\.\w)(?!\[)" if re.search(r"\w$", text) else ""
     if isinstance(fact, int | float) and not isinstance(fact, bool):
         # a minus is of the number; 21-24 is a range
-        starts, ends = rf"{starts}(?<!\W-)", ("0*" if "." in text else r"(?:\.0+)?") + ends
+        starts, ends = (
+            rf"{starts}(?<!\W-)",
+            ("0*" if "." in text else r"(?:\.0+)?") + ends,
+        )
     return starts + re.escape(text) + ends

@@ -1,4 +1,5 @@
-"""Random damage to files, for tests that try what readers do with it; the same damage at each run."""
+"""Random damage to files, for tests that try what readers do with it; the same damage
+at each run."""
 
 from pathlib import Path
 
@@ -20,25 +21,53 @@ BOUNDED = settings(
 ODD_BYTES = st.one_of(
     st.binary(min_size=1, max_size=8),
     st.sampled_from(
-        [b"\x00" * 4, b"\xff" * 4, b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\xc0\x7f", b"\x00\x00\x80\x7f"]
+        [
+            b"\x00" * 4,
+            b"\xff" * 4,
+            b"\x7f\xff\xff\xff",
+            b"\xff\xff\xff\x7f",
+            b"\x00\x00\xc0\x7f",
+            b"\x00\x00\x80\x7f",
+        ]
     ),
     st.sampled_from(
-        [b"-1", b"999999999999", b"nan", b"inf", b"1e400", b"\n", b"<", b">", b"&", b'"', b"\t", b": ", b"[", b"{"]
+        [
+            b"-1",
+            b"999999999999",
+            b"nan",
+            b"inf",
+            b"1e400",
+            b"\n",
+            b"<",
+            b">",
+            b"&",
+            b'"',
+            b"\t",
+            b": ",
+            b"[",
+            b"{",
+        ]
     ),
 )
 
 
 @st.composite
 def damaged(draw: st.DrawFn, whole: bytes, header: int | None = None) -> bytes:
-    """Draw a damaged copy of a file's bytes: cut, overwritten, lengthened, or with a part missing or twice.
+    """Draw a damaged copy of a file's bytes: cut, overwritten, lengthened, or with a
+    part missing or twice.
 
-    `header` is the length of what decides how the rest is read; half of the damage falls there.
+    `header` is the length of what decides how the rest is read; half of the damage
+    falls there.
     """
     data = bytearray(whole)
     for _ in range(draw(st.integers(1, 3))):
         ends = [len(data)] if header is None else [len(data), min(header, len(data))]
         start = draw(st.integers(0, max(draw(st.sampled_from(ends)) - 1, 0)))
-        kind = draw(st.sampled_from(["cut", "overwrite", "overwrite", "insert", "drop", "repeat"]))
+        kind = draw(
+            st.sampled_from(
+                ["cut", "overwrite", "overwrite", "insert", "drop", "repeat"]
+            )
+        )
         length = draw(st.integers(1, 64))
         if kind == "cut":
             del data[start:]
@@ -53,7 +82,8 @@ def damaged(draw: st.DrawFn, whole: bytes, header: int | None = None) -> bytes:
 
 
 def outcome(read, *arguments):
-    """Return what a reader gives, or None where it refuses with a message of gyriflow; any other error gets out.
+    """Return what a reader gives, or None where it refuses with a message of gyriflow;
+    any other error gets out.
 
     A reader leaves the folder of its file as it was.
     """

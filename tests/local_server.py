@@ -1,4 +1,5 @@
-"""A web server on this machine for tests of downloads: it can break off, and remembers what it was asked for."""
+"""A web server on this machine for tests of downloads: it can break off, and remembers
+what it was asked for."""
 
 import gzip
 import hashlib
@@ -19,7 +20,8 @@ class Server:
 
     files: dict[str, bytes]
     broken_after: dict[str, list[int]] = field(default_factory=dict)
-    """By path, the bytes after which one answer each breaks off, in order; further answers are whole."""
+    """By path, the bytes after which one answer each breaks off, in order; further
+    answers are whole."""
     asked: list[str] = field(default_factory=list)
     """The path of each request."""
     url: str = ""
@@ -49,7 +51,9 @@ def serving(server: Server) -> Iterator[Server]:
 
     web = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     server.url = f"http://127.0.0.1:{web.server_address[1]}"
-    thread = Thread(target=web.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
+    thread = Thread(
+        target=web.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True
+    )
     thread.start()
     try:
         yield server
@@ -65,17 +69,30 @@ def sha256(content: bytes) -> str:
 
 def files_in(folder: Path) -> dict[str, bytes]:
     """Return the content of each file of a folder by its path."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 def packed(size: int, seed: int = 0) -> bytes:
     """Return a NIfTI file (.nii.gz) of about so many bytes that do not shrink."""
-    values = np.random.default_rng(seed).integers(0, 2**15, size // 200 * 100, dtype=np.int16)
-    return gzip.compress(nib.Nifti1Image(values.reshape(-1, 100, 1), np.eye(4)).to_bytes(), mtime=0)
+    values = np.random.default_rng(seed).integers(
+        0, 2**15, size // 200 * 100, dtype=np.int16
+    )
+    return gzip.compress(
+        nib.Nifti1Image(values.reshape(-1, 100, 1), np.eye(4)).to_bytes(), mtime=0
+    )
 
 
 def gifti(seed: int = 0) -> bytes:
     """Return a GIFTI file of one triangle."""
     points = np.random.default_rng(seed).random((3, 3)).astype(np.float32)
-    arrays = [(points, "NIFTI_INTENT_POINTSET"), (np.array([[0, 1, 2]], np.int32), "NIFTI_INTENT_TRIANGLE")]
-    return nib.GiftiImage(darrays=[nib.gifti.GiftiDataArray(data, intent) for data, intent in arrays]).to_bytes()
+    arrays = [
+        (points, "NIFTI_INTENT_POINTSET"),
+        (np.array([[0, 1, 2]], np.int32), "NIFTI_INTENT_TRIANGLE"),
+    ]
+    return nib.GiftiImage(
+        darrays=[nib.gifti.GiftiDataArray(data, intent) for data, intent in arrays]
+    ).to_bytes()

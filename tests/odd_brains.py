@@ -1,11 +1,22 @@
-"""Phantoms as brains in clinics and labs are: labels and affine in, labels on the same grid out."""
+"""Phantoms as brains in clinics and labs are: labels and affine in, labels on the same
+grid out."""
 
 from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from phantoms import BRAINSTEM, CALLOSUM, CENTRE_MM, CEREBELLUM, CORTEX, CSF, DEEP_GREY, VENTRICLES, WHITE
+from phantoms import (
+    BRAINSTEM,
+    CALLOSUM,
+    CENTRE_MM,
+    CEREBELLUM,
+    CORTEX,
+    CSF,
+    DEEP_GREY,
+    VENTRICLES,
+    WHITE,
+)
 
 Floats = NDArray[np.float64]
 Labels = NDArray[np.int32]
@@ -16,17 +27,27 @@ SIGN = {"left": -1.0, "right": 1.0}
 
 
 def positions(labels: Labels, affine: Floats) -> Floats:
-    """Return x, y, z of the voxels in mm from the brain's centre, RAS+, (3, i, j, k)."""
+    """Return x, y, z of the voxels in mm from the brain's centre, RAS+, (3, i, j,
+    k)."""
     index = np.indices(labels.shape).reshape(3, -1)
-    return ((affine[:3, :3] @ index).T + affine[:3, 3] - CENTRE_MM).T.reshape(3, *labels.shape)
+    return ((affine[:3, :3] @ index).T + affine[:3, 3] - CENTRE_MM).T.reshape(
+        3, *labels.shape
+    )
 
 
 def without_callosum(labels: Labels, affine: Floats) -> Labels:
-    """Return a brain whose hemispheres are joined at the thalami alone: agenesis of the corpus callosum."""
-    return apart(labels, affine, above_mm=positions(labels, affine)[2][labels == DEEP_GREY].mean())
+    """Return a brain whose hemispheres are joined at the thalami alone: agenesis of the
+    corpus callosum."""
+    return apart(
+        labels,
+        affine,
+        above_mm=positions(labels, affine)[2][labels == DEEP_GREY].mean(),
+    )
 
 
-def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0, above_mm: float = -np.inf) -> Labels:
+def apart(
+    labels: Labels, affine: Floats, gap_mm: float = 3.0, above_mm: float = -np.inf
+) -> Labels:
     """Return unconnected hemispheres, with a gap of CSF between them."""
     x, _, z = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
@@ -35,29 +56,45 @@ def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0, above_mm: float =
 
 
 def holoprosencephaly(labels: Labels, affine: Floats) -> Labels:
-    """Return a brain without a fissure in front, with one ventricle for two and no corpus callosum."""
+    """Return a brain without a fissure in front, with one ventricle for two and no
+    corpus callosum."""
     x, y, z = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
     a, b, c = (np.abs(axis[np.isin(labels, CEREBRUM)]).max() for axis in (x, y, z))
     radius = (x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2
     fused = (np.abs(x) < 6.0) & (y > 0.0) & (labels == CSF) & (radius < 0.72)
     made = np.where(fused, np.where(radius > 0.60, CORTEX, WHITE), made)
-    single = (x / (0.45 * a)) ** 2 + ((y - 2.0) / (0.45 * b)) ** 2 + ((z - 2.0) / 7.0) ** 2 < 1.0
-    return np.where(single & np.isin(made, (WHITE, VENTRICLES, CORTEX)), VENTRICLES, made).astype(np.int32)
+    single = (x / (0.45 * a)) ** 2 + ((y - 2.0) / (0.45 * b)) ** 2 + (
+        (z - 2.0) / 7.0
+    ) ** 2 < 1.0
+    return np.where(
+        single & np.isin(made, (WHITE, VENTRICLES, CORTEX)), VENTRICLES, made
+    ).astype(np.int32)
 
 
-def warp(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) -> Labels:
-    """Return labels moved: `came_from` gives the (3, …) place, in mm from the centre, that each place's label has."""
+def warp(
+    labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]
+) -> Labels:
+    """Return labels moved: `came_from` gives the (3, …) place, in mm from the centre,
+    that each place's label has."""
     place = came_from(positions(labels, affine))
-    index = np.linalg.inv(affine[:3, :3]) @ (place.reshape(3, -1).T + CENTRE_MM - affine[:3, 3]).T
+    index = (
+        np.linalg.inv(affine[:3, :3])
+        @ (place.reshape(3, -1).T + CENTRE_MM - affine[:3, 3]).T
+    )
     nearest = np.rint(index).astype(int)
     inside = ((nearest >= 0) & (nearest < np.array(labels.shape)[:, None])).all(axis=0)
     clipped = np.clip(nearest, 0, np.array(labels.shape)[:, None] - 1)
-    return np.where(inside, labels[tuple(clipped)], 0).reshape(labels.shape).astype(np.int32)
+    return (
+        np.where(inside, labels[tuple(clipped)], 0)
+        .reshape(labels.shape)
+        .astype(np.int32)
+    )
 
 
 def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
-    """Return a brain whose middle is pushed to the right by `mm`, its outer sides in place: a shift of the midline."""
+    """Return a brain whose middle is pushed to the right by `mm`, its outer sides in
+    place: a shift of the midline."""
     x, _, _ = positions(labels, affine)
     half = np.abs(x[np.isin(labels, CEREBRUM)]).max()
 
@@ -65,29 +102,41 @@ def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
         x = place[0]
         inside = np.abs(x) < half
         right = x > mm
-        stretched = np.where(right, (x - mm) * half / (half - mm), (x - mm) * half / (half + mm))
+        stretched = np.where(
+            right, (x - mm) * half / (half - mm), (x - mm) * half / (half + mm)
+        )
         return np.stack([np.where(inside, stretched, x), place[1], place[2]])
 
     return warp(labels, affine, came_from)
 
 
-def wide_hemisphere(labels: Labels, affine: Floats, factor: float = 1.3, *, ventricle: bool = False) -> Labels:
-    """Return a brain whose right hemisphere is wider by `factor`: hemimegalencephaly, or with a wide ventricle."""
+def wide_hemisphere(
+    labels: Labels, affine: Floats, factor: float = 1.3, *, ventricle: bool = False
+) -> Labels:
+    """Return a brain whose right hemisphere is wider by `factor`: hemimegalencephaly,
+    or with a wide ventricle."""
 
     def came_from(place: Floats) -> Floats:
-        return np.stack([np.where(place[0] > 0, place[0] / factor, place[0]), place[1], place[2]])
+        return np.stack(
+            [np.where(place[0] > 0, place[0] / factor, place[0]), place[1], place[2]]
+        )
 
     made = warp(labels, affine, came_from)
     if ventricle:
         x, y, z = positions(made, affine)
         a, b, c = (np.abs(axis[np.isin(made, CEREBRUM)]).max() for axis in (x, y, z))
-        fluid = (x / (0.3 * a) - 1.5) ** 2 + (y / (0.6 * b)) ** 2 + ((z - 2.0) / (0.35 * c)) ** 2 < 1.0
+        fluid = (x / (0.3 * a) - 1.5) ** 2 + (y / (0.6 * b)) ** 2 + (
+            (z - 2.0) / (0.35 * c)
+        ) ** 2 < 1.0
         made = np.where(fluid & np.isin(made, (WHITE, DEEP_GREY)), VENTRICLES, made)
     return made.astype(np.int32)
 
 
-def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: Side = "right") -> Labels:
-    """Return hemispheres apart, one of them shrunk to a share of its volume: hypoplasia."""
+def small_hemisphere(
+    labels: Labels, affine: Floats, share: float = 0.12, side: Side = "right"
+) -> Labels:
+    """Return hemispheres apart, one of them shrunk to a share of its volume:
+    hypoplasia."""
     whole, factor = apart(labels, affine), share ** (1 / 3)
     wall = np.array([1.5 * SIGN[side], 0.0, 0.0])[:, None, None, None]
     x, _, _ = positions(labels, affine)
@@ -96,9 +145,18 @@ def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: 
 
 
 def add_sides(labels: Labels, affine: Floats) -> Labels:
-    """Return the labels of a phantom with sides, as in BOUNTI (`dhcp-19`); the callosum is white matter there."""
+    """Return the labels of a phantom with sides, as in BOUNTI (`dhcp-19`); the callosum
+    is white matter there."""
     x, _, _ = positions(labels, affine)
-    pairs = {CSF: 1, CORTEX: 3, WHITE: 5, CALLOSUM: 5, VENTRICLES: 7, CEREBELLUM: 11, DEEP_GREY: 16}
+    pairs = {
+        CSF: 1,
+        CORTEX: 3,
+        WHITE: 5,
+        CALLOSUM: 5,
+        VENTRICLES: 7,
+        CEREBELLUM: 11,
+        DEEP_GREY: 16,
+    }
     made = np.where(labels == BRAINSTEM, 10, 0)
     for number, left in pairs.items():
         made = np.where(labels == number, np.where(x < 0, left, left + 1), made)
@@ -106,31 +164,40 @@ def add_sides(labels: Labels, affine: Floats) -> Labels:
 
 
 def with_fourth_ventricle(labels: Labels, affine: Floats) -> Labels:
-    """Return the brain with its ventricles joined, through a thin aqueduct, to a fourth ventricle below the cerebrum.
+    """Return the brain with its ventricles joined, through a thin aqueduct, to a fourth
+    ventricle below the cerebrum.
 
     All of it has the label of the ventricles, as in the labels of atlases.
     """
     x, y, z = positions(labels, affine)
     made = labels.copy()
-    below = z[np.isin(labels, CEREBRUM) & (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)].min()
+    below = z[
+        np.isin(labels, CEREBRUM) & (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)
+    ].min()
     brainstem = (np.hypot(x, y + 6.0) < 7.0) & (z < below) & (z > below - 24.0)
     made[brainstem & ~np.isin(labels, CEREBRUM)] = BRAINSTEM
     third = (np.abs(x) < 1.6) & (np.abs(y + 4.0) < 6.0) & (z > below + 4.0) & (z < 0.0)
     aqueduct = (np.hypot(x, y + 6.0) < 1.3) & (z > below - 14.0) & (z < below + 6.0)
-    fourth = (x / 5.0) ** 2 + ((y + 6.0) / 4.0) ** 2 + ((z - below + 15.0) / 6.0) ** 2 < 1.0
+    fourth = (x / 5.0) ** 2 + ((y + 6.0) / 4.0) ** 2 + (
+        (z - below + 15.0) / 6.0
+    ) ** 2 < 1.0
     made[third | aqueduct | fourth] = VENTRICLES
     return made
 
 
-def one_hemisphere(labels: Labels, affine: Floats, side: Side = "left", gap_mm: float = 1.0) -> Labels:
-    """Return one hemisphere alone, as after hemispherectomy or as hemispheres are given one by one."""
+def one_hemisphere(
+    labels: Labels, affine: Floats, side: Side = "left", gap_mm: float = 1.0
+) -> Labels:
+    """Return one hemisphere alone, as after hemispherectomy or as hemispheres are given
+    one by one."""
     x, _, _ = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
     return np.where(SIGN[side] * x > 0.5 * gap_mm, made, 0).astype(np.int32)
 
 
 def bent_midline(labels: Labels, affine: Floats, mm: float = 3.0) -> Labels:
-    """Return a brain whose fissure bends to and fro by `mm`, together with what lies beside it."""
+    """Return a brain whose fissure bends to and fro by `mm`, together with what lies
+    beside it."""
 
     def came_from(place: Floats) -> Floats:
         return np.stack([place[0] - mm * np.sin(place[1] / 12.0), place[1], place[2]])
@@ -139,7 +206,8 @@ def bent_midline(labels: Labels, affine: Floats, mm: float = 3.0) -> Labels:
 
 
 def crop(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels, Floats]:
-    """Return the volume without a share of the brain on top, as where the field of view ends, and its affine."""
+    """Return the volume without a share of the brain on top, as where the field of view
+    ends, and its affine."""
     brain = np.isin(labels, CEREBRUM)
     up = affine[2, :3]
     axis = int(np.abs(up).argmax())

@@ -8,7 +8,11 @@ from matplotlib.text import Text
 
 def words(figure: Figure) -> set[str]:
     """Return all texts that a figure shows."""
-    return {text.get_text() for text in figure.findobj(Text) if text.get_visible() and text.get_text()}
+    return {
+        text.get_text()
+        for text in figure.findobj(Text)
+        if text.get_visible() and text.get_text()
+    }
 
 
 def pictures(figure: Figure) -> list[Axes]:

@@ -8,13 +8,23 @@ from contextlib import suppress
 from pathlib import Path
 
 
-def ran(*command, timeout_s: float = 300, **options) -> subprocess.CompletedProcess[str]:
+def ran(
+    *command, timeout_s: float = 300, **options
+) -> subprocess.CompletedProcess[str]:
     """Run a program to its end and return how it ended, with what it printed."""
-    return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False, **options)
+    return subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        check=False,
+        **options,
+    )
 
 
 def below(pid: int) -> list[int]:
-    """Return the ids of all processes that a process started, and of those that these did."""
+    """Return the ids of all processes that a process started, and of those that these
+    did."""
     listed = ran("pgrep", "-P", str(pid)).stdout
     children = [int(child) for child in listed.split()]
     return children + [other for child in children for other in below(child)]

@@ -8,7 +8,8 @@ SCRIPTS = Path(__file__).parents[1] / "workflow" / "scripts"
 
 
 class Named(dict):
-    """Files or settings of a job, which Snakemake hands over by name, as attributes, and in turn."""
+    """Files or settings of a job, which Snakemake hands over by name, as attributes,
+    and in turn."""
 
     __getattr__ = dict.__getitem__
 
@@ -17,15 +18,26 @@ class Named(dict):
 
 
 def run_script(name, folder, inputs, outputs, params=(), **more):
-    """Run a script on files of a folder by their names, or lists of them, and write its log there."""
+    """Run a script on files of a folder by their names, or lists of them, and write its
+    log there."""
     inputs, outputs = (
         Named(
             {
-                key: [str(folder / f) for f in file] if isinstance(file, list) else file and str(folder / file)
+                key: (
+                    [str(folder / f) for f in file]
+                    if isinstance(file, list)
+                    else file and str(folder / file)
+                )
                 for key, file in files.items()
             }
         )
         for files in (inputs, outputs)
     )
-    job = SimpleNamespace(input=inputs, output=outputs, log=[str(folder / "log")], params=Named(params), **more)
+    job = SimpleNamespace(
+        input=inputs,
+        output=outputs,
+        log=[str(folder / "log")],
+        params=Named(params),
+        **more,
+    )
     runpy.run_path(str(SCRIPTS / name), init_globals={"snakemake": job})

@@ -1,4 +1,5 @@
-"""Small meshes, surfaces and brains whose geometry is known: the one factory of all tests."""
+"""Small meshes, surfaces and brains whose geometry is known: the one factory of all
+tests."""
 
 from functools import cache
 
@@ -10,9 +11,20 @@ from odd_brains import CEREBRUM, positions
 from phantoms import CENTRE_MM, phantom_labels
 from scipy.spatial.transform import Rotation
 
-from gyriflow.anatomy.extraction import isosurface, make_simple, shifted_affine, smooth_mask
+from gyriflow.anatomy.extraction import (
+    isosurface,
+    make_simple,
+    shifted_affine,
+    smooth_mask,
+)
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
-from gyriflow.geometry.triangles import TriangleMesh, face_normals, flipped, submesh, vertex_normals
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    face_normals,
+    flipped,
+    submesh,
+    vertex_normals,
+)
 
 HALF_AXES = np.array([11.0, 24.0, 16.0])
 """Semi-axes in mm of an ellipsoid as large as a small hemisphere of week 21."""
@@ -25,19 +37,27 @@ PAD = 4
 
 
 def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
-    """Return the (4, 4) motion of turns about x, y and z in turn, in degrees, and a shift in mm."""
+    """Return the (4, 4) motion of turns about x, y and z in turn, in degrees, and a
+    shift in mm."""
     matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("xyz", degrees or (0.0, 0.0, 0.0), degrees=True).as_matrix()
+    matrix[:3, :3] = Rotation.from_euler(
+        "xyz", degrees or (0.0, 0.0, 0.0), degrees=True
+    ).as_matrix()
     matrix[:3, 3] = shift
     return matrix
 
 
-FAR = rigid(0.0, 0.0, 30.0, shift=(200.0, -180.0, 130.0)), rigid(25.0, 0.0, -30.0, shift=(-150.0, 220.0, 140.0))
-"""Two poses, each 300 mm from the origin and turned by 30 degrees or more, so that none stands for the other."""
+FAR = (
+    rigid(0.0, 0.0, 30.0, shift=(200.0, -180.0, 130.0)),
+    rigid(25.0, 0.0, -30.0, shift=(-150.0, 220.0, 140.0)),
+)
+"""Two poses, each 300 mm from the origin and turned by 30 degrees or more, so that none
+stands for the other."""
 
 
 def scaling(factors, shift=0.0) -> np.ndarray:
-    """Return the (4, 4) matrix of one factor or three, and a shift in mm after it: the affine of a grid of voxels."""
+    """Return the (4, 4) matrix of one factor or three, and a shift in mm after it: the
+    affine of a grid of voxels."""
     matrix = np.eye(4)
     matrix[:3, :3] *= factors
     matrix[:3, 3] = shift
@@ -54,7 +74,9 @@ def inner(mesh: TriangleMesh, depth_mm: float) -> TriangleMesh:
     return TriangleMesh(mesh.vertices - depth_mm * vertex_normals(mesh), mesh.faces)
 
 
-def sphere(radius: float = 10.0, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> TriangleMesh:
+def sphere(
+    radius: float = 10.0, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)
+) -> TriangleMesh:
     """Return an icosphere, its radius in mm."""
     return ellipsoid((radius,) * 3, subdivisions, centre)
 
@@ -66,18 +88,23 @@ def ellipsoid(half_axes, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> Trian
 
 
 def uneven(ball: TriangleMesh, ratio: float = 5.0) -> TriangleMesh:
-    """Return a sphere around the origin, its triangles at the bottom wider than those at the top by a ratio.
+    """Return a sphere around the origin, its triangles at the bottom wider than those
+    at the top by a ratio.
 
-    The map is conformal, so triangles keep their angles. A mean over vertices is not one over the area.
+    The map is conformal, so triangles keep their angles. A mean over vertices is not
+    one over the area.
     """
     radius = np.linalg.norm(ball.vertices, axis=1)
     x, y, z = (ball.vertices / radius[:, None]).T
-    # half the angle from the top, whose tangent is the distance in stereographic coordinates
+    # half the angle from the top, whose tangent is the distance in stereographic
+    # coordinates
     half_angle = np.arccos(np.clip(z, -1.0, 1.0)) / 2
     polar = 2 * np.arctan2(np.sin(half_angle), np.sqrt(ratio) * np.cos(half_angle))
     azimuth = np.arctan2(y, x)
     flat = np.sin(polar)
-    directions = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(polar)], axis=1)
+    directions = np.stack(
+        [flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(polar)], axis=1
+    )
     return TriangleMesh(radius[:, None] * directions, ball.faces)
 
 
@@ -88,28 +115,49 @@ def _icosphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def octasphere(radius: float, subdivisions: int = 5) -> TriangleMesh:
-    """Return a sphere made of an octahedron, with edges in the planes x = 0, y = 0 and z = 0."""
+    """Return a sphere made of an octahedron, with edges in the planes x = 0, y = 0 and
+    z = 0."""
     shape = trimesh.Trimesh(
         [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]],
-        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
+        [
+            [0, 1, 2],
+            [1, 3, 2],
+            [3, 4, 2],
+            [4, 0, 2],
+            [1, 0, 5],
+            [3, 1, 5],
+            [4, 3, 5],
+            [0, 4, 5],
+        ],
     )
     for _ in range(subdivisions):
         shape = shape.subdivide()
-    return TriangleMesh(radius * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None], shape.faces)
+    return TriangleMesh(
+        radius * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None],
+        shape.faces,
+    )
 
 
 @cache
 def cut_ellipsoid() -> tuple[TriangleMesh, TriangleMesh, TriangleMesh]:
-    """Return the open left and right half of an ellipsoid as large as a brain of week 24, and the left one's wall."""
+    """Return the open left and right half of an ellipsoid as large as a brain of week
+    24, and the left one's wall."""
     ball = octasphere(1.0)
     whole = TriangleMesh(ball.vertices * [22.0, 28.0, 24.0], ball.faces)
     is_left = whole.vertices[whole.faces][:, :, 0].mean(axis=1) < 0.0
     left, right = (submesh(whole, side)[0] for side in (is_left, ~is_left))
-    return left, right, TriangleMesh(left.vertices * [0.0, 1.0, 1.0], left.faces[:, ::-1])
+    return (
+        left,
+        right,
+        TriangleMesh(left.vertices * [0.0, 1.0, 1.0], left.faces[:, ::-1]),
+    )
 
 
-def hemisphere_with_cut(pit_mm: float, radius: float = 25.0, cut: float = 8.0) -> TriangleMesh:
-    """Return half a sphere, closed in the plane x = 0 but for a round cut in a pit so deep, or on a neck so high."""
+def hemisphere_with_cut(
+    pit_mm: float, radius: float = 25.0, cut: float = 8.0
+) -> TriangleMesh:
+    """Return half a sphere, closed in the plane x = 0 but for a round cut in a pit so
+    deep, or on a neck so high."""
     down = np.linspace(0.0, 0.5 * np.pi, 40)
     flat, wall = np.linspace(radius, cut, 25)[1:], np.linspace(0.0, pit_mm, 5)[1:]
     around = np.concatenate([radius * np.sin(down), flat, np.full(len(wall), cut)])
@@ -128,29 +176,37 @@ def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:
 
 
 def sheet(*axes: np.ndarray) -> TriangleMesh:
-    """Return an open surface over a grid: the (n, m) x, y and z of its vertices, seen from above where these ascend."""
+    """Return an open surface over a grid: the (n, m) x, y and z of its vertices, seen
+    from above where these ascend."""
     numbers = np.arange(axes[0].size).reshape(axes[0].shape)
     a, b, c, d = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    faces = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
     return TriangleMesh(np.stack(axes, axis=-1).reshape(-1, 3), faces)
 
 
 def torus(ring: float, tube: float, around: int = 32, across: int = 32) -> TriangleMesh:
-    """Return a torus about z: the radii in mm of its ring and its tube, and the faces along both."""
-    shape = trimesh.creation.torus(ring, tube, major_sections=around, minor_sections=across)
+    """Return a torus about z: the radii in mm of its ring and its tube, and the faces
+    along both."""
+    shape = trimesh.creation.torus(
+        ring, tube, major_sections=around, minor_sections=across
+    )
     return TriangleMesh(shape.vertices, shape.faces)
 
 
 @cache
 def phantom(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[np.ndarray, np.ndarray]:
-    """Return the labels of a synthetic brain and their affine, which are not to be changed."""
+    """Return the labels of a synthetic brain and their affine, which are not to be
+    changed."""
     labels, affine = phantom_labels(week, voxel_mm=voxel_mm)
     labels.flags.writeable = affine.flags.writeable = False
     return labels, affine
 
 
 def mask_surface(mask: np.ndarray, affine: np.ndarray) -> TriangleMesh:
-    """Return the closed surface of the smoothed main parts of a mask of voxels, without handles."""
+    """Return the closed surface of the smoothed main parts of a mask of voxels, without
+    handles."""
     field, _ = make_simple(smooth_mask(np.pad(mask, PAD), 1.0))
     return isosurface(field, shifted_affine(affine, np.full(3, -PAD)))
 
@@ -161,23 +217,36 @@ def cerebrum_surface(labels: np.ndarray, affine: np.ndarray) -> TriangleMesh:
 
 
 @cache
-def phantom_halves(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[TriangleMesh, TriangleMesh]:
-    """Return a phantom's left and right hemisphere as closed surfaces 1.2 mm apart, the fissure at x = 0, in RAS+."""
+def phantom_halves(
+    week: float = 24.0, voxel_mm: float = 1.2
+) -> tuple[TriangleMesh, TriangleMesh]:
+    """Return a phantom's left and right hemisphere as closed surfaces 1.2 mm apart, the
+    fissure at x = 0, in RAS+."""
     labels, affine = phantom(week, voxel_mm)
     centred = affine.copy()
     centred[:3, 3] -= CENTRE_MM
     x, _, _ = positions(labels, affine)
-    left, right = (mask_surface(np.isin(labels, CEREBRUM) & side, centred) for side in (x < -0.6, x > 0.6))
+    left, right = (
+        mask_surface(np.isin(labels, CEREBRUM) & side, centred)
+        for side in (x < -0.6, x > 0.6)
+    )
     return left, right
 
 
-def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetrahedralMesh:
+def box_mesh(
+    cells: tuple[int, int, int], size: tuple[float, float, float]
+) -> TetrahedralMesh:
     """Return a box around the origin, in mm, with six elements per grid cell."""
-    return grid([np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(size, cells, strict=True)])
+    return grid(
+        [np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(size, cells, strict=True)]
+    )
 
 
-def ellipsoid_mesh(cells: int, semi_axes: tuple[float, float, float]) -> TetrahedralMesh:
-    """Return an ellipsoid around the origin, in mm: a cube's grid with its shells drawn out to ellipsoids."""
+def ellipsoid_mesh(
+    cells: int, semi_axes: tuple[float, float, float]
+) -> TetrahedralMesh:
+    """Return an ellipsoid around the origin, in mm: a cube's grid with its shells drawn
+    out to ellipsoids."""
     cube = box_mesh((cells,) * 3, (2.0, 2.0, 2.0))
     x = cube.vertices
     shell = np.abs(x).max(axis=1, keepdims=True)
@@ -189,7 +258,8 @@ def ellipsoid_mesh(cells: int, semi_axes: tuple[float, float, float]) -> Tetrahe
 
 
 def hemisphere(side: int) -> TriangleMesh:
-    """Return an ellipsoid in place of a hemisphere, on the left (-1) or the right (1) of a gap of 3 mm at x = 0."""
+    """Return an ellipsoid in place of a hemisphere, on the left (-1) or the right (1)
+    of a gap of 3 mm at x = 0."""
     return ellipsoid(HALF_AXES, centre=(12.5 * side, 0.0, 0.0))
 
 
@@ -202,6 +272,10 @@ def save_labels(path, labels: np.ndarray, affine: np.ndarray) -> None:
 
 def save_gifti(path, mesh: TriangleMesh) -> None:
     """Write a GIFTI surface as it is, whatever is wrong with it, and name no space."""
-    points = GiftiDataArray(mesh.vertices.astype(np.float32), intent="NIFTI_INTENT_POINTSET")
-    triangles = GiftiDataArray(mesh.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE")
+    points = GiftiDataArray(
+        mesh.vertices.astype(np.float32), intent="NIFTI_INTENT_POINTSET"
+    )
+    triangles = GiftiDataArray(
+        mesh.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE"
+    )
     nib.save(GiftiImage(darrays=[points, triangles]), path)

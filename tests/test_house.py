@@ -1,4 +1,5 @@
-"""The house rules, checked on the source itself: import arrows, open files, names, and lists that must agree."""
+"""The house rules, checked on the source itself: import arrows, open files, names, and
+lists that must agree."""
 
 import ast
 import importlib.util
@@ -12,6 +13,7 @@ import pytest
 import yaml
 
 from gyriflow.code_hash import imported_modules, room_of
+from gyriflow.running.requirements import LIBRARIES
 from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
@@ -19,7 +21,8 @@ PACKAGE = ROOT / "src" / "gyriflow"
 
 GROUND = {"errors", "units", "quantities", "formats", "names", "splines", "grouping"}
 PLAIN = GROUND | {"geometry", "settings"}
-"""What every room may import: errors and messages, units, quantities, formats of files, plain geometry and settings."""
+"""What every room may import: errors and messages, units, quantities, formats of files,
+plain geometry and settings."""
 ARROWS = {
     "errors": set(),
     "units": set(),
@@ -44,27 +47,78 @@ ARROWS = {
     # the solver is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io", "code_hash"},
     "study": PLAIN | {"io", "shipped", "version"},
-    "running": PLAIN | {"code_hash", "study", "anatomy", "folding", "io", "shipped", "step", "version"},
+    "running": (
+        PLAIN
+        | {
+            "code_hash",
+            "study",
+            "anatomy",
+            "folding",
+            "io",
+            "shipped",
+            "step",
+            "version",
+        }
+    ),
     "cli": PLAIN | {"running", "study", "anatomy", "io", "shipped", "version"},
 }
-"""The rooms, and what each may import besides itself. Siblings meet in plain geometry, settings and files."""
+"""The rooms, and what each may import besides itself. Siblings meet in plain geometry,
+settings and files."""
 PROGRAM_ARROWS = {"io", "step"}
 """What the program of a room (`__main__.py`) may import beyond that."""
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
-PROGRAMS = [*SCRIPTS, *(ROOT / "benchmarks").rglob("*.py"), *(ROOT / "atlases").rglob("*.py")]
+PROGRAMS = [
+    *SCRIPTS,
+    *(ROOT / "benchmarks").rglob("*.py"),
+    *(ROOT / "atlases").rglob("*.py"),
+]
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
 OPENING_ROOMS = {"code_hash", "io", "folding", "running", "cli", "step"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
-    *("open", "read_text", "read_bytes", "write_text", "write_bytes", "tofile", "to_filename", "savefig"),
-    *("to_csv", "to_json", "to_hdf", "to_parquet", "to_pickle", "load_new_mesh", "save_current_mesh"),
+    *(
+        "open",
+        "read_text",
+        "read_bytes",
+        "write_text",
+        "write_bytes",
+        "tofile",
+        "to_filename",
+        "savefig",
+    ),
+    *(
+        "to_csv",
+        "to_json",
+        "to_hdf",
+        "to_parquet",
+        "to_pickle",
+        "load_new_mesh",
+        "save_current_mesh",
+    ),
 }
 OPENING_FUNCTIONS = {
-    "numpy": {"load", "save", "savez", "savez_compressed", "loadtxt", "savetxt", "genfromtxt", "fromfile", "memmap"},
-    "pandas": {"read_csv", "read_json", "read_hdf", "read_parquet", "read_table", "read_pickle"},
+    "numpy": {
+        "load",
+        "save",
+        "savez",
+        "savez_compressed",
+        "loadtxt",
+        "savetxt",
+        "genfromtxt",
+        "fromfile",
+        "memmap",
+    },
+    "pandas": {
+        "read_csv",
+        "read_json",
+        "read_hdf",
+        "read_parquet",
+        "read_table",
+        "read_pickle",
+    },
     "nibabel": {"load", "save"},
     "trimesh": {"load", "load_mesh"},
     "pyvista": {"read", "save_meshio", "get_reader"},
@@ -74,13 +128,19 @@ OPENING_FUNCTIONS = {
 
 
 def rooms_imported(path: Path) -> set[str]:
-    """Return the other rooms of gyriflow that a source file imports, at the top or inside functions."""
-    return {room_of(module) for module in imported_modules(path)} - {room_of(path), "__init__"}
+    """Return the other rooms of gyriflow that a source file imports, at the top or
+    inside functions."""
+    return {room_of(module) for module in imported_modules(path)} - {
+        room_of(path),
+        "__init__",
+    }
 
 
 def makes_buffer(node: ast.AST) -> bool:
     """Return whether an expression makes a buffer in memory that looks like a file."""
-    return isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("BytesIO", "StringIO"))
+    return isinstance(node, ast.Call) and ast.unparse(node.func).endswith(
+        ("BytesIO", "StringIO")
+    )
 
 
 def opened_files(path: Path) -> list[str]:
@@ -103,7 +163,9 @@ def opened_files(path: Path) -> list[str]:
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
             continue
-        if node.args and (makes_buffer(node.args[0]) or getattr(node.args[0], "id", None) in in_memory):
+        if node.args and (
+            makes_buffer(node.args[0]) or getattr(node.args[0], "id", None) in in_memory
+        ):
             continue
         match node.func:
             case ast.Name(id=name) if name in OPENING_NAMES:
@@ -129,7 +191,11 @@ def test_rooms_import_only_what_is_below_them():
         short(path): forbidden
         for path in SOURCES
         if room_of(path) != "__init__"
-        if (forbidden := rooms_imported(path) - ARROWS[room_of(path)] - (PROGRAM_ARROWS if is_program(path) else set()))
+        if (
+            forbidden := rooms_imported(path)
+            - ARROWS[room_of(path)]
+            - (PROGRAM_ARROWS if is_program(path) else set())
+        )
     }
     assert upwards == {}
 
@@ -145,25 +211,35 @@ def test_mechanics_is_ufl_only():
 
 
 def test_only_io_and_folding_open_files():
-    closed = [path for path in SOURCES if room_of(path) not in OPENING_ROOMS and not is_program(path)]
-    assert [f"{short(path)}:{call}" for path in closed for call in opened_files(path)] == []
+    closed = [
+        path
+        for path in SOURCES
+        if room_of(path) not in OPENING_ROOMS and not is_program(path)
+    ]
+    assert [
+        f"{short(path)}:{call}" for path in closed for call in opened_files(path)
+    ] == []
 
 
 def test_scripts_read_call_and_write():
-    # numbers are computed in the package, where fast tests reach them; matrices of poses may be multiplied
+    # numbers are computed in the package, where fast tests reach them; matrices of
+    # poses may be multiplied
     arithmetic = ast.Sub | ast.Mult | ast.Pow | ast.Mod | ast.FloorDiv
     computed = [
         f"{short(path)}:{node.lineno}: {ast.unparse(node)}"
         for path in SCRIPTS
         for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.While) or (isinstance(node, ast.BinOp) and isinstance(node.op, arithmetic))
+        if isinstance(node, ast.While)
+        or (isinstance(node, ast.BinOp) and isinstance(node.op, arithmetic))
     ]
     assert computed == []
 
 
 def test_every_script_is_used_and_there():
     text = "\n".join(path.read_text() for path in RULE_FILES)
-    assert set(re.findall(r"\.\./scripts/(\w+\.py)", text)) == {path.name for path in SCRIPTS}
+    assert set(re.findall(r"\.\./scripts/(\w+\.py)", text)) == {
+        path.name for path in SCRIPTS
+    }
 
 
 def test_what_scripts_and_benchmarks_import_is_there():
@@ -172,42 +248,66 @@ def test_what_scripts_and_benchmarks_import_is_there():
         (path.name, node.module, alias.name)
         for path in PROGRAMS
         for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gyriflow")
+        if isinstance(node, ast.ImportFrom)
+        and (node.module or "").startswith("gyriflow")
         for alias in node.names
     ]
-    without = [row for row in imported if not hasattr(importlib.import_module(row[1]), row[2])]
-    assert [row for row in without if importlib.util.find_spec(f"{row[1]}.{row[2]}") is None] == []
+    without = [
+        row for row in imported if not hasattr(importlib.import_module(row[1]), row[2])
+    ]
+    assert [
+        row for row in without if importlib.util.find_spec(f"{row[1]}.{row[2]}") is None
+    ] == []
 
 
 def test_no_vague_names():
-    vague = re.compile(r"(^|_)(utils?|helpers?|managers?|misc|pipelines?)($|_)|V\d$", re.IGNORECASE)
+    vague = re.compile(
+        r"(^|_)(utils?|helpers?|managers?|misc|pipelines?)($|_)|V\d$", re.IGNORECASE
+    )
     names = [(short(path), path.stem) for path in [*SOURCES, *SCRIPTS, *RULE_FILES]]
     for path in [*SOURCES, *SCRIPTS]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ClassDef | ast.FunctionDef):
                 names.append((short(path), node.name))
-                names += [(short(path), part) for part in re.findall(r"[A-Z][a-z]+", node.name)]
+                names += [
+                    (short(path), part)
+                    for part in re.findall(r"[A-Z][a-z]+", node.name)
+                ]
     assert [(path, name) for path, name in names if vague.search(name)] == []
 
 
 def locked() -> dict[str, str]:
-    """Return the version of each package that is locked, all with hashes, and the same in both files."""
+    """Return the version of each package that is locked, all with hashes, and the same
+    in both files."""
     versions: dict[str, str] = {}
     for name in ("requirements.txt", "requirements-dev.txt"):
         text = (ROOT / "envs" / name).read_text()
-        found = dict(re.findall(r"^([\w.-]+)==([^ ]+).*?\\\n    --hash=sha256:", text, flags=re.MULTILINE))
+        found = dict(
+            re.findall(
+                r"^([\w.-]+)==([^ ]+).*?\\\n    --hash=sha256:",
+                text,
+                flags=re.MULTILINE,
+            )
+        )
         assert len(found) == len(re.findall(r"^\w", text, flags=re.MULTILINE))
-        assert found == found | {package: versions[package] for package in found.keys() & versions}
+        assert found == found | {
+            package: versions[package] for package in found.keys() & versions
+        }
         versions |= found
     return versions
 
 
 def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
-    (pip,) = [entry["pip"] for entry in environment["dependencies"] if isinstance(entry, dict)]
+    (pip,) = [
+        entry["pip"] for entry in environment["dependencies"] if isinstance(entry, dict)
+    ]
     content, versions = tomllib.loads((ROOT / "pyproject.toml").read_text()), locked()
     project = content["project"]
-    extras = [*project["optional-dependencies"]["fold"], *project["optional-dependencies"]["calibrate"]]
+    extras = [
+        *project["optional-dependencies"]["fold"],
+        *project["optional-dependencies"]["calibrate"],
+    ]
     entries = [*project["dependencies"], *extras, *content["dependency-groups"]["dev"]]
     # conda-forge has dolfinx, which brings numpy
     from_conda = {"numpy", "dolfinx-solver-real"}
@@ -217,11 +317,17 @@ def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():
 
 
 def test_conda_environment_sets_what_run_sets():
-    (settings,) = re.findall(r"^settings\(\) \{\n(.*?)^\}", (ROOT / "run").read_text(), flags=re.MULTILINE | re.DOTALL)
+    (settings,) = re.findall(
+        r"^settings\(\) \{\n(.*?)^\}",
+        (ROOT / "run").read_text(),
+        flags=re.MULTILINE | re.DOTALL,
+    )
     exports = dict(re.findall(r"\b([A-Z]\w+)=(?:\$\{\w+:-)?([\w:,]+)\}?", settings))
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
     # what concerns the checkout and the user's Python is the launcher's own
-    assert environment["variables"] == {name: exports[name] for name in exports if not name.startswith("PYTHON")}
+    assert environment["variables"] == {
+        name: exports[name] for name in exports if not name.startswith("PYTHON")
+    }
 
 
 @pytest.mark.parametrize("recipe", ["Dockerfile", "gyriflow.def"])
@@ -231,14 +337,25 @@ def test_images_are_made_from_the_same_lists(recipe):
     assert "envs/requirements.txt" in text
     own = re.findall(r"install (?:-\S+ )*([\w.=-]+)", text)
     assert set(own) <= {"-r", "--no-deps", "--no-install-recommends"}
-    packages = {line.split("#")[0].strip() for line in (ROOT / "envs" / "debian.txt").read_text().splitlines()}
+    packages = {
+        line.split("#")[0].strip()
+        for line in (ROOT / "envs" / "debian.txt").read_text().splitlines()
+    }
     assert packages & set(text.split()) == set()
+
+
+def test_libraries_that_jobs_need_are_in_the_list_that_is_installed():
+    lines = (ROOT / "envs" / "debian.txt").read_text().splitlines()
+    assert set(LIBRARIES.values()) <= {line.strip() for line in lines}
 
 
 def test_images_use_the_python_of_the_conda_environment():
     assert "FROM python:3.13-slim\n" in (ROOT / "envs" / "Dockerfile").read_text()
     assert "From: python:3.13-slim\n" in (ROOT / "envs" / "gyriflow.def").read_text()
-    assert "python=3.13" in yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())["dependencies"]
+    assert (
+        "python=3.13"
+        in yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())["dependencies"]
+    )
 
 
 def test_citation_has_the_version_of_the_package():
@@ -246,8 +363,14 @@ def test_citation_has_the_version_of_the_package():
     zenodo = json.loads((ROOT / ".zenodo.json").read_text())
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     fallback = project["tool"]["hatch"]["version"]["raw-options"]["fallback_version"]
-    images = [(ROOT / "envs" / recipe).read_text() for recipe in ("Dockerfile", "gyriflow.def")]
-    labels = [*re.findall(r"ARG VERSION=(.*)", images[0]), *re.findall(r"(?:Version |VERSION=)(\S+)", images[1])]
+    images = [
+        (ROOT / "envs" / recipe).read_text()
+        for recipe in ("Dockerfile", "gyriflow.def")
+    ]
+    labels = [
+        *re.findall(r"ARG VERSION=(.*)", images[0]),
+        *re.findall(r"(?:Version |VERSION=)(\S+)", images[1]),
+    ]
     assert len(labels) == 3
     assert {citation["version"], zenodo["version"], fallback, *labels} == {RELEASE}
     assert f"## {RELEASE}" in (ROOT / "CHANGELOG.md").read_text()
@@ -255,7 +378,10 @@ def test_citation_has_the_version_of_the_package():
 
 def test_links_in_the_documentation_lead_somewhere():
     folders = ROOT / "config", ROOT / "docs"
-    pages = [*ROOT.glob("*.md"), *(page for folder in folders for page in folder.rglob("*.md"))]
+    pages = [
+        *ROOT.glob("*.md"),
+        *(page for folder in folders for page in folder.rglob("*.md")),
+    ]
     broken = [
         f"{short(page)}: {target}"
         for page in pages
@@ -285,6 +411,7 @@ def test_opened_files_are_seen(tmp_path, code):
 def test_buffers_in_memory_are_no_files(tmp_path):
     source = tmp_path / "a.py"
     source.write_text(
-        "import io\nimport numpy as np\nsent = io.BytesIO()\nnp.savez(sent, a=1)\nnp.load(io.BytesIO(b''))"
+        "import io\nimport numpy as np\nsent = io.BytesIO()\nnp.savez(sent,"
+        " a=1)\nnp.load(io.BytesIO(b''))"
     )
     assert opened_files(source) == []

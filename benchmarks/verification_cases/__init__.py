@@ -1,1 +1,2 @@
-"""Cases with known answers for the folding solver, shared by `verification.py` and the tests under MPI."""
+"""Cases with known answers for the folding solver, shared by `verification.py` and the
+tests under MPI."""

@@ -1,7 +1,8 @@
 """Fold a bilayer slab so deep that the banks of its sulcus press on each other.
 
-All lengths are in mm, and the cortex is 1 mm thick. The slab lies between sliding sides, so its surface can only grow
-by folding. No closed answer is known: meshes, element orders and time steps are compared with each other.
+All lengths are in mm, and the cortex is 1 mm thick. The slab lies between sliding
+sides, so its surface can only grow by folding. No closed answer is known: meshes,
+element orders and time steps are compared with each other.
 """
 
 from dataclasses import dataclass
@@ -23,18 +24,21 @@ from .boxes import RATE_PER_S, box_zones, graded_depths, slab_parameters
 WIDTH_MM, DEPTH_MM = 8.0, 8.0
 """About the fastest wave at a contrast of 5, which is 7.07 mm."""
 GROOVE_MM, GROOVE_WIDTH_MM = 1.5, 0.8
-"""Depth of the sulcus at the start, and the distance from its middle at which 1/e of that is left."""
+"""Depth of the sulcus at the start, and the distance from its middle at which 1/e of
+that is left."""
 CONTRAST = 5.0
 BOTTOM = 0.25
 """Share of the depth of the sulcus that counts as its bottom."""
 FINE_DEPTH_MM = 2.5
 COARSENING = 1.5
-"""Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power 1/(cells per cortical thickness)."""
+"""Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power
+1/(cells per cortical thickness)."""
 
 
 @dataclass(frozen=True)
 class Slab:
-    """A slab with `cells` elements of an order through the cortex, which grows by `growth` in each step.
+    """A slab with `cells` elements of an order through the cortex, which grows by
+    `growth` in each step.
 
     `memory_gw` is the time in weeks over which stress is forgotten.
     """
@@ -46,7 +50,8 @@ class Slab:
     memory_gw: float = 0.0
 
     def parameters(self) -> FoldingParameters:
-        """Return the parameters of the run; the core grows, too, which widens gyri and closes the sulcus."""
+        """Return the parameters of the run; the core grows, too, which widens gyri and
+        closes the sulcus."""
         return slab_parameters(
             CONTRAST,
             self.growth,
@@ -61,9 +66,10 @@ class Slab:
 class Fold:
     """The surface after a step.
 
-    `growth` is that of the cortex so far, `area_ratio` the area of the surface over that at the start, `depth_mm`
-    that of the sulcus, and `pressure_pa` the mean pressure of its banks on each other per growth in the step, without
-    the bottom of the sulcus: there the surface is so compressed that neighbours repel each other.
+    `growth` is that of the cortex so far, `area_ratio` the area of the surface over
+    that at the start, `depth_mm` that of the sulcus, and `pressure_pa` the mean
+    pressure of its banks on each other per growth in the step, without the bottom of
+    the sulcus: there the surface is so compressed that neighbours repel each other.
     """
 
     growth: float
@@ -78,7 +84,9 @@ def mesh_of(slab: Slab) -> TetrahedralMesh:
     """Return the slab, one element across, with its sulcus along y in the middle."""
     depths = graded_depths(DEPTH_MM, slab.cells, FINE_DEPTH_MM, COARSENING, np.inf)
     # even, so that the bottom of the sulcus is a row of nodes
-    x = np.linspace(-WIDTH_MM / 2, WIDTH_MM / 2, 2 * round(WIDTH_MM * slab.cells / 2) + 1)
+    x = np.linspace(
+        -WIDTH_MM / 2, WIDTH_MM / 2, 2 * round(WIDTH_MM * slab.cells / 2) + 1
+    )
     mesh = grid([x, np.arange(2) / slab.cells, -depths[::-1] * DEPTH_MM / depths[-1]])
     mesh = mesh if slab.order == 1 else quadratic(mesh)
     vertices = mesh.vertices.copy()
@@ -99,9 +107,11 @@ def folded(slab: Slab, area_ratio: float, comm: MPI.Comm = MPI.COMM_SELF) -> lis
 
 
 def curved_surface(positions: Floats, facets: Ints, order: int) -> TriangleMesh:
-    """Return the surface with `facets` (f, 3) of a mesh at (n, 3) positions in mm; of quadratic elements, a finer one.
+    """Return the surface with `facets` (f, 3) of a mesh at (n, 3) positions in mm; of
+    quadratic elements, a finer one.
 
-    A quadratic element's face is curved: triangles between its nodes have a smaller area.
+    A quadratic element's face is curved: triangles between its nodes have a smaller
+    area.
     """
     if order == 1:
         return TriangleMesh(positions, facets)
@@ -122,14 +132,18 @@ def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
     force = 0.0
     if folding.contact is not None:
         nodes = folding.contact.surface.nodes
-        is_bank = (start[nodes, 0] < 0) & (places[nodes, 2] > height.min() + BOTTOM * depth_mm)
+        is_bank = (start[nodes, 0] < 0) & (
+            places[nodes, 2] > height.min() + BOTTOM * depth_mm
+        )
         forces = folding.contact.forces(folding.solved.displacement)
         force = abs(float(forces[is_bank, 0].sum()))
     row = state.rows[-1]
     bank_area_m2 = (1 - BOTTOM) * depth_mm / slab.cells * M_PER_MM**2
     growth_of_step = row["dt_s"] * RATE_PER_S
     return Fold(
-        growth=float(np.expm1(np.log1p(slab.growth) * state.time_s / folding.parameters.step_s)),
+        growth=float(
+            np.expm1(np.log1p(slab.growth) * state.time_s / folding.parameters.step_s)
+        ),
         area_ratio=area(top) / area(top_at_start),
         depth_mm=depth_mm,
         pressure_pa=force / bank_area_m2 / growth_of_step,
@@ -139,6 +153,12 @@ def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
 
 
 def at_ratio(folds: list[Fold], area_ratio: float) -> NDArray[np.float64]:
-    """Return growth, depth in mm and pressure in Pa at an area ratio, linear between the two steps around it."""
-    values = np.array([(fold.area_ratio, fold.growth, fold.depth_mm, fold.pressure_pa) for fold in folds]).T
+    """Return growth, depth in mm and pressure in Pa at an area ratio, linear between
+    the two steps around it."""
+    values = np.array(
+        [
+            (fold.area_ratio, fold.growth, fold.depth_mm, fold.pressure_pa)
+            for fold in folds
+        ]
+    ).T
     return np.array([np.interp(area_ratio, values[0], value) for value in values[1:]])

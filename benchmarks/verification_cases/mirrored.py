@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones, zones_of_run
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_faces,
+    grid,
+    quadratic,
+)
 from gyriflow.settings.folding import FoldingParameters, parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
 
@@ -19,7 +24,8 @@ SEMI_AXES_MM = np.array([7.0, 12.0, 9.0])
 MIDDLE_MM = 7.5
 """Distance of a hemisphere's centre from the midline."""
 GAP_MM = 1.9
-"""Width of the fissure for the contact planes, which the hemispheres almost touch at the start."""
+"""Width of the fissure for the contact planes, which the hemispheres almost touch at
+the start."""
 STEP_S = 86_400.0
 TURNED = {1: [0, 1, 3, 2], 2: [0, 1, 3, 2, 4, 8, 7, 6, 5, 9]}
 """An element's nodes, by its order, after exchanging corners 2 and 3."""
@@ -32,9 +38,11 @@ class Asymmetry:
     Attributes
     ----------
     relative
-        Largest distance of a vertex from its partner's mirror image, over the largest displacement.
+        Largest distance of a vertex from its partner's mirror image, over the largest
+        displacement.
     displacement_mm, penetration_mm
-        Largest displacement from the start, and the largest depth beyond a contact plane.
+        Largest displacement from the start, and the largest depth beyond a contact
+        plane.
     """
 
     relative: float
@@ -43,9 +51,11 @@ class Asymmetry:
 
 
 def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
-    """Return a right half (mm): an ellipsoid right of the midline, its vertices moved by up to `by` of a cell.
+    """Return a right half (mm): an ellipsoid right of the midline, its vertices moved
+    by up to `by` of a cell.
 
-    They are moved at random (seeded), so that hardly any point has two nearest pial vertices.
+    They are moved at random (seeded), so that hardly any point has two nearest pial
+    vertices.
     """
     cube = grid([np.linspace(-1.0, 1.0, cells + 1)] * 3)
     shell = np.abs(cube.vertices).max(axis=1, keepdims=True)
@@ -59,27 +69,40 @@ def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
 
 
 def rounded(half: TetrahedralMesh, part: float = 0.5) -> TetrahedralMesh:
-    """Return a `hemisphere` with quadratic elements whose outer edges are curved a part of the way to the ellipsoid."""
+    """Return a `hemisphere` with quadratic elements whose outer edges are curved a part
+    of the way to the ellipsoid."""
     straight = quadratic(half)
     pial = np.unique(boundary_faces(straight)[0])
     x = (straight.vertices[pial] - [MIDDLE_MM, 0.0, 0.0]) / SEMI_AXES_MM
     vertices = straight.vertices.copy()
-    vertices[pial] += part * SEMI_AXES_MM * x * (1 / np.linalg.norm(x, axis=1, keepdims=True) - 1)
+    vertices[pial] += (
+        part * SEMI_AXES_MM * x * (1 / np.linalg.norm(x, axis=1, keepdims=True) - 1)
+    )
     return TetrahedralMesh(vertices, straight.tets)
 
 
 def block(cells: int) -> TetrahedralMesh:
-    """Return a right half in mm: a box of even cells, where most points have several nearest pial vertices."""
+    """Return a right half in mm: a box of even cells, where most points have several
+    nearest pial vertices."""
     span = np.linspace(-1.0, 1.0, cells + 1)
-    return grid([semi * span + middle for semi, middle in zip(SEMI_AXES_MM, (MIDDLE_MM, 0.0, 0.0), strict=True)])
+    return grid(
+        [
+            semi * span + middle
+            for semi, middle in zip(SEMI_AXES_MM, (MIDDLE_MM, 0.0, 0.0), strict=True)
+        ]
+    )
 
 
 def reflected_and_merged(half: TetrahedralMesh) -> TetrahedralMesh:
-    """Return a half with its mirror image at x = 0; the partner of vertex i is vertex n + i."""
+    """Return a half with its mirror image at x = 0; the partner of vertex i is vertex n
+    + i."""
     image = half.vertices * [-1.0, 1.0, 1.0]
-    # a mirrored element is inside out: exchange two of its corners and the nodes on their edges
+    # a mirrored element is inside out: exchange two of its corners and the nodes on
+    # their edges
     tets = half.tets[:, TURNED[half.order]] + len(half.vertices)
-    return TetrahedralMesh(np.concatenate([half.vertices, image]), np.concatenate([half.tets, tets]))
+    return TetrahedralMesh(
+        np.concatenate([half.vertices, image]), np.concatenate([half.tets, tets])
+    )
 
 
 def parameters(**changes) -> FoldingParameters:
@@ -105,11 +128,18 @@ def asymmetry(mesh: TetrahedralMesh, state: State, zones: Zones) -> Asymmetry:
     right, left = np.split(state.positions * MM_PER_M, 2)
     moved = np.linalg.norm(state.positions * MM_PER_M - mesh.vertices, axis=1).max()
     gap = np.linalg.norm(right - left * [-1.0, 1.0, 1.0], axis=1).max()
-    return Asymmetry(float(gap / moved), float(moved), zones.penetration_mm(state.positions * MM_PER_M))
+    return Asymmetry(
+        float(gap / moved),
+        float(moved),
+        zones.penetration_mm(state.positions * MM_PER_M),
+    )
 
 
-def folded(half: TetrahedralMesh, steps: int, comm: MPI.Comm = MPI.COMM_WORLD, **changes) -> tuple[State, Asymmetry]:
-    """Fold a half with its mirror image and return the state and its asymmetry after some steps."""
+def folded(
+    half: TetrahedralMesh, steps: int, comm: MPI.Comm = MPI.COMM_WORLD, **changes
+) -> tuple[State, Asymmetry]:
+    """Fold a half with its mirror image and return the state and its asymmetry after
+    some steps."""
     mesh = reflected_and_merged(half)
     p = parameters(**changes)
     zones = zones_of_run(mesh, p, GAP_MM)

@@ -1,8 +1,9 @@
 """Fold a growing slab with small waves on its surface; `modes` predicts how they grow.
 
-One mesh has waves of many lengths, cos(nπx/width), which fit between its sliding sides. They are so small that they do
-not interact; a cosine transform of the surface separates them. The waves of a flat slab, due to the mesh itself, are
-subtracted. All lengths are in mm, and the cortex is 1 mm thick.
+One mesh has waves of many lengths, cos(nπx/width), which fit between its sliding sides.
+They are so small that they do not interact; a cosine transform of the surface separates
+them. The waves of a flat slab, due to the mesh itself, are subtracted. All lengths are
+in mm, and the cortex is 1 mm thick.
 """
 
 import time
@@ -31,7 +32,8 @@ REFERENCE_GROWTH = 0.0086
 """Growth in a step of the reference model."""
 FINE_DEPTH_MM = 2.0
 COARSENING = 1.8
-"""Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power 1/(cells per cortical thickness)."""
+"""Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power
+1/(cells per cortical thickness)."""
 MAX_COARSENING = 8
 """Height of the deepest elements over that of the finest."""
 ROWS = 2
@@ -42,8 +44,8 @@ ROWS = 2
 class Waved:
     """A slab with waves, whose cortex grows by `growth` in each step.
 
-    `memory` is the growth during which stress relaxes, `order` the element order. Width and depth are two wavelengths
-    of the fastest wave.
+    `memory` is the growth during which stress relaxes, `order` the element order. Width
+    and depth are two wavelengths of the fastest wave.
     """
 
     contrast: float
@@ -64,11 +66,16 @@ class Waved:
 
     @property
     def in_theory(self) -> Slab:
-        return Slab(self.contrast, self.poisson_ratio, depth=self.width_mm, memory=self.memory)
+        return Slab(
+            self.contrast, self.poisson_ratio, depth=self.width_mm, memory=self.memory
+        )
 
     def expected(self) -> Floats:
-        """Return the (steps + 1, waves) heights over those at the start, from `modes`."""
-        return amplifications(self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps)
+        """Return the (steps + 1, waves) heights over those at the start, from
+        `modes`."""
+        return amplifications(
+            self.in_theory, 2 * np.pi / self.lengths_mm, self.growth, self.steps
+        )
 
     def parameters(self) -> FoldingParameters:
         """Return the parameters of the run."""
@@ -85,10 +92,15 @@ class Waved:
 
 
 def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
-    """Return a slab with `cells` cells per cortical thickness, coarser below, and waves of a height on top."""
-    down = graded_depths(case.width_mm, cells, FINE_DEPTH_MM, COARSENING, MAX_COARSENING / cells)
+    """Return a slab with `cells` cells per cortical thickness, coarser below, and waves
+    of a height on top."""
+    down = graded_depths(
+        case.width_mm, cells, FINE_DEPTH_MM, COARSENING, MAX_COARSENING / cells
+    )
     stretch = (case.width_mm - FINE_DEPTH_MM) / (down[-1] - FINE_DEPTH_MM)
-    down = np.where(down > FINE_DEPTH_MM, FINE_DEPTH_MM + (down - FINE_DEPTH_MM) * stretch, down)
+    down = np.where(
+        down > FINE_DEPTH_MM, FINE_DEPTH_MM + (down - FINE_DEPTH_MM) * stretch, down
+    )
     x = np.linspace(0.0, case.width_mm, round(case.width_mm * cells) + 1)
     slab = grid([x, np.arange(ROWS) / cells, -down[::-1]])
     slab = slab if case.order == 1 else quadratic(slab)
@@ -101,13 +113,16 @@ def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
 def fastest_wave(case: Waved, cells: int, timed_steps: int = 4) -> dict[str, float]:
     """Return error and cost of a mesh for the fastest wave, on one rank.
 
-    `rate_error` is the error of the growth rate in the first step, relative to the theory. `unknowns_per_mm` and
-    `seconds_per_mm` are per mm across the slab; the latter is the processor time of a step with usual tolerances. The
-    first steps, which compile and set up, are not counted.
+    `rate_error` is the error of the growth rate in the first step, relative to the
+    theory. `unknowns_per_mm` and `seconds_per_mm` are per mm across the slab; the
+    latter is the processor time of a step with usual tolerances. The first steps, which
+    compile and set up, are not counted.
     """
     comm = MPI.COMM_SELF
     mesh, p = mesh_of(case, cells, HEIGHT_MM), case.parameters()
-    p = p.model_copy(update={"solver": Solver(), "step_s": REFERENCE_GROWTH / RATE_PER_S})
+    p = p.model_copy(
+        update={"solver": Solver(), "step_s": REFERENCE_GROWTH / RATE_PER_S}
+    )
     folding = Folding(comm, mesh, box_zones(mesh, p), p)
     state, seconds = State.at_start(mesh.vertices * M_PER_MM, p.step_s), []
     for _ in range(2 + timed_steps):
@@ -132,7 +147,8 @@ def rate_error(case: Waved, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> floa
 
 
 def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats:
-    """Return the (steps + 1, waves) heights (mm) of the waves at the start and after each step."""
+    """Return the (steps + 1, waves) heights (mm) of the waves at the start and after
+    each step."""
     mesh = mesh_of(case, cells, height_mm)
     p = case.parameters()
     folding = Folding(comm, mesh, box_zones(mesh, p), p)
@@ -145,11 +161,14 @@ def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats
     spacings = case.order * round(case.width_mm * cells)
     column = np.rint(flat[top, 0] * spacings / case.width_mm).astype(int)
     counts = np.bincount(column)
-    surface = np.array([np.bincount(column, state.positions[top, 2]) / counts for state in states])
+    surface = np.array(
+        [np.bincount(column, state.positions[top, 2]) / counts for state in states]
+    )
     return (dct(surface, type=1, axis=1) / spacings)[:, WAVES] * MM_PER_M
 
 
 def amplified(case: Waved, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Floats:
-    """Return the (steps + 1, waves) heights over those at the start, less those of a flat slab."""
+    """Return the (steps + 1, waves) heights over those at the start, less those of a
+    flat slab."""
     flat, waved = (heights(case, cells, height, comm) for height in (0.0, HEIGHT_MM))
     return (waved - flat) / waved[0]

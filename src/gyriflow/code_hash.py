@@ -1,4 +1,5 @@
-"""The code that a program depends on: the modules of this package that it imports, directly or through others."""
+"""The code that a program depends on: the modules of this package that it imports,
+directly or through others."""
 
 import hashlib
 import re
@@ -6,23 +7,31 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
-IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^)]*\)|[^\n]*)", re.MULTILINE)
-"""An import: the dots and the module that it is from, and what it names. Parsing all files would take half a second."""
+IMPORT = re.compile(
+    r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^)]*\)|[^\n]*)",
+    re.MULTILINE,
+)
+"""An import: the dots and the module that it is from, and what it names. Parsing all
+files would take half a second."""
 
 
 def code_hash(program: Path, *modules: Path) -> str:
-    """Return "code" and a hash of all modules of this package that a Python program imports.
+    """Return "code" and a hash of all modules of this package that a Python program
+    imports.
 
-    Further `modules` are those that the program imports by a name that it is given. A parameter of a rule, it reruns
-    what depends on a change of the code.
+    Further `modules` are those that the program imports by a name that it is given. A
+    parameter of a rule, it reruns what depends on a change of the code.
     """
     files = modules_behind(program).union(modules, *map(modules_behind, modules))
-    named = sorted((path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files)
+    named = sorted(
+        (path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files
+    )
     return f"code {hashlib.sha256(repr(named).encode()).hexdigest()[:12]}"
 
 
 def modules_behind(program: Path) -> set[Path]:
-    """Return the files of all modules of this package that a Python program imports, directly or through others.
+    """Return the files of all modules of this package that a Python program imports,
+    directly or through others.
 
     A module's C code, in a file of the same name in its folder, is included.
     """
@@ -32,25 +41,39 @@ def modules_behind(program: Path) -> set[Path]:
         module = waiting.pop()
         reached.add(module)
         waiting |= imported_modules(module) - reached
-    c_files = {file for module in reached if (file := module.with_suffix(".c")).is_file()}
+    c_files = {
+        file for module in reached if (file := module.with_suffix(".c")).is_file()
+    }
     return (reached | c_files) - {program}
 
 
 @cache
 def imported_modules(source: Path) -> frozenset[Path]:
-    """Return the files of the modules of this package that a source file imports, at the top or inside functions."""
+    """Return the files of the modules of this package that a source file imports, at
+    the top or inside functions."""
     inside = source.resolve().is_relative_to(PACKAGE)
-    here = [PACKAGE.name, *source.resolve().relative_to(PACKAGE).parts[:-1]] if inside else []
+    here = (
+        [PACKAGE.name, *source.resolve().relative_to(PACKAGE).parts[:-1]]
+        if inside
+        else []
+    )
     names: list[str] = []
     for dots, module, imported in IMPORT.findall(source.read_text()):
         base = here[: len(here) - len(dots) + 1] if dots else []
         start = ".".join([*base, module] if module else base)
-        names += [start, *(f"{start}.{name}" if start else name for name in re.findall(r"[\w.]+", imported))]
+        names += [
+            start,
+            *(
+                f"{start}.{name}" if start else name
+                for name in re.findall(r"[\w.]+", imported)
+            ),
+        ]
     return frozenset(file for name in names for file in _files_of(name))
 
 
 def room_of(module: Path) -> str:
-    """Return the room that a source file belongs to: the folder, or the single module, directly under the package."""
+    """Return the room that a source file belongs to: the folder, or the single module,
+    directly under the package."""
     return module.resolve().relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
@@ -59,8 +82,15 @@ def _files_of(name: str) -> list[Path]:
     package, *parts = name.split(".")
     if package != PACKAGE.name:
         return []
-    around = [PACKAGE.joinpath(*parts[:count], "__init__.py") for count in range(len(parts) + 1)]
-    return [path for path in (*around, PACKAGE.joinpath(*parts).with_suffix(".py")) if path.is_file()]
+    around = [
+        PACKAGE.joinpath(*parts[:count], "__init__.py")
+        for count in range(len(parts) + 1)
+    ]
+    return [
+        path
+        for path in (*around, PACKAGE.joinpath(*parts).with_suffix(".py"))
+        if path.is_file()
+    ]
 
 
 @cache

@@ -1,10 +1,12 @@
-"""Errors that a user can act on, each with the exit code of the program that ends in it."""
+"""Errors that a user can act on, each with the exit code of the program that ends in
+it."""
 
 from os import PathLike
 
 
 class GyriflowError(Exception):
-    """An error with a problem (a short clause), the file concerned, what was found and expected, and a remedy."""
+    """An error with a problem (a short clause), the file concerned, what was found and
+    expected, and a remedy."""
 
     exit_code = 1
 

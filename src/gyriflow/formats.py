@@ -1,4 +1,5 @@
-"""The file formats of surfaces and volumes that can be given, by the ends of names, and some that cannot, by content.
+"""The file formats of surfaces and volumes that can be given, by the ends of names, and
+some that cannot, by content.
 
 Each format has a reader of its `name` in `io.surfaces` or `io.volumes`.
 """
@@ -13,9 +14,11 @@ Content = Literal["surface", "volume"]
 
 @dataclass(frozen=True)
 class FileFormat:
-    """A format of surfaces or volumes; `suffixes` are those of the files by which data are named, in lower case.
+    """A format of surfaces or volumes; `suffixes` are those of the files by which data
+    are named, in lower case.
 
-    `data_suffixes` are those of second files that belong to these, such as the values of a pair.
+    `data_suffixes` are those of second files that belong to these, such as the values
+    of a pair.
     """
 
     name: str
@@ -40,21 +43,37 @@ FORMATS = (
     FileFormat("NIfTI pair", "volume", (".hdr", ".hdr.gz"), (".img", ".img.gz")),
     FileFormat("MGH", "volume", (".mgz", ".mgh")),
 )
-SURFACE_SUFFIXES = tuple(suffix for form in FORMATS if form.content == "surface" for suffix in form.suffixes)
-VOLUME_SUFFIXES = tuple(suffix for form in FORMATS if form.content == "volume" for suffix in form.suffixes)
+SURFACE_SUFFIXES = tuple(
+    suffix for form in FORMATS if form.content == "surface" for suffix in form.suffixes
+)
+VOLUME_SUFFIXES = tuple(
+    suffix for form in FORMATS if form.content == "volume" for suffix in form.suffixes
+)
 ALL_SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.all_suffixes)
 
 
-CIFTI_NAME = re.compile(r"\.(?:d|p|dp|pd)(?:label|scalar|tseries|conn|connseries|connscalar|fan)\.nii$", re.IGNORECASE)
-"""End of the names of CIFTI files, whose values are at vertices and voxels of the grey matter: no NIfTI volumes."""
+CIFTI_NAME = re.compile(
+    r"\.(?:d|p|dp|pd)(?:label|scalar|tseries|conn|connseries|connscalar|fan)\.nii$",
+    re.IGNORECASE,
+)
+"""End of the names of CIFTI files, whose values are at vertices and voxels of the grey
+matter: no NIfTI volumes."""
 
 
 def format_of(path: str | PathLike[str], content: Content) -> FileFormat | None:
-    """Return the format of surfaces or of volumes that a file has by its name, or None."""
+    """Return the format of surfaces or of volumes that a file has by its name, or
+    None."""
     name = str(path).lower()
     if CIFTI_NAME.search(name):
         return None
-    return next((form for form in FORMATS if form.content == content and name.endswith(form.all_suffixes)), None)
+    return next(
+        (
+            form
+            for form in FORMATS
+            if form.content == content and name.endswith(form.all_suffixes)
+        ),
+        None,
+    )
 
 
 def is_volume(path: str | PathLike[str]) -> bool:
@@ -63,18 +82,21 @@ def is_volume(path: str | PathLike[str]) -> bool:
 
 
 SIDE_NAME = re.compile(
-    r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=[._])L)|(right|rh|hemi-R|(?<=[._])R))(?=[._-])", re.IGNORECASE
+    r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=[._])L)|(right|rh|hemi-R|(?<=[._])R))(?=[._-])",
+    re.IGNORECASE,
 )
 
 
 def side_in_name(name: str) -> Literal["left", "right"] | None:
-    """Return the hemisphere that a file's name has, such as `lh.pial` or `sub-01_hemi-R_pial.surf.gii`, or None."""
+    """Return the hemisphere that a file's name has, such as `lh.pial` or
+    `sub-01_hemi-R_pial.surf.gii`, or None."""
     found = {"left" if left else "right" for left, _ in SIDE_NAME.findall(name)}
     return found.pop() if len(found) == 1 else None  # type: ignore[return-value]
 
 
 class ForeignFormat(NamedTuple):
-    """A format recognised by a file's first bytes, and the remedy unless the file's name ends in `suffixes`."""
+    """A format recognised by a file's first bytes, and the remedy unless the file's
+    name ends in `suffixes`."""
 
     start: bytes
     name: str
@@ -84,21 +106,43 @@ class ForeignFormat(NamedTuple):
 
 START_BYTES = 512
 """Number of bytes that identify the format of a file."""
-TO_NIFTI = "Save it as NIfTI (.nii.gz), for example with 3D Slicer, ITK-SNAP or SimpleITK."
+TO_NIFTI = (
+    "Save it as NIfTI (.nii.gz), for example with 3D Slicer, ITK-SNAP or SimpleITK."
+)
 TO_TABLE = "Save it as text separated by tabs (.tsv)."
 FOREIGN_FORMATS = (
     ForeignFormat(rb"NRRD\d{4}", "an NRRD volume", TO_NIFTI),
-    ForeignFormat(rb"(Comment[^\n]*\n)?(ObjectType|NDims) *=", "a MetaImage volume", TO_NIFTI),
-    ForeignFormat(rb".{128}DICM", "a DICOM file", "Convert the series to NIfTI, for example with dcm2niix."),
+    ForeignFormat(
+        rb"(Comment[^\n]*\n)?(ObjectType|NDims) *=", "a MetaImage volume", TO_NIFTI
+    ),
+    ForeignFormat(
+        rb".{128}DICM",
+        "a DICOM file",
+        "Convert the series to NIfTI, for example with dcm2niix.",
+    ),
     ForeignFormat(rb"PK\x03\x04", "an Excel workbook or another ZIP archive", TO_TABLE),
     ForeignFormat(rb"\xd0\xcf\x11\xe0", "an Excel workbook", TO_TABLE),
-    ForeignFormat(rb"(?i)\s*(<!doctype html|<html)", "a web page", "Download the file itself; it may need a login."),
-    ForeignFormat(rb"\x1f\x8b", "compressed by gzip", "Add .gz to its name.", (".gz", ".mgz")),
-    ForeignFormat(rb".{344}(n\+1|ni1)\0", "NIfTI without compression", "Name it .nii.", (".nii", ".hdr")),
+    ForeignFormat(
+        rb"(?i)\s*(<!doctype html|<html)",
+        "a web page",
+        "Download the file itself; it may need a login.",
+    ),
+    ForeignFormat(
+        rb"\x1f\x8b", "compressed by gzip", "Add .gz to its name.", (".gz", ".mgz")
+    ),
+    ForeignFormat(
+        rb".{344}(n\+1|ni1)\0",
+        "NIfTI without compression",
+        "Name it .nii.",
+        (".nii", ".hdr"),
+    ),
 )
 
 
 def foreign_format(path: str | PathLike[str], start: bytes) -> ForeignFormat | None:
-    """Return the format that a file's first `START_BYTES` show, None if its name has the same one or it is unknown."""
+    """Return the format that a file's first `START_BYTES` show, None if its name has
+    the same one or it is unknown."""
     shown = (form for form in FOREIGN_FORMATS if re.match(form.start, start, re.DOTALL))
-    return next((form for form in shown if not str(path).lower().endswith(form.suffixes)), None)
+    return next(
+        (form for form in shown if not str(path).lower().endswith(form.suffixes)), None
+    )

@@ -6,17 +6,20 @@ from collections.abc import Iterable
 N_SHOWN = 3
 """Messages of a kind that are shown."""
 VARYING = re.compile(r"\S*[/\d]\S*")
-"""Words with a digit or a slash: numbers, ids, weeks and paths, in which messages of one kind differ."""
+"""Words with a digit or a slash: numbers, ids, weeks and paths, in which messages of
+one kind differ."""
 
 
 class Kinds:
-    """Messages that come one after another, by kind: of each only the first ones are shown."""
+    """Messages that come one after another, by kind: of each only the first ones are
+    shown."""
 
     def __init__(self) -> None:
         self._messages: dict[str, list[str]] = {}
 
     def add(self, name: str, message: str) -> bool:
-        """Add a message, and return whether to show it; `name` is that of its scan or job, or ""."""
+        """Add a message, and return whether to show it; `name` is that of its scan or
+        job, or ""."""
         alike = self._messages.setdefault(_kind_of(name, message), [])
         if message in alike:
             return False
@@ -26,10 +29,13 @@ class Kinds:
     def others(self) -> list[str]:
         """Return a line about the messages of each kind that were not shown."""
         hidden = [alike for alike in self._messages.values() if len(alike) > N_SHOWN]
-        return [f"… and {len(alike) - N_SHOWN} more like: {alike[0]}" for alike in hidden]
+        return [
+            f"… and {len(alike) - N_SHOWN} more like: {alike[0]}" for alike in hidden
+        ]
 
     def lines(self) -> list[tuple[str, int]]:
-        """Return the lines that stand for all messages, those of a kind together, and for how many each stands."""
+        """Return the lines that stand for all messages, those of a kind together, and
+        for how many each stands."""
         lines = []
         for alike in self._messages.values():
             lines += [(message, 1) for message in alike[:N_SHOWN]]
@@ -40,7 +46,8 @@ class Kinds:
 
 
 def grouped(messages: Iterable[tuple[str, str]]) -> list[tuple[str, int]]:
-    """Return the lines that stand for messages, each with the name of its scan or "", and for how many each stands."""
+    """Return the lines that stand for messages, each with the name of its scan or "",
+    and for how many each stands."""
     kinds = Kinds()
     for name, message in messages:
         kinds.add(name, message)

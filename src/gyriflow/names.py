@@ -1,12 +1,16 @@
-"""Names that become one: in folders, labels and columns, where two things must not share a name."""
+"""Names that become one: in folders, labels and columns, where two things must not
+share a name."""
 
 from collections.abc import Callable, Iterable, Iterator
 
 from .errors import InputError
 
 
-def merged_names(names: Iterable[str], become: Callable[[str], str]) -> Iterator[tuple[str, str]]:
-    """Yield each name that becomes the same as an earlier, different name, after that one."""
+def merged_names(
+    names: Iterable[str], become: Callable[[str], str]
+) -> Iterator[tuple[str, str]]:
+    """Yield each name that becomes the same as an earlier, different name, after that
+    one."""
     earlier: dict[str, str] = {}
     for name in names:
         first = earlier.setdefault(become(name), name)
@@ -20,12 +24,14 @@ def folder_name(name: str) -> str:
 
 
 def column_part(name: str) -> str:
-    """Return a name as it stands in the names of columns, with hyphens in place of spaces."""
+    """Return a name as it stands in the names of columns, with hyphens in place of
+    spaces."""
     return name.replace(" ", "-")
 
 
 def bids_label(name: str) -> str:
-    """Return the ASCII letters and digits of a name, of which labels of BIDS consist."""
+    """Return the ASCII letters and digits of a name, of which labels of BIDS
+    consist."""
     return "".join(letter for letter in name if letter.isascii() and letter.isalnum())
 
 
@@ -35,16 +41,21 @@ def bids_subject(name: str) -> str:
 
 
 def require_bids_names(subjects: Iterable[str], runs: Iterable[str] = ()) -> None:
-    """Raise InputError where a subject or a run has no BIDS label, or two have the same one, with both names."""
+    """Raise InputError where a subject or a run has no BIDS label, or two have the same
+    one, with both names."""
     _require_labels("subject", subjects, bids_subject)
     _require_labels("run", runs, bids_label)
 
 
-def _require_labels(kind: str, names: Iterable[str], label: Callable[[str], str]) -> None:
+def _require_labels(
+    kind: str, names: Iterable[str], label: Callable[[str], str]
+) -> None:
     names = list(names)
     for name in names:
         if label(name) == label(""):
-            raise InputError(f"a {kind} has no BIDS label", found=name, expected="letters or digits")
+            raise InputError(
+                f"a {kind} has no BIDS label", found=name, expected="letters or digits"
+            )
     for first, second in merged_names(names, lambda name: folder_name(label(name))):
         raise InputError(
             f"two {kind}s have the same BIDS label, {label(first)}",

@@ -1,4 +1,5 @@
-"""Location of the data and the workflow that come with the package, in a checkout or installed."""
+"""Location of the data and the workflow that come with the package, in a checkout or
+installed."""
 
 from pathlib import Path
 
@@ -6,7 +7,8 @@ PACKAGE = Path(__file__).resolve().parent
 INSTALLED = PACKAGE / "shipped"
 """In an installed package, the folder with what a checkout has next to `src`."""
 SHIPPED = INSTALLED if INSTALLED.is_dir() else PACKAGE.parents[1]
-"""The folder with the Snakefile, `workflow`, `atlases`, `schemes`, `norms`, `config` and `profiles`."""
+"""The folder with the Snakefile, `workflow`, `atlases`, `schemes`, `norms`, `config`
+and `profiles`."""
 DEMO = SHIPPED / "config" / "config.yaml"
 ATLASES = SHIPPED / "atlases"
 """Folder of the atlases that come with gyriflow, each in a folder of its own."""

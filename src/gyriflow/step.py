@@ -1,7 +1,8 @@
-"""Run a step of the workflow: its log, short error messages, its exit code, and the time and memory that it took.
+"""Run a step of the workflow: its log, short error messages, its exit code, and the
+time and memory that it took.
 
-`python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the exit code and exits with it, or with 5 for
-a bus error.
+`python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the exit code
+and exits with it, or with 5 for a bus error.
 """
 
 import logging
@@ -19,26 +20,30 @@ import psutil
 from .errors import GyriflowError, StorageError
 
 EXIT_FILE = "GYRIFLOW_EXIT_FILE"
-"""Environment variable with the path of the file for the first failed step's exit code."""
+"""Environment variable with the path of the file for the first failed step's exit
+code."""
 INTERRUPTED = 130
 KILLED = 137
 KILLED_MESSAGE = (
-    "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
+    "gyriflow: the program was killed, most probably because memory ran out; see the"
+    " memory predicted above"
 )
 
 BUS_ERROR_CODES = (7, 135)
 """Exit codes of mpiexec and of a shell for a program that a bus error stopped."""
 SHARED_MEMORY_MESSAGE = (
-    "gyriflow: the program was stopped by a bus error, most probably because /dev/shm is full: MPI needs 6 MB of it for"
-    " each rank. In a container: --shm-size 1g"
+    "gyriflow: the program was stopped by a bus error, most probably because /dev/shm"
+    " is full: MPI needs 6 MB of it for each rank. In a container: --shm-size 1g"
 )
 
 
 def record_exit_code(code: int) -> None:
-    """Record an exit code for the launcher, if there is one. The first of several failures counts."""
+    """Record an exit code for the launcher, if there is one. The first of several
+    failures counts."""
     path = os.environ.get(EXIT_FILE)
     if path:
-        # the file exists if another step failed before; without it, Snakemake's own code is used
+        # the file exists if another step failed before; without it, Snakemake's own
+        # code is used
         with suppress(OSError), Path(path).open("x") as file:
             file.write(str(code))
 
@@ -51,7 +56,8 @@ def recorded_exit_code(path: Path) -> int | None:
 
 
 class Usage(NamedTuple):
-    """Wall time since a program began, CPU time and peak memory, those of its ended children included."""
+    """Wall time since a program began, CPU time and peak memory, those of its ended
+    children included."""
 
     wall_s: float
     cpu_s: float
@@ -63,14 +69,18 @@ USAGE_COLUMNS = ("wall_s", "cpu_s", "memory_MiB")
 
 
 def usage() -> Usage:
-    """Return what this program has used, as the system counts it; on Windows without its children."""
+    """Return what this program has used, as the system counts it; on Windows without
+    its children."""
     wall_s = time.time() - psutil.Process().create_time()
     if sys.platform == "win32":
         memory = psutil.Process().memory_info().peak_wset
         return Usage(wall_s, time.process_time(), memory / 2**20)
     import resource
 
-    own, children = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    own, children = (
+        resource.getrusage(resource.RUSAGE_SELF),
+        resource.getrusage(resource.RUSAGE_CHILDREN),
+    )
     cpu_s = own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
     # macOS counts bytes, Linux KiB
     per_mib = 2**20 if sys.platform == "darwin" else 2**10
@@ -79,7 +89,8 @@ def usage() -> Usage:
 
 
 def record_usage(log: str | Path, used: Usage) -> None:
-    """Write what a step has used to a table, which lies in the folder `benchmarks` next to that of its log."""
+    """Write what a step has used to a table, which lies in the folder `benchmarks` next
+    to that of its log."""
     log = Path(log)
     # no step of the workflow has its log elsewhere
     folder = next((folder for folder in log.parents if folder.name == "logs"), None)
@@ -97,12 +108,15 @@ def record_usage(log: str | Path, used: Usage) -> None:
 def step(log: str, *inputs: str) -> Iterator[None]:
     """Run a step and write its messages to the file `log`.
 
-    A GyriflowError ends the program with its exit code and one message, on the terminal and in the log. Any other
-    error ends it with a traceback. The message begins with the step's `inputs` if the error names no file.
+    A GyriflowError ends the program with its exit code and one message, on the terminal
+    and in the log. Any other error ends it with a traceback. The message begins with
+    the step's `inputs` if the error names no file.
     """
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
     try:
-        logging.basicConfig(level=logging.INFO, format=form, filename=log, filemode="w", force=True)
+        logging.basicConfig(
+            level=logging.INFO, format=form, filename=log, filemode="w", force=True
+        )
     except OSError as error:
         print(f"gyriflow: {log}: cannot be written: {error.strerror}", file=sys.stderr)
         record_exit_code(StorageError.exit_code)
@@ -114,7 +128,11 @@ def step(log: str, *inputs: str) -> Iterator[None]:
         if isinstance(error, GyriflowError):
             message, code, named = str(error), error.exit_code, error.names_file
         else:
-            message, code, named = f"memory ran out ({error}). Free memory, or run fewer jobs at once", KILLED, False
+            message, code, named = (
+                f"memory ran out ({error}). Free memory, or run fewer jobs at once",
+                KILLED,
+                False,
+            )
         if inputs and not named:
             message = f"{', '.join(inputs)}: {message}"
         logging.error("%s", message)

@@ -9,5 +9,6 @@ CM2_PER_MM2 = 1e-2
 
 
 def week_tag(week: float) -> str:
-    """Return a gestational week as it stands in file names, for example "21.00" or "21.50"."""
+    """Return a gestational week as it stands in file names, for example "21.00" or
+    "21.50"."""
     return f"{week:05.2f}"

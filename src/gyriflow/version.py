@@ -12,7 +12,8 @@ RELEASE = "0.1.0"
 
 @cache
 def version() -> str:
-    """Return the version, such as `0.1.0`, or `0.1.0+3.gabc1234` three commits after its tag."""
+    """Return the version, such as `0.1.0`, or `0.1.0+3.gabc1234` three commits after
+    its tag."""
     if INSTALLED.is_dir():
         return metadata.version("gyriflow")
     described = _git("describe", "--tags", "--match", "v*", "--always", "--dirty")
@@ -26,15 +27,22 @@ def version() -> str:
 
 @cache
 def commit() -> str | None:
-    """Return the commit of the checkout, with `-dirty` where files differ from it, or None outside of git."""
-    return _git("describe", "--match", "", "--always", "--abbrev=40", "--dirty") if not INSTALLED.is_dir() else None
+    """Return the commit of the checkout, with `-dirty` where files differ from it, or
+    None outside of git."""
+    return (
+        _git("describe", "--match", "", "--always", "--abbrev=40", "--dirty")
+        if not INSTALLED.is_dir()
+        else None
+    )
 
 
 def _git(*arguments: str) -> str | None:
     # a checkout may belong to another user, as in a container
     command = ["git", "-c", "safe.directory=*", "-C", str(SHIPPED), *arguments]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=True, timeout=10
+        )
     except (OSError, subprocess.SubprocessError):
         return None
     return done.stdout.strip() or None

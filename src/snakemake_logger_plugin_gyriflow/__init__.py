@@ -1,4 +1,5 @@
-"""Snakemake's logger plugin `gyriflow`: a quiet terminal (`--logger gyriflow`), the default of `./run snakemake`."""
+"""Snakemake's logger plugin `gyriflow`: a quiet terminal (`--logger gyriflow`), the
+default of `./run snakemake`."""
 
 import logging
 import sys
@@ -9,7 +10,11 @@ from pathlib import Path
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
-OPTION = {"help": "File in .snakemake/log for all messages of Snakemake", "env_var": False, "required": True}
+OPTION = {
+    "help": "File in .snakemake/log for all messages of Snakemake",
+    "env_var": False,
+    "required": True,
+}
 
 
 @dataclass
@@ -30,15 +35,22 @@ class LogHandler(LogHandlerBase):
 
         details = Path(getattr(self.settings, "details", ""))
         self.file = logging.FileHandler(details)
-        self.file.setFormatter(DefaultFormatter(self.common_settings.quiet, show_failed_logs=True))
+        self.file.setFormatter(
+            DefaultFormatter(self.common_settings.quiet, show_failed_logs=True)
+        )
         self.display = RunDisplay(sys.stderr, details)
         # the lock is held while a record is handled, too
-        threading.Thread(target=self.display.watch, args=[self.lock], daemon=True).start()
+        threading.Thread(
+            target=self.display.watch, args=[self.lock], daemon=True
+        ).start()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Hand a record on to the file and to the display."""
         try:
-            if record.levelno >= logging.INFO and getattr(record, "event", None) != "shellcmd":
+            if (
+                record.levelno >= logging.INFO
+                and getattr(record, "event", None) != "shellcmd"
+            ):
                 self.file.emit(record)
             self.display.show(record)
         except Exception:
@@ -51,6 +63,7 @@ class LogHandler(LogHandlerBase):
             self.file.close()
         super().close()
 
-    # it chooses by itself, writes its own lines, and its file is none of Snakemake's logs
+    # it chooses by itself, writes its own lines, and its file is none of Snakemake's
+    # logs
     writes_to_stream = has_filter = has_formatter = True
     writes_to_file = needs_rulegraph = False

@@ -1,4 +1,5 @@
-"""The solver against closed answers: waves on a growing slab, whose theory is tried in its limits, and made-up ones."""
+"""The solver against closed answers: waves on a growing slab, whose theory is tried in
+its limits, and made-up ones."""
 
 import numpy as np
 import pytest
@@ -37,7 +38,9 @@ def test_where_stress_is_kept_a_stiff_film_wrinkles_at_the_critical_growth():
     slab = Slab(1e3, memory=np.inf, depth=150.0, finest=0.04)
     film = thin_film(slab)
     lengths = film.wavelength * np.array([0.6, 1.0, 1.6])
-    found = critical_growth(slab, 2 * np.pi / lengths, film.critical_growth / 25, 2 * film.critical_growth)
+    found = critical_growth(
+        slab, 2 * np.pi / lengths, film.critical_growth / 25, 2 * film.critical_growth
+    )
     assert found.argmin() == 1
     assert found[1] == pytest.approx(film.critical_growth, rel=0.07)
 
@@ -49,7 +52,9 @@ def test_where_stress_is_kept_a_half_space_wrinkles_at_biots_stretch():
 
 
 def test_one_quadratic_element_through_the_cortex_does_what_two_linear_ones_do_not():
-    linear, quadratic = (Waved(contrast=5.0, growth=1e-3, steps=1, order=order) for order in (1, 2))
+    linear, quadratic = (
+        Waved(contrast=5.0, growth=1e-3, steps=1, order=order) for order in (1, 2)
+    )
     assert -0.36 < rate_error(linear, 2, COMM) < -0.25
     assert abs(rate_error(quadratic, 1, COMM)) < 0.06
 
@@ -70,7 +75,8 @@ def test_waves_grow_as_in_theory(memory):
     exact = np.log(case.expected()[-1])
     coarse, fine = (np.log(amplified(case, cells, COMM)[-1]) for cells in (2, 4))
     assert (np.abs(fine - exact) <= 0.6 * np.abs(coarse - exact)).all()
-    # what is left on ever finer meshes: memory changes the long waves by 8 to 28 %, turning normals the short ones
+    # what is left on ever finer meshes: memory changes the long waves by 8 to 28 %,
+    # turning normals the short ones
     limit = fine + (fine - coarse) / (2**ORDER - 1)
     np.testing.assert_allclose(limit[LONG], exact[LONG], rtol=0.03)
     np.testing.assert_allclose(limit, exact, rtol=0.2)
@@ -83,7 +89,9 @@ def test_waves_grow_as_in_theory(memory):
     ids=["linear", "quadratic"],
 )
 @pytest.mark.parametrize("case", CASES)
-def test_errors_fall_with_one_power_more_than_those_of_gradients(case, order, cells, fall, gradient_falls, left):
+def test_errors_fall_with_one_power_more_than_those_of_gradients(
+    case, order, cells, fall, gradient_falls, left
+):
     errors = [solved(case, number, order=order) for number in cells]
     displacement, gradient = rates(errors).T
     assert displacement[-1] >= fall

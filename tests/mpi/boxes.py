@@ -20,7 +20,8 @@ MATERIAL = NeoHookean(poisson_ratio=0.45)
 
 
 def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
-    """Return a box in mm whose inner vertices are moved at random (seeded): no symmetry helps."""
+    """Return a box in mm whose inner vertices are moved at random (seeded): no symmetry
+    helps."""
     mesh = box_mesh(cells, size)
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
     vertices = mesh.vertices.copy()
@@ -29,7 +30,8 @@ def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
 
 
 def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
-    """Return a box in mm of quadratic elements, whose inner nodes are moved at random (seeded): sides are curved."""
+    """Return a box in mm of quadratic elements, whose inner nodes are moved at random
+    (seeded): sides are curved."""
     mesh = quadratic(distorted_box(cells, size))
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
     vertices = mesh.vertices.copy()
@@ -37,7 +39,13 @@ def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
     return TetrahedralMesh(vertices, mesh.tets)
 
 
-def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=None, planes=(-0.5, 0.5)):
+def zones_of(
+    mesh,
+    clamped=lambda x: np.zeros(len(x), bool),
+    left=None,
+    right=None,
+    planes=(-0.5, 0.5),
+):
     """Return zones by conditions on the facets' centroids in mm."""
     facets, _ = boundary_faces(mesh)
     centre = mesh.vertices[facets].mean(axis=1)
@@ -55,9 +63,12 @@ def at_the_bottom(centre):
 
 
 def set_layers(problem, mu, dg, dr, normals, V=None):
-    """Set shear modulus in Pa and growth increments (k,) at the local nodes, with unit normals (c, 3) of the cells."""
+    """Set shear modulus in Pa and growth increments (k,) at the local nodes, with unit
+    normals (c, 3) of the cells."""
     points = problem.points
-    mu, dg, dr = (nodal[problem.domain.cells] @ points.interpolation.T for nodal in (mu, dg, dr))
+    mu, dg, dr = (
+        nodal[problem.domain.cells] @ points.interpolation.T for nodal in (mu, dg, dr)
+    )
     repeated = np.repeat(normals[:, None], len(points.weights), axis=1)
     problem.set_step(mu, layered_inverse(dg, dr, np.ones(len(mu), bool), repeated), V)
 
@@ -73,11 +84,15 @@ class EvenGrowth(StepGrowth):
 
     def inverse(self, tissue):
         elements = tissue.elements
-        return np.tile(np.eye(3) / (1 + self.by), (len(elements.cells), len(elements.points.weights), 1, 1))
+        return np.tile(
+            np.eye(3) / (1 + self.by),
+            (len(elements.cells), len(elements.points.weights), 1, 1),
+        )
 
 
 def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, comm=COMM):
-    """Return a problem with layers that are uniform, or nodal functions of the position in m."""
+    """Return a problem with layers that are uniform, or nodal functions of the position
+    in m."""
     domain = Domain(comm, mesh)
     problem = NonlinearProblem(domain, zones, MATERIAL, has_planes=True)
     x = domain.local(domain.positions)
@@ -86,7 +101,11 @@ def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, comm=COMM):
         return value(x) if callable(value) else np.full(len(x), value)
 
     centres = x[domain.cells].mean(axis=1)
-    normal = np.tile([0.0, 0.0, 1.0], (len(centres), 1)) if normals is None else normals(centres)
+    normal = (
+        np.tile([0.0, 0.0, 1.0], (len(centres), 1))
+        if normals is None
+        else normals(centres)
+    )
     set_layers(problem, nodal(mu), nodal(dg), nodal(dr), normal)
     return problem
 
@@ -101,14 +120,20 @@ def solved(problem, **settings):
 
 
 def smooth_displacement(domain, size=1e-3):
-    """Return a smooth displacement of the local nodes in m that does not depend on the ranks."""
+    """Return a smooth displacement of the local nodes in m that does not depend on the
+    ranks."""
     x = domain.local(domain.positions) * 1e3
     return size * np.stack(
-        [np.sin(0.3 * x[:, 1] + 0.1), np.cos(0.25 * x[:, 2]) - 0.4 * x[:, 0] / 8, np.sin(0.2 * x[:, 0] * x[:, 1] / 4)],
+        [
+            np.sin(0.3 * x[:, 1] + 0.1),
+            np.cos(0.25 * x[:, 2]) - 0.4 * x[:, 0] / 8,
+            np.sin(0.2 * x[:, 0] * x[:, 1] / 4),
+        ],
         axis=1,
     )
 
 
 def gathered(domain, u):
-    """Return the displacement of all vertices: two domains of one mesh may be spread over the ranks differently."""
+    """Return the displacement of all vertices: two domains of one mesh may be spread
+    over the ranks differently."""
     return domain.gather(u[: domain.n_owned])

@@ -25,7 +25,9 @@ def two_blocks(cells=(5, 5, 3), upper=(5, 5, 3), gap=GAP_MM):
     low, high = (box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM)) for n in (cells, upper))
     shift = np.array([0.0, 0.0, (HEIGHT_MM + gap) / 2])
     vertices = np.concatenate([low.vertices - shift, high.vertices + shift])
-    return TetrahedralMesh(vertices, np.concatenate([low.tets, high.tets + len(low.vertices)]))
+    return TetrahedralMesh(
+        vertices, np.concatenate([low.tets, high.tets + len(low.vertices)])
+    )
 
 
 def in_a_tube(mesh):
@@ -44,14 +46,21 @@ def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z
     problem = NonlinearProblem(domain, zones, MATERIAL)
     nodes, cells = len(domain.vertex_of_node), len(domain.cells)
     normal = np.tile([0.0, 0.0, 1.0], (cells, 1))
-    set_layers(problem, np.full(nodes, MU), np.zeros(nodes), np.full(nodes, growth_along_z), normal)
+    set_layers(
+        problem,
+        np.full(nodes, MU),
+        np.zeros(nodes),
+        np.full(nodes, growth_along_z),
+        normal,
+    )
     contact = SelfContact(domain, zones.facets, stiffness, distance)
     problem.contributions.append(contact)
     return problem, contact
 
 
 def approach(domain):
-    """Return displacements of the local nodes in m by which two blocks close half of their gap, not evenly."""
+    """Return displacements of the local nodes in m by which two blocks close half of
+    their gap, not evenly."""
     x = domain.local(domain.positions)
     u = smooth_displacement(domain, 1e-5)
     u[:, 2] -= np.sign(x[:, 2]) * GAP_MM / 4 * M_PER_MM
@@ -59,16 +68,25 @@ def approach(domain):
 
 
 def stress_at(stretch, growth):
-    """Return the first Piola-Kirchhoff stress in Pa along z of uniaxial strain after growth along z."""
+    """Return the first Piola-Kirchhoff stress in Pa along z of uniaxial strain after
+    growth along z."""
     K = 2 * MU * (1 + NU) / (3 * (1 - 2 * NU))
     Fe = stretch / (1 + growth)
-    by_Fe = MU / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3)) + K * (Fe - 1)
+    by_Fe = MU / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3)) + K * (
+        Fe - 1
+    )
     return by_Fe / (1 + growth)
 
 
 def slab_with_a_sulcus():
     """Return a block with a narrow groove along y in its top, in mm."""
-    mesh = grid([np.linspace(-6.0, 6.0, 25), np.linspace(-1.5, 1.5, 4), np.linspace(0.0, 6.0, 11)])
+    mesh = grid(
+        [
+            np.linspace(-6.0, 6.0, 25),
+            np.linspace(-1.5, 1.5, 4),
+            np.linspace(0.0, 6.0, 11),
+        ]
+    )
     x, y, z = mesh.vertices.T
     groove = 3.0 * np.exp(-((x / 0.5) ** 2))
     # even in y but for a trace, so that nothing meets exactly
@@ -77,7 +95,8 @@ def slab_with_a_sulcus():
 
 
 def closing_sulcus(kind, comm=COMM, support="box", **changes):
-    """Return what folds a block with a groove that closes in some steps, and the state at the start."""
+    """Return what folds a block with a groove that closes in some steps, and the state
+    at the start."""
     mesh = slab_with_a_sulcus()
     p = parameters_from(
         {
@@ -94,7 +113,9 @@ def closing_sulcus(kind, comm=COMM, support="box", **changes):
         | changes
     )
     zones = zones_of_run(mesh, p) if support == "free" else box_zones(mesh, p)
-    return Folding(comm, mesh, zones, p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    return Folding(comm, mesh, zones, p), State.at_start(
+        mesh.vertices * M_PER_MM, p.step_s
+    )
 
 
 def after_steps(folding, state, number):

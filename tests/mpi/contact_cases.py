@@ -1,4 +1,5 @@
-"""Contact of the surface with itself: forces, pressed blocks, and large steps that cross nothing."""
+"""Contact of the surface with itself: forces, pressed blocks, and large steps that
+cross nothing."""
 
 import ipctk
 import numpy as np
@@ -26,12 +27,17 @@ from gyriflow.units import M_PER_MM, MM_PER_M
 
 
 def test_forces_fit_the_energy_and_stiffness_the_forces():
-    # grids that do not match: where edges are parallel, which parts are nearest changes at once
+    # grids that do not match: where edges are parallel, which parts are nearest changes
+    # at once
     mesh = two_blocks(upper=(4, 3, 3))
     problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
     domain, u = problem.domain, approach(problem.domain)
     v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
-    energy, stiffness, owned = contact.energy(u), contact.stiffness(u), v[: domain.n_owned].ravel()
+    energy, stiffness, owned = (
+        contact.energy(u),
+        contact.stiffness(u),
+        v[: domain.n_owned].ravel(),
+    )
     direction, change = stiffness.createVecs()
     direction.array[:] = owned
     stiffness.mult(direction, change)
@@ -43,10 +49,16 @@ def test_forces_fit_the_energy_and_stiffness_the_forces():
 
     errors = []
     for h in (0.2, 0.1):
-        first = abs(contact.energy(u + h * v) - energy - h * domain.dot(forces(u), owned))
-        errors.append((first, domain.norm(forces(u + h * v) - forces(u) - h * change.array_r)))
+        first = abs(
+            contact.energy(u + h * v) - energy - h * domain.dot(forces(u), owned)
+        )
+        errors.append(
+            (first, domain.norm(forces(u + h * v) - forces(u) - h * change.array_r))
+        )
     assert energy > 0
-    assert np.log2(np.array(errors[0]) / errors[1]) == pytest.approx([2.0, 2.0], abs=0.15)
+    assert np.log2(np.array(errors[0]) / errors[1]) == pytest.approx(
+        [2.0, 2.0], abs=0.15
+    )
 
 
 def test_forces_have_no_sum_and_no_moment():
@@ -54,21 +66,34 @@ def test_forces_have_no_sum_and_no_moment():
     problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
     u = approach(problem.domain)
     forces = contact.forces(u)
-    places = (problem.domain.positions + gathered(problem.domain, u))[np.unique(boundary_faces(mesh)[0])]
+    places = (problem.domain.positions + gathered(problem.domain, u))[
+        np.unique(boundary_faces(mesh)[0])
+    ]
     size = np.abs(forces).sum()
     assert size > 0
     assert np.abs(forces.sum(axis=0)).max() <= 1e-12 * size
-    assert np.abs(np.cross(places, forces).sum(axis=0)).max() <= 1e-12 * size * np.abs(places).max()
+    assert (
+        np.abs(np.cross(places, forces).sum(axis=0)).max()
+        <= 1e-12 * size * np.abs(places).max()
+    )
 
 
-@pytest.mark.parametrize("upper", [pytest.param((5, 5, 3), marks=pytest.mark.one_rank), (4, 3, 3)])
-def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance(upper):
+@pytest.mark.parametrize(
+    "upper", [pytest.param((5, 5, 3), marks=pytest.mark.one_rank), (4, 3, 3)]
+)
+def test_pressed_blocks_have_the_analytic_pressure_and_their_gap_follows_the_distance(
+    upper,
+):
     growth, gaps = 0.2, []
     mesh = two_blocks(upper=upper)
     zones = in_a_tube(mesh)
     for distance in (0.2, 0.1, 0.05):
-        problem, contact = problem_with_contact(mesh, zones, distance, growth_along_z=growth)
-        u = solved(problem, newton_tolerance=1e-9, krylov_tolerance=1e-6, max_newton=60).displacement
+        problem, contact = problem_with_contact(
+            mesh, zones, distance, growth_along_z=growth
+        )
+        u = solved(
+            problem, newton_tolerance=1e-9, krylov_tolerance=1e-6, max_newton=60
+        ).displacement
         place = mesh.vertices + gathered(problem.domain, u) * MM_PER_M
         on_top = np.isclose(mesh.vertices[:, 2], -GAP_MM / 2)
         below = np.isclose(mesh.vertices[:, 2], GAP_MM / 2)
@@ -78,25 +103,37 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_clo
         pressure = forces[on_top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
         stretch = 1 + (GAP_MM - gaps[-1]) / 2 / HEIGHT_MM
         assert pressure == pytest.approx(-stress_at(stretch, growth), rel=0.01)
-        inside = on_top & (np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
+        inside = on_top & (
+            np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6
+        )
         assert contact.pressure(u)[inside].mean() == pytest.approx(pressure, rel=0.1)
     assert 0 < gaps[2] < gaps[1] < gaps[0] < 0.2
     # to each pressure belongs a part of the distance
     assert gaps[2] / gaps[1] == pytest.approx(0.5, abs=0.1)
     # close to that of blocks that touch
-    assert pressure == pytest.approx(-stress_at(1 + GAP_MM / 2 / HEIGHT_MM, growth), rel=0.05)
-    assert brentq(lambda stretch: stress_at(stretch, growth), 0.9, 1.4) == pytest.approx(1 + growth)
+    assert pressure == pytest.approx(
+        -stress_at(1 + GAP_MM / 2 / HEIGHT_MM, growth), rel=0.05
+    )
+    assert brentq(
+        lambda stretch: stress_at(stretch, growth), 0.9, 1.4
+    ) == pytest.approx(1 + growth)
 
 
 def two_balls():
     ball = ellipsoid_mesh(2, (4.0, 4.0, 4.0))
-    vertices = np.concatenate([ball.vertices - [4.1, 0.0, 0.0], ball.vertices + [4.1, 0.0, 0.0]])
-    return TetrahedralMesh(vertices, np.concatenate([ball.tets, ball.tets + len(ball.vertices)]))
+    vertices = np.concatenate(
+        [ball.vertices - [4.1, 0.0, 0.0], ball.vertices + [4.1, 0.0, 0.0]]
+    )
+    return TetrahedralMesh(
+        vertices, np.concatenate([ball.tets, ball.tets + len(ball.vertices)])
+    )
 
 
 def test_a_surface_that_crosses_itself_is_refused():
     mesh = two_balls()
-    mesh = TetrahedralMesh(mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets)
+    mesh = TetrahedralMesh(
+        mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets
+    )
     facets, _ = boundary_faces(mesh)
     with pytest.raises(MeshError, match=r"mesh\.envelope_mm"):
         SelfContact(Domain(COMM, mesh), facets, 1000.0, 0.2)
@@ -114,7 +151,8 @@ def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_compressed_surface_does_not_repel_itself(order):
-    # edges across are ten times as long as those along the box: a share of the mean edge is longer than the latter
+    # edges across are ten times as long as those along the box: a share of the mean
+    # edge is longer than the latter
     mesh = box_mesh((24, 3, 2), (1.5, 2.0, 2.0))
     mesh = mesh if order == 1 else quadratic(mesh)
     facets, _ = boundary_faces(mesh)
@@ -131,12 +169,15 @@ def test_no_pair_is_missed_where_the_distance_has_grown():
     contact.begin_step()
     problem, wider = problem_with_contact(mesh, zones, distance=0.5)
     assert contact.pair_count(problem.rest()) == wider.pair_count(problem.rest()) > few
-    assert contact.forces(problem.rest()) == pytest.approx(wider.forces(problem.rest()), rel=1e-12)
+    assert contact.forces(problem.rest()) == pytest.approx(
+        wider.forces(problem.rest()), rel=1e-12
+    )
 
 
 @pytest.mark.slow
 def test_large_random_steps_of_a_groove_cross_nothing():
-    # unlike balls, the walls of a groove face each other, and a step that is not cut does cross them
+    # unlike balls, the walls of a groove face each other, and a step that is not cut
+    # does cross them
     mesh = slab_with_a_sulcus()
     facets, _ = boundary_faces(mesh)
     domain = Domain(COMM, mesh)

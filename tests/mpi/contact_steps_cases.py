@@ -1,4 +1,5 @@
-"""Steps of folding with contact: a closing sulcus, mirrored hemispheres, free blocks, and stress as it is written."""
+"""Steps of folding with contact: a closing sulcus, mirrored hemispheres, free blocks,
+and stress as it is written."""
 
 from dataclasses import replace
 
@@ -35,7 +36,9 @@ GROWTH = 2e-7
 def closed_sulcus(kind):
     folding, state = closing_sulcus(kind)
     state = after_steps(folding, state, 12)
-    _, crossing, _ = igl.predicates.find_self_intersections(state.positions * MM_PER_M, folding.zones.facets)
+    _, crossing, _ = igl.predicates.find_self_intersections(
+        state.positions * MM_PER_M, folding.zones.facets
+    )
     return state, len(crossing) > 0
 
 
@@ -66,20 +69,40 @@ def test_a_resumed_run_in_contact_equals_one_without_interruption():
 
 
 def test_hemispheres_that_press_on_each_other_stay_mirror_images():
-    # growth as it is there: pressed harder, vertices that meet exactly would rather slide aside
-    state, found = folded(hemisphere(6), 5, COMM, core_growth_rate_per_s=2e-7, contact={"kind": "global"})
+    # growth as it is there: pressed harder, vertices that meet exactly would rather
+    # slide aside
+    state, found = folded(
+        hemisphere(6), 5, COMM, core_growth_rate_per_s=2e-7, contact={"kind": "global"}
+    )
     assert state.rows[-1]["contact_pairs"] > 0
     assert found.relative <= 1e-8
 
 
 def free_blocks(gap, **changes):
-    """Return what folds two free blocks whose meshes match across a gap, and the state at the start."""
+    """Return what folds two free blocks whose meshes match across a gap, and the state
+    at the start."""
     mesh = two_blocks(gap=gap)
     facets, _ = boundary_faces(mesh)
-    zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-0.5, 0.5), free=True)
-    values = {"start_week": 21.0, "end_week": 30.0, "output_weeks": [21.0, 30.0], "fissure_x_mm": 0.0}
-    p = parameters_from(values | {"support": "free", "no_growth": {"kind": "none"}} | changes)
-    return Folding(COMM, mesh, zones, p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    zones = Zones(
+        facets,
+        np.full(len(facets), FREE),
+        np.ones(len(mesh.vertices)),
+        0.0,
+        (-0.5, 0.5),
+        free=True,
+    )
+    values = {
+        "start_week": 21.0,
+        "end_week": 30.0,
+        "output_weeks": [21.0, 30.0],
+        "fissure_x_mm": 0.0,
+    }
+    p = parameters_from(
+        values | {"support": "free", "no_growth": {"kind": "none"}} | changes
+    )
+    return Folding(COMM, mesh, zones, p), State.at_start(
+        mesh.vertices * M_PER_MM, p.step_s
+    )
 
 
 @pytest.mark.parametrize("support", ["free", "box"])
@@ -96,8 +119,11 @@ def test_blocks_near_each_other_that_do_not_grow_do_not_move(support):
 
 
 def test_parts_that_touch_move_as_one():
-    # one part grows towards the other, which has to give way: only the whole has no motion of its own
-    folding, state = free_blocks(0.02, growth_rate_per_s=1e-6, core_growth_rate_per_s=1e-6)
+    # one part grows towards the other, which has to give way: only the whole has no
+    # motion of its own
+    folding, state = free_blocks(
+        0.02, growth_rate_per_s=1e-6, core_growth_rate_per_s=1e-6
+    )
     domain = folding.domain
     low = domain.part == domain.part[np.argmin(state.positions[:, 2])]
     folding.zones = replace(folding.zones, growth=low.astype(float))
@@ -121,17 +147,30 @@ def test_each_guess_is_swept_for_crossings_from_rest(support, monkeypatch):
     tried, residual = [], problem.residual
     monkeypatch.setattr(problem, "residual", lambda u: tried.append(u) or residual(u))
     folding.solver.solve(*guesses)
-    for guess, u in zip(map(problem.without_rigid_motion, guesses), tried[1:], strict=False):
+    for guess, u in zip(
+        map(problem.without_rigid_motion, guesses), tried[1:], strict=False
+    ):
         part = problem.max_step(problem.rest(), guess)
         assert 0.3 < part < 0.9
         assert u == pytest.approx(part * guess, rel=1e-9, abs=1e-12)
 
 
 def pressed(step_s, days=4, **changes):
-    """Return what has folded two blocks that grow evenly against each other in a tube, and the last state."""
+    """Return what has folded two blocks that grow evenly against each other in a tube,
+    and the last state."""
     mesh = two_blocks(upper=(4, 3, 3))
-    values = {"start_week": 21.0, "end_week": 30.0, "output_weeks": [21.0, 30.0], "fissure_x_mm": 0.0}
-    values |= {"no_growth": {"kind": "none"}, "support": "free", "step_s": step_s, "fields": ["stress", "strain"]}
+    values = {
+        "start_week": 21.0,
+        "end_week": 30.0,
+        "output_weeks": [21.0, 30.0],
+        "fissure_x_mm": 0.0,
+    }
+    values |= {
+        "no_growth": {"kind": "none"},
+        "support": "free",
+        "step_s": step_s,
+        "fields": ["stress", "strain"],
+    }
     folding = Folding(COMM, mesh, in_a_tube(mesh), parameters_from(values | changes))
     state = State.at_start(mesh.vertices * M_PER_MM, step_s)
     folding.model = EvenGrowth(folding.parameters, None, GROWTH * step_s).growth
@@ -147,24 +186,41 @@ def pressed(step_s, days=4, **changes):
 @pytest.mark.parametrize(("memory", "end"), [(0.0, "_per_gw"), ("infinite", "")])
 def test_stress_is_a_rate_where_it_is_forgotten_and_whole_where_it_is_kept(memory, end):
     folding, _ = pressed(43200.0, days=0.5, stress_memory_gw=memory)
-    at_vertices, of_elements = step_fields(folding, ["stress", "strain", "contact_pressure"])
+    at_vertices, of_elements = step_fields(
+        folding, ["stress", "strain", "contact_pressure"]
+    )
     assert set(at_vertices) == {f"contact_pressure_pa{end}"}
-    elastic = {f"{name}{end}" for name in ("von_mises_pa", "pressure_pa", "elastic_strain", "elastic_volume_strain")}
+    elastic = {
+        f"{name}{end}"
+        for name in (
+            "von_mises_pa",
+            "pressure_pa",
+            "elastic_strain",
+            "elastic_volume_strain",
+        )
+    }
     assert set(of_elements) == elastic | {"total_strain", "area_stretch"}
 
 
 @pytest.mark.slow
 @pytest.mark.one_rank
-def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_the_step():
+def test_forgotten_stress_is_written_as_a_rate_that_does_not_depend_on_the_step():
     rates = []
     for step_s in (86400.0, 43200.0, 21600.0):
         folding, state = pressed(step_s)
-        at_vertices, of_elements = step_fields(folding, ["stress", "strain", "contact_pressure"])
+        at_vertices, of_elements = step_fields(
+            folding, ["stress", "strain", "contact_pressure"]
+        )
         fields = of_elements | at_vertices
         at = two_blocks(upper=(4, 3, 3)).vertices
-        inside = np.isclose(np.abs(at[:, 2]), GAP_MM / 2) & (np.abs(at[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
+        inside = np.isclose(np.abs(at[:, 2]), GAP_MM / 2) & (
+            np.abs(at[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6
+        )
         contact = fields["contact_pressure_pa_per_gw"][inside].mean()
-        inner = [np.median(fields[name]) for name in ("pressure_pa_per_gw", "elastic_volume_strain_per_gw")]
+        inner = [
+            np.median(fields[name])
+            for name in ("pressure_pa_per_gw", "elastic_volume_strain_per_gw")
+        ]
         rates.append([*inner, contact])
         assert state.rows[-1]["contact_pairs"] > 0
     # held all around: -ln Je = 3 γ t and p = K times that; of first order in the step
@@ -183,7 +239,9 @@ def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
     # the first rank and the last one
     if COMM.rank in (0, COMM.size - 1):
         single = after_steps(*closing_sulcus("global", comm=MPI.COMM_SELF, **tight), 10)
-        moved = np.abs(single.positions - slab_with_a_sulcus().vertices * M_PER_MM).max()
+        moved = np.abs(
+            single.positions - slab_with_a_sulcus().vertices * M_PER_MM
+        ).max()
         assert np.abs(single.positions - state.positions).max() <= 1e-6 * moved
         assert single.rows[-1]["contact_pairs"] == state.rows[-1]["contact_pairs"]
     COMM.barrier()
@@ -191,10 +249,16 @@ def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
 
 @pytest.mark.parametrize(
     ("half", "steps", "memory_gw", "penetration_mm"),
-    [(hemisphere(6), 5, 0.0, 0.05), (hemisphere(6), 5, 1.0, 0.05), (rounded(hemisphere(4)), 4, 1.0, 0.01)],
+    [
+        (hemisphere(6), 5, 0.0, 0.05),
+        (hemisphere(6), 5, 1.0, 0.05),
+        (rounded(hemisphere(4)), 4, 1.0, 0.01),
+    ],
     ids=["forgetting", "remembering", "quadratic"],
 )
-def test_mirrored_hemispheres_stay_mirror_images(half, steps, memory_gw, penetration_mm):
+def test_mirrored_hemispheres_stay_mirror_images(
+    half, steps, memory_gw, penetration_mm
+):
     state, found = folded(half, steps, COMM, stress_memory_gw=memory_gw)
     # contact acts, and what is compared is large
     assert found.penetration_mm > penetration_mm
@@ -210,18 +274,26 @@ def test_equal_distances_to_several_pial_vertices_do_not_break_the_symmetry():
 
 
 def vertices_pulled_near(gap, count, growth_rate_per_s=0.0):
-    """Return what folds two blocks in a tube, and their start: few vertices of the upper one almost touch the lower."""
+    """Return what folds two blocks in a tube, and their start: few vertices of the
+    upper one almost touch the lower."""
     mesh = two_blocks(gap=gap)
-    facing = np.isclose(mesh.vertices[:, 2], gap / 2) & (np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
+    facing = np.isclose(mesh.vertices[:, 2], gap / 2) & (
+        np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6
+    )
     positions = mesh.vertices.copy()
     positions[np.flatnonzero(facing)[[1, 11][:count]], 2] = 0.01 - gap / 2
-    mesh, p = TetrahedralMesh(positions, mesh.tets), free_blocks(gap, growth_rate_per_s=growth_rate_per_s)[0].parameters
-    return Folding(COMM, mesh, in_a_tube(mesh), p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    mesh, p = (
+        TetrahedralMesh(positions, mesh.tets),
+        free_blocks(gap, growth_rate_per_s=growth_rate_per_s)[0].parameters,
+    )
+    return Folding(COMM, mesh, in_a_tube(mesh), p), State.at_start(
+        mesh.vertices * M_PER_MM, p.step_s
+    )
 
 
 @pytest.mark.parametrize("count", [1, 2])
 @pytest.mark.parametrize(("gap", "distance_mm"), [(0.5, 0.14), (0.12, 0.03)])
-def test_few_vertices_at_a_hundredth_of_a_mm_are_pressed_apart_and_do_not_set_the_contact_distance(
+def test_a_few_vertices_that_nearly_touch_are_pressed_apart_and_set_no_contact_distance(
     count, gap, distance_mm
 ):
     folding, state = vertices_pulled_near(gap, count)
@@ -235,11 +307,15 @@ def test_few_vertices_at_a_hundredth_of_a_mm_are_pressed_apart_and_do_not_set_th
 
 
 @pytest.mark.parametrize("gap", [0.5, 0.24])
-def test_where_few_vertices_start_at_a_hundredth_of_a_mm_nothing_crosses_as_it_grows(gap):
+def test_where_few_vertices_start_at_a_hundredth_of_a_mm_nothing_crosses_as_it_grows(
+    gap,
+):
     folding, state = vertices_pulled_near(gap, 2, growth_rate_per_s=2e-7)
     for _ in range(4):
         state = folding.step(state, state.step_s)
-        _, crossing, _ = igl.predicates.find_self_intersections(state.positions * MM_PER_M, folding.zones.facets)
+        _, crossing, _ = igl.predicates.find_self_intersections(
+            state.positions * MM_PER_M, folding.zones.facets
+        )
         assert len(crossing) == 0
     assert min(row["min_distance_mm"] for row in state.rows) > 0.02
 

@@ -1,4 +1,5 @@
-"""Folds whose banks press on each other: nothing crosses; growth and depth converge in mesh, order and time step."""
+"""Folds whose banks press on each other: nothing crosses; growth and depth converge in
+mesh, order and time step."""
 
 from dataclasses import replace
 
@@ -13,7 +14,8 @@ GROWTH, DEPTH_MM, PRESSURE_PA = 0.436, 4.69, 1850
 
 
 def found_at(slab):
-    """Return growth, depth and pressure at the area ratio; no step has crossing faces or inverted elements."""
+    """Return growth, depth and pressure at the area ratio; no step has crossing faces
+    or inverted elements."""
     folds = folded(slab, AREA_RATIO)
     assert not any(fold.crossing for fold in folds)
     assert min(fold.least_volume_ratio for fold in folds) > 0.5
@@ -22,7 +24,10 @@ def found_at(slab):
 
 def test_a_deep_fold_presses_on_itself_where_it_crosses_without_contact():
     slab = Slab(2, 1, 0.04)
-    assert max(fold.crossing for fold in folded(replace(slab, contact="none"), AREA_RATIO)) > 0
+    assert (
+        max(fold.crossing for fold in folded(replace(slab, contact="none"), AREA_RATIO))
+        > 0
+    )
     growth, depth_mm, pressure_pa = found_at(slab)
     # two linear elements through the cortex are too stiff: they need more growth
     assert growth == pytest.approx(GROWTH, rel=0.15)
@@ -31,7 +36,9 @@ def test_a_deep_fold_presses_on_itself_where_it_crosses_without_contact():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slab", [Slab(4, 1, 0.02), Slab(1, 2, 0.04), Slab(1, 2, 0.02), Slab(1.25, 2, 0.02)])
+@pytest.mark.parametrize(
+    "slab", [Slab(4, 1, 0.02), Slab(1, 2, 0.04), Slab(1, 2, 0.02), Slab(1.25, 2, 0.02)]
+)
 def test_a_deep_fold_is_the_same_with_both_orders_of_elements_and_any_step(slab):
     growth, depth_mm, pressure_pa = found_at(slab)
     assert growth == pytest.approx(GROWTH, rel=0.08 if slab.order == 1 else 0.03)

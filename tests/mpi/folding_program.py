@@ -21,17 +21,28 @@ WEEK = {
 PROGRAM = ["-m", "gyriflow.folding"]
 IMPATIENT = [
     "-c",
-    "import functools, runpy; from gyriflow.folding import newton, simulation; "
-    "simulation.NewtonSettings = functools.partial(newton.NewtonSettings, max_newton=1); "
-    "runpy.run_module('gyriflow.folding', run_name='__main__')",
+    (
+        "import functools, runpy; from gyriflow.folding import newton, simulation;"
+        " simulation.NewtonSettings = functools.partial(newton.NewtonSettings,"
+        " max_newton=1); runpy.run_module('gyriflow.folding', run_name='__main__')"
+    ),
 ]
-"""The program, and the program with steps that fail after one Newton iteration without progress."""
+"""The program, and the program with steps that fail after one Newton iteration without
+progress."""
 
 
 def command(mesh, out, ranks=1, program=PROGRAM, **changes):
     params = out.parent / f"{out.name}.yaml"
     params.write_text(yaml.safe_dump(WEEK | changes))
-    program = [sys.executable, *program, str(mesh), "--params", str(params), "--out", str(out)]
+    program = [
+        sys.executable,
+        *program,
+        str(mesh),
+        "--params",
+        str(params),
+        "--out",
+        str(out),
+    ]
     program += ["--progress", str(out.with_suffix(".jsonl"))]
     return ["mpiexec", "-n", str(ranks), *program]
 
@@ -53,5 +64,6 @@ def failing_after(steps):
 
 
 def kill(process):
-    """Kill a program with its ranks, which Open MPI's daemon puts into groups of their own."""
+    """Kill a program with its ranks, which Open MPI's daemon puts into groups of their
+    own."""
     processes.kill([process.pid, *processes.below(process.pid)])

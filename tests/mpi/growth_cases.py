@@ -1,4 +1,5 @@
-"""Growth and remembered stress with known answers, a body that nothing holds, and what the mesh does between steps."""
+"""Growth and remembered stress with known answers, a body that nothing holds, and what
+the mesh does between steps."""
 
 from dataclasses import replace
 
@@ -31,10 +32,18 @@ from gyriflow.settings.folding import parameters_from
 from gyriflow.units import M_PER_MM, SECONDS_PER_GW
 
 
-@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
+@pytest.mark.parametrize(
+    "mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"]
+)
 def test_tangential_growth_stretches_across_the_normal_only(mesh):
     oblique = np.array([1.0, 2.0, 2.0]) / 3
-    problem = problem_on(mesh, zones_of(mesh), dg=0.2, dr=-0.05, normals=lambda c: np.tile(oblique, (len(c), 1)))
+    problem = problem_on(
+        mesh,
+        zones_of(mesh),
+        dg=0.2,
+        dr=-0.05,
+        normals=lambda c: np.tile(oblique, (len(c), 1)),
+    )
     along = np.outer(oblique, oblique)
     growth = 1.2 * (np.eye(3) - along) + 0.95 * along
     x = problem.domain.local(problem.domain.positions)
@@ -48,7 +57,11 @@ def test_tangential_growth_stretches_across_the_normal_only(mesh):
 def test_a_run_has_the_material_that_it_names(material):
     # Fe = diag(1.2, 1, 1): tr(FeᵀFe) = 3.44, Je = 1.2
     mesh = distorted_box()
-    values = {"shear_modulus_cortex_pa": 1000, "shear_modulus_core_pa": 1000, "growth_rate_per_s": 0}
+    values = {
+        "shear_modulus_cortex_pa": 1000,
+        "shear_modulus_core_pa": 1000,
+        "growth_rate_per_s": 0,
+    }
     folding, start = folding_of(mesh, zones_of(mesh), material=material, **values)
     folding.begin(start, 43200.0)
     problem = folding.problem
@@ -56,7 +69,9 @@ def test_a_run_has_the_material_that_it_names(material):
     bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
     densities = {
         "neo-hookean": 500.0 * (3.44 * 1.2 ** (-2 / 3) - 3) + bulk / 2 * 0.04,
-        "compressible-neo-hookean": 500.0 * (0.44 - 2 * np.log(1.2)) + (bulk - 2000 / 3) / 2 * 0.04,
+        "compressible-neo-hookean": (
+            500.0 * (0.44 - 2 * np.log(1.2)) + (bulk - 2000 / 3) / 2 * 0.04
+        ),
     }
     assert problem.energy(u) == pytest.approx(densities[material] * 288e-9, rel=1e-12)
 
@@ -64,17 +79,27 @@ def test_a_run_has_the_material_that_it_names(material):
 def test_gathering_and_placing_keep_every_vertex_in_its_place():
     mesh = distorted_box()
     domain = Domain(COMM, mesh)
-    np.testing.assert_allclose(domain.gather(domain.local(domain.positions)[: domain.n_owned]), mesh.vertices * 1e-3)
+    np.testing.assert_allclose(
+        domain.gather(domain.local(domain.positions)[: domain.n_owned]),
+        mesh.vertices * 1e-3,
+    )
     moved = domain.positions * 1.5 + [0.1, 0.2, 0.3]
     domain.place(moved)
     volumes = volumes_between(domain.local(moved), domain.cells)
     total = COMM.allreduce(float(volumes.sum()))
     assert total == pytest.approx(1.5**3 * signed_volumes(mesh).sum() * 1e-9, rel=1e-12)
     used = domain.mesh.geometry.x[domain.mesh.geometry.dofmap].mean(axis=1)
-    np.testing.assert_allclose(used, moved[domain.vertex_of_node[domain.cells]].mean(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(
+        used, moved[domain.vertex_of_node[domain.cells]].mean(axis=1), rtol=1e-12
+    )
 
 
-RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0]}
+RUN = {
+    "start_week": 21.0,
+    "end_week": 36.0,
+    "fissure_x_mm": 0.0,
+    "output_weeks": [21.0, 36.0],
+}
 EVEN = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0}
 TIGHT = {"newton_tolerance": 1e-12}
 ORDERS = ["linear", "quadratic"]
@@ -82,8 +107,12 @@ STRETCH = np.array([[1.1, 0.03, 0.0], [0.03, 0.95, -0.02], [0.0, -0.02, 1.02]])
 
 
 def folding_of(mesh, zones, **changes):
-    parameters = parameters_from(RUN | {"contact": {"kind": "none"}, "solver": TIGHT} | changes)
-    return Folding(COMM, mesh, zones, parameters), State.at_start(mesh.vertices * M_PER_MM, parameters.step_s)
+    parameters = parameters_from(
+        RUN | {"contact": {"kind": "none"}, "solver": TIGHT} | changes
+    )
+    return Folding(COMM, mesh, zones, parameters), State.at_start(
+        mesh.vertices * M_PER_MM, parameters.step_s
+    )
 
 
 def stretched_problem(zones, mesh):
@@ -100,7 +129,9 @@ def test_a_free_body_springs_back_from_the_stretch_it_kept():
     mesh = distorted_box()
     problem = stretched_problem(replace(zones_of(mesh), free=True), mesh)
     x = problem.domain.local(problem.domain.positions)
-    assert problem.energy(x @ (np.linalg.inv(STRETCH) - np.eye(3)).T) == pytest.approx(0.0, abs=1e-16)
+    assert problem.energy(x @ (np.linalg.inv(STRETCH) - np.eye(3)).T) == pytest.approx(
+        0.0, abs=1e-16
+    )
     u = solved(problem, newton_tolerance=1e-10, krylov_tolerance=1e-8).displacement
     assert problem.energy(u) == pytest.approx(0.0, abs=1e-14)
     found = gathered(problem.domain, u)
@@ -108,7 +139,10 @@ def test_a_free_body_springs_back_from_the_stretch_it_kept():
     pairs = np.random.default_rng(1).integers(0, len(found), (200, 2))
     now, exact = (
         np.linalg.norm(np.diff(points[pairs], axis=1), axis=2)
-        for points in (problem.domain.positions + found, problem.domain.positions @ np.linalg.inv(STRETCH).T)
+        for points in (
+            problem.domain.positions + found,
+            problem.domain.positions @ np.linalg.inv(STRETCH).T,
+        )
     )
     np.testing.assert_allclose(now, exact, rtol=1e-6, atol=1e-12)
 
@@ -118,14 +152,23 @@ def test_the_energy_of_a_kept_stretch_is_counted_per_volume_without_stress():
     problem = stretched_problem(zones_of(mesh), mesh)
     Je, volume = np.linalg.det(STRETCH), 288e-9
     bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
-    density = 500.0 * ((STRETCH**2).sum() * Je ** (-2 / 3) - 3) + bulk / 2 * (Je - 1) ** 2
-    assert problem.energy(problem.rest()) == pytest.approx(density * volume / Je, rel=1e-12)
+    density = (
+        500.0 * ((STRETCH**2).sum() * Je ** (-2 / 3) - 3) + bulk / 2 * (Je - 1) ** 2
+    )
+    assert problem.energy(problem.rest()) == pytest.approx(
+        density * volume / Je, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("memory_gw", [0.25, np.inf])
-@pytest.mark.parametrize(("mesh", "points"), [(distorted_box(), 1), (curved_box((2, 2, 2)), 8)], ids=ORDERS)
-def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(mesh, points, memory_gw):
-    # uniform isotropic growth of a body whose whole surface is fixed: nothing moves, and ln V adds up and decays
+@pytest.mark.parametrize(
+    ("mesh", "points"), [(distorted_box(), 1), (curved_box((2, 2, 2)), 8)], ids=ORDERS
+)
+def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(
+    mesh, points, memory_gw
+):
+    # uniform isotropic growth of a body whose whole surface is fixed: nothing moves,
+    # and ln V adds up and decays
     zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
     folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw, **EVEN)
     folding.model = EvenGrowth(folding.parameters, None, 0.01).growth
@@ -134,11 +177,14 @@ def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(mesh,
     kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
     strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
     assert strain.shape == (len(mesh.tets), points, 3)
-    np.testing.assert_allclose(strain, -np.log(1.01) * sum(kept**n for n in range(5)), rtol=1e-9)
+    np.testing.assert_allclose(
+        strain, -np.log(1.01) * sum(kept**n for n in range(5)), rtol=1e-9
+    )
 
 
 def stretch_up(growth, volume):
-    """Return the stretch λ of tissue held at its sides that grows evenly, and its elastic volume ratio after that."""
+    """Return the stretch λ of tissue held at its sides that grows evenly, and its
+    elastic volume ratio after that."""
     bulk_to_shear = 2 * 1.45 / (3 * 0.1)
 
     def elastic(up):
@@ -146,16 +192,30 @@ def stretch_up(growth, volume):
 
     def energy(up):
         J = elastic(up).prod()
-        return 0.5 * ((elastic(up) ** 2).sum() * J ** (-2 / 3) - 3) + bulk_to_shear / 2 * (J - 1) ** 2
+        return (
+            0.5 * ((elastic(up) ** 2).sum() * J ** (-2 / 3) - 3)
+            + bulk_to_shear / 2 * (J - 1) ** 2
+        )
 
     up = minimize_scalar(energy, (1.0, 1.1), tol=1e-12).x
     return up, elastic(up).prod()
 
 
 @pytest.mark.parametrize("relaxation", ["all", "shape"])
-@pytest.mark.parametrize("mesh", [box_mesh((3, 3, 3), (6.0, 6.0, 6.0)), curved_box((2, 2, 2))], ids=ORDERS)
-def test_tissue_held_at_its_sides_keeps_the_volume_it_grew_by_if_only_its_shape_relaxes(mesh, relaxation):
-    parameters = parameters_from(RUN | {"contact": {"kind": "none"}, "support": "free", "no_growth": {"kind": "none"}})
+@pytest.mark.parametrize(
+    "mesh", [box_mesh((3, 3, 3), (6.0, 6.0, 6.0)), curved_box((2, 2, 2))], ids=ORDERS
+)
+def test_tissue_held_at_its_sides_keeps_the_volume_it_grew_by_if_only_its_shape_relaxes(
+    mesh, relaxation
+):
+    parameters = parameters_from(
+        RUN
+        | {
+            "contact": {"kind": "none"},
+            "support": "free",
+            "no_growth": {"kind": "none"},
+        }
+    )
     zones = box_zones(mesh, parameters)
     folding, state = folding_of(mesh, zones, relaxation=relaxation, **EVEN)
     folding.model = EvenGrowth(folding.parameters, None, 0.02).growth
@@ -171,11 +231,14 @@ def test_tissue_held_at_its_sides_keeps_the_volume_it_grew_by_if_only_its_shape_
 
 
 def test_an_elastic_state_stays_where_it_is_in_equilibrium():
-    # no growth, one stiffness: what is kept from a stretched start is released in part; then nothing is left to do
+    # no growth, one stiffness: what is kept from a stretched start is released in part;
+    # then nothing is left to do
     mesh = box_mesh((3, 3, 3), (6.0, 6.0, 6.0))
     zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
     stiffness = {"shear_modulus_cortex_pa": 800, "shear_modulus_core_pa": 800}
-    folding, start = folding_of(mesh, zones, stress_memory_gw="infinite", growth_rate_per_s=0.0, **stiffness)
+    folding, start = folding_of(
+        mesh, zones, stress_memory_gw="infinite", growth_rate_per_s=0.0, **stiffness
+    )
     start = replace(start, stretch=packed(np.tile(STRETCH, (len(mesh.tets), 1, 1, 1))))
     once = folding.step(start, 43200.0)
     again = folding.step(once, 43200.0)
@@ -187,7 +250,9 @@ def test_an_elastic_state_stays_where_it_is_in_equilibrium():
 @pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=ORDERS)
 def test_a_free_body_grows_without_drifting(mesh):
     zones = replace(zones_of(mesh), free=True)
-    folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"})
+    folding, state = folding_of(
+        mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"}
+    )
     # growth on one side only, which would turn a body that is only extrapolated
     folding.zones = replace(zones, growth=(mesh.vertices[:, 0] > 0).astype(float))
     for _ in range(4):
@@ -196,4 +261,6 @@ def test_a_free_body_grows_without_drifting(mesh):
         size = np.abs(u).max()
         assert size > 1e-6
         assert np.abs(u.mean(axis=0)).max() <= 1e-12 * size
-        assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(x).max() * size * len(x)
+        assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(
+            x
+        ).max() * size * len(x)

@@ -1,4 +1,5 @@
-"""PETSc's objects do not add up over steps, whatever holds the body and whatever solves it."""
+"""PETSc's objects do not add up over steps, whatever holds the body and whatever solves
+it."""
 
 import gc
 import re
@@ -16,15 +17,19 @@ SPARE = 2
 
 
 def alive(folding, path):
-    """Return how many objects of each class PETSc has made and not destroyed, so far."""
-    # what was let go of waits for the next clean-up, and how much that is differs from step to step
+    """Return how many objects of each class PETSc has made and not destroyed, so
+    far."""
+    # what was let go of waits for the next clean-up, and how much that is differs from
+    # step to step
     gc.collect()
     folding.problem.tangent(folding.problem.residual(folding.problem.rest()))
     viewer = PETSc.Viewer().createASCII(str(path), comm=COMM)
     PETSc.Log.view(viewer)
     viewer.destroy()
     COMM.barrier()
-    rows = re.findall(r"^\s*([A-Z][\w ]+?)\s+(\d+)\s+(\d+)\s*$", path.read_text(), flags=re.MULTILINE)
+    rows = re.findall(
+        r"^\s*([A-Z][\w ]+?)\s+(\d+)\s+(\d+)\s*$", path.read_text(), flags=re.MULTILINE
+    )
     found = {name: int(made) - int(gone) for name, made, gone in rows}
     # a log of another format would leave nothing to compare
     assert {"Vector", "Matrix"} <= found.keys(), path.read_text()
@@ -36,7 +41,9 @@ def alive(folding, path):
     [
         ("global", {}),
         # the tangent has to be raised in every step
-        pytest.param("none", {"stress_memory_gw": "infinite"}, marks=pytest.mark.one_rank),
+        pytest.param(
+            "none", {"stress_memory_gw": "infinite"}, marks=pytest.mark.one_rank
+        ),
     ],
 )
 def test_objects_do_not_add_up(kind, changes, tmp_path_factory):

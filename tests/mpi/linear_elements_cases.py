@@ -29,7 +29,11 @@ class Mixed(Material):
 def test_energy_forces_and_stiffness_are_those_of_the_form_compiler(law, monkeypatch):
     monkeypatch.setattr(boxes, "MATERIAL", law(0.45))
     mesh = distorted_box()
-    layers = {"mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3), "dg": lambda x: 0.004 + 0.4 * x[:, 2], "dr": 0.002}
+    layers = {
+        "mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3),
+        "dg": lambda x: 0.004 + 0.4 * x[:, 2],
+        "dr": 0.002,
+    }
     problem = problem_on(mesh, zones_of(mesh), **layers)
     domain = problem.domain
     u = smooth_displacement(domain)
@@ -40,7 +44,9 @@ def test_energy_forces_and_stiffness_are_those_of_the_form_compiler(law, monkeyp
     dx = ufl.dx(metadata={"quadrature_degree": 1})
     energy = law.energy_density(Fe, problem._weight, ratio * problem._weight) * dx
     residual = ufl.derivative(energy, problem._u)
-    energy, residual, tangent = map(dolfinx.fem.form, (energy, residual, ufl.derivative(residual, problem._u)))
+    energy, residual, tangent = map(
+        dolfinx.fem.form, (energy, residual, ufl.derivative(residual, problem._u))
+    )
 
     expected = COMM.allreduce(dolfinx.fem.assemble_scalar(energy))
     assert problem.energy(u) == pytest.approx(expected, rel=1e-12)
@@ -48,7 +54,9 @@ def test_energy_forces_and_stiffness_are_those_of_the_form_compiler(law, monkeyp
     forces = dolfinx.fem.assemble_vector(residual)
     forces.scatter_reverse(dolfinx.la.InsertMode.add)
     largest = COMM.allreduce(np.abs(forces.array).max(), op=boxes.MPI.MAX)
-    np.testing.assert_allclose(at.owned, forces.array[: 3 * domain.n_owned], rtol=0, atol=1e-12 * largest)
+    np.testing.assert_allclose(
+        at.owned, forces.array[: 3 * domain.n_owned], rtol=0, atol=1e-12 * largest
+    )
 
     matrix = dolfinx.fem.assemble_matrix(tangent, block_mode=BlockMode.compact)
     matrix.scatter_reverse()
@@ -56,4 +64,6 @@ def test_energy_forces_and_stiffness_are_those_of_the_form_compiler(law, monkeyp
     blocks, kept = elastic.values, elastic._stored
     stiffness = matrix.data[: blocks.size].reshape(blocks.shape)[kept]
     blocks = blocks[kept]
-    np.testing.assert_allclose(blocks, stiffness, rtol=0, atol=1e-12 * np.abs(stiffness).max())
+    np.testing.assert_allclose(
+        blocks, stiffness, rtol=0, atol=1e-12 * np.abs(stiffness).max()
+    )

@@ -1,4 +1,5 @@
-"""The linear solver: its preconditioner, tangents that are not positive definite, what is kept between iterations."""
+"""The linear solver: its preconditioner, tangents that are not positive definite, what
+is kept between iterations."""
 
 import numpy as np
 import pytest
@@ -39,7 +40,10 @@ def clamped_box(**layers):
 def test_the_preconditioner_is_that_of_the_present_tangent():
     problem = clamped_box()
     domain = problem.domain
-    nothing, up = np.zeros(len(problem.rest())), np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
+    nothing, up = (
+        np.zeros(len(problem.rest())),
+        np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1)),
+    )
     r, z = tangent_at_rest(problem).matrix.createVecs()
     r.array[:] = smooth_displacement(domain, 1.0)[: domain.n_owned].ravel()
     problem.clear_fixed(r.array_w)
@@ -50,17 +54,23 @@ def test_the_preconditioner_is_that_of_the_present_tangent():
         preconditioner.renew()
         preconditioner.apply(None, r, z)
         results.append(z.array.copy())
-    assert results[0] == pytest.approx(3.0 * results[1], rel=1e-6, abs=1e-9 * np.abs(results[0]).max())
+    assert results[0] == pytest.approx(
+        3.0 * results[1], rel=1e-6, abs=1e-9 * np.abs(results[0]).max()
+    )
 
 
 def test_rigid_motions_of_the_parts_are_solved_by_the_coarse_level(monkeypatch):
-    # with a part for the whole body, which is held by weak springs alone, that is all there is to solve
+    # with a part for the whole body, which is held by weak springs alone, that is all
+    # there is to solve
     monkeypatch.setattr(linear_solver, "MAX_PARTS", 1)
     mesh = distorted_box()
     problem = problem_on(mesh, zones_of(mesh), mu=500.0)
     tangent = tangent_at_rest(problem)
     matrix = tangent.elastic.matrix
-    for node in np.flatnonzero(matrix.nodes == matrix.columns - problem.domain.space.dofmap.index_map.local_range[0]):
+    for node in np.flatnonzero(
+        matrix.nodes
+        == matrix.columns - problem.domain.space.dofmap.index_map.local_range[0]
+    ):
         matrix.values[node] += 1e-3 * np.eye(3)
     preconditioner = TwoLevelPreconditioner(problem.domain, tangent)
     preconditioner.renew()
@@ -74,16 +84,26 @@ def test_rigid_motions_of_the_parts_are_solved_by_the_coarse_level(monkeypatch):
 
 @pytest.mark.one_rank
 def test_blocks_that_are_not_positive_definite_are_made_so():
-    turn = np.linalg.qr(np.array([[2.0, 1.0, 0.0], [0.3, 1.0, 1.0], [0.0, 0.2, 3.0]]))[0]
-    blocks = np.stack([turn @ np.diag(values) @ turn.T for values in ([4.0, 2.0, 1.0], [4.0, 2.0, -1.0])])
+    turn = np.linalg.qr(np.array([[2.0, 1.0, 0.0], [0.3, 1.0, 1.0], [0.0, 0.2, 3.0]]))[
+        0
+    ]
+    blocks = np.stack(
+        [
+            turn @ np.diag(values) @ turn.T
+            for values in ([4.0, 2.0, 1.0], [4.0, 2.0, -1.0])
+        ]
+    )
     expected = turn @ np.diag([0.25, 0.5, 1.0]) @ turn.T
-    assert inverse_blocks(blocks) == pytest.approx(np.stack([expected, expected]), abs=1e-12)
+    assert inverse_blocks(blocks) == pytest.approx(
+        np.stack([expected, expected]), abs=1e-12
+    )
     for block in blocks:
         assert inverse_matrix(block) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_tangent_that_is_not_positive_definite_is_shifted():
-    # a bar, slightly bent, that grows by 4 % between two walls: three times what makes it buckle
+    # a bar, slightly bent, that grows by 4 % between two walls: three times what makes
+    # it buckle
     bar = box_mesh((16, 2, 2), (32.0, 2.0, 2.0))
     bend = 0.1 * np.cos(np.pi * bar.vertices[:, 0] / 32) ** 2
     mesh = TetrahedralMesh(bar.vertices + bend[:, None] * [0.0, 0.0, 1.0], bar.tets)
@@ -120,8 +140,12 @@ def counted(monkeypatch, problem):
     return calls
 
 
-@pytest.mark.parametrize("kind", ["global", pytest.param("none", marks=pytest.mark.one_rank)])
-def test_a_lagged_tangent_saves_assemblies_and_gives_the_same_solution(kind, monkeypatch):
+@pytest.mark.parametrize(
+    "kind", ["global", pytest.param("none", marks=pytest.mark.one_rank)]
+)
+def test_a_lagged_tangent_saves_assemblies_and_gives_the_same_solution(
+    kind, monkeypatch
+):
     folding, state = closing_sulcus(kind, **TIGHT)
     start = state.positions
     calls = counted(monkeypatch, folding.problem)
@@ -149,7 +173,9 @@ def test_a_tangent_that_predicts_other_forces_is_not_lagged():
         assert problem.tangent(residual, within=0.03).elastic.lagged == known
 
 
-@pytest.mark.parametrize("support", ["box", pytest.param("free", marks=pytest.mark.one_rank)])
+@pytest.mark.parametrize(
+    "support", ["box", pytest.param("free", marks=pytest.mark.one_rank)]
+)
 def test_newtons_method_begins_at_the_first_good_guess(support):
     folding, state = closing_sulcus("global", support=support)
     state = after_steps(folding, state, 3)

@@ -1,9 +1,26 @@
-"""Quadratic elements with curved sides: what they must do as linear ones do, and what is theirs alone."""
+"""Quadratic elements with curved sides: what they must do as linear ones do, and what
+is theirs alone."""
 
 import numpy as np
 import pytest
-from boxes import COMM, at_the_bottom, curved_box, gathered, problem_on, solved, zones_of
-from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stress_at, two_blocks
+from boxes import (
+    COMM,
+    at_the_bottom,
+    curved_box,
+    gathered,
+    problem_on,
+    solved,
+    zones_of,
+)
+from contact_bodies import (
+    GAP_MM,
+    HEIGHT_MM,
+    SIDE_MM,
+    approach,
+    in_a_tube,
+    stress_at,
+    two_blocks,
+)
 from mpi4py import MPI
 from shapes import box_mesh
 from verification_cases.boxes import slab_parameters
@@ -14,27 +31,46 @@ from gyriflow.folding.domain import Domain
 from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.jacobians import EDGES
 from gyriflow.geometry.straightening import straightness
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_faces,
+    quadratic,
+    signed_volumes,
+)
 from gyriflow.units import M_PER_MM, MM_PER_M
 
 
 def test_volumes_and_facets_are_those_of_the_curved_elements():
     mesh = curved_box()
-    zones = zones_of(mesh, at_the_bottom, left=lambda c: c[:, 0] < -3.99, right=lambda c: c[:, 0] > 3.99)
+    zones = zones_of(
+        mesh,
+        at_the_bottom,
+        left=lambda c: c[:, 0] < -3.99,
+        right=lambda c: c[:, 0] > 3.99,
+    )
     domain = Domain(COMM, mesh)
-    assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(signed_volumes(mesh).sum() * 1e-9, rel=1e-12)
+    assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(
+        signed_volumes(mesh).sum() * 1e-9, rel=1e-12
+    )
     assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(288e-9, rel=1e-12)
     tags = domain.local_facets(zones.facets, zones.facet_zone)
     counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
-    np.testing.assert_array_equal(4 * counts, np.bincount(zones.facet_zone, minlength=5))
-    np.testing.assert_allclose(domain.gather(domain.local(domain.positions)[: domain.n_owned]), mesh.vertices * 1e-3)
+    np.testing.assert_array_equal(
+        4 * counts, np.bincount(zones.facet_zone, minlength=5)
+    )
+    np.testing.assert_allclose(
+        domain.gather(domain.local(domain.positions)[: domain.n_owned]),
+        mesh.vertices * 1e-3,
+    )
 
 
 def test_iterations_do_not_grow_with_the_mesh():
     taken = []
     for cells in (2, 4, 8):
         mesh = quadratic(box_mesh((cells,) * 3, (6.0, 6.0, 6.0)))
-        problem = problem_on(mesh, zones_of(mesh, at_the_bottom), dg=lambda x: 0.01 + x[:, 2])
+        problem = problem_on(
+            mesh, zones_of(mesh, at_the_bottom), dg=lambda x: 0.01 + x[:, 2]
+        )
         count = solved(problem, newton_tolerance=1e-9, krylov_tolerance=1e-8)
         taken.append(count.krylov / count.newton)
     assert taken[2] <= 1.5 * taken[1]
@@ -43,7 +79,8 @@ def test_iterations_do_not_grow_with_the_mesh():
 def test_an_element_that_inverts_between_its_points_is_detected():
     mesh = quadratic(box_mesh((1, 1, 1), (2.0, 2.0, 2.0)))
     problem = problem_on(mesh, zones_of(mesh))
-    # a node on an edge pulled beyond a quarter of it: the Jacobian changes sign at the end of the edge
+    # a node on an edge pulled beyond a quarter of it: the Jacobian changes sign at the
+    # end of the edge
     a, b, middle = mesh.tets[0, [0, 1, 4]]
     bounds = []
     for part in (0.2, 0.3):
@@ -57,7 +94,8 @@ def test_an_element_that_inverts_between_its_points_is_detected():
 
 
 def pressed_blocks(comm, growth, distance):
-    """Return the problem of two blocks in a tube that grow towards each other, their contact, and the mesh."""
+    """Return the problem of two blocks in a tube that grow towards each other, their
+    contact, and the mesh."""
     mesh = quadratic(two_blocks((2, 2, 1), (3, 2, 2)))
     zones = in_a_tube(mesh)
     problem = problem_on(mesh, zones, dr=growth, comm=comm)
@@ -70,19 +108,29 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_on_any_number_of_
     places = []
     for comm in (COMM, MPI.COMM_SELF):
         problem, contact, mesh = pressed_blocks(comm, growth=0.1, distance=0.1)
-        u = solved(problem, newton_tolerance=1e-10, krylov_tolerance=1e-8, max_newton=80).displacement
+        u = solved(
+            problem, newton_tolerance=1e-10, krylov_tolerance=1e-8, max_newton=80
+        ).displacement
         assert contact.pair_count(u) > 10
         places.append(mesh.vertices + gathered(problem.domain, u) * MM_PER_M)
-    assert np.abs(places[0] - places[1]).max() <= 1e-6 * np.abs(places[1] - mesh.vertices).max()
+    assert (
+        np.abs(places[0] - places[1]).max()
+        <= 1e-6 * np.abs(places[1] - mesh.vertices).max()
+    )
     place = places[0]
-    on_top, below = (np.isclose(mesh.vertices[:, 2], side * GAP_MM / 2) for side in (-1, 1))
+    on_top, below = (
+        np.isclose(mesh.vertices[:, 2], side * GAP_MM / 2) for side in (-1, 1)
+    )
     gap = place[below, 2].mean() - place[on_top, 2].mean()
     forces = np.zeros_like(place)
     forces[np.unique(boundary_faces(mesh)[0])] = contact.forces(u)
     pressure = forces[on_top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
     assert 0 < gap < 0.1
-    assert pressure == pytest.approx(-stress_at(1 + (GAP_MM - gap) / 2 / HEIGHT_MM, 0.1), rel=0.01)
-    # an even pressure leaves faces even, although the meshes do not match: elements are 2 and 3 mm long
+    assert pressure == pytest.approx(
+        -stress_at(1 + (GAP_MM - gap) / 2 / HEIGHT_MM, 0.1), rel=0.01
+    )
+    # an even pressure leaves faces even, although the meshes do not match: elements are
+    # 2 and 3 mm long
     assert place[below, 2].std() < 0.01
 
 
@@ -103,25 +151,36 @@ def test_the_diagonal_has_the_blocks_of_contact():
         if 0 <= node - first < problem.domain.n_owned:
             expected = product.array.reshape(-1, 3)[node - first]
             # products are in single precision
-            assert blocks[node - first, :, 1] == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(blocks).max())
+            assert blocks[node - first, :, 1] == pytest.approx(
+                expected, rel=1e-6, abs=1e-6 * np.abs(blocks).max()
+            )
 
 
 def box_with_a_bowed_side():
-    """Return a box with an inner side of an element bowed by 0.15 of its length, and the node in its middle."""
+    """Return a box with an inner side of an element bowed by 0.15 of its length, and
+    the node in its middle."""
     mesh = quadratic(box_mesh((3, 3, 3), (6.0, 5.0, 4.0)))
     middles, sides = mesh.tets[:, 4:].ravel(), mesh.tets[:, EDGES].reshape(-1, 2)
     inner = np.flatnonzero(~np.isin(middles, boundary_faces(mesh)[0]))[0]
     positions = mesh.vertices.copy()
     along = np.diff(positions[sides[inner]], axis=0)[0]
     across = np.cross(along, [0.3, 0.5, 0.8])
-    positions[middles[inner]] += 0.15 * np.linalg.norm(along) * across / np.linalg.norm(across)
+    positions[middles[inner]] += (
+        0.15 * np.linalg.norm(along) * across / np.linalg.norm(across)
+    )
     return TetrahedralMesh(positions, mesh.tets), middles[inner]
 
 
 @pytest.mark.parametrize("memory_gw", [0.0, 1.0])
 def test_inner_sides_that_bow_are_straightened_unless_stress_is_kept(memory_gw):
     mesh, bowed = box_with_a_bowed_side()
-    p = slab_parameters(5.0, 0.01, stress_memory_gw=memory_gw, fissure_x_mm=0.0, contact={"kind": "global"})
+    p = slab_parameters(
+        5.0,
+        0.01,
+        stress_memory_gw=memory_gw,
+        fissure_x_mm=0.0,
+        contact={"kind": "global"},
+    )
     state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
     after = Folding(COMM, mesh, zones_of(mesh, at_the_bottom), p).step(state, p.step_s)
     moved_by_solver = state.positions + after.last

@@ -1,4 +1,5 @@
-"""Contact on several ranks: together they find the same as a single one, and each of them does its part."""
+"""Contact on several ranks: together they find the same as a single one, and each of
+them does its part."""
 
 import numpy as np
 import pytest
@@ -19,7 +20,8 @@ def contact_in(comm, mesh, distance=0.15):
 
 
 def blocks(order):
-    """Return two blocks whose meshes do not match, and a shaken displacement in mm that brings them near each other."""
+    """Return two blocks whose meshes do not match, and a shaken displacement in mm that
+    brings them near each other."""
     mesh = two_blocks(upper=(4, 3, 3))
     if order == 2:
         mesh = quadratic(two_blocks(cells=(3, 3, 1), upper=(2, 2, 1)))
@@ -31,7 +33,8 @@ def blocks(order):
 
 
 def what_is_found(comm, mesh, moved_mm, further_mm):
-    """Return numbers and fields of contact for a displaced body, and the pairs of this rank."""
+    """Return numbers and fields of contact for a displaced body, and the pairs of this
+    rank."""
     domain, contact = contact_in(comm, mesh)
     u = domain.local(moved_mm) * M_PER_MM
     x = np.random.default_rng(8).standard_normal(mesh.vertices.shape)
@@ -64,7 +67,12 @@ def test_all_ranks_together_find_what_one_finds_alone(order):
     assert pairs > 100
     # none does all of it
     assert len(own) <= (1 if COMM.size == 1 else 0.8) * pairs
-    assert min(len(kinds.ev_collisions), len(kinds.ee_collisions), len(kinds.fv_collisions)) > 5
+    assert (
+        min(
+            len(kinds.ev_collisions), len(kinds.ee_collisions), len(kinds.fv_collisions)
+        )
+        > 5
+    )
     assert found["pairs"] == pairs
     assert 0 < alone["step"] < 1
     for name in ("energy", "smallest", "step"):
@@ -85,7 +93,9 @@ def test_parts_of_the_ranks_follow_a_surface_that_moves_far(order):
         # a way longer than the part has room for
         aside = np.tile([0.0, 0.0, 7.0], (len(u), 1)) * M_PER_MM
         assert contact.max_step(u, aside) == 1.0
-        found.append([contact.pair_count(u), contact.energy(u), np.abs(contact.forces(u)).sum()])
+        found.append(
+            [contact.pair_count(u), contact.energy(u), np.abs(contact.forces(u)).sum()]
+        )
     assert found[0][0] > 100
     assert found[1] == pytest.approx(found[0], rel=1e-9)
     assert found[2] == pytest.approx(found[0], rel=1e-9)
@@ -98,6 +108,8 @@ def test_parts_that_touch_are_joined_on_all_ranks():
     lifted = mesh.vertices.copy()
     lifted[:, 2] += np.where(z > 0, -0.4 * np.exp(-((x - 3) ** 2) - (y - 3) ** 2), 0.0)
     for vertices, parts in ((mesh.vertices, 2), (lifted, 1)):
-        domain, contact = contact_in(COMM, type(mesh)(vertices, mesh.tets), distance=0.15)
+        domain, contact = contact_in(
+            COMM, type(mesh)(vertices, mesh.tets), distance=0.15
+        )
         assert domain.part.max() == 1
         assert len(np.unique(contact.join_touching(domain.part))) == parts

@@ -1,10 +1,20 @@
-"""Consistency of energy, residual and tangent, the patch test, and the rungs of the linear solver."""
+"""Consistency of energy, residual and tangent, the patch test, and the rungs of the
+linear solver."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import COMM, at_the_bottom, curved_box, distorted_box, problem_on, solved, solver_of, zones_of
+from boxes import (
+    COMM,
+    at_the_bottom,
+    curved_box,
+    distorted_box,
+    problem_on,
+    solved,
+    solver_of,
+    zones_of,
+)
 from facts import Facts
 from shapes import box_mesh
 from verification_cases.consistency import patch_residual, slopes_of_remainders
@@ -16,7 +26,11 @@ from gyriflow.folding.newton import NewtonSettings
 def growing_problem(contact=False, mesh=None, **changes):
     mesh = mesh or distorted_box()
     # walls that stand on the wrong side of their planes: contact acts from the start
-    walls = {"left": lambda c: c[:, 0] < -3.99, "right": lambda c: c[:, 0] > 3.99, "planes": (-5.0, 5.0)}
+    walls = {
+        "left": lambda c: c[:, 0] < -3.99,
+        "right": lambda c: c[:, 0] > 3.99,
+        "planes": (-5.0, 5.0),
+    }
     zones = zones_of(mesh, at_the_bottom, **(walls if contact else {}))
     layers = {
         "mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3),
@@ -37,7 +51,9 @@ def test_a_uniform_body_is_in_equilibrium_under_an_affine_displacement(order):
     assert patch_residual(COMM, order) <= 1e-12
 
 
-@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
+@pytest.mark.parametrize(
+    "mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"]
+)
 def test_contact_pushes_back_with_the_penalty_pressure(mesh):
     zones = zones_of(mesh, right=lambda c: c[:, 0] > 3.99, planes=(-5.0, 4.5))
     without = problem_on(mesh, zones_of(mesh))
@@ -46,13 +62,18 @@ def test_contact_pushes_back_with_the_penalty_pressure(mesh):
     for problem in (with_contact, without):
         residual = problem.residual(problem.rest())
         total.append(COMM.allreduce(float(residual.owned.reshape(-1, 3)[:, 0].sum())))
-    # the wall at 4 mm stands 0.5 mm beyond a plane that the right hemisphere may not pass to the left
+    # the wall at 4 mm stands 0.5 mm beyond a plane that the right hemisphere may not
+    # pass to the left
     assert total[0] - total[1] == pytest.approx(-5e5 * 0.5e-3 * 36e-6, rel=1e-10)
 
 
-@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
+@pytest.mark.parametrize(
+    "mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"]
+)
 def test_newton_converges_quadratically_with_tight_linear_solves(mesh):
-    count = solved(growing_problem(mesh=mesh), newton_tolerance=1e-12, krylov_tolerance=1e-10)
+    count = solved(
+        growing_problem(mesh=mesh), newton_tolerance=1e-12, krylov_tolerance=1e-10
+    )
     assert count.newton <= 7
     assert count.residual <= 1e-12
     assert count.rung == PLAIN
@@ -89,7 +110,9 @@ def test_a_first_guess_that_inverts_elements_is_not_used():
 def test_a_rank_on_which_nothing_moves_does_not_stop_the_others():
     # a long bar clamped over most of its length: some rank has clamped nodes only
     mesh = box_mesh((24, 1, 1), (48.0, 2.0, 2.0))
-    problem = problem_on(mesh, zones_of(mesh, lambda c: c[:, 0] < 12.0), dg=0.01, dr=0.01)
+    problem = problem_on(
+        mesh, zones_of(mesh, lambda c: c[:, 0] < 12.0), dg=0.01, dr=0.01
+    )
     solver = solver_of(problem)
     again = solver.solve().displacement
     assert solver.solve(again).residual <= NewtonSettings().newton_tolerance
@@ -98,7 +121,9 @@ def test_a_rank_on_which_nothing_moves_does_not_stop_the_others():
 def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monkeypatch):
     problem = growing_problem()
     solver = solver_of(problem)
-    monkeypatch.setattr(solver, "_line_search", lambda iterate, _: replace(iterate, exhausted=True))
+    monkeypatch.setattr(
+        solver, "_line_search", lambda iterate, _: replace(iterate, exhausted=True)
+    )
     count = solver.solve()
     assert count.newton == 1
     assert count.residual > NewtonSettings().newton_tolerance
@@ -109,9 +134,13 @@ def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monke
 
 @pytest.mark.one_rank
 @pytest.mark.parametrize(("gain", "newton"), [(1e-3, 50), (0.0, 5)])
-def test_iterations_that_lower_the_energy_do_not_count_towards_their_limit(gain, newton, monkeypatch):
+def test_iterations_that_lower_the_energy_do_not_count_towards_their_limit(
+    gain, newton, monkeypatch
+):
     problem = growing_problem()
     solver = solver_of(problem, max_newton=5)
-    monkeypatch.setattr(solver, "_line_search", lambda iterate, _: replace(iterate, progress=gain))
+    monkeypatch.setattr(
+        solver, "_line_search", lambda iterate, _: replace(iterate, progress=gain)
+    )
     with pytest.raises(NotConvergedError, check=Facts(newton)):
         solver.solve()

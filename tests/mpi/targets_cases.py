@@ -1,4 +1,5 @@
-"""Growth towards known shapes and by curves of sizes: they are met, and a run that was stopped meets them as well."""
+"""Growth towards known shapes and by curves of sizes: they are met, and a run that was
+stopped meets them as well."""
 
 import math
 from dataclasses import replace
@@ -16,7 +17,11 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.growth import GrowthInputs
 from gyriflow.folding.simulation import Folding, advance
 from gyriflow.folding.step_fields import von_mises
-from gyriflow.folding.stretches import deformation_gradients, inverse_stretch, log_stretch
+from gyriflow.folding.stretches import (
+    deformation_gradients,
+    inverse_stretch,
+    log_stretch,
+)
 from gyriflow.folding.targets import missed_targets, shrinkage_note
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
@@ -35,21 +40,40 @@ TIGHT = {"solver": {"newton_tolerance": 1e-11}}
 
 
 def bent(week):
-    """Return the target of the body's vertices after some weeks: larger, and bent smoothly."""
+    """Return the target of the body's vertices after some weeks: larger, and bent
+    smoothly."""
     x, y, z = BODY.vertices.T
-    wave = np.stack([1.2 * np.sin(y / 12), 0.8 * np.cos(z / 10), 1.0 * np.sin(x / 14)], axis=1)
+    wave = np.stack(
+        [1.2 * np.sin(y / 12), 0.8 * np.cos(z / 10), 1.0 * np.sin(x / 14)], axis=1
+    )
     return 1.04**week * BODY.vertices + week * wave
 
 
 def towards(targets, mesh=BODY, **changes):
     """Return a free body with target shapes by week, and its state at the start."""
-    weeks = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
-    settings = {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
-    uniform = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0, "step_s": DAY_S}
+    weeks = {
+        "start_week": 21.0,
+        "end_week": 23.0,
+        "output_weeks": [21.0, 23.0],
+        "fissure_x_mm": 0.0,
+    }
+    settings = {
+        "support": "free",
+        "no_growth": {"kind": "none"},
+        "contact": {"kind": "none"},
+        "thickness_mm": 4.0,
+    }
+    uniform = {
+        "shear_modulus_cortex_pa": 300.0,
+        "shear_modulus_core_pa": 300.0,
+        "step_s": DAY_S,
+    }
     sizes = {"area_cm2": {21.0: 1.0, 23.0: 1.0}, "volume_ml": {21.0: 1.0, 23.0: 1.0}}
     names = {week: f"target_{week:05.2f}" for week in targets}
     growth = {"model": "shapes"} | sizes
-    parameters = parameters_from(weeks | settings | uniform | {"growth": growth, "targets": names} | changes)
+    parameters = parameters_from(
+        weeks | settings | uniform | {"growth": growth, "targets": names} | changes
+    )
     maps = {
         f"{names[week]}_{axis}": places
         for week, at in targets.items()
@@ -87,13 +111,17 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
 
     # the sum of growth is that of the target: 4 % in each direction, and the bend
     ratios = np.linalg.det(first.growth)
-    assert ratios @ cell_sizes(BODY.vertices, BODY.tets) == pytest.approx(volume(targets[22.0]), rel=1e-3)
+    assert ratios @ cell_sizes(BODY.vertices, BODY.tets) == pytest.approx(
+        volume(targets[22.0]), rel=1e-3
+    )
     assert first.growth_s == 7 * DAY_S
 
     motion = rigid(20, -35, 50, shift=(8.0, -3.0, 5.0))
     turned = {week: transform_points(at, motion) for week, at in targets.items()}
     again = after_steps(towards(turned)[0], start, 2)
-    np.testing.assert_allclose(again.positions, after_steps(folding, start, 2).positions, atol=1e-3 * M_PER_MM)
+    np.testing.assert_allclose(
+        again.positions, after_steps(folding, start, 2).positions, atol=1e-3 * M_PER_MM
+    )
 
 
 def test_the_path_passes_its_shapes_in_their_weeks_with_a_velocity_that_does_not_jump():
@@ -101,10 +129,17 @@ def test_the_path_passes_its_shapes_in_their_weeks_with_a_velocity_that_does_not
     path = path_through(list(shapes), list(shapes.values()), BODY)
     velocity = path.curve.derivative()
     for week, shape in shapes.items():
-        assert np.abs(without_rigid_motion(path(week), shape, np.ones(len(shape)))).max() < 1e-9
+        assert (
+            np.abs(without_rigid_motion(path(week), shape, np.ones(len(shape)))).max()
+            < 1e-9
+        )
         if 21.0 < week < 23.0:
-            assert velocity(week - 1e-9) == pytest.approx(velocity(week + 1e-9), abs=1e-5)
-    folding, start = towards({week: shape for week, shape in shapes.items() if week > 21.0})
+            assert velocity(week - 1e-9) == pytest.approx(
+                velocity(week + 1e-9), abs=1e-5
+            )
+    folding, start = towards(
+        {week: shape for week, shape in shapes.items() if week > 21.0}
+    )
     state = after_steps(folding, start, 14)
     assert max(row["to_path_mm"] for row in state.rows) < 0.1
     assert misfit(state, shapes[23.0]) < 0.05
@@ -118,17 +153,25 @@ def waves(vertices, week):
 
 
 def sound(cells, order=1):
-    """Return a box of 30 mm of sound elements, centred, with so many nodes along an edge."""
+    """Return a box of 30 mm of sound elements, centred, with so many nodes along an
+    edge."""
     mesh = box_mesh((cells // order,) * 3, (30.0, 30.0, 30.0))
     return quadratic(mesh) if order == 2 else mesh
 
 
 def wavy_run(mesh, steps, **changes):
-    """Return a run of two weeks towards waves with a number of steps a week, its last state, and the exact shape."""
+    """Return a run of two weeks towards waves with a number of steps a week, its last
+    state, and the exact shape."""
     step_s = 7 * DAY_S / steps
-    targets = {week: waves(mesh.vertices, week - 21.0) for week in (21.5, 22.0, 22.5, 23.0)}
+    targets = {
+        week: waves(mesh.vertices, week - 21.0) for week in (21.5, 22.0, 22.5, 23.0)
+    }
     folding, state = towards(targets, mesh=mesh, step_s=step_s, **changes)
-    return folding, after_steps(folding, replace(state, step_s=step_s), 2 * steps), targets[23.0]
+    return (
+        folding,
+        after_steps(folding, replace(state, step_s=step_s), 2 * steps),
+        targets[23.0],
+    )
 
 
 @pytest.mark.one_rank
@@ -137,16 +180,27 @@ def test_a_run_along_a_compatible_path_arrives_without_stress_on_any_mesh(order)
     for cells in (6, 10):
         mesh = sound(cells, order)
         folding, state, target = wavy_run(mesh, 7)
-        places, sizes = state.positions * MM_PER_M, vertex_sizes(mesh.vertices, linear_pieces(mesh))
-        # in quadratic elements the sums of growth and nodes differ by what the elements do not resolve
+        places, sizes = (
+            state.positions * MM_PER_M,
+            vertex_sizes(mesh.vertices, linear_pieces(mesh)),
+        )
+        # in quadratic elements the sums of growth and nodes differ by what the elements
+        # do not resolve
         assert np.abs(without_rigid_motion(places, target, sizes)).max() < 1e-3
-        stress = von_mises(folding.problem.evaluate("stress", folding.solved.displacement).reshape(-1, 3, 3))
+        stress = von_mises(
+            folding.problem.evaluate("stress", folding.solved.displacement).reshape(
+                -1, 3, 3
+            )
+        )
         assert np.median(stress) < 1e-4 * folding.parameters.shear_modulus_core_pa
-        # the growth of elements is the stretch of the whole way, but for axes that turn in a step
+        # the growth of elements is the stretch of the whole way, but for axes that turn
+        # in a step
         end = transform_points(target, rigid_fit(target, places, sizes))
         slopes = folding.problem.points.gradients
         F = deformation_gradients(mesh.vertices, end, mesh.tets, slopes)
-        exact = log_stretch(np.einsum("q,cqij->cij", folding.problem.points.weights, F), left=True)
+        exact = log_stretch(
+            np.einsum("q,cqij->cij", folding.problem.points.weights, F), left=True
+        )
         found = log_stretch(state.growth, left=True)
         assert np.linalg.norm(found - exact) < 0.01 * np.linalg.norm(exact)
 
@@ -157,14 +211,20 @@ def test_elements_that_a_target_inverts_do_not_grow_and_the_run_goes_on(order):
     mesh = sound(6, order)
     # a node near the centre moves out of its elements
     target = 1.05 * mesh.vertices
-    target[np.argmin(np.linalg.norm(mesh.vertices, axis=1))] += [3.5 if order == 2 else 7.0, 0.0, 0.0]
+    target[np.argmin(np.linalg.norm(mesh.vertices, axis=1))] += [
+        3.5 if order == 2 else 7.0,
+        0.0,
+        0.0,
+    ]
     folding, state = towards({21.5: target, 23.0: target}, mesh=mesh)
     while state.time_s < 4 * DAY_S * (1 - 1e-9):
         state = advance(folding, state, 4 * DAY_S)
     assert 0 < max(row["held_elements"] for row in state.rows) < 0.2 * len(mesh.tets)
     assert min(row["min_J"] for row in state.rows) > 0
     grown = cell_sizes(state.positions * MM_PER_M, linear_pieces(mesh)).sum()
-    assert grown / cell_sizes(mesh.vertices, linear_pieces(mesh)).sum() == pytest.approx(1.05**3, rel=0.01)
+    assert grown / cell_sizes(
+        mesh.vertices, linear_pieces(mesh)
+    ).sum() == pytest.approx(1.05**3, rel=0.01)
 
 
 @pytest.mark.one_rank
@@ -224,7 +284,10 @@ def test_elements_that_shrink_fast_are_counted_by_the_day():
         rows = after_steps(folding, replace(start, step_s=step_s), steps).rows
         assert {row["held_elements"] for row in rows} == {0}
         # linear in time, so that the loss of a day rises
-        losses = [1 - after["volume_ml"] / before["volume_ml"] for before, after in pairwise(rows)]
+        losses = [
+            1 - after["volume_ml"] / before["volume_ml"]
+            for before, after in pairwise(rows)
+        ]
         fast = [loss > 0.1 * step_s / DAY_S for loss in losses]
         assert any(fast)
         assert not all(fast)
@@ -232,20 +295,27 @@ def test_elements_that_shrink_fast_are_counted_by_the_day():
 
 
 @pytest.mark.one_rank
-def test_a_known_growth_of_a_body_that_bends_and_twists_is_found_in_the_axes_of_the_tissue():
+def test_known_growth_of_a_body_that_bends_and_twists_is_found_in_the_tissue_s_axes():
     mesh = ellipsoid_mesh(16, (20.0, 24.0, 18.0))
     pieces = linear_pieces(mesh)
 
     def grown(week):
         # along x, more where z is large
-        longer = mesh.vertices * np.exp(0.08 * week * np.outer(1 + mesh.vertices[:, 2] / 72, [1.0, 0.0, 0.0]))
+        longer = mesh.vertices * np.exp(
+            0.08 * week * np.outer(1 + mesh.vertices[:, 2] / 72, [1.0, 0.0, 0.0])
+        )
         angle = np.radians(3 * week) * mesh.vertices[:, 1:2] / 24
         return Rotation.from_rotvec(angle * [0.0, 1.0, 0.0]).apply(longer)
 
-    folding, start = towards({21.5: grown(0.5), 22.0: grown(1), 22.5: grown(1.5), 23.0: grown(2)}, mesh=mesh)
+    folding, start = towards(
+        {21.5: grown(0.5), 22.0: grown(1), 22.5: grown(1.5), 23.0: grown(2)}, mesh=mesh
+    )
     state = after_steps(folding, start, 14)
     end = transform_points(
-        grown(2), rigid_fit(grown(2), state.positions * MM_PER_M, vertex_sizes(mesh.vertices, pieces))
+        grown(2),
+        rigid_fit(
+            grown(2), state.positions * MM_PER_M, vertex_sizes(mesh.vertices, pieces)
+        ),
     )
     F = deformation_gradients(mesh.vertices, end, pieces, SLOPES[None])[:, 0]
     axes, stretches, back = np.linalg.svd(F)
@@ -259,12 +329,18 @@ def test_a_known_growth_of_a_body_that_bends_and_twists_is_found_in_the_axes_of_
     assert norm(result - expected) < 0.01 * norm(expected)
     # in axes that do not turn it is another one
     turn = axes @ back
-    assert norm(np.swapaxes(turn, 1, 2) @ expected @ turn - expected) > 0.05 * norm(expected)
+    assert norm(np.swapaxes(turn, 1, 2) @ expected @ turn - expected) > 0.05 * norm(
+        expected
+    )
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("lengths", [[1.05, 0.98, 1.1], [1.02, 0.99, 1.04], [1.16, 0.7, 1.0]])
-def test_stretches_and_their_logarithms_are_those_of_the_gradient_whatever_its_rotation(lengths):
+@pytest.mark.parametrize(
+    "lengths", [[1.05, 0.98, 1.1], [1.02, 0.99, 1.04], [1.16, 0.7, 1.0]]
+)
+def test_stretches_and_their_logarithms_are_those_of_the_gradient_whatever_its_rotation(
+    lengths,
+):
     axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     U = axes @ np.diag(lengths) @ axes.T
     R = rigid(30, 40, 50)[:3, :3]
@@ -272,7 +348,9 @@ def test_stretches_and_their_logarithms_are_those_of_the_gradient_whatever_its_r
     assert inverse_stretch(F)[0] == pytest.approx(np.stack([np.linalg.inv(U)] * 2))
     # growth of a half, and of tissue that does not grow
     half = axes @ np.diag(1 / np.sqrt(lengths)) @ axes.T
-    assert inverse_stretch(F, np.array([0.5, 0.0]))[0] == pytest.approx(np.stack([half, np.eye(3)]))
+    assert inverse_stretch(F, np.array([0.5, 0.0]))[0] == pytest.approx(
+        np.stack([half, np.eye(3)])
+    )
     clipped = axes @ np.diag(np.exp(-np.clip(np.log(lengths), -0.1, 0.1))) @ axes.T
     found, is_limited = inverse_stretch(F, limit=0.1)
     assert found[1] == pytest.approx(clipped)
@@ -290,16 +368,35 @@ def test_a_displacement_that_is_far_too_long_for_contact_is_shortened():
     approach = problem.domain.local(problem.domain.positions).copy()
     approach[:, :2], approach[:, 2] = 0.0, np.sign(approach[:, 2])
     for way_mm, part in ((100.0, 0.08), (4.0, 1.0)):
-        assert contact.max_step(problem.rest(), approach * way_mm * M_PER_MM) == pytest.approx(part, rel=1e-6)
+        assert contact.max_step(
+            problem.rest(), approach * way_mm * M_PER_MM
+        ) == pytest.approx(part, rel=1e-6)
 
 
 def following(growth):
-    """Return a free ellipsoid that is to grow by (area, volume) per week as logarithms, and the state before."""
+    """Return a free ellipsoid that is to grow by (area, volume) per week as logarithms,
+    and the state before."""
     mesh = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
-    weeks = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0, "step_s": DAY_S}
-    weeks |= {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
-    start = GrowthInputs(mesh, zones_of_run(mesh, parameters_from(weeks)), {}).size(mesh.vertices)
-    sizes = {"area_cm2": start.area_mm2 * CM2_PER_MM2, "volume_ml": start.volume_mm3 * ML_PER_MM3}
+    weeks = {
+        "start_week": 21.0,
+        "end_week": 23.0,
+        "output_weeks": [21.0, 23.0],
+        "fissure_x_mm": 0.0,
+        "step_s": DAY_S,
+    }
+    weeks |= {
+        "support": "free",
+        "no_growth": {"kind": "none"},
+        "contact": {"kind": "none"},
+        "thickness_mm": 4.0,
+    }
+    start = GrowthInputs(mesh, zones_of_run(mesh, parameters_from(weeks)), {}).size(
+        mesh.vertices
+    )
+    sizes = {
+        "area_cm2": start.area_mm2 * CM2_PER_MM2,
+        "volume_ml": start.volume_mm3 * ML_PER_MM3,
+    }
     curves = {
         name: {21.0: size, 23.0: size * math.exp(2 * rate)}
         for (name, size), rate in zip(sizes.items(), growth, strict=True)
@@ -309,7 +406,9 @@ def following(growth):
     return folding, State.at_start(mesh.vertices * M_PER_MM, DAY_S)
 
 
-@pytest.mark.parametrize("growth", [(0.10, 0.145), pytest.param((0.02, 0.03), marks=pytest.mark.one_rank)])
+@pytest.mark.parametrize(
+    "growth", [(0.10, 0.145), pytest.param((0.02, 0.03), marks=pytest.mark.one_rank)]
+)
 def test_area_and_volume_meet_their_curves_at_the_end_of_each_week(growth):
     folding, state = following(growth)
     state = after_steps(folding, state, 14)
@@ -320,13 +419,19 @@ def test_area_and_volume_meet_their_curves_at_the_end_of_each_week(growth):
     assert row["area_cm2"] == pytest.approx(found.area_mm2 * CM2_PER_MM2, rel=1e-12)
     # the aim is the curve itself
     start = folding.parameters.growth.area_cm2[21.0]
-    assert row["area_aim_cm2"] == pytest.approx(start * math.exp(2 * growth[0]), rel=1e-9)
+    assert row["area_aim_cm2"] == pytest.approx(
+        start * math.exp(2 * growth[0]), rel=1e-9
+    )
 
 
 @pytest.mark.one_rank
 def test_no_rate_is_negative_where_curves_shrink():
     row = after_steps(*following((-0.10, -0.15)), 1).rows[-1]
-    assert (row["growth_rate_per_s"], row["core_growth_rate_per_s"], row["growth_limited"]) == (0.0, 0.0, 1)
+    assert (
+        row["growth_rate_per_s"],
+        row["core_growth_rate_per_s"],
+        row["growth_limited"],
+    ) == (0.0, 0.0, 1)
 
 
 def test_the_shortfall_of_a_step_is_corrected_after_a_resumption_too():
@@ -335,5 +440,7 @@ def test_the_shortfall_of_a_step_is_corrected_after_a_resumption_too():
     whole = after_steps(folding, middle, 2)
     resumed = after_steps(following((0.10, 0.15))[0], middle, 2)
     assert resumed.correction == pytest.approx(whole.correction, rel=1e-6)
-    assert resumed.rows[-1]["growth_rate_per_s"] == pytest.approx(whole.rows[-1]["growth_rate_per_s"], rel=1e-6)
+    assert resumed.rows[-1]["growth_rate_per_s"] == pytest.approx(
+        whole.rows[-1]["growth_rate_per_s"], rel=1e-6
+    )
     np.testing.assert_allclose(resumed.positions, whole.positions, atol=1e-3 * M_PER_MM)

@@ -1,4 +1,5 @@
-"""The folding program when it is broken off: it goes on from its checkpoint, or keeps what it has reached."""
+"""The folding program when it is broken off: it goes on from its checkpoint, or keeps
+what it has reached."""
 
 import subprocess
 
@@ -29,7 +30,9 @@ pytestmark = pytest.mark.slow
 MANY_STEPS = 4000.0
 
 
-def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp_path, monkeypatch):
+def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(
+    tmp_path, monkeypatch
+):
     path, axes = tmp_path / "curved.xdmf", (20.0, 26.0, 18.0)
     write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, axes), ellipsoid(axes)))
     fields = ["displacement", "cortex_weight", "stress", "strain"]
@@ -46,18 +49,29 @@ def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp
     one, three = (tmp_path / name / "frames.h5" for name in ("one", "three"))
     assert read_tets(one).shape == (len(mesh.tets), 10)
     moved = np.abs(read_positions(one, 21.5) - mesh.vertices).max()
-    assert np.abs(read_positions(one, 21.5) - read_positions(three, 21.5)).max() <= 1e-8 * moved
+    assert (
+        np.abs(read_positions(one, 21.5) - read_positions(three, 21.5)).max()
+        <= 1e-8 * moved
+    )
     for field in ("von_mises_pa", "elastic_strain"):
         values = element_field(one, 21.5, field)
         assert values.shape == (len(mesh.tets),)
-        np.testing.assert_allclose(values, element_field(three, 21.5, field), rtol=1e-4, atol=1e-4 * values.max())
-    surface, _ = boundary_surface(TetrahedralMesh(read_positions(one, 21.5), read_tets(one)))
+        np.testing.assert_allclose(
+            values,
+            element_field(three, 21.5, field),
+            rtol=1e-4,
+            atol=1e-4 * values.max(),
+        )
+    surface, _ = boundary_surface(
+        TetrahedralMesh(read_positions(one, 21.5), read_tets(one))
+    )
     assert is_closed(surface)
 
 
 @pytest.fixture(scope="module")
 def long_run(mesh, tmp_path_factory):
-    """A run of so many steps that it does not end before it is killed, uninterrupted."""
+    """A run of so many steps that it does not end before it is killed,
+    uninterrupted."""
     out = tmp_path_factory.mktemp("long") / "out"
     done = fold(mesh, out, solver=TIGHT, step_s=MANY_STEPS)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -65,7 +79,8 @@ def long_run(mesh, tmp_path_factory):
 
 
 def killed_after(step, arguments):
-    """Start the program, kill it when it has printed a step, and return what it printed."""
+    """Start the program, kill it when it has printed a step, and return what it
+    printed."""
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         printed = []
         for line in process.stdout:
@@ -77,22 +92,34 @@ def killed_after(step, arguments):
 
 
 @pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 1)])
-def test_a_killed_run_resumes_and_ends_like_an_uninterrupted_one(mesh, long_run, tmp_path, first, then):
+def test_a_killed_run_resumes_and_ends_like_an_uninterrupted_one(
+    mesh, long_run, tmp_path, first, then
+):
     out = tmp_path / "out"
-    printed = killed_after(3, command(mesh, out, first, solver=TIGHT, step_s=MANY_STEPS))
+    printed = killed_after(
+        3, command(mesh, out, first, solver=TIGHT, step_s=MANY_STEPS)
+    )
     assert not (out / "frames.h5").exists(), printed
     again = fold(mesh, out, then, solver=TIGHT, step_s=MANY_STEPS)
     assert again.returncode == 0, again.stderr
     resumed = read_json(out / "summary.json")["resumed_after_step"]
     assert resumed >= 3
     assert again.stdout == Facts("checkpoint", resumed)
-    one, more = (read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out))
-    largest = np.linalg.norm(one - read_positions(out / "frames.h5", 21.0), axis=1).max()
+    one, more = (
+        read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out)
+    )
+    largest = np.linalg.norm(
+        one - read_positions(out / "frames.h5", 21.0), axis=1
+    ).max()
     assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
-    assert len(pd.read_csv(out / "steps.csv")) == len(pd.read_csv(long_run / "steps.csv"))
+    assert len(pd.read_csv(out / "steps.csv")) == len(
+        pd.read_csv(long_run / "steps.csv")
+    )
 
 
-def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run, tmp_path):
+def test_a_checkpoint_of_other_parameters_waits_for_their_return(
+    mesh, long_run, tmp_path
+):
     out = tmp_path / "out"
     killed_after(2, command(mesh, out, step_s=MANY_STEPS))
     done = fold(mesh, out, thickness_mm=2.5)
@@ -103,29 +130,40 @@ def test_a_checkpoint_of_other_parameters_waits_for_their_return(mesh, long_run,
     assert again.returncode == 0
     assert read_json(out / "summary.json")["resumed_after_step"] > 0
     assert not list(out.glob("checkpoint-*"))
-    one, resumed = (read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out))
+    one, resumed = (
+        read_positions(folder / "frames.h5", 21.5) for folder in (long_run, out)
+    )
     assert np.linalg.norm(resumed - one, axis=1).max() <= 1e-3
 
 
-def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(mesh, tmp_path, monkeypatch, capsys):
+def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(
+    mesh, tmp_path, monkeypatch, capsys
+):
     brain = read_tetrahedral_mesh(mesh)
     weeks = WEEK | {"output_weeks": [21.0, 21.25, 21.5], "ranks": 1}
     parameters = parameters_from(weeks)
     monkeypatch.setattr(Folding, "step", failing_after(5))
     zones = zones_of_run(brain, parameters)
-    with pytest.raises(SolverError, check=Facts("no way on", "folding.end_week", "folding.solver.max_halvings")):
+    with pytest.raises(
+        SolverError,
+        check=Facts("no way on", "folding.end_week", "folding.solver.max_halvings"),
+    ):
         run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path)
     key = run_key(brain, parameters, {})
     state, _ = read_checkpoint(tmp_path / f"checkpoint-{key}" / "state.h5", key)
     assert len(state.rows) == 5
-    earlier = parameters_from(weeks | {"end_week": 21.25, "output_weeks": [21.0, 21.25]})
+    earlier = parameters_from(
+        weeks | {"end_week": 21.25, "output_weeks": [21.0, 21.25]}
+    )
     run(MPI.COMM_SELF, brain, zones, earlier, {}, tmp_path)
     assert Facts("checkpoint", 5) in capsys.readouterr().out.splitlines()
     assert read_weeks(tmp_path / "frames.h5") == [21.0, 21.25]
     assert pd.read_csv(tmp_path / "steps.csv")["week"].iloc[-1] == pytest.approx(21.25)
 
 
-def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tmp_path, monkeypatch):
+def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(
+    mesh, tmp_path, monkeypatch
+):
     brain = read_tetrahedral_mesh(mesh)
     parameters = parameters_from(WEEK)
     monkeypatch.setattr(Folding, "step", failing_after(5))
@@ -140,4 +178,8 @@ def test_a_run_that_may_diverge_ends_with_the_weeks_that_it_has_reached(mesh, tm
     monkeypatch.setattr(Folding, "step", failing_after(0))
     run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path, may_diverge=True)
     summary = read_json(tmp_path / "summary.json")
-    assert (summary["steps"], summary["weeks"], summary["reached_week"]) == (0, [21.0], 21.0)
+    assert (summary["steps"], summary["weeks"], summary["reached_week"]) == (
+        0,
+        [21.0],
+        21.0,
+    )

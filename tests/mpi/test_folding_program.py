@@ -46,8 +46,13 @@ def default_run(mesh, tmp_path_factory):
 
 def test_a_run_leaves_every_file_and_nothing_else(tight_run):
     assert {p.name for p in tight_run.iterdir()} == {
-        ".lock", "frames.h5", "frames.xdmf", "steps.csv", "summary.json", "zones.json"
-    }  # fmt: skip
+        ".lock",
+        "frames.h5",
+        "frames.xdmf",
+        "steps.csv",
+        "summary.json",
+        "zones.json",
+    }
     frames = tight_run / "frames.h5"
     assert read_weeks(frames) == [21.0, 21.25, 21.5]
     steps = pd.read_csv(tight_run / "steps.csv")
@@ -56,36 +61,65 @@ def test_a_run_leaves_every_file_and_nothing_else(tight_run):
         assert np.abs(steps["week"] - week).min() < 1e-12
     assert (steps["min_J"] > 0).all()
     moved = read_positions(frames, 21.5) - read_positions(frames, 21.0)
-    np.testing.assert_allclose(moved, read_field(frames, 21.5, "displacement_mm"), atol=1e-12)
+    np.testing.assert_allclose(
+        moved, read_field(frames, 21.5, "displacement_mm"), atol=1e-12
+    )
     summary = read_json(tight_run / "summary.json")
     assert summary["steps"] == len(steps)
     ratios = [
-        np.quantile(radius_ratios(TetrahedralMesh(read_positions(frames, week), read_tets(frames))), 0.01)
+        np.quantile(
+            radius_ratios(
+                TetrahedralMesh(read_positions(frames, week), read_tets(frames))
+            ),
+            0.01,
+        )
         for week in summary["weeks"]
     ]
     assert summary["radius_ratio_01"] == pytest.approx(ratios)
     assert len(set(ratios)) == 3
 
 
-def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, default_run):
-    one, other = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, default_run[0]))
+def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(
+    tight_run, default_run
+):
+    one, other = (
+        read_positions(out / "frames.h5", 21.5) for out in (tight_run, default_run[0])
+    )
     assert np.linalg.norm(other - one, axis=1).max() <= 1e-3
 
 
 @pytest.mark.extended
-def test_ziglang_compiles_forms_and_c_code_where_there_is_no_compiler(mesh, tight_run, tmp_path):
+def test_ziglang_compiles_forms_and_c_code_where_there_is_no_compiler(
+    mesh, tight_run, tmp_path
+):
     packages = tmp_path / "packages"
-    install = [sys.executable, "-m", "pip", "install", "--quiet", "--target", packages, "ziglang"]
+    install = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--target",
+        packages,
+        "ziglang",
+    ]
     subprocess.run(install, check=True, timeout=600)
-    without_cc = {"PATH": str(Path(sys.executable).parent), "PYTHONPATH": f"{packages}:{os.environ['PYTHONPATH']}"}
+    without_cc = {
+        "PATH": str(Path(sys.executable).parent),
+        "PYTHONPATH": f"{packages}:{os.environ['PYTHONPATH']}",
+    }
     without_cc |= {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-    environment = {name: value for name, value in os.environ.items() if name != "CC"} | without_cc
+    environment = {
+        name: value for name, value in os.environ.items() if name != "CC"
+    } | without_cc
     program = command(mesh, tmp_path / "out", solver=TIGHT)
     done = ran(*program, env=environment, timeout_s=900)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "cache" / "zig").is_dir()
     expected = read_positions(tight_run / "frames.h5", 21.5)
-    np.testing.assert_allclose(read_positions(tmp_path / "out" / "frames.h5", 21.5), expected, atol=1e-5)
+    np.testing.assert_allclose(
+        read_positions(tmp_path / "out" / "frames.h5", 21.5), expected, atol=1e-5
+    )
 
 
 def test_too_little_shared_memory_is_named(mesh, tmp_path):
@@ -115,10 +149,14 @@ def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
 
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_path):
     hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "program": IMPATIENT}
-    done = fold(mesh, tmp_path / "out", end_week=21.4, output_weeks=[21.0, 21.4], **hard)
+    done = fold(
+        mesh, tmp_path / "out", end_week=21.4, output_weeks=[21.0, 21.4], **hard
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     # which step fails first depends on round-off
-    assert re.search(r"step of (86400|69120) s failed .*: trying (43200|34560) s", done.stdout)
+    assert re.search(
+        r"step of (86400|69120) s failed .*: trying (43200|34560) s", done.stdout
+    )
     steps = pd.read_csv(tmp_path / "out" / "steps.csv")
     assert steps["dt_s"].min() <= 34560
     assert steps["week"].iloc[-1] == pytest.approx(21.4)
@@ -126,7 +164,12 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_p
 
 
 def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
-    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_halvings": 0}, "program": IMPATIENT}
+    hard = {
+        "growth_rate_per_s": 1e-5,
+        "step_s": 86400.0,
+        "solver": {"max_halvings": 0},
+        "program": IMPATIENT,
+    }
     done = fold(mesh, tmp_path / "out", 2, **hard)
     assert done.returncode == 4, done.stdout + done.stderr
     # no step is halved: a whole one fails, or what is left before the first output
@@ -142,12 +185,22 @@ def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_p
     ends = []
     for ranks in (1, 2):
         out = tmp_path / f"out{ranks}"
-        settings = {"thickness_mm": {"map": "thickness_mm"}, "solver": TIGHT, "fields": ["cortex_weight"]}
-        call = [*command(mesh, out, ranks, **settings), "--maps", str(tmp_path / "maps.h5")]
+        settings = {
+            "thickness_mm": {"map": "thickness_mm"},
+            "solver": TIGHT,
+            "fields": ["cortex_weight"],
+        }
+        call = [
+            *command(mesh, out, ranks, **settings),
+            "--maps",
+            str(tmp_path / "maps.h5"),
+        ]
         done = ran(*call)
         assert done.returncode == 0, done.stdout + done.stderr
         ends.append(read_positions(out / "frames.h5", 21.5))
-    assert np.abs(ends[0] - ends[1]).max() <= 1e-8 * np.abs(ends[0] - brain.vertices).max()
+    assert (
+        np.abs(ends[0] - ends[1]).max() <= 1e-8 * np.abs(ends[0] - brain.vertices).max()
+    )
     weight = read_field(tmp_path / "out1" / "frames.h5", 21.0, "cortex_weight")
     inside = np.abs(weight - 0.5) < 0.499
     assert weight[inside & (y > 0)].mean() > weight[inside & (y < 0)].mean()
@@ -179,7 +232,9 @@ runpy.run_module("gyriflow.folding", run_name="__main__")
 """
 
 
-def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, default_run, tmp_path):
+def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(
+    mesh, default_run, tmp_path
+):
     out = tmp_path / "out"
     shutil.copytree(default_run[0], out)
     before = {path.name: path.read_bytes() for path in out.iterdir()}
@@ -187,8 +242,12 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, defaul
     done = ran(*program)
     assert done.returncode == 5, done.stdout + done.stderr
     assert done.stderr == Facts(out, "--directory")
-    assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
-    assert not [path for path in out.rglob("*") if path.is_file() and path.parent != out]
+    assert {
+        path.name: path.read_bytes() for path in out.iterdir() if path.is_file()
+    } == before
+    assert not [
+        path for path in out.rglob("*") if path.is_file() and path.parent != out
+    ]
 
 
 def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):

@@ -1,4 +1,5 @@
-"""The solver's cases under mpiexec: on one rank pytest runs them itself, as all other tests."""
+"""The solver's cases under mpiexec: on one rank pytest runs them itself, as all other
+tests."""
 
 import sys
 from pathlib import Path
@@ -10,8 +11,12 @@ pytestmark = pytest.mark.slow
 
 FOLDER = Path(__file__).parent
 CASES = sorted(map(str, FOLDER.glob("*_cases.py")))
-OF_PARTS = [str(FOLDER / f"{name}_cases.py") for name in ("growth", "linear_solver", "shared_contact", "targets")]
-"""Whose answers hang on how many neighbours a rank's part of the mesh has: with three there are two of them."""
+OF_PARTS = [
+    str(FOLDER / f"{name}_cases.py")
+    for name in ("growth", "linear_solver", "shared_contact", "targets")
+]
+"""Whose answers hang on how many neighbours a rank's part of the mesh has: with three
+there are two of them."""
 
 
 RUNS = [(2, case) for case in CASES]
@@ -19,12 +24,25 @@ RUNS = [(2, case) for case in CASES]
 RUNS += [pytest.param(3, case, marks=pytest.mark.extended) for case in OF_PARTS]
 
 
-# a file each, since MPICH has at most 2048 communicators in a process, and what cases leave behind has some
+# a file each, since MPICH has at most 2048 communicators in a process, and what cases
+# leave behind has some
 @pytest.mark.parametrize(("ranks", "case"), RUNS)
 def test_cases_hold_on(ranks, case):
-    program = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider"]
+    program = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-x",
+        "-n",
+        "0",
+        "-p",
+        "no:cacheprovider",
+    ]
     command = ["mpiexec", "-n", str(ranks), *program, "-m", "not one_rank", case]
     done = ran(*command, timeout_s=1200)
     # 5: all cases of the file are for one rank
     assert done.returncode in (0, 5), done.stdout[-6000:] + done.stderr[-2000:]
-    assert done.stdout.count(" passed") == (ranks if done.returncode == 0 else 0), done.stdout
+    assert done.stdout.count(" passed") == (ranks if done.returncode == 0 else 0), (
+        done.stdout
+    )

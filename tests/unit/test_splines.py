@@ -1,4 +1,5 @@
-"""Penalised splines: what their penalties leave free, their degrees of freedom, and their ends."""
+"""Penalised splines: what their penalties leave free, their degrees of freedom, and
+their ends."""
 
 import numpy as np
 import pytest
@@ -19,7 +20,10 @@ def coefficients(values: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("order", "power"), [(1, 1), (2, 2)])
 def test_a_penalty_leaves_lines_or_quadratics(order: int, power: int) -> None:
     x, penalty = np.linspace(21, 31, 200), splines.penalty(*ENDS, order)
-    free, bent = coefficients(3.0 - 2 * (x - 22) ** power), coefficients((x - 22) ** (power + 1))
+    free, bent = (
+        coefficients(3.0 - 2 * (x - 22) ** power),
+        coefficients((x - 22) ** (power + 1)),
+    )
     assert free @ penalty @ free == pytest.approx(0.0, abs=1e-8)
     assert bent @ penalty @ bent > 0.01
 
@@ -27,7 +31,8 @@ def test_a_penalty_leaves_lines_or_quadratics(order: int, power: int) -> None:
 def test_beyond_its_ends_a_curve_is_a_line() -> None:
     curve = coefficients((np.linspace(21, 31, 200) - 22) ** 3)
     before, after = (
-        splines.design(np.array(weeks), *ENDS) @ curve for weeks in ([20.0, 20.5, 21.0], [31.0, 31.5, 32.0])
+        splines.design(np.array(weeks), *ENDS) @ curve
+        for weeks in ([20.0, 20.5, 21.0], [31.0, 31.5, 32.0])
     )
     # slopes 3·1² and 3·9²
     assert np.diff(before) == pytest.approx([1.5, 1.5], rel=1e-3)
@@ -35,7 +40,8 @@ def test_beyond_its_ends_a_curve_is_a_line() -> None:
 
 
 def matrices(weeks: np.ndarray, order: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal matrix and the penalty of a fit to weeks (n,), with knots from the first to the last."""
+    """Return the normal matrix and the penalty of a fit to weeks (n,), with knots from
+    the first to the last."""
     ends = weeks[0], weeks[-1], 5
     rows = splines.design(weeks, *ends)
     return rows.T @ rows, splines.penalty(*ends, order)
@@ -59,24 +65,32 @@ def test_freedom_that_no_penalty_gives_is_warned_of(caplog) -> None:
     # four weeks have four degrees of freedom, a line has two
     assert splines.strength(normal, penalty, 6.0, "volume") == pytest.approx(weakest)
     assert splines.strength(normal, penalty, 1.0, "area") == pytest.approx(strongest)
-    for message, facts in zip(caplog.messages, (Facts("volume", 4, 6), Facts("area", 2, 1)), strict=True):
+    for message, facts in zip(
+        caplog.messages, (Facts("volume", 4, 6), Facts("area", 2, 1)), strict=True
+    ):
         assert facts(message)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("missing", [-0.009, -1e-7, 0.0, 1e-7, 0.009])
-def test_near_an_end_of_the_range_the_strength_is_that_end(order: int, missing: float, caplog) -> None:
+def test_near_an_end_of_the_range_the_strength_is_that_end(
+    order: int, missing: float, caplog
+) -> None:
     normal, penalty = matrices(WEEKS[:5], order)
     weakest, strongest = range_of_strengths(normal, penalty)
     assert splines.strength(normal, penalty, 5.0 + missing) == pytest.approx(weakest)
-    assert splines.strength(normal, penalty, order + 1 + missing) == pytest.approx(strongest)
+    assert splines.strength(normal, penalty, order + 1 + missing) == pytest.approx(
+        strongest
+    )
     assert not caplog.messages
 
 
 def test_where_any_strength_will_do_it_is_the_strongest() -> None:
     # two weeks have two degrees of freedom with any penalty
     normal, penalty = matrices(np.array([21.0, 21.0, 24.0]))
-    assert splines.strength(normal, penalty, 2.0) == pytest.approx(range_of_strengths(normal, penalty)[1])
+    assert splines.strength(normal, penalty, 2.0) == pytest.approx(
+        range_of_strengths(normal, penalty)[1]
+    )
 
 
 @pytest.mark.parametrize("span", [0.2, 1.0, 10.0])
@@ -88,7 +102,9 @@ def test_rounding_does_not_decide_the_strength(span: float, freedom: float) -> N
     for _ in range(20):
         noise = 1e-15 * random.uniform(-1, 1, normal.shape)
         noisy_normal = normal * (1 + noise + noise.T)
-        assert splines.strength(noisy_normal, penalty, freedom) == pytest.approx(expected, rel=1e-4)
+        assert splines.strength(noisy_normal, penalty, freedom) == pytest.approx(
+            expected, rel=1e-4
+        )
 
 
 @pytest.mark.parametrize("freedom", [2.5, 4.0])

@@ -1,4 +1,5 @@
-"""A step ends in the exit code of its error, with one message on the terminal and in its log."""
+"""A step ends in the exit code of its error, with one message on the terminal and in
+its log."""
 
 import logging
 import resource
@@ -40,7 +41,9 @@ def test_a_known_error_is_one_message_and_its_code(exit_file, tmp_path, capsys):
 
     def close_holes():
         logging.getLogger("room").info("a hole was closed")
-        raise MeshError("has a hole", path="x.gii", found="12 mm", expected="at most 3 mm")
+        raise MeshError(
+            "has a hole", path="x.gii", found="12 mm", expected="at most 3 mm"
+        )
 
     with pytest.raises(SystemExit) as end, step(str(log)):
         close_holes()
@@ -53,8 +56,13 @@ def test_a_known_error_is_one_message_and_its_code(exit_file, tmp_path, capsys):
     assert "Traceback" not in text
 
 
-@pytest.mark.parametrize(("path", "named"), [(None, "a.gii, b.gii: has a hole"), ("x.gii", "x.gii: has a hole")])
-def test_an_error_that_names_no_file_is_given_the_inputs(exit_file, tmp_path, capsys, path, named):
+@pytest.mark.parametrize(
+    ("path", "named"),
+    [(None, "a.gii, b.gii: has a hole"), ("x.gii", "x.gii: has a hole")],
+)
+def test_an_error_that_names_no_file_is_given_the_inputs(
+    exit_file, tmp_path, capsys, path, named
+):
     with pytest.raises(SystemExit), step(str(tmp_path / "log"), "a.gii", "b.gii"):
         raise MeshError("has a hole", path=path)
     assert capsys.readouterr().err == f"gyriflow: {named}\n"
@@ -73,7 +81,9 @@ def test_memory_that_ran_out_is_said_with_the_input(exit_file, tmp_path, capsys)
     with pytest.raises(SystemExit) as end, step(str(tmp_path / "log"), "a.nii"):
         raise MemoryError("Unable to allocate 9.1 GiB")
     assert (end.value.code, recorded_exit_code(exit_file)) == (137, 137)
-    assert capsys.readouterr().err == Facts("gyriflow: a.nii:", "Unable to allocate 9.1 GiB")
+    assert capsys.readouterr().err == Facts(
+        "gyriflow: a.nii:", "Unable to allocate 9.1 GiB"
+    )
 
 
 def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path):
@@ -86,17 +96,25 @@ def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path)
     assert recorded_exit_code(exit_file) == 137
 
 
-def test_a_step_records_the_processor_time_of_itself_and_its_children_next_to_its_log(tmp_path, monkeypatch):
+def test_a_step_records_the_processor_time_of_itself_and_its_children_next_to_its_log(
+    tmp_path, monkeypatch
+):
     counted = {
-        resource.RUSAGE_SELF: SimpleNamespace(ru_utime=2.0, ru_stime=0.5, ru_maxrss=2**20),
-        resource.RUSAGE_CHILDREN: SimpleNamespace(ru_utime=10.0, ru_stime=0.25, ru_maxrss=3 * 2**20),
+        resource.RUSAGE_SELF: SimpleNamespace(
+            ru_utime=2.0, ru_stime=0.5, ru_maxrss=2**20
+        ),
+        resource.RUSAGE_CHILDREN: SimpleNamespace(
+            ru_utime=10.0, ru_stime=0.25, ru_maxrss=3 * 2**20
+        ),
     }
     monkeypatch.setattr(resource, "getrusage", counted.get)
     monkeypatch.setattr(step_module.sys, "platform", "linux")
     (tmp_path / "a" / "logs").mkdir(parents=True)
     with step(str(tmp_path / "a" / "logs" / "one.week-21.00.log")):
         pass
-    head, row = (tmp_path / "a" / "benchmarks" / "one.week-21.00.tsv").read_text().splitlines()
+    head, row = (
+        (tmp_path / "a" / "benchmarks" / "one.week-21.00.tsv").read_text().splitlines()
+    )
     assert head.split("\t") == ["wall_s", "cpu_s", "memory_MiB"]
     assert [float(value) for value in row.split("\t")[1:]] == [12.75, 3072]
 

@@ -1,4 +1,5 @@
-"""The workflow from a copy of the checkout, so that editing the sources meanwhile changes nothing."""
+"""The workflow from a copy of the checkout, so that editing the sources meanwhile
+changes nothing."""
 
 import os
 import re
@@ -24,17 +25,27 @@ CHECKOUT = Path(__file__).parents[2]
 
 
 def labelled(week: int) -> dict:
-    """Return the source of a brain whose labels `Workflow.write` makes, synthetic ones of a week."""
+    """Return the source of a brain whose labels `Workflow.write` makes, synthetic ones
+    of a week."""
     return {"labels": f"phantom-{week}.nii.gz", "scheme": "spina-bifida-atlas"}
 
 
 SMALL_STUDY = {
-    "brains": [{"id": "a", "week": 21, **labelled(21)}, {"id": "b", "week": 22, **labelled(22)}],
+    "brains": [
+        {"id": "a", "week": 21, **labelled(21)},
+        {"id": "b", "week": 22, **labelled(22)},
+    ],
     "start": "a",
     "folding": {"end_week": 22},
     "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
 }
-COARSE = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 3.0, "core_edge_mm": 5.0, "max_surface_distance_mm": 1.0}
+COARSE = {
+    "order": 1,
+    "mesher": "tetgen",
+    "surface_edge_mm": 3.0,
+    "core_edge_mm": 5.0,
+    "max_surface_distance_mm": 1.0,
+}
 """A mesh that is made in a second."""
 
 
@@ -59,11 +70,16 @@ class Surfaces:
         return log.read_text()
 
     def require_refused(self, brain: str, *facts: object) -> None:
-        """Check that a brain was refused with facts, in its log and on the terminal, and that nothing is left."""
+        """Check that a brain was refused with facts, in its log and on the terminal,
+        and that nothing is left."""
         message = cause(self.log(brain))
         assert message == Facts(*facts)
         assert message in self.outcome.stderr
-        assert not [path for path in (self.results / brain / "surface").rglob("*") if path.is_file()]
+        assert not [
+            path
+            for path in (self.results / brain / "surface").rglob("*")
+            if path.is_file()
+        ]
 
     def require_exit_code(self, code: int) -> None:
         """Check how the run ended, and that it showed no traceback."""
@@ -86,9 +102,16 @@ class Workflow:
     def environment(self) -> dict[str, str]:
         return os.environ | {"PYTHONPATH": str(self.checkout / "src")}
 
-    def run(self, *arguments: str, timeout_s: float = 300) -> subprocess.CompletedProcess[str]:
+    def run(
+        self, *arguments: str, timeout_s: float = 300
+    ) -> subprocess.CompletedProcess[str]:
         """Run the launcher in the working directory."""
-        return ran(*self.command(*arguments), timeout_s=timeout_s, cwd=self.directory, env=self.environment)
+        return ran(
+            *self.command(*arguments),
+            timeout_s=timeout_s,
+            cwd=self.directory,
+            env=self.environment,
+        )
 
     def jobs(self, *arguments: str) -> dict[str, int]:
         """Return the number of jobs per rule that a dry run plans."""
@@ -98,10 +121,14 @@ class Workflow:
             return {}
         _, _, table = (outcome.stdout + outcome.stderr).partition("Job stats:")
         table, _, _ = table.partition("\ntotal")
-        return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, flags=re.MULTILINE)}
+        return {
+            rule: int(count)
+            for rule, count in re.findall(r"^(\w+) +(\d+)$", table, flags=re.MULTILINE)
+        }
 
     def write(self, name: str, config: dict) -> str:
-        """Write a configuration, and labels that it calls `labelled`, and return its name."""
+        """Write a configuration, and labels that it calls `labelled`, and return its
+        name."""
         for brain in config.get("brains", []):
             given = re.fullmatch(r"phantom-(\d+)\.nii\.gz", brain.get("labels", ""))
             # a newer file would have its surface made again
@@ -126,32 +153,62 @@ class Workflow:
         assert touched.returncode == 0, touched.stderr
 
     def count_ellipsoid_as_meshed(self, config: dict, cells: int) -> None:
-        """Write a configuration of one brain, `a`, as study.yaml, with an ellipsoid's surface and mesh taken for made.
+        """Write a configuration of one brain, `a`, as study.yaml, with an ellipsoid's
+        surface and mesh taken for made.
 
         `cells` is the number of the mesh's cells along an axis.
         """
         arguments = ("mesh", "--configfile", self.write("study.yaml", config))
         self.lay_out(*arguments)
         brain = self.directory / "results" / "brains" / "a"
-        write_json(brain / "surface" / "surface.json", {"fissure_x_mm": 0.0, "pose": Pose().plain()})
+        write_json(
+            brain / "surface" / "surface.json",
+            {"fissure_x_mm": 0.0, "pose": Pose().plain()},
+        )
         for side, sign in (("left", -1), ("right", 1)):
             write_surface(brain / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
-        write_tetrahedral_mesh(brain / "mesh" / "brain.xdmf", ellipsoid_mesh(cells, (20.0, 26.0, 18.0)))
+        write_tetrahedral_mesh(
+            brain / "mesh" / "brain.xdmf", ellipsoid_mesh(cells, (20.0, 26.0, 18.0))
+        )
         self.count_as_made(*arguments)
 
     def surfaces(self, config: dict, *more: str) -> Surfaces:
-        """Make the pial surfaces of all brains of a configuration, and more targets, as far as that goes."""
+        """Make the pial surfaces of all brains of a configuration, and more targets, as
+        far as that goes."""
         name = self.write("study.yaml", config)
-        targets = [f"results/brains/{brain['id']}/surface/pial.surf.gii" for brain in config["brains"]]
-        outcome = self.run(*more, *targets, "--cores", "2", "--keep-going", "--configfile", name, timeout_s=900)
+        targets = [
+            f"results/brains/{brain['id']}/surface/pial.surf.gii"
+            for brain in config["brains"]
+        ]
+        outcome = self.run(
+            *more,
+            *targets,
+            "--cores",
+            "2",
+            "--keep-going",
+            "--configfile",
+            name,
+            timeout_s=900,
+        )
         return Surfaces(self.directory, outcome)
 
 
 @pytest.fixture(scope="session")
 def checkout_copy(tmp_path_factory):
     copy = tmp_path_factory.mktemp("checkout")
-    for name in ("src", "workflow", "config", "profiles", "envs", "atlases", "schemes", "norms"):
-        shutil.copytree(CHECKOUT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in (
+        "src",
+        "workflow",
+        "config",
+        "profiles",
+        "envs",
+        "atlases",
+        "schemes",
+        "norms",
+    ):
+        shutil.copytree(
+            CHECKOUT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__")
+        )
     shutil.copy(CHECKOUT / "Snakefile", copy)
     return copy
 
@@ -163,7 +220,8 @@ def workflow(checkout_copy, tmp_path):
 
 @pytest.fixture(scope="session")
 def finished(checkout_copy, tmp_path_factory):
-    """A small study whose results count as made: empty files with the records that Snakemake keeps of real ones."""
+    """A small study whose results count as made: empty files with the records that
+    Snakemake keeps of real ones."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("finished"))
     workflow.write("study.yaml", SMALL_STUDY)
     files = workflow.lay_out("--configfile", "study.yaml")

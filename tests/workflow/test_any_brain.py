@@ -1,4 +1,5 @@
-"""Brains of clinics and labs in the real program: each ends right, or is refused with its true cause."""
+"""Brains of clinics and labs in the real program: each ends right, or is refused with
+its true cause."""
 
 import nibabel as nib
 import numpy as np
@@ -26,18 +27,32 @@ pytestmark = pytest.mark.slow
 LABELS, AFFINE = phantom(voxel_mm=2.0)
 WHOLE = cerebrum_surface(LABELS, AFFINE)
 APART = odd_brains.apart(LABELS, AFFINE)
-LEFT, RIGHT = sorted(pieces(cerebrum_surface(APART, AFFINE)), key=lambda piece: piece.vertices[:, 0].mean())
+LEFT, RIGHT = sorted(
+    pieces(cerebrum_surface(APART, AFFINE)),
+    key=lambda piece: piece.vertices[:, 0].mean(),
+)
 
 
 def with_polyp(mesh):
-    """Return the surface with a ball of 4 mm radius on a stalk of 1 mm radius and 8 mm length below it."""
+    """Return the surface with a ball of 4 mm radius on a stalk of 1 mm radius and 8 mm
+    length below it."""
     grid = np.indices((40, 40, 60)).reshape(3, -1).T * 0.4 - [8.0, 8.0, 18.0]
     ball = np.linalg.norm(grid - [0, 0, -12.0], axis=1) < 4.0
-    stalk = (np.hypot(grid[:, 0], grid[:, 1]) < 1.1) & (grid[:, 2] > -12.0) & (grid[:, 2] < 4.0)
-    affine = scaling(0.4, mesh.vertices[mesh.vertices[:, 2].argmin()] - [8.0, 8.0, 18.0])
+    stalk = (
+        (np.hypot(grid[:, 0], grid[:, 1]) < 1.1)
+        & (grid[:, 2] > -12.0)
+        & (grid[:, 2] < 4.0)
+    )
+    affine = scaling(
+        0.4, mesh.vertices[mesh.vertices[:, 2].argmin()] - [8.0, 8.0, 18.0]
+    )
     polyp = isosurface(smooth_mask((ball | stalk).reshape(40, 40, 60), 1.0), affine)
-    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
-    part = pv.PolyData.from_regular_faces(np.array(polyp.vertices), np.array(polyp.faces, dtype=int))
+    body = pv.PolyData.from_regular_faces(
+        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
+    )
+    part = pv.PolyData.from_regular_faces(
+        np.array(polyp.vertices), np.array(polyp.faces, dtype=int)
+    )
     both = body.boolean_union(part).triangulate().clean()
     return TriangleMesh(both.points, both.regular_faces)
 
@@ -53,19 +68,27 @@ def labelled(change=lambda labels, affine: labels, scheme="spina-bifida-atlas"):
 
 
 def stored_oddly(folder, name):
-    """Write labels as floats with a fourth axis and two matrices, of which the configuration names one."""
+    """Write labels as floats with a fourth axis and two matrices, of which the
+    configuration names one."""
     image = nib.Nifti1Image(LABELS[..., None].astype(np.float32), AFFINE)
     image.header.set_xyzt_units("mm")
     image.set_sform(AFFINE, code=1)
     image.set_qform(np.diag([2.0, 2.0, 2.0, 1.0]), code=2)
     nib.save(image, folder / f"{name}.nii.gz")
-    return {"labels": f"{name}.nii.gz", "scheme": "spina-bifida-atlas", "affine_from": "sform"}
+    return {
+        "labels": f"{name}.nii.gz",
+        "scheme": "spina-bifida-atlas",
+        "affine_from": "sform",
+    }
 
 
 def in_flat_voxels(*_):
-    """Return the same brain in slices of 2.4 mm, three times the voxels' edge in the other directions."""
+    """Return the same brain in slices of 2.4 mm, three times the voxels' edge in the
+    other directions."""
     labels, affine = phantom(voxel_mm=0.8)
-    return labels[1::3], affine @ np.array([[3, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    return labels[1::3], affine @ np.array(
+        [[3, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]
+    )
 
 
 def whole(mesh, suffix="surf.gii"):
@@ -85,9 +108,13 @@ def both_sides(left, right, *, white_mm=None, coordinates="ras"):
             write_geometry(folder / f"{name}.{side}.pial", mesh.vertices, mesh.faces)
             entry[side] = f"{name}.{side}.pial"
             if white_mm is not None:
-                write_surface(folder / f"{name}.{side}.white.stl", inner(mesh, white_mm))
+                write_surface(
+                    folder / f"{name}.{side}.white.stl", inner(mesh, white_mm)
+                )
                 white.append(f"{name}.{side}.white.stl")
-        return {"hemispheres": entry, "coordinates": coordinates} | ({"white": white} if white else {})
+        return {"hemispheres": entry, "coordinates": coordinates} | (
+            {"white": white} if white else {}
+        )
 
     return made
 
@@ -97,21 +124,37 @@ def alone(side, change):
 
     def made(folder, name):
         entry = labelled(change)(folder, name)
-        return {"hemisphere": {"file": entry["labels"], "side": side}, "scheme": entry["scheme"]}
+        return {
+            "hemisphere": {"file": entry["labels"], "side": side},
+            "scheme": entry["scheme"],
+        }
 
     return made
 
 
-MOTIONS = {"left": rigid(100, 40, -70, shift=(30.0, 0.0, -50.0)), "right": rigid(-20, 130, 60, shift=(0.0, 9.0, 0.0))}
-POSED = [flipped(transformed(half, turn)) for half, turn in zip(atlas_halves(), MOTIONS.values(), strict=True)]
+MOTIONS = {
+    "left": rigid(100, 40, -70, shift=(30.0, 0.0, -50.0)),
+    "right": rigid(-20, 130, 60, shift=(0.0, 9.0, 0.0)),
+}
+POSED = [
+    flipped(transformed(half, turn))
+    for half, turn in zip(atlas_halves(), MOTIONS.values(), strict=True)
+]
 GOOD = {
     "plain": labelled(),
     "polyp": labelled(odd_brains.with_fourth_ventricle),
     "agenesis": labelled(odd_brains.without_callosum),
     "holoprosencephaly": labelled(odd_brains.holoprosencephaly),
-    "wide": labelled(lambda labels, affine: odd_brains.wide_hemisphere(labels, affine, 1.35, ventricle=True)),
+    "wide": labelled(
+        lambda labels, affine: odd_brains.wide_hemisphere(
+            labels, affine, 1.35, ventricle=True
+        )
+    ),
     "hypoplasia": labelled(
-        lambda labels, affine: odd_brains.add_sides(odd_brains.small_hemisphere(labels, affine), affine), "dhcp-19"
+        lambda labels, affine: odd_brains.add_sides(
+            odd_brains.small_hemisphere(labels, affine), affine
+        ),
+        "dhcp-19",
     ),
     "shifted": labelled(odd_brains.shifted_midline),
     "cropped": labelled(odd_brains.crop),
@@ -122,9 +165,15 @@ GOOD = {
     # what else is read as it is meant, or refused: tests/unit/io/test_volumes.py
     "stored_oddly": stored_oddly,
     "flat": labelled(in_flat_voxels),
-    "own_scheme": lambda folder, name: labelled(scheme="mine")(folder, name) | {"week": 24.5},
+    "own_scheme": lambda folder, name: (
+        labelled(scheme="mine")(folder, name) | {"week": 24.5}
+    ),
 }
-MINE = {"cerebrum": [1, 2, 5, 6, 8], "cortex": [5], "known": {3: "cerebellum", 4: "CSF", 7: "brainstem"}}
+MINE = {
+    "cerebrum": [1, 2, 5, 6, 8],
+    "cortex": [5],
+    "known": {3: "cerebellum", 4: "CSF", 7: "brainstem"},
+}
 BAD = {
     "small_half": (labelled(odd_brains.small_hemisphere), ["volume", 0.5]),
     "whole_as_half": (alone("right", lambda labels, affine: labels), [0.56]),
@@ -142,22 +191,36 @@ CROSSING = both_sides(LEFT, RIGHT, white_mm=-1.5)
 def study(checkout_copy, tmp_path_factory):
     """One run of the surface stage over all of them."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("any"))
-    makers = GOOD | {name: make for name, (make, _) in BAD.items()} | {"crossing": CROSSING}
+    makers = (
+        GOOD | {name: make for name, (make, _) in BAD.items()} | {"crossing": CROSSING}
+    )
     makers["hemispherectomy"] = HEMISPHERECTOMY
-    brains = [{"id": name, "week": 24} | make(workflow.directory, name) for name, make in makers.items()]
+    brains = [
+        {"id": name, "week": 24} | make(workflow.directory, name)
+        for name, make in makers.items()
+    ]
     surface = {"edge_length_mm": 2.5, "asymmetric": True}
     metrics = {"curvature_radius_mm": 7.0, "spangy_modes": 50}
-    config = {"schemes": {"mine": MINE}, "brains": brains, "start": "plain", "folding": {"end_week": 25}}
+    config = {
+        "schemes": {"mine": MINE},
+        "brains": brains,
+        "start": "plain",
+        "folding": {"end_week": 25},
+    }
     config |= {"surface": surface, "metrics": metrics}
     measured = ("freesurfer", "crossing", "own_scheme")
-    thickness = [f"results/brains/{name}/surface/thickness.shape.gii" for name in measured]
+    thickness = [
+        f"results/brains/{name}/surface/thickness.shape.gii" for name in measured
+    ]
     return workflow.surfaces(config, *thickness)
 
 
 @pytest.fixture(scope="module")
 def measuring(checkout_copy, study):
     """The metrics of pathologies."""
-    tables = [f"results/brains/{name}/metrics/metrics.csv" for name in ("plain", *NAMED)]
+    tables = [
+        f"results/brains/{name}/metrics/metrics.csv" for name in ("plain", *NAMED)
+    ]
     run = Workflow(checkout_copy, study.directory).run
     return run(*tables, "--cores", "2", "--configfile", "study.yaml", timeout_s=600)
 
@@ -186,10 +249,16 @@ def test_what_cannot_be_used_is_refused_with_its_cause_and_nothing_is_left(study
 @pytest.mark.parametrize("name", GOOD)
 def test_each_hemisphere_is_one_piece_on_its_side(study, name):
     folder = study.results / name / "surface"
-    left, right = (read_surface(folder / f"{side}.pial.surf.gii") for side in ("left", "right"))
+    left, right = (
+        read_surface(folder / f"{side}.pial.surf.gii") for side in ("left", "right")
+    )
     assert len(pieces(left)) == len(pieces(right)) == 1
     report = study.report(name)
-    assert left.vertices[:, 0].mean() < report["fissure_x_mm"] < right.vertices[:, 0].mean()
+    assert (
+        left.vertices[:, 0].mean()
+        < report["fissure_x_mm"]
+        < right.vertices[:, 0].mean()
+    )
     # found by their shapes, as the configuration asks for
     assert report["pose"]["together"] == (name != "posed")
 
@@ -204,18 +273,29 @@ def test_what_is_doubtful_is_told(study, name):
 @pytest.mark.parametrize("name", ["stored_oddly", "flat"])
 def test_a_brain_is_the_same_however_it_is_stored(study, name):
     sizes, expected = (
-        [*report["area_cm2"].values(), report["volume_mL"]] for report in map(study.report, (name, "plain"))
+        [*report["area_cm2"].values(), report["volume_mL"]]
+        for report in map(study.report, (name, "plain"))
     )
     np.testing.assert_allclose(sizes, expected, rtol=0.06 if name == "flat" else 0.005)
-    assert (study.log(name) == Facts("flat.nii.gz:", "2.4 x 0.8 x 0.8 mm")) == (name == "flat")
+    assert (study.log(name) == Facts("flat.nii.gz:", "2.4 x 0.8 x 0.8 mm")) == (
+        name == "flat"
+    )
     assert "2 x 2 x 2" not in study.log("plain")
 
 
-def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its_week(study):
+def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its_week(
+    study,
+):
     report = study.report("own_scheme")
-    assert (report["week"], report["scheme"], report["euler_number"]) == (24.5, "mine", 2)
+    assert (report["week"], report["scheme"], report["euler_number"]) == (
+        24.5,
+        "mine",
+        2,
+    )
     assert abs(report["smoothing"]["volume_change"]) < 0.01
-    (thickness,) = nib.load(study.results / "own_scheme" / "surface" / "thickness.shape.gii").darrays
+    (thickness,) = nib.load(
+        study.results / "own_scheme" / "surface" / "thickness.shape.gii"
+    ).darrays
     assert len(thickness.data) == report["vertices"]
 
 
@@ -230,7 +310,9 @@ def test_what_hangs_below_the_brain_is_left_out(study):
 def test_missing_tissues_are_named_and_a_missing_fissure_is_cut(study):
     assert study.report("agenesis")["missing_tissues"] == ["8 corpus callosum"]
     found, plain = study.report("holoprosencephaly"), study.report("plain")
-    assert found["volume_mL"] == pytest.approx(cerebrum_ml(odd_brains.holoprosencephaly(LABELS, AFFINE)), rel=0.01)
+    assert found["volume_mL"] == pytest.approx(
+        cerebrum_ml(odd_brains.holoprosencephaly(LABELS, AFFINE)), rel=0.01
+    )
     area = found["area_cm2"]
     # in front, each side is what is nearer to its own tissue
     assert area["left"] == pytest.approx(area["right"], rel=0.05)
@@ -241,17 +323,23 @@ def test_missing_tissues_are_named_and_a_missing_fissure_is_cut(study):
 @pytest.mark.parametrize("name", ["wide", "cropped"])
 def test_all_of_the_cerebrum_that_is_there_counts(study, name):
     made = {
-        "wide": lambda: odd_brains.wide_hemisphere(LABELS, AFFINE, 1.35, ventricle=True),
+        "wide": lambda: odd_brains.wide_hemisphere(
+            LABELS, AFFINE, 1.35, ventricle=True
+        ),
         "cropped": lambda: odd_brains.crop(LABELS, AFFINE)[0],
     }
-    assert study.report(name)["volume_mL"] == pytest.approx(cerebrum_ml(made[name]()), rel=0.01)
+    assert study.report(name)["volume_mL"] == pytest.approx(
+        cerebrum_ml(made[name]()), rel=0.01
+    )
 
 
 def test_a_midline_that_bends_or_is_shifted_is_followed(study):
     bent, shifted = (study.report(name)["area_cm2"] for name in ("bent", "shifted"))
     assert bent["left"] == pytest.approx(bent["right"], rel=0.1)
     assert shifted["left"] > 1.2 * shifted["right"]
-    assert study.report("shifted")["fissure_x_mm"] == pytest.approx(CENTRE_MM[0] + 8.0, abs=2.5)
+    assert study.report("shifted")["fissure_x_mm"] == pytest.approx(
+        CENTRE_MM[0] + 8.0, abs=2.5
+    )
 
 
 def test_thickness_is_the_distance_to_white_surfaces(study):
@@ -267,13 +355,24 @@ def test_white_surfaces_outside_the_pial_ones_are_refused(study):
 @pytest.mark.parametrize("name", NAMED)
 def test_pathologies_go_through_to_metrics(study, measuring, name):
     assert measuring.returncode == 0, measuring.stderr
-    tables = [pd.read_csv(study.results / brain / "metrics" / "metrics.csv") for brain in (name, "plain")]
-    found, plain = (table.set_index(["hemisphere", "metric"])["value"] for table in tables)
-    sides = {"whole", "left"} if name == "hemispherectomy" else {"whole", "left", "right"}
+    tables = [
+        pd.read_csv(study.results / brain / "metrics" / "metrics.csv")
+        for brain in (name, "plain")
+    ]
+    found, plain = (
+        table.set_index(["hemisphere", "metric"])["value"] for table in tables
+    )
+    sides = (
+        {"whole", "left"} if name == "hemispherectomy" else {"whole", "left", "right"}
+    )
     assert set(found.index.get_level_values("hemisphere")) == sides
-    assert found["whole", "area"] == pytest.approx(study.report(name)["area_cm2"]["whole"], rel=1e-6)
+    assert found["whole", "area"] == pytest.approx(
+        study.report(name)["area_cm2"]["whole"], rel=1e-6
+    )
     ratio = {"hypoplasia": 0.51, "hemispherectomy": 0.49, "wide": 1.16}.get(name, 1.0)
-    assert found["whole", "volume"] / plain["whole", "volume"] == pytest.approx(ratio, abs=0.04)
+    assert found["whole", "volume"] / plain["whole", "volume"] == pytest.approx(
+        ratio, abs=0.04
+    )
 
 
 def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):
@@ -281,7 +380,9 @@ def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workfl
     whole = (workflow.directory / "whole.nii.gz").read_bytes()
     (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
     brain = {"id": "a", "week": 21, "labels": "torn.nii.gz", "scheme": "binary"}
-    name = workflow.write("study.yaml", {"brains": [brain], "start": "a", "folding": {"end_week": 23}})
+    name = workflow.write(
+        "study.yaml", {"brains": [brain], "start": "a", "folding": {"end_week": 23}}
+    )
     # a user's; tables of an earlier run go: test_snakemake_internals.py
     table = workflow.directory / "results" / "study" / "volumes.csv"
     table.parent.mkdir(parents=True)

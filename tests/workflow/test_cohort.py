@@ -1,4 +1,5 @@
-"""A cohort in the real program: brains of one side, from a surface and from labels, beside subjects that fail."""
+"""A cohort in the real program: brains of one side, from a surface and from labels,
+beside subjects that fail."""
 
 from types import SimpleNamespace
 
@@ -36,7 +37,9 @@ def left_half(week):
 def cohort(checkout_copy, tmp_path_factory):
     """One call for surfaces, mesh, folding, metrics, pages and some figures."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("cohort"))
-    write_surface(workflow.directory / "surface.surf.gii", cerebrum_surface(*left_half(22.0)))
+    write_surface(
+        workflow.directory / "surface.surf.gii", cerebrum_surface(*left_half(22.0))
+    )
     save_labels(workflow.directory / "labels.nii.gz", *left_half(23.0))
     whole = (workflow.directory / "labels.nii.gz").read_bytes()
     (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
@@ -46,22 +49,41 @@ def cohort(checkout_copy, tmp_path_factory):
         "participants": "participants.tsv",
         "start": "sub-01",
         "surface": {"edge_length_mm": 3.0},
-        "mesh": {"order": 1, "mesher": "tetgen", "surface_edge_mm": 3.0, "max_surface_distance_mm": 2.0},
+        "mesh": {
+            "order": 1,
+            "mesher": "tetgen",
+            "surface_edge_mm": 3.0,
+            "max_surface_distance_mm": 2.0,
+        },
         "metrics": {"curvature_radius_mm": 7.0, "spangy_modes": 50},
-        "folding": {"end_week": 23, "step_s": 302400, "solver": {"newton_tolerance": 1e-4}},
+        "folding": {
+            "end_week": 23,
+            "step_s": 302400,
+            "solver": {"newton_tolerance": 1e-4},
+        },
     }
     name = workflow.write("study.yaml", config)
     refusal = workflow.run("-n", "--configfile", name)
     options = ("--cores", "2", "--keep-going", "--configfile", name)
     outcome = workflow.run("quality", *options, timeout_s=900)
-    later = [workflow.run(*targets, *options, timeout_s=900) for targets in (("folding",), ("metrics",))]
+    later = [
+        workflow.run(*targets, *options, timeout_s=900)
+        for targets in (("folding",), ("metrics",))
+    ]
     results = workflow.directory / "results"
     return SimpleNamespace(
-        refusal=refusal, outcome=outcome, later=later, results=results, config=name, workflow=workflow
+        refusal=refusal,
+        outcome=outcome,
+        later=later,
+        results=results,
+        config=name,
+        workflow=workflow,
     )
 
 
-def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(cohort):
+def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(
+    cohort,
+):
     assert cohort.refusal.returncode == 2
     assert cohort.refusal.stderr == Facts("sub-04: week:", "n/a")
 
@@ -84,7 +106,10 @@ def test_a_hemisphere_has_surfaces_and_maps_of_its_side_only(cohort, brain):
     assert not list(folder.rglob("right*"))
     report = read_json(folder / "surface" / "surface.json")
     assert report["side"] == "left"
-    assert read_surface(folder / "surface" / "pial.surf.gii").vertices[:, 0].max() < report["fissure_x_mm"]
+    assert (
+        read_surface(folder / "surface" / "pial.surf.gii").vertices[:, 0].max()
+        < report["fissure_x_mm"]
+    )
 
 
 def test_a_hemisphere_folds_with_its_wall_in_its_plane(cohort):
@@ -94,9 +119,15 @@ def test_a_hemisphere_folds_with_its_wall_in_its_plane(cohort):
     whole = area(read_surface(run / "surfaces" / "week-22.00" / "pial.surf.gii"))
     assert 0.05 < zones["medial wall"]["area_mm2"] / whole < 0.4
     assert zones["right contact"]["facets"] == zones["between planes"]["facets"] == 0
-    start, end = (read_surface(run / "surfaces" / f"week-{week}" / "left.pial.surf.gii") for week in ("22.00", "23.00"))
+    start, end = (
+        read_surface(run / "surfaces" / f"week-{week}" / "left.pial.surf.gii")
+        for week in ("22.00", "23.00")
+    )
     wall = start.vertices[:, 0].max()
     assert end.vertices[:, 0].max() < wall + 0.5
     assert area(end) > area(start)
     assert not (run / "surfaces" / "week-23.00" / "right.pial.surf.gii").exists()
-    assert set(pd.read_csv(cohort.results / "study" / "metrics.csv")["hemisphere"]) == {"whole", "left"}
+    assert set(pd.read_csv(cohort.results / "study" / "metrics.csv")["hemisphere"]) == {
+        "whole",
+        "left",
+    }

@@ -23,7 +23,9 @@ def test_a_registration_waits_for_the_images_that_it_reads(workflow):
     atlas = {"name": "spina-bifida", "series": "unoperated", "images": True}
     study = {"atlas": atlas, "start": week(21), "folding": {"end_week": 22}}
     registered = f"results/study/registration/{week(21)}/{week(22)}.h5"
-    jobs = workflow.jobs(registered, "--configfile", workflow.write("study.yaml", study))
+    jobs = workflow.jobs(
+        registered, "--configfile", workflow.write("study.yaml", study)
+    )
     assert jobs == {"atlas_file": 2, "register": 1}
 
 
@@ -31,22 +33,43 @@ EXPECTED = {
     # a brain a week, of which eight are of an output week after the start
     "spina-bifida-atlas": (
         "all",
-        {"pial_with_thickness": 5, "simulate": 2, "measure": 5, "measure_simulated": 10, "register": 4},
+        {
+            "pial_with_thickness": 5,
+            "simulate": 2,
+            "measure": 5,
+            "measure_simulated": 10,
+            "register": 4,
+        },
     ),
     "simple-shapes": ("all", {"shape": 1, "pial": 1, "simulate": 2}),
-    # twelve members: one is the reference, one is in both studies; the observed brain of 29 GW
+    # twelve members: one is the reference, one is in both studies; the observed brain
+    # of 29 GW
     "paper": (
         "paper",
-        {"simulate": 2, "simulate_member": 10, "compare_member": 12, "study_tables": 2, "tetrahedralise": 1}
+        {
+            "simulate": 2,
+            "simulate_member": 10,
+            "compare_member": 12,
+            "study_tables": 2,
+            "tetrahedralise": 1,
+        }
         | {"measure": 1},
     ),
-    "calibration": ("calibrate", {"calibration_design": 4, "simulate_member": 24, "calibration_score": 24}),
+    "calibration": (
+        "calibrate",
+        {"calibration_design": 4, "simulate_member": 24, "calibration_score": 24},
+    ),
     "crl-atlas": ("all", {"atlas_file": 9, "pial_with_thickness": 9}),
     "dhcp-atlas": ("all", {"atlas_file": 48, "pial_with_thickness": 16, "pial": 16}),
     # a stage plans no later one
     "labels-and-hemispheres": (
         "growth",
-        {"growth_figure": 1, "tetrahedralise": None, "simulate": None, "html_report": None},
+        {
+            "growth_figure": 1,
+            "tetrahedralise": None,
+            "simulate": None,
+            "html_report": None,
+        },
     ),
 }
 
@@ -54,9 +77,14 @@ EXPECTED = {
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXPECTED)
 def test_an_example_is_planned(workflow, example):
-    """Narrow licences are accepted first, and files that an example expects to lie there do."""
+    """Narrow licences are accepted first, and files that an example expects to lie
+    there do."""
     target, expected = EXPECTED[example]
-    text = (EXAMPLES / f"{example}.yaml").read_text().replace("accept_licence: false", "accept_licence: true")
+    text = (
+        (EXAMPLES / f"{example}.yaml")
+        .read_text()
+        .replace("accept_licence: false", "accept_licence: true")
+    )
     folder = workflow.directory / "config" / "examples"
     folder.mkdir(parents=True)
     (folder / "study.yaml").write_text(text)

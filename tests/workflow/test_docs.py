@@ -1,4 +1,5 @@
-"""What the documentation says can be done: configurations load, commands name what there is, the site is whole."""
+"""What the documentation says can be done: configurations load, commands name what
+there is, the site is whole."""
 
 import re
 import shlex
@@ -12,7 +13,11 @@ from processes import ran
 from gyriflow.study.loading import load
 
 CHECKOUT = Path(__file__).parents[2]
-PAGES = [CHECKOUT / "README.md", CHECKOUT / "docs" / "tutorial.md", *sorted(CHECKOUT.glob("docs/how-to/*.md"))]
+PAGES = [
+    CHECKOUT / "README.md",
+    CHECKOUT / "docs" / "tutorial.md",
+    *sorted(CHECKOUT.glob("docs/how-to/*.md")),
+]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"[\w./-]+\.(?:nii\.gz|gii|tsv|mgz|pial|white)\b")
 
@@ -25,7 +30,11 @@ def completed(block):
     """Return the configuration of a block that shows part of one."""
     given = yaml.safe_load(block)
     if {"brains", "atlas", "participants"} & set(given):
-        rest = {"start": given["brains"][0]["id"]} if isinstance(given.get("brains"), list) else {"start": "all"}
+        rest = (
+            {"start": given["brains"][0]["id"]}
+            if isinstance(given.get("brains"), list)
+            else {"start": "all"}
+        )
     else:
         rest = {"brains": labelled(21, 24), "start": "a"}
     return rest | given | {"folding": {"end_week": 32} | given.get("folding", {})}
@@ -41,33 +50,68 @@ CONFIGURATIONS = [
 @pytest.mark.parametrize("block", CONFIGURATIONS)
 def test_a_configuration_that_is_shown_is_one(block, tmp_path):
     touched(tmp_path, *FILE.findall(block), "labels.nii.gz")
-    (tmp_path / "participants.tsv").write_text("participant_id\tgestational_age\tfiles\ns1\t24.1\tlabels.nii.gz\n")
+    (tmp_path / "participants.tsv").write_text(
+        "participant_id\tgestational_age\tfiles\ns1\t24.1\tlabels.nii.gz\n"
+    )
     assert load(completed(block), tmp_path).runs
 
 
 def test_targets_and_files_of_commands_that_are_shown_exist():
-    rules = "".join(path.read_text() for path in [CHECKOUT / "Snakefile", *CHECKOUT.glob("workflow/rules/*.smk")])
+    rules = "".join(
+        path.read_text()
+        for path in [CHECKOUT / "Snakefile", *CHECKOUT.glob("workflow/rules/*.smk")]
+    )
     targets = set(re.findall(r"^rule (\w+):", rules, re.MULTILINE))
     unknown, shown = [], 0
-    lines = [line for page in PAGES for block in blocks(page, "") for line in block.splitlines()]
+    lines = [
+        line
+        for page in PAGES
+        for block in blocks(page, "")
+        for line in block.splitlines()
+    ]
     for line in lines:
-        words = shlex.split(line, comments=True) if line.strip().startswith("./run ") else []
+        words = (
+            shlex.split(line, comments=True)
+            if line.strip().startswith("./run ")
+            else []
+        )
         if words[1:2] == ["snakemake"]:
-            options = {word: value for word, value in zip(words, [*words[1:], ""], strict=True) if word[0] == "-"}
-            named = [word for word in words[2:] if re.fullmatch(r"[a-z_]+", word) and word not in options.values()]
+            options = {
+                word: value
+                for word, value in zip(words, [*words[1:], ""], strict=True)
+                if word[0] == "-"
+            }
+            named = [
+                word
+                for word in words[2:]
+                if re.fullmatch(r"[a-z_]+", word) and word not in options.values()
+            ]
         elif words[1:3] == ["gyriflow", "run"]:
             named = [words[words.index("--stage") + 1]] if "--stage" in words else []
         else:
             continue
         shown += 1
-        examples = [word for word in words if word.startswith("config/") and not (CHECKOUT / word).exists()]
-        unknown += [f"{line}: {word}" for word in (*named, *examples) if word not in targets]
+        examples = [
+            word
+            for word in words
+            if word.startswith("config/") and not (CHECKOUT / word).exists()
+        ]
+        unknown += [
+            f"{line}: {word}" for word in (*named, *examples) if word not in targets
+        ]
     assert shown > 5
     assert unknown == []
 
 
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning(tmp_path):
-    done = ran("mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site"), cwd=CHECKOUT)
+    done = ran(
+        "mkdocs",
+        "build",
+        "--strict",
+        "--site-dir",
+        str(tmp_path / "site"),
+        cwd=CHECKOUT,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "site" / "how-to" / "extend.html").exists()

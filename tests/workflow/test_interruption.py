@@ -30,11 +30,15 @@ LOG = "results/runs/reference/a/logs/simulate.log"
 def launched(workflow, *arguments):
     return subprocess.Popen(
         workflow.command("--cores", "2", *arguments),
-        cwd=workflow.directory, env=workflow.environment, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        cwd=workflow.directory,
+        env=workflow.environment,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
         # which a background shell may have ignored
         preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
-    )  # fmt: skip
+    )
 
 
 def wait_until(condition, process):
@@ -47,17 +51,26 @@ def wait_until(condition, process):
 
 def started(workflow, until):
     """Start the folding and return its process when the log has a line with `until`."""
-    process, log = launched(workflow, SUMMARY, "--configfile", "study.yaml"), workflow.directory / LOG
+    process, log = (
+        launched(workflow, SUMMARY, "--configfile", "study.yaml"),
+        workflow.directory / LOG,
+    )
     wait_until(lambda: log.exists() and until in log.read_text(), process)
     return process
 
 
 @pytest.mark.extended
-def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on_with_the_same_command(workflow):
+def test_a_killed_rank_is_reported_as_memory_and_an_interrupted_folding_resumes(
+    workflow,
+):
     # an ellipsoid's
     workflow.count_ellipsoid_as_meshed(STUDY, cells=10)
     process = started(workflow, until="step    2")
-    ranks = [pid for pid in below(process.pid) if command_of(pid)[1:3] == ["-m", "gyriflow.folding"]]
+    ranks = [
+        pid
+        for pid in below(process.pid)
+        if command_of(pid)[1:3] == ["-m", "gyriflow.folding"]
+    ]
     kill(ranks[-1:])
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 137, printed
@@ -73,7 +86,11 @@ def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on
     assert process.returncode == 130, printed
 
     assert all_end(started_by_it)
-    assert list((workflow.directory / "results/runs/reference/a/folding").glob("checkpoint-*/state.h5"))
+    assert list(
+        (workflow.directory / "results/runs/reference/a/folding").glob(
+            "checkpoint-*/state.h5"
+        )
+    )
     again = workflow.run("--cores", "2", SUMMARY, "--configfile", "study.yaml")
     assert again.returncode == 0, again.stdout + again.stderr
     assert "checkpoint" in (workflow.directory / LOG).read_text()
@@ -86,10 +103,14 @@ FOREIGN = "import pathlib, sys; pathlib.Path('{0}.ran').touch(); sys.exit('{0}')
 
 
 def test_nothing_of_the_working_directory_is_run_by_a_study(workflow):
-    workflow.count_ellipsoid_as_meshed(STUDY | {"folding": STUDY["folding"] | {"end_week": 21.02}}, cells=10)
+    workflow.count_ellipsoid_as_meshed(
+        STUDY | {"folding": STUDY["folding"] | {"end_week": 21.02}}, cells=10
+    )
     for name in ("random", "click", "numpy", "nibabel", "mpi4py"):
         (workflow.directory / f"{name}.py").write_text(FOREIGN.format(name))
-    (workflow.directory / "Snakefile").write_text("rule all:\n    shell: 'touch snakefile.ran'\n")
+    (workflow.directory / "Snakefile").write_text(
+        "rule all:\n    shell: 'touch snakefile.ran'\n"
+    )
     for profile in ("default", "profiles/default"):
         (workflow.directory / profile).mkdir(parents=True)
         (workflow.directory / profile / "config.yaml").write_text("touch: true\n")
@@ -102,15 +123,28 @@ def test_nothing_of_the_working_directory_is_run_by_a_study(workflow):
 STUBBORN = """
 rule slow:
     output: "slow.txt"
-    shell: "mpiexec -n 2 sleep 600 & (trap '' TERM INT HUP; touch begun; sleep 600); wait"
+    shell:
+        "mpiexec -n 2 sleep 600 &"
+        " (trap '' TERM INT HUP; touch begun; sleep 600); wait"
 """
 
 
-@pytest.mark.parametrize(("name", "send"), [("SIGTERM", os.kill), ("SIGTERM", os.killpg), ("SIGHUP", os.kill)])
+@pytest.mark.parametrize(
+    ("name", "send"),
+    [("SIGTERM", os.kill), ("SIGTERM", os.killpg), ("SIGHUP", os.kill)],
+)
 def test_a_signal_to_the_launcher_stops_its_jobs(workflow, name, send):
     (workflow.directory / "stubborn.smk").write_text(STUBBORN)
-    process, number = launched(workflow, "slow.txt", "--snakefile", "stubborn.smk"), signal.Signals[name]
-    wait_until(lambda: (workflow.directory / "begun").exists() and len(below(process.pid)) >= 5, process)
+    process, number = (
+        launched(workflow, "slow.txt", "--snakefile", "stubborn.smk"),
+        signal.Signals[name],
+    )
+    wait_until(
+        lambda: (
+            (workflow.directory / "begun").exists() and len(below(process.pid)) >= 5
+        ),
+        process,
+    )
     jobs, sent = below(process.pid), time.monotonic()
     send(process.pid, number)
     printed, _ = process.communicate(timeout=60)
@@ -118,5 +152,6 @@ def test_a_signal_to_the_launcher_stops_its_jobs(workflow, name, send):
     assert process.returncode == 128 + number, printed
     assert printed == Facts("interrupted", "same command", "resume")
     assert "failed" not in printed
-    # if all get the signal at once, what ignores it may have no parent by which the launcher finds it
+    # if all get the signal at once, what ignores it may have no parent by which the
+    # launcher finds it
     assert send is os.killpg or all_end(jobs)

@@ -1,4 +1,5 @@
-"""What `./run snakemake` does around Snakemake, locks and exit codes, and the commands of gyriflow."""
+"""What `./run snakemake` does around Snakemake, locks and exit codes, and the commands
+of gyriflow."""
 
 import errno
 import re
@@ -29,14 +30,23 @@ def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(wo
     for folder in ("my study", "elsewhere"):
         (workflow.directory / folder).mkdir()
         (workflow.directory / folder / "labels.nii.gz").touch()
-        table = f"participant_id\tweek\tlabels\nof-{folder}\t24\tlabels.nii.gz\n".replace(" ", "-")
+        table = (
+            f"participant_id\tweek\tlabels\nof-{folder}\t24\tlabels.nii.gz\n".replace(
+                " ", "-"
+            )
+        )
         (workflow.directory / folder / "participants.tsv").write_text(table)
     table = {"file": "participants.tsv", "columns": {"scheme": "binary"}}
     study = {"participants": table, "start": "all", "folding": {"end_week": 26}}
     name = workflow.write("my study/study.yaml", study)
-    outcome = workflow.run("-n", "surface", "--configfile", name, "--directory", "elsewhere")
+    outcome = workflow.run(
+        "-n", "surface", "--configfile", name, "--directory", "elsewhere"
+    )
     assert outcome.returncode == 0, outcome.stderr
-    assert str(workflow.directory / "my study" / "labels.nii.gz") in outcome.stdout + outcome.stderr
+    assert (
+        str(workflow.directory / "my study" / "labels.nii.gz")
+        in outcome.stdout + outcome.stderr
+    )
     assert "of-my-study" in outcome.stdout + outcome.stderr
     assert "of-elsewhere" not in outcome.stdout + outcome.stderr
 
@@ -55,13 +65,23 @@ def test_a_stale_lock_is_cleared(tmp_path, capsys):
     assert capsys.readouterr().err == Facts("gyriflow:", "lock")
 
 
-def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_look(workflow):
+def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_look(
+    workflow,
+):
     lock = stale(workflow.directory)
     holder = subprocess.Popen(
-        [*workflow.command()[:1], "-c", "from gyriflow.running.launch import hold_lock; from pathlib import Path;"
-         "lock = hold_lock(Path('.')); print('held', flush=True); input()"],
-        cwd=workflow.directory, env=workflow.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [
+            *workflow.command()[:1],
+            "-c",
+            "from gyriflow.running.launch import hold_lock; from pathlib import Path;"
+            "lock = hold_lock(Path('.')); print('held', flush=True); input()",
+        ],
+        cwd=workflow.directory,
+        env=workflow.environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     try:
         assert holder.stdout.readline() == "held\n"
         refused = workflow.run("--cores", "1", "surface")
@@ -73,7 +93,9 @@ def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_l
         holder.communicate("\n")
 
 
-def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(tmp_path, monkeypatch, capsys):
+def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(
+    tmp_path, monkeypatch, capsys
+):
     def no_locks(*_):
         raise OSError(errno.ENOLCK, "No locks available")
 
@@ -85,7 +107,11 @@ def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(tmp_pat
     assert lock.exists()
     with locked(tmp_path / "folding"), form_compiler(MPI.COMM_SELF):
         warned = capsys.readouterr().err
-    assert warned == Facts("gyriflow: warning:", tmp_path / ".snakemake" / "gyriflow.lock", "No locks available")
+    assert warned == Facts(
+        "gyriflow: warning:",
+        tmp_path / ".snakemake" / "gyriflow.lock",
+        "No locks available",
+    )
     assert warned.count("\n") == 1
 
 
@@ -97,7 +123,9 @@ def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
 
 
 @pytest.mark.parametrize("place", ["Snakefile", "workflow/Snakefile"])
-def test_the_first_line_says_what_runs_where_a_folder_has_its_own_workflow(tmp_path, monkeypatch, place):
+def test_the_first_line_says_what_runs_where_a_folder_has_its_own_workflow(
+    tmp_path, monkeypatch, place
+):
     monkeypatch.chdir(tmp_path)
     demo = SHIPPED / "config" / "config.yaml"
     assert what_runs(tmp_path) == Facts("--configfile", "demo", demo)
@@ -114,16 +142,28 @@ def test_what_runs_is_said_first_without_a_configuration(workflow):
     (workflow.directory / "Snakefile").touch()
     outcome = workflow.run("-n", "surface")
     assert outcome.returncode == 0, outcome.stderr
-    assert outcome.stderr.splitlines()[0] == Facts("gyriflow:", "demo", workflow.directory / "Snakefile")
-    outcome = workflow.run("-n", "surface", "--configfile", workflow.write("study.yaml", SMALL_STUDY))
+    assert outcome.stderr.splitlines()[0] == Facts(
+        "gyriflow:", "demo", workflow.directory / "Snakefile"
+    )
+    outcome = workflow.run(
+        "-n", "surface", "--configfile", workflow.write("study.yaml", SMALL_STUDY)
+    )
     assert "demo" not in outcome.stderr
 
 
 def test_results_that_are_a_link_to_nowhere_are_named(workflow):
     (workflow.directory / "results").symlink_to("disk/results")
-    outcome = workflow.run("--cores", "1", "surface", "--configfile", workflow.write("study.yaml", SMALL_STUDY))
+    outcome = workflow.run(
+        "--cores",
+        "1",
+        "surface",
+        "--configfile",
+        workflow.write("study.yaml", SMALL_STUDY),
+    )
     assert outcome.returncode == 5
-    assert message(outcome).splitlines()[-1] == Facts("results is a link to disk/results")
+    assert message(outcome).splitlines()[-1] == Facts(
+        "results is a link to disk/results"
+    )
     assert "disk space" not in outcome.stderr
 
 
@@ -133,16 +173,23 @@ def gyriflow(workflow, *arguments):
 
 
 def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
-    outcome = gyriflow(workflow, "run", workflow.write("study.yaml", SMALL_STUDY), "--stage", "metrcs")
+    outcome = gyriflow(
+        workflow, "run", workflow.write("study.yaml", SMALL_STUDY), "--stage", "metrcs"
+    )
     assert outcome.returncode == 2
     assert message(outcome).splitlines()[-1] == Facts("gyriflow:", "metrcs", "metrics")
 
 
 @pytest.mark.slow
 def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
-    vary = {"thickness_mm": [1 + 0.2 * i for i in range(10)], "shear_modulus_cortex_pa": [300, 600, 900, 1500, 3000]}
+    vary = {
+        "thickness_mm": [1 + 0.2 * i for i in range(10)],
+        "shear_modulus_cortex_pa": [300, 600, 900, 1500, 3000],
+    }
     fifty = {"fifty": {"base": "reference", "vary": vary, "compare_week": 22}}
-    name = workflow.write("study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "studies": fifty})
+    name = workflow.write(
+        "study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "studies": fifty}
+    )
     outcome = gyriflow(workflow, "check", name, "--stage", "studies", "--cores", "1000")
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     said = outcome.stdout

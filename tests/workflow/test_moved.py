@@ -1,4 +1,5 @@
-"""A finished study elsewhere: moved, copied, its data in another place, and with a newer version of gyriflow."""
+"""A finished study elsewhere: moved, copied, its data in another place, and with a
+newer version of gyriflow."""
 
 import os
 import re
@@ -17,14 +18,18 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def made(checkout_copy, tmp_path_factory):
-    """A study that counts as made, in a folder `study` of a project, with one scan beside it and one in it."""
+    """A study that counts as made, in a folder `study` of a project, with one scan
+    beside it and one in it."""
     project = tmp_path_factory.mktemp("project")
     workflow = Workflow(checkout_copy, project / "study")
     (project / "scans").mkdir()
     workflow.directory.mkdir()
     save_labels(project / "scans" / "b.nii.gz", *phantom(22.0, 2.0))
     study = SMALL_STUDY | {
-        "brains": [SMALL_STUDY["brains"][0], SMALL_STUDY["brains"][1] | {"labels": "../scans/b.nii.gz"}]
+        "brains": [
+            SMALL_STUDY["brains"][0],
+            SMALL_STUDY["brains"][1] | {"labels": "../scans/b.nii.gz"},
+        ]
     }
     arguments = ("--configfile", workflow.write("study.yaml", study))
     workflow.lay_out(*arguments)
@@ -35,8 +40,13 @@ def made(checkout_copy, tmp_path_factory):
 def commands(workflow, *command):
     """Return what a command of gyriflow says."""
     outcome = ran(
-        sys.executable, "-m", "gyriflow.cli", *command, cwd=workflow.directory, env=workflow.environment
-    )  # fmt: skip
+        sys.executable,
+        "-m",
+        "gyriflow.cli",
+        *command,
+        cwd=workflow.directory,
+        env=workflow.environment,
+    )
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     return outcome.stdout
 
@@ -53,9 +63,14 @@ def test_a_moved_or_copied_study_is_up_to_date(made, tmp_path):
     workflow = copied(made, tmp_path / "copy")
     before = {path: path.stat().st_mtime_ns for path in workflow.directory.rglob("*")}
     assert "everything is up to date" in commands(workflow, "run", "study.yaml", "-n")
-    assert before == {path: path.stat().st_mtime_ns for path in workflow.directory.rglob("*")}
+    assert before == {
+        path: path.stat().st_mtime_ns for path in workflow.directory.rglob("*")
+    }
     outcome = workflow.run("--cores", "1", "--configfile", "study.yaml")
-    assert (outcome.returncode, "everything is up to date" in outcome.stderr) == (0, True), outcome.stderr
+    assert (outcome.returncode, "everything is up to date" in outcome.stderr) == (
+        0,
+        True,
+    ), outcome.stderr
     # from now on it has its own dates
     assert workflow.jobs("--configfile", "study.yaml") == {}
     shutil.move(tmp_path / "copy", tmp_path / "moved")
@@ -63,19 +78,25 @@ def test_a_moved_or_copied_study_is_up_to_date(made, tmp_path):
     assert "everything is up to date" in commands(moved, "check", "study.yaml")
 
 
-def test_a_moved_data_set_is_up_to_date_for_measuring_and_for_the_bids_app(checkout_copy, tmp_path, monkeypatch):
+def test_a_moved_data_set_is_up_to_date_for_measuring_and_for_the_bids_app(
+    checkout_copy, tmp_path, monkeypatch
+):
     workflow = Workflow(checkout_copy, tmp_path / "here")
     make_tree(
         workflow.directory / "data",
         labels=["sub-01/ses-1/anat/sub-01_ses-1_dseg.nii.gz"],
         tables={"participants.tsv": ["participant_id scan_age", "sub-01 24.0"]},
     )
-    bids, measure = ("data", "out", "group", "-n"), ("measure", "data", "-d", "measured", "-n")
+    bids, measure = (
+        ("data", "out", "group", "-n"),
+        ("measure", "data", "-d", "measured", "-n"),
+    )
     commands(workflow, *bids)
     commands(workflow, "init", "data")
     for directory, config, targets in (
-        ("out/work", "out/work/gyriflow.yaml", ("all", "export")), ("measured", "data/gyriflow.yaml", ("all",))
-    ):  # fmt: skip
+        ("out/work", "out/work/gyriflow.yaml", ("all", "export")),
+        ("measured", "data/gyriflow.yaml", ("all",)),
+    ):
         if directory == "measured":
             monkeypatch.setenv("GYRIFLOW_MEASURE_ONLY", "1")
         inside = Workflow(checkout_copy, workflow.directory / directory)
@@ -95,18 +116,27 @@ def test_a_moved_data_set_is_up_to_date_for_measuring_and_for_the_bids_app(check
 def test_data_in_another_place_are_the_same_if_their_content_is(made, tmp_path):
     workflow = copied(made, tmp_path / "copy")
     (tmp_path / "disk").mkdir()
-    scan = shutil.move(tmp_path / "copy" / "scans" / "b.nii.gz", tmp_path / "disk" / "other name.nii.gz")
+    scan = shutil.move(
+        tmp_path / "copy" / "scans" / "b.nii.gz",
+        tmp_path / "disk" / "other name.nii.gz",
+    )
     config = workflow.directory / "study.yaml"
     config.write_text(config.read_text().replace("../scans/b.nii.gz", scan.as_posix()))
     assert "everything is up to date" in commands(workflow, "run", "study.yaml", "-n")
     assert workflow.run("--cores", "1", "--configfile", "study.yaml").returncode == 0
     save_labels(scan, *phantom(22.5, 2.0))
     said = commands(workflow, "run", "study.yaml", "-n")
-    assert re.search(r"^  changed input other name\.nii\.gz: .*pial_with_thickness", said, re.MULTILINE)
+    assert re.search(
+        r"^  changed input other name\.nii\.gz: .*pial_with_thickness",
+        said,
+        re.MULTILINE,
+    )
 
 
 def test_another_version_runs_only_what_its_code_changes(made, tmp_path):
-    newer = shutil.copytree(made.checkout, tmp_path / "newer", copy_function=shutil.copy)
+    newer = shutil.copytree(
+        made.checkout, tmp_path / "newer", copy_function=shutil.copy
+    )
     workflow = Workflow(newer, made.directory)
     assert "everything is up to date" in commands(workflow, "check", "study.yaml")
     with (newer / "src" / "gyriflow" / "compare" / "placement.py").open("a") as file:

@@ -1,4 +1,5 @@
-"""The package as a wheel: what it carries, and that its command works in an empty folder without the checkout."""
+"""The package as a wheel: what it carries, and that its command works in an empty
+folder without the checkout."""
 
 import os
 import re
@@ -20,29 +21,59 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    built = ran(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, CHECKOUT)
+    built = ran(
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-deps",
+        "--wheel-dir",
+        folder,
+        CHECKOUT,
+    )
     assert built.returncode == 0, built.stdout + built.stderr
     (found,) = folder.glob("gyriflow-*.whl")
     return found
 
 
-FOLD = "dolfinx dolfinx_solver petsc4py slepc4py mpi4py ipctk SimpleITK picsl_greedy optuna pytetwild"
+FOLD = (
+    "dolfinx dolfinx_solver petsc4py slepc4py mpi4py ipctk SimpleITK picsl_greedy"
+    " optuna pytetwild"
+)
 
 
 def installed(wheel, folder, without=""):
-    """Return the command of a virtual environment with the wheel and the packages of this environment.
+    """Return the command of a virtual environment with the wheel and the packages of
+    this environment.
 
     Imports of the packages `without` fail.
     """
-    subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", folder], check=True, timeout=120)
+    subprocess.run(
+        [sys.executable, "-m", "venv", "--system-site-packages", folder],
+        check=True,
+        timeout=120,
+    )
     python = folder / "bin" / "python"
     found = "import sysconfig; print(sysconfig.get_path('purelib'))"
     site = ran(python, "-c", found).stdout.strip()
     (Path(site) / "environment.pth").write_text(sysconfig.get_path("purelib") + "\n")
     blocked = f"import sys; sys.modules.update(dict.fromkeys({without!r}.split()))"
     (Path(site) / "blocked.pth").write_text(blocked + "\n")
-    plain = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    install = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", wheel]
+    plain = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("PYTHONPATH", "VIRTUAL_ENV")
+    }
+    install = [
+        python,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        wheel,
+    ]
     subprocess.run(install, env=plain, check=True, timeout=120)
     return folder / "bin" / "gyriflow", plain | {"PATH": "/usr/bin:/bin"}
 
@@ -50,14 +81,20 @@ def installed(wheel, folder, without=""):
 def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     folders = ("workflow", "atlases", "schemes", "norms", "config", "profiles", "envs")
-    tracked = ran("git", "-C", CHECKOUT, "ls-files", "Snakefile", *folders).stdout.split()
+    tracked = ran(
+        "git", "-C", CHECKOUT, "ls-files", "Snakefile", *folders
+    ).stdout.split()
     assert len(tracked) > 100
     assert {f"gyriflow/shipped/{name}" for name in tracked} <= names
-    sources = ran("git", "-C", CHECKOUT, "ls-files", "src/*.py", "src/*.c").stdout.split()
+    sources = ran(
+        "git", "-C", CHECKOUT, "ls-files", "src/*.py", "src/*.c"
+    ).stdout.split()
     assert "src/gyriflow/folding/products.c" in sources
     assert {name.removeprefix("src/") for name in sources} <= names
     assert "snakemake_logger_plugin_gyriflow/__init__.py" in names
-    assert not [name for name in names if "__pycache__" in name or name.startswith("tests")]
+    assert not [
+        name for name in names if "__pycache__" in name or name.startswith("tests")
+    ]
 
 
 def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory):
@@ -81,18 +118,32 @@ def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory)
 
 
 def test_a_brain_is_measured_without_the_solver(wheel, tmp_path, tmp_path_factory):
-    command, environment = installed(wheel, tmp_path_factory.mktemp("installed"), without=FOLD)
+    command, environment = installed(
+        wheel, tmp_path_factory.mktemp("installed"), without=FOLD
+    )
     python = command.with_name("python")
     blocked = ran(python, "-c", "import mpi4py", cwd=tmp_path, env=environment)
     assert blocked.returncode == 1
-    outcome = ran(python, "-P", CHECKOUT / "tests" / "measure_installed.py", cwd=tmp_path, env=environment)
+    outcome = ran(
+        python,
+        "-P",
+        CHECKOUT / "tests" / "measure_installed.py",
+        cwd=tmp_path,
+        env=environment,
+    )
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     assert outcome.stdout.splitlines()[-1] == "measured"
 
 
-def test_simulating_without_the_solver_names_the_extra_before_the_first_job(wheel, tmp_path, tmp_path_factory):
-    command, environment = installed(wheel, tmp_path_factory.mktemp("installed"), without=FOLD)
-    demo = re.search(r"(\S+/config\.yaml)", ran(command, "run", cwd=tmp_path, env=environment).stderr)[1]
+def test_simulating_without_the_solver_names_the_extra_before_the_first_job(
+    wheel, tmp_path, tmp_path_factory
+):
+    command, environment = installed(
+        wheel, tmp_path_factory.mktemp("installed"), without=FOLD
+    )
+    demo = re.search(
+        r"(\S+/config\.yaml)", ran(command, "run", cwd=tmp_path, env=environment).stderr
+    )[1]
     outcome = ran(command, "run", demo, "--cores", "1", cwd=tmp_path, env=environment)
     assert outcome.returncode == 2
     assert outcome.stderr == Facts("dolfinx", "gyriflow[fold]")

@@ -1,4 +1,5 @@
-"""Paths of atlases that studies keep for each other: found again, not missed, and made anew where they are damaged."""
+"""Paths of atlases that studies keep for each other: found again, not missed, and made
+anew where they are damaged."""
 
 import pytest
 from atlas_brains import atlas_labels
@@ -28,11 +29,27 @@ def server(tmp_path, monkeypatch):
 
 
 def study(workflow, url):
-    """Write a study that predicts a brain by an atlas at a server, whose files go to the folder `atlas`."""
-    write_atlas(workflow.directory, {"scheme": "spina-bifida-atlas", "weeks": [*WEEKS]}, name="far", url=url)
+    """Write a study that predicts a brain by an atlas at a server, whose files go to
+    the folder `atlas`."""
+    write_atlas(
+        workflow.directory,
+        {"scheme": "spina-bifida-atlas", "weeks": [*WEEKS]},
+        name="far",
+        url=url,
+    )
     labels, affine = atlas_labels(22)
-    save_labels(workflow.directory / "mine.nii.gz", labels, affine * [[1.05], [0.96], [1.0], [1.0]])
-    mine = {"id": "mine", "week": 22, "labels": "mine.nii.gz", "scheme": "spina-bifida-atlas", "population": "b"}
+    save_labels(
+        workflow.directory / "mine.nii.gz",
+        labels,
+        affine * [[1.05], [0.96], [1.0], [1.0]],
+    )
+    mine = {
+        "id": "mine",
+        "week": 22,
+        "labels": "mine.nii.gz",
+        "scheme": "spina-bifida-atlas",
+        "population": "b",
+    }
     config = {
         "brains": [mine],
         "atlas": {"name": "atlas.yaml", "folder": "atlas"},
@@ -46,10 +63,16 @@ def study(workflow, url):
 
 
 @pytest.mark.slow
-def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(workflow, server):
+def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(
+    workflow, server
+):
     call = (TARGETS, "--cores", "2", "--configfile", study(workflow, server.url))
     planned = workflow.jobs(*call)
-    assert (planned["atlas_file"], planned["atlas_path"], planned["register"]) == (2, 1, 2)
+    assert (planned["atlas_file"], planned["atlas_path"], planned["register"]) == (
+        2,
+        1,
+        2,
+    )
     first = workflow.run(*call, timeout_s=900)
     assert first.returncode == 0, first.stderr
     folder = workflow.directory / "atlas" / "paths"
@@ -63,7 +86,8 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(wo
     assert workflow.jobs(*call) == {}
     (workflow.directory / "away").rename(folder)
 
-    # another study copies it, and needs neither the kept one nor what that was made from any more
+    # another study copies it, and needs neither the kept one nor what that was made
+    # from any more
     (workflow.directory / "results").rename(workflow.directory / "results of the first")
     planned = workflow.jobs(*call)
     assert (planned["kept_path"], planned["register"]) == (1, 1)
@@ -82,17 +106,33 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(wo
     (workflow.directory / PATH).unlink()
     whole = kept.read_bytes()
     middle = len(whole) // 2
-    for damaged in (whole[:middle], whole[:middle] + bytes(100) + whole[middle + 100 :]):
+    for damaged in (
+        whole[:middle],
+        whole[:middle] + bytes(100) + whole[middle + 100 :],
+    ):
         kept.write_bytes(damaged)
         assert workflow.jobs(*call)["atlas_path"] == 1
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("atlas", "files"), [("dhcp-surface", 2 * 15), ("dhcp-volume", 15)])
-def test_a_prediction_by_a_shipped_atlas_without_checksums_is_planned(workflow, atlas, files):
-    mine = {"id": "mine", "week": 22, "labels": "phantom-22.nii.gz", "scheme": "spina-bifida-atlas", "population": "b"}
+@pytest.mark.parametrize(
+    ("atlas", "files"), [("dhcp-surface", 2 * 15), ("dhcp-volume", 15)]
+)
+def test_a_prediction_by_a_shipped_atlas_without_checksums_is_planned(
+    workflow, atlas, files
+):
+    mine = {
+        "id": "mine",
+        "week": 22,
+        "labels": "phantom-22.nii.gz",
+        "scheme": "spina-bifida-atlas",
+        "population": "b",
+    }
     settings = {"name": atlas, "weeks": [*range(22, 37)], "accept_licence": True}
     folding = {"preset": "expected", "end_week": 30}
-    name = workflow.write("study.yaml", {"brains": [mine], "atlas": settings, "start": "mine", "folding": folding})
+    name = workflow.write(
+        "study.yaml",
+        {"brains": [mine], "atlas": settings, "start": "mine", "folding": folding},
+    )
     planned = workflow.jobs(TARGETS, "--configfile", name)
     assert (planned["atlas_file"], planned["atlas_path"]) == (files, 1)

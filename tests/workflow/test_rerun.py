@@ -1,4 +1,5 @@
-"""Which stages run again after a change of settings, brains, code or files, and that no other does."""
+"""Which stages run again after a change of settings, brains, code or files, and that no
+other does."""
 
 import copy
 import os
@@ -24,25 +25,45 @@ STAGES = (
 REPORT = {"html_report": 1}
 RESULTS = REPORT | {"study_records": 1}
 ONE_RUN = RESULTS | {
-    "prepare": 1, "simulate": 1, "measure_simulated": 2, "validation": 1,
-}  # fmt: skip
-BOTH_RUNS = RESULTS | {rule: 2 * count for rule, count in ONE_RUN.items() if rule not in RESULTS}
+    "prepare": 1,
+    "simulate": 1,
+    "measure_simulated": 2,
+    "validation": 1,
+}
+BOTH_RUNS = RESULTS | {
+    rule: 2 * count for rule, count in ONE_RUN.items() if rule not in RESULTS
+}
 CURVES = {"growth_curves": 1, "growth_rates": 1, "growth_figure": 1}
-# of the surface of a measured brain that starts no run: its own, and what compares others with it
-OF_THE_OTHER_BRAIN = RESULTS | CURVES | {
-    "pial_with_thickness": 1, "measure": 1, "validation": 2,
-}  # fmt: skip
+# of the surface of a measured brain that starts no run: its own, and what compares
+# others with it
+OF_THE_OTHER_BRAIN = (
+    RESULTS
+    | CURVES
+    | {
+        "pial_with_thickness": 1,
+        "measure": 1,
+        "validation": 2,
+    }
+)
 
 
 def planned(workflow: Workflow, *arguments: str) -> dict[str, int]:
     """Return the jobs of `STAGES` that a dry run plans."""
-    return {rule: count for rule, count in workflow.jobs(*arguments).items() if rule in STAGES}
+    return {
+        rule: count
+        for rule, count in workflow.jobs(*arguments).items()
+        if rule in STAGES
+    }
 
 
 @contextmanager
 def changed_files(root, *names, content=b"\n# changed\n"):
-    """Have something else at the end of files of a checkout or study for as long as the block lasts."""
-    kept = {root / name: ((root / name).read_bytes(), (root / name).stat()) for name in names}
+    """Have something else at the end of files of a checkout or study for as long as the
+    block lasts."""
+    kept = {
+        root / name: ((root / name).read_bytes(), (root / name).stat())
+        for name in names
+    }
     try:
         for path, (before, _) in kept.items():
             path.write_bytes(before + content)
@@ -60,16 +81,28 @@ SETTINGS = {
         RESULTS | {"measure": 2, "measure_simulated": 4, "validation": 2},
     ),
     "run": ({"runs": {"thick": {"thickness_mm": 3.5}}}, ONE_RUN),
-    "growth": ({"folding": {"growth_rate_per_s": 1e-7}}, BOTH_RUNS | {"growth_figure": 1}),
+    "growth": (
+        {"folding": {"growth_rate_per_s": 1e-7}},
+        BOTH_RUNS | {"growth_figure": 1},
+    ),
     "mesh": (
         {"mesh": {"surface_edge_mm": 0.9}},
         BOTH_RUNS | {"tetrahedralise": 1},
     ),
     "surface": (
         {"surface": {"edge_length_mm": 1.5}},
-        BOTH_RUNS | CURVES | {"tetrahedralise": 1, "pial_with_thickness": 2, "measure": 2},
+        BOTH_RUNS
+        | CURVES
+        | {
+            "tetrahedralise": 1,
+            "pial_with_thickness": 2,
+            "measure": 2,
+        },
     ),
-    "later end": ({"folding": {"end_week": 22.5}}, BOTH_RUNS | {"measure_simulated": 6}),
+    "later end": (
+        {"folding": {"end_week": 22.5}},
+        BOTH_RUNS | {"measure_simulated": 6},
+    ),
     # the number of ranks changes no result, but the report shows the configuration
     "ranks": ({"folding": {"ranks": 1}}, RESULTS),
     "new brain": (
@@ -80,12 +113,21 @@ SETTINGS = {
 
 
 @pytest.mark.parametrize("change", SETTINGS)
-def test_exactly_what_depends_on_a_change_of_the_configuration_runs_again(finished, change):
+def test_exactly_what_depends_on_a_change_of_the_configuration_runs_again(
+    finished, change
+):
     values, expected = SETTINGS[change]
     study = copy.deepcopy(SMALL_STUDY)
     for section, content in values.items():
-        study[section] = [*study[section], *content] if section == "brains" else study.get(section, {}) | content
-    assert planned(finished, "--configfile", finished.write("changed.yaml", study)) == expected
+        study[section] = (
+            [*study[section], *content]
+            if section == "brains"
+            else study.get(section, {}) | content
+        )
+    assert (
+        planned(finished, "--configfile", finished.write("changed.yaml", study))
+        == expected
+    )
 
 
 CODE = {
@@ -95,7 +137,14 @@ CODE = {
         {rule: count for rule, count in BOTH_RUNS.items() if rule != "prepare"},
     ),
     # what the terminal says, comments in rules and the environment make no result
-    "around": (["src/gyriflow/running/launch.py", "workflow/rules/metrics.smk", "envs/gyriflow.yaml"], {}),
+    "around": (
+        [
+            "src/gyriflow/running/launch.py",
+            "workflow/rules/metrics.smk",
+            "envs/gyriflow.yaml",
+        ],
+        {},
+    ),
 }
 
 
@@ -106,13 +155,17 @@ def test_a_change_of_code_runs_again_what_uses_it(finished, change):
         assert planned(finished, "--configfile", "study.yaml") == expected
 
 
-def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(finished):
+def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(
+    finished,
+):
     assert finished.jobs("--configfile", "study.yaml") == {}
     labels = "phantom-22.nii.gz"
     with changed_files(finished.directory, labels):
         assert planned(finished, "--configfile", "study.yaml") == OF_THE_OTHER_BRAIN
         said = finished.run("-n", "--configfile", "study.yaml").stdout
-    (reason,) = re.findall(r"rule pial_with_thickness:\n(?: +.*\n)*? +reason: (.*)\n", said)
+    (reason,) = re.findall(
+        r"rule pial_with_thickness:\n(?: +.*\n)*? +reason: (.*)\n", said
+    )
     assert reason == f"Updated input files: {finished.directory / labels}"
 
 

@@ -1,4 +1,5 @@
-"""Missing files of atlases, fetched by the workflow from a server on this machine; what is there is left alone."""
+"""Missing files of atlases, fetched by the workflow from a server on this machine; what
+is there is left alone."""
 
 from pathlib import Path
 
@@ -25,13 +26,24 @@ def server():
 
 
 def study(folder: Path, url: str) -> dict:
-    """Write an atlas whose files are at a server into a folder and return a study of it."""
-    weeks = {week: {"labels": {"sha256": sha256(FILES[f"w{week}/labels.nii.gz"])}} for week in WEEKS}
-    write_atlas(folder, {"files": {"labels": "w{week}/labels.nii.gz"}, "weeks": weeks}, name="far", url=url)
+    """Write an atlas whose files are at a server into a folder and return a study of
+    it."""
+    weeks = {
+        week: {"labels": {"sha256": sha256(FILES[f"w{week}/labels.nii.gz"])}}
+        for week in WEEKS
+    }
+    write_atlas(
+        folder,
+        {"files": {"labels": "w{week}/labels.nii.gz"}, "weeks": weeks},
+        name="far",
+        url=url,
+    )
     return {"atlas": "atlas.yaml", "start": "far-21", "folding": {"end_week": 22}}
 
 
-def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workflow, server):
+def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(
+    workflow, server
+):
     name = workflow.write("study.yaml", study(workflow.directory, server.url))
     folder = workflow.directory / "resources" / "atlases" / "far"
     planned = workflow.run("-n", "growth", "--configfile", name)
@@ -78,7 +90,9 @@ def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
     failed = workflow.run("retrieve", "--cores", "1", "--configfile", name)
     assert failed.returncode == 5
     assert "Traceback" not in failed.stderr
-    assert files_in(workflow.directory / "mine") == {"old/w21/labels.nii.gz": FILES["w21/labels.nii.gz"]}
+    assert files_in(workflow.directory / "mine") == {
+        "old/w21/labels.nii.gz": FILES["w21/labels.nii.gz"]
+    }
     after = own.stat()
     assert (after.st_mtime_ns, after.st_ino) == (before.st_mtime_ns, before.st_ino)
 

@@ -1,4 +1,5 @@
-"""./run itself: what it executes, what it hands on, and that its set-up can be interrupted. No environment is made."""
+"""./run itself: what it executes, what it hands on, and that its set-up can be
+interrupted. No environment is made."""
 
 import hashlib
 import os
@@ -18,7 +19,8 @@ ROOT = Path(__file__).parents[2]
 RUN = ROOT / "run"
 
 PYTHON = r"""#!/bin/bash
-# stands in for Python: notes its arguments, makes a venv that holds itself and one program
+# stands in for Python: notes its arguments, makes a venv that holds itself and one
+# program
 echo "$*" >> "$RECORD"
 case "$*" in
     "-m venv "*)
@@ -28,14 +30,18 @@ case "$*" in
         printf '#!/bin/sh\necho "from the environment: $*"\n' > "$3/bin/tool"
         chmod +x "$3/bin/tool" ;;
     *"pip install"*)
-        if [ -e "$RECORD.fails" ]; then echo "ConnectionError: no such thing"; exit 1; fi
+        if [ -e "$RECORD.fails" ]; then
+            echo "ConnectionError: no such thing"
+            exit 1
+        fi
         sleep "${SECONDS_TO_CREATE:-0}"
         while [ -e "$RECORD.wait" ]; do sleep 0.05; done ;;
 esac
 """
 
 CONDA = r"""#!/bin/bash
-# stands in for conda or micromamba: notes its arguments, makes an environment that holds one program
+# stands in for conda or micromamba: notes its arguments, makes an environment that
+# holds one program
 echo "$*" >> "$RECORD"
 case "$*" in
     *hook*)
@@ -64,19 +70,28 @@ def write_program(folder, name, text):
 
 @pytest.fixture
 def outside(tmp_path):
-    """Return the variables of a shell outside of any environment, with a stand-in for Python 3.13 first on PATH."""
+    """Return the variables of a shell outside of any environment, with a stand-in for
+    Python 3.13 first on PATH."""
     programs = tmp_path / "programs"
     for name in ("python3", "python3.12", "python3.14"):
         write_program(programs, name, SHIM)
     write_program(programs, "python3.13", PYTHON)
-    env = {name: value for name, value in os.environ.items() if name not in {"VIRTUAL_ENV", "CONDA_PREFIX"}}
-    files = {"GYRIFLOW_CACHE": str(tmp_path / "cache"), "RECORD": str(tmp_path / "record")}
+    env = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in {"VIRTUAL_ENV", "CONDA_PREFIX"}
+    }
+    files = {
+        "GYRIFLOW_CACHE": str(tmp_path / "cache"),
+        "RECORD": str(tmp_path / "record"),
+    }
     return env | files | {"PATH": f"{programs}:{env['PATH']}"}
 
 
 @pytest.fixture
 def with_conda(outside, tmp_path):
-    """Return such variables for a machine that is too old for the wheels and has conda."""
+    """Return such variables for a machine that is too old for the wheels and has
+    conda."""
     write_program(tmp_path / "programs", "getconf", OLD_GLIBC)
     write_program(tmp_path / "programs", "conda", CONDA)
     return outside
@@ -93,10 +108,16 @@ def run(*command, env=None):
 def start(*command, env):
     """Start ./run with signals as a shell starts it, whatever they are here."""
     return subprocess.Popen(
-        [RUN, *command], env=env,
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: [signal.signal(s, signal.SIG_DFL) for s in (signal.SIGINT, signal.SIGTERM)],
-    )  # fmt: skip
+        [RUN, *command],
+        env=env,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: [
+            signal.signal(s, signal.SIG_DFL) for s in (signal.SIGINT, signal.SIGTERM)
+        ],
+    )
 
 
 def wait_until(condition, seconds=20.0):
@@ -112,21 +133,30 @@ def wait_until(condition, seconds=20.0):
 def running(word):
     """Return the processes that have a word in their command line."""
     pids = [int(process.name) for process in Path("/proc").glob("[0-9]*")]
-    return [pid for pid in pids if pid != os.getpid() and any(word in part for part in command_of(pid))]
+    return [
+        pid
+        for pid in pids
+        if pid != os.getpid() and any(word in part for part in command_of(pid))
+    ]
 
 
-# --- inside an environment -----------------------------------------------------------------------------------
+# --- inside an environment ---------------------------------------------------------
 
 
 def test_arguments_and_exit_code_are_handed_on():
-    assert run("printf", "%s|", "a b", "", "*", "$HOME", "'").stdout == "a b||*|$HOME|'|"
+    assert (
+        run("printf", "%s|", "a b", "", "*", "$HOME", "'").stdout == "a b||*|$HOME|'|"
+    )
     assert run("bash", "-c", "exit 7").returncode == 7
     assert run("no-such-command").returncode == 127
 
 
 def test_blas_is_an_optimised_one():
     loaded = run(
-        "python", "-c", "import gyriflow.folding, petsc4py.PETSc; print(open('/proc/self/maps').read())"
+        "python",
+        "-c",
+        "import gyriflow.folding, petsc4py.PETSc;"
+        " print(open('/proc/self/maps').read())",
     ).stdout
     assert "openblas" in loaded or "mkl" in loaded
 
@@ -142,7 +172,11 @@ OPEN_MPI = "raise ImportError('libpetsc.so: undefined symbol: ompi_mpi_comm_worl
 
 def write_solver(folder, petsc, dolfinx="0.11.0"):
     """Write packages that stand in for dolfinx, mpi4py and petsc4py."""
-    modules = {"dolfinx": f"__version__ = {dolfinx!r}", "mpi4py/MPI": "COMM_SELF = None", "petsc4py/PETSc": petsc}
+    modules = {
+        "dolfinx": f"__version__ = {dolfinx!r}",
+        "mpi4py/MPI": "COMM_SELF = None",
+        "petsc4py/PETSc": petsc,
+    }
     for name, code in modules.items():
         module = folder / f"{name}.py"
         module.parent.mkdir(parents=True, exist_ok=True)
@@ -153,15 +187,22 @@ def write_solver(folder, petsc, dolfinx="0.11.0"):
 def active(outside, tmp_path):
     """Return variables of an active venv with stand-ins for the solver."""
     folder = tmp_path / "active"
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=60)
+    subprocess.run(
+        [sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=60
+    )
     for python in (folder / "bin").glob("python3*"):
         # ./run would make its own environment by it
         python.unlink()
     (folder / "bin" / "python").unlink()
     (folder / "bin" / "python").symlink_to(sys._base_executable)
-    write_program(folder / "bin", "tool", "#!/bin/sh\necho from the active environment\n")
+    write_program(
+        folder / "bin", "tool", "#!/bin/sh\necho from the active environment\n"
+    )
     write_solver(packages_of(folder), PETSC.format(scalar="float"))
-    return outside | {"VIRTUAL_ENV": str(folder), "PATH": f"{folder / 'bin'}:{outside['PATH']}"}
+    return outside | {
+        "VIRTUAL_ENV": str(folder),
+        "PATH": f"{folder / 'bin'}:{outside['PATH']}",
+    }
 
 
 def packages_of(folder):
@@ -169,23 +210,37 @@ def packages_of(folder):
     return found
 
 
-def test_an_active_environment_with_the_solver_is_taken_whatever_variables_name_another(active, tmp_path):
+def test_an_active_environment_with_the_solver_is_taken_whatever_variables_name_another(
+    active, tmp_path
+):
     write_solver(tmp_path / "foreign", OPEN_MPI)
-    other = {"PETSC_DIR": "/nowhere", "PETSC_ARCH": "linux-gnu", "PYTHONPATH": str(tmp_path / "foreign")}
+    other = {
+        "PETSC_DIR": "/nowhere",
+        "PETSC_ARCH": "linux-gnu",
+        "PYTHONPATH": str(tmp_path / "foreign"),
+    }
     assert run("tool", env=active | other).stdout == "from the active environment\n"
 
 
 @pytest.mark.parametrize(
     ("petsc", "dolfinx"),
-    [(PETSC.format(scalar="complex"), "0.11.0"), (OPEN_MPI, "0.11.0"), (PETSC.format(scalar="float"), "0.10.0")],
+    [
+        (PETSC.format(scalar="complex"), "0.11.0"),
+        (OPEN_MPI, "0.11.0"),
+        (PETSC.format(scalar="float"), "0.10.0"),
+    ],
 )
-def test_an_active_environment_with_another_solver_is_not_taken(active, tmp_path, petsc, dolfinx):
+def test_an_active_environment_with_another_solver_is_not_taken(
+    active, tmp_path, petsc, dolfinx
+):
     write_solver(packages_of(tmp_path / "active"), petsc, dolfinx)
     (tmp_path / "active" / "bin" / "tool").unlink()
     assert run("tool", "1", env=active).stdout == "from the environment: 1\n"
 
 
-def test_with_conda_and_a_venv_active_the_first_python_on_path_decides(active, tmp_path):
+def test_with_conda_and_a_venv_active_the_first_python_on_path_decides(
+    active, tmp_path
+):
     conda = tmp_path / "conda"
     write_program(conda / "bin", "python", "#!/bin/sh\nexit 1\n")
     both = active | {"CONDA_PREFIX": str(conda)}
@@ -201,7 +256,7 @@ def test_ranks_under_mpiexec_are_of_one_run():
     assert done.stdout == "22", done.stderr
 
 
-# --- the set-up ----------------------------------------------------------------------------------------------
+# --- the set-up --------------------------------------------------------------------
 
 
 def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp_path):
@@ -216,7 +271,9 @@ def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp
     assert f"-m venv {venv}" in calls
     (installation,) = [line for line in calls if "pip install" in line]
     assert "--require-hashes" in installation
-    assert installation.endswith(f"-r {ROOT}/envs/requirements.txt -r {ROOT}/envs/requirements-dev.txt")
+    assert installation.endswith(
+        f"-r {ROOT}/envs/requirements.txt -r {ROOT}/envs/requirements-dev.txt"
+    )
 
 
 def test_a_python_of_pyenv_is_found_behind_shims(outside, tmp_path):
@@ -229,12 +286,20 @@ def test_a_python_of_pyenv_is_found_behind_shims(outside, tmp_path):
 
 def test_a_python_with_wheels_goes_before_3_14(outside, tmp_path):
     for name in ("python3", "python3.14"):
-        write_program(tmp_path / "programs", name, PYTHON.replace("from the environment", "from 3.14"))
+        write_program(
+            tmp_path / "programs",
+            name,
+            PYTHON.replace("from the environment", "from 3.14"),
+        )
     assert run("tool", "1", env=outside).stdout == "from the environment: 1\n"
 
 
 def test_without_any_way_it_says_what_is_needed(outside, tmp_path):
-    write_program(tmp_path / "programs", "uname", '#!/bin/sh\n[ "$1" = -m ] && echo aarch64 || echo Linux\n')
+    write_program(
+        tmp_path / "programs",
+        "uname",
+        '#!/bin/sh\n[ "$1" = -m ] && echo aarch64 || echo Linux\n',
+    )
     done = run("tool", env=outside | {"PATH": f"{tmp_path / 'programs'}:/usr/bin:/bin"})
     assert done.returncode == 2
     assert done.stderr == Facts("3.12", "2.35", "envs/gyriflow.yaml")
@@ -254,9 +319,13 @@ def test_with_python_3_11_alone_it_says_what_is_needed(outside, tmp_path):
 
 
 def test_a_full_disk_is_named_before_anything_is_loaded(outside, tmp_path):
-    on_small_disk = f"mount -t tmpfs -o size=1m tmpfs '{tmp_path / 'cache'}' && '{RUN}' tool"
+    on_small_disk = (
+        f"mount -t tmpfs -o size=1m tmpfs '{tmp_path / 'cache'}' && '{RUN}' tool"
+    )
     (tmp_path / "cache").mkdir()
-    done = ran("unshare", "--map-root-user", "--mount", "sh", "-c", on_small_disk, env=outside)
+    done = ran(
+        "unshare", "--map-root-user", "--mount", "sh", "-c", on_small_disk, env=outside
+    )
     if "unshare" in done.stderr:
         pytest.skip("this machine allows no mounts")
     assert done.returncode == 2
@@ -266,11 +335,18 @@ def test_a_full_disk_is_named_before_anything_is_loaded(outside, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "create", "hook"),
-    [("conda", "env create", "shell.bash hook"), ("micromamba", "create --yes", "shell hook --shell bash")],
+    [
+        ("conda", "env create", "shell.bash hook"),
+        ("micromamba", "create --yes", "shell hook --shell bash"),
+    ],
 )
-def test_conda_environment_is_made_once_and_activated(with_conda, tmp_path, name, create, hook):
+def test_conda_environment_is_made_once_and_activated(
+    with_conda, tmp_path, name, create, hook
+):
     (tmp_path / "programs" / "conda").rename(tmp_path / "programs" / name)
-    tag = hashlib.sha256((ROOT / "envs" / "gyriflow.yaml").read_bytes()).hexdigest()[:12]
+    tag = hashlib.sha256((ROOT / "envs" / "gyriflow.yaml").read_bytes()).hexdigest()[
+        :12
+    ]
     prefix = tmp_path / "cache" / f"conda-{tag}" / "conda"
     first = run("tool", "1", env=with_conda)
     second = run("bash", "-c", "tool 2; exit 5", env=with_conda)
@@ -284,14 +360,30 @@ def test_conda_environment_is_made_once_and_activated(with_conda, tmp_path, name
 
 
 def test_bytecode_is_kept_which_every_process_would_make_again(outside):
-    done = run("printenv", "PYTHONDONTWRITEBYTECODE", env=outside | {"PYTHONDONTWRITEBYTECODE": "1"})
+    done = run(
+        "printenv",
+        "PYTHONDONTWRITEBYTECODE",
+        env=outside | {"PYTHONDONTWRITEBYTECODE": "1"},
+    )
     assert (done.stdout, done.returncode) == ("", 1)
 
 
-def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(outside, tmp_path):
-    write_program(tmp_path / "programs", "getent", f"#!/bin/sh\necho me:x:0:0::{tmp_path}/home:/bin/sh\n")
-    env = {name: value for name, value in outside.items() if name not in ("GYRIFLOW_CACHE", "XDG_CACHE_HOME")}
-    assert run("tool", "1", env=env | {"HOME": ""}).stdout == "from the environment: 1\n"
+def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(
+    outside, tmp_path
+):
+    write_program(
+        tmp_path / "programs",
+        "getent",
+        f"#!/bin/sh\necho me:x:0:0::{tmp_path}/home:/bin/sh\n",
+    )
+    env = {
+        name: value
+        for name, value in outside.items()
+        if name not in ("GYRIFLOW_CACHE", "XDG_CACHE_HOME")
+    }
+    assert (
+        run("tool", "1", env=env | {"HOME": ""}).stdout == "from the environment: 1\n"
+    )
     assert list((tmp_path / "home" / ".cache" / "gyriflow").glob("venv-*/ready"))
 
 
@@ -303,7 +395,12 @@ def test_no_module_of_the_working_directory_is_imported(outside, tmp_path):
 
 
 def test_signals_reach_the_command(outside):
-    process = start("bash", "-c", "trap 'echo stopped; exit 9' TERM; echo up; while :; do sleep 0.1; done", env=outside)
+    process = start(
+        "bash",
+        "-c",
+        "trap 'echo stopped; exit 9' TERM; echo up; while :; do sleep 0.1; done",
+        env=outside,
+    )
     assert process.stdout.readline() == "up\n"
     process.send_signal(signal.SIGTERM)
     assert process.stdout.read() == "stopped\n"
@@ -321,9 +418,16 @@ def test_no_process_stays_between_run_and_the_command(outside):
 
 def test_a_current_folder_that_was_deleted_is_named(outside, tmp_path):
     (tmp_path / "gone").mkdir()
-    done = ran("bash", "-c", f"cd '{tmp_path}/gone' && rmdir ../gone && '{RUN}' true", env=outside)
+    done = ran(
+        "bash",
+        "-c",
+        f"cd '{tmp_path}/gone' && rmdir ../gone && '{RUN}' true",
+        env=outside,
+    )
     assert done.returncode == 2
-    assert done.stderr.splitlines()[-1] == Facts("gyriflow:", "the current folder no longer exists")
+    assert done.stderr.splitlines()[-1] == Facts(
+        "gyriflow:", "the current folder no longer exists"
+    )
 
 
 def test_failing_set_up_shows_why_and_is_tried_again(outside, tmp_path):
@@ -347,9 +451,18 @@ def test_two_at_once_make_one_environment(outside, tmp_path):
     waiting = second.stderr.readline()
     held.unlink()
     results = [process.communicate(timeout=30) for process in (first, second)]
-    assert [out for out, _ in results] == ["from the environment: first\n", "from the environment: second\n"]
+    assert [out for out, _ in results] == [
+        "from the environment: first\n",
+        "from the environment: second\n",
+    ]
     assert waiting == Facts("gyriflow:", "./run")
-    assert sum("pip install" in line for line in (tmp_path / "record").read_text().splitlines()) == 1
+    assert (
+        sum(
+            "pip install" in line
+            for line in (tmp_path / "record").read_text().splitlines()
+        )
+        == 1
+    )
 
 
 def test_an_environment_is_made_without_locks(outside, tmp_path):
@@ -359,8 +472,13 @@ def test_an_environment_is_made_without_locks(outside, tmp_path):
     assert done.stderr == Facts(f"{tmp_path / 'cache'} has no locks")
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
-def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_path, number, code):
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)],
+)
+def test_interrupted_set_up_leaves_nothing_running_and_is_redone(
+    outside, tmp_path, number, code
+):
     process = start("tool", "first", env=outside | {"SECONDS_TO_CREATE": OWN})
     assert wait_until(lambda: running(OWN))
     process.send_signal(number)
@@ -368,7 +486,8 @@ def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_pa
     if number != signal.SIGKILL:
         assert process.stderr.read() == Facts("gyriflow:")
         assert wait_until(lambda: not running(OWN))
-    # after SIGKILL the stand-in is gone, yet not what it had started: the next run waits for that
+    # after SIGKILL the stand-in is gone, yet not what it had started: the next run
+    # waits for that
     for orphan in running(OWN):
         os.kill(orphan, signal.SIGTERM)
     assert run("tool", "again", env=outside).stdout == "from the environment: again\n"

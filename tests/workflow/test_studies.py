@@ -17,12 +17,18 @@ STUDY = {
     "surface": {"edge_length_mm": 3.0},
     "mesh": COARSE | {"max_surface_distance_mm": 0.6},
     "metrics": {"spangy_modes": 60, "curvature_radius_mm": 7.0},
-    "folding": {"step_s": 86400, "ranks": 1, "thickness_mm": 3.0, "contact": {"kind": "planes"}},
+    "folding": {
+        "step_s": 86400,
+        "ranks": 1,
+        "thickness_mm": 3.0,
+        "contact": {"kind": "planes"},
+    },
 }
 
 
 def ellipsoids(first_week, *semi_axes_mm):
-    """Return brains of ellipsoids, of a week and the next, with the end of folding in the latter."""
+    """Return brains of ellipsoids, of a week and the next, with the end of folding in
+    the latter."""
     weeks = (first_week, first_week + 1)
     brains = [
         {"id": name, "week": week, "shape": {"semi_axes_mm": axes}}
@@ -43,16 +49,23 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
     brains = ellipsoids(27, [28, 36, 25], [29, 37, 26])
     study = STUDY | brains | {"studies": {"rate": rates}}
     name = workflow.write("study.yaml", study)
-    outcome = workflow.run("studies", "--cores", "2", "--configfile", name, timeout_s=900)
+    outcome = workflow.run(
+        "studies", "--cores", "2", "--configfile", name, timeout_s=900
+    )
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     folder = workflow.directory / "results" / "study"
     members = pd.read_csv(folder / "rate" / "members.csv").set_index("run")
-    assert members["outcome"].to_dict() == {"rate-1e-07": "finished", "rate-1e-05": "diverged"}
+    assert members["outcome"].to_dict() == {
+        "rate-1e-07": "finished",
+        "rate-1e-05": "diverged",
+    }
     assert members.loc["rate-1e-05", "cause"] == Facts("GW", "mm")
     assert members.loc["rate-1e-05", "reached_week"] < 28
     for table in ("comparison", "nearest"):
         # bands that are not resolved have no nearest run
-        assert set(pd.read_csv(folder / "rate" / f"{table}.csv")["run"].dropna()) == {"rate-1e-07"}
+        assert set(pd.read_csv(folder / "rate" / f"{table}.csv")["run"].dropna()) == {
+            "rate-1e-07"
+        }
     # nothing is left to do, and only what a change concerns runs again
     assert workflow.jobs("studies", "--configfile", name) == {}
     study["studies"]["rate"] = rates | {"vary": {"growth_rate_per_s": [1e-7, 1.5e-7]}}
@@ -64,7 +77,8 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
 @pytest.mark.slow
 @pytest.mark.extended
 def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(workflow):
-    """The brain of the later week is a tenth larger along each axis: its area takes growth, the volume stays behind."""
+    """The brain of the later week is a tenth larger along each axis: its area takes
+    growth, the volume stays behind."""
     search = {
         "base": "reference",
         "parameters": {"growth_rate_per_s": [0.5e-7, 4.0e-7]},
@@ -72,9 +86,18 @@ def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(wor
         "compare_week": 22,
         "rounds": [3, 1],
     }
-    study = STUDY | ellipsoids(21, [20, 26, 18], [21, 27, 19]) | {"runs": {"reference": {}}, "calibrate": search}
+    study = (
+        STUDY
+        | ellipsoids(21, [20, 26, 18], [21, 27, 19])
+        | {
+            "runs": {"reference": {}},
+            "calibrate": search,
+        }
+    )
     name = workflow.write("study.yaml", study)
-    outcome = workflow.run("calibrate", "--cores", "2", "--configfile", name, timeout_s=900)
+    outcome = workflow.run(
+        "calibrate", "--cores", "2", "--configfile", name, timeout_s=900
+    )
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     results = workflow.directory / "results"
     runs = pd.read_csv(results / "study/calibration/runs.csv")
@@ -83,13 +106,24 @@ def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(wor
     real = read_surface(results / "brains/b/surface/pial.surf.gii")
     for row in runs.to_dict("records"):
         frames = results / f"runs/{row['run']}/a/folding/frames.h5"
-        folded, _ = boundary_surface(TetrahedralMesh(read_positions(frames, 22.0), read_tets(frames)))
-        expected = np.hypot(area(folded) / area(real) - 1, signed_volume(folded) / signed_volume(real) - 1)
+        folded, _ = boundary_surface(
+            TetrahedralMesh(read_positions(frames, 22.0), read_tets(frames))
+        )
+        expected = np.hypot(
+            area(folded) / area(real) - 1,
+            signed_volume(folded) / signed_volume(real) - 1,
+        )
         assert row["size"] == pytest.approx(expected, rel=1e-6)
-        assert row["score"] == pytest.approx(row["size"] + 0.1 * row["surface_distance"])
+        assert row["score"] == pytest.approx(
+            row["size"] + 0.1 * row["surface_distance"]
+        )
     # the more growth, the larger: the least score is not at the lowest rate
     (best,) = pd.read_csv(results / "study/calibration/optimum.csv").to_dict("records")
-    assert (best["parameter"], best["lowest"], best["highest"]) == ("growth_rate_per_s", 0.5e-7, 4.0e-7)
+    assert (best["parameter"], best["lowest"], best["highest"]) == (
+        "growth_rate_per_s",
+        0.5e-7,
+        4.0e-7,
+    )
     assert best["score"] == runs["score"].min()
     assert best["value"] == runs.set_index("run").loc[best["run"], "growth_rate_per_s"]
     assert (results / "study/calibration/calibration.png").exists()

@@ -1,4 +1,5 @@
-"""What a run tells on the terminal, and what it leaves in the log; in a folder and of a file of any name."""
+"""What a run tells on the terminal, and what it leaves in the log; in a folder and of a
+file of any name."""
 
 import os
 import pty
@@ -24,9 +25,13 @@ def on_a_terminal(workflow, *arguments):
     """Return the exit code of a run on a pseudo terminal, and what it has written."""
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
-        workflow.command(*arguments), cwd=workflow.directory, env=workflow.environment | {"TERM": "xterm"},
-        stdin=theirs, stdout=theirs, stderr=theirs,
-    )  # fmt: skip
+        workflow.command(*arguments),
+        cwd=workflow.directory,
+        env=workflow.environment | {"TERM": "xterm"},
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+    )
     os.close(theirs)
     pieces = []
     # the end of a pseudo terminal is an error
@@ -38,18 +43,35 @@ def on_a_terminal(workflow, *arguments):
 
 
 @pytest.mark.slow
-def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(checkout_copy, tmp_path):
+def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(
+    checkout_copy, tmp_path
+):
     workflow = Workflow(checkout_copy, tmp_path / FOLDER)
     workflow.directory.mkdir()
     save_labels(workflow.directory / "plain.nii.gz", *phantom(21.0, 2.0))
     (workflow.directory / "plain.nii.gz").rename(workflow.directory / FILE)
     brain = {"id": "a", "week": 21, "labels": FILE, "scheme": "spina-bifida-atlas"}
-    config = {"brains": [brain], "start": "a", "surface": {"edge_length_mm": 3.0}, "folding": {"end_week": 22}}
-    arguments = ("--cores", "1", "surface", "--configfile", workflow.write("study.yaml", config))
+    config = {
+        "brains": [brain],
+        "start": "a",
+        "surface": {"edge_length_mm": 3.0},
+        "folding": {"end_week": 22},
+    }
+    arguments = (
+        "--cores",
+        "1",
+        "surface",
+        "--configfile",
+        workflow.write("study.yaml", config),
+    )
     code, said = on_a_terminal(workflow, *arguments)
     assert code == 0, said
     assert "pial_with_thickness a\r\x1b[2K" in said
-    (log,) = set(re.findall(rf"{re.escape(str(workflow.directory))}/\.snakemake/log/[\w.-]+\.log", said))
+    (log,) = set(
+        re.findall(
+            rf"{re.escape(str(workflow.directory))}/\.snakemake/log/[\w.-]+\.log", said
+        )
+    )
     assert "rule pial_with_thickness:" in Path(log).read_text()
     state = read_json(workflow.directory / STATE)
     assert state["done"] == state["total"] == 2
@@ -61,6 +83,8 @@ def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(c
     # Snakemake's own messages are a word away
     as_before = workflow.run(*arguments, "--verbose")
     assert "Nothing to be done" in as_before.stdout + as_before.stderr
-    assert (workflow.directory / "results/brains/a/surface/pial.surf.gii").stat().st_size > 0
+    assert (
+        workflow.directory / "results/brains/a/surface/pial.surf.gii"
+    ).stat().st_size > 0
     assert not list(tmp_path.rglob("pwned*"))
     assert not (checkout_copy / "pwned").exists()

@@ -1,4 +1,5 @@
-"""Write the atlas' own brain of a predicted week, aligned with the predicted brain and scaled to its volume."""
+"""Write the atlas' own brain of a predicted week, aligned with the predicted brain and
+scaled to its volume."""
 
 import numpy as np
 
@@ -14,8 +15,16 @@ from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0]):
-    targets, predicted = read_weekly_shapes(files.targets), read_surface(files.predicted)
+    targets, predicted = (
+        read_weekly_shapes(files.targets),
+        read_surface(files.predicted),
+    )
     start, _ = boundary_surface(read_tetrahedral_mesh(files.mesh))
     shapes = np.stack(targets.surfaces["atlas"])
-    atlas = TriangleMesh(positions_at(snakemake.params.week, shapes, targets.weeks, vertex_areas(start)), start.faces)
-    write_surface(snakemake.output[0], align(scale_to_volume(atlas, predicted), predicted))
+    atlas = TriangleMesh(
+        positions_at(snakemake.params.week, shapes, targets.weeks, vertex_areas(start)),
+        start.faces,
+    )
+    write_surface(
+        snakemake.output[0], align(scale_to_volume(atlas, predicted), predicted)
+    )

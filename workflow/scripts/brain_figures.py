@@ -1,4 +1,5 @@
-"""Draw a measured brain: page and table row of quality control, maps and small pictures."""
+"""Draw a measured brain: page and table row of quality control, maps and small
+pictures."""
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.anatomy.thickness import posed_whites
@@ -8,7 +9,12 @@ from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_volume_map
 from gyriflow.report.pictures import ROUND_VIEWS, shape_maps, small_pictures
-from gyriflow.report.quality import QualityBrain, quality_page, quality_row, tissue_groups
+from gyriflow.report.quality import (
+    QualityBrain,
+    quality_page,
+    quality_row,
+    tissue_groups,
+)
 from gyriflow.running.jobs import read_messages
 from gyriflow.step import step
 
@@ -21,21 +27,44 @@ with step(snakemake.log[0]):
         image = values, pose.world @ affine
     if params.labels:
         labels = params.labels.read()
-        tissues = tissue_groups(labels.labels, params.labels.scheme), pose.world @ labels.affine
+        tissues = (
+            tissue_groups(labels.labels, params.labels.scheme),
+            pose.world @ labels.affine,
+        )
     if files.thickness:
         (thickness,) = read_vertex_maps(files.thickness).values()
-    whites = posed_whites(pose, {side: read_surface(path) for side, path in params.white_files.items()})
+    whites = posed_whites(
+        pose, {side: read_surface(path) for side, path in params.white_files.items()}
+    )
     white = merged(*whites.values()) if whites else None
-    warnings = list(dict.fromkeys(message for level, message in read_messages(params.log) if level == "warning"))
+    warnings = list(
+        dict.fromkeys(
+            message
+            for level, message in read_messages(params.log)
+            if level == "warning"
+        )
+    )
     expected = expected_volume_ml(report["week"])
-    row = quality_row(params.columns, report, read_json(files.measured) if files.measured else {}, warnings, expected)
-    brain = QualityBrain(surface, report["fissure_x_mm"], thickness, white, image, tissues)
+    row = quality_row(
+        params.columns,
+        report,
+        read_json(files.measured) if files.measured else {},
+        warnings,
+        expected,
+    )
+    brain = QualityBrain(
+        surface, report["fissure_x_mm"], thickness, white, image, tissues
+    )
     halves = [
         (read_surface(hemisphere), read_vertex_maps(maps))
         for hemisphere, maps in zip(files.hemispheres, files.maps, strict=True)
     ]
-    maps = shape_maps({"": {report["week"]: halves}}, quantity="shape_index", views=ROUND_VIEWS)
+    maps = shape_maps(
+        {"": {report["week"]: halves}}, quantity="shape_index", views=ROUND_VIEWS
+    )
     write_figure(output.quality, output.quality_pdf, quality_page(brain, row, warnings))
     write_figure(output.maps, output.maps_pdf, maps)
-    write_figure(output.small, output.small_pdf, small_pictures(halves, side=params.side))
+    write_figure(
+        output.small, output.small_pdf, small_pictures(halves, side=params.side)
+    )
     write_json(output.row, row)

@@ -1,10 +1,15 @@
-"""Choose the parameters of a round's runs: first spread over the bounds, later near the best."""
+"""Choose the parameters of a round's runs: first spread over the bounds, later near the
+best."""
 
 from gyriflow.compare.calibration import first_round, next_round, require_bands
 from gyriflow.io.files import read_table, read_tables, write_table
 from gyriflow.step import step
 
-params, earlier, spectra = snakemake.params, snakemake.input.scores, snakemake.input.spectra
+params, earlier, spectra = (
+    snakemake.params,
+    snakemake.input.scores,
+    snakemake.input.spectra,
+)
 with step(snakemake.log[0], *spectra):
     for path in spectra:
         require_bands(read_table(path), params.score, path)

@@ -1,11 +1,17 @@
-"""Carry regions to the vertices of a brain's hemispheres from the brain on which they are given."""
+"""Carry regions to the vertices of a brain's hemispheres from the brain on which they
+are given."""
 
 import numpy as np
 
 from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carrying import carry_regions
 from gyriflow.io.registrations import read_correspondence
-from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_labels, write_vertex_labels
+from gyriflow.io.surfaces import (
+    read_pose,
+    read_surface,
+    read_vertex_labels,
+    write_vertex_labels,
+)
 from gyriflow.settings.terms import SIDES, STRUCTURES
 from gyriflow.step import step
 
@@ -20,5 +26,11 @@ with step(snakemake.log[0]):
     for side in SIDES:
         regions, names = read_vertex_labels(files[f"{side}_regions"])
         pairs = zip((files[f"given_{side}"], files[side]), back, strict=True)
-        found = carry_regions(regions, *(transformed(read_surface(path), matrix) for path, matrix in pairs), between)
-        write_vertex_labels(snakemake.output[f"{side}_regions"], found, names, STRUCTURES[side])
+        found = carry_regions(
+            regions,
+            *(transformed(read_surface(path), matrix) for path, matrix in pairs),
+            between,
+        )
+        write_vertex_labels(
+            snakemake.output[f"{side}_regions"], found, names, STRUCTURES[side]
+        )

@@ -1,4 +1,5 @@
-"""Compare a run of a sweep with the observed brains of its week; no rows if it has not reached that week."""
+"""Compare a run of a sweep with the observed brains of its week; no rows if it has not
+reached that week."""
 
 from itertools import batched
 
@@ -20,11 +21,15 @@ def parts(paths):
 with step(snakemake.log[0]):
     table, coefficients = joined_comparisons([]), pd.DataFrame(columns=COEFFICIENTS)
     if files.get("metrics"):
-        metrics, spectra, coefficients = map(read_tables, (files.metrics, files.spectra, files.coefficients))
+        metrics, spectra, coefficients = map(
+            read_tables, (files.metrics, files.spectra, files.coefficients)
+        )
         observed = map(parts, batched(files.measured, len(params.parts)))
         observed = dict(zip(params.real, observed, strict=True))
         populations = {names.brain: params.population, **params.real}
         simulated = parts(files.simulated)
-        table = comparison_table(names.run, names.brain, populations, metrics, spectra, simulated, observed)
+        table = comparison_table(
+            names.run, names.brain, populations, metrics, spectra, simulated, observed
+        )
     write_table(snakemake.output.table, table)
     write_table(snakemake.output.coefficients, coefficients[COEFFICIENTS])

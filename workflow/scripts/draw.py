@@ -1,4 +1,5 @@
-"""Draw figures and tables of `workflow/figures.yaml`: read their input files and call their functions."""
+"""Draw figures and tables of `workflow/figures.yaml`: read their input files and call
+their functions."""
 
 from importlib import import_module
 from pathlib import Path
@@ -26,13 +27,17 @@ def read_boundary(path):
 
 
 def read_elements(path):
-    """Return the elements of a run, and the fields of the model at its first and last week."""
+    """Return the elements of a run, and the fields of the model at its first and last
+    week."""
     frames, run = path.replace(".xdmf", ".h5"), Path(path).parents[1]
     params, weeks = parameters_from(read_yaml(run / "params.yaml")), read_weeks(frames)
     mesh = TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames))
     zones = zones_of_run(mesh, params)
     ends = (weeks[0], weeks[-1])
-    return mesh.tets, {week: model_fields(zones, read_positions(frames, week), params, week) for week in ends}
+    return mesh.tets, {
+        week: model_fields(zones, read_positions(frames, week), params, week)
+        for week in ends
+    }
 
 
 READERS = {
@@ -52,10 +57,13 @@ READERS = {
 
 
 def read(inputs):
-    """Return nested dictionaries and lists with each path replaced by the content of its file."""
+    """Return nested dictionaries and lists with each path replaced by the content of
+    its file."""
     match inputs:
         case str():
-            return next(reader for end, reader in READERS.items() if inputs.endswith(end))(inputs)
+            return next(
+                reader for end, reader in READERS.items() if inputs.endswith(end)
+            )(inputs)
         case dict():
             return {key: read(value) for key, value in inputs.items()}
         case list():
@@ -67,7 +75,9 @@ with step(snakemake.log[0]):
     for figure in snakemake.params.figures:
         name, _, function = figure["draw"].partition(".")
         module = import_module(f"gyriflow.report.{name}")
-        drawn = getattr(module, function)(**read(dict(figure["inputs"])), **figure["options"])
+        drawn = getattr(module, function)(
+            **read(dict(figure["inputs"])), **figure["options"]
+        )
         if isinstance(drawn, pd.DataFrame):
             write_html(*figure["files"], module.html_table(drawn))
         else:

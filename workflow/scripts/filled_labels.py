@@ -1,6 +1,12 @@
-"""Fill the surfaces of a brain without labels to a label volume for its registration."""
+"""Fill the surfaces of a brain without labels to a label volume for its
+registration."""
 
-from gyriflow.anatomy.thickness import TYPICAL_THICKNESS_MM, TYPICAL_VOXEL_MM, filled_labels, posed_whites
+from gyriflow.anatomy.thickness import (
+    TYPICAL_THICKNESS_MM,
+    TYPICAL_VOXEL_MM,
+    filled_labels,
+    posed_whites,
+)
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
@@ -8,7 +14,10 @@ from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0], *files.white):
-    report, similar = read_json(files.report), read_json(files.similar) if files.similar else {}
+    report, similar = (
+        read_json(files.report),
+        read_json(files.similar) if files.similar else {},
+    )
     whites = {side: read_surface(path) for side, path in snakemake.params.white.items()}
     labels, affine = filled_labels(
         read_surface(files.whole),

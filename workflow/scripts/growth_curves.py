@@ -1,4 +1,5 @@
-"""Fit smooth curves to the measured areas and volumes of each series of brains, and write their errors."""
+"""Fit smooth curves to the measured areas and volumes of each series of brains, and
+write their errors."""
 
 import pandas as pd
 
@@ -10,7 +11,10 @@ output = snakemake.output
 with step(snakemake.log[0]):
     areas, curves, misfits = read_table(snakemake.input[0]), [], []
     for name, fits in fits_of_series(areas).items():
-        tables = curve_table({quantity: fit.curve for quantity, fit in fits.items()}), errors(fits)
+        tables = (
+            curve_table({quantity: fit.curve for quantity, fit in fits.items()}),
+            errors(fits),
+        )
         for table, joined in zip(tables, (curves, misfits), strict=True):
             joined.append(table.assign(series=name)[["series", *table.columns]])
     write_table(output.curves, pd.concat(curves, ignore_index=True))

@@ -1,4 +1,5 @@
-"""Write the growth that a run towards shapes has found, as maps on the pial surface: one set per output week."""
+"""Write the growth that a run towards shapes has found, as maps on the pial surface:
+one set per output week."""
 
 from gyriflow.growth.rates import growth_per_week
 from gyriflow.io.frames import read_pial_frames
@@ -10,7 +11,9 @@ from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0]):
-    growth = growth_per_week(read_pial_frames(files.frames), parameters_from(read_yaml(files.params)).step_s)
+    growth = growth_per_week(
+        read_pial_frames(files.frames), parameters_from(read_yaml(files.params)).step_s
+    )
     maps = {
         name_in_interval(name, *interval): values
         for interval, found in growth.items()

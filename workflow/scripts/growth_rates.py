@@ -1,4 +1,5 @@
-"""Measure cortical areas and brain volumes of all brains, and growth rates between their weeks."""
+"""Measure cortical areas and brain volumes of all brains, and growth rates between
+their weeks."""
 
 import pandas as pd
 
@@ -12,14 +13,26 @@ from gyriflow.step import step
 files, params, output = snakemake.input, snakemake.params, snakemake.output
 thickness = dict(zip(params.with_thickness, files.thickness, strict=True))
 with step(snakemake.log[0]):
-    areas = pd.DataFrame({"series": params.series, "subject": params.brains, "week": params.weeks})
+    areas = pd.DataFrame(
+        {"series": params.series, "subject": params.brains, "week": params.weeks}
+    )
     surfaces = [read_surface(file) for file in files.whole]
     areas["area_cm2"] = list(map(area_cm2, surfaces))
-    areas["thickness_mm"] = areas["subject"].map({name: read_json(path)["mean_mm"] for name, path in thickness.items()})
+    areas["thickness_mm"] = areas["subject"].map(
+        {name: read_json(path)["mean_mm"] for name, path in thickness.items()}
+    )
     areas["volume_ml"] = list(map(volume_ml, surfaces))
     for _, brains in areas.groupby("series", sort=False):
-        logged(thickness_jumps(brains[["subject", "week", "thickness_mm"]].itertuples(index=False, name=None)))
-    tissues = [read_json(report).get("label_volumes_mL", {}) for report in files.reports]
+        logged(
+            thickness_jumps(
+                brains[["subject", "week", "thickness_mm"]].itertuples(
+                    index=False, name=None
+                )
+            )
+        )
+    tissues = [
+        read_json(report).get("label_volumes_mL", {}) for report in files.reports
+    ]
     for tissue in TISSUES:
         areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in tissues]
     write_table(output.areas, areas)

@@ -6,5 +6,8 @@ from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0]):
-    run, members = read_vertex_maps(files.run), [read_vertex_maps(path) for path in files.members]
+    run, members = (
+        read_vertex_maps(files.run),
+        [read_vertex_maps(path) for path in files.members],
+    )
     write_vertex_maps(snakemake.output[0], growth_sd(run, members))

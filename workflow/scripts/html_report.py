@@ -5,13 +5,28 @@ from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml, yaml_text
-from gyriflow.report.page import Tables, brain_page, hide_paths, page_figures, report_page, study_page
+from gyriflow.report.page import (
+    Tables,
+    brain_page,
+    hide_paths,
+    page_figures,
+    report_page,
+    study_page,
+)
 from gyriflow.report.view3d import surfaces_view
 from gyriflow.step import step
 
 PICTURE_BYTES = 9_000_000
 PARTS = ("style", "three", "notice", "controls", "viewer")
-TABLES = ("quality", "metrics", "centiles", "warnings", "runs", "validation", "intervals")
+TABLES = (
+    "quality",
+    "metrics",
+    "centiles",
+    "warnings",
+    "runs",
+    "validation",
+    "intervals",
+)
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 
 
@@ -19,29 +34,52 @@ def with_content(figures):
     """Return the figures and tables of a page with their content."""
     paths = [figure["path"] for figure in figures]
     pictures = [path for path in paths if path.endswith(".png")]
-    contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))
-    return page_figures(figures, {path: contents.get(path) or read_body(path) for path in paths})
+    contents = dict(
+        zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True)
+    )
+    return page_figures(
+        figures, {path: contents.get(path) or read_body(path) for path in paths}
+    )
 
 
 def read_weeks(weeks):
     """Return the hemispheres of a brain with their maps by week."""
-    return [(week, [(read_surface(mesh), read_vertex_maps(maps)) for mesh, maps in halves]) for week, halves in weeks]
+    return [
+        (week, [(read_surface(mesh), read_vertex_maps(maps)) for mesh, maps in halves])
+        for week, halves in weeks
+    ]
 
 
 with step(snakemake.log[0]):
-    template, parts = read_text(files.page), {name: read_text(files[name]) for name in PARTS}
+    template, parts = (
+        read_text(files.page),
+        {name: read_text(files[name]) for name in PARTS},
+    )
     tables = Tables(**{name: read_table(files[name]) for name in TABLES if files[name]})
-    origin = {"provenance": read_json(files.provenance), "methods": read_text(files.methods)}
+    origin = {
+        "provenance": read_json(files.provenance),
+        "methods": read_text(files.methods),
+    }
     origin["configuration"] = yaml_text(hide_paths(params.config))
     brains = {brain["id"]: brain for brain in params.brains}
-    for path, (name, figures) in zip(output.brains, params.brain_figures.items(), strict=True):
+    for path, (name, figures) in zip(
+        output.brains, params.brain_figures.items(), strict=True
+    ):
         page = brain_page(brains[name], tables, with_content(figures), norm=params.norm)
         write_text(path, report_page(template, parts, {"groups": []}, **origin, **page))
-    small = dict(zip(params.brain_figures, picture_addresses(files.small, PICTURE_BYTES), strict=True))
+    small = dict(
+        zip(
+            params.brain_figures,
+            picture_addresses(files.small, PICTURE_BYTES),
+            strict=True,
+        )
+    )
     prediction = params.prediction
     if prediction:
         accuracy = read_yaml(files.accuracy)
-        tests = prediction_facts(accuracy["rows"], prediction["start_week"], prediction["week"])
+        tests = prediction_facts(
+            accuracy["rows"], prediction["start_week"], prediction["week"]
+        )
         prediction = prediction | {"accuracy": accuracy, "tests": tests}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
     page = study_page(params.brains, tables, with_content(params.figures), **about)

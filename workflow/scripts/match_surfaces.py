@@ -14,7 +14,14 @@ with step(snakemake.log[0], *first, *second):
     for files, pose in zip((first, second), poses, strict=True):
         # each hemisphere may have its own pose
         sides = zip(files, SIDES[: len(files)], strict=True)
-        surfaces.append(merged(*(transformed(outward(read_surface(path)), pose.of_file(side)) for path, side in sides)))
+        surfaces.append(
+            merged(
+                *(
+                    transformed(outward(read_surface(path)), pose.of_file(side))
+                    for path, side in sides
+                )
+            )
+        )
     found, report = match_surfaces(*surfaces)
     # correspondences are in the coordinates of the files, like registrations
     between = between_moved(found, *(pose.inverse for pose in poses))

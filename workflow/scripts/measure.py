@@ -1,9 +1,16 @@
-"""Measure an observed or a simulated brain at a week; of a simulated brain, also write surfaces and thickness."""
+"""Measure an observed or a simulated brain at a week; of a simulated brain, also write
+surfaces and thickness."""
 
 from gyriflow.folding.folded_surfaces import folded_surfaces
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.frames import read_positions
-from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_brain, write_vertex_maps
+from gyriflow.io.surfaces import (
+    STRUCTURES,
+    read_surface,
+    read_vertex_maps,
+    write_brain,
+    write_vertex_maps,
+)
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.metrics.thickness import depth_of_weight, simulated_thickness
@@ -25,10 +32,21 @@ with step(snakemake.log[0]):
     if brain.get("thickness"):
         (settings["thickness_mm"],) = read_vertex_maps(brain.thickness).values()
     if brain.get("report"):
-        settings["label_volumes_ml"] = read_json(brain.report).get("label_volumes_mL", {})
-    left, right = (read_surface(brain[side]) if brain.get(side) else None for side in SIDES)
+        settings["label_volumes_ml"] = read_json(brain.report).get(
+            "label_volumes_mL", {}
+        )
+    left, right = (
+        read_surface(brain[side]) if brain.get(side) else None for side in SIDES
+    )
     found = measure_brain(read_surface(brain.whole), left, right, **settings)
-    for name, table in (("metrics", found.table), ("spectra", found.spectra), ("coefficients", found.coefficients)):
-        write_table(output[name], table.assign(**params.labels)[[*params.labels, *table.columns]])
+    for name, table in (
+        ("metrics", found.table),
+        ("spectra", found.spectra),
+        ("coefficients", found.coefficients),
+    ):
+        write_table(
+            output[name],
+            table.assign(**params.labels)[[*params.labels, *table.columns]],
+        )
     for side, maps in found.maps.items():
         write_vertex_maps(output[f"{side}_maps"], maps, STRUCTURES[side])

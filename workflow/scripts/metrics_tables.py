@@ -1,4 +1,5 @@
-"""Join the metrics of all brains into tables, and write change, asymmetry, norms and distances between spectra."""
+"""Join the metrics of all brains into tables, and write change, asymmetry, norms and
+distances between spectra."""
 
 import pandas as pd
 
@@ -15,12 +16,21 @@ from gyriflow.metrics.norms import (
 )
 from gyriflow.metrics.repeatability import with_change_noise, with_distance_noise
 from gyriflow.metrics.spangy import spectral_distances
-from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, wide_table
+from gyriflow.metrics.tables import (
+    asymmetry,
+    change_between_scans,
+    long_table,
+    wide_table,
+)
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    tables = {name: read_tables(files[name]) for name in ("metrics", "spectra", "regions") if files[name]}
+    tables = {
+        name: read_tables(files[name])
+        for name in ("metrics", "spectra", "regions")
+        if files[name]
+    }
     metrics, regions = tables["metrics"], [tables["regions"]] if files.regions else []
     people = metrics.assign(person=metrics["subject"].map(params.subjects))
     reference = [] if files.cohort else params.reference
@@ -29,8 +39,16 @@ with step(snakemake.log[0]):
         content = read_json(files.cohort[0])
         cohort, population = cohort_from_plain(content), content.get("population")
     else:
-        cohort = cohort_norms(people, reference, individuals=params.individuals, made_with=params.made_with)
-    parts = [asymmetry(table.fillna({"region": ""})) for table in (metrics.assign(region=""), *regions)]
+        cohort = cohort_norms(
+            people,
+            reference,
+            individuals=params.individuals,
+            made_with=params.made_with,
+        )
+    parts = [
+        asymmetry(table.fillna({"region": ""}))
+        for table in (metrics.assign(region=""), *regions)
+    ]
     tables |= {
         "metrics_long": (long := long_table([metrics, *regions])),
         "metrics_wide": wide_table(long, params.covariates),
@@ -38,12 +56,19 @@ with step(snakemake.log[0]):
         "asymmetry": pd.concat(parts, ignore_index=True),
         "norm_curves": norm_curves(cohort),
         "centiles": measured_scores(people, reference, cohort),
-        "spectral_distance": with_distance_noise(spectral_distances(tables["spectra"]), noise, "metric"),
+        "spectral_distance": with_distance_noise(
+            spectral_distances(tables["spectra"]), noise, "metric"
+        ),
     }
     if files.labelled:
         reports = [read_json(path)["volumes_of_labels_mL"] for path in files.labelled]
-        volumes = [{int(label): ml for label, ml in report.items()} for report in reports]
-        brains = [LabelledBrain(*brain, by_label) for brain, by_label in zip(params.labelled, volumes, strict=True)]
+        volumes = [
+            {int(label): ml for label, ml in report.items()} for report in reports
+        ]
+        brains = [
+            LabelledBrain(*brain, by_label)
+            for brain, by_label in zip(params.labelled, volumes, strict=True)
+        ]
         norms = published_norms(read_yaml(files.norms))
         tables["volumes"], tables["published_centiles"] = volume_tables(brains, norms)
     write_json(snakemake.output.norms, {"population": population, **cohort.plain})

@@ -1,4 +1,5 @@
-"""Write the shapes that a start brain would have in later weeks if it grew as an atlas."""
+"""Write the shapes that a start brain would have in later weeks if it grew as an
+atlas."""
 
 import numpy as np
 
@@ -8,7 +9,12 @@ from gyriflow.growth.atlas_path import AtlasPath
 from gyriflow.growth.expected import predict_shapes
 from gyriflow.growth.series_shapes import SeriesShapes, sizes_of
 from gyriflow.io.files import read_json
-from gyriflow.io.registrations import WeeklyShapes, read_correspondence, read_weekly_shapes, write_weekly_shapes
+from gyriflow.io.registrations import (
+    WeeklyShapes,
+    read_correspondence,
+    read_weekly_shapes,
+    write_weekly_shapes,
+)
 from gyriflow.io.surfaces import read_pose
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.norms import cohort_from_plain
@@ -17,13 +23,21 @@ from gyriflow.step import step
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh, kept = read_tetrahedral_mesh(files.mesh), read_weekly_shapes(files.path)
-    path = AtlasPath(kept.tets, SeriesShapes(kept.weeks.tolist(), kept.positions, kept.stops))
+    path = AtlasPath(
+        kept.tets, SeriesShapes(kept.weeks.tolist(), kept.positions, kept.stops)
+    )
     pair_of_poses = zip(files.reports, params.posed, strict=True)
-    poses = [np.eye(4) if is_posed else read_pose(report).world for report, is_posed in pair_of_poses]
+    poses = [
+        np.eye(4) if is_posed else read_pose(report).world
+        for report, is_posed in pair_of_poses
+    ]
     pair = between_moved(read_correspondence(files.correspondence[0]), *poses)
     # labels whose sulci stay fused have none to open; given surfaces count as open
     opened = read_json(files.reports[1]).get("sulci", {"sheets": 1}).get("sheets")
-    options = {"further_weeks": params.further_weeks, "open_sulci": bool(params.opens_sulci and opened)}
+    options = {
+        "further_weeks": params.further_weeks,
+        "open_sulci": bool(params.opens_sulci and opened),
+    }
     if files.norms:
         weeks = [kept.weeks[number] for number in path.observed]
         options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(weeks)
@@ -35,5 +49,7 @@ with step(snakemake.log[0]):
     found = predict_shapes(mesh, *growth, ElasticFit, **options)
     sizes, ages = sizes_of(mesh, found.positions), found.ages.table()
     special = found.shapes.stops, found.between
-    shapes = WeeklyShapes(np.array(found.weeks), found.positions, sizes, found.baselines, ages, *special)
+    shapes = WeeklyShapes(
+        np.array(found.weeks), found.positions, sizes, found.baselines, ages, *special
+    )
     write_weekly_shapes(snakemake.output[0], shapes)

@@ -1,4 +1,5 @@
-"""Prepare a run: write its parameters, their maps on the start mesh, and the mesh's zones and fields."""
+"""Prepare a run: write its parameters, their maps on the start mesh, and the mesh's
+zones and fields."""
 
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.anatomy.plausible import require_plausible_thickness
@@ -24,12 +25,23 @@ with step(snakemake.log[0]):
         path = ", ".join(source["map"])
         if source["surface"]:
             surface, values = read_surface_maps(source["map"], source["surface"])
-            surface = on_mesh.move_to_mesh(mesh.vertices[boundary_surface(mesh)[1]], surface, pose.of_file())
-            maps[name] = on_mesh.vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
+            surface = on_mesh.move_to_mesh(
+                mesh.vertices[boundary_surface(mesh)[1]], surface, pose.of_file()
+            )
+            maps[name] = on_mesh.vertex_map_on_mesh(
+                mesh.vertices, facets, surface, values, path
+            )
         else:
-            (values, affine), motion = read_volume_map(path, params.affine_from), pose.of_volume(path)
-            maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, values, motion @ affine, path)
-        on_mesh.require_within(maps[name], bounds_of(FoldingSettings.model_fields[name]), path)
+            (values, affine), motion = (
+                read_volume_map(path, params.affine_from),
+                pose.of_volume(path),
+            )
+            maps[name] = on_mesh.volume_map_on_mesh(
+                mesh.vertices, values, motion @ affine, path
+            )
+        on_mesh.require_within(
+            maps[name], bounds_of(FoldingSettings.model_fields[name]), path
+        )
         if name == "thickness_mm":
             require_plausible_thickness(maps[name], source["curve"], path)
     if files.targets:
@@ -37,15 +49,27 @@ with step(snakemake.log[0]):
         passed, stops = targets.passed, targets.stops
         weekly = targets.weeks[passed].tolist()
         sizes = {
-            name: dict(zip(weekly, values[passed].tolist(), strict=True)) for name, values in targets.sizes.items()
+            name: dict(zip(weekly, values[passed].tolist(), strict=True))
+            for name, values in targets.sizes.items()
         }
         maps |= target_maps(weekly[1:], targets.positions[passed[1:]])
     curves = read_table(files.curves) if files.curves else None
-    inputs = params.settings, params.weeks, read_json(files.surface), sizes, stops, curves, params.series
+    inputs = (
+        params.settings,
+        params.weeks,
+        read_json(files.surface),
+        sizes,
+        stops,
+        curves,
+        params.series,
+    )
     write_yaml(output.params, parameters := run_parameters(*inputs))
     if maps:
         write_maps(output.maps, maps)
     regions = start_regions(
-        mesh, parameters_from(parameters), maps, lambda mesh: nearer_left(mesh, *map(read_surface, files.sides))
+        mesh,
+        parameters_from(parameters),
+        maps,
+        lambda mesh: nearer_left(mesh, *map(read_surface, files.sides)),
     )
     write_regions(output.regions, regions)

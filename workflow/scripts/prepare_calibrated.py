@@ -1,4 +1,5 @@
-"""Prepare a run of the calibration: the parameters of the base run with the values of its round."""
+"""Prepare a run of the calibration: the parameters of the base run with the values of
+its round."""
 
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.compare.calibration import calibrated_parameters
@@ -14,10 +15,18 @@ files, output = snakemake.input, snakemake.output
 with step(snakemake.log[0]):
     design = read_table(files.design).set_index("run")
     values = design.loc[snakemake.wildcards.run].astype(float).to_dict()
-    parameters = calibrated_parameters(read_yaml(files.base), values, snakemake.params.week)
+    parameters = calibrated_parameters(
+        read_yaml(files.base), values, snakemake.params.week
+    )
     write_yaml(output.params, parameters)
-    mesh, maps = read_tetrahedral_mesh(files.mesh), read_maps(files.maps) if files.maps else {}
+    mesh, maps = (
+        read_tetrahedral_mesh(files.mesh),
+        read_maps(files.maps) if files.maps else {},
+    )
     regions = start_regions(
-        mesh, parameters_from(parameters), maps, lambda mesh: nearer_left(mesh, *map(read_surface, files.sides))
+        mesh,
+        parameters_from(parameters),
+        maps,
+        lambda mesh: nearer_left(mesh, *map(read_surface, files.sides)),
     )
     write_regions(output.regions, regions)

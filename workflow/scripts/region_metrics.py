@@ -13,6 +13,12 @@ with step(snakemake.log[0]):
         {side: read_surface(files[side]) for side in SIDES},
         {side: read_vertex_maps(files[f"{side}_maps"]) for side in SIDES},
         {side: labels for side, (labels, _) in regions.items()},
-        {number: name for _, names in regions.values() for number, name in names.items()},
+        {
+            number: name
+            for _, names in regions.values()
+            for number, name in names.items()
+        },
     )
-    write_table(snakemake.output[0], table.assign(**columns)[[*columns, *table.columns]])
+    write_table(
+        snakemake.output[0], table.assign(**columns)[[*columns, *table.columns]]
+    )

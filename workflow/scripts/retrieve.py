@@ -7,4 +7,10 @@ from gyriflow.step import step
 
 params = snakemake.params
 with step(snakemake.log[0]):
-    fetch(snakemake.output[0], params.url, logging.info, sha256=params.sha256, size=params.size)
+    fetch(
+        snakemake.output[0],
+        params.url,
+        logging.info,
+        sha256=params.sha256,
+        size=params.size,
+    )

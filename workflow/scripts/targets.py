@@ -1,4 +1,5 @@
-"""Write the shapes of a brain's mesh in the later weeks of its own series: targets of a run, or an atlas' path."""
+"""Write the shapes of a brain's mesh in the later weeks of its own series: targets of a
+run, or an atlas' path."""
 
 from contextlib import suppress
 from itertools import pairwise
@@ -12,7 +13,12 @@ from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.series_shapes import SeriesShapes, follow_series, sizes_of
 from gyriflow.io.files import read_json
 from gyriflow.io.origins import present_key
-from gyriflow.io.registrations import WeeklyShapes, read_correspondence, stored_name, write_weekly_shapes
+from gyriflow.io.registrations import (
+    WeeklyShapes,
+    read_correspondence,
+    stored_name,
+    write_weekly_shapes,
+)
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.unfinished import unfinished_series
@@ -22,19 +28,35 @@ files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
     surfaces = [read_surface(path) for path in files.surfaces]
-    # mesh and surfaces are posed; correspondences are too, or are in the coordinates of the files
+    # mesh and surfaces are posed; correspondences are too, or are in the coordinates of
+    # the files
     poses = pairwise(read_pose(path).world for path in (files.report, *files.reports))
     pairs = [
         between_moved(
             read_correspondence(path),
-            *(np.eye(4) if is_posed else pose for is_posed, pose in zip(posed, pair, strict=True)),
+            *(
+                np.eye(4) if is_posed else pose
+                for is_posed, pose in zip(posed, pair, strict=True)
+            ),
         )
-        for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
+        for path, posed, pair in zip(
+            files.correspondences, params.posed, poses, strict=True
+        )
     ]
     # labels whose sulci stay fused have none to open; given surfaces count as open
-    opened = [read_json(path).get("sulci", {"sheets": 1}).get("sheets") for path in files.reports]
+    opened = [
+        read_json(path).get("sulci", {"sheets": 1}).get("sheets")
+        for path in files.reports
+    ]
     open_sulci = params.opens_sulci and any(opened)
-    made_from = [files.mesh, files.data, files.report, *files.correspondences, *files.surfaces, *files.reports]
+    made_from = [
+        files.mesh,
+        files.data,
+        files.report,
+        *files.correspondences,
+        *files.surfaces,
+        *files.reports,
+    ]
     settings = [params.weeks, params.posed, open_sulci, params.code]
     unfinished = unfinished_series(snakemake.output[0], made_from, settings)
     state = unfinished.read()
@@ -64,5 +86,7 @@ with step(snakemake.log[0]):
     write_weekly_shapes(snakemake.output[0], shapes)
     if params.store and key:
         with suppress(StorageError):
-            write_weekly_shapes(Path(params.store, stored_name(snakemake.wildcards.brain, key)), shapes)
+            write_weekly_shapes(
+                Path(params.store, stored_name(snakemake.wildcards.brain, key)), shapes
+            )
     unfinished.remove()

@@ -1,4 +1,5 @@
-"""Fill the start brain's pial surface with tetrahedra; a refused mesh is kept for inspection."""
+"""Fill the start brain's pial surface with tetrahedra; a refused mesh is kept for
+inspection."""
 
 from pathlib import Path
 
@@ -17,7 +18,10 @@ with step(snakemake.log[0]):
     refused = Path(params.refused)
     surface = read_surface(snakemake.input[0])
     mesh = tetrahedralise(surface, **params.settings)
-    summary, fields = quality_summary(mesh, surface), {"radius_ratio": radius_ratios(mesh)}
+    summary, fields = (
+        quality_summary(mesh, surface),
+        {"radius_ratio": radius_ratios(mesh)},
+    )
     with making_files(refused, refused.with_name(".refused-files.json")):
         try:
             refuse_bad_mesh(mesh, summary, refused / "brain.xdmf", **params.gates)

@@ -1,6 +1,11 @@
 """Compare a run with the observed brains week by week."""
 
-from gyriflow.compare.comparison import ObservedBrain, add_curves, comparison_table, simple_predictions
+from gyriflow.compare.comparison import (
+    ObservedBrain,
+    add_curves,
+    comparison_table,
+    simple_predictions,
+)
 from gyriflow.compare.shapes import PreparedSurface
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
@@ -17,34 +22,58 @@ files, params, output = snakemake.input, snakemake.params, snakemake.output
 
 def prepared(name, number):
     """Read a surface that was prepared for comparison in a week."""
-    return PreparedSurface(read_surface(files[name][number]), **read_vertex_maps(files[f"{name}_maps"][number]))
+    return PreparedSurface(
+        read_surface(files[name][number]),
+        **read_vertex_maps(files[f"{name}_maps"][number]),
+    )
 
 
 def simple_models():
-    """Yield for each week the predictions without mechanics, the same for all runs from a start brain."""
+    """Yield for each week the predictions without mechanics, the same for all runs from
+    a start brain."""
     targets = read_weekly_shapes(files.targets)
     start, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
     atlas = dict(zip(params.atlas_weeks, map(read_surface, files.atlas), strict=True))
     for week in params.weeks:
         at = targets.index(week)
         target = TriangleMesh(targets.positions[at][used], start.faces)
-        registered = {name: TriangleMesh(points[at], start.faces) for name, points in targets.surfaces.items()}
+        registered = {
+            name: TriangleMesh(points[at], start.faces)
+            for name, points in targets.surfaces.items()
+        }
         yield simple_predictions(start, target, registered, atlas.get(week))
 
 
 with step(snakemake.log[0]):
-    models = {week: {"run": read_surface(path)} for week, path in zip(params.weeks, files.simulated, strict=True)}
+    models = {
+        week: {"run": read_surface(path)}
+        for week, path in zip(params.weeks, files.simulated, strict=True)
+    }
     # these are written with the run that grows as the atlas
     if params.get("of_atlas"):
-        models = {week: models[week] | simple for week, simple in zip(models, simple_models(), strict=True)}
+        models = {
+            week: models[week] | simple
+            for week, simple in zip(models, simple_models(), strict=True)
+        }
     observed = {}
     for number, week in enumerate(params.weeks):
         baselines = {name: prepared(name, number) for name in ("start", "adjacent")}
         surface = read_surface(files.whole[number])
-        observed[week] = ObservedBrain(params.observed[number], surface, prepared("observed", number), baselines)
-    labels = {name: params[name] for name in ("run", "kind", "start_week")} | {"start": snakemake.wildcards.brain}
-    table = comparison_table(labels, models, observed, radius_mm=params.curvature_radius_mm)
+        observed[week] = ObservedBrain(
+            params.observed[number], surface, prepared("observed", number), baselines
+        )
+    labels = {name: params[name] for name in ("run", "kind", "start_week")} | {
+        "start": snakemake.wildcards.brain
+    }
+    table = comparison_table(
+        labels, models, observed, radius_mm=params.curvature_radius_mm
+    )
     if files.get("params"):
-        growth, curves = read_yaml(files.params)["growth"], read_table(files.curves) if files.curves else None
-        table = add_curves(table, sizes_on_curves(growth, curves, params.series, params.weeks))
+        growth, curves = (
+            read_yaml(files.params)["growth"],
+            read_table(files.curves) if files.curves else None,
+        )
+        table = add_curves(
+            table, sizes_on_curves(growth, curves, params.series, params.weeks)
+        )
     write_table(output.table, table)

@@ -1,8 +1,15 @@
-"""Make the white surfaces of a brain from its labels or from given files, and measure them."""
+"""Make the white surfaces of a brain from its labels or from given files, and measure
+them."""
 
 from gyriflow.anatomy.thickness import white_from_labels, white_from_surfaces
 from gyriflow.io.files import write_table
-from gyriflow.io.surfaces import STRUCTURES, read_pose, read_surface, write_surface, write_vertex_maps
+from gyriflow.io.surfaces import (
+    STRUCTURES,
+    read_pose,
+    read_surface,
+    write_surface,
+    write_vertex_maps,
+)
 from gyriflow.metrics.measure import measure_white
 from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
@@ -10,16 +17,26 @@ from gyriflow.step import step
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 labels, settings = params.labels, dict(params.surface)
 with step(snakemake.log[0], *files.given):
-    pial, pose = {side: read_surface(files[side]) for side in SIDES if files.get(side)}, read_pose(files.report)
+    pial, pose = (
+        {side: read_surface(files[side]) for side in SIDES if files.get(side)},
+        read_pose(files.report),
+    )
     max_hole_mm = settings.pop("max_hole_mm")
     if labels:
         volume = labels.read(cropped=True)
-        sides = white_from_labels(volume.labels, volume.affine, labels.scheme, pial, pose, **settings)
+        sides = white_from_labels(
+            volume.labels, volume.affine, labels.scheme, pial, pose, **settings
+        )
     else:
         whites = {name: read_surface(path, name) for name, path in params.white.items()}
-        sides = white_from_surfaces(whites, pial, pose, max_hole_mm=max_hole_mm, **settings)
+        sides = white_from_surfaces(
+            whites, pial, pose, max_hole_mm=max_hole_mm, **settings
+        )
     table, maps = measure_white(sides, params.curvature_radius_mm)
-    write_table(output.metrics, table.assign(**params.columns)[[*params.columns, *table.columns]])
+    write_table(
+        output.metrics,
+        table.assign(**params.columns)[[*params.columns, *table.columns]],
+    )
     for side, mesh in sides.items():
         write_surface(output[f"{side}_surface"], mesh, STRUCTURES[side], "GrayWhite")
         write_vertex_maps(output[f"{side}_maps"], maps[side], STRUCTURES[side])

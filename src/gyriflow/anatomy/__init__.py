@@ -1,1 +1,2 @@
-"""Pial surfaces from label volumes and surface files: posed, closed, clean, split at the fissure."""
+"""Pial surfaces from label volumes and surface files: posed, closed, clean, split at
+the fissure."""

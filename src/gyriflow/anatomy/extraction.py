@@ -1,4 +1,5 @@
-"""Masks of voxels: smoothing, topology correction, removal of parts that hang by a stalk, and isosurfaces."""
+"""Masks of voxels: smoothing, topology correction, removal of parts that hang by a
+stalk, and isosurfaces."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -22,33 +23,54 @@ LEVEL = 0.5
 EDGE_SLOPE = 0.4
 # smaller groups of outside voxels that smoothing closes are roughness of the labels
 MIN_SLIT_VOXELS = 20
-# a part at least this large, relative to the largest, is kept: hemispheres may not touch
+# a part at least this large, relative to the largest, is kept: hemispheres may not
+# touch
 COMPARABLE = 0.2
-# inside voxels are connected through faces only, outside voxels through edges and corners too
+# inside voxels are connected through faces only, outside voxels through edges and
+# corners too
 INSIDE = ndimage.generate_binary_structure(3, 1)
 OUTSIDE = ndimage.generate_binary_structure(3, 3)
-# the 27 cells of a 3 × 3 × 3 block, and bit masks of those that share a corner, an edge or a face with the middle one
+# the 27 cells of a 3 × 3 × 3 block, and bit masks of those that share a corner, an edge
+# or a face with the middle one
 CELLS = np.array(list(np.ndindex(3, 3, 3)))
 CORNER_CELLS, EDGE_CELLS, FACE_CELLS = (
-    sum(1 << place for place, cell in enumerate(CELLS) if 0 < np.abs(cell - 1).sum() <= limit) for limit in (3, 2, 1)
+    sum(
+        1 << place
+        for place, cell in enumerate(CELLS)
+        if 0 < np.abs(cell - 1).sum() <= limit
+    )
+    for limit in (3, 2, 1)
 )
 BY_CORNERS, BY_FACES = (
-    [sum(1 << place for place, cell in enumerate(CELLS) if 0 < distance(cell - middle) <= 1) for middle in CELLS]
-    for distance in (lambda offset: np.abs(offset).max(), lambda offset: np.abs(offset).sum())
+    [
+        sum(
+            1 << place
+            for place, cell in enumerate(CELLS)
+            if 0 < distance(cell - middle) <= 1
+        )
+        for middle in CELLS
+    ]
+    for distance in (
+        lambda offset: np.abs(offset).max(),
+        lambda offset: np.abs(offset).sum(),
+    )
 )
 # bytes 0 and 1 as the digits of a binary number
 DIGITS = bytes.maketrans(b"\0\1", b"01")
 # radii in voxels of the openings and closings that find bridges and tunnels
 RADII = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
-# margins in voxels for examining how a change affects connectivity; the last is the whole volume
+# margins in voxels for examining how a change affects connectivity; the last is the
+# whole volume
 MARGINS = (4, 16, 64, 100_000)
-# values of a field, and distances in voxels, that agree to so many decimals are equal, whatever the order of sums
+# values of a field, and distances in voxels, that agree to so many decimals are equal,
+# whatever the order of sums
 FIELD_DECIMALS = 4
 # changed voxels get the level plus or minus this value
 CHANGED_STEP = 0.2
 # stalks are thinner than twice this
 NECK_RADIUS_MM = 1.6
-# limits of the stalk's cross-section and of the size of the hanging part: larger ones belong to the brain
+# limits of the stalk's cross-section and of the size of the hanging part: larger ones
+# belong to the brain
 MAX_NECK_MM2 = 12.0
 MAX_HANGING_SHARE = 0.05
 MIN_HANGING_MM3 = 15.0
@@ -57,20 +79,23 @@ STALK_MM = 4.0
 
 
 def crop(mask: Mask) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
-    """Return the bounding box of an (i, j, k) mask, and the (3,) index of its first voxel padded by `PAD_VOXELS`."""
+    """Return the bounding box of an (i, j, k) mask, and the (3,) index of its first
+    voxel padded by `PAD_VOXELS`."""
     box = ndimage.find_objects(mask.astype(np.uint8))[0]
     return box, np.array([side.start for side in box]) - PAD_VOXELS
 
 
 def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
-    """Return the affine of a volume that was cropped or padded to begin at voxel `first`."""
+    """Return the affine of a volume that was cropped or padded to begin at voxel
+    `first`."""
     moved = np.array(affine, dtype=float)
     moved[:3, 3] += moved[:3, :3] @ first
     return moved
 
 
 def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
-    """Yield for each connected part (faces, edges, corners) of a mask its box plus one voxel, and its mask there."""
+    """Yield for each connected part (faces, edges, corners) of a mask its box plus one
+    voxel, and its mask there."""
     number, _ = ndimage.label(mask, OUTSIDE)
     for index, tight in enumerate(ndimage.find_objects(number), start=1):
         box = _wider(tight, 1)
@@ -81,30 +106,41 @@ def _wider(box: tuple[slice, ...], margin: int) -> tuple[slice, ...]:
     return tuple(slice(max(side.start - margin, 0), side.stop + margin) for side in box)
 
 
-def smooth_mask(mask: Mask, smoothing_voxels: float = SMOOTHING_VOXELS) -> NDArray[np.float32]:
-    """Return the mask smoothed by a Gaussian of the given σ in voxels, as a field from 0 to 1."""
+def smooth_mask(
+    mask: Mask, smoothing_voxels: float = SMOOTHING_VOXELS
+) -> NDArray[np.float32]:
+    """Return the mask smoothed by a Gaussian of the given σ in voxels, as a field from
+    0 to 1."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
-def remove_bridges(mask: Mask, field: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
-    """Reopen slits of a mask that smoothing has closed; return the smoothed field and the number of voxels reopened.
+def remove_bridges(
+    mask: Mask, field: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], int]:
+    """Reopen slits of a mask that smoothing has closed; return the smoothed field and
+    the number of voxels reopened.
 
-    A slit is a group of outside voxels connected to the outside, one voxel wide: a sulcus or the fissure. Its voxels
-    get the value that places the surface at its walls. Small groups, and slits that would pierce the mask, stay closed.
+    A slit is a group of outside voxels connected to the outside, one voxel wide: a
+    sulcus or the fissure. Its voxels get the value that places the surface at its
+    walls. Small groups, and slits that would pierce the mask, stay closed.
     """
     number, _ = ndimage.label(~mask)
     # the volume is padded, so its first voxel is outside
     closed = (number == number[0, 0, 0]) & (field > LEVEL)
     number, gains = _parts_with_gains(field > LEVEL, closed)
-    opened = (np.bincount(number[closed], minlength=len(gains)) >= MIN_SLIT_VOXELS) & (gains == 0)
+    opened = (np.bincount(number[closed], minlength=len(gains)) >= MIN_SLIT_VOXELS) & (
+        gains == 0
+    )
     slits = closed & opened[number]
-    # the wall lies half-way between a voxel of the slit and the next one, which has this value at a slit 1 voxel wide
+    # the wall lies half-way between a voxel of the slit and the next one, which has
+    # this value at a slit 1 voxel wide
     wall_value = 1.0 - (ndtr(1.5 / SMOOTHING_VOXELS) - ndtr(0.5 / SMOOTHING_VOXELS))
     return np.where(slits, np.float32(1.0 - wall_value), field), int(slits.sum())
 
 
 def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats]:
-    """Interpolate an (i, j, k) field linearly to voxels `factor` times smaller; return it and its affine."""
+    """Interpolate an (i, j, k) field linearly to voxels `factor` times smaller; return
+    it and its affine."""
     fine = np.array(affine, dtype=float)
     fine[:3, :3] /= factor
     # the first fine voxel's centre lies nearer to the first coarse voxel's corner
@@ -113,57 +149,80 @@ def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats
 
 
 def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
-    """Return the mask's parts of comparable size to its largest, cavities filled; parts and voxels dropped."""
+    """Return the mask's parts of comparable size to its largest, cavities filled; parts
+    and voxels dropped."""
     number, count = ndimage.label(mask)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0
     is_main = (sizes >= comparable * sizes.max()) & (sizes > 0)
     dropped = ~is_main & (sizes > 0)
-    return ndimage.binary_fill_holes(is_main[number]), int(dropped.sum()), int(sizes[dropped].sum())
+    return (
+        ndimage.binary_fill_holes(is_main[number]),
+        int(dropped.sum()),
+        int(sizes[dropped].sum()),
+    )
 
 
 def make_simple(
     field: NDArray[np.float32], comparable: float = COMPARABLE
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Return the field with a level set of main parts without cavities or handles, and a report; see `main_parts`."""
+    """Return the field with a level set of main parts without cavities or handles, and
+    a report; see `main_parts`."""
     inside = field > LEVEL
     if not inside.any():
         raise MeshError("the mask is empty after smoothing")
     main, parts, voxels = main_parts(inside, comparable)
-    field = np.where(main, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)).astype(np.float32)
+    field = np.where(
+        main, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)
+    ).astype(np.float32)
     field, handles_repaired = without_handles(field)
-    dropped = {"parts_dropped": parts, "voxels_dropped": voxels, "voxels_filled": int((main & ~inside).sum())}
+    dropped = {
+        "parts_dropped": parts,
+        "voxels_dropped": voxels,
+        "voxels_filled": int((main & ~inside).sum()),
+    }
     return unambiguous(field), dropped | handles_repaired
 
 
 def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
-    """Return the outward surface in mm on which an (i, j, k) field is one half; MeshError if it encloses no volume."""
+    """Return the outward surface in mm on which an (i, j, k) field is one half;
+    MeshError if it encloses no volume."""
     vertices, faces, _, _ = marching_cubes(field, LEVEL, gradient_direction="ascent")
     # transformed() flips the faces if the affine mirrors (LAS, LPI, …)
     mesh = transformed(TriangleMesh(vertices, faces), affine)
     if signed_volume(mesh) <= 0:
-        raise MeshError("the surface of the mask encloses no volume", found=f"{signed_volume(mesh):.3g} mm³")
+        raise MeshError(
+            "the surface of the mask encloses no volume",
+            found=f"{signed_volume(mesh):.3g} mm³",
+        )
     return mesh
 
 
 def handles(mask: Mask) -> int:
-    """Return the number of handles of an (i, j, k) mask: parts plus cavities minus Euler number."""
+    """Return the number of handles of an (i, j, k) mask: parts plus cavities minus
+    Euler number."""
     parts, outside = _pieces(np.pad(mask, 1))
     return parts + outside - 1 - _euler_number(mask)
 
 
-def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, int]]:
-    """Cut or fill the handles of the level set at one half of an (i, j, k) field; return the field and the counts.
+def without_handles(
+    field: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], dict[str, int]]:
+    """Cut or fill the handles of the level set at one half of an (i, j, k) field;
+    return the field and the counts.
 
-    Patches that an opening removes or a closing adds are tried, smallest first. One that removes a handle is applied
-    but for its simple points (Bertrand and Malandain 1994, doi 10.1016/0167-8655(94)90046-9). Equal sizes are decided
-    by the field and by distances, not by the order of voxels, so that a mirrored mask has mirrored corrections.
+    Patches that an opening removes or a closing adds are tried, smallest first. One
+    that removes a handle is applied but for its simple points (Bertrand and Malandain
+    1994, doi 10.1016/0167-8655(94)90046-9). Equal sizes are decided by the field and by
+    distances, not by the order of voxels, so that a mirrored mask has mirrored
+    corrections.
     """
     original = field > 0.5
     mask = original.copy()
     remaining = handles(mask)
     counts = {False: 0, True: 0}
-    # in the second round a cut may leave cavities connected to the outside through edges and corners only
+    # in the second round a cut may leave cavities connected to the outside through
+    # edges and corners only
     for closed_by, radius in product((INSIDE, OUTSIDE), RADII):
         if remaining == 0:
             break
@@ -171,13 +230,21 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
             # an earlier change may have touched this patch
             patch = patch & (mask[box] != fills)
             changed = np.where(patch, fills, mask[box])
-            if remaining == 0 or not patch.any() or _euler_number(changed) <= _euler_number(mask[box]):
+            if (
+                remaining == 0
+                or not patch.any()
+                or _euler_number(changed) <= _euler_number(mask[box])
+            ):
                 continue
-            if removed := _change(mask, box, _minimal_change(mask[box], changed, field[box]), closed_by):
+            if removed := _change(
+                mask, box, _minimal_change(mask[box], changed, field[box]), closed_by
+            ):
                 remaining -= removed
                 counts[fills] += 1
     added, cut = mask & ~original, original & ~mask
-    changed = np.where(added, 0.5 + CHANGED_STEP, np.where(cut, 0.5 - CHANGED_STEP, field)).astype(field.dtype)
+    changed = np.where(
+        added, 0.5 + CHANGED_STEP, np.where(cut, 0.5 - CHANGED_STEP, field)
+    ).astype(field.dtype)
     return changed, {
         "bridges_cut": counts[False],
         "voxels_cut_from_bridges": int(cut.sum()),
@@ -190,8 +257,9 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
 def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     """Adjust a field so that its isosurface connects inside voxels through faces only.
 
-    Where inside and outside alternate around a square, or two opposite corners of a cube differ from the other six,
-    marching cubes decides from the values; these are changed so that it never connects the inside.
+    Where inside and outside alternate around a square, or two opposite corners of a
+    cube differ from the other six, marching cubes decides from the values; these are
+    changed so that it never connects the inside.
     """
     mask = field > 0.5
     ambiguous = np.zeros_like(mask)
@@ -205,7 +273,10 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     ends = (slice(None, -1), slice(1, None))
     count = sum(mask[i, j, k].astype(np.int8) for i in ends for j in ends for k in ends)
     for j, k in np.ndindex(2, 2):
-        low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
+        low, high = (
+            mask[ends[0], ends[j], ends[k]],
+            mask[ends[1], ends[1 - j], ends[1 - k]],
+        )
         opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
         for corner in np.ndindex(2, 2, 2):
             ambiguous[tuple(ends[side] for side in corner)] |= opposite
@@ -214,7 +285,8 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def dilated(mask: Mask, radius: float) -> Mask:
-    """Dilate an (i, j, k) mask by a ball of at most 10 voxels; a distance transform takes ten times as long."""
+    """Dilate an (i, j, k) mask by a ball of at most 10 voxels; a distance transform
+    takes ten times as long."""
     squared = np.where(mask, 0, int(radius**2) + 1).astype(np.uint8)
     for axis in range(3):
         nearest = squared.copy()
@@ -226,15 +298,22 @@ def dilated(mask: Mask, radius: float) -> Mask:
     return squared <= radius**2
 
 
-def _patches(mask: Mask, field: NDArray[np.float32], radius: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
+def _patches(
+    mask: Mask, field: NDArray[np.float32], radius: float
+) -> list[tuple[bool, tuple[slice, ...], Mask]]:
     closed = ~dilated(~dilated(mask, radius), radius)
     opened = dilated(~dilated(~mask, radius), radius)
     patches = []
     for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):
         number, gains = _parts_with_gains(mask, change)
-        patches += [(fills, box, patch) for box, patch in parts_in_boxes(change & (gains > 0)[number])]
+        patches += [
+            (fills, box, patch)
+            for box, patch in parts_in_boxes(change & (gains > 0)[number])
+        ]
 
-    def size_and_change(item: tuple[bool, tuple[slice, ...], Mask]) -> tuple[int, float]:
+    def size_and_change(
+        item: tuple[bool, tuple[slice, ...], Mask],
+    ) -> tuple[int, float]:
         _, box, patch = item
         needed = np.abs(field[box][patch] - LEVEL).sum(dtype=float)
         return int(patch.sum()), round(float(needed), FIELD_DECIMALS)
@@ -243,20 +322,28 @@ def _patches(mask: Mask, field: NDArray[np.float32], radius: float) -> list[tupl
 
 
 def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) -> int:
-    """Change a mask in a box if this removes handles and preserves its parts; return the number of handles removed.
+    """Change a mask in a box if this removes handles and preserves its parts; return
+    the number of handles removed.
 
-    Voxels that the change connects or separates may be connected outside the box, so ever wider boxes are examined.
-    Cavities are filled; the connectivity `closed_by` defines them.
+    Voxels that the change connects or separates may be connected outside the box, so
+    ever wider boxes are examined. Cavities are filled; the connectivity `closed_by`
+    defines them.
     """
     for margin in MARGINS:
         wide = _wider(box, margin)
-        inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, wide, strict=True))
+        inner = tuple(
+            slice(a.start - b.start, a.stop - b.start)
+            for a, b in zip(box, wide, strict=True)
+        )
         before, after = mask[wide], mask[wide].copy()
         after[inner] = changed
         after = ndimage.binary_fill_holes(after, closed_by)
         gain = _euler_number(after) - _euler_number(before)
         # the frame connects everything that reaches the border of the box
-        framed = [ndimage.label(np.pad(state, 1, constant_values=True), INSIDE)[1] for state in (before, after)]
+        framed = [
+            ndimage.label(np.pad(state, 1, constant_values=True), INSIDE)[1]
+            for state in (before, after)
+        ]
         if gain <= 0 or framed[0] < framed[1]:
             return 0
         if _pieces(before) == _pieces(after):
@@ -270,7 +357,8 @@ def _pieces(mask: Mask) -> tuple[int, int]:
 
 
 def _euler_cells(mask: Mask) -> NDArray[np.int8]:
-    """Return each 2 × 2 × 2 block's part of the Euler number, at its first voxel; faces connect voxels."""
+    """Return each 2 × 2 × 2 block's part of the Euler number, at its first voxel; faces
+    connect voxels."""
     x, y, z = (_pairs(mask, axis) for axis in range(3))
     xy, xz, yz = _pairs(x, 1), _pairs(x, 2), _pairs(y, 2)
     return mask.astype(np.int8) - x - y - z + xy + xz + yz - _pairs(xy, 2)
@@ -286,8 +374,11 @@ def _euler_number(mask: Mask) -> int:
     return int(_euler_cells(mask).sum(dtype=np.int64))
 
 
-def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Label the parts of a `change` of the mask; return the labels, and by label the change of the Euler number."""
+def _parts_with_gains(
+    mask: Mask, change: Mask
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Label the parts of a `change` of the mask; return the labels, and by label the
+    change of the Euler number."""
     number, count = ndimage.label(change, OUTSIDE)
     gain = _euler_cells(mask ^ change) - _euler_cells(mask)
     places, last = np.argwhere(gain), np.array(mask.shape) - 1
@@ -299,14 +390,17 @@ def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDAr
 
 
 def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
-    """Return `after` with voxels restored to `before` where topology allows, those far from one half first.
+    """Return `after` with voxels restored to `before` where topology allows, those far
+    from one half first.
 
     Of equal ones, those far from the middle of the change come first.
     """
     mask = np.pad(after, 1)
     places = np.argwhere(before != after)
     from_half = np.abs(field[tuple(places.T)] - LEVEL).round(FIELD_DECIMALS)
-    from_middle = np.linalg.norm(places - places.mean(axis=0), axis=1).round(FIELD_DECIMALS)
+    from_middle = np.linalg.norm(places - places.mean(axis=0), axis=1).round(
+        FIELD_DECIMALS
+    )
     places = places[np.lexsort((-from_middle, -from_half))] + 1
     is_progressing = True
     while is_progressing and len(places):
@@ -323,18 +417,22 @@ def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Ma
 
 @lru_cache(maxsize=2**16)
 def is_simple(block: bytes) -> bool:
-    """Return whether the middle voxel of a 3 × 3 × 3 block can be flipped without a change of topology."""
+    """Return whether the middle voxel of a 3 × 3 × 3 block can be flipped without a
+    change of topology."""
     voxels = int(block[::-1].translate(DIGITS), 2)
     inside, outside = voxels & EDGE_CELLS, ~voxels & CORNER_CELLS
     touching = inside & FACE_CELLS
     if not touching or not outside:
         return False
     is_inside_connected = not touching & ~_connected(inside, touching, BY_FACES)
-    return is_inside_connected and not outside & ~_connected(outside, outside, BY_CORNERS)
+    return is_inside_connected and not outside & ~_connected(
+        outside, outside, BY_CORNERS
+    )
 
 
 def _connected(places: int, seeds: int, neighbours: list[int]) -> int:
-    """Return the places (bits of an integer) that are connected to the lowest bit of `seeds`."""
+    """Return the places (bits of an integer) that are connected to the lowest bit of
+    `seeds`."""
     reached = new = seeds & -seeds
     while new:
         lowest = new & -new
@@ -345,9 +443,11 @@ def _connected(places: int, seeds: int, neighbours: list[int]) -> int:
 
 
 def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
-    """Remove the parts of an (i, j, k) mask that hang by a stalk; return the mask and each part's volume and place.
+    """Remove the parts of an (i, j, k) mask that hang by a stalk; return the mask and
+    each part's volume and place.
 
-    A ball of 3.2 mm diameter cannot pass through a stalk, and its cross-section is at most 12 mm²; a gyrus is wider.
+    A ball of 3.2 mm diameter cannot pass through a stalk, and its cross-section is at
+    most 12 mm²; a gyrus is wider.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     depth = ndimage.distance_transform_edt(mask, sampling=size)
@@ -357,7 +457,9 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     sizes = np.bincount(number.ravel())[1:]
     large = sizes >= MAX_HANGING_SHARE * sizes.sum()
     main = np.isin(number, np.flatnonzero(large) + 1)
-    solid = mask & (ndimage.distance_transform_edt(~main, sampling=size) <= NECK_RADIUS_MM)
+    solid = mask & (
+        ndimage.distance_transform_edt(~main, sampling=size) <= NECK_RADIUS_MM
+    )
     max_voxels = MAX_HANGING_SHARE * mask.sum()
     hanging, reach = np.zeros_like(mask), NECK_RADIUS_MM + STALK_MM
     for part, tight in enumerate(ndimage.find_objects(number)):
@@ -368,8 +470,13 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
         near = ndimage.distance_transform_edt(~ball, sampling=size) <= reach
         loose, _ = ndimage.label(mask[box] & ~solid[box] & near, INSIDE)
         cut = np.isin(loose, np.setdiff1d(loose[ball], 0))
-        large_enough = cut.sum() * size.prod() >= MIN_HANGING_MM3 and cut.sum() < max_voxels
-        if large_enough and 0 < _contact_mm2(cut, mask[box] & ~cut, size) <= MAX_NECK_MM2:
+        large_enough = (
+            cut.sum() * size.prod() >= MIN_HANGING_MM3 and cut.sum() < max_voxels
+        )
+        if (
+            large_enough
+            and 0 < _contact_mm2(cut, mask[box] & ~cut, size) <= MAX_NECK_MM2
+        ):
             hanging[box] |= cut
     number, count = ndimage.label(hanging, INSIDE)
     remaining = mask & ~hanging
@@ -377,7 +484,11 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
         {
             "volume_mm3": float(part.sum() * size.prod()),
             "stalk_mm2": _contact_mm2(part, remaining, size),
-            "place_mm": (affine[:3, :3] @ np.argwhere(part).mean(axis=0) + affine[:3, 3]).round(1).tolist(),
+            "place_mm": (
+                affine[:3, :3] @ np.argwhere(part).mean(axis=0) + affine[:3, 3]
+            )
+            .round(1)
+            .tolist(),
         }
         for part in (number == n for n in range(1, count + 1))
     ]

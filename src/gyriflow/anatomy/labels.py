@@ -1,4 +1,5 @@
-"""Read a label volume by its scheme: mask and tissues of the cerebrum, checks of its labels, their layout and sides."""
+"""Read a label volume by its scheme: mask and tissues of the cerebrum, checks of its
+labels, their layout and sides."""
 
 import logging
 from collections.abc import Iterable, Iterator
@@ -20,23 +21,28 @@ log = logging.getLogger(__name__)
 
 Labels = NDArray[np.integer[Any]]
 
-# brains of the example atlas have cortex at 86 % or more of their surface; with a wrong scheme 48 % or less
+# brains of the example atlas have cortex at 86 % or more of their surface; with a wrong
+# scheme 48 % or less
 MIN_CORTEX_OUTSIDE = 0.5
-# share of voxel pairs of both hemispheres that must lie on the correct sides of each other
+# share of voxel pairs of both hemispheres that must lie on the correct sides of each
+# other
 MIN_SEPARATED = 0.9
 # less cortex than this at the cerebrum's surface gives a warning
 LITTLE_CORTEX = 0.7
 # a larger relative loss of volume gives a warning
 REPORTED_LOSS = 0.005
-# area of the slice at a border of the volume over that of the next one. None of 47 volumes of the atlases of Fidon et
-# al. 2021, CRL and Wu et al. 2021, cropped to the cerebrum, is taken as cut; of 1179 ends that lack up to 8 slices and
-# more than 0.5 % of the brain, 3 are missed
+# area of the slice at a border of the volume over that of the next one. None of 47
+# volumes of the atlases of Fidon et al. 2021, CRL and Wu et al. 2021, cropped to the
+# cerebrum, is taken as cut; of 1179 ends that lack up to 8 slices and more than 0.5 %
+# of the brain, 3 are missed
 CUT_SLICE_RATIO = 2 / 3
 # directions of rays from a voxel of fluid: to the faces, edges and corners of its cell
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1
-# fluid belongs to the cerebrum if more than this share of its rays hits the cerebrum's tissue
+# fluid belongs to the cerebrum if more than this share of its rays hits the cerebrum's
+# tissue
 ENCLOSED = 0.5
-# the same for unlabelled ventricles if no cortex is labelled, since rays in fissures hit cortex
+# the same for unlabelled ventricles if no cortex is labelled, since rays in fissures
+# hit cortex
 ENCLOSED_WITHOUT_CORTEX = 0.93
 # smoothing of the share of rays, in voxels
 RAY_SMOOTHING = 2.0
@@ -44,26 +50,32 @@ RAY_SMOOTHING = 2.0
 MIN_PART_SHARE = 0.02
 # smallest volume of a hemisphere relative to the other one, if the sides are labelled
 MIN_HEMISPHERE_RATIO = 0.04
-# unlabelled ventricles are searched in what a closing with a ball of this radius adds to the tissue
+# unlabelled ventricles are searched in what a closing with a ball of this radius adds
+# to the tissue
 CLOSING_MM = 6.0
-# share of a tissue's neighbours that are cerebrum; in 47 brains ≥ 0.89 for white matter and fluid, ≤ 0.33 outside
+# share of a tissue's neighbours that are cerebrum; in 47 brains ≥ 0.89 for white matter
+# and fluid, ≤ 0.33 outside
 MIN_INSIDE, MAX_OUTSIDE = 0.4, 0.5
-# shares of the cerebrum's tissue; in these brains 0.16 to 0.43 is cortex, 0.49 or more white matter
+# shares of the cerebrum's tissue; in these brains 0.16 to 0.43 is cortex, 0.49 or more
+# white matter
 CORTEX, WHITE, SMALL = (0.03, 0.6), (0.15, 1.0), 0.01
 # limit of the ratio between left and right of cortex over white matter
 MAX_IMBALANCE = 4.0
-# share of the contacts of sided labels that are with the other side; 0.11 or less in 15 brains, 0.69 or more if mixed
+# share of the contacts of sided labels that are with the other side; 0.11 or less in 15
+# brains, 0.69 or more if mixed
 MAX_BETWEEN = 0.4
 HOLE = -1
-"""Value for unlabelled voxels enclosed by labels, which are neither inside nor outside."""
+"""Value for unlabelled voxels enclosed by labels, which are neither inside nor
+outside."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cerebrum:
     """The cerebrum of a label volume, cropped with a margin of `PAD_VOXELS`.
 
-    `mask` (i, j, k) is its mask, `tissue` the labels, 0 where they were removed; the (4, 4) affine is that of the
-    cropped volume. Parts below `smallest_part` of the largest were removed. The report is in plain values.
+    `mask` (i, j, k) is its mask, `tissue` the labels, 0 where they were removed; the
+    (4, 4) affine is that of the cropped volume. Parts below `smallest_part` of the
+    largest were removed. The report is in plain values.
     """
 
     mask: Mask
@@ -78,66 +90,109 @@ class Cerebrum:
         return float(self.mask.sum() * abs(np.linalg.det(self.affine[:3, :3])))
 
 
-def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_cortex: float = 0.0) -> Cerebrum:
-    """Return the cerebrum without open ventricles, parts on thin stalks and separate parts.
+def read_cerebrum(
+    labels: Labels, affine: Floats, scheme: LabelScheme, min_cortex: float = 0.0
+) -> Cerebrum:
+    """Return the cerebrum without open ventricles, parts on thin stalks and separate
+    parts.
 
-    Holes and unlabelled ventricles get the label of the nearest tissue. InputError if the labels do not fit the scheme,
-    or if cortex covers less than `min_cortex` of the cerebrum's surface.
+    Holes and unlabelled ventricles get the label of the nearest tissue. InputError if
+    the labels do not fit the scheme, or if cortex covers less than `min_cortex` of the
+    cerebrum's surface.
     """
     mask = cerebrum_mask(labels, scheme)
     report: dict[str, Any] = {}
     warnings: list[str] = []
     absent = np.setdiff1d(scheme.cerebrum, labels)
-    if missing_tissues := [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number in absent]:
+    if missing_tissues := [
+        f"{number} {scheme.labels[number]}"
+        for number in scheme.cerebrum
+        if number in absent
+    ]:
         report["missing_tissues"] = missing_tissues
-        log.info("tissues that this brain does not have: %s", ", ".join(missing_tissues[:20]))
+        log.info(
+            "tissues that this brain does not have: %s", ", ".join(missing_tissues[:20])
+        )
     if note := hindbrain_note(labels, scheme):
         report["hindbrain"] = note
         log.info(note)
     warnings += misplaced_cortex(labels, affine, scheme)
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = unlabelled_ventricles(labels, scheme, affine)
-    if scheme.cortex and (share := require_cortex_outside(labels, scheme, min_cortex, unlabelled)) < LITTLE_CORTEX:
-        warnings.append(f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface: check the labels")
+    if (
+        scheme.cortex
+        and (share := require_cortex_outside(labels, scheme, min_cortex, unlabelled))
+        < LITTLE_CORTEX
+    ):
+        warnings.append(
+            f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface: check"
+            " the labels"
+        )
     if unlabelled.any():
         warnings.append(
-            f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie inside it and were filled: "
-            "ventricles without a label?"
+            f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie"
+            " inside it and were filled: ventricles without a label?"
         )
     open_fluid = outside_ventricles(labels, scheme)
     whole, stalks = extraction.without_stalks((mask & ~open_fluid) | unlabelled, affine)
-    smallest = MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else extraction.COMPARABLE
+    smallest = (
+        MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else extraction.COMPARABLE
+    )
     main, parts, dropped = extraction.main_parts(whole, smallest)
     if dropped > REPORTED_LOSS * main.sum():
-        loss = f"{dropped * voxel_ml:.2f} mL, {100 * dropped / main.sum():.1f} % of the brain"
+        loss = (
+            f"{dropped * voxel_ml:.2f} mL, {100 * dropped / main.sum():.1f} % of the"
+            " brain"
+        )
         warnings.append(f"{parts} separate parts were dropped: {loss}")
     tissue = np.where(mask & ~main, 0, labels)
     outer, holes = np.isin(tissue, scheme.cortex), main & ~mask
-    for empty, source in ((holes, mask & main), (holes & unlabelled, mask & main & ~outer)):
+    for empty, source in (
+        (holes, mask & main),
+        (holes & unlabelled, mask & main & ~outer),
+    ):
         if empty.any():
-            nearest = ndimage.distance_transform_edt(~source, return_distances=False, return_indices=True)
+            nearest = ndimage.distance_transform_edt(
+                ~source, return_distances=False, return_indices=True
+            )
             tissue[empty] = labels[tuple(nearest[:, empty])]
     fluid_ml = float(open_fluid.sum() * voxel_ml)
     dropped_parts = {"parts": parts, "parts_mL": float(dropped * voxel_ml)}
     report["outside"] = {"ventricles_mL": fluid_ml, "stalks": stalks, **dropped_parts}
     lost = fluid_ml + sum(stalk["volume_mm3"] for stalk in stalks) * ML_PER_MM3
     if lost > REPORTED_LOSS * mask.sum() * voxel_ml:
-        warnings.append(f"{lost:.2f} mL of the cerebrum's labels lie outside it or on a thin stalk and were left out")
+        warnings.append(
+            f"{lost:.2f} mL of the cerebrum's labels lie outside it or on a thin stalk"
+            " and were left out"
+        )
     fluid = main & (np.isin(labels, scheme.ventricles) | unlabelled)
     volumes = {"cerebrum": main}
     if scheme.cortex:
         volumes |= {"cortex": outer, "inside_cortex": main & ~fluid & ~outer}
     if scheme.ventricles or unlabelled.any():
         volumes |= {"tissue": main & ~fluid, "ventricles": fluid}
-    report["label_volumes_mL"] = {name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()}
+    report["label_volumes_mL"] = {
+        name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()
+    }
     report["border_share"] = border_share(main)
     box, first = extraction.crop(main)
-    cropped, labelled = np.pad(main[box], extraction.PAD_VOXELS), np.pad(tissue[box], extraction.PAD_VOXELS)
-    return Cerebrum(cropped, labelled, extraction.shifted_affine(affine, first), smallest, report, warnings)
+    cropped, labelled = (
+        np.pad(main[box], extraction.PAD_VOXELS),
+        np.pad(tissue[box], extraction.PAD_VOXELS),
+    )
+    return Cerebrum(
+        cropped,
+        labelled,
+        extraction.shifted_affine(affine, first),
+        smallest,
+        report,
+        warnings,
+    )
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
-    """Return the (i, j, k) mask of the cerebrum; InputError for labels not in the scheme, or missing tissues of it."""
+    """Return the (i, j, k) mask of the cerebrum; InputError for labels not in the
+    scheme, or missing tissues of it."""
     present = set(map(int, np.unique(labels))) - {0}
     unknown = sorted(present - set(scheme.labels))
     if unknown:
@@ -145,9 +200,12 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
             f"the label volume has labels that are not in the scheme {scheme.name!r}",
             found=f"{_listed(unknown)} among {_listed(sorted(present))}",
             expected=_listed(scheme.labels, scheme),
-            remedy="Name the scheme that the labels were made with, since another one with these numbers gives wrong "
-            f"tissues. There are {', '.join(SCHEME_FILES)}; write others under schemes. Is this an image? gyriflow "
-            "does not segment.",
+            remedy=(
+                "Name the scheme that the labels were made with, since another one"
+                " with these numbers gives wrong tissues. There are"
+                f" {', '.join(SCHEME_FILES)}; write others under schemes. Is this an"
+                " image? gyriflow does not segment."
+            ),
         )
     if not present & set(scheme.cerebrum):
         raise InputError(
@@ -155,11 +213,14 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
             found=f"labels {_listed(sorted(present)) or 'none but 0'}",
             expected="voxels of " + _listed(scheme.cerebrum, scheme),
         )
-    inside = scheme.white_matter or tuple(set(scheme.cerebrum) - set(scheme.cortex) if scheme.cortex else ())
+    inside = scheme.white_matter or tuple(
+        set(scheme.cerebrum) - set(scheme.cortex) if scheme.cortex else ()
+    )
     for tissue, numbers in (("cortex", scheme.cortex), ("white matter", inside)):
         if numbers and not present & set(numbers):
             raise InputError(
-                f"the {tissue} of the scheme {scheme.name!r} is missing from the label volume",
+                f"the {tissue} of the scheme {scheme.name!r} is missing from the label"
+                " volume",
                 found=f"labels {_listed(sorted(present))}",
                 expected="voxels of " + _listed(numbers, scheme),
             )
@@ -167,24 +228,34 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
 
 
 def require_cortex_outside(
-    labels: Labels, scheme: LabelScheme, minimum: float = MIN_CORTEX_OUTSIDE, unlabelled: Mask | bool = False
+    labels: Labels,
+    scheme: LabelScheme,
+    minimum: float = MIN_CORTEX_OUTSIDE,
+    unlabelled: Mask | bool = False,
 ) -> float:
-    """Return the share of the cerebrum's surface with cortex; InputError below `minimum`: another scheme."""
-    cerebrum = ndimage.binary_fill_holes(np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1))
+    """Return the share of the cerebrum's surface with cortex; InputError below
+    `minimum`: another scheme."""
+    cerebrum = ndimage.binary_fill_holes(
+        np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1)
+    )
     outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
     cortex = ndimage.binary_dilation(np.pad(np.isin(labels, scheme.cortex), 1))
     share = float((outside & cortex).sum() / outside.sum())
     if share < minimum:
         raise InputError(
-            f"with the scheme {scheme.name!r} the cortex does not surround the cerebrum",
+            f"with the scheme {scheme.name!r} the cortex does not surround the"
+            " cerebrum",
             found=f"cortex at {100 * share:.0f} % of the surface",
             expected=f"{100 * minimum:.0f} % or more",
         )
     return share
 
 
-def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right: Floats) -> None:
-    """Raise InputError if, along `to_right` (3,) in mm, labels of left lie right of those of right, or are mixed."""
+def require_sides(
+    labels: Labels, scheme: LabelScheme, affine: Floats, to_right: Floats
+) -> None:
+    """Raise InputError if, along `to_right` (3,) in mm, labels of left lie right of
+    those of right, or are mixed."""
     if not (np.isin(labels, scheme.left).any() and np.isin(labels, scheme.right).any()):
         return
     left, right = (
@@ -200,17 +271,23 @@ def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right:
     separated = float(np.searchsorted(left, right).mean() / len(left))
     if separated < MIN_SEPARATED:
         raise InputError(
-            f"with the scheme {scheme.name!r} the labels of left and right are not hemispheres",
-            found=f"voxels of the right one to the right of those of the left one in {100 * separated:.0f} % of pairs",
+            f"with the scheme {scheme.name!r} the labels of left and right are not"
+            " hemispheres",
+            found=(
+                "voxels of the right one to the right of those of the left one in"
+                f" {100 * separated:.0f} % of pairs"
+            ),
             expected=f"{100 * MIN_SEPARATED:.0f} % or more",
         )
 
 
 def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
-    """Return the (i, j, k) mask of ventricles that are not enclosed by the cerebrum's tissue.
+    """Return the (i, j, k) mask of ventricles that are not enclosed by the cerebrum's
+    tissue.
 
-    Their labels often continue to the fourth ventricle. A voxel is enclosed if more than half of its 26 rays through
-    fluid hit tissue. With cerebellum or brainstem in the scheme, only parts that mostly touch these are left out.
+    Their labels often continue to the fourth ventricle. A voxel is enclosed if more
+    than half of its 26 rays through fluid hit tissue. With cerebellum or brainstem in
+    the scheme, only parts that mostly touch these are left out.
     """
     fluid = np.isin(labels, scheme.ventricles)
     if not fluid.any():
@@ -222,7 +299,10 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
     if not hindbrain.any():
         return out
-    elsewhere, touching = ~hindbrain & ~np.isin(labels, scheme.cerebrum), np.zeros_like(out)
+    elsewhere, touching = (
+        ~hindbrain & ~np.isin(labels, scheme.cerebrum),
+        np.zeros_like(out),
+    )
     for box, part in extraction.parts_in_boxes(out):
         around = ndimage.binary_dilation(part, extraction.OUTSIDE)
         if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
@@ -231,10 +311,12 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
 
 
 def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
-    """Return the (i, j, k) mask of unlabelled ventricles; empty if any ventricle is labelled.
+    """Return the (i, j, k) mask of unlabelled ventricles; empty if any ventricle is
+    labelled.
 
-    More than half of the 26 rays of such a voxel hit tissue inside the cortex, almost all if no cortex is labelled.
-    Less than `REPORTED_LOSS` of the cerebrum is roughness of the labels.
+    More than half of the 26 rays of such a voxel hit tissue inside the cortex, almost
+    all if no cortex is labelled. Less than `REPORTED_LOSS` of the cerebrum is roughness
+    of the labels.
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)
@@ -249,18 +331,25 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     closed = ndimage.distance_transform_edt(near, sampling=size) > CLOSING_MM
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
     clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
-    hit_share = _ray_share(clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * RAY_SMOOTHING)
+    hit_share = _ray_share(
+        clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * RAY_SMOOTHING
+    )
     number, _ = ndimage.label(
-        clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)), extraction.OUTSIDE
+        clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)),
+        extraction.OUTSIDE,
     )
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
-    enclosed = np.isin(number, np.flatnonzero(sizes >= max(1, MIN_PART_SHARE * sizes.max())) + 1)
+    enclosed = np.isin(
+        number, np.flatnonzero(sizes >= max(1, MIN_PART_SHARE * sizes.max())) + 1
+    )
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
         filled[box] = enclosed[(slice(margin, -margin),) * 3]
     return filled
 
 
-def _ray_share(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
+def _ray_share(
+    clear: Mask, tissue: Mask, smoothing_voxels: float
+) -> NDArray[np.float32]:
     pad = np.pad(clear, 1), np.pad(tissue, 1)
     start = np.argwhere(pad[0])
     hits = np.zeros(len(start), dtype=np.int32)
@@ -278,10 +367,12 @@ def _ray_share(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np
 
 
 def border_share(mask: Mask) -> float:
-    """Return the share of an (i, j, k) mask's surface at those borders of its volume that cut it off.
+    """Return the share of an (i, j, k) mask's surface at those borders of its volume
+    that cut it off.
 
-    The slices of a rounded end grow from the first one on: the second has at least twice the area of the first. So a
-    volume that ends exactly at the mask does not cut it off (`CUT_SLICE_RATIO`).
+    The slices of a rounded end grow from the first one on: the second has at least
+    twice the area of the first. So a volume that ends exactly at the mask does not cut
+    it off (`CUT_SLICE_RATIO`).
     """
     surface = mask & ~ndimage.binary_erosion(mask, border_value=1)
     at_border = cut_off = 0
@@ -295,14 +386,18 @@ def border_share(mask: Mask) -> float:
 
 
 def _listed(numbers: Iterable[int], scheme: LabelScheme | None = None) -> str:
-    names = [f"{number} {scheme.labels[number]}" if scheme else str(number) for number in numbers]
+    names = [
+        f"{number} {scheme.labels[number]}" if scheme else str(number)
+        for number in numbers
+    ]
     text = ", ".join(names[:30])
     return f"{text}, … ({len(names)} in all)" if len(names) > 30 else text
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The labels of a volume (n,), the numbers of voxel faces that they share (n, n), and of their voxels (n,)."""
+    """The labels of a volume (n,), the numbers of voxel faces that they share (n, n),
+    and of their voxels (n,)."""
 
     labels: Labels
     contact: Floats
@@ -320,15 +415,29 @@ def layout_of(labels: Labels) -> Layout:
     contact = np.zeros((n, n))
     for axis in range(3):
         along = np.moveaxis(rows, axis, 0)
-        contact += np.bincount((along[1:] * n + along[:-1]).ravel(), minlength=n * n).reshape(n, n)
-    return Layout(numbers, (contact + contact.T) * ~np.eye(n, dtype=bool), np.bincount(rows.ravel()))
+        contact += np.bincount(
+            (along[1:] * n + along[:-1]).ravel(), minlength=n * n
+        ).reshape(n, n)
+    return Layout(
+        numbers,
+        (contact + contact.T) * ~np.eye(n, dtype=bool),
+        np.bincount(rows.ravel()),
+    )
 
 
 def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
-    """Yield the contradictions between the arrangement of labels and a scheme; none for a scheme without cortex."""
+    """Yield the contradictions between the arrangement of labels and a scheme; none for
+    a scheme without cortex."""
     cerebrum, cortex, white, fluid, left, right = (
         np.isin(layout.labels, getattr(scheme, name))
-        for name in ("cerebrum", "cortex", "white_matter", "ventricles", "left", "right")
+        for name in (
+            "cerebrum",
+            "cortex",
+            "white_matter",
+            "ventricles",
+            "left",
+            "right",
+        )
     )
     if not cortex.any():
         return
@@ -341,29 +450,66 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
 
     def with_numbers(tissue: NDArray[np.bool], name: str) -> str:
         numbers = [str(number) for number in layout.labels[tissue]]
-        return f"{name} ({', '.join([*numbers[:4], *(['…'] if len(numbers) > 4 else [])])})"
+        return (
+            f"{name}"
+            f" ({', '.join([*numbers[:4], *(['…'] if len(numbers) > 4 else [])])})"
+        )
 
     surface = layout.contact[np.ix_(cerebrum, outside)].sum(axis=1)
     cortex_share = float(surface[cortex[cerebrum]].sum() / max(surface.sum(), 1))
     if cortex_share < MIN_CORTEX_OUTSIDE:
-        yield f"{with_numbers(cortex, 'cortex')} would cover {cortex_share:.0%} of the cerebrum's surface"
-    for tissue, name, (low, high) in ((cortex, "cortex", CORTEX), (white, "white matter", WHITE)):
-        if tissue.any() and not low <= (share := float(layout.count[tissue].sum() / size)) <= high:
-            yield f"{with_numbers(tissue, name)} would be {share:.0%} of the cerebrum's tissue"
-    for tissue, name, within in ((white, "white matter", cerebrum), (fluid, "ventricles", cerebrum & ~cortex)):
+        yield (
+            f"{with_numbers(cortex, 'cortex')} would cover {cortex_share:.0%} of the"
+            " cerebrum's surface"
+        )
+    for tissue, name, (low, high) in (
+        (cortex, "cortex", CORTEX),
+        (white, "white matter", WHITE),
+    ):
+        if (
+            tissue.any()
+            and not low <= (share := float(layout.count[tissue].sum() / size)) <= high
+        ):
+            yield (
+                f"{with_numbers(tissue, name)} would be {share:.0%} of the cerebrum's"
+                " tissue"
+            )
+    for tissue, name, within in (
+        (white, "white matter", cerebrum),
+        (fluid, "ventricles", cerebrum & ~cortex),
+    ):
         if tissue.any() and (share := contact_share(tissue, within)) < MIN_INSIDE:
-            yield f"{with_numbers(tissue, name)} would lie outside: {share:.0%} of their neighbours are inside"
+            yield (
+                f"{with_numbers(tissue, name)} would lie outside: {share:.0%} of their"
+                " neighbours are inside"
+            )
     for number in layout.labels[outside & (layout.labels != 0)]:
         tissue, name = layout.labels == number, scheme.labels.get(int(number), "")
         share = contact_share(tissue, cerebrum & ~cortex)
         if share > MAX_OUTSIDE and layout.count[tissue].sum() > SMALL * size:
-            yield f"{with_numbers(tissue, name)} would lie inside: {share:.0%} of its neighbours are there"
+            yield (
+                f"{with_numbers(tissue, name)} would lie inside: {share:.0%} of its"
+                " neighbours are there"
+            )
     between = 2 * layout.contact[np.ix_(left, right)].sum()
     contacts = layout.contact[np.ix_(left | right, cerebrum)].sum()
     if between > MAX_BETWEEN * contacts:
-        yield f"left and right would be mixed: {between / contacts:.0%} of their contacts are with the other side"
-    (a, b), (c, d) = ([layout.count[tissue & side].sum() for side in (left, right)] for tissue in (cortex, white))
+        yield (
+            f"left and right would be mixed: {between / contacts:.0%} of their contacts"
+            " are with the other side"
+        )
+    (a, b), (c, d) = (
+        [layout.count[tissue & side].sum() for side in (left, right)]
+        for tissue in (cortex, white)
+    )
     # a hemisphere may be small or missing, but with all of its tissues
-    is_unequal = (a > 0) != (c > 0) or (b > 0) != (d > 0) or max(a * d, b * c) > MAX_IMBALANCE * min(a * d, b * c)
+    is_unequal = (
+        (a > 0) != (c > 0)
+        or (b > 0) != (d > 0)
+        or max(a * d, b * c) > MAX_IMBALANCE * min(a * d, b * c)
+    )
     if scheme.left and scheme.white_matter and is_unequal:
-        yield f"left and right would have {a} and {b} voxels of cortex, {c} and {d} of white matter"
+        yield (
+            f"left and right would have {a} and {b} voxels of cortex, {c} and {d} of"
+            " white matter"
+        )

@@ -1,4 +1,5 @@
-"""Make a brain's posed pial surface from a label volume, from surface files or from a simple shape."""
+"""Make a brain's posed pial surface from a label volume, from surface files or from a
+simple shape."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -34,13 +35,15 @@ from .repair import RepairedSurface
 from .sulci import open_fused_sulci
 from .thickness import MIN_VOXELS, border, voxels_through_cortex
 
-# the mid-plane agrees with the labels if this is the cosine between its normal and the line from left to right: 45°
+# the mid-plane agrees with the labels if this is the cosine between its normal and the
+# line from left to right: 45°
 MIN_AXIS_COSINE = 0.7
 # an asymmetry of more than this share of the brain's width gives a warning
 MAX_USUAL_ASYMMETRY = 0.03
 # largest ratio of the hemispheres' areas; with 4 % of the volume it is about 10
 MAX_AREA_RATIO = 15.0
-# up to this week labels of 0.8 mm close no sulci: CRL has the same area with fused and opened ones
+# up to this week labels of 0.8 mm close no sulci: CRL has the same area with fused and
+# opened ones
 FUSED_AFTER_GW = 26.0
 # voxels of this size are fine enough to determine the pose by shape
 POSE_VOXEL_MM = 1.5
@@ -52,8 +55,9 @@ MIN_GAP_MM = 0.5
 class PialSurface:
     """A posed pial surface in RAS+ mm.
 
-    `whole` is closed and outward, in one or two pieces. `left` and `right` (None if missing) are its parts, open where
-    cut at the fissure, the plane x = `fissure_x_mm`, and at capped medial walls. `pose` leads from the brain's files.
+    `whole` is closed and outward, in one or two pieces. `left` and `right` (None if
+    missing) are its parts, open where cut at the fissure, the plane x = `fissure_x_mm`,
+    and at capped medial walls. `pose` leads from the brain's files.
     """
 
     whole: TriangleMesh
@@ -78,7 +82,9 @@ class _Brain:
 
     def take(self, surface: RepairedSurface, suffix: str = "") -> None:
         """Keep the warnings and the report of repairs, its keys with a suffix."""
-        self.report |= {f"{key}{suffix}": value for key, value in surface.report.items()}
+        self.report |= {
+            f"{key}{suffix}": value for key, value in surface.report.items()
+        }
         self.warn(surface.warnings)
 
 
@@ -92,30 +98,42 @@ def from_labels(
     edge_length_mm: float = 1.0,
     open_sulci: bool = False,
 ) -> PialSurface:
-    """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
+    """Return the pial surface around the cerebrum of an (i, j, k) label volume with a
+    (4, 4) affine to RAS+ mm.
 
-    The pose follows from cerebellum, brainstem and sides, or else from the shape. The mask is smoothed (Gaussian, σ = 1
-    voxel) and freed of handles; its surface is smoothed, remeshed to `edge_length_mm`, freed of terraces, given the
-    mask's volume, and rotated so that the mid-plane is x = const. Where cortex labels of both sides touch, the fissure
-    is opened to 1.5 mm; with `open_sulci`, fused sulci are. A hemisphere (`side`) is posed as in `from_surface`.
+    The pose follows from cerebellum, brainstem and sides, or else from the shape. The
+    mask is smoothed (Gaussian, σ = 1 voxel) and freed of handles; its surface is
+    smoothed, remeshed to `edge_length_mm`, freed of terraces, given the mask's volume,
+    and rotated so that the mid-plane is x = const. Where cortex labels of both sides
+    touch, the fissure is opened to 1.5 mm; with `open_sulci`, fused sulci are. A
+    hemisphere (`side`) is posed as in `from_surface`.
 
-    InputError if the labels do not fit the scheme, the week or the `side`. MeshError if self-intersections remain.
+    InputError if the labels do not fit the scheme, the week or the `side`. MeshError if
+    self-intersections remain.
     """
-    brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "labels"})
+    brain = _Brain(
+        week, {"source": "hemisphere", "side": side} if side else {"source": "labels"}
+    )
     cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
     smooth, affine = extraction.smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
     grid, removed_ml = affine, 0.0
     side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     if not side:
-        plane, side_mm = _fissure_of_labels(cerebrum, core, smooth, affine, scheme, brain)
-        smooth, brain.report["slit_voxels_reopened"] = extraction.remove_bridges(cerebrum.mask, smooth)
+        plane, side_mm = _fissure_of_labels(
+            cerebrum, core, smooth, affine, scheme, brain
+        )
+        smooth, brain.report["slit_voxels_reopened"] = extraction.remove_bridges(
+            cerebrum.mask, smooth
+        )
     original = smooth, grid
     if scheme.cortex and not side:
         smooth, affine, removed_ml = _with_fissure(smooth, affine, side_mm, core)
         brain.report["fissure_opened_mL"] = removed_ml
     if open_sulci:
-        smooth, affine, taken_ml = _with_sulci(smooth, affine, cerebrum, core, scheme, None if side else side_mm, brain)
+        smooth, affine, taken_ml = _with_sulci(
+            smooth, affine, cerebrum, core, scheme, None if side else side_mm, brain
+        )
         removed_ml += taken_ml
     even = repair.surface_of_mask(
         smooth,
@@ -129,94 +147,171 @@ def from_labels(
     brain.take(even)
     if side:
         plausible.require_single_hemisphere(even.mesh)
-        return _one_side(even, side, posing.pose_of_hemisphere(even.mesh, side, "auto", of_volume=True), brain)
+        return _one_side(
+            even,
+            side,
+            posing.pose_of_hemisphere(even.mesh, side, "auto", of_volume=True),
+            brain,
+        )
     heights = fissure.sample(side_mm, grid, triangles.corners(even.mesh).mean(axis=1))
     return _two_sides(even, fissure.left_faces(even.mesh, heights), plane, pose, brain)
 
 
 def _read_volume(
-    labels: Labels, affine: Floats, scheme: LabelScheme, side: Side | None, brain: _Brain
+    labels: Labels,
+    affine: Floats,
+    scheme: LabelScheme,
+    side: Side | None,
+    brain: _Brain,
 ) -> tuple[Cerebrum, Pose]:
-    """Return the checked cerebrum of a label volume and its pose; that of a hemisphere is found from its surface."""
+    """Return the checked cerebrum of a label volume and its pose; that of a hemisphere
+    is found from its surface."""
     # the medial wall of a single hemisphere may have no cortex
-    cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE)
+    cerebrum = read_cerebrum(
+        labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE
+    )
     brain.report |= {"scheme": scheme.name, **cerebrum.report}
     brain.warn(cerebrum.warnings)
     pose = None if side else posing.pose_of_labels(labels, affine, scheme)
     labelled = np.intersect1d(cerebrum.tissue, scheme.cortex or scheme.cerebrum)
-    sides = [name for name, numbers in (("left", scheme.left), ("right", scheme.right)) if {*labelled} & {*numbers}]
+    sides = [
+        name
+        for name, numbers in (("left", scheme.left), ("right", scheme.right))
+        if {*labelled} & {*numbers}
+    ]
     if side and set(sides) - {side}:
-        raise InputError(f"the volume contains labels of another hemisphere than the {side} one")
-    brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, brain.week))
+        raise InputError(
+            f"the volume contains labels of another hemisphere than the {side} one"
+        )
+    brain.warn(
+        plausible.require_plausible_size(
+            (2.0 if side else 1.0) * cerebrum.volume_mm3, brain.week
+        )
+    )
     if (share := cerebrum.report["border_share"]) > REPORTED_LOSS:
-        cut = f"the border of the volume cuts the cerebrum at {100 * share:.0f} % of its surface"
+        cut = (
+            f"the border of the volume cuts the cerebrum at {100 * share:.0f} % of its"
+            " surface"
+        )
         wall = "unless it is the medial wall, " if side else ""
-        brain.warn([f"{cut}: {wall}parts outside are missing, and the surface is flat there"])
+        brain.warn(
+            [f"{cut}: {wall}parts outside are missing, and the surface is flat there"]
+        )
     if not side:
         brain.warn(scheme_contradictions(layout_of(labels), scheme))
         if len(sides) == 1:
             problem = f"the volume has labels of the {sides[0]} hemisphere only"
-            remedy = "If there is one hemisphere, give it under `hemisphere`, with its side. If both have these "
+            remedy = (
+                "If there is one hemisphere, give it under `hemisphere`, with its side."
+                " If both have these "
+            )
             remedy += "labels, name their scheme, which is without left and right."
-            raise InputError(problem, expected="labels of both hemispheres", remedy=remedy)
+            raise InputError(
+                problem, expected="labels of both hemispheres", remedy=remedy
+            )
         field = extraction.smooth_mask(cerebrum.mask)
         # parts that are removed below because of their size do not count
         parts, _, _ = extraction.main_parts(field > LEVEL, cerebrum.smallest_part)
         surface = extraction.isosurface(extraction.smooth_mask(parts), cerebrum.affine)
-        # a brain that is cut by the field of view may be as narrow, which has been reported already
-        brain.warn(plausible.require_whole(surface, "volume", refuses=share <= REPORTED_LOSS))
+        # a brain that is cut by the field of view may be as narrow, which has been
+        # reported already
+        brain.warn(
+            plausible.require_whole(surface, "volume", refuses=share <= REPORTED_LOSS)
+        )
         if pose is None:
-            every = max(int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
+            every = max(
+                int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1
+            )
             coarse = extraction.unambiguous(field[::every, ::every, ::every])
-            rough = extraction.isosurface(coarse, cerebrum.affine @ np.diag([every, every, every, 1.0]))
-            pose = posing.pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
+            rough = extraction.isosurface(
+                coarse, cerebrum.affine @ np.diag([every, every, every, 1.0])
+            )
+            pose = posing.pose_of_volume_by_shape(
+                rough, has_sides=bool(scheme.left and scheme.right)
+            )
         brain.warn(pose.warnings)
     return cerebrum, pose or Pose()
 
 
 def _fissure_of_labels(
-    cerebrum: Cerebrum, core: Mask, field: NDArray[np.float32], affine: Floats, scheme: LabelScheme, brain: _Brain
+    cerebrum: Cerebrum,
+    core: Mask,
+    field: NDArray[np.float32],
+    affine: Floats,
+    scheme: LabelScheme,
+    brain: _Brain,
 ) -> tuple[MidPlane, NDArray[np.float32]]:
-    """Return the mid-plane, and each voxel's distance from the surface between the hemispheres."""
+    """Return the mid-plane, and each voxel's distance from the surface between the
+    hemispheres."""
     mask, has_sides = cerebrum.mask, bool(scheme.left and scheme.right)
-    # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
-    walls = extraction.isosurface(extraction.smooth_mask(core) if scheme.cortex else field, affine)
+    # medial walls of the tissue inside the cortex show the fissure even where the
+    # cortex hides it
+    walls = extraction.isosurface(
+        extraction.smooth_mask(core) if scheme.cortex else field, affine
+    )
     plane = fissure.mid_plane(walls)
-    sides = [np.isin(cerebrum.tissue, labels) for labels in (scheme.left, scheme.right) if has_sides]
+    sides = [
+        np.isin(cerebrum.tissue, labels)
+        for labels in (scheme.left, scheme.right)
+        if has_sides
+    ]
     if has_sides:
         left, right = sides
-        axis = affine[:3, :3] @ (np.argwhere(right).mean(axis=0) - np.argwhere(left).mean(axis=0))
+        axis = affine[:3, :3] @ (
+            np.argwhere(right).mean(axis=0) - np.argwhere(left).mean(axis=0)
+        )
         if abs(plane.normal @ (axis / np.linalg.norm(axis))) < MIN_AXIS_COSINE:
             plane = fissure.plane_between_labels(left, right, affine, mask)
-            brain.warn(["the hemispheres are not mirror images of each other: the mid-plane is that of their labels"])
+            brain.warn(
+                [
+                    "the hemispheres are not mirror images of each other: the mid-plane"
+                    " is that of their labels"
+                ]
+            )
     require_sides(cerebrum.tissue, scheme, affine, plane.normal)
     return plane, fissure.side_distance(
-        mask, core if scheme.cortex else mask, affine, fissure.fissure_between(walls, plane), *sides
+        mask,
+        core if scheme.cortex else mask,
+        affine,
+        fissure.fissure_between(walls, plane),
+        *sides,
     )
 
 
 def _with_fissure(
     field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], core: Mask
 ) -> tuple[NDArray[np.float32], Floats, float]:
-    """Open a hidden fissure as a whole; return the field, its affine, and the volume removed (mL).
+    """Open a hidden fissure as a whole; return the field, its affine, and the volume
+    removed (mL).
 
-    Where more than a thousandth of the brain is removed, voxels too coarse for its walls are refined first.
+    Where more than a thousandth of the brain is removed, voxels too coarse for its
+    walls are refined first.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     # an opening of less than two voxels would be lost
     factor = int(np.ceil(1.8 * size.max() / fissure.FISSURE_MM))
     for bridges in (False, True):
-        hidden = fissure.hidden_fissure(side_mm, field > LEVEL, core, affine, bridges=bridges)
+        hidden = fissure.hidden_fissure(
+            side_mm, field > LEVEL, core, affine, bridges=bridges
+        )
         if not hidden.any():
             return field, affine, 0.0
-        to_hidden = ndimage.distance_transform_edt(~hidden, sampling=size).astype(np.float32)
+        to_hidden = ndimage.distance_transform_edt(~hidden, sampling=size).astype(
+            np.float32
+        )
         before, grid = field, affine
         wide = fissure.open_fissure(field, affine, side_mm, to_hidden)
-        if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
-            distances = (extraction.refine(values, affine, factor)[0] for values in (side_mm, to_hidden))
+        if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(
+            dtype=float
+        ):
+            distances = (
+                extraction.refine(values, affine, factor)[0]
+                for values in (side_mm, to_hidden)
+            )
             before, grid = extraction.refine(field, affine, factor)
             wide = fissure.open_fissure(before, grid, *distances)
-        # tissue that crosses the fissure makes tunnels of it, and closing these would close the fissure
+        # tissue that crosses the fissure makes tunnels of it, and closing these would
+        # close the fissure
         if not extraction.handles(wide > LEVEL):
             break
     voxel_ml = abs(np.linalg.det(grid[:3, :3])) * ML_PER_MM3
@@ -236,8 +331,13 @@ def _with_sulci(
     grid = cerebrum.affine
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
         report: dict[str, Any] = {"stays_fused": "the labels have no white matter"}
-    elif (voxels := voxels_through_cortex(cerebrum.mask, border(core, grid), grid)) < MIN_VOXELS:
-        fused = f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks like two banks"
+    elif (
+        voxels := voxels_through_cortex(cerebrum.mask, border(core, grid), grid)
+    ) < MIN_VOXELS:
+        fused = (
+            f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks"
+            " like two banks"
+        )
         report = {"stays_fused": fused}
     else:
         # handles are found faster before voxels are refined
@@ -269,31 +369,57 @@ def from_hemispheres(
 ) -> PialSurface:
     """Return the pial surface of a brain from surfaces of its hemispheres.
 
-    They are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to `edge_length_mm`,
-    rotated so that the mid-plane is x = const, and moved to a gap of 0.5 mm. With coordinates "auto" each may have any
-    rigid pose; `declared` is whether both files name one coordinate system. Hemispheres that share the vertices of a
-    cut are joined. InputError if the pose is unclear, or they are swapped or of different or impossible size; MeshError
-    if one cannot be made sound.
+    They are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed,
+    remeshed to `edge_length_mm`, rotated so that the mid-plane is x = const, and moved
+    to a gap of 0.5 mm. With coordinates "auto" each may have any rigid pose; `declared`
+    is whether both files name one coordinate system. Hemispheres that share the
+    vertices of a cut are joined. InputError if the pose is unclear, or they are swapped
+    or of different or impossible size; MeshError if one cannot be made sound.
     """
     if (joined := joined_along_cut(left, right)) is not None:
         connected = from_surface(
-            joined, week=week, coordinates=coordinates, edge_length_mm=edge_length_mm, max_hole_mm=max_hole_mm
+            joined,
+            week=week,
+            coordinates=coordinates,
+            edge_length_mm=edge_length_mm,
+            max_hole_mm=max_hole_mm,
         )
         to_pose = connected.pose.of_file()
         plausible.require_left_and_right(
-            triangles.transformed(left, to_pose), triangles.transformed(right, to_pose), coordinates
+            triangles.transformed(left, to_pose),
+            triangles.transformed(right, to_pose),
+            coordinates,
         )
-        return replace(connected, report=connected.report | {"source": "hemispheres", "joined_along_cut": True})
-    brain, named = _Brain(week, {"source": "hemispheres", "coordinates": coordinates}), coordinates != "auto"
+        return replace(
+            connected,
+            report=connected.report
+            | {
+                "source": "hemispheres",
+                "joined_along_cut": True,
+            },
+        )
+    brain, named = (
+        _Brain(week, {"source": "hemispheres", "coordinates": coordinates}),
+        coordinates != "auto",
+    )
     to_ras = CONVENTIONS[coordinates] if named else np.eye(4)
     parts = [
-        repair.sound_pieces(triangles.transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True)
+        repair.sound_pieces(
+            triangles.transformed(mesh, to_ras),
+            max_hole_mm,
+            single=True,
+            caps_walls=True,
+        )
         for mesh in (left, right)
     ]
     for side, part in zip(SIDES, parts, strict=True):
         brain.take(part, f"_{side}")
     left, right = (part.mesh for part in parts)
-    brain.warn(plausible.require_plausible_size(triangles.signed_volume(left) + triangles.signed_volume(right), week))
+    brain.warn(
+        plausible.require_plausible_size(
+            triangles.signed_volume(left) + triangles.signed_volume(right), week
+        )
+    )
     if named:
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
     else:
@@ -322,16 +448,22 @@ def from_hemispheres(
     if plane.asymmetry_mm > max_asymmetry * length:
         raise InputError(
             "the hemispheres are not posed as one brain",
-            found=f"{plane.asymmetry_mm:.1f} mm between the surface and its mirror image",
+            found=(
+                f"{plane.asymmetry_mm:.1f} mm between the surface and its mirror image"
+            ),
             expected=f"at most {max_asymmetry * length:.1f} mm",
-            remedy="Give both of one subject in the same coordinates; if they are, set surface.asymmetric to true.",
+            remedy=(
+                "Give both of one subject in the same coordinates; if they are, set"
+                " surface.asymmetric to true."
+            ),
         )
     is_left = np.arange(len(surface.mesh.faces)) < len(parts[0].mesh.faces)
     return _two_pieces(surface, is_left, plane, pose, brain, named=named)
 
 
 def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | None:
-    """Return the closed surface of two open hemispheres with the same vertices along their cut, or None."""
+    """Return the closed surface of two open hemispheres with the same vertices along
+    their cut, or None."""
     if triangles.is_closed(left) or triangles.is_closed(right):
         return None
     both = triangles.merged(left, right)
@@ -341,9 +473,16 @@ def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | 
 
 
 def _two_pieces(
-    surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, brain: _Brain, *, named: bool
+    surface: RepairedSurface,
+    is_left: Mask,
+    plane: MidPlane,
+    pose: Pose,
+    brain: _Brain,
+    *,
+    named: bool,
 ) -> PialSurface:
-    """Return the pial surface of a brain whose hemispheres are closed pieces, with a gap between them."""
+    """Return the pial surface of a brain whose hemispheres are closed pieces, with a
+    gap between them."""
     left, right = fissure.cut_sides(surface.mesh, is_left)
     is_cap = np.concatenate([surface.is_cap[is_left], surface.is_cap[~is_left]])
     gap, to_right = fissure.smallest_gap(left, right), plane.normal
@@ -351,14 +490,24 @@ def _two_pieces(
     mesh = triangles.merged(left, right)
     brain.warn(plausible.facing_warnings(left, right, to_right))
     if moved > 0:
-        brain.warn([f"each hemisphere was moved by {moved:.2f} mm, to a gap of {MIN_GAP_MM:g} mm between them"])
+        brain.warn(
+            [
+                f"each hemisphere was moved by {moved:.2f} mm, to a gap of"
+                f" {MIN_GAP_MM:g} mm between them"
+            ]
+        )
         plane = fissure.mid_plane(mesh, named=named)
-    shifts = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
+    shifts = {
+        "left": motion(shift=-moved * to_right),
+        "right": motion(shift=moved * to_right),
+    }
     files = {side: shift @ pose.of_file(side) for side, shift in shifts.items()}
     pose = replace(pose, files={**pose.files, **files})
     brain.report |= {"moved_apart_mm": moved, "gap_before_mm": gap}
     surface = replace(surface, mesh=mesh, is_cap=is_cap)
-    return _two_sides(surface, np.arange(len(is_cap)) < len(left.faces), plane, pose, brain)
+    return _two_sides(
+        surface, np.arange(len(is_cap)) < len(left.faces), plane, pose, brain
+    )
 
 
 def from_surface(
@@ -370,16 +519,26 @@ def from_surface(
     edge_length_mm: float = 1.0,
     max_hole_mm: float = 3.0,
 ) -> PialSurface:
-    """Return the pial surface of a brain, or of a single hemisphere (`side`), from one surface.
+    """Return the pial surface of a brain, or of a single hemisphere (`side`), from one
+    surface.
 
-    It is repaired and posed as in `from_hemispheres`; two pieces get a gap as there. The medial wall of a hemisphere is
-    set upright next to x = `fissure_x_mm`. InputError if it is not a surface of `side`, or of an impossible size;
-    MeshError if it cannot be made sound.
+    It is repaired and posed as in `from_hemispheres`; two pieces get a gap as there.
+    The medial wall of a hemisphere is set upright next to x = `fissure_x_mm`.
+    InputError if it is not a surface of `side`, or of an impossible size; MeshError if
+    it cannot be made sound.
     """
-    brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "pial"})
-    clean = repair.sound_pieces(mesh, max_hole_mm, single=side is not None, caps_walls=True)
+    brain = _Brain(
+        week, {"source": "hemisphere", "side": side} if side else {"source": "pial"}
+    )
+    clean = repair.sound_pieces(
+        mesh, max_hole_mm, single=side is not None, caps_walls=True
+    )
     brain.take(clean)
-    brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * triangles.signed_volume(clean.mesh), week))
+    brain.warn(
+        plausible.require_plausible_size(
+            (2.0 if side else 1.0) * triangles.signed_volume(clean.mesh), week
+        )
+    )
     if side:
         plausible.require_single_hemisphere(clean.mesh)
     even = repair.make_pieces_sound(clean, edge_length_mm)
@@ -390,13 +549,20 @@ def from_surface(
         brain.warn(plausible.require_whole(even.mesh, "surface"))
         pose = posing.pose_of_surface(even.mesh, coordinates)
     # "lps" if these were found, else the configured coordinates
-    brain.report["coordinates"] = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
+    brain.report["coordinates"] = (
+        coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
+    )
     if side:
         return _one_side(even, side, pose, brain)
     brain.warn(pose.warnings)
-    even, named = replace(even, mesh=triangles.transformed(even.mesh, pose.of_file())), coordinates != "auto"
+    even, named = (
+        replace(even, mesh=triangles.transformed(even.mesh, pose.of_file())),
+        coordinates != "auto",
+    )
     plane = fissure.mid_plane(even.mesh, named=named)
-    heights = fissure.fissure_between(even.mesh, plane).height_above(triangles.corners(even.mesh).mean(axis=1))
+    heights = fissure.fissure_between(even.mesh, plane).height_above(
+        triangles.corners(even.mesh).mean(axis=1)
+    )
     is_left = fissure.left_faces(even.mesh, heights)
     if all(map(triangles.is_closed, fissure.cut_sides(even.mesh, is_left))):
         return _two_pieces(even, is_left, plane, pose, brain, named=named)
@@ -404,16 +570,25 @@ def from_surface(
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
-    """Return a simple geometry, unchanged, as a brain with sides at x = 0; MeshError if it is not sound."""
+    """Return a simple geometry, unchanged, as a brain with sides at x = 0; MeshError if
+    it is not sound."""
     repair.require_sound(mesh)
     sides = dict(zip(SIDES, fissure.split(mesh, 0.0), strict=True))
-    return _pial_surface(mesh, sides, 0.0, Pose(), _Brain(week, {"source": "shape", "rotation_deg": 0.0}))
+    return _pial_surface(
+        mesh, sides, 0.0, Pose(), _Brain(week, {"source": "shape", "rotation_deg": 0.0})
+    )
 
 
 def _pial_surface(
-    whole: TriangleMesh, sides: Mapping[Side, TriangleMesh], fissure_x: float, pose: Pose, brain: _Brain
+    whole: TriangleMesh,
+    sides: Mapping[Side, TriangleMesh],
+    fissure_x: float,
+    pose: Pose,
+    brain: _Brain,
 ) -> PialSurface:
-    areas: dict[str, float] = {side: triangles.area_cm2(part) for side, part in sides.items()}
+    areas: dict[str, float] = {
+        side: triangles.area_cm2(part) for side, part in sides.items()
+    }
     report = brain.report | {
         "pose": pose.plain(),
         "week": brain.week,
@@ -427,36 +602,74 @@ def _pial_surface(
         "euler_number": triangles.euler_number(whole),
         "warnings": brain.warnings,
     }
-    return PialSurface(whole, sides.get("left"), sides.get("right"), fissure_x, pose, report)
+    return PialSurface(
+        whole, sides.get("left"), sides.get("right"), fissure_x, pose, report
+    )
 
 
-def _two_sides(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, brain: _Brain) -> PialSurface:
+def _two_sides(
+    surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, brain: _Brain
+) -> PialSurface:
     """Return the pial surface of a brain, upright and cut into its hemispheres."""
-    mesh, is_cap, is_kept = _without_islands(surface, {"left": is_left, "right": ~is_left}, pose.of_file(), brain)
+    mesh, is_cap, is_kept = _without_islands(
+        surface, {"left": is_left, "right": ~is_left}, pose.of_file(), brain
+    )
     is_left = is_left[is_kept]
     matrix, angle = fissure.upright(plane, mesh.vertices.mean(axis=0))
     whole = triangles.transformed(mesh, matrix)
     for cap, sign in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
         _require_medial(triangles.submesh(whole, cap)[0], sign)
-    left, right = fissure.cut_sides(triangles.submesh(whole, ~is_cap)[0], is_left[~is_cap])
-    # x of the plane, which may be tilted by less than half a degree, at the brain's centre
+    left, right = fissure.cut_sides(
+        triangles.submesh(whole, ~is_cap)[0], is_left[~is_cap]
+    )
+    # x of the plane, which may be tilted by less than half a degree, at the brain's
+    # centre
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
-    fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
+    fissure_x = float(
+        (offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0]
+    )
     if not left.vertices[:, 0].mean() < fissure_x < right.vertices[:, 0].mean():
-        brain.warn(["the mid-plane is not between the unequal hemispheres: the middle of their cut is used"])
+        brain.warn(
+            [
+                "the mid-plane is not between the unequal hemispheres: the middle of"
+                " their cut is used"
+            ]
+        )
         fissure_x = fissure.cut_middle(left, right)
     if plane.fissure_points == 0:
-        brain.warn(["no fissure was found between facing walls: the plane of mirror symmetry is used"])
+        brain.warn(
+            [
+                "no fissure was found between facing walls: the plane of mirror"
+                " symmetry is used"
+            ]
+        )
     if plane.asymmetry_mm > MAX_USUAL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
-        brain.warn([f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose"])
+        brain.warn(
+            [
+                f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm):"
+                " check its pose"
+            ]
+        )
     brain.warn(plausible.proportion_warnings(np.ptp(whole.vertices, axis=0)))
     areas = sorted((triangles.area(left), triangles.area(right)))
     if areas[1] > MAX_AREA_RATIO * areas[0]:
-        found = f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²"
-        raise InputError("one hemisphere is too small", found=found, expected=f"a ratio of at most {MAX_AREA_RATIO:g}")
+        found = (
+            f"areas of {areas[0] * CM2_PER_MM2:.2f} and"
+            f" {areas[1] * CM2_PER_MM2:.2f} cm²"
+        )
+        raise InputError(
+            "one hemisphere is too small",
+            found=found,
+            expected=f"a ratio of at most {MAX_AREA_RATIO:g}",
+        )
     if areas[1] > plausible.DOUBTFUL_RATIO * areas[0]:
-        brain.warn([f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline"])
+        brain.warn(
+            [
+                "the hemispheres' areas differ by"
+                f" {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline"
+            ]
+        )
     share = fissure.cut_share(left, right)
     brain.warn(plausible.cut_warnings(share, brain.week))
     brain.report |= {
@@ -466,20 +679,31 @@ def _two_sides(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: P
         "fissure_points": plane.fissure_points,
         "asymmetry_mm": plane.asymmetry_mm,
     }
-    return _pial_surface(whole, {"left": left, "right": right}, fissure_x, pose.then(matrix), brain)
+    return _pial_surface(
+        whole, {"left": left, "right": right}, fissure_x, pose.then(matrix), brain
+    )
 
 
-def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -> PialSurface:
-    """Return the pial surface of a single hemisphere, next to the mid-sagittal plane."""
+def _one_side(
+    surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain
+) -> PialSurface:
+    """Return the pial surface of a single hemisphere, next to the mid-sagittal
+    plane."""
     brain.warn(pose.warnings)
     every = np.ones(len(surface.mesh.faces), dtype=bool)
     mesh, is_cap, _ = _without_islands(surface, {side: every}, np.eye(4), brain)
     whole = pial = triangles.transformed(mesh, pose.of_file())
     if is_cap.any():
-        _require_medial(triangles.submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
+        _require_medial(
+            triangles.submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0
+        )
         pial = triangles.submesh(whole, ~is_cap)[0]
     x = whole.vertices[:, 0]
-    fissure_x = float(x.max() + posing.WALL_DISTANCE_MM if side == "left" else x.min() - posing.WALL_DISTANCE_MM)
+    fissure_x = float(
+        x.max() + posing.WALL_DISTANCE_MM
+        if side == "left"
+        else x.min() - posing.WALL_DISTANCE_MM
+    )
     brain.report["rotation_deg"] = angle_deg(pose.of_file()[:3, :3])
     return _pial_surface(whole, {side: pial}, fissure_x, pose, brain)
 
@@ -487,17 +711,32 @@ def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -
 def _without_islands(
     surface: RepairedSurface, sides: Mapping[Side, Mask], of_file: Floats, brain: _Brain
 ) -> tuple[TriangleMesh, Mask, Mask]:
-    """Remove all but the largest piece of a side; return the surface, masks of its caps and of the faces kept."""
-    is_kept, warnings = fissure.largest_pieces(surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float))
+    """Remove all but the largest piece of a side; return the surface, masks of its caps
+    and of the faces kept."""
+    is_kept, warnings = fissure.largest_pieces(
+        surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float)
+    )
     brain.warn(warnings)
     is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_kept)
-    return triangles.submesh(surface.mesh, is_kept)[0] if warnings else surface.mesh, is_cap[is_kept], is_kept
+    return (
+        triangles.submesh(surface.mesh, is_kept)[0] if warnings else surface.mesh,
+        is_cap[is_kept],
+        is_kept,
+    )
 
 
 def _require_medial(cap: TriangleMesh, sign: float) -> None:
-    """Raise MeshError if the cap of a posed hemisphere does not face the other one, in the direction `sign` x."""
+    """Raise MeshError if the cap of a posed hemisphere does not face the other one, in
+    the direction `sign` x."""
     normal = triangles.area_vectors(cap).sum(axis=0)
     if sign * normal[0] < MIN_AXIS_COSINE * np.linalg.norm(normal):
-        problem = "the surface has a hole that is too large to close, and is not the medial wall of a hemisphere"
+        problem = (
+            "the surface has a hole that is too large to close, and is not the medial"
+            " wall of a hemisphere"
+        )
         found = f"a hole {np.ptp(cap.vertices, axis=0).max():.1f} mm across"
-        raise MeshError(problem, found=found, expected="a closed surface, or hemispheres open at medial walls only")
+        raise MeshError(
+            problem,
+            found=found,
+            expected="a closed surface, or hemispheres open at medial walls only",
+        )

@@ -1,4 +1,5 @@
-"""Estimate the pose of a surface from its shape, and of a label volume from hindbrain and labelled sides, or its shape.
+"""Estimate the pose of a surface from its shape, and of a label volume from hindbrain
+and labelled sides, or its shape.
 
 Left hemispheres are mirrored here and treated as right ones.
 """
@@ -20,28 +21,39 @@ from . import template
 from .plausible import EXCHANGED_OR_MIRRORED
 from .template import PointCloud
 
-# a pose is clear if the next best one fits worse by this factor (1.01 in ellipsoids, 1.3 and more in hemispheres of
-# atlases of 21 to 38 GW, 1.1 in their whole brains), and its own residual is at most this, in sizes
+# a pose is clear if the next best one fits worse by this factor (1.01 in ellipsoids,
+# 1.3 and more in hemispheres of atlases of 21 to 38 GW, 1.1 in their whole brains), and
+# its own residual is at most this, in sizes
 MIN_CONFIDENCE, MAX_RESIDUAL = 1.07, 0.13
-# the side is clear if the mirrored shape fits worse by this factor: 1.16 and more in atlases of 21 to 38 GW
+# the side is clear if the mirrored shape fits worse by this factor: 1.16 and more in
+# atlases of 21 to 38 GW
 MIN_SIDE_RATIO = 1.07
 # poses within this angle of the axes of files (RAS, LPS) are likely a priori
 CONVENTION_DEG = 35.0
-# tolerances for agreement of the shape with the axes of the file: tilt of the mid-plane, and pitch
+# tolerances for agreement of the shape with the axes of the file: tilt of the
+# mid-plane, and pitch
 TILT_TOL_DEG, PITCH_TOL_DEG = 10.0, 15.0
 # of the axes of RAS+, down and up
 DIRECTIONS = ("LR", "PA", "IS")
-# two files share their coordinates if their poses differ by less; distances are in sizes
+# two files share their coordinates if their poses differ by less; distances are in
+# sizes
 COMMON_DEG, COMMON_OFFSET, COMMON_DISTANCE = 5.0, 0.08, 0.15
 # the same for files that name one coordinate system
 DECLARED_TURN_DEG = 30.0
-# distance of the medial walls from the mid-sagittal plane if it does not follow from the files
+# distance of the medial walls from the mid-sagittal plane if it does not follow from
+# the files
 WALL_DISTANCE_MM = 0.5
-# decimals of reported values: rounding a rotation moves no point of a brain by a micrometre
+# decimals of reported values: rounding a rotation moves no point of a brain by a
+# micrometre
 DIGITS = 6
-# from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over weeks 21 to 34 of the example atlas
-EXPECTED = {"cerebellum": np.array([0.0, -0.58, -0.81]), "brainstem": np.array([0.0, -0.30, -0.95])}
-# minimum of these distances, in cube roots of the cerebrum's volume; 0.37 or more in weeks 21 to 36
+# from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over
+# weeks 21 to 34 of the example atlas
+EXPECTED = {
+    "cerebellum": np.array([0.0, -0.58, -0.81]),
+    "brainstem": np.array([0.0, -0.30, -0.95]),
+}
+# minimum of these distances, in cube roots of the cerebrum's volume; 0.37 or more in
+# weeks 21 to 36
 MIN_HINDBRAIN_DISTANCE = 0.25
 # labelled sides weigh as much as the hindbrain
 TO_RIGHT = np.array([1.0, 0.0, 0.0])
@@ -51,20 +63,26 @@ MIN_TURN_DEG = 60.0
 DOUBTFUL_TURN_DEG = 15.0
 PITCH_KEPT = "its mid-plane is set upright, its pitch is kept; check the file's axes"
 # without known sides a rotated brain cannot be distinguished from a mirrored one
-MIRROR_WARNING = "if an axis is reversed instead, or two are exchanged, left and right are wrong now: check them"
+MIRROR_WARNING = (
+    "if an axis is reversed instead, or two are exchanged, left and right are wrong"
+    " now: check them"
+)
 # two directions closer than this (radians) do not determine the rotation about them
 MIN_SPREAD = 0.06
-# a rotation this close to quarter turns is taken for quarter turns, as caused by wrong axis codes
+# a rotation this close to quarter turns is taken for quarter turns, as caused by wrong
+# axis codes
 QUARTERS_DEG = 15.0
 
 
 @dataclass(frozen=True, eq=False)
 class PosedShape:
-    """A right hemisphere, a mirrored left one, or a brain, by its `kind`, with the pose estimated from its shape.
+    """A right hemisphere, a mirrored left one, or a brain, by its `kind`, with the pose
+    estimated from its shape.
 
-    `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from the centre of volume. `residual`
-    is in sizes; `confidence` is that of the next best pose over it, `side_ratio` that of the mirrored shape, which
-    `mirrored_rotation` leads to RAS+.
+    `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from
+    the centre of volume. `residual` is in sizes; `confidence` is that of the next best
+    pose over it, `side_ratio` that of the mirrored shape, which `mirrored_rotation`
+    leads to RAS+.
     """
 
     kind: Literal["hemisphere", "brain"]
@@ -82,7 +100,8 @@ class PosedShape:
 
 
 def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
-    """Estimate the pose of a right hemisphere (or a mirrored left one) from its shape, even if it is not clear."""
+    """Estimate the pose of a right hemisphere (or a mirrored left one) from its shape,
+    even if it is not clear."""
     shape = template.shape_of(mesh)
     templates = template.template_shapes("hemisphere")
     fit, confidence = template.register_from_all_sides(shape, templates)
@@ -91,27 +110,56 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
     side_ratio = mirrored.residual / fit.residual
     rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
-    return PosedShape("hemisphere", shape, rotation, wall_mm, fit.residual, confidence, side_ratio, mirrored.rotation)
+    return PosedShape(
+        "hemisphere",
+        shape,
+        rotation,
+        wall_mm,
+        fit.residual,
+        confidence,
+        side_ratio,
+        mirrored.rotation,
+    )
 
 
-def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
-    """Return the pose of a brain from two closed, outward hemispheres, each in any rigid pose.
+def pose_of_pair(
+    left: TriangleMesh, right: TriangleMesh, *, declared: bool = False
+) -> Pose:
+    """Return the pose of a brain from two closed, outward hemispheres, each in any
+    rigid pose.
 
-    Common coordinates close to RAS or LPS are kept; other common ones get one rigid motion, else each gets its own,
-    with the medial walls next to x = 0. `declared` is whether both files name one coordinate system. If a shape fits
-    several poses, both are taken as RAS+ with a warning. InputError if that does not fit, or the two seem swapped or of
-    one side.
+    Common coordinates close to RAS or LPS are kept; other common ones get one rigid
+    motion, else each gets its own, with the medial walls next to x = 0. `declared` is
+    whether both files name one coordinate system. If a shape fits several poses, both
+    are taken as RAS+ with a warning. InputError if that does not fit, or the two seem
+    swapped or of one side.
     """
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     _require_sides(shapes)
     if not all(hemisphere.is_clear for hemisphere in shapes):
-        poses = [_pose_as_ras(shape, f"{side} {shape.kind}") for shape, side in zip(shapes, SIDES, strict=True)]
+        poses = [
+            _pose_as_ras(shape, f"{side} {shape.kind}")
+            for shape, side in zip(shapes, SIDES, strict=True)
+        ]
         return poses[0]
     mirrored_left, own_right = shapes
-    fit = template.register(mirrored_left.shape, [own_right.shape], own_right.rotation.T @ mirrored_left.rotation)
+    fit = template.register(
+        mirrored_left.shape,
+        [own_right.shape],
+        own_right.rotation.T @ mirrored_left.rotation,
+    )
     # mean of the right one's own estimate and of that from the left one
-    middle = Rotation.from_matrix([own_right.rotation, mirrored_left.rotation @ fit.rotation.T]).mean().as_matrix()
-    pair = replace(mirrored_left, rotation=middle @ fit.rotation), replace(own_right, rotation=middle)
+    middle = (
+        Rotation.from_matrix(
+            [own_right.rotation, mirrored_left.rotation @ fit.rotation.T]
+        )
+        .mean()
+        .as_matrix()
+    )
+    pair = (
+        replace(mirrored_left, rotation=middle @ fit.rotation),
+        replace(own_right, rotation=middle),
+    )
     motions = _motions(*pair, fit)
     together = _share_coordinates(*motions, *pair, declared)
     if together:
@@ -124,7 +172,10 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
     evidence = {
         "coordinates": frame,
         **{
-            name: {side: round(getattr(shape, name), DIGITS) for side, shape in zip(SIDES, shapes, strict=True)}
+            name: {
+                side: round(getattr(shape, name), DIGITS)
+                for side, shape in zip(SIDES, shapes, strict=True)
+            }
             for name in ("residual", "confidence", "side_ratio")
         },
         "mirror_residual": round(fit.residual, DIGITS),
@@ -133,13 +184,19 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
     if not together:
         angle, shift = _difference(*motions, mirrored_left)
         doubts.append(
-            f"the medial walls do not face each other in the files' coordinates: {np.linalg.norm(shift):.1f} mm and "
-            f"{angle:.0f}° off: each was posed by its own shape. Are both files in one space?"
+            "the medial walls do not face each other in the files' coordinates:"
+            f" {np.linalg.norm(shift):.1f} mm and {angle:.0f}° off: each was posed by"
+            " its own shape. Are both files in one space?"
         )
     if together and not frame and (axes := axes_of_file(motions[0][:3, :3])):
-        doubts.append(f"the files have the axes {axes} according to the shape; {MIRROR_WARNING}")
+        doubts.append(
+            f"the files have the axes {axes} according to the shape; {MIRROR_WARNING}"
+        )
     if _mean_side_ratio(shapes) < MIN_SIDE_RATIO:
-        doubts.append("left and right are those of the configuration: the shapes do not show if the files are swapped")
+        doubts.append(
+            "left and right are those of the configuration: the shapes do not show if"
+            " the files are swapped"
+        )
     # volumes of the brain are in RAS+
     return Pose(
         np.eye(4) if frame else whole,
@@ -157,7 +214,10 @@ def _mean_side_ratio(shapes: list[PosedShape]) -> float:
 
 def _require_sides(shapes: list[PosedShape]) -> None:
     ratios = [shape.side_ratio for shape in shapes]
-    found = f"{ratios[0]:.2f} (left) and {ratios[1]:.2f} (right) times the distance from the other side's template"
+    found = (
+        f"{ratios[0]:.2f} (left) and {ratios[1]:.2f} (right) times the distance from"
+        " the other side's template"
+    )
     if min(ratios) < 1 / MIN_SIDE_RATIO and max(ratios) > MIN_SIDE_RATIO:
         raise InputError(
             "both hemispheres seem to be of one side",
@@ -170,32 +230,45 @@ def _require_sides(shapes: list[PosedShape]) -> None:
 
 
 def _wrong_sides(shapes: list[PosedShape], found: str) -> InputError:
-    """Return the error of hemispheres that each have the shape of the other side: exchanged, or mirrored.
+    """Return the error of hemispheres that each have the shape of the other side:
+    exchanged, or mirrored.
 
-    A mirrored hemisphere has the shape of the other one, so both explain any such pair. Only the axes of the files
-    speak for one of them: exchanged files are most likely in RAS or LPS, as other files are.
+    A mirrored hemisphere has the shape of the other one, so both explain any such pair.
+    Only the axes of the files speak for one of them: exchanged files are most likely in
+    RAS or LPS, as other files are.
     """
     mirrored_left, own_right = shapes
     mirror = MIRROR[:3, :3]
     # from the coordinates of the files to RAS+, if these are exchanged
-    rotations = [mirrored_left.mirrored_rotation, mirror @ own_right.mirrored_rotation @ mirror]
+    rotations = [
+        mirrored_left.mirrored_rotation,
+        mirror @ own_right.mirrored_rotation @ mirror,
+    ]
     exchanged = {axes_of_file(rotation) for rotation in rotations}
     mirrored = {axes_of_file(mirror @ rotation) for rotation in rotations}
     axes = exchanged.pop() if len(exchanged) == 1 else ""
     mirrored_axes = mirrored.pop() if len(mirrored) == 1 else ""
     if axes and axes.lower() not in CONVENTIONS:
         return InputError(
-            "the coordinates of the hemispheres seem to be mirrored, unless the files are exchanged in unusual axes",
+            "the coordinates of the hemispheres seem to be mirrored, unless the files"
+            " are exchanged in unusual axes",
             found=f"the axes {mirrored_axes} if mirrored, {axes} if exchanged; {found}",
             expected="the axes RAS or LPS, and more than 1",
-            remedy="Export the surfaces in RAS or LPS, which shows which it is. Do not swap `left` and `right` before: "
-            "the left one of mirrored hemispheres would be measured as the right one.",
+            remedy=(
+                "Export the surfaces in RAS or LPS, which shows which it is. Do not"
+                " swap `left` and `right` before: the left one of mirrored hemispheres"
+                " would be measured as the right one."
+            ),
         )
     if axes:
         found += f"; the axes {axes} if they are exchanged, {mirrored_axes} if mirrored"
-    known = "If both the sides and the axes are known to be right, set coordinates: ras or lps."
+    known = (
+        "If both the sides and the axes are known to be right, set coordinates: ras or"
+        " lps."
+    )
     return InputError(
-        "the hemispheres are exchanged, or their coordinates mirrored; their shapes do not show which",
+        "the hemispheres are exchanged, or their coordinates mirrored; their shapes do"
+        " not show which",
         found=found,
         expected="more than 1",
         remedy=f"{EXCHANGED_OR_MIRRORED}. {known}",
@@ -203,9 +276,11 @@ def _wrong_sides(shapes: list[PosedShape], found: str) -> InputError:
 
 
 def axes_of_file(to_ras: Floats) -> str:
-    """Return the directions of a file's axes, such as RAS or LPI, or "" if they are oblique.
+    """Return the directions of a file's axes, such as RAS or LPI, or "" if they are
+    oblique.
 
-    `to_ras` is the (3, 3) rotation, or rotation and reflection, from the coordinates of the file to RAS+.
+    `to_ras` is the (3, 3) rotation, or rotation and reflection, from the coordinates of
+    the file to RAS+.
     """
     columns = to_ras.T
     along = np.abs(columns).argmax(axis=1)
@@ -213,27 +288,46 @@ def axes_of_file(to_ras: Floats) -> str:
     if is_oblique.any() or len(set(along)) < len(along):
         return ""
     signs = columns[range(3), along] > 0
-    return "".join(DIRECTIONS[axis][int(sign)] for axis, sign in zip(along, signs, strict=True))
+    return "".join(
+        DIRECTIONS[axis][int(sign)] for axis, sign in zip(along, signs, strict=True)
+    )
 
 
 def _pose_as_ras(shape: PosedShape, name: str) -> Pose:
-    """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+."""
-    fit = template.register(shape.shape, template.template_shapes(shape.kind), np.eye(3))
-    fits_ras = fit.residual < MIN_CONFIDENCE * shape.residual and fit.residual <= MAX_RESIDUAL
+    """Return the file's pose for a shape that fits several; InputError if it fits
+    clearly worse near RAS+."""
+    fit = template.register(
+        shape.shape, template.template_shapes(shape.kind), np.eye(3)
+    )
+    fits_ras = (
+        fit.residual < MIN_CONFIDENCE * shape.residual and fit.residual <= MAX_RESIDUAL
+    )
     if not fits_ras or angle_deg(fit.rotation) >= CONVENTION_DEG:
         next_best = f"the next best pose has {shape.confidence:.2f} times as much"
         raise InputError(
             f"the pose of the {name} cannot be determined from its shape",
             found=f"a residual of {shape.residual:.3f}; {next_best}",
-            expected=f"at most {MAX_RESIDUAL}, and at least {MIN_CONFIDENCE} times; or a pose near RAS",
-            remedy="Is it the closed pial surface of a cerebrum? If so, pose it and set coordinates: ras or lps.",
+            expected=(
+                f"at most {MAX_RESIDUAL}, and at least {MIN_CONFIDENCE} times; or a"
+                " pose near RAS"
+            ),
+            remedy=(
+                "Is it the closed pial surface of a cerebrum? If so, pose it and set"
+                " coordinates: ras or lps."
+            ),
         )
-    doubt = "the coordinates are taken as RAS+, but the shape fits other poses as well: set coordinates"
+    doubt = (
+        "the coordinates are taken as RAS+, but the shape fits other poses as well: set"
+        " coordinates"
+    )
     return Pose(by="default", warnings=(doubt,))
 
 
-def _motions(left: PosedShape, right: PosedShape, fit: RigidFit) -> tuple[Floats, Floats]:
-    # offset between the centres of volume of both posed hemispheres, the left one mirrored
+def _motions(
+    left: PosedShape, right: PosedShape, fit: RigidFit
+) -> tuple[Floats, Floats]:
+    # offset between the centres of volume of both posed hemispheres, the left one
+    # mirrored
     offset = right.rotation @ fit.shift * right.shape.size_mm
     posed = []
     for side, share in ((left, 0.5), (right, -0.5)):
@@ -242,25 +336,44 @@ def _motions(left: PosedShape, right: PosedShape, fit: RigidFit) -> tuple[Floats
     return MIRROR @ posed[0] @ MIRROR, posed[1]
 
 
-def _difference(to_left: Floats, to_right: Floats, left: PosedShape) -> tuple[float, Floats]:
-    """Return the angle between two motions, and their shift (3,) in mm at the left hemisphere's centre."""
+def _difference(
+    to_left: Floats, to_right: Floats, left: PosedShape
+) -> tuple[float, Floats]:
+    """Return the angle between two motions, and their shift (3,) in mm at the left
+    hemisphere's centre."""
     difference = to_right - to_left
     shift = difference[:3, :3] @ MIRROR[:3, :3] @ left.shape.centre + difference[:3, 3]
     return angle_deg(to_right[:3, :3].T @ to_left[:3, :3]), shift
 
 
-def _share_coordinates(to_left: Floats, to_right: Floats, left: PosedShape, right: PosedShape, declared: bool) -> bool:
+def _share_coordinates(
+    to_left: Floats,
+    to_right: Floats,
+    left: PosedShape,
+    right: PosedShape,
+    declared: bool,
+) -> bool:
     angle, shift_mm = _difference(to_left, to_right, left)
     if declared and angle < DECLARED_TURN_DEG:
         return True
     shift = np.abs(shift_mm) / right.shape.size_mm
-    return bool(angle < COMMON_DEG and shift[0] < COMMON_DISTANCE and np.hypot(*shift[1:]) < COMMON_OFFSET)
+    return bool(
+        angle < COMMON_DEG
+        and shift[0] < COMMON_DISTANCE
+        and np.hypot(*shift[1:]) < COMMON_OFFSET
+    )
 
 
-def _mean_motion(to_left: Floats, to_right: Floats, left: PosedShape, right: PosedShape) -> Floats:
+def _mean_motion(
+    to_left: Floats, to_right: Floats, left: PosedShape, right: PosedShape
+) -> Floats:
     centre = 0.5 * (MIRROR[:3, :3] @ left.shape.centre + right.shape.centre)
-    rotation = Rotation.from_matrix([to_left[:3, :3], to_right[:3, :3]]).mean().as_matrix()
-    moved = 0.5 * sum(side[:3, :3] @ centre + side[:3, 3] for side in (to_left, to_right))
+    rotation = (
+        Rotation.from_matrix([to_left[:3, :3], to_right[:3, :3]]).mean().as_matrix()
+    )
+    moved = 0.5 * sum(
+        side[:3, :3] @ centre + side[:3, 3] for side in (to_left, to_right)
+    )
     return motion(rotation, moved - rotation @ centre)
 
 
@@ -274,18 +387,30 @@ def _frame(to_ras: Floats) -> str | None:
 
 
 def pitch_deg(rotation: Floats) -> float:
-    """Return the angle in degrees of the rotation about x that is closest to a (3, 3) rotation."""
+    """Return the angle in degrees of the rotation about x that is closest to a (3, 3)
+    rotation."""
     block = rotation[1:, 1:]
-    return float(np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1])))
+    return float(
+        np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1]))
+    )
 
 
-def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> list[str]:
-    """Return warnings if the shapes of two hemispheres contradict their sides or the coordinates, "ras" or "lps"."""
+def hemisphere_warnings(
+    left: TriangleMesh, right: TriangleMesh, coordinates: str
+) -> list[str]:
+    """Return warnings if the shapes of two hemispheres contradict their sides or the
+    coordinates, "ras" or "lps"."""
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
-        exchanged = f"left and right are exchanged and the coordinates are not {coordinates.upper()}"
+        exchanged = (
+            "left and right are exchanged and the coordinates are not"
+            f" {coordinates.upper()}"
+        )
         check = "set coordinates: auto, and do not swap before"
-        return [f"the shapes fit the other sides better: {exchanged}, or these are mirrored: {check}"]
+        return [
+            f"the shapes fit the other sides better: {exchanged}, or these are"
+            f" mirrored: {check}"
+        ]
     turns = [angle_deg(shape.rotation) for shape in shapes]
     if all(shape.is_clear for shape in shapes) and min(turns) > MIN_TURN_DEG:
         return [_contradiction(coordinates, "hemispheres are", float(np.mean(turns)))]
@@ -293,125 +418,220 @@ def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: st
 
 
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
-    """Return the pose of a brain's surface in coordinates "ras", "lps" or "auto"; InputError if this is unclear."""
+    """Return the pose of a brain's surface in coordinates "ras", "lps" or "auto";
+    InputError if this is unclear."""
     shape = template.shape_of(mesh, max_depth=template.MAX_DEPTH)
-    fit, confidence = template.register_from_all_sides(shape, template.template_shapes("brain"))
-    brain = PosedShape("brain", shape, fit.rotation, 0.0, fit.residual, confidence, 1.0, fit.rotation)
+    fit, confidence = template.register_from_all_sides(
+        shape, template.template_shapes("brain")
+    )
+    brain = PosedShape(
+        "brain", shape, fit.rotation, 0.0, fit.residual, confidence, 1.0, fit.rotation
+    )
     return _choose_pose(brain, brain.rotation, coordinates)
 
 
 def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
-    """Return the pose of a label volume from the surface of its cerebrum, in the volume's coordinates.
+    """Return the pose of a label volume from the surface of its cerebrum, in the
+    volume's coordinates.
 
-    The file's is kept, with a warning, if it is within 60° or unclear. `has_sides` is whether the sides are labelled.
+    The file's is kept, with a warning, if it is within 60° or unclear. `has_sides` is
+    whether the sides are labelled.
     """
-    unchecked = Pose(warnings=("neither labels nor shape determine the pose: it is the file's, unchecked",))
+    unchecked = Pose(
+        warnings=(
+            "neither labels nor shape determine the pose: it is the file's, unchecked",
+        )
+    )
     try:
         pose = pose_of_surface(mesh, "auto")
     except InputError:
         return unchecked
-    return unchecked if pose.by == "default" else pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
+    return (
+        unchecked
+        if pose.by == "default"
+        else pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
+    )
 
 
-def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:
-    """Return the pose of a single, clean hemisphere in coordinates "ras", "lps" or "auto".
+def pose_of_hemisphere(
+    mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False
+) -> Pose:
+    """Return the pose of a single, clean hemisphere in coordinates "ras", "lps" or
+    "auto".
 
-    With "auto", axes of the file that fit RAS or LPS within 35° are kept and the medial wall is set upright, else the
-    pose is that of the shape. `of_volume`: the surface is that of a label volume, whose axes other volumes have, too.
-    InputError if the pose is ambiguous or the shape is the other hemisphere's.
+    With "auto", axes of the file that fit RAS or LPS within 35° are kept and the medial
+    wall is set upright, else the pose is that of the shape. `of_volume`: the surface is
+    that of a label volume, whose axes other volumes have, too. InputError if the pose
+    is ambiguous or the shape is the other hemisphere's.
     """
     mirror = MIRROR if side == "left" else np.eye(4)
     hemisphere = hemisphere_by_shape(transformed(mesh, mirror))
     rotation = mirror[:3, :3] @ hemisphere.rotation @ mirror[:3, :3]
     side_ratio, other = hemisphere.side_ratio, "right" if side == "left" else "left"
-    if coordinates == "auto" and hemisphere.is_clear and side_ratio < 1 / MIN_SIDE_RATIO:
+    if (
+        coordinates == "auto"
+        and hemisphere.is_clear
+        and side_ratio < 1 / MIN_SIDE_RATIO
+    ):
         raise InputError(
-            f"the hemisphere seems to be the {other} one, or mirrored; its shape does not show which",
+            f"the hemisphere seems to be the {other} one, or mirrored; its shape does"
+            " not show which",
             found=f"{side_ratio:.2f} times the distance from the other side's template",
             expected="more than 1",
-            remedy=f"Find out which. If it is the {other} one, set side: {other}. If an axis is reversed, or two are "
-            "exchanged, export it in its true orientation (RAS or LPS) and keep the side.",
+            remedy=(
+                f"Find out which. If it is the {other} one, set side: {other}. If an"
+                " axis is reversed, or two are exchanged, export it in its true"
+                " orientation (RAS or LPS) and keep the side."
+            ),
         )
     pose = _choose_pose(hemisphere, rotation, coordinates, of_volume=of_volume)
     if side_ratio < 1 / MIN_SIDE_RATIO:
-        doubt = f"the shape fits the {other} side better than the {side} one: is the side wrong, or an axis reversed?"
+        doubt = (
+            f"the shape fits the {other} side better than the {side} one: is the side"
+            " wrong, or an axis reversed?"
+        )
         pose = replace(pose, warnings=(doubt, *pose.warnings))
     elif side_ratio < MIN_SIDE_RATIO:
-        doubt = f"the side, {side}, is that of the configuration: it cannot be determined from the shape"
+        doubt = (
+            f"the side, {side}, is that of the configuration: it cannot be determined"
+            " from the shape"
+        )
         pose = replace(pose, warnings=(doubt, *pose.warnings))
-    return replace(pose, evidence={"confidence": hemisphere.confidence, "side_ratio": side_ratio})
+    return replace(
+        pose, evidence={"confidence": hemisphere.confidence, "side_ratio": side_ratio}
+    )
 
 
-def _choose_pose(shape: PosedShape, rotation: Floats, coordinates: str, *, of_volume: bool = False) -> Pose:
-    """Return the pose in named coordinates, or that of the shape; `rotation` (3, 3) leads to RAS+."""
-    angles = {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}
+def _choose_pose(
+    shape: PosedShape, rotation: Floats, coordinates: str, *, of_volume: bool = False
+) -> Pose:
+    """Return the pose in named coordinates, or that of the shape; `rotation` (3, 3)
+    leads to RAS+."""
+    angles = {
+        name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()
+    }
     if coordinates != "auto":
         is_doubtful = shape.is_clear and angles[coordinates] > MIN_TURN_DEG
-        doubts = [_contradiction(coordinates, f"{shape.kind} is", angles[coordinates])] if is_doubtful else []
-        return turned(CONVENTIONS[coordinates][:3, :3], "configuration", coordinates, *doubts)
+        doubts = (
+            [_contradiction(coordinates, f"{shape.kind} is", angles[coordinates])]
+            if is_doubtful
+            else []
+        )
+        return turned(
+            CONVENTIONS[coordinates][:3, :3], "configuration", coordinates, *doubts
+        )
     if not shape.is_clear:
         return _pose_as_ras(shape, shape.kind)
     nearest = min(angles, key=lambda name: angles[name])
     if angles[nearest] >= CONVENTION_DEG:
-        moved = f"the {shape.kind} was rotated by {angles['ras']:.0f}° according to its shape"
+        moved = (
+            f"the {shape.kind} was rotated by {angles['ras']:.0f}° according to its"
+            " shape"
+        )
         return turned(rotation, "shape", "ras", f"{moved}; {MIRROR_WARNING}")
     axes = CONVENTIONS[nearest][:3, :3]
-    notes = [] if nearest == "ras" else [f"the coordinates are {nearest.upper()} according to the shape"]
+    notes = (
+        []
+        if nearest == "ras"
+        else [f"the coordinates are {nearest.upper()} according to the shape"]
+    )
     if shape.kind == "brain":
         # a single hemisphere shows by its shape whether it is mirrored
-        return turned(axes, "shape", nearest, *(f"{note}; {MIRROR_WARNING}" for note in notes))
+        return turned(
+            axes, "shape", nearest, *(f"{note}; {MIRROR_WARNING}" for note in notes)
+        )
     # the smallest rotation that sets the medial wall upright
-    upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [axes @ rotation.T @ np.array([1.0, 0.0, 0.0])])
-    return turned(upright.as_matrix() @ axes, "file", "ras" if of_volume else nearest, *notes)
+    upright, _ = Rotation.align_vectors(
+        [[1.0, 0.0, 0.0]], [axes @ rotation.T @ np.array([1.0, 0.0, 0.0])]
+    )
+    return turned(
+        upright.as_matrix() @ axes, "file", "ras" if of_volume else nearest, *notes
+    )
 
 
 def _contradiction(coordinates: str, what: str, angle: float) -> str:
     check = "check them, and whether an axis is reversed; or set coordinates: auto"
-    return f"according to the shape the {what} rotated by {angle:.0f}° from the coordinates {coordinates}: {check}"
+    return (
+        f"according to the shape the {what} rotated by {angle:.0f}° from the"
+        f" coordinates {coordinates}: {check}"
+    )
 
 
-def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose | None:
-    """Estimate the pose from cerebellum, brainstem and labelled sides; return None if too few of them are labelled.
+def pose_of_labels(
+    labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme
+) -> Pose | None:
+    """Estimate the pose from cerebellum, brainstem and labelled sides; return None if
+    too few of them are labelled.
 
-    InputError if labels of left and right are mirrored, so that no rotation can correct them.
+    InputError if labels of left and right are mirrored, so that no rotation can correct
+    them.
     """
     names = "cerebrum", "cerebellum", "brainstem", "left", "right"
-    places = {name: np.argwhere(np.isin(labels, getattr(scheme, name))) for name in names}
-    centres = {name: affine[:3, :3] @ voxels.mean(axis=0) for name, voxels in places.items() if len(voxels)}
-    hindbrain = {name: centres[name] - centres["cerebrum"] for name in EXPECTED if name in centres}
-    size = np.cbrt(np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3])))
+    places = {
+        name: np.argwhere(np.isin(labels, getattr(scheme, name))) for name in names
+    }
+    centres = {
+        name: affine[:3, :3] @ voxels.mean(axis=0)
+        for name, voxels in places.items()
+        if len(voxels)
+    }
+    hindbrain = {
+        name: centres[name] - centres["cerebrum"]
+        for name in EXPECTED
+        if name in centres
+    }
+    size = np.cbrt(
+        np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3]))
+    )
     for name, offset in hindbrain.items():
         if (share := np.linalg.norm(offset) / size) < MIN_HINDBRAIN_DISTANCE:
             raise InputError(
                 f"with the scheme {scheme.name!r} the {name} lies inside the cerebrum",
-                found=f"distance of the centres: {share:.2f} times the cerebrum's size (cube root of its volume)",
+                found=(
+                    f"distance of the centres: {share:.2f} times the cerebrum's size"
+                    " (cube root of its volume)"
+                ),
                 expected=f"{MIN_HINDBRAIN_DISTANCE} or more",
             )
-    sides = unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None
+    sides = (
+        unit(centres["right"] - centres["left"])
+        if {"left", "right"} <= set(centres)
+        else None
+    )
     rotation = _rotation_from_hindbrain(hindbrain)
     if sides is not None and hindbrain:
         rotation = _rotation_from_sides(hindbrain, sides, rotation)
     if rotation is None:
         return None
-    by = " and ".join([*hindbrain, *(["the labelled sides"] if sides is not None else [])])
+    by = " and ".join(
+        [*hindbrain, *(["the labelled sides"] if sides is not None else [])]
+    )
     return pose_from_rotation(rotation, by, sides is not None)
 
 
 def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
-    """Return the pose of a volume that an estimated (3, 3) rotation about its origin would bring to RAS+.
+    """Return the pose of a volume that an estimated (3, 3) rotation about its origin
+    would bring to RAS+.
 
-    Rotations of 60° and more are applied, as quarter turns if these are close. Smaller ones only give a warning, from
-    15° on. `evidence` names what the estimate rests on; `has_sides` is whether left and right are labelled.
+    Rotations of 60° and more are applied, as quarter turns if these are close. Smaller
+    ones only give a warning, from 15° on. `evidence` names what the estimate rests on;
+    `has_sides` is whether left and right are labelled.
     """
     quarters = _nearest_quarters(rotation)
     if angle_deg(rotation @ quarters.T) < QUARTERS_DEG:
         rotation = quarters
     angle = angle_deg(rotation)
     if angle >= MIN_TURN_DEG:
-        warning = f"the brain was rotated by {angle:.0f}° according to {evidence}: its affine has other axes"
+        warning = (
+            f"the brain was rotated by {angle:.0f}° according to {evidence}: its affine"
+            " has other axes"
+        )
         warning = warning if has_sides else f"{warning}; {MIRROR_WARNING}"
         return turned(rotation, evidence.removeprefix("the "), "ras", warning)
-    doubt = f"according to {evidence} the brain is rotated by about {angle:.0f}°: {PITCH_KEPT}"
+    doubt = (
+        f"according to {evidence} the brain is rotated by about {angle:.0f}°:"
+        f" {PITCH_KEPT}"
+    )
     return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
 
 
@@ -422,22 +642,34 @@ def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
         (np.cross(*pair), unit(pair[0] + pair[1]))
         for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
     )
-    # the cross product points to the right. If both lie in the same direction, the rotation about it is unknown
+    # the cross product points to the right. If both lie in the same direction, the
+    # rotation about it is unknown
     if np.linalg.norm(theirs[0]) < MIN_SPREAD:
         return None
     return _rotation_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
 
 
-def _rotation_from_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
-    """Estimate the (3, 3) rotation to RAS+ from labelled sides and hindbrain; InputError if they are mirrored."""
+def _rotation_from_sides(
+    hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None
+) -> Floats:
+    """Estimate the (3, 3) rotation to RAS+ from labelled sides and hindbrain;
+    InputError if they are mirrored."""
     below = [(unit(offset), EXPECTED[name]) for name, offset in hindbrain.items()]
-    turn, mirrored = (_rotation_onto([(to_right, TO_RIGHT), *below]) for to_right in (sides, -sides))
+    turn, mirrored = (
+        _rotation_onto([(to_right, TO_RIGHT), *below]) for to_right in (sides, -sides)
+    )
     if _is_mirrored(turn, mirrored) if rotation is None else (rotation @ sides)[0] < 0:
         raise InputError(
             "labels of the left hemisphere lie on the right",
-            found=f"the sides are the wrong way round with {' and '.join(hindbrain)} below and behind",
+            found=(
+                f"the sides are the wrong way round with {' and '.join(hindbrain)}"
+                " below and behind"
+            ),
             expected="left at the smaller x (RAS+)",
-            remedy="The volume's affine mirrors the brain, or the scheme's sides are swapped.",
+            remedy=(
+                "The volume's affine mirrors the brain, or the scheme's sides are"
+                " swapped."
+            ),
         )
     return turn
 
@@ -450,14 +682,21 @@ def _rotation_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
 def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
     """Return whether exchanged sides explain a volume better than a rotation.
 
-    Mirrored sides and one more direction fit an oblique half turn, and exchanged an upright brain; wrong axis codes
-    give quarter turns, most often from LPS.
+    Mirrored sides and one more direction fit an oblique half turn, and exchanged an
+    upright brain; wrong axis codes give quarter turns, most often from LPS.
     """
     if angle_deg(turn) < MIN_TURN_DEG:
         return False
-    off_lps, off_quarters = (angle_deg(turn @ axes.T) for axes in (CONVENTIONS["lps"][:3, :3], _nearest_quarters(turn)))
-    return angle_deg(mirrored) < min(MIN_TURN_DEG, off_lps, max(DOUBTFUL_TURN_DEG, off_quarters))
+    off_lps, off_quarters = (
+        angle_deg(turn @ axes.T)
+        for axes in (CONVENTIONS["lps"][:3, :3], _nearest_quarters(turn))
+    )
+    return angle_deg(mirrored) < min(
+        MIN_TURN_DEG, off_lps, max(DOUBTFUL_TURN_DEG, off_quarters)
+    )
 
 
 def _nearest_quarters(rotation: Floats) -> Floats:
-    return np.asarray(min(CUBE_ROTATIONS, key=lambda turn: angle_deg(rotation @ turn.T)).round())
+    return np.asarray(
+        min(CUBE_ROTATIONS, key=lambda turn: angle_deg(rotation @ turn.T)).round()
+    )

@@ -1,4 +1,5 @@
-"""Repair surfaces: clean them, remove stalks, remesh, restore the volume, or rebuild them; every repair is counted."""
+"""Repair surfaces: clean them, remove stalks, remesh, restore the volume, or rebuild
+them; every repair is counted."""
 
 import logging
 from collections.abc import Mapping
@@ -18,7 +19,16 @@ from ..geometry.triangles import Ints, TriangleMesh
 from ..settings.terms import MAX_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
-from .extraction import EDGE_SLOPE, LEVEL, Floats, Mask, dilated, isosurface, make_simple, without_stalks
+from .extraction import (
+    EDGE_SLOPE,
+    LEVEL,
+    Floats,
+    Mask,
+    dilated,
+    isosurface,
+    make_simple,
+    without_stalks,
+)
 from .fissure import sample
 from .labels import REPORTED_LOSS
 from .terraces import without_terraces
@@ -27,11 +37,13 @@ log = logging.getLogger(__name__)
 
 # vertices closer than this are merged
 MERGE_MM = 1e-5
-# pieces with at least this share of the largest area are kept: two hemispheres in one file
+# pieces with at least this share of the largest area are kept: two hemispheres in one
+# file
 COMPARABLE = 0.3
 # range of lengths of brains and hemispheres
 MIN_LENGTH_MM, MAX_LENGTH_MM = 15.0, 300.0
-# an edge longer than this, and than this multiple of the median, suggests a vertex far off the surface
+# an edge longer than this, and than this multiple of the median, suggests a vertex far
+# off the surface
 SPIKE_MM, SPIKE_FACTOR = 10.0, 10.0
 # voxel size of the search for stalks
 STALK_VOXEL_MM = 0.8
@@ -43,12 +55,14 @@ MARGIN_VOXELS = 2
 MAX_FILLED_MM3 = 100.0
 # a larger relative change of volume by smoothing gives a warning
 VOLUME_TOL = 0.01
-# with a larger loss, smoothing has removed structures, and moving the whole surface cannot restore them
+# with a larger loss, smoothing has removed structures, and moving the whole surface
+# cannot restore them
 MAX_RESTORED = 0.05
 # Taubin smoothing
 SMOOTHING_ITERATIONS = 10
 ROUNDS = 2
-# rounds that reset crossing walls, and the rings of neighbours that are reset with them after smoothing
+# rounds that reset crossing walls, and the rings of neighbours that are reset with them
+# after smoothing
 N_RESETS, N_RESET_RINGS = 4, 3
 # walls where the field before an opening was above this are walls of the opening
 INSIDE_LEVEL = 0.8
@@ -56,7 +70,8 @@ INSIDE_LEVEL = 0.8
 
 @dataclass(frozen=True, eq=False)
 class RepairedSurface:
-    """A surface after repairs, a plain report, warnings, and the (m,) mask of medial caps, empty for labels."""
+    """A surface after repairs, a plain report, warnings, and the (m,) mask of medial
+    caps, empty for labels."""
 
     mesh: TriangleMesh
     report: dict[str, Any]
@@ -65,25 +80,37 @@ class RepairedSurface:
 
 
 def sound_pieces(
-    mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False, caps_walls: bool = False
+    mesh: TriangleMesh,
+    max_hole_mm: float,
+    *,
+    single: bool = False,
+    caps_walls: bool = False,
 ) -> RepairedSurface:
-    """Clean a surface of one or two pieces (only the largest with `single`) and remove parts on stalks.
+    """Clean a surface of one or two pieces (only the largest with `single`) and remove
+    parts on stalks.
 
-    With `caps_walls`, one larger hole of each hemisphere is capped; after posing it must face the other one.
+    With `caps_walls`, one larger hole of each hemisphere is capped; after posing it
+    must face the other one.
     """
-    lengths = np.linalg.norm(np.diff(mesh.vertices[triangles.edges(mesh)[0]], axis=1), axis=2)
-    mesh, repairs, is_cap = clean(mesh, max_hole_mm, single=single, caps_walls=caps_walls)
+    lengths = np.linalg.norm(
+        np.diff(mesh.vertices[triangles.edges(mesh)[0]], axis=1), axis=2
+    )
+    mesh, repairs, is_cap = clean(
+        mesh, max_hole_mm, single=single, caps_walls=caps_walls
+    )
     warnings, dropped, remaining = [], repairs["area_dropped_mm2"], triangles.area(mesh)
     if lengths.max() > max(SPIKE_MM, SPIKE_FACTOR * np.median(lengths)):
-        warnings.append(f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?")
+        warnings.append(
+            f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?"
+        )
     if dropped > REPORTED_LOSS * remaining:
         warnings.append(
-            f"{repairs['pieces_dropped']} pieces outside or inside the brain were dropped: "
-            f"{100 * dropped / (remaining + dropped):.1f} % of the area"
+            f"{repairs['pieces_dropped']} pieces outside or inside the brain were"
+            f" dropped: {100 * dropped / (remaining + dropped):.1f} % of the area"
         )
     warnings += [
-        f"a hemisphere is open at its medial wall, {width:.0f} mm across: it was closed by a cap, which does not count "
-        "in area, curvature and depth"
+        f"a hemisphere is open at its medial wall, {width:.0f} mm across: it was closed"
+        " by a cap, which does not count in area, curvature and depth"
         for width in repairs["medial_walls_capped_mm"]
     ]
     whole = mesh
@@ -91,16 +118,24 @@ def sound_pieces(
     if stalks:
         is_cap = is_cap[nearest_on(triangles.corners(mesh).mean(axis=1), whole)[1]]
     warnings += [
-        f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of {stalk['stalk_mm2']:.0f} mm² was cut off"
+        f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of"
+        f" {stalk['stalk_mm2']:.0f} mm² was cut off"
         for stalk in stalks
     ]
-    return RepairedSurface(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings, is_cap)
+    return RepairedSurface(
+        mesh,
+        {"repair": repairs} | ({"stalks": stalks} if stalks else {}),
+        warnings,
+        is_cap,
+    )
 
 
 def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
-    """Smooth and remesh a surface so that each piece is a sphere without self-intersections.
+    """Smooth and remesh a surface so that each piece is a sphere without
+    self-intersections.
 
-    Else it is rebuilt through voxels ("remade" in the report). MeshError if self-intersections remain.
+    Else it is rebuilt through voxels ("remade" in the report). MeshError if
+    self-intersections remain.
     """
     smooth, cutting = make_even(mesh, edge_length_mm)
     report: dict[str, Any] = {"self_intersections": cutting}
@@ -109,33 +144,54 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
     mesh, report["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
     smooth, _ = make_even(mesh, edge_length_mm)
     require_sound(smooth)
-    return RepairedSurface(smooth, report, [f"the surface was rebuilt through voxels, since it had {remaining}"])
+    return RepairedSurface(
+        smooth,
+        report,
+        [f"the surface was rebuilt through voxels, since it had {remaining}"],
+    )
 
 
 def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> RepairedSurface:
-    """Make each piece of a clean surface sound by itself, since hemispheres may share their medial wall."""
+    """Make each piece of a clean surface sound by itself, since hemispheres may share
+    their medial wall."""
     component, report = triangles.face_components(clean.mesh), dict[str, Any]()
     parts, caps = list[RepairedSurface](), list[Mask]()
     for number, piece in enumerate(pieces(clean.mesh)):
         even = make_sound(piece, edge_length_mm)
-        report |= {f"{key}_{number + 1}" if number else key: value for key, value in even.report.items()}
-        is_cap = clean.is_cap[component == number][nearest_on(triangles.corners(even.mesh).mean(axis=1), piece)[1]]
+        report |= {
+            f"{key}_{number + 1}" if number else key: value
+            for key, value in even.report.items()
+        }
+        is_cap = clean.is_cap[component == number][
+            nearest_on(triangles.corners(even.mesh).mean(axis=1), piece)[1]
+        ]
         # the pial surface around a cap is in one piece
-        is_cap[~is_cap] = triangles.face_components(triangles.submesh(even.mesh, ~is_cap)[0]) > 0
+        is_cap[~is_cap] = (
+            triangles.face_components(triangles.submesh(even.mesh, ~is_cap)[0]) > 0
+        )
         parts, caps = [*parts, even], [*caps, is_cap]
     warnings = [warning for part in parts for warning in part.warnings]
-    return RepairedSurface(triangles.merged(*(part.mesh for part in parts)), report, warnings, np.concatenate(caps))
+    return RepairedSurface(
+        triangles.merged(*(part.mesh for part in parts)),
+        report,
+        warnings,
+        np.concatenate(caps),
+    )
 
 
 def require_sound(mesh: TriangleMesh) -> None:
-    """Raise MeshError if the surface is not made of closed spheres without self-intersections."""
+    """Raise MeshError if the surface is not made of closed spheres without
+    self-intersections."""
     if problems := faults(mesh):
         expected = "closed pieces of Euler number 2 without self-intersections"
-        raise MeshError("the surface could not be repaired", found=problems, expected=expected)
+        raise MeshError(
+            "the surface could not be repaired", found=problems, expected=expected
+        )
 
 
 def faults(mesh: TriangleMesh) -> str:
-    """Return the faults of a surface that should be closed spheres without self-intersections; empty if none."""
+    """Return the faults of a surface that should be closed spheres without
+    self-intersections; empty if none."""
     euler = [triangles.euler_number(piece) for piece in pieces(mesh)]
     crossing = int(remeshing.self_intersecting_faces(mesh).sum())
     problems = [
@@ -147,21 +203,27 @@ def faults(mesh: TriangleMesh) -> str:
 
 
 def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
-    """Smooth (Taubin 1995, λ = 0.5, μ = −0.53), remesh and untangle a surface; also count crossing faces before.
+    """Smooth (Taubin 1995, λ = 0.5, μ = −0.53), remesh and untangle a surface; also
+    count crossing faces before.
 
     Walls of a narrow slit that keep crossing are not smoothed.
     """
     document = remeshing.in_meshlab(mesh)
     document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
     smooth = remeshing.from_meshlab(document)
-    even, crossing, remaining = remeshing.untangle(remeshing.remesh(smooth, edge_length_mm))
+    even, crossing, remaining = remeshing.untangle(
+        remeshing.remesh(smooth, edge_length_mm)
+    )
     if remaining:
-        even, _, _ = remeshing.untangle(remeshing.remesh(_without_crossings(mesh, smooth), edge_length_mm))
+        even, _, _ = remeshing.untangle(
+            remeshing.remesh(_without_crossings(mesh, smooth), edge_length_mm)
+        )
     return even, crossing
 
 
 def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
-    """Reset self-intersecting faces of a smoothed surface, and some rings around them, to their original places."""
+    """Reset self-intersecting faces of a smoothed surface, and some rings around them,
+    to their original places."""
     for _ in range(N_RESETS):
         reset = remeshing.self_intersecting_faces(smooth)
         if not reset.any():
@@ -175,15 +237,22 @@ def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh
 
 
 def clean(
-    mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False, caps_walls: bool = False
+    mesh: TriangleMesh,
+    max_hole_mm: float,
+    *,
+    single: bool = False,
+    caps_walls: bool = False,
 ) -> tuple[TriangleMesh, dict[str, Any], Mask]:
-    """Return the surface as closed, outward, manifold pieces of similar size, counts of repairs, and the mask of caps.
+    """Return the surface as closed, outward, manifold pieces of similar size, counts of
+    repairs, and the mask of caps.
 
-    Equal vertices are merged, degenerate and duplicate faces removed, edges of more than two faces split, holes up to
-    `max_hole_mm` closed, faces turned outward, and small or inner pieces dropped; `single` and `caps_walls` as in
-    `sound_pieces`. MeshError for other holes and surfaces that stay open.
+    Equal vertices are merged, degenerate and duplicate faces removed, edges of more
+    than two faces split, holes up to `max_hole_mm` closed, faces turned outward, and
+    small or inner pieces dropped; `single` and `caps_walls` as in `sound_pieces`.
+    MeshError for other holes and surfaces that stay open.
     """
-    # before vertices are merged, which may join pieces; without shared vertices, each face is a piece
+    # before vertices are merged, which may join pieces; without shared vertices, each
+    # face is a piece
     mesh, turned = _turn_outward(mesh, 2)
     mesh, doubles = _drop_doubles(mesh)
     # after merging, since faces that meet in copies of a vertex would count
@@ -191,40 +260,65 @@ def clean(
     mesh, opened = _make_manifold(mesh)
     mesh, dropped = _main_pieces(mesh, single)
     # a brain in one piece has no medial walls that could be open
-    mesh, holes, is_cap = _fill_holes(mesh, max_hole_mm, caps_walls and (single or dropped["pieces"] > 1))
+    mesh, holes, is_cap = _fill_holes(
+        mesh, max_hole_mm, caps_walls and (single or dropped["pieces"] > 1)
+    )
     mesh, turned_later = _turn_outward(mesh, dropped["pieces"])
     if not triangles.is_closed(mesh):
-        found = f"{int((triangles.edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair"
-        raise MeshError("the surface cannot be closed", found=found, expected="a closed surface")
-    counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": turned + turned_later}
+        found = (
+            f"{int((triangles.edges(mesh)[1] != 2).sum())} edges without exactly two"
+            " faces after repair"
+        )
+        raise MeshError(
+            "the surface cannot be closed", found=found, expected="a closed surface"
+        )
+    counts = {
+        "faces_that_cut_others": crossing,
+        "pieces_turned_outward": turned + turned_later,
+    }
     return mesh, doubles | opened | dropped | holes | counts, is_cap
 
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
     """Return the connected pieces of a surface, the largest area first."""
     component = triangles.face_components(mesh)
-    return [triangles.submesh(mesh, component == number)[0] for number in range(int(component.max()) + 1)]
+    return [
+        triangles.submesh(mesh, component == number)[0]
+        for number in range(int(component.max()) + 1)
+    ]
 
 
 def _turn_outward(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, int]:
-    """Turn the `count` largest pieces outward if they are closed; return the surface and how many were turned."""
+    """Turn the `count` largest pieces outward if they are closed; return the surface
+    and how many were turned."""
     component = triangles.face_components(mesh)
-    parts = [triangles.submesh(mesh, component == number)[0] for number in range(min(int(component.max()) + 1, count))]
+    parts = [
+        triangles.submesh(mesh, component == number)[0]
+        for number in range(min(int(component.max()) + 1, count))
+    ]
     inward = [
-        number for number, part in enumerate(parts) if triangles.is_closed(part) and triangles.signed_volume(part) < 0
+        number
+        for number, part in enumerate(parts)
+        if triangles.is_closed(part) and triangles.signed_volume(part) < 0
     ]
     is_inward = np.isin(component, inward)[:, None]
-    return TriangleMesh(mesh.vertices, np.where(is_inward, mesh.faces[:, ::-1], mesh.faces)), len(inward)
+    return TriangleMesh(
+        mesh.vertices, np.where(is_inward, mesh.faces[:, ::-1], mesh.faces)
+    ), len(inward)
 
 
 def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
-    vertices, _, _, faces = igl.remove_duplicate_vertices(mesh.vertices, mesh.faces, MERGE_MM)
+    vertices, _, _, faces = igl.remove_duplicate_vertices(
+        mesh.vertices, mesh.faces, MERGE_MM
+    )
     used = len(np.unique(mesh.faces))
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]
     lowest_first = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
-    _, first = np.unique(np.take_along_axis(faces, lowest_first, axis=1), axis=0, return_index=True)
+    _, first = np.unique(
+        np.take_along_axis(faces, lowest_first, axis=1), axis=0, return_index=True
+    )
     distinct = TriangleMesh(vertices, faces[np.sort(first)])
     result, used_vertices = triangles.submesh(distinct, ~_duplicate_opposites(distinct))
     return result, {
@@ -235,12 +329,18 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
 
 
 def _duplicate_opposites(mesh: TriangleMesh) -> Mask:
-    """Return the (m,) mask of faces that repeat an earlier one in the opposite orientation, except shared walls.
+    """Return the (m,) mask of faces that repeat an earlier one in the opposite
+    orientation, except shared walls.
 
-    Each edge of a wall that two closed pieces share has as many faces in one direction as in the other.
+    Each edge of a wall that two closed pieces share has as many faces in one direction
+    as in the other.
     """
     _, first, face, count = np.unique(
-        np.sort(mesh.faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+        np.sort(mesh.faces, axis=1),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+        return_counts=True,
     )
     is_double = (count == 2)[face]
     is_duplicate = is_double.copy()
@@ -276,12 +376,23 @@ def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     }
 
 
-def _main_pieces(mesh: TriangleMesh, single: bool) -> tuple[TriangleMesh, dict[str, Any]]:
+def _main_pieces(
+    mesh: TriangleMesh, single: bool
+) -> tuple[TriangleMesh, dict[str, Any]]:
     parts = pieces(mesh)
     areas = [triangles.area(piece) for piece in parts]
     main = [parts[0]]
     for piece, size in zip(parts[1:], areas[1:], strict=True):
-        inside = np.median(np.abs(igl.fast_winding_number(parts[0].vertices, parts[0].faces, piece.vertices))) > 0.5
+        inside = (
+            np.median(
+                np.abs(
+                    igl.fast_winding_number(
+                        parts[0].vertices, parts[0].faces, piece.vertices
+                    )
+                )
+            )
+            > 0.5
+        )
         if size >= COMPARABLE * areas[0] and not (inside or single):
             main.append(piece)
     dropped = {
@@ -291,17 +402,29 @@ def _main_pieces(mesh: TriangleMesh, single: bool) -> tuple[TriangleMesh, dict[s
     return triangles.merged(*main), {"pieces": len(main)} | dropped
 
 
-def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tuple[TriangleMesh, dict[str, Any], Mask]:
+def _fill_holes(
+    mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool
+) -> tuple[TriangleMesh, dict[str, Any], Mask]:
     by_size = sorted(
-        (float(np.ptp(mesh.vertices[loop], axis=0).max()), list(loop)) for loop in igl.boundary_loop_all(mesh.faces)
+        (float(np.ptp(mesh.vertices[loop], axis=0).max()), list(loop))
+        for loop in igl.boundary_loop_all(mesh.faces)
     )
-    sizes, loops = [size for size, _ in by_size], [np.asarray(loop) for _, loop in by_size]
+    sizes, loops = (
+        [size for size, _ in by_size],
+        [np.asarray(loop) for _, loop in by_size],
+    )
     small = sum(size <= max_hole_mm for size in sizes)
     wide, component = sizes[small:], triangles.face_components(mesh)
-    pieces_with_wide = {int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop in loops[small:]}
+    pieces_with_wide = {
+        int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop in loops[small:]
+    }
     if wide and not (caps_walls and len(pieces_with_wide) == len(wide)):
         can_cover = "or raise surface.max_hole_mm if the opening may be covered."
-        remedy = can_cover if wide[-1] <= MAX_HOLE_MM else "since holes of this size cannot be covered."
+        remedy = (
+            can_cover
+            if wide[-1] <= MAX_HOLE_MM
+            else "since holes of this size cannot be covered."
+        )
         raise MeshError(
             "the surface has holes that are too large to close",
             found=f"{len(wide)} of {len(loops)} holes, up to {wide[-1]:.1f} mm across",
@@ -310,23 +433,44 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tup
         )
     for number, loop in enumerate(loops):
         # new faces have the edges of existing ones in the opposite direction
-        is_same = (mesh.faces[:, [0, 1, 2]] == loop[0]) & (mesh.faces[:, [1, 2, 0]] == loop[1])
+        is_same = (mesh.faces[:, [0, 1, 2]] == loop[0]) & (
+            mesh.faces[:, [1, 2, 0]] == loop[1]
+        )
         loops[number] = loop[::-1] if is_same.any() else loop
     for loop in loops[:small]:
-        fan = np.stack([loop, np.roll(loop, -1), np.full(len(loop), len(mesh.vertices))], axis=1)
+        fan = np.stack(
+            [loop, np.roll(loop, -1), np.full(len(loop), len(mesh.vertices))], axis=1
+        )
         centre = mesh.vertices[loop].mean(axis=0, keepdims=True)
-        mesh = TriangleMesh(np.concatenate([mesh.vertices, centre]), np.concatenate([mesh.faces, fan]))
-    counts = {"holes_closed": small, "largest_hole_mm": max(sizes[:small], default=0.0), "medial_walls_capped_mm": wide}
-    mesh, is_cap = _with_caps(mesh, loops[small:]) if wide else (mesh, np.zeros(len(mesh.faces), dtype=bool))
+        mesh = TriangleMesh(
+            np.concatenate([mesh.vertices, centre]), np.concatenate([mesh.faces, fan])
+        )
+    counts = {
+        "holes_closed": small,
+        "largest_hole_mm": max(sizes[:small], default=0.0),
+        "medial_walls_capped_mm": wide,
+    }
+    mesh, is_cap = (
+        _with_caps(mesh, loops[small:])
+        if wide
+        else (mesh, np.zeros(len(mesh.faces), dtype=bool))
+    )
     return mesh, counts, is_cap
 
 
 def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mask]:
-    """Close loops by patches of the smallest area, and remesh these; return the surface and the mask of the caps."""
-    rims = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
+    """Close loops by patches of the smallest area, and remesh these; return the surface
+    and the mask of the caps."""
+    rims = np.concatenate(
+        [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops]
+    )
     patches = [triangles.smallest_patch(mesh, loop) for loop in loops]
-    document = remeshing.in_meshlab(TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches])))
-    document.compute_selection_by_condition_per_face(condselect=f"fi >= {len(mesh.faces)}")
+    document = remeshing.in_meshlab(
+        TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches]))
+    )
+    document.compute_selection_by_condition_per_face(
+        condselect=f"fi >= {len(mesh.faces)}"
+    )
     length = remeshing.pymeshlab.PureValue(triangles.mean_length(mesh.vertices, rims))
     document.meshing_isotropic_explicit_remeshing(
         iterations=remeshing.REMESHING_ROUNDS,
@@ -335,11 +479,16 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
         checksurfdist=False,
         selectedonly=True,
     )
-    return remeshing.from_meshlab(document), np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
+    return remeshing.from_meshlab(document), np.asarray(
+        document.current_mesh().face_selection_array(), dtype=bool
+    )
 
 
-def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
-    """Remove the parts of a closed surface that hang by a stalk and close the cuts; return it and the parts."""
+def surface_without_stalks(
+    mesh: TriangleMesh,
+) -> tuple[TriangleMesh, list[dict[str, Any]]]:
+    """Remove the parts of a closed surface that hang by a stalk and close the cuts;
+    return it and the parts."""
     if not MIN_LENGTH_MM < np.ptp(mesh.vertices, axis=0).max() < MAX_LENGTH_MM:
         # surfaces in another unit are reported elsewhere
         return mesh, []
@@ -348,8 +497,12 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
     if not report:
         return mesh, []
     # a face belongs to the same side of a cut as the nearest voxel inside
-    nearest = ndimage.distance_transform_edt(labels == 0, return_distances=False, return_indices=True)
-    voxel = np.rint(voxel_index(triangles.corners(mesh).mean(axis=1), affine)).astype(int)
+    nearest = ndimage.distance_transform_edt(
+        labels == 0, return_distances=False, return_indices=True
+    )
+    voxel = np.rint(voxel_index(triangles.corners(mesh).mean(axis=1), affine)).astype(
+        int
+    )
     is_kept = remaining[tuple(nearest[(slice(None), *voxel)])]
     cut_open, _ = triangles.submesh(mesh, is_kept)
     return clean(cut_open, MAX_CUT_MM)[0], report
@@ -365,44 +518,69 @@ def surface_of_mask(
     taken_mm3: float = 0.0,
     original: tuple[NDArray[np.float32], Floats] | None = None,
 ) -> RepairedSurface:
-    """Return the even surface around a smoothed (i, j, k) mask, without terraces and with the mask's volume.
+    """Return the even surface around a smoothed (i, j, k) mask, without terraces and
+    with the mask's volume.
 
-    `volume_mm3` is the volume of the mask, `taken_mm3` the part removed by openings; parts below `smallest` of the
-    largest are left out. `original` is the field before sulci and fissure were opened, with its affine: walls of
-    openings have no terraces. The report includes "topology" and "smoothing". MeshError if self-intersections remain.
+    `volume_mm3` is the volume of the mask, `taken_mm3` the part removed by openings;
+    parts below `smallest` of the largest are left out. `original` is the field before
+    sulci and fissure were opened, with its affine: walls of openings have no terraces.
+    The report includes "topology" and "smoothing". MeshError if self-intersections
+    remain.
     """
     simple, topology = make_simple(field, smallest)
     rough = isosurface(simple, affine)
     even = make_sound(rough, edge_length_mm)
     before, grid = original or (simple, affine)
-    smooth = without_terraces(even.mesh, grid, sample(before, grid, even.mesh.vertices) > INSIDE_LEVEL)
+    smooth = without_terraces(
+        even.mesh, grid, sample(before, grid, even.mesh.vertices) > INSIDE_LEVEL
+    )
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
-    mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, triangles.area(rough))
+    mesh, smoothing = with_volume(
+        smooth, repaired_mm3 - taken_mm3, triangles.area(rough)
+    )
     moved = np.linalg.norm(smooth.vertices - even.mesh.vertices, axis=1)
-    smoothing |= {"terraces_moved_mm": float(moved.mean()), "terraces_moved_most_mm": float(moved.max())}
+    smoothing |= {
+        "terraces_moved_mm": float(moved.mean()),
+        "terraces_moved_most_mm": float(moved.max()),
+    }
     warnings = [*even.warnings, *filled_warning(topology, affine)]
     if abs(change := smoothing["volume_change"]) > VOLUME_TOL:
-        warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: use finer voxels")
-    return RepairedSurface(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)
+        warnings.append(
+            f"smoothing changed the volume by {100 * change:.1f} %: use finer voxels"
+        )
+    return RepairedSurface(
+        mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings
+    )
 
 
 def filled_warning(topology: Mapping[str, Any], affine: Floats) -> list[str]:
-    """Return a warning if closing handles has added much tissue, from the report of `make_simple`."""
-    added_mm3 = topology["voxels_filled_in_tunnels"] * float(abs(np.linalg.det(affine[:3, :3])))
+    """Return a warning if closing handles has added much tissue, from the report of
+    `make_simple`."""
+    added_mm3 = topology["voxels_filled_in_tunnels"] * float(
+        abs(np.linalg.det(affine[:3, :3]))
+    )
     if added_mm3 <= MAX_FILLED_MM3:
         return []
-    return [f"closing handles added {added_mm3:.0f} mm³ of tissue: check that no sulcus or fissure was closed there"]
+    return [
+        f"closing handles added {added_mm3:.0f} mm³ of tissue: check that no sulcus or"
+        " fissure was closed there"
+    ]
 
 
-def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Move a closed surface along its normals until it encloses a volume; return it and a report in plain values.
+def with_volume(
+    mesh: TriangleMesh, volume_mm3: float, area_mm2: float
+) -> tuple[TriangleMesh, dict[str, Any]]:
+    """Move a closed surface along its normals until it encloses a volume; return it and
+    a report in plain values.
 
-    Walls that would cross are not moved, nor is a surface that lacks more than 5 % or still would cross itself.
-    `area_mm2` is the area before smoothing and remeshing.
+    Walls that would cross are not moved, nor is a surface that lacks more than 5 % or
+    still would cross itself. `area_mm2` is the area before smoothing and remeshing.
     """
     before = triangles.signed_volume(mesh) / volume_mm3 - 1.0
-    moved = _move_along_normals(mesh, volume_mm3) if abs(before) <= MAX_RESTORED else mesh
+    moved = (
+        _move_along_normals(mesh, volume_mm3) if abs(before) <= MAX_RESTORED else mesh
+    )
     change = triangles.signed_volume(moved) / volume_mm3 - 1.0
     report = {
         "volume_expected_mL": volume_mm3 * ML_PER_MM3,
@@ -410,7 +588,11 @@ def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple
         "volume_change_before_correction": before,
         "area_change": triangles.area(moved) / area_mm2 - 1.0,
     }
-    log.info("volume changed by %.2f %%, area by %.2f %% through smoothing", 100 * change, 100 * report["area_change"])
+    log.info(
+        "volume changed by %.2f %%, area by %.2f %% through smoothing",
+        100 * change,
+        100 * report["area_change"],
+    )
     return moved, report
 
 
@@ -421,7 +603,10 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
         for _ in range(ROUNDS):
             share = float(triangles.vertex_areas(moved)[free].sum())
             offset = (volume_mm3 - triangles.signed_volume(moved)) / share * free
-            moved = TriangleMesh(moved.vertices + offset[:, None] * triangles.vertex_normals(moved), moved.faces)
+            moved = TriangleMesh(
+                moved.vertices + offset[:, None] * triangles.vertex_normals(moved),
+                moved.faces,
+            )
         if not (crossing := remeshing.self_intersecting_faces(moved)).any():
             return moved
         near = np.isin(mesh.faces, mesh.faces[crossing]).any(axis=1)
@@ -432,9 +617,12 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 
 
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Rebuild a surface through voxels by winding numbers, free of handles and crossings; return it and a report."""
+    """Rebuild a surface through voxels by winding numbers, free of handles and
+    crossings; return it and a report."""
     ends = np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
-    labels, affine = surface_mask(mesh, voxel_mm, ends + voxel_mm * np.array([[-MARGIN_VOXELS], [MARGIN_VOXELS]]))
+    labels, affine = surface_mask(
+        mesh, voxel_mm, ends + voxel_mm * np.array([[-MARGIN_VOXELS], [MARGIN_VOXELS]])
+    )
     inside = labels > 0
     # beyond two voxels from the surface, the field is 0 or 1
     near = dilated(inside, 2.0) & dilated(~inside, 2.0)

@@ -1,4 +1,5 @@
-"""Spheres and ellipsoids as closed surfaces in mm, RAS+ around the origin, for tests of a folding model."""
+"""Spheres and ellipsoids as closed surfaces in mm, RAS+ around the origin, for tests of
+a folding model."""
 
 import numpy as np
 
@@ -22,23 +23,34 @@ def shape_surface(
     noise_mm: float = ShapeSettings.model_fields["noise_mm"].default,
     seed: int = ShapeSettings.model_fields["seed"].default,
 ) -> TriangleMesh:
-    """Return an ellipsoid as a closed, outward surface of even triangles, with smooth bumps along the normal.
+    """Return an ellipsoid as a closed, outward surface of even triangles, with smooth
+    bumps along the normal.
 
-    They have the root mean square height `noise_mm` and a pattern of the `seed`. InputError if the edges are too long.
+    They have the root mean square height `noise_mm` and a pattern of the `seed`.
+    InputError if the edges are too long.
     """
     size = np.array(semi_axes_mm, dtype=float)
     longest = 0.5 * size.min() ** 2 / size.max()
     if edge_length_mm > longest:
         raise InputError(
-            "the edges are too long for the shape", found=f"{edge_length_mm:g} mm", expected=f"at most {longest:.3g} mm"
+            "the edges are too long for the shape",
+            found=f"{edge_length_mm:g} mm",
+            expected=f"at most {longest:.3g} mm",
         )
     points = size * _directions(int(np.ceil(np.pi * size.max() / edge_length_mm)))
     mesh = remesh(
-        convex_hull(TriangleMesh(points, np.empty((0, 3), dtype=np.int64))), edge_length_mm, REMESHING_ROUNDS, SHARP_DEG
+        convex_hull(TriangleMesh(points, np.empty((0, 3), dtype=np.int64))),
+        edge_length_mm,
+        REMESHING_ROUNDS,
+        SHARP_DEG,
     )
-    vertices = mesh.vertices / np.linalg.norm(mesh.vertices / size, axis=1, keepdims=True)
+    vertices = mesh.vertices / np.linalg.norm(
+        mesh.vertices / size, axis=1, keepdims=True
+    )
     heights = noise_mm * _pattern(vertices, seed)
-    return TriangleMesh(vertices + heights[:, None] * unit(vertices / size**2), mesh.faces)
+    return TriangleMesh(
+        vertices + heights[:, None] * unit(vertices / size**2), mesh.faces
+    )
 
 
 def _directions(count: int) -> Floats:
@@ -55,4 +67,6 @@ def _pattern(points: Floats, seed: int) -> Floats:
     lengths = np.exp(random.uniform(shortest, longest, WAVES))
     waves *= (2.0 * np.pi / lengths / np.linalg.norm(waves, axis=1))[:, None]
     phases = random.uniform(0.0, 2.0 * np.pi, WAVES)
-    return np.asarray(np.sqrt(2.0 / WAVES) * np.cos(points @ waves.T + phases).sum(axis=1))
+    return np.asarray(
+        np.sqrt(2.0 / WAVES) * np.cos(points @ waves.T + phases).sum(axis=1)
+    )

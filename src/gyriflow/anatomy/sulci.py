@@ -1,6 +1,8 @@
-"""Open fused sulci where fronts from the white matter of two banks meet within the cortex.
+"""Open fused sulci where fronts from the white matter of two banks meet within the
+cortex.
 
-There the nearest white matter changes from one bank to the other (Han et al. 2004, 10.1016/j.neuroimage.2004.06.043).
+There the nearest white matter changes from one bank to the other (Han et al. 2004,
+10.1016/j.neuroimage.2004.06.043).
 """
 
 import heapq
@@ -14,67 +16,110 @@ from scipy.spatial import cKDTree
 
 from ..geometry.deformations import transform_points
 from ..units import ML_PER_MM3
-from .extraction import INSIDE, LEVEL, OUTSIDE, Floats, Mask, is_simple, main_parts, refine, shifted_affine
+from .extraction import (
+    INSIDE,
+    LEVEL,
+    OUTSIDE,
+    Floats,
+    Mask,
+    is_simple,
+    main_parts,
+    refine,
+    shifted_affine,
+)
 from .fissure import sample
 
-# voxels are refined to at most this size before a slit is cut; voxels of about 0.5 mm are kept
+# voxels are refined to at most this size before a slit is cut; voxels of about 0.5 mm
+# are kept
 MAX_VOXEL_MM = 0.55
-# white matter of two banks is at least this many cortical thicknesses apart, closer under a bend or a thick crest
+# white matter of two banks is at least this many cortical thicknesses apart, closer
+# under a bend or a thick crest
 MIN_BANK_DISTANCE = 1.4
 # the cortex of a bank has at least this share of its usual thickness
 MIN_BANK = 0.75
-# smaller sheets are roughness of the labels; less deep ones (in thicknesses) the rounded bottom of an open sulcus
+# smaller sheets are roughness of the labels; less deep ones (in thicknesses) the
+# rounded bottom of an open sulcus
 MIN_SHEET_MM2 = 8.0
 MIN_SHEET_DEPTH = 1.5
 # margin around a brain
 MARGIN_VOXELS = 3
-# value of the field in a slit; with 1 next to it, a slit of one voxel becomes 0.9 voxels wide
+# value of the field in a slit; with 1 next to it, a slit of one voxel becomes 0.9
+# voxels wide
 SLIT_VALUE = 0.1
 # the usual thickness is that of the surface nearby where this is thinner
 NEARBY_MM = 15.0
 # places at which it is determined, and depths of the surface that count for it
 PLACES_MM, N_DEPTHS = 5.0, 10_000
-# cortex further from white matter than this many thicknesses lacks white matter; largest share of such cortex
+# cortex further from white matter than this many thicknesses lacks white matter;
+# largest share of such cortex
 FAR, MAX_FAR_SHARE = 3.0, 0.05
 
 
 def open_fused_sulci(
-    field: NDArray[np.float32], affine: Floats, core: Mask, side_mm: NDArray[np.float32] | None = None
+    field: NDArray[np.float32],
+    affine: Floats,
+    core: Mask,
+    side_mm: NDArray[np.float32] | None = None,
 ) -> tuple[NDArray[np.float32], Floats, dict[str, Any]]:
-    """Open the fused sulci of a cerebrum's smoothed mask by slits; return the field, its affine, and a report.
+    """Open the fused sulci of a cerebrum's smoothed mask by slits; return the field,
+    its affine, and a report.
 
-    The (i, j, k) `field` is refined to voxels of at most 0.55 mm; they are those of `core`, the tissue inside the
-    cortex, or an integer fraction. Slits grow inward over simple points, so they add no handles, and end where both
-    banks have the same white matter; between hemispheres (signs of `side_mm`) there are none. The field is unchanged if
-    no sulcus is fused, or if much cortex is far from white matter: "stays_fused" in the report.
+    The (i, j, k) `field` is refined to voxels of at most 0.55 mm; they are those of
+    `core`, the tissue inside the cortex, or an integer fraction. Slits grow inward over
+    simple points, so they add no handles, and end where both banks have the same white
+    matter; between hemispheres (signs of `side_mm`) there are none. The field is
+    unchanged if no sulcus is fused, or if much cortex is far from white matter:
+    "stays_fused" in the report.
     """
     factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / MAX_VOXEL_MM))
     every = field.shape[0] // core.shape[0]
     brain, part = _around_brain(field, every)
-    solid, _ = refine(main_parts(core)[0][part].astype(np.float32), affine, every * factor)
-    near, grid = field[brain], shifted_affine(affine, np.array([side.start for side in brain]))
+    solid, _ = refine(
+        main_parts(core)[0][part].astype(np.float32), affine, every * factor
+    )
+    near, grid = (
+        field[brain],
+        shifted_affine(affine, np.array([side.start for side in brain])),
+    )
     whole, fine = refine(near, grid, factor)
     size = np.linalg.norm(fine[:3, :3], axis=0)
     inside, solid = whole > LEVEL, solid > LEVEL
     cortex = inside & ~solid
-    is_right = None if side_mm is None else refine(side_mm[part], affine, every * factor)[0] > 0
-    nearest = ndimage.distance_transform_edt(~solid, sampling=size, return_distances=False, return_indices=True)
+    is_right = (
+        None
+        if side_mm is None
+        else refine(side_mm[part], affine, every * factor)[0] > 0
+    )
+    nearest = ndimage.distance_transform_edt(
+        ~solid, sampling=size, return_distances=False, return_indices=True
+    )
     places = np.argwhere(cortex).astype(np.int32)
     depth_mm = np.linalg.norm((nearest[:, cortex].T - places) * size, axis=1)
     at_surface = ndimage.binary_dilation(~inside, INSIDE)
     surface = at_surface[cortex]
-    if (far := float((depth_mm > FAR * np.quantile(depth_mm[surface], 0.25)).mean())) > MAX_FAR_SHARE:
-        reason = f"{100 * far:.0f} % of the cortex is further than {FAR:g} times its thickness from white matter"
+    if (
+        far := float((depth_mm > FAR * np.quantile(depth_mm[surface], 0.25)).mean())
+    ) > MAX_FAR_SHARE:
+        reason = (
+            f"{100 * far:.0f} % of the cortex is further than {FAR:g} times its"
+            " thickness from white matter"
+        )
         return field, affine, {"stays_fused": reason}
     thickness = np.zeros(cortex.shape, dtype=np.float32)
-    thickness[cortex] = _usual_thickness(places * size, places[surface] * size, depth_mm[surface])
+    thickness[cortex] = _usual_thickness(
+        places * size, places[surface] * size, depth_mm[surface]
+    )
     bank = cortex.copy()
     bank[cortex] = depth_mm > MIN_BANK * thickness[cortex]
     distance = np.zeros(cortex.shape, dtype=np.float32)
     for axis in range(3):
-        _mark_sheet(distance, bank, nearest, axis, MIN_BANK_DISTANCE * thickness, size, is_right)
+        _mark_sheet(
+            distance, bank, nearest, axis, MIN_BANK_DISTANCE * thickness, size, is_right
+        )
     # the depth of a sheet is measured on coarse voxels, in an eighth of the time
-    below = ndimage.distance_transform_edt(near > LEVEL, sampling=np.linalg.norm(affine[:3, :3], axis=0))
+    below = ndimage.distance_transform_edt(
+        near > LEVEL, sampling=np.linalg.norm(affine[:3, :3], axis=0)
+    )
     depth = sample(below, grid, transform_points(np.argwhere(distance > 0), fine))
     is_deep = depth > MIN_SHEET_DEPTH * thickness[distance > 0]
     sheets, count = _deep_sheets(distance > 0, at_surface, size, is_deep)
@@ -83,37 +128,61 @@ def open_fused_sulci(
     slit = _grow_slits(inside, sheets, cortex, distance)
     opened = np.where(slit, np.minimum(whole, np.float32(SLIT_VALUE)), whole)
     taken = float((whole - opened).sum(dtype=float) * size.prod() * ML_PER_MM3)
-    return opened, fine, {"sheets": count, "slit_voxels": int(slit.sum()), "opened_mL": taken}
+    return (
+        opened,
+        fine,
+        {"sheets": count, "slit_voxels": int(slit.sum()), "opened_mL": taken},
+    )
 
 
-def _around_brain(field: NDArray[np.float32], every: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Return the slices of a field around a brain, and those of voxels `every` times larger."""
+def _around_brain(
+    field: NDArray[np.float32], every: int
+) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Return the slices of a field around a brain, and those of voxels `every` times
+    larger."""
     large = [
-        slice(max(side.start // every - MARGIN_VOXELS, 0), -(-side.stop // every) + MARGIN_VOXELS)
+        slice(
+            max(side.start // every - MARGIN_VOXELS, 0),
+            -(-side.stop // every) + MARGIN_VOXELS,
+        )
         for side in ndimage.find_objects((field > LEVEL).astype(np.uint8))[0]
     ]
-    return tuple(slice(every * side.start, every * side.stop) for side in large), tuple(large)
+    return tuple(slice(every * side.start, every * side.stop) for side in large), tuple(
+        large
+    )
 
 
 def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
-    """Return the median depth in mm of the cortex at the surface around (n, 3) points, at most that of the brain.
+    """Return the median depth in mm of the cortex at the surface around (n, 3) points,
+    at most that of the brain.
 
-    `depth` (m,) is at the (m, 3) surface points; medians are within `NEARBY_MM` of places `PLACES_MM` apart.
+    `depth` (m,) is at the (m, 3) surface points; medians are within `NEARBY_MM` of
+    places `PLACES_MM` apart.
     """
     every = max(1, len(surface) // N_DEPTHS)
     tree, depth = cKDTree(surface[::every]), depth[::every]
     cell = np.rint(points / PLACES_MM).astype(np.int64)
     shape, overall = tuple(cell.max(axis=0) + 1), float(np.median(depth))
-    nearby = tree.query_ball_point(PLACES_MM * np.array(list(np.ndindex(shape))), NEARBY_MM)
-    medians = np.array([min(np.median(depth[rows]), overall) if rows else overall for rows in nearby])
+    nearby = tree.query_ball_point(
+        PLACES_MM * np.array(list(np.ndindex(shape))), NEARBY_MM
+    )
+    medians = np.array(
+        [min(np.median(depth[rows]), overall) if rows else overall for rows in nearby]
+    )
     return medians.reshape(shape)[tuple(cell.T)]
 
 
-def _deep_sheets(sheet: Mask, at_surface: Mask, size_mm: Floats, is_deep: Mask) -> tuple[Mask, int]:
-    """Return the large parts of a mask from `at_surface` to places where `is_deep` (n,) holds, and their number."""
+def _deep_sheets(
+    sheet: Mask, at_surface: Mask, size_mm: Floats, is_deep: Mask
+) -> tuple[Mask, int]:
+    """Return the large parts of a mask from `at_surface` to places where `is_deep` (n,)
+    holds, and their number."""
     number, count = ndimage.label(sheet, OUTSIDE)
     part, parts = number[sheet], np.arange(count + 1)
-    large = np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3) >= MIN_SHEET_MM2
+    large = (
+        np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3)
+        >= MIN_SHEET_MM2
+    )
     reached = np.bincount(part, at_surface[sheet], minlength=count + 1) > 0
     deep = np.bincount(part, is_deep, minlength=count + 1) > 0
     is_sheet = large & reached & deep & (parts > 0)
@@ -129,9 +198,11 @@ def _mark_sheet(
     size: Floats,
     is_right: Mask | None,
 ) -> None:
-    """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along an axis have different banks.
+    """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along
+    an axis have different banks.
 
-    Only distances above `min_mm`, and voxels that the plane half-way between the banks passes, are set.
+    Only distances above `min_mm`, and voxels that the plane half-way between the banks
+    passes, are set.
     """
     step = np.eye(3, dtype=int)[axis]
     first = np.argwhere(cortex & np.roll(cortex, -1, axis))
@@ -148,16 +219,26 @@ def _mark_sheet(
     reach = 0.5 * (np.abs(normal) * size).sum(axis=1)
     for voxels in (first, first + step):
         through = np.abs(((voxels * size - middle) * normal).sum(axis=1)) <= reach
-        np.maximum.at(distance, tuple(voxels[through].T), length[through].astype(np.float32))
+        np.maximum.at(
+            distance, tuple(voxels[through].T), length[through].astype(np.float32)
+        )
 
 
-def _grow_slits(inside: Mask, sheet: Mask, cortex: Mask, distance: NDArray[np.float32]) -> Mask:
-    """Return the slits: voxels of a sheet into which the outside grows over simple points, widest banks first.
+def _grow_slits(
+    inside: Mask, sheet: Mask, cortex: Mask, distance: NDArray[np.float32]
+) -> Mask:
+    """Return the slits: voxels of a sheet into which the outside grows over simple
+    points, widest banks first.
 
-    Gaps of one voxel in the sheet are bridged, and filled again if this was not necessary.
+    Gaps of one voxel in the sheet are bridged, and filled again if this was not
+    necessary.
     """
     layer, row = inside.shape[1] * inside.shape[2], inside.shape[2]
-    steps = [i * layer + j * row + k for i, j, k in product((-1, 0, 1), repeat=3) if (i, j, k) != (0, 0, 0)]
+    steps = [
+        i * layer + j * row + k
+        for i, j, k in product((-1, 0, 1), repeat=3)
+        if (i, j, k) != (0, 0, 0)
+    ]
     faces = (1, -1, row, -row, layer, -layer)
     rows = [i * layer + j * row - 1 for i in (-1, 0, 1) for j in (-1, 0, 1)]
     # flat bytes, since reading single voxels of an array takes ten times as long
@@ -169,7 +250,9 @@ def _grow_slits(inside: Mask, sheet: Mask, cortex: Mask, distance: NDArray[np.fl
     heapq.heapify(queue)
 
     def simple(place: int) -> bool:
-        return is_simple(b"".join([mask[place + begin : place + begin + 3] for begin in rows]))
+        return is_simple(
+            b"".join([mask[place + begin : place + begin + 3] for begin in rows])
+        )
 
     while queue:
         _, place = heapq.heappop(queue)

@@ -1,4 +1,5 @@
-"""Register surfaces to the shipped atlas at three weeks: the rotation to RAS+ and its confidence."""
+"""Register surfaces to the shipped atlas at three weeks: the rotation to RAS+ and its
+confidence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +11,16 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from ..geometry import alignment
 from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Planes, RigidFit
-from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face_normals, merged, transformed, unit
+from ..geometry.triangles import (
+    Floats,
+    TriangleMesh,
+    corners,
+    face_areas,
+    face_normals,
+    merged,
+    transformed,
+    unit,
+)
 from ..io.surfaces import read_surface
 from ..shipped import SHIPPED
 
@@ -18,14 +28,16 @@ WEEKS = 21, 28, 34
 POINTS = 2400
 # points of whole brains deeper than this below the hull (in sizes) are left out
 MAX_DEPTH = 0.15
-# weight of a difference of normals relative to a distance (in sizes) in the search for nearest points
+# weight of a difference of normals relative to a distance (in sizes) in the search for
+# nearest points
 NORMAL_WEIGHT = 0.2
 # scales of the robust weight of distances (in sizes), at first and at the end
 COARSE, FINE = 0.3, 0.12
 MAX_DISTANCE = 0.3
 # poses that differ by less count as one; number of poses that are refined
 DISTINCT_DEG, N_REFINED = 40.0, 3
-# the medial wall: largest distances of its points from the plane (in sizes) and of their normals from the plane's (°)
+# the medial wall: largest distances of its points from the plane (in sizes) and of
+# their normals from the plane's (°)
 WALL = ((0.30, 40.0), (0.15, 25.0), (0.075, 15.0), (0.075, 10.0))
 WALL_ROUNDS, WALL_COSINE = 6, 0.85
 # narrower fits that rotate the plane by more than this follow a bend of the wall
@@ -36,7 +48,8 @@ BEND_DEG = 1.0
 class PointCloud:
     """Points on a closed surface, independent of its position and size.
 
-    (n, 3) `points` are relative to the `centre` of volume (3,) in mm, over the size, the cube root of the volume.
+    (n, 3) `points` are relative to the `centre` of volume (3,) in mm, over the size,
+    the cube root of the volume.
     """
 
     points: Floats
@@ -56,18 +69,31 @@ class PointCloud:
     def mirrored(self) -> "PointCloud":
         """Return the mirror image."""
         mirror = MIRROR[:3, :3]
-        return PointCloud(self.points @ mirror, self.normals @ mirror, mirror @ self.centre, self.size_mm)
+        return PointCloud(
+            self.points @ mirror,
+            self.normals @ mirror,
+            mirror @ self.centre,
+            self.size_mm,
+        )
 
 
 def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
-    """Sample a closed, outward surface by area, but for points deeper than `max_depth` sizes below its hull."""
+    """Sample a closed, outward surface by area, but for points deeper than `max_depth`
+    sizes below its hull."""
     triangles, areas = corners(mesh), face_areas(mesh)
-    volumes = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0
+    volumes = (
+        np.einsum(
+            "ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])
+        )
+        / 6.0
+    )
     centre = 0.75 * volumes @ triangles.mean(axis=1) / volumes.sum()
     size = float(np.cbrt(volumes.sum()))
     random = np.random.default_rng(0)
     faces = random.choice(len(areas), POINTS, p=areas / areas.sum())
-    points = np.einsum("nc,ncd->nd", random.dirichlet(np.ones(3), POINTS), triangles[faces])
+    points = np.einsum(
+        "nc,ncd->nd", random.dirichlet(np.ones(3), POINTS), triangles[faces]
+    )
     points, normals = (points - centre) / size, face_normals(mesh)[faces]
     if np.isfinite(max_depth):
         hull = ConvexHull(points).equations
@@ -78,27 +104,40 @@ def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
 
 @cache
 def template_shapes(kind: str) -> tuple[PointCloud, ...]:
-    """Return the right hemispheres of the template for the `kind` "hemisphere", its whole brains for "brain"."""
+    """Return the right hemispheres of the template for the `kind` "hemisphere", its
+    whole brains for "brain"."""
     folder = SHIPPED / "atlases" / "spina-bifida"
     surfaces = [read_surface(folder / f"right.week{week}.surf.gii") for week in WEEKS]
     if kind == "hemisphere":
         return tuple(map(shape_of, surfaces))
-    return tuple(shape_of(merged(transformed(right, MIRROR), right), max_depth=MAX_DEPTH) for right in surfaces)
-
-
-def register(
-    shape: PointCloud, targets: Sequence[PointCloud], rotation: Floats, shift: Floats | None = None
-) -> RigidFit:
-    """Return the best fit of a shape to one of several targets, starting from a (3, 3) rotation close to it."""
-    return min(
-        (_descend(shape, target, rotation, shift, FINE, 30, 3) for target in targets), key=lambda fit: fit.residual
+    return tuple(
+        shape_of(merged(transformed(right, MIRROR), right), max_depth=MAX_DEPTH)
+        for right in surfaces
     )
 
 
-def register_from_all_sides(shape: PointCloud, targets: Sequence[PointCloud]) -> tuple[RigidFit, float]:
-    """Return the best fit of a shape to one of several targets from 24 starts, and its confidence.
+def register(
+    shape: PointCloud,
+    targets: Sequence[PointCloud],
+    rotation: Floats,
+    shift: Floats | None = None,
+) -> RigidFit:
+    """Return the best fit of a shape to one of several targets, starting from a (3, 3)
+    rotation close to it."""
+    return min(
+        (_descend(shape, target, rotation, shift, FINE, 30, 3) for target in targets),
+        key=lambda fit: fit.residual,
+    )
 
-    This is the residual of the best pose more than 40° away over that of the best: near 1 the pose is unclear.
+
+def register_from_all_sides(
+    shape: PointCloud, targets: Sequence[PointCloud]
+) -> tuple[RigidFit, float]:
+    """Return the best fit of a shape to one of several targets from 24 starts, and its
+    confidence.
+
+    This is the residual of the best pose more than 40° away over that of the best: near
+    1 the pose is unclear.
     """
     middle = targets[len(targets) // 2]
     fits = alignment.fits_from_all_sides(
@@ -110,16 +149,27 @@ def register_from_all_sides(shape: PointCloud, targets: Sequence[PointCloud]) ->
     )
     best = min(fits, key=lambda fit: fit.residual)
     confidence = alignment.residual_ratio(fits, best, DISTINCT_DEG)
-    fine = [_descend(shape, target, best.rotation, best.shift, FINE, 30, 1) for target in targets]
+    fine = [
+        _descend(shape, target, best.rotation, best.shift, FINE, 30, 1)
+        for target in targets
+    ]
     return min(fine, key=lambda fit: fit.residual), confidence
 
 
 def _descend(
-    shape: PointCloud, target: PointCloud, rotation: Floats, shift: Floats | None, scale: float, rounds: int, every: int
+    shape: PointCloud,
+    target: PointCloud,
+    rotation: Floats,
+    shift: Floats | None,
+    scale: float,
+    rounds: int,
+    every: int,
 ) -> RigidFit:
-    """Return the fit after `rounds` of iterative closest points, with every `every`-th point.
+    """Return the fit after `rounds` of iterative closest points, with every `every`-th
+    point.
 
-    Symmetric point-to-plane steps (Rusinkiewicz 2019, doi 10.1145/3306346.3323037), Geman-McClure weights.
+    Symmetric point-to-plane steps (Rusinkiewicz 2019, doi 10.1145/3306346.3323037),
+    Geman-McClure weights.
     """
     points, normals = shape.points[::every], shape.normals[::every]
 
@@ -133,20 +183,30 @@ def _descend(
         return moved, plane, distances, agrees / (1.0 + (distances / scale) ** 2) ** 2
 
     def is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
-        return bool(np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3)
+        return bool(
+            np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3
+        )
 
     rotation, shift = alignment.follow_planes(
         rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged
     )
-    forward, _ = target.tree.query(target.features(points @ rotation.T + shift, normals @ rotation.T))
+    forward, _ = target.tree.query(
+        target.features(points @ rotation.T + shift, normals @ rotation.T)
+    )
     target_points, facing = target.points[::every], target.normals[::every]
-    backward, _ = shape.tree.query(shape.features((target_points - shift) @ rotation, facing @ rotation))
-    squares = [np.mean(np.minimum(distance, MAX_DISTANCE) ** 2) for distance in (forward, backward)]
+    backward, _ = shape.tree.query(
+        shape.features((target_points - shift) @ rotation, facing @ rotation)
+    )
+    squares = [
+        np.mean(np.minimum(distance, MAX_DISTANCE) ** 2)
+        for distance in (forward, backward)
+    ]
     return RigidFit(rotation, shift, float(np.sqrt(np.mean(squares))))
 
 
 def medial_wall(shape: PointCloud, normal: Floats) -> tuple[Floats, float]:
-    """Fit normal·p = offset (in sizes) to a hemisphere's medial wall, given its approximate outward normal (3,)."""
+    """Fit normal·p = offset (in sizes) to a hemisphere's medial wall, given its
+    approximate outward normal (3,)."""
     facing = shape.normals @ normal > WALL_COSINE
     points, normals = shape.points[facing], shape.normals[facing]
     heights = points @ normal
@@ -162,10 +222,17 @@ def medial_wall(shape: PointCloud, normal: Floats) -> tuple[Floats, float]:
 
 
 def _wall_plane(
-    points: Floats, normals: Floats, normal: Floats, offset: float, width: float, max_deg: float
+    points: Floats,
+    normals: Floats,
+    normal: Floats,
+    offset: float,
+    width: float,
+    max_deg: float,
 ) -> tuple[Floats, float]:
     for _ in range(WALL_ROUNDS):
-        weights = _biweight((points @ normal - offset) / width) * _biweight(_degrees(normals @ normal) / max_deg)
+        weights = _biweight((points @ normal - offset) / width) * _biweight(
+            _degrees(normals @ normal) / max_deg
+        )
         _, axes = np.linalg.eigh(np.cov(points.T, aweights=weights))
         normal = np.asarray(axes[:, 0] * np.sign(axes[:, 0] @ normal), dtype=np.float64)
         offset = float(np.average(points, axis=0, weights=weights) @ normal)
@@ -173,7 +240,9 @@ def _wall_plane(
 
 
 def _degrees(cosine: ArrayLike) -> Floats:
-    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), dtype=np.float64)
+    return np.asarray(
+        np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), dtype=np.float64
+    )
 
 
 def _biweight(distance: NDArray[np.floating]) -> Floats:

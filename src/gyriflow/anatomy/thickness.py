@@ -1,4 +1,5 @@
-"""Cortical thickness on a pial surface, white surfaces, the inner border of the cortex, and labels filled from both."""
+"""Cortical thickness on a pial surface, white surfaces, the inner border of the cortex,
+and labels filled from both."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,15 @@ from ..errors import InputError
 from ..geometry.deformations import transform_points
 from ..geometry.matching import layer_thickness, nearest_on, surface_mask
 from ..geometry.poses import Pose
-from ..geometry.triangles import TriangleMesh, area, merged, signed_volume, transformed, vertex_areas, vertex_normals
+from ..geometry.triangles import (
+    TriangleMesh,
+    area,
+    merged,
+    signed_volume,
+    transformed,
+    vertex_areas,
+    vertex_normals,
+)
 from ..settings.schemes import FILLED, LabelScheme
 from ..settings.terms import SIDES, Side
 from .extraction import LEVEL, Floats, Mask, isosurface, main_parts, smooth_mask
@@ -25,7 +34,8 @@ from .repair import make_sound, sound_pieces, surface_of_mask
 
 log = logging.getLogger(__name__)
 
-# a vertex has cortex under it if a voxel of it is closer than this, and lies at the labels if one outside is
+# a vertex has cortex under it if a voxel of it is closer than this, and lies at the
+# labels if one outside is
 NEAR_VOXELS = 1.0
 MAX_OUTSIDE_VOXELS = 1.5
 # an opened fissure is this close to its plane
@@ -43,21 +53,26 @@ N_SAMPLES = 8000
 # offset of a surface by which its mean curvature is measured
 OFFSET_MM = 0.05
 USUAL_MM = 0.4, 3.5  # means in label atlases of 21 to 36 GW are 0.8 to 2.7 mm
-# the white surface crosses the pial one if a larger share of its area is further outside than this
+# the white surface crosses the pial one if a larger share of its area is further
+# outside than this
 OUTSIDE_MM, MAX_OUTSIDE_SHARE = 0.5, 0.01
 TYPICAL_THICKNESS_MM = 2.0
-"""Thickness of the cortex if no brain of the study has a measured one; means in label atlases are 0.8 to 2.7 mm."""
+"""Thickness of the cortex if no brain of the study has a measured one; means in label
+atlases are 0.8 to 2.7 mm."""
 TYPICAL_VOXEL_MM = 0.8
 """Voxel size if no brain of the study has labels: that of label atlases."""
 CUT_TOL_MM = 1e-3
-"""A voxel lies below a cut if that is nearer than the pial surface by more than this."""
+"""A voxel lies below a cut if that is nearer than the pial surface by more than
+this."""
 
 
 @dataclass(frozen=True, eq=False)
 class Thickness:
-    """Cortical thickness on a surface; the report has means and shares, in plain values for JSON.
+    """Cortical thickness on a surface; the report has means and shares, in plain values
+    for JSON.
 
-    Vertices that are not `is_measured` (n,) have the value of the nearest measured one in `values_mm` (n,).
+    Vertices that are not `is_measured` (n,) have the value of the nearest measured one
+    in `values_mm` (n,).
     """
 
     values_mm: Floats
@@ -71,14 +86,21 @@ class Thickness:
 
 
 def cortical_thickness(
-    pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats, fissure_x_mm: float | None = None
+    pial: TriangleMesh,
+    cerebrum: Mask,
+    cortex: Mask,
+    affine: Floats,
+    fissure_x_mm: float | None = None,
 ) -> Thickness:
-    """Return the cortical thickness at the vertices of a pial surface; InputError if it has no cortex under it.
+    """Return the cortical thickness at the vertices of a pial surface; InputError if it
+    has no cortex under it.
 
-    It is the `layer_thickness` to the surface of the cerebrum without its cortex. It is not measured without cortex
-    below, nor where a hidden fissure or fused sulci were opened (in sulci it is with `fissure_x_mm`). The (4, 4) affine
-    leads from the (i, j, k) masks to the coordinates of `pial` in mm. The report's "area_ratio" is the pial area over
-    that of a complete surface around the cortex, (1 + mean curvature × thickness) × volume / thickness.
+    It is the `layer_thickness` to the surface of the cerebrum without its cortex. It is
+    not measured without cortex below, nor where a hidden fissure or fused sulci were
+    opened (in sulci it is with `fissure_x_mm`). The (4, 4) affine leads from the (i, j,
+    k) masks to the coordinates of `pial` in mm. The report's "area_ratio" is the pial
+    area over that of a complete surface around the cortex, (1 + mean curvature ×
+    thickness) × volume / thickness.
     """
     inner = border(cerebrum & ~cortex, affine)
     values = layer_thickness(pial, inner)
@@ -86,54 +108,86 @@ def cortical_thickness(
     # of long voxels, no centre may be nearer than half their diagonal
     voxel = max(float(np.cbrt(size.prod())), 0.5 * float(np.linalg.norm(size)))
     to_cortex, to_outside = (
-        sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points) for mask in (~cortex, cerebrum)
+        sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points)
+        for mask in (~cortex, cerebrum)
     )
-    at_labels, over_cortex = to_outside < MAX_OUTSIDE_VOXELS * voxel, to_cortex < NEAR_VOXELS * voxel
+    at_labels, over_cortex = (
+        to_outside < MAX_OUTSIDE_VOXELS * voxel,
+        to_cortex < NEAR_VOXELS * voxel,
+    )
     if fissure_x_mm is not None:
         at_labels |= np.abs(points[:, 0] - fissure_x_mm) > FISSURE_REACH_MM
     is_measured = at_labels & over_cortex & (values >= MIN_LAYER_VOXELS * voxel)
     if not is_measured.any():
         raise InputError(
             "the labels of the cortex lie nowhere at the surface of the cerebrum",
-            found=f"{int(cortex.sum())} voxels of cortex, all of them deep inside or thinner than a third of a voxel",
+            found=(
+                f"{int(cortex.sum())} voxels of cortex, all of them deep inside or"
+                " thinner than a third of a voxel"
+            ),
             expected="a layer around the cerebrum",
         )
     _, nearest = cKDTree(points[is_measured]).query(points[~is_measured])
     filled = values.copy()
     filled[~is_measured] = values[is_measured][nearest]
     report = summary(values, is_measured, vertex_areas(pial))
-    # volume over thickness is the area of the middle of the sheet; a convex brain has more outside
-    sheet_mm2 = float(cortex.sum()) * float(abs(np.linalg.det(affine[:3, :3]))) / report["mean_mm"]
-    complete_mm2 = sheet_mm2 * (1.0 + mean_curvature(pial, is_measured) * report["mean_mm"])
+    # volume over thickness is the area of the middle of the sheet; a convex brain has
+    # more outside
+    sheet_mm2 = (
+        float(cortex.sum())
+        * float(abs(np.linalg.det(affine[:3, :3])))
+        / report["mean_mm"]
+    )
+    complete_mm2 = sheet_mm2 * (
+        1.0 + mean_curvature(pial, is_measured) * report["mean_mm"]
+    )
     report |= {"area_ratio": area(pial) / complete_mm2, "voxel_mm": float(size.max())}
     report["voxels_through_cortex"] = voxels_through_cortex(cerebrum, inner, affine)
     return Thickness(filled, is_measured, report)
 
 
 def border(mask: Mask, affine: Floats) -> TriangleMesh:
-    """Return the surface in mm around the main parts of an (i, j, k) mask, moved to enclose their volume."""
+    """Return the surface in mm around the main parts of an (i, j, k) mask, moved to
+    enclose their volume."""
     field = smooth_mask(mask)
     kept, _, _ = main_parts(field > LEVEL)
-    field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3))
+    field = np.where(
+        kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)
+    )
     mesh = isosurface(field.astype(np.float32), affine)
-    missing_mm3 = main_parts(mask)[0].sum() * abs(np.linalg.det(affine[:3, :3])) - signed_volume(mesh)
-    return TriangleMesh(mesh.vertices + missing_mm3 / area(mesh) * vertex_normals(mesh), mesh.faces)
+    missing_mm3 = main_parts(mask)[0].sum() * abs(
+        np.linalg.det(affine[:3, :3])
+    ) - signed_volume(mesh)
+    return TriangleMesh(
+        mesh.vertices + missing_mm3 / area(mesh) * vertex_normals(mesh), mesh.faces
+    )
 
 
 def voxels_through_cortex(cerebrum: Mask, inner: TriangleMesh, affine: Floats) -> float:
-    """Return the median cortical thickness, from mask to `inner` surface, over a voxel's longest edge."""
+    """Return the median cortical thickness, from mask to `inner` surface, over a
+    voxel's longest edge."""
     outer = border(cerebrum, affine)
     points = outer.vertices[:: max(1, len(outer.vertices) // N_SAMPLES)]
     inward, _, nearest = nearest_on(points, inner)
-    values = 0.5 * (inward + nearest_on(nearest, outer)[0]) / np.linalg.norm(affine[:3, :3], axis=0).max()
+    values = (
+        0.5
+        * (inward + nearest_on(nearest, outer)[0])
+        / np.linalg.norm(affine[:3, :3], axis=0).max()
+    )
     return float(np.median(values[values >= MIN_LAYER_VOXELS]))
 
 
 def mean_curvature(mesh: TriangleMesh, at: Mask) -> float:
-    """Return the mean curvature (1/mm) of a surface over some vertices, an (n,) mask: half of what its area grows."""
+    """Return the mean curvature (1/mm) of a surface over some vertices, an (n,) mask:
+    half of what its area grows."""
     step = OFFSET_MM * vertex_normals(mesh)
     areas = [
-        float(vertex_areas(TriangleMesh(mesh.vertices + sign * step, mesh.faces))[at].sum()) for sign in (-1, 0, 1)
+        float(
+            vertex_areas(TriangleMesh(mesh.vertices + sign * step, mesh.faces))[
+                at
+            ].sum()
+        )
+        for sign in (-1, 0, 1)
     ]
     return (areas[2] - areas[0]) / (4.0 * OFFSET_MM * areas[1])
 
@@ -146,28 +200,47 @@ def thickness_from_labels(
     pose: Pose,
     fissure_x_mm: float | None = None,
 ) -> Thickness:
-    """Return the cortical thickness on the whole `surface` that `from_labels` made of the same labels.
+    """Return the cortical thickness on the whole `surface` that `from_labels` made of
+    the same labels.
 
-    `pose` and `fissure_x_mm` are the surface's; the scheme has to separate cortex from the tissue inside.
+    `pose` and `fissure_x_mm` are the surface's; the scheme has to separate cortex from
+    the tissue inside.
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     cortex = np.isin(cerebrum.tissue, scheme.cortex)
-    thickness = cortical_thickness(surface, cerebrum.mask, cortex, cerebrum.affine, fissure_x_mm)
+    thickness = cortical_thickness(
+        surface, cerebrum.mask, cortex, cerebrum.affine, fissure_x_mm
+    )
     mean = thickness.report["mean_mm"]
     log.info("cortical thickness: %.2f mm on average", mean)
     if not USUAL_MM[0] <= mean <= USUAL_MM[1]:
-        log.warning("the cortex is %.1f mm thick on average: are its labels correct?", mean)
+        log.warning(
+            "the cortex is %.1f mm thick on average: are its labels correct?", mean
+        )
     if (voxels := thickness.report["voxels_through_cortex"]) < MIN_VOXELS:
-        log.warning("the labels of the cortex are %.1f voxels thick: its thickness is inaccurate", voxels)
+        log.warning(
+            "the labels of the cortex are %.1f voxels thick: its thickness is"
+            " inaccurate",
+            voxels,
+        )
     elif (ratio := thickness.report["area_ratio"]) < MIN_AREA_RATIO:
-        log.warning("the pial area is %.2f of a complete surface's around this cortex: %s", ratio, HIDDEN)
+        log.warning(
+            "the pial area is %.2f of a complete surface's around this cortex: %s",
+            ratio,
+            HIDDEN,
+        )
     return thickness
 
 
 def summary(values: Floats, is_measured: Mask, areas: Floats) -> dict[str, Any]:
     """Summarise the thickness; means are weighted by area."""
     values, weights = values[is_measured], areas[is_measured]
-    quantiles = np.quantile(values, [QUANTILES[0], 0.5, QUANTILES[1]], weights=weights, method="inverted_cdf")
+    quantiles = np.quantile(
+        values,
+        [QUANTILES[0], 0.5, QUANTILES[1]],
+        weights=weights,
+        method="inverted_cdf",
+    )
     low, median, high = map(float, quantiles)
     mean = float(np.average(values, weights=weights))
     return {
@@ -181,12 +254,17 @@ def summary(values: Floats, is_measured: Mask, areas: Floats) -> dict[str, Any]:
 
 
 def thickness_from_white(
-    surface: TriangleMesh, pose: Pose, fissure_x_mm: float, whites: Mapping[str, TriangleMesh]
+    surface: TriangleMesh,
+    pose: Pose,
+    fissure_x_mm: float,
+    whites: Mapping[str, TriangleMesh],
 ) -> Thickness:
-    """Return the cortical thickness on a pial surface from its distance to the white surface.
+    """Return the cortical thickness on a pial surface from its distance to the white
+    surface.
 
-    `surface` is the whole one with its `pose` and fissure; `whites` are by side, or "whole", in its files' coordinates.
-    InputError if one is in the other hemisphere or crosses the pial surface.
+    `surface` is the whole one with its `pose` and fissure; `whites` are by side, or
+    "whole", in its files' coordinates. InputError if one is in the other hemisphere or
+    crosses the pial surface.
     """
     posed = posed_whites(pose, whites)
     for side, white in posed.items():
@@ -195,20 +273,37 @@ def thickness_from_white(
         if side in SIDES and (middle < fissure_x_mm) != (side == "left"):
             raise InputError(
                 f"the white surface ({side}) lies in the other hemisphere",
-                found=f"its middle at x = {middle:.1f} mm, the fissure at {fissure_x_mm:.1f} mm",
-                expected=f"{'<' if side == 'left' else '>'} {fissure_x_mm:.1f} mm (RAS+)",
-                remedy="Give each side its own white surface, in the coordinates of its pial one: they are swapped, "
-                "both of one side, or in other coordinates.",
+                found=(
+                    f"its middle at x = {middle:.1f} mm, the fissure at"
+                    f" {fissure_x_mm:.1f} mm"
+                ),
+                expected=(
+                    f"{'<' if side == 'left' else '>'} {fissure_x_mm:.1f} mm (RAS+)"
+                ),
+                remedy=(
+                    "Give each side its own white surface, in the coordinates of its"
+                    " pial one: they are swapped, both of one side, or in other"
+                    " coordinates."
+                ),
             )
-        outside = igl.fast_winding_number(surface.vertices, surface.faces, white.vertices) < 0.5
+        outside = (
+            igl.fast_winding_number(surface.vertices, surface.faces, white.vertices)
+            < 0.5
+        )
         distance, _, _ = nearest_on(white.vertices, surface)
         crossing = outside & (distance > OUTSIDE_MM)
         share = float(areas[crossing].sum() / areas.sum())
         if share > MAX_OUTSIDE_SHARE:
             raise InputError(
                 f"the white surface ({side}) crosses the pial one",
-                found=f"{100 * share:.0f} % of its area outside, by up to {distance[crossing].max():.1f} mm",
-                expected=f"at most {100 * MAX_OUTSIDE_SHARE:.0f} % by more than {OUTSIDE_MM} mm",
+                found=(
+                    f"{100 * share:.0f} % of its area outside, by up to"
+                    f" {distance[crossing].max():.1f} mm"
+                ),
+                expected=(
+                    f"at most {100 * MAX_OUTSIDE_SHARE:.0f} % by more than"
+                    f" {OUTSIDE_MM} mm"
+                ),
             )
     inner = merged(*posed.values())
     values = layer_thickness(surface, inner)
@@ -219,12 +314,18 @@ def thickness_from_white(
             found=f"a distance of at most {values.max():.2f} mm",
             expected=f"{MIN_MM} mm and more",
         )
-    return Thickness(values, is_measured, summary(values, is_measured, vertex_areas(surface)))
+    return Thickness(
+        values, is_measured, summary(values, is_measured, vertex_areas(surface))
+    )
 
 
-def posed_whites(pose: Pose, whites: Mapping[str, TriangleMesh]) -> dict[str, TriangleMesh]:
+def posed_whites(
+    pose: Pose, whites: Mapping[str, TriangleMesh]
+) -> dict[str, TriangleMesh]:
     """Return the white surfaces by side, in the pose of the pial surfaces."""
-    return {side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()}
+    return {
+        side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()
+    }
 
 
 def white_from_labels(
@@ -236,15 +337,19 @@ def white_from_labels(
     *,
     edge_length_mm: float = 1.0,
 ) -> dict[Side, TriangleMesh]:
-    """Return by side the surface around the tissue within the cortex of an (i, j, k) label volume.
+    """Return by side the surface around the tissue within the cortex of an (i, j, k)
+    label volume.
 
-    It is made like the pial surface, which it equals without cortex. MeshError if it keeps self-intersections.
+    It is made like the pial surface, which it equals without cortex. MeshError if it
+    keeps self-intersections.
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     volume = float(core.sum() * abs(np.linalg.det(cerebrum.affine[:3, :3])))
     field, smallest = smooth_mask(core), cerebrum.smallest_part
-    even = surface_of_mask(field, cerebrum.affine, volume, edge_length_mm, smallest=smallest)
+    even = surface_of_mask(
+        field, cerebrum.affine, volume, edge_length_mm, smallest=smallest
+    )
     return _cut_as_pial(even.mesh, pial)
 
 
@@ -256,15 +361,22 @@ def white_from_surfaces(
     max_hole_mm: float = 3.0,
     edge_length_mm: float = 1.0,
 ) -> dict[Side, TriangleMesh]:
-    """Pose and remesh white surfaces of the sides or the "whole"; return them by side. MeshError if not sound."""
+    """Pose and remesh white surfaces of the sides or the "whole"; return them by side.
+    MeshError if not sound."""
     even = {
         name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, edge_length_mm).mesh
         for name, mesh in posed_whites(pose, whites).items()
     }
-    return _cut_as_pial(even["whole"], pial) if "whole" in even else {side: even[side] for side in pial}
+    return (
+        _cut_as_pial(even["whole"], pial)
+        if "whole" in even
+        else {side: even[side] for side in pial}
+    )
 
 
-def _cut_as_pial(mesh: TriangleMesh, pial: Mapping[Side, TriangleMesh]) -> dict[Side, TriangleMesh]:
+def _cut_as_pial(
+    mesh: TriangleMesh, pial: Mapping[Side, TriangleMesh]
+) -> dict[Side, TriangleMesh]:
     if len(pial) == 1:
         return dict.fromkeys(pial, mesh)
     left, right = cut_sides(mesh, nearer_left(mesh, pial["left"], pial["right"]))
@@ -280,11 +392,13 @@ def filled_labels(
     thickness_mm: float = TYPICAL_THICKNESS_MM,
     voxel_mm: float = TYPICAL_VOXEL_MM,
 ) -> tuple[NDArray[np.int32], Floats]:
-    """Return an (i, j, k) volume with the labels of `FILLED` inside a pial surface, and its (4, 4) affine.
+    """Return an (i, j, k) volume with the labels of `FILLED` inside a pial surface, and
+    its (4, 4) affine.
 
-    `whole` is the closed surface, `sides` are its hemispheres, open or capped at the midline, all in one pose. Cortex
-    lies between the `sides` and the `whites`, or else within `thickness_mm`; cuts and coinciding surfaces have none.
-    Hemispheres are joined where their gap at the fissure is as narrow as one that is opened in labels.
+    `whole` is the closed surface, `sides` are its hemispheres, open or capped at the
+    midline, all in one pose. Cortex lies between the `sides` and the `whites`, or else
+    within `thickness_mm`; cuts and coinciding surfaces have none. Hemispheres are
+    joined where their gap at the fissure is as narrow as one that is opened in labels.
     """
     mask, affine = surface_mask(whole, voxel_mm)
     inside = mask > 0
@@ -296,9 +410,13 @@ def filled_labels(
         white = merged(*whites)
         thickness = layer_thickness(pial, white)[pial.faces[faces]].mean(axis=1)
         # the sign depends on the order of corners
-        outside = np.abs(igl.fast_winding_number(white.vertices, white.faces, points)) < 0.5
+        outside = (
+            np.abs(igl.fast_winding_number(white.vertices, white.faces, points)) < 0.5
+        )
         below_cut = depth > nearest_on(points, whole)[0] + CUT_TOL_MM
-        is_cortex = outside & (thickness >= MIN_MM) & ((depth <= thickness) | ~below_cut)
+        is_cortex = (
+            outside & (thickness >= MIN_MM) & ((depth <= thickness) | ~below_cut)
+        )
     else:
         is_cortex = depth <= thickness_mm
     labels = np.zeros(inside.shape, dtype=np.int32)
@@ -308,8 +426,11 @@ def filled_labels(
     return labels, affine
 
 
-def _narrow_gaps(inside: NDArray[np.bool_], affine: Floats, fissure_x_mm: float) -> NDArray[np.bool_]:
-    """Return the mask of the gaps at the fissure up to `FISSURE_MM` and a voxel wide."""
+def _narrow_gaps(
+    inside: NDArray[np.bool_], affine: Floats, fissure_x_mm: float
+) -> NDArray[np.bool_]:
+    """Return the mask of the gaps at the fissure up to `FISSURE_MM` and a voxel
+    wide."""
     voxel = float(affine[0, 0])
     radius = 0.5 * (FISSURE_MM + voxel)
     near = ndimage.distance_transform_edt(~inside, sampling=voxel) <= radius

@@ -1,1 +1,2 @@
-"""The command `gyriflow`: a study begun, checked, run, looked at and compared from the terminal."""
+"""The command `gyriflow`: a study begun, checked, run, looked at and compared from the
+terminal."""

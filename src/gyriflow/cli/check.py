@@ -1,4 +1,5 @@
-"""Check a study before it is run: its configuration, its files, what will run, and what that will take."""
+"""Check a study before it is run: its configuration, its files, what will run, and what
+that will take."""
 
 import logging
 import math
@@ -14,7 +15,12 @@ from tempfile import TemporaryDirectory
 from textwrap import fill
 from typing import NamedTuple
 
-from ..anatomy.labels import MIN_CORTEX_OUTSIDE, layout_of, read_cerebrum, scheme_contradictions
+from ..anatomy.labels import (
+    MIN_CORTEX_OUTSIDE,
+    layout_of,
+    read_cerebrum,
+    scheme_contradictions,
+)
 from ..anatomy.plausible import require_plausible_size
 from ..errors import GyriflowError, InputError
 from ..grouping import grouped
@@ -22,7 +28,14 @@ from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
-from ..running.cost import ERROR_FACTOR, FOLDINGS, MIN_SURFACE_MIB, job_seconds, simulation_needs, surface_memory_mib
+from ..running.cost import (
+    ERROR_FACTOR,
+    FOLDINGS,
+    MIN_SURFACE_MIB,
+    job_seconds,
+    simulation_needs,
+    surface_memory_mib,
+)
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
 from ..running.provenance import recorded_version
@@ -31,7 +44,12 @@ from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.schemes import LabelScheme
-from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, element_error, is_too_coarse
+from ..settings.terms import (
+    ELEMENTS_NEEDED,
+    LARGE_ELEMENT_ERROR,
+    element_error,
+    is_too_coarse,
+)
 from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
@@ -43,10 +61,20 @@ from .recognition import require_fit, scheme_fits
 from .scans import ScanRow, scan_lines
 
 NAMED_RUNS = 6
-THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1): 0.67, ("tetgen", 2): 0.27}
-"""Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as found on the shipped brains."""
-CODE_ONLY = re.compile(r"before: ('code \w+',?|<nothing exclusive>)* now: ('code \w+',?|<nothing exclusive>)* $")
-"""End of Snakemake's reason to run a job again whose code has changed and nothing else of its parameters."""
+THROUGH_CORTEX = {
+    ("pytetwild", 1): 0.95,
+    ("pytetwild", 2): 0.39,
+    ("tetgen", 1): 0.67,
+    ("tetgen", 2): 0.27,
+}
+"""Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as
+found on the shipped brains."""
+CODE_ONLY = re.compile(
+    r"before: ('code \w+',?|<nothing exclusive>)* now: ('code \w+',?|<nothing"
+    r" exclusive>)* $"
+)
+"""End of Snakemake's reason to run a job again whose code has changed and nothing else
+of its parameters."""
 
 
 class PlannedJob(NamedTuple):
@@ -61,40 +89,76 @@ class PlannedJob(NamedTuple):
 
 
 def check_study(
-    path: Path, directory: Path, cores: int, stages: Sequence[str] = (), *, name: Path | None = None
+    path: Path,
+    directory: Path,
+    cores: int,
+    stages: Sequence[str] = (),
+    *,
+    name: Path | None = None,
 ) -> Iterator[tuple[str, int]]:
-    """Yield lines on a study, its files and what would run up to some stages, each with its number of problems.
+    """Yield lines on a study, its files and what would run up to some stages, each with
+    its number of problems.
 
     `name` stands for a temporary configuration.
     """
     with _read_study(path, directory) as study, _collected_warnings() as logged:
         config, problems = study.config, list(input_problems(study.config))
         valid = not any(bad for *_, bad in problems)
-        volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
-        without_unit = sum(read_header(volume).unit == "unknown" for volume in volumes) if valid else 0
+        volumes = [
+            volume
+            for brain in config.brains
+            if (volume := brain.label_volume) and Path(volume).is_file()
+        ]
+        without_unit = (
+            sum(read_header(volume).unit == "unknown" for volume in volumes)
+            if valid
+            else 0
+        )
         from .inputs import check_other_files, input_facts
 
         further, facts = list(check_other_files(study)), list(input_facts(study))
         valid = valid and not further
         downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{name or path}: {_contents(study)}", False
-    warnings = [(brain, f"  warning: brain {brain}: {text}") for brain, text, bad in problems if not bad]
+    warnings = [
+        (brain, f"  warning: brain {brain}: {text}")
+        for brain, text, bad in problems
+        if not bad
+    ]
     told = {text for _, text, _ in problems}
     warnings += [("", f"  warning: {text}") for text in logged if text not in told]
     yield from ((line, False) for line, _ in grouped(warnings))
-    refusals = [(brain, f"  brain {brain}: {text}") for brain, text, bad in problems if bad]
+    refusals = [
+        (brain, f"  brain {brain}: {text}") for brain, text, bad in problems if bad
+    ]
     refusals += [(owner, f"  {owner}: {text}") for owner, text, _ in further]
     yield from grouped(refusals)
     yield from ((f"  {line}", False) for line in facts)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
-    yield from ((f"  warning: no export: {line}", False) for line in export_problems(study))
+    yield from (
+        (f"  warning: no export: {line}", False) for line in export_problems(study)
+    )
     if without_unit:
-        yield f"  note: {without_unit} of {len(volumes)} label volumes give no unit of length, taken as mm", False
+        yield (
+            (
+                f"  note: {without_unit} of {len(volumes)} label volumes give no unit"
+                " of length, taken as mm"
+            ),
+            False,
+        )
     if downloads:
-        yield f"  {downloads} atlas file{'s are' if downloads > 1 else ' is'} missing and will be downloaded", False
+        yield (
+            (
+                f"  {downloads} atlas file{'s are' if downloads > 1 else ' is'} missing"
+                " and will be downloaded"
+            ),
+            False,
+        )
     if valid:
         yield "  input files: no problem found", False
-        yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
+        yield from work_of(
+            path, directory, cores, ["--cores", str(cores), *stages], study
+        )
     yield from ((f"not used: {line}", False) for line in commented_scans(path))
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
 
@@ -112,7 +176,8 @@ class _Collector(logging.Handler):
 
 @contextmanager
 def _collected_warnings() -> Iterator[list[str]]:
-    """Collect the warnings that readers log, which would be printed each time that a file is read."""
+    """Collect the warnings that readers log, which would be printed each time that a
+    file is read."""
     logger, collector = logging.getLogger("gyriflow"), _Collector()
     propagate = logger.propagate
     logger.addHandler(collector)
@@ -126,19 +191,27 @@ def _collected_warnings() -> Iterator[list[str]]:
 
 @contextmanager
 def _read_study(path: Path, directory: Path) -> Iterator[Study]:
-    """Read a study in its working directory, since paths of a configuration may be relative to that."""
+    """Read a study in its working directory, since paths of a configuration may be
+    relative to that."""
     file = path.absolute()
     with chdir(directory if directory.is_dir() else Path()):
         yield resolve(load(read_keys(file), folder_of(file)))
 
 
 def work_of(
-    path: Path, directory: Path, cores: int, further: Sequence[str], study: Study | None = None, *, show: bool = False
+    path: Path,
+    directory: Path,
+    cores: int,
+    further: Sequence[str],
+    study: Study | None = None,
+    *,
+    show: bool = False,
 ) -> Iterator[tuple[str, bool]]:
-    """Yield lines about the jobs that would run and their needs, each with whether these exceed the available ones.
+    """Yield lines about the jobs that would run and their needs, each with whether
+    these exceed the available ones.
 
-    The study is read from `path` unless given. `further` are arguments for Snakemake. With `show`, it lists every job
-    on the terminal first.
+    The study is read from `path` unless given. `further` are arguments for Snakemake.
+    With `show`, it lists every job on the terminal first.
     """
     jobs = plan(path, directory, further, show=show)
     if not jobs:
@@ -149,8 +222,19 @@ def work_of(
     for job in jobs:
         rules_by_reason[_why(job.reason, directory)][job.rule] += 1
     for reason, rules in rules_by_reason.items():
-        words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
-        yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
+        words = ", ".join(
+            rule if number == 1 else f"{rule}×{number}"
+            for rule, number in rules.items()
+        )
+        yield (
+            fill(
+                f"{reason}: {words}",
+                width=100,
+                initial_indent="  ",
+                subsequent_indent="    ",
+            ),
+            False,
+        )
     if study is None:
         with _read_study(path, directory) as read:
             study = read
@@ -161,17 +245,26 @@ def _why(reason: str, directory: Path) -> str:
     """Return Snakemake's reason to run a job in words, the first of several."""
     changed, _, files = reason.partition("Updated input files: ")
     if not changed and files.startswith("/"):
-        return f"changed input {', '.join(Path(file).name for file in files.partition(';')[0].split(', '))}"
+        paths = files.partition(";")[0].split(", ")
+        names = [Path(path).name for path in paths]
+        return f"changed input {', '.join(names)}"
     if reason.startswith("Params have changed"):
         if not CODE_ONLY.search(reason):
             return "changed settings"
         made_by, this = recorded_version(directory), version()
-        return "changed code" if made_by in (None, this) else f"changed code (gyriflow {made_by}, now {this})"
+        return (
+            "changed code"
+            if made_by in (None, this)
+            else f"changed code (gyriflow {made_by}, now {this})"
+        )
     return reason.partition(":")[0]
 
 
-def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
-    """Return the jobs that Snakemake would run, without targets, or exit with its code; `show` lists them, too."""
+def plan(
+    config: Path, directory: Path, further: Sequence[str], *, show: bool = False
+) -> list[PlannedJob]:
+    """Return the jobs that Snakemake would run, without targets, or exit with its code;
+    `show` lists them, too."""
     jobs = []
 
     def take(record: logging.LogRecord) -> bool:
@@ -179,7 +272,11 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
         if job.get("event") == "job_info" and job["output"]:
             files = job["input"] or (), job["output"]
             names = dict(job["wildcards"] or {})
-            jobs.append(PlannedJob(job["rule_name"], names, job["threads"], job["reason"], *files))
+            jobs.append(
+                PlannedJob(
+                    job["rule_name"], names, job["threads"], job["reason"], *files
+                )
+            )
         return show or record.levelno >= logging.ERROR
 
     logger = logging.getLogger("snakemake.logging")
@@ -199,16 +296,23 @@ def _contents(study: Study) -> str:
     runs = list(study.config.runs)
     names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
     brains, folded = len(study.brains), len(study.run_simulations)
-    simulations = f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"
+    simulations = (
+        f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})"
+        if folded
+        else "measured only"
+    )
     parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
-    parts += [f"{len(sweep.members)} of study {name}" for name, sweep in study.sweeps.items()]
+    parts += [
+        f"{len(sweep.members)} of study {name}" for name, sweep in study.sweeps.items()
+    ]
     if study.calibration is not None:
         parts.append(f"{len(study.calibration.rounds)} of the calibration")
     return ", ".join(parts)
 
 
 def coarse_cortices(study: Study) -> Iterator[str]:
-    """Yield a warning, with its runs, for each number of elements through the cortex that is too small or inexact."""
+    """Yield a warning, with its runs, for each number of elements through the cortex
+    that is too small or inexact."""
     mesh = study.config.mesh
     coarse: dict[str, list[str]] = defaultdict(list)
     needed = ELEMENTS_NEEDED[mesh.order]
@@ -219,30 +323,41 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         # a map's thickness is unknown before the surface is made
         if isinstance(thickness, Varying) and thickness.map:
             continue
-        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, simulation.start.week)
+        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(
+            thickness, simulation.start.week
+        )
         elements = through / mesh.surface_edge_mm
         error, text = element_error(mesh.order, elements)
         few, remedy = "", "mesh.order: 2"
         if is_coarse := is_too_coarse(mesh.order, elements):
             few = f", fewer than the {needed:g} needed"
-            remedy = f"mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g}"
+            remedy = (
+                f"mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g}"
+            )
         if is_coarse or error > LARGE_ELEMENT_ERROR:
-            coarse[f"about {text}{few}; use {remedy}"].append(f"run {simulation.run} from {simulation.start.id}")
+            coarse[f"about {text}{few}; use {remedy}"].append(
+                f"run {simulation.run} from {simulation.start.id}"
+            )
     yield from (f"{', '.join(names)}: {text}" for text, names in coarse.items())
 
 
 def export_problems(study: Study) -> Iterator[str]:
-    """Yield why a study cannot be exported under the labels that BIDS would give its subjects and runs."""
+    """Yield why a study cannot be exported under the labels that BIDS would give its
+    subjects and runs."""
     try:
-        require_bids_names([brain.subject for brain in study.brains.values()], study.config.runs)
+        require_bids_names(
+            [brain.subject for brain in study.brains.values()], study.config.runs
+        )
     except InputError as error:
         yield str(error)
 
 
 def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
-    """Yield each problem or warning about a brain's input files: the brain's id, the text, and if it is a problem.
+    """Yield each problem or warning about a brain's input files: the brain's id, the
+    text, and if it is a problem.
 
-    Unreadable files and labels of another scheme are problems; an unusual size for the week is a warning.
+    Unreadable files and labels of another scheme are problems; an unusual size for the
+    week is a warning.
     """
     checksums = known_checksums(used_atlases(config))
     for brain in config.brains:
@@ -253,22 +368,40 @@ def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
                 doubts.extend(_check_files(brain, config, checksums))
             except GyriflowError as error:
                 refusals.append(str(error))
-        yield from ((brain.id, text, False) for text in dict.fromkeys([*logged, *doubts]))
+        yield from (
+            (brain.id, text, False) for text in dict.fromkeys([*logged, *doubts])
+        )
         yield from ((brain.id, text, True) for text in refusals)
 
 
-def _scans(config: Config, problems: Sequence[tuple[str, str, bool]]) -> Iterator[ScanRow]:
-    atlases = {brain["id"]: used.atlas.name for used in used_atlases(config) for brain in atlas_brains(used)}
+def _scans(
+    config: Config, problems: Sequence[tuple[str, str, bool]]
+) -> Iterator[ScanRow]:
+    atlases = {
+        brain["id"]: used.atlas.name
+        for used in used_atlases(config)
+        for brain in atlas_brains(used)
+    }
     for brain in config.brains:
         is_bad = {bad for name, _, bad in problems if name == brain.id}
         verdict = "refused" if True in is_bad else "warning" if is_bad else "ok"
-        source = config.age_sources.get(brain.id) or atlases.get(brain.id, "configuration")
+        source = config.age_sources.get(brain.id) or atlases.get(
+            brain.id, "configuration"
+        )
         data = ", ".join(Path(file).name for file in brain.files) or brain.source
-        yield ScanRow(brain.id, f"{brain.week:g}", source, data, brain.scheme or "–", verdict)
+        yield ScanRow(
+            brain.id, f"{brain.week:g}", source, data, brain.scheme or "–", verdict
+        )
 
 
-def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[str, str]]) -> Iterator[str]:
-    files = [path for path in (*brain.files, brain.image) if path in checksums and Path(path).is_file()]
+def _check_files(
+    brain: BrainConfig, config: Config, checksums: dict[str, tuple[str, str]]
+) -> Iterator[str]:
+    files = [
+        path
+        for path in (*brain.files, brain.image)
+        if path in checksums and Path(path).is_file()
+    ]
     require_checksums({path: checksums[path] for path in files})
     volume = brain.label_volume
     if volume is not None and Path(volume).is_file():
@@ -279,58 +412,105 @@ def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[
     yield from check_brain_files(brain)
 
 
-def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Iterator[str]:
+def _check_labels(
+    volume: str, brain: BrainConfig, scheme: LabelScheme
+) -> Iterator[str]:
     memory, available = surface_memory_mib(volume, brain.week), available_memory_mib()
     if memory > max(available, MIN_SURFACE_MIB):
-        yield f"needs about {_gib(memory)} of memory, {_gib(available)} are here: resample it to larger voxels"
+        yield (
+            f"needs about {_gib(memory)} of memory, {_gib(available)} are here:"
+            " resample it to larger voxels"
+        )
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
     whole = brain.hemisphere is None
-    cerebrum = read_cerebrum(read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0)
+    cerebrum = read_cerebrum(
+        read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0
+    )
     yield from cerebrum.warnings
-    if whole and (doubts := list(scheme_contradictions(layout_of(read.labels), scheme))):
+    if whole and (
+        doubts := list(scheme_contradictions(layout_of(read.labels), scheme))
+    ):
         require_fit(scheme_fits(read.labels), scheme.name, volume, "; ".join(doubts))
         yield from doubts
     if whole:
         yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
 
 
-def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
+def _needs(
+    jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
+) -> Iterator[tuple[str, bool]]:
     seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
     made_by = {file: number for number, job in enumerate(jobs) for file in job.outputs}
 
     @cache
     def end_s(number: int) -> float:
-        before = (end_s(made_by[file]) for file in jobs[number].inputs if file in made_by)
-        return max(before, default=0.0) + seconds[number] / min(jobs[number].threads, cores)
+        before = (
+            end_s(made_by[file]) for file in jobs[number].inputs if file in made_by
+        )
+        return max(before, default=0.0) + seconds[number] / min(
+            jobs[number].threads, cores
+        )
 
     foldings = [job for job in jobs if job.rule in FOLDINGS]
     needs = [
-        simulation_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh)
+        simulation_needs(
+            study.simulations[job.wildcards["run"], job.wildcards["brain"]],
+            study.config.mesh,
+        )
         for job in foldings
     ]
     yield from ((line, False) for line in _path_lines(jobs, seconds, study, directory))
     hours = sum(seconds) / 3600
     wall_s = max(sum(seconds) / cores, *map(end_s, range(len(jobs))))
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
-    yield f"time    about {format_duration(wall_s)} on {on}, within a factor of {ERROR_FACTOR:g}", False
-    share = f", {sum(each.seconds for each in needs) / sum(seconds):.0%} of them for folding" if foldings else ""
+    yield (
+        (
+            f"time    about {format_duration(wall_s)} on {on}, within a factor of"
+            f" {ERROR_FACTOR:g}"
+        ),
+        False,
+    )
+    share = (
+        f", {sum(each.seconds for each in needs) / sum(seconds):.0%} of them for"
+        " folding"
+        if foldings
+        else ""
+    )
     yield f"work    about {hours:.2g} core hours{share}", False
     at_once = max(cores // max((job.threads for job in foldings), default=1), 1)
     memory = sum(sorted((each.memory_mib for each in needs), reverse=True)[:at_once])
     disk = sum(each.disk_mib for each in needs) + len(jobs)
     # the memory of this machine does not limit a cluster
     here = cores <= available_cores()
-    yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, available_memory_mib() if here else None)
-    folder = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
+    yield from _fits(
+        "memory",
+        memory or MIN_SURFACE_MIB / 4,
+        available_memory_mib() if here else None,
+    )
+    folder = next(
+        path
+        for path in (directory.absolute(), *directory.absolute().parents)
+        if path.is_dir()
+    )
     yield from _fits("disk", disk, shutil.disk_usage(folder).free / 2**20)
 
 
-def _path_lines(jobs: Sequence[PlannedJob], seconds: Sequence[float], study: Study, directory: Path) -> Iterator[str]:
-    """Yield a line on each path of an atlas: whether it is kept or has to be made, and where it will be kept."""
+def _path_lines(
+    jobs: Sequence[PlannedJob], seconds: Sequence[float], study: Study, directory: Path
+) -> Iterator[str]:
+    """Yield a line on each path of an atlas: whether it is kept or has to be made, and
+    where it will be kept."""
     for job, path_s in zip(jobs, seconds, strict=True):
         brain = job.wildcards.get("brain", "")
-        used = next((used for used in study.used_atlases if used.atlas is study.atlases.get(brain)), None)
+        used = next(
+            (
+                used
+                for used in study.used_atlases
+                if used.atlas is study.atlases.get(brain)
+            ),
+            None,
+        )
         name = used.atlas.name if used else brain
         if job.rule == "kept_path":
             yield f"path of {name}: kept from an earlier study"
@@ -340,18 +520,27 @@ def _path_lines(jobs: Sequence[PlannedJob], seconds: Sequence[float], study: Stu
 
 
 def _reuse(folder: str | None, directory: Path) -> str:
-    """Return which studies find a path again that is kept in the folder of an atlas' files, None for the default."""
+    """Return which studies find a path again that is kept in the folder of an atlas'
+    files, None for the default."""
     if folder is None or Path(folder).is_relative_to(directory.resolve()):
         return (
-            "kept for this study only; with a folder of the atlas outside it (--folder, atlas.folder), for others too"
+            "kept for this study only; with a folder of the atlas outside it (--folder,"
+            " atlas.folder), for others too"
         )
     return f"once for all studies with the folder {folder}"
 
 
 def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:
     bad = there_mib is not None and mib > there_mib
-    here = ", for the foldings that run at the same time" if there_mib is None else f"; {_gib(there_mib)} available"
-    yield f"{name:<7} about {_gib(mib)}{here}{', which is too little' if bad else ''}", bad
+    here = (
+        ", for the foldings that run at the same time"
+        if there_mib is None
+        else f"; {_gib(there_mib)} available"
+    )
+    yield (
+        f"{name:<7} about {_gib(mib)}{here}{', which is too little' if bad else ''}",
+        bad,
+    )
 
 
 def _gib(mib: float) -> str:

@@ -1,4 +1,5 @@
-"""The commands of `gyriflow`, thin: each reads its arguments, calls one function and prints what it returns."""
+"""The commands of `gyriflow`, thin: each reads its arguments, calls one function and
+prints what it returns."""
 
 import os
 import shlex
@@ -22,7 +23,12 @@ if TYPE_CHECKING:
 
 LEVELS = ("participant", "group")
 BIDS_LEVELS = [[level] for level in LEVELS]
-BIDS_LABEL_OPTIONS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
+BIDS_LABEL_OPTIONS = (
+    "--participant-label",
+    "--participant_label",
+    "--session-label",
+    "--session_label",
+)
 """Options of BIDS apps with several values after each other."""
 REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 """Options of Snakemake with which jobs run on other machines."""
@@ -31,22 +37,30 @@ REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 class Cores(click.IntRange):
     """A number of cores, or `all` that may be used."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
         """Return the number."""
-        return available_cores() if value == "all" else super().convert(value, param, ctx)
+        return (
+            available_cores() if value == "all" else super().convert(value, param, ctx)
+        )
 
 
 class InputPath(click.Path):
     """A path, with a hint if there is none."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
         """Return the path."""
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
             if Path(value).exists():
                 raise
-            from ..settings.base import hint_for_missing  # settings take a while to import
+            from ..settings.base import (
+                hint_for_missing,
+            )  # settings take a while to import
 
             message = f"{error.message}{hint_for_missing(Path(value))}"
             raise click.BadParameter(message, ctx=ctx, param=param) from None
@@ -56,27 +70,57 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 EXISTING_DIR = InputPath(exists=True, file_okay=False, path_type=Path)
 EXISTING_FILE = InputPath(exists=True, dir_okay=False, path_type=Path)
 directory_option = click.option(
-    "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
+    "-d",
+    "--directory",
+    type=FOLDER,
+    default=Path(),
+    help="Working directory, for results/. [default: here]",
 )
 cores_option = click.option(
-    "-c", "--cores", type=Cores(1), default=available_cores, show_default="all", help="Cores to use, or all."
+    "-c",
+    "--cores",
+    type=Cores(1),
+    default=available_cores,
+    show_default="all",
+    help="Cores to use, or all.",
 )
-stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Stop at this target. May be repeated.")
-scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")
-files_option = click.option("--files", help="Pattern of the paths to use if a scan has several files.")
+stages_option = click.option(
+    "-s",
+    "--stage",
+    "stages",
+    multiple=True,
+    help="Stop at this target. May be repeated.",
+)
+scheme_option = click.option(
+    "--scheme", help="Label scheme. [default: found from the labels]"
+)
+files_option = click.option(
+    "--files", help="Pattern of the paths to use if a scan has several files."
+)
 notation_option = click.option(
-    "--decimal-weeks/--weeks-days", "decimal_weeks", default=None, help="Whether an age of 24.3 is decimal, or 24+3."
+    "--decimal-weeks/--weeks-days",
+    "decimal_weeks",
+    default=None,
+    help="Whether an age of 24.3 is decimal, or 24+3.",
 )
-dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Only show what would run, and why.")
+dry_run_option = click.option(
+    "-n", "--dry-run", is_flag=True, help="Only show what would run, and why."
+)
 
 
 class Commands(click.Group):
-    """Commands that end in one message and the exit code of their error, without a traceback."""
+    """Commands that end in one message and the exit code of their error, without a
+    traceback."""
 
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
-        """Read the arguments; those of a BIDS app, `BIDS OUT participant`, are of the command `bids`."""
+        """Read the arguments; those of a BIDS app, `BIDS OUT participant`, are of the
+        command `bids`."""
         # a data set may lie in a folder that is called as a command
-        named = bool(args) and args[0] in self.commands and (args[3:4] in BIDS_LEVELS or not Path(args[0]).is_dir())
+        named = (
+            bool(args)
+            and args[0] in self.commands
+            and (args[3:4] in BIDS_LEVELS or not Path(args[0]).is_dir())
+        )
         if not named and args[2:3] in BIDS_LEVELS:
             args = ["bids", *_one_by_one(args)]
         return super().parse_args(context, args)
@@ -91,16 +135,23 @@ class Commands(click.Group):
             sys.exit(error.exit_code)
         except click.UsageError as error:
             command = error.ctx.command_path if error.ctx else command_name()
-            click.echo(f"gyriflow: {' '.join(error.format_message().split())} See `{command} --help`.", err=True)
+            click.echo(
+                f"gyriflow: {' '.join(error.format_message().split())} See `{command}"
+                " --help`.",
+                err=True,
+            )
             sys.exit(error.exit_code)
 
 
 def require_current_folder() -> None:
-    """Raise InputError if the current folder was deleted, since all paths are relative to it."""
+    """Raise InputError if the current folder was deleted, since all paths are relative
+    to it."""
     try:
         Path.cwd()
     except FileNotFoundError:
-        raise InputError("the current folder no longer exists", remedy="cd to one that does.") from None
+        raise InputError(
+            "the current folder no longer exists", remedy="cd to one that does."
+        ) from None
 
 
 def _one_by_one(args: Sequence[str]) -> list[str]:
@@ -115,8 +166,13 @@ def _one_by_one(args: Sequence[str]) -> list[str]:
 
 
 def command_name() -> str:
-    """Return what a user types to get this command: in a checkout that is not installed, `./run gyriflow`."""
-    return "gyriflow" if shutil.which("gyriflow") or not (SHIPPED / "run").is_file() else "./run gyriflow"
+    """Return what a user types to get this command: in a checkout that is not
+    installed, `./run gyriflow`."""
+    return (
+        "gyriflow"
+        if shutil.which("gyriflow") or not (SHIPPED / "run").is_file()
+        else "./run gyriflow"
+    )
 
 
 def version(context: click.Context, parameter: click.Parameter, value: bool) -> None:
@@ -133,18 +189,25 @@ def version(context: click.Context, parameter: click.Parameter, value: bool) -> 
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog=f"Every key of a configuration: {SHIPPED / 'config' / 'README.md'}",
 )
-@click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=version, help="Show the version.")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=version,
+    help="Show the version.",
+)
 def main() -> None:
     """From fetal brain MRI to folding metrics.
 
     \b
     A study, from its data to its report:
-      gyriflow init my-data         write my-data/gyriflow.yaml for the files there
+      gyriflow init my-data    write my-data/gyriflow.yaml for the files there
       cd my-data
-      gyriflow check                check the files; show what will run and how long it takes
-      gyriflow run                  run it; after an interruption, run it again to resume
-      gyriflow status               show the progress (from another terminal)
-      gyriflow view                 open the report
+      gyriflow check           check the files; show what will run and how long it takes
+      gyriflow run             run it; after an interruption, run it again to resume
+      gyriflow status          show the progress (from another terminal)
+      gyriflow view            open the report
 
     \b
     Metrics without simulations, of a folder or a configuration:
@@ -163,7 +226,12 @@ def main() -> None:
 
 @main.command()
 @click.argument("folder", type=EXISTING_DIR)
-@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help=f"[default: FOLDER/{CONFIG}]",
+)
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @scheme_option
 @files_option
@@ -171,8 +239,9 @@ def main() -> None:
 def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> None:
     """Write a configuration for the brains in a FOLDER.
 
-    It recognises tissue label volumes (and their label scheme), surfaces, and ages in participants.tsv, sessions.tsv
-    or in names such as week21 or GA21. Files that cannot be used are listed with the cause; the exit code is then 2.
+    It recognises tissue label volumes (and their label scheme), surfaces, and ages in
+    participants.tsv, sessions.tsv or in names such as week21 or GA21. Files that cannot
+    be used are listed with the cause; the exit code is then 2.
     """
     from .init import write_configuration
 
@@ -184,7 +253,9 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
     sys.exit(_show_scans(found, may_fill_in=True))
 
 
-def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, **selection: Any) -> "FoundScans":
+def _recognise(
+    folder: Path, *, decimal_weeks: bool | None, files: str | None, **selection: Any
+) -> "FoundScans":
     from .recognition import recognise, scheme_reasons
 
     notation: Any = {None: None, True: "decimal", False: "days"}[decimal_weeks]
@@ -195,36 +266,54 @@ def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, *
 
 
 def _show_scans(
-    found: "FoundScans", verdicts: dict[str, tuple[str, str]] | None = None, *, may_fill_in: bool = False
+    found: "FoundScans",
+    verdicts: dict[str, tuple[str, str]] | None = None,
+    *,
+    may_fill_in: bool = False,
 ) -> int:
-    """Print the table of scans and the unused files; return the exit code, 0 if values `may_fill_in` only."""
+    """Print the table of scans and the unused files; return the exit code, 0 if values
+    `may_fill_in` only."""
     from .scans import found_rows, scan_lines
 
     _show_unused(found)
     for line in scan_lines(found_rows(found, verdicts or {})):
         click.echo(line)
-    causes = (brain.problem or brain.contradiction or (brain.notes and not may_fill_in) for brain in found.brains)
+    causes = (
+        brain.problem or brain.contradiction or (brain.notes and not may_fill_in)
+        for brain in found.brains
+    )
     return InputError.exit_code if any(causes) else 0
 
 
 def _show_unused(found: "FoundScans") -> None:
-    for line, _ in grouped((file, f"not used: {file} ({reason})") for file, reason in found.unused.items()):
+    for line, _ in grouped(
+        (file, f"not used: {file} ({reason})") for file, reason in found.unused.items()
+    ):
         click.echo(line)
 
 
 @main.command()
-@click.argument("data", type=click.Path(path_type=Path), required=False, metavar="[FOLDER|CONFIG]")
+@click.argument(
+    "data", type=click.Path(path_type=Path), required=False, metavar="[FOLDER|CONFIG]"
+)
 @scheme_option
 @files_option
 @notation_option
 @directory_option
 @cores_option
 @stages_option
-def check(data: Path | None, directory: Path, cores: int, stages: Sequence[str], **selection: Any) -> None:
+def check(
+    data: Path | None,
+    directory: Path,
+    cores: int,
+    stages: Sequence[str],
+    **selection: Any,
+) -> None:
     """Check a study; show what it would run and need.
 
-    Its configuration and files are checked. Nothing is run or written. CONFIG is gyriflow.yaml by default. A FOLDER
-    without gyriflow.yaml is checked as `gyriflow measure` would measure it.
+    Its configuration and files are checked. Nothing is run or written. CONFIG is
+    gyriflow.yaml by default. A FOLDER without gyriflow.yaml is checked as `gyriflow
+    measure` would measure it.
     """
     from .check import check_study
 
@@ -238,17 +327,24 @@ def check(data: Path | None, directory: Path, cores: int, stages: Sequence[str],
             _show_unused(found)
         else:
             _require_no_selection(data, **selection)
-            config = _find_config(data / CONFIG if data is not None and data.is_dir() else data, directory)
-        for line, bad in check_study(config, directory, cores, stages, name=data if is_folder else None):
+            config = _find_config(
+                data / CONFIG if data is not None and data.is_dir() else data, directory
+            )
+        for line, bad in check_study(
+            config, directory, cores, stages, name=data if is_folder else None
+        ):
             click.echo(line)
             problems += bad
     if problems:
-        click.echo(f"gyriflow: {problems} problem{'s' if problems > 1 else ''} found", err=True)
+        click.echo(
+            f"gyriflow: {problems} problem{'s' if problems > 1 else ''} found", err=True
+        )
         sys.exit(2)
 
 
 def _write_measured(data: Path, config: Path, **selection: Any) -> "FoundScans":
-    """Write a configuration to measure the brains of a folder, and have this process fold nothing."""
+    """Write a configuration to measure the brains of a folder, and have this process
+    fold nothing."""
     from ..running.launch import MEASURE_ONLY_VAR
     from .init import write_configuration
 
@@ -259,11 +355,23 @@ def _write_measured(data: Path, config: Path, **selection: Any) -> "FoundScans":
 
 
 def _require_no_selection(data: Path | None, **selection: Any) -> None:
-    """Raise InputError if options are set that select the files of a folder, where a configuration has them."""
-    names = {"scheme": "--scheme", "files": "--files", "decimal_weeks": "--decimal-weeks, --weeks-days"}
+    """Raise InputError if options are set that select the files of a folder, where a
+    configuration has them."""
+    names = {
+        "scheme": "--scheme",
+        "files": "--files",
+        "decimal_weeks": "--decimal-weeks, --weeks-days",
+    }
     if given := [names[key] for key, value in selection.items() if value is not None]:
-        remedy = f"Set these in the configuration, or write it anew: {command_name()} init FOLDER --force."
-        raise InputError(f"{', '.join(given)}: not used, as there is a configuration", path=data, remedy=remedy)
+        remedy = (
+            f"Set these in the configuration, or write it anew: {command_name()} init"
+            " FOLDER --force."
+        )
+        raise InputError(
+            f"{', '.join(given)}: not used, as there is a configuration",
+            path=data,
+            remedy=remedy,
+        )
 
 
 @main.command(context_settings={"ignore_unknown_options": True})
@@ -272,13 +380,24 @@ def _require_no_selection(data: Path | None, **selection: Any) -> None:
 @stages_option
 @dry_run_option
 @click.option("-v", "--verbose", is_flag=True, help="Show all messages of Snakemake.")
-@click.argument("further", nargs=-1, type=click.UNPROCESSED, metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]")
+@click.argument(
+    "further",
+    nargs=-1,
+    type=click.UNPROCESSED,
+    metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]",
+)
 def run(
-    directory: Path, cores: int, stages: Sequence[str], dry_run: bool, verbose: bool, further: Sequence[str]
+    directory: Path,
+    cores: int,
+    stages: Sequence[str],
+    dry_run: bool,
+    verbose: bool,
+    further: Sequence[str],
 ) -> None:
     """Run a study. Results that are up to date are kept.
 
-    CONFIG is gyriflow.yaml by default. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
+    CONFIG is gyriflow.yaml by default. Further arguments go to Snakemake, such as
+    `--profile profiles/slurm`.
     """
     first = further[0] if further else ""
     # other arguments are options and results
@@ -288,38 +407,71 @@ def run(
     # an option of one value stands before the targets
     options = ["--verbose"] if verbose else []
     # a cluster is limited by its profile, not by the cores of this machine
-    default = click.get_current_context().get_parameter_source("cores") == ParameterSource.DEFAULT
-    if not (default and any(argument.partition("=")[0] in REMOTE_OPTIONS for argument in further)):
+    default = (
+        click.get_current_context().get_parameter_source("cores")
+        == ParameterSource.DEFAULT
+    )
+    if not (
+        default
+        and any(argument.partition("=")[0] in REMOTE_OPTIONS for argument in further)
+    ):
         options += ["--cores", str(cores)]
-    sys.exit(_run(config, directory, cores, dry_run, options, *stages, *further[int(named) :]))
+    sys.exit(
+        _run(
+            config, directory, cores, dry_run, options, *stages, *further[int(named) :]
+        )
+    )
 
 
-def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list[str], *targets: str) -> int:
+def _run(
+    config: Path,
+    directory: Path,
+    cores: int,
+    dry_run: bool,
+    options: list[str],
+    *targets: str,
+) -> int:
     if dry_run:
         from .check import work_of
 
-        for line, _ in work_of(config, directory, cores, [*options, *targets], show="--verbose" in options):
+        for line, _ in work_of(
+            config, directory, cores, [*options, *targets], show="--verbose" in options
+        ):
             click.echo(line)
         return 0
     from ..running.launch import main as launch
 
-    return launch(["--configfile", str(config.absolute()), *options, "--directory", str(directory), *targets])
+    return launch(
+        [
+            "--configfile",
+            str(config.absolute()),
+            *options,
+            "--directory",
+            str(directory),
+            *targets,
+        ]
+    )
 
 
 @main.command()
-@click.argument("data", type=InputPath(exists=True, path_type=Path), metavar="FOLDER|CONFIG")
+@click.argument(
+    "data", type=InputPath(exists=True, path_type=Path), metavar="FOLDER|CONFIG"
+)
 @scheme_option
 @files_option
 @notation_option
 @directory_option
 @cores_option
 @dry_run_option
-def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection: Any) -> None:
+def measure(
+    data: Path, directory: Path, cores: int, dry_run: bool, **selection: Any
+) -> None:
     """Measure brains and write the report, without simulations.
 
-    The brains are those of a folder or a configuration. In a FOLDER without gyriflow.yaml, one is written, as by
-    `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished; the exit code is
-    that of the first failure.
+    The brains are those of a folder or a configuration. In a FOLDER without
+    gyriflow.yaml, one is written, as by `gyriflow init`. It needs neither `start` nor
+    `folding`. If a brain fails, the others are finished; the exit code is that of the
+    first failure.
     """
     from ..running.launch import MEASURE_ONLY_VAR
     from .init import commented_scans
@@ -336,42 +488,94 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
             for line in commented_scans(config) if data.is_dir() else ():
                 click.echo(f"not used, by {config}: {line}")
                 refused = InputError.exit_code
-        code = _run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all")
+        code = _run(
+            config,
+            directory,
+            cores,
+            dry_run,
+            ["--cores", str(cores), "--keep-going"],
+            "all",
+        )
     sys.exit(code or refused)
 
 
 @main.command()
-@click.argument("files", type=EXISTING_FILE, nargs=-1, required=True, metavar="LABELS|SURFACE|LEFT RIGHT")
-@click.option("--white", type=EXISTING_FILE, multiple=True, help="White surface: one for each pial surface.")
+@click.argument(
+    "files",
+    type=EXISTING_FILE,
+    nargs=-1,
+    required=True,
+    metavar="LABELS|SURFACE|LEFT RIGHT",
+)
+@click.option(
+    "--white",
+    type=EXISTING_FILE,
+    multiple=True,
+    help="White surface: one for each pial surface.",
+)
 @click.option("--week", type=float, required=True, help="Gestational week of the scan.")
 @click.option("--until", type=float, required=True, help="Gestational week to predict.")
-@click.option("--atlas", help=f"Atlas whose growth is used: {', '.join(shipped_atlases())}, or an atlas.yaml.")
+@click.option(
+    "--atlas",
+    help=(
+        f"Atlas whose growth is used: {', '.join(shipped_atlases())}, or an atlas.yaml."
+    ),
+)
 @scheme_option
-@click.option("--folder", type=EXISTING_DIR, help="Folder with the atlas' files. [default: download them]")
+@click.option(
+    "--folder",
+    type=EXISTING_DIR,
+    help="Folder with the atlas' files. [default: download them]",
+)
 @click.option("--image", type=EXISTING_FILE, help="T2-weighted volume of the scan.")
-@click.option("--accept-licence", "accepted", is_flag=True, help="Accept the licence of the atlas.")
-@click.option("--ensemble", type=click.IntRange(3), help="Also fold so many members with uncertain inputs varied.")
-@click.option("--quick", is_flag=True, help="First look: coarse meshes, steps of a day, every other week of the atlas.")
+@click.option(
+    "--accept-licence",
+    "accepted",
+    is_flag=True,
+    help="Accept the licence of the atlas.",
+)
+@click.option(
+    "--ensemble",
+    type=click.IntRange(3),
+    help="Also fold so many members with uncertain inputs varied.",
+)
+@click.option(
+    "--quick",
+    is_flag=True,
+    help="First look: coarse meshes, steps of a day, every other week of the atlas.",
+)
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @directory_option
 @cores_option
 @dry_run_option
 def predict(
-    files: Sequence[Path], week: float, until: float, directory: Path, cores: int, dry_run: bool, **settings: Any
+    files: Sequence[Path],
+    week: float,
+    until: float,
+    directory: Path,
+    cores: int,
+    dry_run: bool,
+    **settings: Any,
 ) -> None:
     """Predict a brain at a later week.
 
-    It is given as tissue LABELS, as one pial SURFACE of the whole brain, or as the pial surfaces of its LEFT and RIGHT
-    hemisphere. It grows as the brains of an atlas do. This writes gyriflow.yaml into the working directory and runs it.
-    The report shows where the predicted surfaces and labels are. After an interruption, the same command resumes.
+    It is given as tissue LABELS, as one pial SURFACE of the whole brain, or as the pial
+    surfaces of its LEFT and RIGHT hemisphere. It grows as the brains of an atlas do.
+    This writes gyriflow.yaml into the working directory and runs it. The report shows
+    where the predicted surfaces and labels are. After an interruption, the same command
+    resumes.
     """
     from .init import write_prediction
 
     with TemporaryDirectory() as scratch:
         config = Path(scratch if dry_run else directory) / CONFIG
-        for line in write_prediction(config, directory / CONFIG, files, (week, until), **settings):
+        for line in write_prediction(
+            config, directory / CONFIG, files, (week, until), **settings
+        ):
             click.echo(line)
-        code = _run(config, directory, cores, dry_run, ["--cores", str(cores)], "all", "export")
+        code = _run(
+            config, directory, cores, dry_run, ["--cores", str(cores)], "all", "export"
+        )
     sys.exit(code)
 
 
@@ -379,8 +583,15 @@ def predict(
 @click.argument("data", type=EXISTING_DIR, metavar="BIDS")
 @click.argument("out", type=FOLDER)
 @click.argument("level", type=click.Choice(LEVELS))
-@click.option(*BIDS_LABEL_OPTIONS[:2], "participants", multiple=True, help="Only these participants.")
-@click.option(*BIDS_LABEL_OPTIONS[2:], "sessions", multiple=True, help="Only these sessions.")
+@click.option(
+    *BIDS_LABEL_OPTIONS[:2],
+    "participants",
+    multiple=True,
+    help="Only these participants.",
+)
+@click.option(
+    *BIDS_LABEL_OPTIONS[2:], "sessions", multiple=True, help="Only these sessions."
+)
 @files_option
 @notation_option
 @scheme_option
@@ -389,16 +600,35 @@ def predict(
     type=click.Path(exists=True, dir_okay=False, resolve_path=True),
     help="Configuration without brains, such as resolution, norms or what to fold.",
 )
-@click.option("--fold/--no-fold", default=None, help="Fold the first of several scans of a subject. [default: no]")
-@click.option("-w", "--work-dir", "work", type=FOLDER, help="Working directory, for results/. [default: OUT/work]")
+@click.option(
+    "--fold/--no-fold",
+    default=None,
+    help="Fold the first of several scans of a subject. [default: no]",
+)
+@click.option(
+    "-w",
+    "--work-dir",
+    "work",
+    type=FOLDER,
+    help="Working directory, for results/. [default: OUT/work]",
+)
 @cores_option
 @dry_run_option
-def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_run: bool, **selection: Any) -> None:
+def bids(
+    data: Path,
+    out: Path,
+    level: str,
+    work: Path | None,
+    cores: int,
+    dry_run: bool,
+    **selection: Any,
+) -> None:
     """Run a BIDS data set, as a BIDS app: BIDS OUT LEVEL.
 
-    The data are tissue labels or surfaces. The level participant writes surfaces and maps of each participant to OUT,
-    and with --fold simulations, too. The level group adds the tables and the report of all participants, with the same
-    options. Results that are up to date are kept. If a participant fails, the others are finished.
+    The data are tissue labels or surfaces. The level participant writes surfaces and
+    maps of each participant to OUT, and with --fold simulations, too. The level group
+    adds the tables and the report of all participants, with the same options. Results
+    that are up to date are kept. If a participant fails, the others are finished.
     """
     from ..io.exports import publish_derivatives
     from ..io.made_files import require_own_data_set
@@ -412,15 +642,24 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     if level == "group":
         selection = with_earlier_options(options, selection)
     folding = {key: selection[key] for key in ("settings", "fold")}
-    found = _recognise(data, **{key: value for key, value in selection.items() if key not in folding})
+    found = _recognise(
+        data, **{key: value for key, value in selection.items() if key not in folding}
+    )
     brains = write_bids(found, data, config, **folding)
     if level == "participant" and not dry_run:
         store_options(options, selection)
-    work_to_do = "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
-    click.echo(f"{len(brains)} scan{'s' if len(brains) > 1 else ''} to {work_to_do}: {', '.join(brains)}")
+    work_to_do = (
+        "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
+    )
+    click.echo(
+        f"{len(brains)} scan{'s' if len(brains) > 1 else ''} to {work_to_do}:"
+        f" {', '.join(brains)}"
+    )
     click.echo(f"configuration: {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
-    code = _run(config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets)
+    code = _run(
+        config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets
+    )
     if not dry_run and (exported / "dataset_description.json").is_file():
         publish_derivatives(exported, out, data, brains, whole=level == "group")
         click.echo(f"derivatives: {out}")
@@ -440,7 +679,12 @@ def status(directory: Path) -> None:
 
 @main.command()
 @click.argument("directory", type=FOLDER, default=Path())
-@click.option("--print", "only_print", is_flag=True, help="Print the path of the report instead of opening it.")
+@click.option(
+    "--print",
+    "only_print",
+    is_flag=True,
+    help="Print the path of the report instead of opening it.",
+)
 def view(directory: Path, only_print: bool) -> None:
     """Open the report of a study."""
     from ..running.status import find_report
@@ -452,8 +696,14 @@ def view(directory: Path, only_print: bool) -> None:
 
 
 def _find_config(config: Path | None, directory: Path) -> Path:
-    found = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), Path(CONFIG))
+    found = config or next(
+        (path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()),
+        Path(CONFIG),
+    )
     if not found.is_file():
-        remedy = f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}."
+        remedy = (
+            f"Write one from the files of a folder: {command_name()} init FOLDER. The"
+            f" demo's is {DEMO}."
+        )
         raise InputError("found no configuration", path=found.absolute(), remedy=remedy)
     return found

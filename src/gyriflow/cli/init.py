@@ -1,4 +1,5 @@
-"""Write the first configuration of a study: from a folder's brains, for one prediction, or for a BIDS data set."""
+"""Write the first configuration of a study: from a folder's brains, for one prediction,
+or for a BIDS data set."""
 
 import re
 from collections import defaultdict
@@ -34,36 +35,69 @@ QUICK_GW = 2.0
 
 
 def write_configuration(
-    found: FoundScans, folder: Path, path: Path, *, force: bool = False, only_measured: bool = False
+    found: FoundScans,
+    folder: Path,
+    path: Path,
+    *,
+    force: bool = False,
+    only_measured: bool = False,
 ) -> Path | None:
-    """Write a configuration for the scans of a folder. Scans that cannot be used are comments in it, with the cause.
+    """Write a configuration for the scans of a folder. Scans that cannot be used are
+    comments in it, with the cause.
 
-    By default, one of them is folded, and values may be left to fill in. InputError if no scan can be used or if the
-    configuration exists, unless `force` is set: then it gets another name, which is returned.
+    By default, one of them is folded, and values may be left to fill in. InputError if
+    no scan can be used or if the configuration exists, unless `force` is set: then it
+    gets another name, which is returned.
     """
     if path.exists() and not force:
-        raise InputError("already exists", path=path, remedy="Choose another file with --output, or add --force.")
+        raise InputError(
+            "already exists",
+            path=path,
+            remedy="Choose another file with --output, or add --force.",
+        )
     inside = path.resolve().parent == folder.resolve()
-    usable = [brain for brain in found.brains if not (brain.causes if only_measured else brain.problem)]
+    usable = [
+        brain
+        for brain in found.brains
+        if not (brain.causes if only_measured else brain.problem)
+    ]
     if not usable:
-        raise InputError("no scan can be used", path=folder, found=_causes(found.brains))
+        raise InputError(
+            "no scan can be used", path=folder, found=_causes(found.brains)
+        )
     lines = []
     for brain in found.brains:
         entry = brain.entry if inside else _absolute(brain.entry, folder)
-        text = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=10_000, allow_unicode=True).strip()
+        text = yaml.safe_dump(
+            entry,
+            default_flow_style=True,
+            sort_keys=False,
+            width=10_000,
+            allow_unicode=True,
+        ).strip()
         notes = [" ".join(note.split()) for note in (*brain.causes, *brain.warnings)]
         notes += [f"week: {brain.age_source}"] if brain.age_source else []
-        lines.append(f"  {'-' if brain in usable else '# -'} {text}" + "".join(f"  # {note}" for note in notes) + "\n")
+        lines.append(
+            f"  {'-' if brain in usable else '# -'} {text}"
+            + "".join(f"  # {note}" for note in notes)
+            + "\n"
+        )
     # the start is a brain with later scans of its subject or atlas, if any
     several = _series(usable)
     series = several[0] if several else usable
     weeks = _weeks(series)
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    text = _from_template("brains", config=SHIPPED / "config", brains="".join(lines).rstrip())
+    text = _from_template(
+        "brains", config=SHIPPED / "config", brains="".join(lines).rstrip()
+    )
     if not only_measured:
         # an id may look like a number, which YAML writes in quotes
         start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
-        measured_run = "\n  measured: {preset: measured}" if several and _have_shapes(series, folder) else ""
+        measured_run = (
+            "\n  measured: {preset: measured}"
+            if several and _have_shapes(series, folder)
+            else ""
+        )
         text += _from_template("folding", start=start, end=end, measured=measured_run)
     kept = _keep_other(path, text)
     write_text(path, text)
@@ -75,7 +109,8 @@ def _from_template(name: str, **values: object) -> str:
 
 
 def _keep_other(path: Path, text: str) -> Path | None:
-    """Rename a configuration with another text, such as to gyriflow.yaml.1, and return its new path."""
+    """Rename a configuration with another text, such as to gyriflow.yaml.1, and return
+    its new path."""
     if not path.exists() or read_text(path) == text:
         return None
     names = (path.with_name(f"{path.name}.{number}") for number in count(1))
@@ -83,14 +118,24 @@ def _keep_other(path: Path, text: str) -> Path | None:
 
 
 def commented_scans(path: Path) -> list[str]:
-    """Return lines on the scans that are comments in a configuration as of `write_configuration`: id and cause."""
-    scans = re.findall(r"^  # - \{id: ([^,]+),.*?\}  # (.*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
-    return [line for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans)]
+    """Return lines on the scans that are comments in a configuration as of
+    `write_configuration`: id and cause."""
+    scans = re.findall(
+        r"^  # - \{id: ([^,]+),.*?\}  # (.*)$",
+        path.read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    return [
+        line for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans)
+    ]
 
 
 def _causes(brains: Iterable[FoundBrain]) -> str:
     scans = [(brain.entry["id"], cause) for brain in brains for cause in brain.causes]
-    return "".join(f"\n  {line}" for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans))
+    return "".join(
+        f"\n  {line}"
+        for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans)
+    )
 
 
 def write_prediction(
@@ -109,97 +154,168 @@ def write_prediction(
     quick: bool,
     force: bool,
 ) -> Iterator[str]:
-    """Write a configuration that folds a brain by the growth of an atlas; yield lines about it.
+    """Write a configuration that folds a brain by the growth of an atlas; yield lines
+    about it.
 
-    `files` are its label volume or pial surfaces; `weeks` are the week of the brain and the week to predict; `folder`
-    has the atlas' files; `accepted` is about its licence. InputError if anything is missing, or if the configuration at
-    `shown_path` exists with different content and `force` is not set.
+    `files` are its label volume or pial surfaces; `weeks` are the week of the brain and
+    the week to predict; `folder` has the atlas' files; `accepted` is about its licence.
+    InputError if anything is missing, or if the configuration at `shown_path` exists
+    with different content and `force` is not set.
     """
     if atlas is None:
         yield (
-            f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina bifida aperta and are not "
-            "normal; unoperated ones end at 25 GW"
+            f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina"
+            " bifida aperta and are not normal; unoperated ones end at 25 GW"
         )
     entry = recognise_brain(files, white, scheme)
     if image and "scheme" not in entry:
-        raise InputError("--image: only labels are shown on an image", found="surfaces", remedy="Leave it out.")
+        raise InputError(
+            "--image: only labels are shown on an image",
+            found="surfaces",
+            remedy="Leave it out.",
+        )
     entry = {"id": entry["id"], "week": weeks[0], "population": entry["id"]} | entry
     entry |= {"image": str(own_name(image))} if image else {}
-    keys = {"name": atlas or SHIPPED_ATLAS, "folder": folder and str(folder), "accept_licence": accepted}
+    keys = {
+        "name": atlas or SHIPPED_ATLAS,
+        "folder": folder and str(folder),
+        "accept_licence": accepted,
+    }
     settings = validated(AtlasSettings, keys, "--atlas").located(Path.cwd())
-    series = _growth_series(Atlas(**read_keys(settings.description)), weeks, accepted, QUICK_GW if quick else 0.0)
+    series = _growth_series(
+        Atlas(**read_keys(settings.description)),
+        weeks,
+        accepted,
+        QUICK_GW if quick else 0.0,
+    )
     section = settings.model_dump(exclude_defaults=True) | series
     more = read_keys(TEMPLATES / "quick.yaml") if quick else {"folding": {}}
     folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
-    config = {"brains": [entry], "atlas": section, "start": entry["id"], **more, "folding": folding}
+    config = {
+        "brains": [entry],
+        "atlas": section,
+        "start": entry["id"],
+        **more,
+        "folding": folding,
+    }
     config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
     load(config)
     text = yaml.safe_dump(config, sort_keys=False)
     if shown_path.exists() and shown_path.read_text() != text and not force:
         remedy = "Choose another --directory, or add --force."
-        raise InputError("already exists with different content", path=shown_path, remedy=remedy)
+        raise InputError(
+            "already exists with different content", path=shown_path, remedy=remedy
+        )
     if kept := _keep_other(path, text):
         yield f"the earlier configuration is now {kept}"
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
     given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
-    names = ", ".join(f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()) or files[0]
+    names = (
+        ", ".join(
+            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
+        )
+        or files[0]
+    )
     yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
 
 
 def with_earlier_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:
-    """Return the options of a call for a whole BIDS data set. Missing ones are those of earlier calls, from a file."""
+    """Return the options of a call for a whole BIDS data set. Missing ones are those of
+    earlier calls, from a file."""
     earlier = read_json(path) if path.is_file() else {}
-    return {key: value if value not in (None, ()) else earlier.get(key) for key, value in options.items()}
+    return {
+        key: value if value not in (None, ()) else earlier.get(key)
+        for key, value in options.items()
+    }
 
 
 def store_options(path: Path, options: dict[str, Any]) -> None:
-    """Store the options of a call for a part of a BIDS data set; earlier participants and sessions are added."""
+    """Store the options of a call for a part of a BIDS data set; earlier participants
+    and sessions are added."""
     earlier = read_json(path) if path.is_file() else options
     stored = dict(options)
     for key in ("participants", "sessions"):
         # an empty list means all
         several = bool(options[key] and earlier[key])
-        stored[key] = list(dict.fromkeys([*earlier[key], *options[key]])) if several else []
+        stored[key] = (
+            list(dict.fromkeys([*earlier[key], *options[key]])) if several else []
+        )
     write_json(path, stored)
 
 
 def write_bids(
-    found: FoundScans, folder: Path, path: Path, *, settings: str | None = None, fold: bool | None = None
+    found: FoundScans,
+    folder: Path,
+    path: Path,
+    *,
+    settings: str | None = None,
+    fold: bool | None = None,
 ) -> list[str]:
-    """Write a configuration for the scans of a BIDS data set that can be used; return their ids.
+    """Write a configuration for the scans of a BIDS data set that can be used; return
+    their ids.
 
-    `settings` is a configuration without brains. The scans are measured; with `fold` the first of several scans of a
-    subject is also folded. Scans without `sub-` in their path become unused. InputError if no scan can be used.
+    `settings` is a configuration without brains. The scans are measured; with `fold`
+    the first of several scans of a subject is also folded. Scans without `sub-` in
+    their path become unused. InputError if no scan can be used.
     """
     for brain in found.brains:
         if not brain.entry["id"].startswith("sub-"):
             found.unused[brain.files] = "no sub-… in its path"
-    found.brains = [brain for brain in found.brains if brain.entry["id"].startswith("sub-")]
+    found.brains = [
+        brain for brain in found.brains if brain.entry["id"].startswith("sub-")
+    ]
     brains = [brain for brain in found.brains if not brain.causes]
     if not brains:
         causes = _causes(found.brains) or "no files named sub-…"
-        choice = "Choose one of several files with --files, such as '*_desc-brain_dseg.nii.gz'."
+        choice = (
+            "Choose one of several files with --files, such as"
+            " '*_desc-brain_dseg.nii.gz'."
+        )
         remedy = choice if "keep one" in causes else None
-        raise InputError("no scan can be used", path=folder, found=causes, remedy=remedy)
-    require_bids_names(brain.entry.get("subject", brain.entry["id"]) for brain in brains)
+        raise InputError(
+            "no scan can be used", path=folder, found=causes, remedy=remedy
+        )
+    require_bids_names(
+        brain.entry.get("subject", brain.entry["id"]) for brain in brains
+    )
     youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     further = read_keys(Path(settings)) if settings else {}
-    text: dict[str, Any] = {"brains": [_absolute(brain.entry, folder) for brain in brains]}
+    text: dict[str, Any] = {
+        "brains": [_absolute(brain.entry, folder) for brain in brains]
+    }
     if fold:
         followed, weeks = _series(brains), _weeks(brains)
-        can_measure = followed and all(_have_shapes(scans, folder) for scans in followed)
-        runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if can_measure else {})
-        text |= {"start": [scans[0].entry["id"] for scans in followed] or youngest, "runs": runs, **further}
-        text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (further.get("folding") or {})
+        can_measure = followed and all(
+            _have_shapes(scans, folder) for scans in followed
+        )
+        runs: dict[str, Any] = {"reference": {}} | (
+            {"measured": {"preset": "measured"}} if can_measure else {}
+        )
+        text |= {
+            "start": [scans[0].entry["id"] for scans in followed] or youngest,
+            "runs": runs,
+            **further,
+        }
+        text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (
+            further.get("folding") or {}
+        )
     else:
-        text |= {key: value for key, value in further.items() if key not in FOLDING_SECTIONS}
+        text |= {
+            key: value for key, value in further.items() if key not in FOLDING_SECTIONS
+        }
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
-    is_own = path.with_name(BIDS_OPTIONS).exists() or (path.exists() and read_text(path).startswith(BIDS_HEAD))
+    is_own = path.with_name(BIDS_OPTIONS).exists() or (
+        path.exists() and read_text(path).startswith(BIDS_HEAD)
+    )
     if path.exists() and not is_own:
         remedy = "Choose another folder with --work-dir."
-        raise InputError("was not written by gyriflow bids and is not replaced", path=path, remedy=remedy)
+        raise InputError(
+            "was not written by gyriflow bids and is not replaced",
+            path=path,
+            remedy=remedy,
+        )
     write_text(path, BIDS_HEAD + yaml.safe_dump(text, sort_keys=False))
     return [brain.entry["id"] for brain in brains]
 
@@ -213,33 +329,56 @@ def _series(brains: Sequence[FoundBrain]) -> list[list[FoundBrain]]:
 
 
 def _weeks(brains: Sequence[FoundBrain]) -> list[float]:
-    return sorted({brain.entry["week"] for brain in brains if brain.entry["week"] != UNSET})
+    return sorted(
+        {brain.entry["week"] for brain in brains if brain.entry["week"] != UNSET}
+    )
 
 
-def _growth_series(atlas: Atlas, weeks: tuple[float, float], accepted: bool, least_gw: float = 0.0) -> dict[str, Any]:
-    """Return the first series of an atlas that covers a start and an end week, and its weeks that are used.
+def _growth_series(
+    atlas: Atlas, weeks: tuple[float, float], accepted: bool, least_gw: float = 0.0
+) -> dict[str, Any]:
+    """Return the first series of an atlas that covers a start and an end week, and its
+    weeks that are used.
 
-    These are all later ones, so that a prediction does not depend on where it ends; with `least_gw` between them only
-    those that a prediction to the end needs.
+    These are all later ones, so that a prediction does not depend on where it ends;
+    with `least_gw` between them only those that a prediction to the end needs.
     """
     if atlas.licence.accept and not accepted:
-        terms = f"{atlas.licence.name} ({atlas.licence.url}): {atlas.licence.terms.rstrip('.')}"
-        raise InputError(f"the licence of {atlas.name} is not accepted", found=terms, remedy="Add --accept-licence.")
+        terms = (
+            f"{atlas.licence.name} ({atlas.licence.url}):"
+            f" {atlas.licence.terms.rstrip('.')}"
+        )
+        raise InputError(
+            f"the licence of {atlas.name} is not accepted",
+            found=terms,
+            remedy="Add --accept-licence.",
+        )
     for name, series in atlas.series.items():
         available = sorted(series.weeks)
-        first = max((week for week in available if week <= weeks[0]), default=available[0])
+        first = max(
+            (week for week in available if week <= weeks[0]), default=available[0]
+        )
         last = min((week for week in available if week >= weeks[1]), default=None)
         if last is not None and weeks[0] < weeks[1] and first <= weeks[0] + BEFORE_GW:
             later = [week for week in available if week >= first]
-            return {"series": name, "weeks": _thinned(later, weeks[1], least_gw) if least_gw else later}
-    spans = (f"{name}: {min(series.weeks):g} to {max(series.weeks):g} GW" for name, series in atlas.series.items())
-    problem = f"no series of the atlas {atlas.name} covers {weeks[0]:g} to {weeks[1]:g} GW"
+            return {
+                "series": name,
+                "weeks": _thinned(later, weeks[1], least_gw) if least_gw else later,
+            }
+    spans = (
+        f"{name}: {min(series.weeks):g} to {max(series.weeks):g} GW"
+        for name, series in atlas.series.items()
+    )
+    problem = (
+        f"no series of the atlas {atlas.name} covers {weeks[0]:g} to {weeks[1]:g} GW"
+    )
     remedy = "Choose another --atlas, or another --until, after --week."
     raise InputError(problem, found="; ".join(spans), remedy=remedy)
 
 
 def _thinned(weeks: Sequence[float], end: float, least_gw: float) -> list[float]:
-    """Return ascending weeks at least so far apart, up to the first one at or past an end, or as far as they go."""
+    """Return ascending weeks at least so far apart, up to the first one at or past an
+    end, or as far as they go."""
     chosen = [weeks[0]]
     for week in weeks[1:]:
         is_far = week - chosen[-1] >= least_gw
@@ -250,11 +389,24 @@ def _thinned(weeks: Sequence[float], end: float, least_gw: float) -> list[float]
 
 
 def _have_shapes(scans: Sequence[FoundBrain], folder: Path) -> bool:
-    """Return whether scans can give the later shapes of a start brain: label volumes or vertex-matched surfaces."""
+    """Return whether scans can give the later shapes of a start brain: label volumes or
+    vertex-matched surfaces."""
     if all("labels" in brain.entry for brain in scans):
         return True
-    dated = [brain.entry for brain in scans if brain.entry["week"] != UNSET and UNSET not in brain.entry.values()]
-    return unmatched_reason([validated(BrainConfig, _absolute(entry, folder), entry["id"]) for entry in dated]) is None
+    dated = [
+        brain.entry
+        for brain in scans
+        if brain.entry["week"] != UNSET and UNSET not in brain.entry.values()
+    ]
+    return (
+        unmatched_reason(
+            [
+                validated(BrainConfig, _absolute(entry, folder), entry["id"])
+                for entry in dated
+            ]
+        )
+        is None
+    )
 
 
 def _absolute(value: object, folder: Path) -> object:

@@ -1,4 +1,5 @@
-"""Open each file that a study names once, describe its content, and find what a run would refuse minutes later."""
+"""Open each file that a study names once, describe its content, and find what a run
+would refuse minutes later."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -14,11 +15,22 @@ from ..anatomy.plausible import (
     require_plausible_thickness,
     require_single_hemisphere,
 )
-from ..anatomy.pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface
+from ..anatomy.pose import (
+    hemisphere_warnings,
+    pose_of_hemisphere,
+    pose_of_pair,
+    pose_of_surface,
+)
 from ..errors import GyriflowError, InputError
 from ..formats import is_volume
 from ..geometry.poses import CONVENTIONS
-from ..geometry.triangles import TriangleMesh, convex_hull, is_closed, signed_volume, transformed
+from ..geometry.triangles import (
+    TriangleMesh,
+    convex_hull,
+    is_closed,
+    signed_volume,
+    transformed,
+)
 from ..io.surfaces import (
     load_gifti,
     read_hemispheres,
@@ -39,26 +51,41 @@ SUBJECT_NAME = re.compile(r"(?<![A-Za-z0-9])sub-([A-Za-z0-9]+)")
 TEMPLATE_SPACES = ("mni", "mni_152", "talairach", "template")
 """Spaces of NIfTI and GIFTI files in which a brain may have the size of a template."""
 HULL_SHARE = 0.8
-"""About the volume of a hemisphere over that of its convex hull, where a surface is open."""
+"""About the volume of a hemisphere over that of its convex hull, where a surface is
+open."""
 
 
 def describe(path: str) -> str:
-    """Return what a file holds: size, unit, side and numbers of vertices or voxels; InputError as its reader's."""
+    """Return what a file holds: size, unit, side and numbers of vertices or voxels;
+    InputError as its reader's."""
     if is_volume(path):
         header = read_header(path)
         size = " x ".join(f"{size:.3g}" for size in header.voxel_mm)
-        unit = {"unknown": ", no unit given", "mm": ""}.get(header.unit, f", given in {header.unit}")
-        return f"{' x '.join(map(str, header.shape))} voxels of {size} mm{unit}, {header.space} space"
+        unit = {"unknown": ", no unit given", "mm": ""}.get(
+            header.unit, f", given in {header.unit}"
+        )
+        return (
+            f"{' x '.join(map(str, header.shape))} voxels of {size} mm{unit},"
+            f" {header.space} space"
+        )
     if path.lower().endswith((".shape.gii", ".func.gii", ".label.gii")):
         image = load_gifti(path)
         values = [np.asarray(array.data) for array in image.darrays]
-        span = ", ".join(f"{part.min():.4g} to {part.max():.4g}" for part in values if part.size)
-        return f"{', '.join(str(len(part)) for part in values)} values, {span}{_side(structure_of(image, path))}"
+        span = ", ".join(
+            f"{part.min():.4g} to {part.max():.4g}" for part in values if part.size
+        )
+        return (
+            f"{', '.join(str(len(part)) for part in values)} values,"
+            f" {span}{_side(structure_of(image, path))}"
+        )
     mesh, space, structure = surface_space_structure(path)
     size = " x ".join(f"{extent:.3g}" for extent in np.ptp(mesh.vertices, axis=0))
     named = f", {space.removeprefix('NIFTI_XFORM_').lower()} space" if space else ""
     closed = "closed" if is_closed(mesh) else "open"
-    return f"{closed} surface of {len(mesh.vertices)} vertices, {size} mm{_side(structure)}{named}"
+    return (
+        f"{closed} surface of {len(mesh.vertices)} vertices, {size}"
+        f" mm{_side(structure)}{named}"
+    )
 
 
 def _side(structure: str | None) -> str:
@@ -66,25 +93,35 @@ def _side(structure: str | None) -> str:
 
 
 def input_facts(study: Study) -> Iterator[str]:
-    """Yield a line about each file of brains, regions and maps that can be read, in the order of the configuration."""
+    """Yield a line about each file of brains, regions and maps that can be read, in the
+    order of the configuration."""
     owners: dict[str, list[str]] = {}
     for brain in study.config.brains:
-        for path in (*brain.files, *brain.white_files.values(), *filter(None, [brain.image])):
+        for path in (
+            *brain.files,
+            *brain.white_files.values(),
+            *filter(None, [brain.image]),
+        ):
             owners.setdefault(path, []).append(brain.id)
     for owner, files, _ in _other_files(study):
         for path in files:
             owners.setdefault(path, []).append(owner)
     for path, names in owners.items():
-        # problems are those of `check_brain_files` and `check_other_files`; files of atlases may be missing yet
+        # problems are those of `check_brain_files` and `check_other_files`; files of
+        # atlases may be missing yet
         if Path(path).is_file():
             try:
-                yield f"{', '.join(dict.fromkeys(names))}: {Path(path).name}: {describe(path)}"
+                yield (
+                    f"{', '.join(dict.fromkeys(names))}: {Path(path).name}:"
+                    f" {describe(path)}"
+                )
             except GyriflowError:
                 continue
 
 
 def check_brain_files(brain: BrainConfig) -> Iterator[str]:
-    """Yield doubts about a brain's surfaces and images; InputError for what a run would refuse.
+    """Yield doubts about a brain's surfaces and images; InputError for what a run would
+    refuse.
 
     Labels are checked elsewhere.
     """
@@ -97,7 +134,9 @@ def check_brain_files(brain: BrainConfig) -> Iterator[str]:
     for side, path in brain.white_files.items():
         read_surface(path, side)
     if brain.hemispheres is not None:
-        left, right, declared = read_hemispheres(brain.hemispheres.left, brain.hemispheres.right)
+        left, right, declared = read_hemispheres(
+            brain.hemispheres.left, brain.hemispheres.right
+        )
         yield from _check_pair(brain, left, right, declared=declared)
     elif brain.files:
         own_side = brain.hemisphere.side if brain.hemisphere else None
@@ -110,11 +149,15 @@ def check_brain_files(brain: BrainConfig) -> Iterator[str]:
             yield from pose_of_surface(mesh, brain.coordinates).warnings
 
 
-def _check_pair(brain: BrainConfig, left: TriangleMesh, right: TriangleMesh, *, declared: bool) -> Iterator[str]:
+def _check_pair(
+    brain: BrainConfig, left: TriangleMesh, right: TriangleMesh, *, declared: bool
+) -> Iterator[str]:
     left, right = _outward(left), _outward(right)
     yield from _check_size(brain, left, right)
     if brain.coordinates != "auto":
-        left, right = (transformed(mesh, CONVENTIONS[brain.coordinates]) for mesh in (left, right))
+        left, right = (
+            transformed(mesh, CONVENTIONS[brain.coordinates]) for mesh in (left, right)
+        )
         require_left_and_right(left, right, brain.coordinates)
     # shapes of open surfaces are compared after their repair
     if is_closed(left) and is_closed(right):
@@ -128,23 +171,36 @@ def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:
     sides = 1 if brain.hemisphere is None else 2
     closed = all(map(is_closed, meshes))
     volumes = [signed_volume(mesh if closed else convex_hull(mesh)) for mesh in meshes]
-    doubts = require_plausible_size(sides * sum(volumes) * (1.0 if closed else HULL_SHARE), brain.week)
+    doubts = require_plausible_size(
+        sides * sum(volumes) * (1.0 if closed else HULL_SHARE), brain.week
+    )
     return doubts if closed else []
 
 
 def _outward(mesh: TriangleMesh) -> TriangleMesh:
-    return mesh if signed_volume(mesh) >= 0 else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    return (
+        mesh
+        if signed_volume(mesh) >= 0
+        else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    )
 
 
 def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:
     name, own = Path(path).name, {*SUBJECT_NAME.findall(f"{brain.id} {brain.subject}")}
     if own and (found := {*SUBJECT_NAME.findall(name)} - own):
         yield f"{path} has a name of sub-{', sub-'.join(sorted(found))}"
-    spaces = {space for space in SPACE_NAME.findall(name) if space.lower() not in NATIVE_SPACES}
+    spaces = {
+        space
+        for space in SPACE_NAME.findall(name)
+        if space.lower() not in NATIVE_SPACES
+    }
     if Path(path).is_file() and (space := _template_space(path)):
         spaces.add(space)
     if spaces:
-        yield f"{path} is in the space {', '.join(sorted(spaces))}: has the brain its own size and shape there?"
+        yield (
+            f"{path} is in the space {', '.join(sorted(spaces))}: has the brain its own"
+            " size and shape there?"
+        )
 
 
 def _template_space(path: str) -> str:
@@ -152,12 +208,17 @@ def _template_space(path: str) -> str:
     if is_volume(path):
         space = read_header(path).space
     else:
-        space = (surface_space_structure(path)[1] or "").removeprefix("NIFTI_XFORM_").lower()
+        space = (
+            (surface_space_structure(path)[1] or "")
+            .removeprefix("NIFTI_XFORM_")
+            .lower()
+        )
     return space if space in TEMPLATE_SPACES else ""
 
 
 def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:
-    """Yield each problem of files of regions and maps: whose it is, the text, and True."""
+    """Yield each problem of files of regions and maps: whose it is, the text, and
+    True."""
     seen = set()
     for owner, files, check in _other_files(study):
         # runs may share a map
@@ -170,15 +231,24 @@ def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:
 
 
 def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], None]]]:
-    """Yield whose each group of files of regions and maps is, the files, and the function that checks them."""
+    """Yield whose each group of files of regions and maps is, the files, and the
+    function that checks them."""
     regions = study.config.metrics.regions
     for name, given in ({} if isinstance(regions, str) else regions).items():
         brain = study.brains[name].config if name in study.brains else None
-        yield f"regions of {name}", [*given.files.values()], partial(_check_regions, given, brain)
+        yield (
+            f"regions of {name}",
+            [*given.files.values()],
+            partial(_check_regions, given, brain),
+        )
     for simulation in study.run_simulations:
         for name, value in simulation.mapped.items():
             files = [*files_of(value.map), *files_of(value.surface)]
-            yield f"{name} of run {simulation.run}", files, partial(_check_map, name, value)
+            yield (
+                f"{name} of run {simulation.run}",
+                files,
+                partial(_check_map, name, value),
+            )
 
 
 def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:
@@ -186,15 +256,30 @@ def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:
         read_label_volume(regions.volume, brain.affine_from if brain else "auto")
     for side in SIDES:
         if (given := getattr(regions, side)) is not None:
-            labels, surface = read_vertex_labels(given.labels, side)[0], read_surface(given.surface, side)
+            labels, surface = (
+                read_vertex_labels(given.labels, side)[0],
+                read_surface(given.surface, side),
+            )
             if len(labels) != len(surface.vertices):
-                problem, found = "does not belong to its surface", f"{len(labels)} labels"
-                expected = f"{len(surface.vertices)}, the number of vertices of {given.surface}"
-                raise InputError(problem, path=given.labels, found=found, expected=expected)
+                problem, found = (
+                    "does not belong to its surface",
+                    f"{len(labels)} labels",
+                )
+                expected = (
+                    f"{len(surface.vertices)}, the number of vertices of"
+                    f" {given.surface}"
+                )
+                raise InputError(
+                    problem, path=given.labels, found=found, expected=expected
+                )
 
 
 def _check_map(name: str, value: Any) -> None:
     paths, surfaces = files_of(value.map), files_of(value.surface)
-    values = read_surface_maps(paths, surfaces)[1] if surfaces else read_volume_map(paths[0])[0].ravel()
+    values = (
+        read_surface_maps(paths, surfaces)[1]
+        if surfaces
+        else read_volume_map(paths[0])[0].ravel()
+    )
     if name == "thickness_mm":
         require_plausible_thickness(values, mean_of_curve(value), ", ".join(paths))

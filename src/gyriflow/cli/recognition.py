@@ -1,4 +1,5 @@
-"""Recognise the scans of a folder by file names, labels, and the tables of participants and sessions."""
+"""Recognise the scans of a folder by file names, labels, and the tables of participants
+and sessions."""
 
 import re
 from collections import Counter, defaultdict
@@ -12,7 +13,15 @@ import numpy as np
 
 from ..anatomy.labels import cerebrum_mask, layout_of, scheme_contradictions
 from ..errors import InputError
-from ..formats import CIFTI_NAME, SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume, side_in_name
+from ..formats import (
+    CIFTI_NAME,
+    SIDE_NAME,
+    SURFACE_SUFFIXES,
+    VOLUME_SUFFIXES,
+    format_of,
+    is_volume,
+    side_in_name,
+)
 from ..io.files import files_in, reading
 from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
@@ -21,23 +30,51 @@ from ..settings.base import did_you_mean, own_name
 from ..settings.terms import SIDES, Side
 from ..settings.weeks import WeekNotation
 from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
-from ..study.participants import TABLE_NAME, ScanTables, ambiguity_of, covariates, data_set_of
+from ..study.participants import (
+    TABLE_NAME,
+    ScanTables,
+    ambiguity_of,
+    covariates,
+    data_set_of,
+)
 
-LABEL_NAME = re.compile(r"(?!.*probseg).*(label|seg|parcellation|tissue)", re.IGNORECASE)
+LABEL_NAME = re.compile(
+    r"(?!.*probseg).*(label|seg|parcellation|tissue)", re.IGNORECASE
+)
 LAYER_NAME = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
 NO_BRAIN_NAME = re.compile(
     r"sphere|inflated|midthickness|flat|graymid|smoothwm|orig|cerebell|stem|skull|scalp|head|hull|ventric|white|wm",
     re.IGNORECASE,
 )
 """Surfaces without a side that are not pial surfaces of a whole brain."""
-RESAMPLED_NAME = re.compile(r"[._-]?(?:(?:space-\w+?_)?den-\w+?|\d+k_fs_LR)(?=[._]|$)", re.IGNORECASE)
+RESAMPLED_NAME = re.compile(
+    r"[._-]?(?:(?:space-\w+?_)?den-\w+?|\d+k_fs_LR)(?=[._]|$)", re.IGNORECASE
+)
 SPACE_NAME = re.compile(r"(?<![A-Za-z0-9])space-([A-Za-z0-9]+)")
-NATIVE_SPACES = ("orig", "native", "individual", "subject", "anat", "scanner", "acpc", "t1w", "t2w")
+NATIVE_SPACES = (
+    "orig",
+    "native",
+    "individual",
+    "subject",
+    "anat",
+    "scanner",
+    "acpc",
+    "t1w",
+    "t2w",
+)
 SIDE_FOLDER = re.compile(r"lh|rh|left|right|l|r|hemi-[lr]", re.IGNORECASE)
 TEMPLATE_FOLDER = re.compile(r"tpl-.*|MNINonLinear|fsaverage(?!_LR).*")
-GENERIC_FOLDER = re.compile(r"surf|mri|anat|labels?|seg|segmentation|native|t[12]w|derivatives", re.IGNORECASE)
+GENERIC_FOLDER = re.compile(
+    r"surf|mri|anat|labels?|seg|segmentation|native|t[12]w|derivatives", re.IGNORECASE
+)
 """Folders that do not name a subject."""
-_SUFFIX_WORDS = sorted({word for suffix in (*SURFACE_SUFFIXES, *VOLUME_SUFFIXES) for word in suffix[1:].split(".")})
+_SUFFIX_WORDS = sorted(
+    {
+        word
+        for suffix in (*SURFACE_SUFFIXES, *VOLUME_SUFFIXES)
+        for word in suffix[1:].split(".")
+    }
+)
 SUFFIXES = re.compile(
     r"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|native"
     rf"|{'|'.join(_SUFFIX_WORDS)})(?=[._-]|$)",
@@ -45,22 +82,25 @@ SUFFIXES = re.compile(
 )
 ENTITY = re.compile(r"(?<![A-Za-z0-9])(sub|ses)-([^_/.]+)")
 FREESURFER_INPUT = re.compile(r"\.T[12]$")
-"""Suffix for the image that a surface was made with: lh.pial is often a link to lh.pial.T1."""
+"""Suffix for the image that a surface was made with: lh.pial is often a link to
+lh.pial.T1."""
 RESAMPLED = "resampled"
 """Space of a subject's own surface on the mesh of a template."""
 WHOLE_BRAIN_ML = (15.0, 700.0)
 """Smallest and largest volume of a closed surface that is accepted as a brain."""
 UNSET = "CHOOSE"
-"""Placeholder for values that the files do not give; `gyriflow check` then asks for them."""
+"""Placeholder for values that the files do not give; `gyriflow check` then asks for
+them."""
 
 
 @dataclass
 class FoundBrain:
-    """A recognised scan: the file that names it, its entry of `brains`, and reasons why it cannot be used.
+    """A recognised scan: the file that names it, its entry of `brains`, and reasons why
+    it cannot be used.
 
-    `space` is "" for the subject's own. `problem` is about its files, `contradiction` about its age (`named_age`: as in
-    its name); `notes` are values to fill in. It `is_unreadable` if files are damaged or missing. `fits` is from
-    `scheme_fits`.
+    `space` is "" for the subject's own. `problem` is about its files, `contradiction`
+    about its age (`named_age`: as in its name); `notes` are values to fill in. It
+    `is_unreadable` if files are damaged or missing. `fits` is from `scheme_fits`.
     """
 
     file: Path
@@ -79,25 +119,34 @@ class FoundBrain:
     @property
     def causes(self) -> list[str]:
         """Reasons why the scan cannot be used as it is."""
-        return [cause for cause in (self.problem, self.contradiction, *self.notes) if cause]
+        return [
+            cause for cause in (self.problem, self.contradiction, *self.notes) if cause
+        ]
 
     @property
     def files(self) -> str:
         """Its files, separated by commas."""
-        source = self.entry.get("labels") or self.entry.get("pial") or self.entry.get("hemisphere", {}).get("file")
+        source = (
+            self.entry.get("labels")
+            or self.entry.get("pial")
+            or self.entry.get("hemisphere", {}).get("file")
+        )
         return str(source or ", ".join(self.entry["hemispheres"].values()))
 
 
 @dataclass
 class FoundScans:
-    """The scans of a folder, the youngest first, and files that are not used, with the reasons."""
+    """The scans of a folder, the youngest first, and files that are not used, with the
+    reasons."""
 
     brains: list[FoundBrain]
     unused: dict[str, str]
 
 
 def _labels(file: Path, entity: str) -> list[str]:
-    return sorted({label for name, label in ENTITY.findall(file.as_posix()) if name == entity})
+    return sorted(
+        {label for name, label in ENTITY.findall(file.as_posix()) if name == entity}
+    )
 
 
 def _label(file: Path, entity: str) -> str | None:
@@ -106,12 +155,14 @@ def _label(file: Path, entity: str) -> str | None:
 
 
 def _scan_of(file: Path) -> str:
-    """Return the id of the scan that a file is of: the `_scan_name` with only the characters that ids may have."""
+    """Return the id of the scan that a file is of: the `_scan_name` with only the
+    characters that ids may have."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", _scan_name(file)).strip("._-") or "brain"
 
 
 def _scan_name(file: Path) -> str:
-    """Return the name of the scan that a file is of: `sub-` and `ses-`, or else the name of the file or folder."""
+    """Return the name of the scan that a file is of: `sub-` and `ses-`, or else the
+    name of the file or folder."""
     subject, session = _label(file, "sub"), _label(file, "ses")
     if subject:
         return f"sub-{subject}_ses-{session}" if session else f"sub-{subject}"
@@ -131,21 +182,35 @@ def recognise(
     participants: Collection[str] | None = None,
     sessions: Collection[str] | None = None,
 ) -> FoundScans:
-    """Return the scans of a folder and of those in it, from files whose paths match a pattern.
+    """Return the scans of a folder and of those in it, from files whose paths match a
+    pattern.
 
-    Results and data sets of gyriflow itself are left out. If a `scheme` is named, all labels are of it. If
-    `participants` or `sessions` are named, with or without `sub-` and `ses-`, files of others are not read. InputError
-    if no scan is found, or none of a named participant or session.
+    Results and data sets of gyriflow itself are left out. If a `scheme` is named, all
+    labels are of it. If `participants` or `sessions` are named, with or without `sub-`
+    and `ses-`, files of others are not read. InputError if no scan is found, or none of
+    a named participant or session.
     """
     paths = [path.relative_to(folder) for path in files_in(folder)]
-    own = [file.parent for file in paths if file.name == "dataset_description.json" and is_own_data_set(folder / file)]
-    own += [file.parents[1] for file in paths if file.parts[-2:] == ("study", "study.json")]
+    own = [
+        file.parent
+        for file in paths
+        if file.name == "dataset_description.json" and is_own_data_set(folder / file)
+    ]
+    own += [
+        file.parents[1] for file in paths if file.parts[-2:] == ("study", "study.json")
+    ]
     own += [results.parent / "resources" for results in own]
     files = [file for file in paths if not any(map(file.is_relative_to, own))]
-    tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
+    tables = ScanTables(
+        [folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation
+    )
     found: dict[str, list[FoundBrain]] = defaultdict(list)
     unreadable = [file for file in files if (folder / file).is_dir()]
-    for brain in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files, unreadable)):
+    for brain in (
+        *_hemispheres(files),
+        *_whole_surfaces(files),
+        *_volumes(files, unreadable),
+    ):
         if fnmatch(str(brain.file), pattern):
             found[_scan_of(brain.file)].append(brain)
     # sessions without labels or surfaces count
@@ -157,39 +222,73 @@ def recognise(
     selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
     selected["ses"] = {label.removeprefix("ses-") for label in sessions or ()}
     for entity, labels in selected.items():
-        existing = {_label(brain.file, entity) for group in found.values() for brain in group}
+        existing = {
+            _label(brain.file, entity) for group in found.values() for brain in group
+        }
         if absent := sorted(labels - existing):
-            problem = f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
-            names = ", ".join(sorted(f"{entity}-{label}" for label in existing if label)[:20]) or "none"
+            problem = (
+                f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
+            )
+            names = (
+                ", ".join(
+                    sorted(f"{entity}-{label}" for label in existing if label)[:20]
+                )
+                or "none"
+            )
             remedy = "Labels must be equal, with their zeros and case."
             raise InputError(problem, path=folder, found=names, remedy=remedy)
     unused: dict[str, str] = {}
     brains: list[FoundBrain] = []
     for name, group in found.items():
-        if not any(labels and _label(group[0].file, entity) not in labels for entity, labels in selected.items()):
+        if not any(
+            labels and _label(group[0].file, entity) not in labels
+            for entity, labels in selected.items()
+        ):
             brains += _brains_of_scan(folder, name, group, tables, sessions_of, unused)
     # templates among subjects are not scans
-    if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (0, len(brains)):
+    if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (
+        0,
+        len(brains),
+    ):
         unused |= {brain.files: brain.problem for brain in brains if brain.is_template}
         brains = own_scans
     if not brains:
         if unused:
             raise _no_brain(folder, unused)
-        raise InputError("has no scan of these participants in these sessions", path=folder)
-    by_name = "" if notation else ambiguity_of(brain.named_age for brain in brains if brain.named_age)
+        raise InputError(
+            "has no scan of these participants in these sessions", path=folder
+        )
+    by_name = (
+        ""
+        if notation
+        else ambiguity_of(brain.named_age for brain in brains if brain.named_age)
+    )
     if ambiguity := tables.ambiguity or by_name:
         raise InputError(ambiguity, path=folder)
     _refuse_equal_weeks(brains)
     choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
-    brains.sort(key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
+    brains.sort(
+        key=lambda brain: (
+            brain.entry["week"] == UNSET,
+            brain.entry["week"],
+            brain.entry["id"],
+        )
+    )
     return FoundScans(brains, unused)
 
 
 def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
-    expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
-    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]] + ["\n  …"] * (len(reasons) > 10)
+    expected = (
+        "tissue label volumes (.nii.gz), or surfaces with left and right or pial in"
+        " their names"
+    )
+    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]] + [
+        "\n  …"
+    ] * (len(reasons) > 10)
     found = f"{len(reasons)} files{''.join(names)}\n"
-    return InputError("no brain was recognised", path=folder, found=found, expected=expected)
+    return InputError(
+        "no brain was recognised", path=folder, found=found, expected=expected
+    )
 
 
 def _rejection(file: Path) -> str:
@@ -198,7 +297,11 @@ def _rejection(file: Path) -> str:
         return "a CIFTI file, with values at grayordinates and no volume of labels"
     if name.endswith(VOLUME_SUFFIXES):
         return "its name has no label, seg, parcellation or tissue"
-    return "its name is not that of a pial surface" if name.endswith(SURFACE_SUFFIXES) else "not a volume or surface"
+    return (
+        "its name is not that of a pial surface"
+        if name.endswith(SURFACE_SUFFIXES)
+        else "not a volume or surface"
+    )
 
 
 def _brains_of_scan(
@@ -209,34 +312,48 @@ def _brains_of_scan(
     sessions_of: Mapping[str | None, set[str | None]],
     unused: dict[str, str],
 ) -> list[FoundBrain]:
-    """Return a brain for each file of a scan that may be used; of several, one must be kept. Add to the `unused`."""
+    """Return a brain for each file of a scan that may be used; of several, one must be
+    kept. Add to the `unused`."""
     brains = []
     for brain in _preferred_files(group, unused):
         _complete(brain, folder, tables, sessions_of)
-        if brain.is_unreadable and "pial" in brain.entry and not LAYER_NAME.search(brain.file.name):
+        if (
+            brain.is_unreadable
+            and "pial" in brain.entry
+            and not LAYER_NAME.search(brain.file.name)
+        ):
             unused[brain.files] = brain.problem
         else:
             brains.append(brain)
     readable = [brain for brain in brains if not brain.is_unreadable]
     names = sorted({_scan_name(brain.file) for brain in group})
     data_sets = _data_sets(group)
-    for number, brain in enumerate([*readable, *(brain for brain in brains if brain.is_unreadable)], start=1):
+    for number, brain in enumerate(
+        [*readable, *(brain for brain in brains if brain.is_unreadable)], start=1
+    ):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
             # several files of one scan do not make a series
             brain.entry.pop("subject", None)
         if len(names) > 1:
             found = ", ".join(names)
-            brain.problem = f"several scans would have the id {name}; found {found}; rename them with ASCII letters"
+            brain.problem = (
+                f"several scans would have the id {name}; found {found}; rename them"
+                " with ASCII letters"
+            )
         elif len(data_sets) > 1:
-            brain.problem = f"several data sets have this scan; found {', '.join(data_sets)}; run each by itself"
+            brain.problem = (
+                f"several data sets have this scan; found {', '.join(data_sets)}; run"
+                " each by itself"
+            )
         elif len(readable) > 1 and brain in readable:
             brain.notes.append(f"{len(readable)} files are of {name}: keep one")
     return brains
 
 
 def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
-    """Return the folders of data sets that have the same kind of data of a scan, if there are several.
+    """Return the folders of data sets that have the same kind of data of a scan, if
+    there are several.
 
     Labels and surfaces of one scan may be in folders of their own.
     """
@@ -251,17 +368,28 @@ def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
     return sorted(most)
 
 
-def _preferred_files(group: Sequence[FoundBrain], unused: dict[str, str]) -> list[FoundBrain]:
-    """Return the files of a scan in the subject's own space, else the resampled ones, else all; add to the `unused`."""
+def _preferred_files(
+    group: Sequence[FoundBrain], unused: dict[str, str]
+) -> list[FoundBrain]:
+    """Return the files of a scan in the subject's own space, else the resampled ones,
+    else all; add to the `unused`."""
     native = [brain for brain in group if not brain.space]
     resampled = [brain for brain in group if brain.space == RESAMPLED]
     preferred = native or resampled or list(group)
     # volumes of FreeSurfer subjects that have surfaces, too
-    volumes = {brain.file.parents[1] / "mri" for brain in preferred if brain.file.parent.name == "surf"}
+    volumes = {
+        brain.file.parents[1] / "mri"
+        for brain in preferred
+        if brain.file.parent.name == "surf"
+    }
     preferred = [brain for brain in preferred if brain.file.parent not in volumes]
     for brain in group:
         if brain not in preferred:
-            reason = f"in the space {brain.space}" if brain.space else "a volume of a subject with surfaces"
+            reason = (
+                f"in the space {brain.space}"
+                if brain.space
+                else "a volume of a subject with surfaces"
+            )
             unused[str(brain.file)] = RESAMPLED if brain.space == RESAMPLED else reason
     return preferred
 
@@ -272,17 +400,27 @@ def _refuse_equal_weeks(brains: Sequence[FoundBrain]) -> None:
         if "subject" in brain.entry and brain.entry["week"] != UNSET:
             scans[brain.entry["subject"], brain.entry["week"]].append(brain)
     for (_, week), group in scans.items():
-        found = ", ".join(f"{brain.entry['id']} ({brain.age_source})" for brain in group)
+        found = ", ".join(
+            f"{brain.entry['id']} ({brain.age_source})" for brain in group
+        )
         for brain in group if len(group) > 1 else ():
-            brain.contradiction = f"scans of one subject have the same age, {week:g}; found {found}; expected one"
+            brain.contradiction = (
+                f"scans of one subject have the same age, {week:g}; found {found};"
+                " expected one"
+            )
 
 
 def _space(file: Path, *, is_surface: bool) -> str:
-    """Return the space of a file, "" for the subject's own; a subject's surface on a template's mesh is resampled."""
+    """Return the space of a file, "" for the subject's own; a subject's surface on a
+    template's mesh is resampled."""
     if folders := [part for part in file.parts if TEMPLATE_FOLDER.fullmatch(part)]:
         return "of a template, " + folders[0]
     space = SPACE_NAME.search(file.name)
-    if is_surface and RESAMPLED_NAME.search(file.name) and not (space and space[1].startswith("MNI")):
+    if (
+        is_surface
+        and RESAMPLED_NAME.search(file.name)
+        and not (space and space[1].startswith("MNI"))
+    ):
         return RESAMPLED
     return space[1] if space and space[1].lower() not in NATIVE_SPACES else ""
 
@@ -301,10 +439,18 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
         layer = LAYER_NAME.search(name)
         is_pial = layer[1] if layer else _may_be_brain(name)
         is_double = name != file.name and file.with_name(name) in existing
-        if (layer or is_pial) and name.lower().endswith(SURFACE_SUFFIXES) and not is_double:
+        if (
+            (layer or is_pial)
+            and name.lower().endswith(SURFACE_SUFFIXES)
+            and not is_double
+        ):
             # sides may be in other folders or in another order of parts
-            folders = [part for part in file.parts[:-1] if not SIDE_FOLDER.fullmatch(part)]
-            parts = sorted(re.split(r"[._]+", LAYER_NAME.sub("", SIDE_NAME.sub("", name))))
+            folders = [
+                part for part in file.parts[:-1] if not SIDE_FOLDER.fullmatch(part)
+            ]
+            parts = sorted(
+                re.split(r"[._]+", LAYER_NAME.sub("", SIDE_NAME.sub("", name)))
+            )
             key = "/".join([*folders, *parts]), "pial" if is_pial else "white"
             if surfaces.setdefault(key, {}).setdefault(side, file) != file:
                 further[key].append((side, file))
@@ -322,97 +468,190 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
             source = {"hemisphere": {"file": str(file), "side": first}}
             for side, sign in files_of[_scan_of(file)].items():
                 if side != first:
-                    found = f"found {sign}; expected both sides, or no file of the {side} one"
+                    found = (
+                        f"found {sign}; expected both sides, or no file of the"
+                        f" {side} one"
+                    )
                     problem = f"has no pial surface of the {side} hemisphere; {found}"
         elif len(white) == 1:
-            problem = f"has one white surface; found {next(iter(white.values()))}; expected both or none"
+            problem = (
+                f"has one white surface; found {next(iter(white.values()))}; expected"
+                " both or none"
+            )
         elif white:
             source["white"] = [str(white[side]) for side in SIDES]
         for key in ((rest, "pial"), (rest, "white")):
             for side, other in further[key]:
-                problem = f"has two {key[1]} surfaces of the {side} hemisphere; found {surfaces[key][side]} and {other}"
+                problem = (
+                    f"has two {key[1]} surfaces of the {side} hemisphere; found"
+                    f" {surfaces[key][side]} and {other}"
+                )
         yield FoundBrain(file, source, _space(file, is_surface=True), problem)
 
 
 def _may_be_brain(name: str) -> bool:
     """Return whether a surface whose name has no layer may be a pial one."""
     # GIFTI files may have other data than pial surfaces
-    return not (NO_BRAIN_NAME.search(name) or name.lower().endswith((".gii", ".gii.gz")))
+    return not (
+        NO_BRAIN_NAME.search(name) or name.lower().endswith((".gii", ".gii.gz"))
+    )
 
 
 def _whole_surfaces(files: Sequence[Path]) -> Iterator[FoundBrain]:
     for file in files:
         name = file.name.lower()
         layer = LAYER_NAME.search(name)
-        if name.endswith(SURFACE_SUFFIXES) and (layer or _may_be_brain(name)) and not SIDE_NAME.search(name):
-            problem = "a white surface alone; a pial one is needed" if layer and layer[2] else ""
-            yield FoundBrain(file, {"pial": str(file)}, _space(file, is_surface=True), problem)
+        if (
+            name.endswith(SURFACE_SUFFIXES)
+            and (layer or _may_be_brain(name))
+            and not SIDE_NAME.search(name)
+        ):
+            problem = (
+                "a white surface alone; a pial one is needed"
+                if layer and layer[2]
+                else ""
+            )
+            yield FoundBrain(
+                file, {"pial": str(file)}, _space(file, is_surface=True), problem
+            )
 
 
 def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[FoundBrain]:
     # of a pair, the header
-    volumes = [file for file in files if is_volume(file) and file.name.lower().endswith(VOLUME_SUFFIXES)]
+    volumes = [
+        file
+        for file in files
+        if is_volume(file) and file.name.lower().endswith(VOLUME_SUFFIXES)
+    ]
     images: dict[Path, list[str]] = defaultdict(list)
     for file in volumes:
         if "_T2w." in file.name:
             images[file.parent].append(str(file))
     for file in files:
         if ENTITY.fullmatch(file.name) and file not in unreadable:
-            yield FoundBrain(file, {"labels": str(file)}, "", "is a link to a folder that is not there")
+            yield FoundBrain(
+                file,
+                {"labels": str(file)},
+                "",
+                "is a link to a folder that is not there",
+            )
     for file in volumes:
         if LABEL_NAME.match(file.name):
-            image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
-            yield FoundBrain(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, is_surface=False))
+            image = (
+                {"image": images[file.parent][0]}
+                if len(images[file.parent]) == 1
+                else {}
+            )
+            yield FoundBrain(
+                file,
+                {"labels": str(file), "scheme": UNSET} | image,
+                _space(file, is_surface=False),
+            )
     for folder in unreadable:
-        yield FoundBrain(folder, {"labels": str(folder)}, "", "is a folder that cannot be read: permission denied")
+        yield FoundBrain(
+            folder,
+            {"labels": str(folder)},
+            "",
+            "is a folder that cannot be read: permission denied",
+        )
 
 
 def _complete(
-    brain: FoundBrain, folder: Path, tables: ScanTables, sessions_of: Mapping[str | None, set[str | None]]
+    brain: FoundBrain,
+    folder: Path,
+    tables: ScanTables,
+    sessions_of: Mapping[str | None, set[str | None]],
 ) -> None:
-    """Add the age, the subject and its other values to a scan, read its files, and add why it cannot be used."""
-    scan, subject, session = _scan_of(brain.file), _label(brain.file, "sub"), _label(brain.file, "ses")
+    """Add the age, the subject and its other values to a scan, read its files, and add
+    why it cannot be used."""
+    scan, subject, session = (
+        _scan_of(brain.file),
+        _label(brain.file, "sub"),
+        _label(brain.file, "ses"),
+    )
     owners = _owners(brain.file, tables) if subject is None else [subject]
     facts, cause = None, ""
     if len(owners) > 1:
-        cause = f"several rows may be of this scan: found {', '.join(owners)}; expected one id in its path"
+        cause = (
+            f"several rows may be of this scan: found {', '.join(owners)}; expected one"
+            " id in its path"
+        )
     elif owners:
         is_only_scan = subject is None or len(sessions_of[subject]) < 2
         facts = tables.facts(owners[0], session, is_only_scan, folder / brain.file)
         cause = "" if facts or subject is None else _similar_ids(subject, tables)
     else:
         cause = _similar_ids(scan, tables, only_similar=True)
-    age, named = facts or ScanAge(None, cause=cause), week_in_name(brain.file.parts, tables.notation)
-    if age.week is not None and named.week is not None and not _agree(age.week, named.week):
-        age = ScanAge(None, cause=f"found two ages, {age.week:g} ({age.source}) and {named.source}; expected one")
+    age, named = (
+        facts or ScanAge(None, cause=cause),
+        week_in_name(brain.file.parts, tables.notation),
+    )
+    if (
+        age.week is not None
+        and named.week is not None
+        and not _agree(age.week, named.week)
+    ):
+        age = ScanAge(
+            None,
+            cause=(
+                f"found two ages, {age.week:g} ({age.source}) and {named.source};"
+                " expected one"
+            ),
+        )
     elif age.week is None and not age.cause:
         age = named
-    entry: dict[str, Any] = {"id": scan, "week": UNSET if age.week is None else age.week}
+    entry: dict[str, Any] = {
+        "id": scan,
+        "week": UNSET if age.week is None else age.week,
+    }
     entry |= {"subject": f"sub-{subject}" if subject else owners[0]} if owners else {}
     brain.entry = entry | (covariates(facts.values) if facts else {}) | brain.entry
     brain.age_source, brain.named_age = age.source, age.named
     if age.week is None:
         brain.contradiction = age.cause
-        brain.notes += [] if age.cause else ["week: neither its name nor a table gives the week"]
+        brain.notes += (
+            [] if age.cause else ["week: neither its name nor a table gives the week"]
+        )
     labels = {entity: _labels(brain.file, entity) for entity in ("ses", "sub")}
-    if names := [f"{entity}-{label}" for entity in labels for label in labels[entity] if len(labels[entity]) > 1]:
-        brain.problem = f"its path names several scans: found {', '.join(names)}; expected one"
-    elif not all(re.fullmatch("[A-Za-z0-9-]+", label) for label in (*labels["sub"], *labels["ses"])):
-        brain.problem = f"has other characters than letters and digits in {_scan_name(brain.file)}"
+    if names := [
+        f"{entity}-{label}"
+        for entity in labels
+        for label in labels[entity]
+        if len(labels[entity]) > 1
+    ]:
+        brain.problem = (
+            f"its path names several scans: found {', '.join(names)}; expected one"
+        )
+    elif not all(
+        re.fullmatch("[A-Za-z0-9-]+", label)
+        for label in (*labels["sub"], *labels["ses"])
+    ):
+        brain.problem = (
+            f"has other characters than letters and digits in {_scan_name(brain.file)}"
+        )
     elif brain.space and brain.space != RESAMPLED:
-        brain.is_template = any(TEMPLATE_FOLDER.fullmatch(part) for part in brain.file.parts)
+        brain.is_template = any(
+            TEMPLATE_FOLDER.fullmatch(part) for part in brain.file.parts
+        )
         brain.problem = f"is in the space {brain.space}; expected the subject's own"
     elif brain.space:
-        brain.warnings.append("a surface on a template's mesh is used, since no native one was found")
+        brain.warnings.append(
+            "a surface on a template's mesh is used, since no native one was found"
+        )
     if brain.problem:
         return
     try:
         if "labels" in brain.entry:
-            brain.fits = scheme_fits(read_label_volume(folder / brain.file, cropped=True).labels)
+            brain.fits = scheme_fits(
+                read_label_volume(folder / brain.file, cropped=True).labels
+            )
         elif "pial" in brain.entry:
             _require_brain(folder / brain.file)
         else:
-            for path in (folder / file for file in (*brain.files.split(", "), *brain.entry.get("white", ()))):
+            for path in (
+                folder / file
+                for file in (*brain.files.split(", "), *brain.entry.get("white", ()))
+            ):
                 with reading(path, "a surface"), path.open("rb") as file:
                     if not file.read(1):
                         raise InputError("is empty", path=path, expected="a surface")
@@ -428,42 +667,77 @@ def _require_brain(path: Path, *, whole: bool = False) -> None:
 
     mesh = read_surface(path)
     if not WHOLE_BRAIN_ML[0] < (volume := abs(volume_ml(mesh))) < WHOLE_BRAIN_ML[1]:
-        expected = f"the closed surface of a brain, {WHOLE_BRAIN_ML[0]:g} to {WHOLE_BRAIN_ML[1]:g} mL"
-        raise InputError("is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected)
+        expected = (
+            f"the closed surface of a brain, {WHOLE_BRAIN_ML[0]:g} to"
+            f" {WHOLE_BRAIN_ML[1]:g} mL"
+        )
+        raise InputError(
+            "is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected
+        )
     if not whole:
         return
     require_one_brain(mesh, "surface", path)
     if (shape := narrowness(mesh)) < MIN_NARROWNESS:
         problem = "seems to be one hemisphere only, and atlases have whole brains"
-        found, expected = f"a shortest extent of {shape:.2f} of the longest", f"{MIN_NARROWNESS} or more"
-        raise InputError(problem, path=path, found=found, expected=expected, remedy="Give LEFT and RIGHT.")
+        found, expected = (
+            f"a shortest extent of {shape:.2f} of the longest",
+            f"{MIN_NARROWNESS} or more",
+        )
+        raise InputError(
+            problem,
+            path=path,
+            found=found,
+            expected=expected,
+            remedy="Give LEFT and RIGHT.",
+        )
 
 
 def _agree(week: float, named: float) -> bool:
     # names may give whole weeks, completed or rounded
-    return abs(week - named) <= MAX_DIFFERENCE_WEEKS or (named.is_integer() and -0.5 <= week - named < 1.0)
+    return abs(week - named) <= MAX_DIFFERENCE_WEEKS or (
+        named.is_integer() and -0.5 <= week - named < 1.0
+    )
 
 
 def _owners(file: Path, tables: ScanTables) -> list[str]:
-    """Return the subjects of tables whose ids are whole parts of a path without `sub-`: of the name or of a folder."""
+    """Return the subjects of tables whose ids are whole parts of a path without `sub-`:
+    of the name or of a folder."""
     parts = re.split(r"[._]", file.name)
-    beginnings = {"_".join(parts[:number]) for number in range(1, len(parts) + 1)} | {_scan_of(file)}
+    beginnings = {"_".join(parts[:number]) for number in range(1, len(parts) + 1)} | {
+        _scan_of(file)
+    }
     in_name = [subject for subject in tables.ids if subject in beginnings]
     in_folders = [subject for subject in tables.ids if subject in file.parts[:-1]]
     return [max(in_name, key=len)] if in_name else in_folders
 
 
-def _similar_ids(subject: str, tables: ScanTables, *, only_similar: bool = False) -> str:
-    """Return which ids tables have instead of a subject's: those that differ in zeros or case, else the first five."""
-    plain, *plain_ids = (re.sub(r"(?<!\d)0+(?=\d)", "", name.lower()) for name in (subject, *tables.ids))
+def _similar_ids(
+    subject: str, tables: ScanTables, *, only_similar: bool = False
+) -> str:
+    """Return which ids tables have instead of a subject's: those that differ in zeros
+    or case, else the first five."""
+    plain, *plain_ids = (
+        re.sub(r"(?<!\d)0+(?=\d)", "", name.lower()) for name in (subject, *tables.ids)
+    )
     named = zip(tables.ids.items(), plain_ids, strict=True)
-    similar = [f"{name} ({table})" for (name, table), plain_id in named if plain_id == plain]
-    found = ", ".join(similar or ([] if only_similar or not tables.ids else [*list(tables.ids)[:5], "…"]))
-    return f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if found else ""
+    similar = [
+        f"{name} ({table})" for (name, table), plain_id in named if plain_id == plain
+    ]
+    found = ", ".join(
+        similar
+        or ([] if only_similar or not tables.ids else [*list(tables.ids)[:5], "…"])
+    )
+    return (
+        f"no table has its id; found {found}; expected {subject}, with the same zeros"
+        " and case"
+        if found
+        else ""
+    )
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:
-    """Return the shipped schemes with all labels of a volume, each with a contradiction or ""."""
+    """Return the shipped schemes with all labels of a volume, each with a contradiction
+    or ""."""
     numbers = set(np.unique(labels).tolist()) - {0}
     layout, causes = layout_of(labels), {}
     for name, scheme in SCHEMES.items():
@@ -476,31 +750,51 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
     return causes
 
 
-def require_fit(fits: Mapping[str, str], scheme: str, path: str | Path, found: str) -> None:
-    """Raise InputError if other schemes fit the labels of a file, and this one does not."""
+def require_fit(
+    fits: Mapping[str, str], scheme: str, path: str | Path, found: str
+) -> None:
+    """Raise InputError if other schemes fit the labels of a file, and this one does
+    not."""
     fitting = [name for name, against in fits.items() if not against]
     if fitting and scheme not in fitting:
-        problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme}"
+        problem = (
+            f"has labels arranged like those of {' or '.join(fitting)}, not like those"
+            f" of {scheme}"
+        )
         raise InputError(problem, path=path, found=found)
 
 
-def recognise_brain(files: Sequence[Path], white: Sequence[Path], scheme: str | None) -> dict[str, Any]:
-    """Return the entry of one brain: from a label volume, one surface, or the left and the right pial surface.
+def recognise_brain(
+    files: Sequence[Path], white: Sequence[Path], scheme: str | None
+) -> dict[str, Any]:
+    """Return the entry of one brain: from a label volume, one surface, or the left and
+    the right pial surface.
 
-    There may be as many `white` surfaces as pial ones. InputError for files of other kinds, numbers or sides, and for
-    one hemisphere.
+    There may be as many `white` surfaces as pial ones. InputError for files of other
+    kinds, numbers or sides, and for one hemisphere.
     """
     if any(map(is_volume, files)):
         if len(files) > 1 or white:
             found = " and ".join(file.name for file in (*files, *white))
-            raise InputError("one brain is expected", found=found, expected="one label volume, or surfaces alone")
+            raise InputError(
+                "one brain is expected",
+                found=found,
+                expected="one label volume, or surfaces alone",
+            )
         return recognise_labels(own_name(files[0]), scheme)
     if scheme:
-        raise InputError("--scheme: surfaces have no labels", found=scheme, remedy="Leave it out.")
+        raise InputError(
+            "--scheme: surfaces have no labels", found=scheme, remedy="Leave it out."
+        )
     for file in (*files, *white):
         if format_of(file, "surface") is None:
-            expected = f"a label volume ({', '.join(VOLUME_SUFFIXES)}) or a surface ({', '.join(SURFACE_SUFFIXES)})"
-            raise InputError("is neither a label volume nor a surface", path=file, expected=expected)
+            expected = (
+                f"a label volume ({', '.join(VOLUME_SUFFIXES)}) or a surface"
+                f" ({', '.join(SURFACE_SUFFIXES)})"
+            )
+            raise InputError(
+                "is neither a label volume nor a surface", path=file, expected=expected
+            )
     pial = _in_order(files, "pial")
     entry: dict[str, Any] = {"id": _scan_of(own_name(files[0]))}
     if len(pial) == 1:
@@ -510,7 +804,10 @@ def recognise_brain(files: Sequence[Path], white: Sequence[Path], scheme: str | 
         entry["hemispheres"] = dict(zip(SIDES, map(str, pial), strict=True))
     if white and len(white) != len(files):
         problem = f"--white: found {len(white)} surfaces for {len(files)} pial ones"
-        raise InputError(problem, expected="one for each: of the left and the right, or of the whole brain")
+        raise InputError(
+            problem,
+            expected="one for each: of the left and the right, or of the whole brain",
+        )
     if white:
         whites = [str(file) for file in _in_order(white, "white")]
         entry["white"] = whites if len(whites) > 1 else whites[0]
@@ -518,9 +815,11 @@ def recognise_brain(files: Sequence[Path], white: Sequence[Path], scheme: str | 
 
 
 def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
-    """Return the surfaces of one layer, left before right, with resolved folders; their names may say which is which.
+    """Return the surfaces of one layer, left before right, with resolved folders; their
+    names may say which is which.
 
-    InputError if a name says another layer, or if it is one hemisphere, both are of one side, or there are more.
+    InputError if a name says another layer, or if it is one hemisphere, both are of one
+    side, or there are more.
     """
     sides = [side_in_name(file.name) for file in files]
     for file in files:
@@ -528,21 +827,37 @@ def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
         if named and bool(named[1]) != (layer == "pial"):
             problem = f"is named as a {'pial' if named[1] else 'white'} surface"
             remedy = "Give pial surfaces first, and white ones each after --white."
-            raise InputError(problem, path=file, expected=f"a {layer} surface", remedy=remedy)
+            raise InputError(
+                problem, path=file, expected=f"a {layer} surface", remedy=remedy
+            )
     if len(files) == 1 and sides[0]:
         problem = f"is the {sides[0]} hemisphere only, and atlases have whole brains"
-        raise InputError(problem, path=files[0], expected="LEFT and RIGHT, or one surface of the whole brain")
+        raise InputError(
+            problem,
+            path=files[0],
+            expected="LEFT and RIGHT, or one surface of the whole brain",
+        )
     if len(files) > len(SIDES) or (None not in sides and len(set(sides)) < len(sides)):
         found = ", ".join(file.name for file in files)
         expected = "the left and the right one, or one of the whole brain"
-        raise InputError(f"these are not the {layer} surfaces of one brain", found=found, expected=expected)
-    return [own_name(file) for file in (files if sides != ["right", "left"] else files[::-1])]
+        raise InputError(
+            f"these are not the {layer} surfaces of one brain",
+            found=found,
+            expected=expected,
+        )
+    return [
+        own_name(file)
+        for file in (files if sides != ["right", "left"] else files[::-1])
+    ]
 
 
 def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
-    """Return the entry of a label volume: its id, file and scheme; InputError if the scheme is unknown or unclear."""
+    """Return the entry of a label volume: its id, file and scheme; InputError if the
+    scheme is unknown or unclear."""
     if scheme not in (None, *SCHEMES):
-        raise InputError(f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}")
+        raise InputError(
+            f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}"
+        )
     entry = {"id": _scan_of(file), "labels": str(file), "scheme": UNSET}
     fits = scheme_fits(read_label_volume(file, cropped=True).labels)
     if scheme:
@@ -550,17 +865,26 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     brain = FoundBrain(file, entry, fits=fits)
     choose_schemes([brain], scheme)
     if brain.notes:
-        raise InputError("has labels of an unknown scheme", path=file, found=brain.notes[0], remedy="Name --scheme")
+        raise InputError(
+            "has labels of an unknown scheme",
+            path=file,
+            found=brain.notes[0],
+            remedy="Name --scheme",
+        )
     return brain.entry
 
 
 def choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> None:
-    """Set the scheme of all brains with labels: `scheme`, otherwise the only scheme that fits all of them.
+    """Set the scheme of all brains with labels: `scheme`, otherwise the only scheme
+    that fits all of them.
 
-    If none fits all, each has its own. A note asks for the scheme if several fit or none does, or if the scans of one
-    subject would have several.
+    If none fits all, each has its own. A note asks for the scheme if several fit or
+    none does, or if the scans of one subject would have several.
     """
-    each = [[name for name, against in (brain.fits or {}).items() if not against] for brain in brains]
+    each = [
+        [name for name, against in (brain.fits or {}).items() if not against]
+        for brain in brains
+    ]
     fitting = [set(names) for names in each if names]
     common = set.intersection(*fitting) if fitting else set()
     by_subject: dict[str, set[str]] = defaultdict(set)
@@ -572,20 +896,43 @@ def choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> N
         elif choices:
             brain.notes.append(f"scheme: {' or '.join(choices)} both fit the labels")
         else:
-            against = [f"; not {name}: {cause}" for name, cause in (brain.fits or {}).items()]
-            brain.notes.append(f"scheme: no shipped one fits{''.join(against) or ', none has all labels'}")
+            against = [
+                f"; not {name}: {cause}" for name, cause in (brain.fits or {}).items()
+            ]
+            brain.notes.append(
+                "scheme: no shipped one"
+                f" fits{''.join(against) or ', none has all labels'}"
+            )
     for brain in brains:
         schemes = by_subject[brain.entry.get("subject", "")]
         if brain.entry.get("subject") and len(schemes) > 1:
             brain.entry["scheme"] = UNSET
-            brain.notes.append(f"scheme: scans of {brain.entry['subject']} fit {' and '.join(sorted(schemes))}")
+            brain.notes.append(
+                f"scheme: scans of {brain.entry['subject']} fit"
+                f" {' and '.join(sorted(schemes))}"
+            )
 
 
 def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
-    """Yield the number of volumes of each chosen scheme, then contradictions to it and to the other schemes."""
-    for name, number in Counter(brain.entry.get("scheme", UNSET) for brain in brains).items():
+    """Yield the number of volumes of each chosen scheme, then contradictions to it and
+    to the other schemes."""
+    for name, number in Counter(
+        brain.entry.get("scheme", UNSET) for brain in brains
+    ).items():
         if name != UNSET:
-            fits = [brain.fits or {} for brain in brains if brain.entry.get("scheme") == name]
-            causes = {fitted: cause for schemes in fits for fitted, cause in schemes.items() if cause}
+            fits = [
+                brain.fits or {}
+                for brain in brains
+                if brain.entry.get("scheme") == name
+            ]
+            causes = {
+                fitted: cause
+                for schemes in fits
+                for fitted, cause in schemes.items()
+                if cause
+            }
             yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
-            yield from (f"  {'but' if fitted == name else f'not {fitted}:'} {causes[fitted]}" for fitted in causes)
+            yield from (
+                f"  {'but' if fitted == name else f'not {fitted}:'} {causes[fitted]}"
+                for fitted in causes
+            )

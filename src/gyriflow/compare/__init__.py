@@ -1,1 +1,2 @@
-"""Comparison of simulations with observed brains: validation, prediction, deviation, sweeps and calibration."""
+"""Comparison of simulations with observed brains: validation, prediction, deviation,
+sweeps and calibration."""

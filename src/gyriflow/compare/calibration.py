@@ -1,4 +1,5 @@
-"""Calibration: choose the parameters of the next runs, score the runs, and find the best."""
+"""Calibration: choose the parameters of the next runs, score the runs, and find the
+best."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
@@ -14,7 +15,15 @@ from scipy.stats import qmc
 from ..errors import InputError
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
-from ..settings.terms import AMPLITUDE, FOLD_BANDS, MEASURED, PROXIES, SPECTRAL_SCORES, STIFFNESS_RATIO, Score
+from ..settings.terms import (
+    AMPLITUDE,
+    FOLD_BANDS,
+    MEASURED,
+    PROXIES,
+    SPECTRAL_SCORES,
+    STIFFNESS_RATIO,
+    Score,
+)
 from .comparison import Group, ObservedBrain, compare
 
 Bounds = Mapping[str, Sequence[float]]
@@ -22,11 +31,13 @@ Bounds = Mapping[str, Sequence[float]]
 DIGITS = 6
 """Significant digits of calibrated values."""
 AT_BOUND = 0.01
-"""Distance from a bound, as a share of the range, below which a value counts as at the bound."""
+"""Distance from a bound, as a share of the range, below which a value counts as at the
+bound."""
 
 
 def first_round(bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
-    """Spread `count` rows of values evenly over the bounds, by a scrambled Sobol sequence (Sobol 1967; Owen 1998).
+    """Spread `count` rows of values evenly over the bounds, by a scrambled Sobol
+    sequence (Sobol 1967; Owen 1998).
 
     The same seed gives the same rows.
     """
@@ -35,17 +46,22 @@ def first_round(bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
     sequence = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed))
     points = sequence.random_base2(power)[:count]
     low, high = np.transpose(list(bounds.values()))
-    return _rounded(pd.DataFrame(low + points * (high - low), columns=list(bounds)), bounds)
+    return _rounded(
+        pd.DataFrame(low + points * (high - low), columns=list(bounds)), bounds
+    )
 
 
-def next_round(runs: pd.DataFrame, bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
+def next_round(
+    runs: pd.DataFrame, bounds: Bounds, count: int, seed: int
+) -> pd.DataFrame:
     """Choose the values of the next `count` runs from all earlier ones.
 
-    By optuna's tree-structured Parzen estimator (Bergstra et al. 2011), which compares the density of the best runs
-    with that of the others, and counts runs that it has proposed as bad until they are scored (constant liar).
+    By optuna's tree-structured Parzen estimator (Bergstra et al. 2011), which compares
+    the density of the best runs with that of the others, and counts runs that it has
+    proposed as bad until they are scored (constant liar).
 
-    `runs` has columns of the parameters, score (NaN if diverged) and cause. The same runs and seed give the same rows.
-    InputError if no run has a score.
+    `runs` has columns of the parameters, score (NaN if diverged) and cause. The same
+    runs and seed give the same rows. InputError if no run has a score.
     """
     require_finished(runs)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
@@ -63,12 +79,19 @@ def next_round(runs: pd.DataFrame, bounds: Bounds, count: int, seed: int) -> pd.
     return _rounded(pd.DataFrame(proposed, columns=list(bounds)), bounds)
 
 
-def _trial(run: Mapping[Any, Any], distributions: dict[str, BaseDistribution]) -> FrozenTrial:
-    """Return a run as optuna's trial: finished, or pruned, which counts as worse than all finished ones."""
+def _trial(
+    run: Mapping[Any, Any], distributions: dict[str, BaseDistribution]
+) -> FrozenTrial:
+    """Return a run as optuna's trial: finished, or pruned, which counts as worse than
+    all finished ones."""
     parameters = {name: run[name] for name in distributions}
     if np.isnan(run["score"]):
-        return create_trial(state=TrialState.PRUNED, params=parameters, distributions=distributions)
-    return create_trial(value=run["score"], params=parameters, distributions=distributions)
+        return create_trial(
+            state=TrialState.PRUNED, params=parameters, distributions=distributions
+        )
+    return create_trial(
+        value=run["score"], params=parameters, distributions=distributions
+    )
 
 
 def _rounded(values: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
@@ -79,7 +102,8 @@ def _rounded(values: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
 
 
 def require_finished(runs: pd.DataFrame) -> None:
-    """Raise InputError if none of the runs (columns score, NaN if diverged, and cause) has a score."""
+    """Raise InputError if none of the runs (columns score, NaN if diverged, and cause)
+    has a score."""
     if runs["score"].notna().any():
         return
     causes = "; ".join(dict.fromkeys(runs["cause"].dropna().astype(str)))
@@ -87,17 +111,20 @@ def require_finished(runs: pd.DataFrame) -> None:
         "no run of the calibration has finished",
         found=f"0 of {len(runs)} runs with a score; {causes}",
         expected="one or more",
-        remedy="Narrow the bounds of calibrate.parameters around values with which calibrate.base finishes, or "
-        "start with more runs (calibrate.rounds).",
+        remedy=(
+            "Narrow the bounds of calibrate.parameters around values with which"
+            " calibrate.base finishes, or start with more runs (calibrate.rounds)."
+        ),
     )
 
 
 def find_optimum(runs: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
     """Return the parameters of the run with the least score: a row per parameter.
 
-    `runs` has columns of run, the parameters, score (NaN if diverged) and cause. Returns columns parameter, value,
-    lowest and highest (the bounds), at_bound (whether the value is within 1 % of a bound), run and score. InputError
-    if no run has a score.
+    `runs` has columns of run, the parameters, score (NaN if diverged) and cause.
+    Returns columns parameter, value, lowest and highest (the bounds), at_bound (whether
+    the value is within 1 % of a bound), run and score. InputError if no run has a
+    score.
     """
     require_finished(runs)
     best = runs.iloc[int(np.nanargmin(runs["score"].to_numpy(dtype=float)))]
@@ -106,16 +133,26 @@ def find_optimum(runs: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
         value = best[name]
         margin = AT_BOUND * (high - low)
         is_at_bound = value < low + margin or value > high - margin
-        row = {"parameter": name, "value": value, "lowest": low, "highest": high, "at_bound": is_at_bound}
+        row = {
+            "parameter": name,
+            "value": value,
+            "lowest": low,
+            "highest": high,
+            "at_bound": is_at_bound,
+        }
         rows.append(row | {"run": best["run"], "score": best["score"]})
     return pd.DataFrame(rows)
 
 
-def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], week: float) -> dict[str, Any]:
-    """Return the content of `params.yaml` for a run of a calibration that ends at a week.
+def calibrated_parameters(
+    base: Mapping[str, Any], values: Mapping[str, float], week: float
+) -> dict[str, Any]:
+    """Return the content of `params.yaml` for a run of a calibration that ends at a
+    week.
 
-    `base` is that of the base run, `values` the value of each parameter: a key of `params.yaml` (with dots for nested
-    keys), `stiffness_ratio`, or `KEY.amplitude`, a factor on the curve KEY.
+    `base` is that of the base run, `values` the value of each parameter: a key of
+    `params.yaml` (with dots for nested keys), `stiffness_ratio`, or `KEY.amplitude`, a
+    factor on the curve KEY.
     """
     params = deepcopy(dict(base))
     for key, value in values.items():
@@ -126,7 +163,9 @@ def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], 
         section = params
         for name in outer:
             section = section[name]
-        section[last] = _scaled(section[last], value) if key.endswith(AMPLITUDE) else value
+        section[last] = (
+            _scaled(section[last], value) if key.endswith(AMPLITUDE) else value
+        )
     return params | {"end_week": week, "output_weeks": [params["start_week"], week]}
 
 
@@ -137,59 +176,106 @@ def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
 
 
 SURFACE_SCORES: dict[Score, tuple[Group, Callable[[Mapping[str, float]], float]]] = {
-    "size": ("size", lambda row: float(np.hypot(row["area_difference"], row["volume_difference"]))),
+    "size": (
+        "size",
+        lambda row: float(np.hypot(row["area_difference"], row["volume_difference"])),
+    ),
     "surface_distance": ("distance", lambda row: row["distance_mm"]),
     "shape_index": ("folds", lambda row: 1 - row["r_shape_index"]),
     "mean_curvature": ("folds", lambda row: 1 - row["r_mean_curvature"]),
     "curvature_distribution": ("folds", lambda row: row["curvature_distance_per_mm"]),
 }
-"""Scores of a row of `comparison.compare`, 0 for equal brains, and the group of columns that they need."""
+"""Scores of a row of `comparison.compare`, 0 for equal brains, and the group of columns
+that they need."""
 
 
-def require_bands(spectra: pd.DataFrame, names: Collection[str], path: str | None = None) -> None:
+def require_bands(
+    spectra: pd.DataFrame, names: Collection[str], path: str | None = None
+) -> None:
     """Raise InputError unless the bands of spectral scores are complete and resolved.
 
-    `spectra`, from the file `path`, have the columns proxy, band, wavelength_min_mm, wavelength_max_mm, complete,
-    resolved.
+    `spectra`, from the file `path`, have the columns proxy, band, wavelength_min_mm,
+    wavelength_max_mm, complete, resolved.
     """
     rows = spectra[(spectra["proxy"] == PROXIES[0]) & spectra["band"].isin(FOLD_BANDS)]
     # the spectral distance covers all complete bands
-    last = int(rows.loc[rows["complete"], "band"].max()) if rows["complete"].any() else FOLD_BANDS[0]
+    last = (
+        int(rows.loc[rows["complete"], "band"].max())
+        if rows["complete"].any()
+        else FOLD_BANDS[0]
+    )
     for name in [name for name in names if name in SPECTRAL_SCORES]:
-        for band in range(FOLD_BANDS[0], last + 1) if name == "spectral_distance" else [int(name[-1])]:
+        for band in (
+            range(FOLD_BANDS[0], last + 1)
+            if name == "spectral_distance"
+            else [int(name[-1])]
+        ):
             row = rows[rows["band"] == band]
             if row["complete"].all() and row["resolved"].all():
                 continue
-            problem, remedy = "not resolved", "Use shorter edges and a smaller metrics.curvature_radius_mm"
+            problem, remedy = (
+                "not resolved",
+                "Use shorter edges and a smaller metrics.curvature_radius_mm",
+            )
             if not row["complete"].all():
                 problem, remedy = "cut off", f"Set metrics.spangy_modes: B{band}"
             raise InputError(
                 f"calibrate.score {name} needs a band that is {problem}",
                 path=path,
-                found=f"B{band}, {row['wavelength_min_mm'].min():.1f} to {row['wavelength_max_mm'].max():.1f} mm",
+                found=(
+                    f"B{band}, {row['wavelength_min_mm'].min():.1f} to"
+                    f" {row['wavelength_max_mm'].max():.1f} mm"
+                ),
                 remedy=f"{remedy}, or use another score.",
             )
 
 
-def spectral_scores(simulated: pd.DataFrame, observed: pd.DataFrame) -> dict[str, float]:
-    """Return the `SPECTRAL_SCORES` of two brains: means over hemispheres, NaN where bands are not complete or resolved.
+def spectral_scores(
+    simulated: pd.DataFrame, observed: pd.DataFrame
+) -> dict[str, float]:
+    """Return the `SPECTRAL_SCORES` of two brains: means over hemispheres, NaN where
+    bands are not complete or resolved.
 
-    Both have the columns hemisphere, proxy, band, power, relative_power, complete, resolved.
+    Both have the columns hemisphere, proxy, band, power, relative_power, complete,
+    resolved.
     """
     tables = [simulated.assign(run=""), observed.assign(run=MEASURED)]
     both = pd.concat(tables, ignore_index=True).assign(subject="", week=0.0)
-    distances = spectral_distances(both).query("run == ''").groupby("metric")["value"].mean().dropna()
-    shares = both[both["proxy"] == PROXIES[0]].pivot_table("relative_power", ["hemisphere", "band"], "run")
+    distances = (
+        spectral_distances(both)
+        .query("run == ''")
+        .groupby("metric")["value"]
+        .mean()
+        .dropna()
+    )
+    shares = both[both["proxy"] == PROXIES[0]].pivot_table(
+        "relative_power", ["hemisphere", "band"], "run"
+    )
     differences = (shares[""] - shares[MEASURED]).abs().groupby("band").mean()
-    scores = {f"relative_power_b{band}": float(differences.get(band, np.nan)) for band in FOLD_BANDS}
-    return scores | {"spectral_distance": float(distances.iloc[-1]) if len(distances) else np.nan}
+    scores = {
+        f"relative_power_b{band}": float(differences.get(band, np.nan))
+        for band in FOLD_BANDS
+    }
+    return scores | {
+        "spectral_distance": float(distances.iloc[-1]) if len(distances) else np.nan
+    }
 
 
 def brain_scores(
-    simulated: TriangleMesh, observed: ObservedBrain, names: Collection[Score], *, radius_mm: float
+    simulated: TriangleMesh,
+    observed: ObservedBrain,
+    names: Collection[Score],
+    *,
+    radius_mm: float,
 ) -> dict[Score, float]:
-    """Return the scores of `names` for a simulated closed surface in mm. `radius_mm` is that of fitted curvature."""
-    row, _ = compare(simulated, observed, radius_mm=radius_mm, groups={SURFACE_SCORES[name][0] for name in names})
+    """Return the scores of `names` for a simulated closed surface in mm. `radius_mm` is
+    that of fitted curvature."""
+    row, _ = compare(
+        simulated,
+        observed,
+        radius_mm=radius_mm,
+        groups={SURFACE_SCORES[name][0] for name in names},
+    )
     return {name: SURFACE_SCORES[name][1](row) for name in names}
 
 
@@ -201,19 +287,24 @@ def run_score(
     radius_mm: float,
     spectra: Iterable[tuple[pd.DataFrame, pd.DataFrame]] = (),
 ) -> dict[str, Any]:
-    """Return the score of a run, the weighted sum of its scores' means over all pairs of brains.
+    """Return the score of a run, the weighted sum of its scores' means over all pairs
+    of brains.
 
-    `pairs` are simulated surfaces and the observed brains to compare them with, `spectra` those of the same pairs as in
-    `spectral_scores`, only needed if `weights` has some of these scores. Neither is read if there are `causes` why
-    simulations of the run have diverged.
+    `pairs` are simulated surfaces and the observed brains to compare them with,
+    `spectra` those of the same pairs as in `spectral_scores`, only needed if `weights`
+    has some of these scores. Neither is read if there are `causes` why simulations of
+    the run have diverged.
 
-    Returns score and the mean of each score in `weights`, NaN if the run has diverged; outcome ("finished" or
-    "diverged") and cause.
+    Returns score and the mean of each score in `weights`, NaN if the run has diverged;
+    outcome ("finished" or "diverged") and cause.
     """
     rows: list[dict[str, float]] = []
     if not causes:
         surface_names = [name for name in weights if name not in SPECTRAL_SCORES]
-        rows = [dict(brain_scores(*pair, surface_names, radius_mm=radius_mm).items()) for pair in pairs]
+        rows = [
+            dict(brain_scores(*pair, surface_names, radius_mm=radius_mm).items())
+            for pair in pairs
+        ]
         if len(surface_names) < len(weights):
             for row, pair in zip(rows, spectra, strict=True):
                 require_bands(pd.concat(pair), weights)
@@ -221,5 +312,8 @@ def run_score(
     table = pd.DataFrame(rows, columns=list(weights))
     means: dict[str, float] = {name: float(table[name].mean()) for name in weights}
     score = sum(weight * means[name] for name, weight in weights.items())
-    outcome = {"outcome": "diverged" if causes else "finished", "cause": "; ".join(causes)}
+    outcome = {
+        "outcome": "diverged" if causes else "finished",
+        "cause": "; ".join(causes),
+    }
     return {"score": score, **means, **outcome}

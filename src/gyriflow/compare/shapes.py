@@ -1,4 +1,5 @@
-"""Surfaces prepared for comparison: scaled to the observed brain's volume, remeshed, aligned, with their curvature."""
+"""Surfaces prepared for comparison: scaled to the observed brain's volume, remeshed,
+aligned, with their curvature."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -11,26 +12,36 @@ from ..errors import InputError
 from ..geometry.alignment import align
 from ..geometry.matching import surface_mask
 from ..geometry.remeshing import remesh
-from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, transformed, vertex_areas
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    signed_volume,
+    transformed,
+    vertex_areas,
+)
 from ..metrics.curvature import curvature
 from ..settings.terms import CURVATURE_RADIUS_MM
 
 EDGE_MM = 1.0
 """Edge length after remeshing."""
 MAX_CURVATURE_PER_MM = 1.0
-"""Limit of mean curvature, which is clipped: larger values come from single sharp edges."""
+"""Limit of mean curvature, which is clipped: larger values come from single sharp
+edges."""
 CORTEX_MM, VOXEL_MM = 2.0, 0.8
-"""Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels that are counted."""
+"""Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels
+that are counted."""
 MAX_VOXELS = 1 << 20
 """Largest number of voxels along a direction."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedSurface:
-    """A closed surface in mm with even triangles, prepared for comparison, with the curvature at its n vertices.
+    """A closed surface in mm with even triangles, prepared for comparison, with the
+    curvature at its n vertices.
 
-    `mean_curvature` (n,) is in 1/mm, positive on gyri, clipped at ± `MAX_CURVATURE_PER_MM`; `shape_index` (n,) is from
-    −1, a pit, to 1.
+    `mean_curvature` (n,) is in 1/mm, positive on gyri, clipped at ±
+    `MAX_CURVATURE_PER_MM`; `shape_index` (n,) is from −1, a pit, to 1.
     """
 
     mesh: TriangleMesh
@@ -38,7 +49,9 @@ class PreparedSurface:
     shape_index: Floats
 
     def __post_init__(self) -> None:
-        clipped = np.clip(self.mean_curvature, -MAX_CURVATURE_PER_MM, MAX_CURVATURE_PER_MM)
+        clipped = np.clip(
+            self.mean_curvature, -MAX_CURVATURE_PER_MM, MAX_CURVATURE_PER_MM
+        )
         object.__setattr__(self, "mean_curvature", clipped)
 
     @cached_property
@@ -55,10 +68,11 @@ class PreparedSurface:
 def prepare_for_comparison(
     mesh: TriangleMesh, observed: TriangleMesh, radius_mm: float = CURVATURE_RADIUS_MM
 ) -> PreparedSurface:
-    """Scale a closed surface to the observed brain's volume, remesh it, align it rigidly and fit its curvature.
+    """Scale a closed surface to the observed brain's volume, remesh it, align it
+    rigidly and fit its curvature.
 
-    The observed brain itself (`mesh is observed`) is only remeshed. `radius_mm` is that of `metrics.curvature`.
-    InputError where a surface encloses no volume.
+    The observed brain itself (`mesh is observed`) is only remeshed. `radius_mm` is that
+    of `metrics.curvature`. InputError where a surface encloses no volume.
     """
     volumes = [signed_volume(surface) for surface in (mesh, observed)]
     if min(volumes) <= 0:
@@ -81,13 +95,18 @@ def scale_to_volume(mesh: TriangleMesh, other: TriangleMesh) -> TriangleMesh:
     return transformed(mesh, np.diag([factor] * 3 + [1.0]))
 
 
-def curvature_differences(surface: PreparedSurface, observed: PreparedSurface) -> dict[str, float]:
+def curvature_differences(
+    surface: PreparedSurface, observed: PreparedSurface
+) -> dict[str, float]:
     """Compare how strongly two surfaces are folded, regardless of where.
 
-    curvature_rms_ratio is the ratio to the observed one; curvature_distance_per_mm is the first Wasserstein distance
-    between the distributions of mean curvature over the area.
+    curvature_rms_ratio is the ratio to the observed one; curvature_distance_per_mm is
+    the first Wasserstein distance between the distributions of mean curvature over the
+    area.
     """
-    distance = wasserstein_distance(surface.mean_curvature, observed.mean_curvature, surface.areas, observed.areas)
+    distance = wasserstein_distance(
+        surface.mean_curvature, observed.mean_curvature, surface.areas, observed.areas
+    )
     return {
         "curvature_rms_ratio": surface.curvature_rms / observed.curvature_rms,
         "curvature_distance_per_mm": float(distance),
@@ -95,7 +114,8 @@ def curvature_differences(surface: PreparedSurface, observed: PreparedSurface) -
 
 
 def cortex_dice(surface: TriangleMesh, observed: TriangleMesh) -> float:
-    """Return the Dice overlap of the outermost `CORTEX_MM` of two aligned closed surfaces in mm."""
+    """Return the Dice overlap of the outermost `CORTEX_MM` of two aligned closed
+    surfaces in mm."""
     first, second = _ribbon(surface), _ribbon(observed)
     both = np.intersect1d(first, second, assume_unique=True)
     return 2 * len(both) / (len(first) + len(second))
@@ -103,11 +123,14 @@ def cortex_dice(surface: TriangleMesh, observed: TriangleMesh) -> float:
 
 @lru_cache(maxsize=2)
 def _ribbon(mesh: TriangleMesh) -> Ints:
-    """Return the voxels of the outermost `CORTEX_MM` as (k,) numbers, the same for all surfaces."""
+    """Return the voxels of the outermost `CORTEX_MM` as (k,) numbers, the same for all
+    surfaces."""
     corner = np.floor(mesh.vertices.min(axis=0) / VOXEL_MM)
     box = np.stack([corner * VOXEL_MM, mesh.vertices.max(axis=0)])
     mask, affine = surface_mask(mesh, VOXEL_MM, box)
     # distances are to the centres of voxels outside, half a voxel beyond the surface
     depth = distance_transform_edt(mask, sampling=VOXEL_MM) - VOXEL_MM / 2
-    voxels = np.argwhere((mask > 0) & (depth <= CORTEX_MM)) + np.rint(affine[:3, 3] / VOXEL_MM).astype(np.int64)
+    voxels = np.argwhere((mask > 0) & (depth <= CORTEX_MM)) + np.rint(
+        affine[:3, 3] / VOXEL_MM
+    ).astype(np.int64)
     return np.asarray(voxels @ (MAX_VOXELS ** np.arange(3)))

@@ -1,4 +1,5 @@
-"""The folding program: `mpiexec -n N python -m gyriflow.folding MESH --params params.yaml --out DIR`."""
+"""The folding program: `mpiexec -n N python -m gyriflow.folding MESH --params
+params.yaml --out DIR`."""
 
 import argparse
 import shutil
@@ -31,23 +32,35 @@ from .zones import zones_of_run
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Parse the command line."""
-    parser = argparse.ArgumentParser(prog="python -m gyriflow.folding", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m gyriflow.folding", description=__doc__
+    )
     parser.add_argument("mesh", type=Path, help="tetrahedral mesh, RAS+ mm (XDMF)")
     parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
-    parser.add_argument("--maps", type=Path, help="maps of parameters at the mesh's vertices (HDF5)")
+    parser.add_argument(
+        "--maps", type=Path, help="maps of parameters at the mesh's vertices (HDF5)"
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--progress", type=Path, help="file of the run's events, one JSON object per line (.jsonl)")
+    parser.add_argument(
+        "--progress",
+        type=Path,
+        help="file of the run's events, one JSON object per line (.jsonl)",
+    )
     parser.add_argument(
         "--may-diverge",
         action="store_true",
-        help="if the run diverges, keep the weeks it reached and end without an error; the summary gives the reason",
+        help=(
+            "if the run diverges, keep the weeks it reached and end without an error;"
+            " the summary gives the reason"
+        ),
     )
     return parser.parse_args(arguments)
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock the folder for this run; StorageError if another run has locked it or it cannot be written."""
+    """Lock the folder for this run; StorageError if another run has locked it or it
+    cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / ".lock").open("w")
@@ -59,11 +72,16 @@ def locked(folder: Path) -> Iterator[None]:
         yield
 
 
-def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters) -> None:
-    """Raise StorageError if the disk has no room for the run's frames, which exist twice while they are joined."""
+def require_space(
+    out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters
+) -> None:
+    """Raise StorageError if the disk has no room for the run's frames, which exist
+    twice while they are joined."""
     # positions in double precision, fields in single
     per_element = 16 * len(set(ELEMENT_FIELDS) & set(parameters.fields))
-    frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(mesh.tets)
+    frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(
+        mesh.tets
+    )
     points = len(IntegrationPoints.for_order(mesh.order).weights)
     values = 6 if parameters.keeps_stretch else 0
     stretch = 8 * values * points * len(mesh.tets)
@@ -73,40 +91,78 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     free = shutil.disk_usage(out).free
     if free < needed:
         room, expected = (f"{size / 2**20:.0f} MiB" for size in (free, needed))
-        raise StorageError("not enough disk space for this run", path=out, found=f"{room} free", expected=expected)
+        raise StorageError(
+            "not enough disk space for this run",
+            path=out,
+            found=f"{room} free",
+            expected=expected,
+        )
 
 
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Read and check the inputs, print a summary of them, and run the simulation."""
     parameters = parameters_from(read_yaml(arguments.params))
-    mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
-    zones = comm.bcast(zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0)
-    maps: Maps = comm.bcast(read_maps(arguments.maps) if comm.rank == 0 and arguments.maps else {}, root=0)
+    mesh = comm.bcast(
+        read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0
+    )
+    zones = comm.bcast(
+        zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0
+    )
+    maps: Maps = comm.bcast(
+        read_maps(arguments.maps) if comm.rank == 0 and arguments.maps else {}, root=0
+    )
     if comm.rank == 0:
         require_maps(parameters, maps, len(mesh.vertices))
         thickness = value_at(parameters.thickness_mm, parameters.start_week, maps)
         report = zone_report(mesh, zones, float(np.median(thickness)))
-        memory = predicted_memory_mib(len(mesh.tets), comm.size, parameters.contact.kind, mesh.order)
-        size = f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks"
-        facts = {"elements": len(mesh.tets), "unknowns": 3 * len(mesh.vertices), "ranks": comm.size}
-        print_line(f"{size}, about {memory:.0f} MiB", "size", **facts, memory_mib=round(memory))
+        memory = predicted_memory_mib(
+            len(mesh.tets), comm.size, parameters.contact.kind, mesh.order
+        )
+        size = (
+            f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size}"
+            " ranks"
+        )
+        facts = {
+            "elements": len(mesh.tets),
+            "unknowns": 3 * len(mesh.vertices),
+            "ranks": comm.size,
+        }
+        print_line(
+            f"{size}, about {memory:.0f} MiB", "size", **facts, memory_mib=round(memory)
+        )
         for name in ZONE_NAMES:
             zone = report["zones"][name]
             print_line(f"  {name}: {zone['facets']} facets, {zone['area_mm2']:.0f} mm2")
-        shares = ", ".join(f"{side} {share:.1%}" for side, share in report["clamped_share"].items())
-        print_line(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
+        shares = ", ".join(
+            f"{side} {share:.1%}" for side, share in report["clamped_share"].items()
+        )
+        print_line(
+            f"  clamped share: {shares}; initial penetration"
+            f" {report['initial_penetration_mm']:g} mm"
+        )
         through = report["elements_through_cortex"]
         print_line(f"  elements through the cortex: {through:.1f}")
         locking = stiffness_warning(parameters.poisson_ratio) if mesh.order == 1 else ""
         if parameters.targets and {"stress", "strain"} & {*parameters.fields}:
-            print_line("growth towards shapes has no stress but in contact: no fields of stress and elastic strain")
+            print_line(
+                "growth towards shapes has no stress but in contact: no fields of"
+                " stress and elastic strain"
+            )
         if locking:
             warn(locking)
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / "zones.json", report)
     comm.barrier()
-    run(comm, mesh, zones, parameters, maps, arguments.out, may_diverge=arguments.may_diverge)
+    run(
+        comm,
+        mesh,
+        zones,
+        parameters,
+        maps,
+        arguments.out,
+        may_diverge=arguments.may_diverge,
+    )
     own = usage()
     # by all ranks
     cpu_s = comm.allreduce(own.cpu_s)
@@ -116,7 +172,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
-    """Run `main` with the folder locked, and end every rank with the exit code of the first error."""
+    """Run `main` with the folder locked, and end every rank with the exit code of the
+    first error."""
     try:
         if comm.rank == 0:
             with locked(arguments.out):

@@ -1,7 +1,9 @@
-"""The state of a run between two steps, and its checkpoint, which resumes on any number of ranks.
+"""The state of a run between two steps, and its checkpoint, which resumes on any number
+of ranks.
 
-Arrays are in the mesh file's order. A checkpoint contains a hash of its mesh, parameters and code, and a checksum of
-its content; one that does not match or is corrupt is not used.
+Arrays are in the mesh file's order. A checkpoint contains a hash of its mesh,
+parameters and code, and a checksum of its content; one that does not match or is
+corrupt is not used.
 """
 
 import hashlib
@@ -34,7 +36,8 @@ class State:
     positions
         (n, 3), in m.
     time_s, step_s
-        Time since the start, and the current time step, which is smaller than the nominal one after a halving.
+        Time since the start, and the current time step, which is smaller than the
+        nominal one after a halving.
     last, before_last, last_s, before_last_s
         Displacements (n, 3) in m and lengths of the last two steps; zero before them.
     successes
@@ -44,8 +47,8 @@ class State:
     correction
         Feedback of the last step to growth by sizes (`StepGrowth.correction`).
     growth, growth_s
-        Deformation (m, 3, 3) of the elements by growth since the last output week, unless growth is by rates, and the
-        time since then.
+        Deformation (m, 3, 3) of the elements by growth since the last output week,
+        unless growth is by rates, and the time since then.
     rows
         The step table so far.
     """
@@ -67,20 +70,24 @@ class State:
     @classmethod
     def at_start(cls, positions: Floats, step_s: float) -> "State":
         """Return the state before the first step, free of stress."""
-        return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
+        return cls(
+            positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions)
+        )
 
     def initial_guesses(self, step_s: float) -> list[Floats]:
         """Return initial guesses (n, 3) in m of the displacement of the next step.
 
-        The first one extrapolates the rates of the last two steps linearly; the second one repeats the last rate, which
-        is better in the step after growth has changed.
+        The first one extrapolates the rates of the last two steps linearly; the second
+        one repeats the last rate, which is better in the step after growth has changed.
         """
         if self.last_s == 0:
             return []
         rate = self.last / self.last_s
         if self.before_last_s == 0:
             return [rate * step_s]
-        slope = (rate - self.before_last / self.before_last_s) / ((self.last_s + self.before_last_s) / 2)
+        slope = (rate - self.before_last / self.before_last_s) / (
+            (self.last_s + self.before_last_s) / 2
+        )
         return [(rate + slope * (self.last_s + step_s) / 2) * step_s, rate * step_s]
 
     def after(
@@ -114,10 +121,12 @@ class State:
 
 
 def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) -> str:
-    """Return a hash of everything that determines the states of a run: mesh, parameters, maps and code.
+    """Return a hash of everything that determines the states of a run: mesh,
+    parameters, maps and code.
 
-    Parameters are left out if they only determine the end of the run, its output, its ranks, or how long the solver
-    tries: so a run that failed can be resumed with an earlier end or more halvings.
+    Parameters are left out if they only determine the end of the run, its output, its
+    ranks, or how long the solver tries: so a run that failed can be resumed with an
+    earlier end or more halvings.
     """
     values = parameters.model_dump(mode="json")
     for name in ("ranks", "end_week", "output_weeks", "output_every_gw"):
@@ -142,7 +151,8 @@ def _checksum(arrays: dict[str, Floats], scalars: str) -> str:
 
 
 def write_checkpoint(path: Path, key: str, state: State) -> None:
-    """Write the state of the run `key`; StorageError where the disk is full or the folder cannot be written."""
+    """Write the state of the run `key`; StorageError where the disk is full or the
+    folder cannot be written."""
     values = dict(vars(state))
     arrays = {name: array for name in ARRAYS if (array := values.pop(name)) is not None}
     scalars = json.dumps({**values, "key": key}, sort_keys=True)
@@ -155,7 +165,8 @@ def write_checkpoint(path: Path, key: str, state: State) -> None:
 
 
 def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
-    """Return the state of the run `key`, or None, and a message for the user, empty without a checkpoint."""
+    """Return the state of the run `key`, or None, and a message for the user, empty
+    without a checkpoint."""
     if not path.exists():
         return None, ""
     try:
@@ -167,9 +178,21 @@ def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
             raise ValueError("its checksum is wrong")
         values = json.loads(scalars)
     except Exception as error:  # HDF5 may raise anything on a corrupt file
-        return None, f"the checkpoint {path} is corrupt ({error}): not used, the run starts again"
+        return (
+            None,
+            (
+                f"the checkpoint {path} is corrupt ({error}): not used, the run starts"
+                " again"
+            ),
+        )
     if values.pop("key") != key:
-        return None, f"the checkpoint {path} belongs to another mesh or other parameters: not used"
+        return (
+            None,
+            (
+                f"the checkpoint {path} belongs to another mesh or other parameters:"
+                " not used"
+            ),
+        )
     values["rows"] = tuple(values["rows"])
     state = State(**arrays, **values)
     return state, f"resuming from the checkpoint after step {len(state.rows)}"

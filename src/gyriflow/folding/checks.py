@@ -11,57 +11,79 @@ from ..settings.terms import BASE, CLAMPED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
 MAX_POISSON_RATIO = 0.46
-"""Poisson's ratio above which linear elements are clearly too stiff. With two of them through the cortex, the
-fastest-growing wave of a slab grows 32 % too slowly at 0.45, 40 % at 0.48, 47 % at 0.49 and 69 % at 0.499, where a wave
-of another length is the fastest."""
+"""Poisson's ratio above which linear elements are clearly too stiff. With two of them
+through the cortex, the fastest-growing wave of a slab grows 32 % too slowly at 0.45, 40
+% at 0.48, 47 % at 0.49 and 69 % at 0.499, where a wave of another length is the
+fastest."""
 
 
 def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
     """Return a report on the zones.
 
-    It contains the facets and area of each zone, the clamped share of each hemisphere, the order of the elements, the
-    initial penetration of the planes in mm (0 by construction), and the number of elements through the cortex.
+    It contains the facets and area of each zone, the clamped share of each hemisphere,
+    the order of the elements, the initial penetration of the planes in mm (0 by
+    construction), and the number of elements through the cortex.
     """
     pial = TriangleMesh(mesh.vertices, zones.facets)
     areas = face_areas(pial)
     centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
     clamped = np.isin(zones.facet_zone, (CLAMPED, BASE))
-    sides = {"left": centroid_x < zones.fissure_x_mm, "right": centroid_x >= zones.fissure_x_mm}
+    sides = {
+        "left": centroid_x < zones.fissure_x_mm,
+        "right": centroid_x >= zones.fissure_x_mm,
+    }
     return {
         "zones": {
-            name: {"facets": int((zones.facet_zone == i).sum()), "area_mm2": float(areas[zones.facet_zone == i].sum())}
+            name: {
+                "facets": int((zones.facet_zone == i).sum()),
+                "area_mm2": float(areas[zones.facet_zone == i].sum()),
+            }
             for i, name in enumerate(ZONE_NAMES)
         },
         "clamped_share": {
-            side: float(areas[clamped & mask].sum() / areas[mask].sum()) if mask.any() else 0.0
+            side: (
+                float(areas[clamped & mask].sum() / areas[mask].sum())
+                if mask.any()
+                else 0.0
+            )
             for side, mask in sides.items()
         },
         "order": mesh.order,
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
-        "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
+        "elements_through_cortex": (
+            thickness_mm / edge_length_within(mesh, zones, thickness_mm)
+        ),
     }
 
 
-def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
-    """Return the mean edge length in mm of the elements whose centroid is in the cortex, or of all if none is."""
+def edge_length_within(
+    mesh: TetrahedralMesh, zones: Zones, thickness_mm: float
+) -> float:
+    """Return the mean edge length in mm of the elements whose centroid is in the
+    cortex, or of all if none is."""
     centroids = sum(mesh.vertices[corners] for corners in mesh.corners.T) / 4
     depth = cKDTree(mesh.vertices[np.unique(zones.cortex_facets)]).query(centroids)[0]
     cortex = mesh.corners[depth <= thickness_mm]
     if not len(cortex):
         cortex = mesh.corners
-    return float(np.mean([mean_length(mesh.vertices, cortex[:, pair]) for pair in EDGES]))
+    return float(
+        np.mean([mean_length(mesh.vertices, cortex[:, pair]) for pair in EDGES])
+    )
 
 
 def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     """Raise an error for a brain that cannot be folded with these zones.
 
-    InputError if nothing grows, no facet has cortex, no facet is clamped, or the fissure lies outside the brain;
-    MeshError if elements are inverted, the surface is not closed, or a part has no clamped facet and would float.
+    InputError if nothing grows, no facet has cortex, no facet is clamped, or the
+    fissure lies outside the brain; MeshError if elements are inverted, the surface is
+    not closed, or a part has no clamped facet and would float.
     """
     if mesh.order == 2:
         folded = np.flatnonzero(lower_bounds(mesh.vertices, mesh.tets) <= 0)
         if len(folded):
-            place = np.round(mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1).tolist()
+            place = np.round(
+                mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1
+            ).tolist()
             count = f"{len(folded)} of {len(mesh.tets)}, one at {place} mm"
             raise MeshError("the mesh has inverted curved elements", found=count)
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
@@ -74,33 +96,53 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
         )
     _, uses = edges(TriangleMesh(mesh.vertices, zones.facets))
     if (uses % 2).any():
-        raise MeshError("the boundary of the mesh is not closed", found=f"{int((uses % 2).sum())} open edges")
+        raise MeshError(
+            "the boundary of the mesh is not closed",
+            found=f"{int((uses % 2).sum())} open edges",
+        )
     if not len(zones.cortex_facets):
-        raise InputError("no facet has cortex under it", remedy="Choose another folding.support.")
+        raise InputError(
+            "no facet has cortex under it", remedy="Choose another folding.support."
+        )
     if not (zones.growth > 0).any():
-        raise InputError("no vertex grows", remedy="Make the no-growth ellipsoid smaller (folding.no_growth).")
+        raise InputError(
+            "no vertex grows",
+            remedy="Make the no-growth ellipsoid smaller (folding.no_growth).",
+        )
     if zones.free:
         return
     # a sliding wall supports a hemisphere too
-    clamped = zones.vertices_of(CLAMPED, BASE, *((MEDIAL_WALL,) if zones.anchors else ()))
+    clamped = zones.vertices_of(
+        CLAMPED, BASE, *((MEDIAL_WALL,) if zones.anchors else ())
+    )
     if not len(clamped):
         raise InputError(
             "no facet is clamped, so the brain would drift",
-            expected="pial facets inside the ellipsoid without growth (folding.no_growth), or another folding.support",
+            expected=(
+                "pial facets inside the ellipsoid without growth (folding.no_growth),"
+                " or another folding.support"
+            ),
         )
     part = connected_parts(mesh)
     parts = part.max() + 1
     floating = np.setdiff1d(np.arange(parts), part[clamped])
     if len(floating):
-        detached = f"{len(floating)} of {parts} parts, the largest with {np.bincount(part)[floating].max()} vertices"
-        raise MeshError("parts of the brain have no clamped facet and would float", found=detached)
+        detached = (
+            f"{len(floating)} of {parts} parts, the largest with"
+            f" {np.bincount(part)[floating].max()} vertices"
+        )
+        raise MeshError(
+            "parts of the brain have no clamped facet and would float", found=detached
+        )
 
 
 def stiffness_warning(poisson_ratio: float) -> str:
-    """Return a warning if linear elements are too stiff for a Poisson's ratio, else an empty text."""
+    """Return a warning if linear elements are too stiff for a Poisson's ratio, else an
+    empty text."""
     if poisson_ratio <= MAX_POISSON_RATIO:
         return ""
     return (
-        f"folding.poisson_ratio is {poisson_ratio:g}: above {MAX_POISSON_RATIO:g} linear elements lock, and folds grow "
-        "too slowly and with wrong wavelengths (docs/verification.md); use quadratic ones (mesh.order: 2)"
+        f"folding.poisson_ratio is {poisson_ratio:g}: above {MAX_POISSON_RATIO:g}"
+        " linear elements lock, and folds grow too slowly and with wrong wavelengths"
+        " (docs/verification.md); use quadratic ones (mesh.order: 2)"
     )

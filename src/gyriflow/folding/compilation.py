@@ -1,4 +1,5 @@
-"""Compilation of forms and C code. Each kind of processor has a cache, where one process compiles at a time."""
+"""Compilation of forms and C code. Each kind of processor has a cache, where one
+process compiles at a time."""
 
 import hashlib
 import os
@@ -18,33 +19,57 @@ from numpy.typing import NDArray
 from ..io.locks import lock_file
 from .compiler import set_compiler
 
-# lets the compiler reorder sums, a fifth faster; all of -ffast-math would break checks for NaN
-REORDERED_SUMS = ["-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno"]
+# lets the compiler reorder sums, a fifth faster; all of -ffast-math would break checks
+# for NaN
+REORDERED_SUMS = [
+    "-fassociative-math",
+    "-fno-signed-zeros",
+    "-fno-trapping-math",
+    "-fno-math-errno",
+]
 NATIVE = "-march=native"
 COMPILER_ARGUMENTS = ["-O3", NATIVE, *REORDERED_SUMS]
 
 
 def processor() -> str:
-    """Return a text that differs between processors for which -march=native gives different code."""
+    """Return a text that differs between processors for which -march=native gives
+    different code."""
     cpuinfo = Path("/proc/cpuinfo")
     lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
-    return next((line for line in lines if line.startswith(("flags", "Features"))), platform.processor())
+    return next(
+        (line for line in lines if line.startswith(("flags", "Features"))),
+        platform.processor(),
+    )
 
 
 @contextmanager
 def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
-    """Yield the options of the form compiler, for all ranks to compile forms within the block.
+    """Yield the options of the form compiler, for all ranks to compile forms within the
+    block.
 
-    Rank 0 locks the cache during the block, since concurrent runs share it, and removes what a killed compilation has
-    left there: later ones would wait for it to finish. Ranks on different processors share code without `NATIVE`.
+    Rank 0 locks the cache during the block, since concurrent runs share it, and removes
+    what a killed compilation has left there: later ones would wait for it to finish.
+    Ranks on different processors share code without `NATIVE`.
     """
     set_compiler()
     processors = sorted(set(comm.allgather(processor())))
     is_mixed = len(processors) > 1
-    kind = platform.machine() if is_mixed else hashlib.sha256(processors[0].encode()).hexdigest()[:8]
+    kind = (
+        platform.machine()
+        if is_mixed
+        else hashlib.sha256(processors[0].encode()).hexdigest()[:8]
+    )
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
-    arguments = [argument for argument in COMPILER_ARGUMENTS if not is_mixed or argument != NATIVE]
+    cache = (
+        base
+        / "gyriflow"
+        / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
+    )
+    arguments = [
+        argument
+        for argument in COMPILER_ARGUMENTS
+        if not is_mixed or argument != NATIVE
+    ]
     options = {"cffi_extra_compile_args": arguments, "cache_dir": str(cache)}
     with ExitStack() as stack:
         if comm.rank == 0:
@@ -57,37 +82,58 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
 
 
 def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, Any]:
-    """Return the cffi interface and the library of C code, compiled unless cached; collective over the ranks."""
-    name = f"gyriflow_{hashlib.sha256(repr((code, COMPILER_ARGUMENTS)).encode()).hexdigest()[:16]}"
+    """Return the cffi interface and the library of C code, compiled unless cached;
+    collective over the ranks."""
+    content = repr((code, COMPILER_ARGUMENTS)).encode()
+    name = f"gyriflow_{hashlib.sha256(content).hexdigest()[:16]}"
     interface = cffi.FFI()
     interface.cdef(declarations)
     with form_compiler(comm) as options:
         library = Path(options["cache_dir"]) / f"{name}.so"
         if comm.rank == 0 and not library.exists():
-            interface.set_source(name, code, extra_compile_args=options["cffi_extra_compile_args"])
+            interface.set_source(
+                name, code, extra_compile_args=options["cffi_extra_compile_args"]
+            )
             with TemporaryDirectory(dir=library.parent) as folder:
                 Path(interface.compile(tmpdir=folder)).rename(library)
     return interface, interface.dlopen(str(library))
 
 
-def pointer(interface: cffi.FFI, array: NDArray, dtype: type, size: int, *, is_written: bool = False) -> Any:
-    """Return the pointer to an array for C code, which reads it as at least `size` numbers of a type.
+def pointer(
+    interface: cffi.FFI,
+    array: NDArray,
+    dtype: type,
+    size: int,
+    *,
+    is_written: bool = False,
+) -> Any:
+    """Return the pointer to an array for C code, which reads it as at least `size`
+    numbers of a type.
 
-    TypeError for another type, ValueError for fewer numbers, an order that is not C's, or an array that `is_written`
-    although it is read-only: C code would read something else, or beyond the end, without a word.
+    TypeError for another type, ValueError for fewer numbers, an order that is not C's,
+    or an array that `is_written` although it is read-only: C code would read something
+    else, or beyond the end, without a word.
     """
     if array.dtype != dtype:
-        raise TypeError(f"C code needs an array of {np.dtype(dtype)}, and this one has {array.dtype}")
+        raise TypeError(
+            f"C code needs an array of {np.dtype(dtype)}, and this one has"
+            f" {array.dtype}"
+        )
     if array.size < size:
-        raise ValueError(f"C code needs {size} numbers, and the array has the shape {array.shape}")
+        raise ValueError(
+            f"C code needs {size} numbers, and the array has the shape {array.shape}"
+        )
     return interface.from_buffer(array, require_writable=is_written)
 
 
 def remove_incomplete_entries(cache: Path) -> None:
-    """Remove the files of each form that has no source, no library, or no mark that both are complete."""
+    """Remove the files of each form that has no source, no library, or no mark that
+    both are complete."""
     names = {path.name.split(".")[0] for path in cache.glob("libffcx_*")}
     for name in names:
-        complete = (cache / f"{name}.c").exists() and (cache / f"{name}.c.cached").exists()
+        complete = (cache / f"{name}.c").exists() and (
+            cache / f"{name}.c.cached"
+        ).exists()
         if not (complete and any(cache.glob(f"{name}.*.so"))):
             for path in cache.glob(f"{name}.*"):
                 path.unlink(missing_ok=True)

@@ -8,7 +8,8 @@ import sysconfig
 
 
 def has_compiler() -> bool:
-    """Return whether there is a C compiler: $CC, the one that Python was built with, or ziglang from PyPI."""
+    """Return whether there is a C compiler: $CC, the one that Python was built with, or
+    ziglang from PyPI."""
     return _has_system_compiler() or _has_ziglang()
 
 

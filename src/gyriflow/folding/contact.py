@@ -1,10 +1,12 @@
-"""Contact of the pial surface with itself: Incremental Potential Contact (Li et al. 2020), with the IPC Toolkit.
+"""Contact of the pial surface with itself: Incremental Potential Contact (Li et al.
+2020), with the IPC Toolkit.
 
-Pairs of vertices, edges or faces that are nearer than a distance d̂ repel each other with a barrier potential, which
-tends to infinity as their distance tends to zero. No displacement may move one through the other. Every rank has the
-whole surface (`contact_surface`) and searches for the pairs of its own part (`contact_search`). Energies, forces and
-stiffness are summed over the ranks, gaps and collision-free steps are minima over them, so that all ranks take the same
-decisions.
+Pairs of vertices, edges or faces that are nearer than a distance d̂ repel each other
+with a barrier potential, which tends to infinity as their distance tends to zero. No
+displacement may move one through the other. Every rank has the whole surface
+(`contact_surface`) and searches for the pairs of its own part (`contact_search`).
+Energies, forces and stiffness are summed over the ranks, gaps and collision-free steps
+are minima over them, so that all ranks take the same decisions.
 """
 
 import ipctk
@@ -22,51 +24,61 @@ from .contact_surface import ContactSurface
 from .domain import Domain, bisect_points
 
 DISTANCE_PER_MEAN_EDGE = 0.1
-"""Largest contact distance d̂ as a multiple of the mean edge length of the contact surface: well below what the mesh
-resolves. It grows with the edges of the surface; a fixed distance would only make contact harder to solve."""
+"""Largest contact distance d̂ as a multiple of the mean edge length of the contact
+surface: well below what the mesh resolves. It grows with the edges of the surface; a
+fixed distance would only make contact harder to solve."""
 DISTANCE_PER_SHORT_EDGE = 0.2
-"""Largest contact distance as a multiple of the length of a short edge. With a larger one a compressed surface would
-repel itself and resist compression (docs/verification.md)."""
+"""Largest contact distance as a multiple of the length of a short edge. With a larger
+one a compressed surface would repel itself and resist compression
+(docs/verification.md)."""
 SHORT_EDGES = 0.05
 """The share of edges that are shorter than a short edge."""
 STIFFNESS_PER_MODULUS = 0.1
-"""The barrier's stiffness κ as a multiple of the cortex' shear modulus. The pressure between folds, some tenths of the
-modulus, then keeps them at about half of the contact distance; a stiffer barrier takes more iterations and changes
-nothing else."""
+"""The barrier's stiffness κ as a multiple of the cortex' shear modulus. The pressure
+between folds, some tenths of the modulus, then keeps them at about half of the contact
+distance; a stiffer barrier takes more iterations and changes nothing else."""
 STIFFEN_BELOW = 0.1
-"""Fraction of the contact distance. Where the smallest gap at a step's start is smaller, the barrier is stiffer, by the
-square root of the ratio, if it may stiffen: with stress memory folds press on each other ever harder, and a barrier
-that is too soft lets them come so near that Newton's method stagnates."""
+"""Fraction of the contact distance. Where the smallest gap at a step's start is
+smaller, the barrier is stiffer, by the square root of the ratio, if it may stiffen:
+with stress memory folds press on each other ever harder, and a barrier that is too soft
+lets them come so near that Newton's method stagnates."""
 MAX_STIFFENING = 32.0
 """Largest stiffness of the barrier, as a multiple of the initial one."""
 MAX_GAP_FRACTION = 0.999
-"""Largest contact distance as a fraction of the small gap at the start of a run (`small_gap_mm`)."""
+"""Largest contact distance as a fraction of the small gap at the start of a run
+(`small_gap_mm`)."""
 FEW_VERTICES, FEW_SHARE, MAX_FEW_SHARE = 12, 0.001, 0.02
-"""Number of vertices, at least those around one, that may be nearer than the rest and do not set the distance: this
-number or this share of all, and at most the last share."""
+"""Number of vertices, at least those around one, that may be nearer than the rest and
+do not set the distance: this number or this share of all, and at most the last
+share."""
 FEW_BELOW = 0.25
 """Factor by which these must be nearer than the rest."""
 NEIGHBOUR_EDGES = {1: 3, 2: 6}
-"""Vertices that so few edges connect are neighbours, by the order of the elements: a node of a quadratic element is two
-edges from the next. Neighbours on small faces are nearer to each other than the contact distance, but no gap is between
-them."""
+"""Vertices that so few edges connect are neighbours, by the order of the elements: a
+node of a quadratic element is two edges from the next. Neighbours on small faces are
+nearer to each other than the contact distance, but no gap is between them."""
 MAX_DISPLACEMENT_MM = 8.0
-"""Longest displacement of a vertex in one iteration; a solve with a longer one diverges."""
+"""Longest displacement of a vertex in one iteration; a solve with a longer one
+diverges."""
 BARRIER = ipctk.TwoStageBarrier()
 N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
 
 
 class SelfContact:
-    """The barrier between all parts of the pial surface, a contribution to the energy of a step.
+    """The barrier between all parts of the pial surface, a contribution to the energy
+    of a step.
 
-    Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the start of the step.
-    `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is the barrier's initial stiffness. The contact
-    distance is the given `distance_mm`, or else by the edge lengths at each step's start (`contact_distance_mm`), but
-    below the small gap at the start of the run, neighbours aside: a body that does not grow must not move, except where
-    neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory.
-    MeshError where the surface crosses itself at the start.
+    Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the
+    start of the step. `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is
+    the barrier's initial stiffness. The contact distance is the given `distance_mm`, or
+    else by the edge lengths at each step's start (`contact_distance_mm`), but below the
+    small gap at the start of the run, neighbours aside: a body that does not grow must
+    not move, except where neighbours on thin triangles or a few vertices are nearer to
+    each other. `stiffens` is for runs with stress memory. MeshError where the surface
+    crosses itself at the start.
 
-    Attributes: contact distance d̂, `distance_mm`, and stiffness κ of the barrier, `stiffness_pa`, in the current step.
+    Attributes: contact distance d̂, `distance_mm`, and stiffness κ of the barrier,
+    `stiffness_pa`, in the current step.
     """
 
     def __init__(
@@ -81,17 +93,27 @@ class SelfContact:
         ipctk.set_num_threads(1)  # more threads would compete with other ranks
         self.domain, self.surface = domain, ContactSurface(domain, facets)
         self._stiffens = stiffens
-        self._initial_pa, self._given_mm, self._max_mm = stiffness_pa, distance_mm, np.inf
+        self._initial_pa, self._given_mm, self._max_mm = (
+            stiffness_pa,
+            distance_mm,
+            np.inf,
+        )
         start = self.surface.reference_mm()
         self._edges = edges(TriangleMesh(start, self.surface.faces))[0]
         # from rank 0, since other processors may round differently
-        self._owned = domain.comm.bcast(bisect_points(start, domain.comm.size), root=0) == domain.comm.rank
+        self._owned = (
+            domain.comm.bcast(bisect_points(start, domain.comm.size), root=0)
+            == domain.comm.rank
+        )
         self._search = ContactSearch(self.surface.faces, self._owned, start, 0.0)
         self.begin_step()
         part, mesh = self._search.part_at(start)
-        if domain.comm.allreduce(ipctk.has_intersections(mesh, part.restrict(start)), op=MPI.LOR):
+        if domain.comm.allreduce(
+            ipctk.has_intersections(mesh, part.restrict(start)), op=MPI.LOR
+        ):
             raise MeshError(
-                "the pial surface of the mesh crosses itself, which contact cannot undo",
+                "the pial surface of the mesh crosses itself, which contact cannot"
+                " undo",
                 remedy="Repair the surface, or mesh with a smaller mesh.envelope_mm.",
             )
         if distance_mm is None:
@@ -103,36 +125,48 @@ class SelfContact:
             self.begin_step()
 
     def _lower_gaps(self, gaps: Floats, near: NearPairs) -> None:
-        """Lower the gap (n,) of each vertex to the smallest of a rank's pairs with it that are not neighbours."""
+        """Lower the gap (n,) of each vertex to the smallest of a rank's pairs with it
+        that are not neighbours."""
         corners = near.vertices_of_pairs()
         rows = near.part.vertices[np.unique(np.concatenate([[], *corners])).astype(int)]
         count = len(self._rest)
         ends = np.concatenate([self._edges, self._edges[:, ::-1]]).T
-        links = sparse.coo_array((np.ones(ends.shape[1]), ends), shape=(count, count)).tocsr() + sparse.eye_array(count)
+        links = sparse.coo_array(
+            (np.ones(ends.shape[1]), ends), shape=(count, count)
+        ).tocsr() + sparse.eye_array(count)
         around = links[rows]
         for _ in range(NEIGHBOUR_EDGES[self.domain.order] - 1):
             around = around @ links
         for i, vertices in enumerate(corners):
             numbers = near.part.vertices[vertices]
-            if (around[np.searchsorted(rows, numbers)][:, numbers].toarray() == 0).any():
+            if (
+                around[np.searchsorted(rows, numbers)][:, numbers].toarray() == 0
+            ).any():
                 gaps[numbers] = np.minimum(gaps[numbers], near.distance_mm(i))
 
     def begin_step(self) -> None:
-        """Start from the current positions; set the barrier by edge lengths and the smallest gap there."""
+        """Start from the current positions; set the barrier by edge lengths and the
+        smallest gap there."""
         self._rest = self.surface.reference_mm()
         lengths = edge_lengths(self._rest, self._edges)
         # from rank 0, as above
         by_edges = self.domain.comm.bcast(contact_distance_mm(lengths), root=0)
         distance_mm = self._given_mm or min(by_edges, self._max_mm)
-        self._search = ContactSearch(self.surface.faces, self._owned, self._rest, distance_mm, self._search)
+        self._search = ContactSearch(
+            self.surface.faces, self._owned, self._rest, distance_mm, self._search
+        )
         self._near: NearPairs | None = None
         factor = 1.0
         if self._stiffens:
             # the first residual of the step needs them again
             self._near = self._search.near(self._rest)
-            factor = stiffening(self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN) / distance_mm)
+            factor = stiffening(
+                self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN) / distance_mm
+            )
         self.distance_mm, self.stiffness_pa = distance_mm, factor * self._initial_pa
-        self._potential = ipctk.BarrierPotential(BARRIER, distance_mm, self.stiffness_pa, use_physical_barrier=True)
+        self._potential = ipctk.BarrierPotential(
+            BARRIER, distance_mm, self.stiffness_pa, use_physical_barrier=True
+        )
 
     def near_pairs(self, u: Floats) -> NearPairs:
         """Return this rank's pairs. Those of the last displacement are cached."""
@@ -142,7 +176,8 @@ class SelfContact:
         return self._near
 
     def join_touching(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return new part numbers (n,) of the mesh's vertices: parts in contact at the start of the step become one."""
+        """Return new part numbers (n,) of the mesh's vertices: parts in contact at the
+        start of the step become one."""
         if part.max() == 0:
             return part
         near = self.near_pairs(np.zeros((len(self.domain.vertex_of_node), 3)))
@@ -150,7 +185,9 @@ class SelfContact:
         part_of_vertex = part[self.surface.nodes][nearest_node][near.part.vertices]
         sides = [part_of_vertex[pair] for pair in near.vertices_of_pairs()]
         own_links = {(int(pair.min()), int(pair.max())) for pair in sides}
-        links = np.array(sorted(set().union(*self.domain.comm.allgather(own_links)))).reshape(-1, 2)
+        links = np.array(
+            sorted(set().union(*self.domain.comm.allgather(own_links)))
+        ).reshape(-1, 2)
         return connected(links, int(part.max()) + 1)[part].astype(np.int64)
 
     def energy(self, u: Floats) -> float:
@@ -176,26 +213,40 @@ class SelfContact:
         self.surface.add_to(out, self.forces(u))
 
     def stiffness(self, u: Floats, *, convex: bool = False) -> PETSc.Mat | None:
-        """Return the second derivative in N/m, None without any pair; `convex` makes each pair's part semidefinite."""
+        """Return the second derivative in N/m, None without any pair; `convex` makes
+        each pair's part semidefinite."""
         near = self.near_pairs(u)
         if not self.domain.comm.allreduce(len(near.pairs)):
             return None
         own = None
         if len(near.pairs):
-            projection = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
-            own = self._potential.hessian(near.pairs, near.mesh, near.part_positions, projection) * N_PER_M_PER_PA_MM
+            projection = (
+                ipctk.PSDProjectionMethod.CLAMP
+                if convex
+                else ipctk.PSDProjectionMethod.NONE
+            )
+            own = (
+                self._potential.hessian(
+                    near.pairs, near.mesh, near.part_positions, projection
+                )
+                * N_PER_M_PER_PA_MM
+            )
         return self.surface.matrix_sum(near.part, own)
 
     def max_step(self, u: Floats, direction: Floats) -> float:
-        """Return the largest fraction, up to 1, of a direction (k, 3) in m that can be added to u without collision."""
+        """Return the largest fraction, up to 1, of a direction (k, 3) in m that can be
+        added to u without collision."""
         displacement = self.surface.displacement_mm(direction)
         # the candidates near a longer displacement would fill the memory
-        part = MAX_DISPLACEMENT_MM / max(float(np.linalg.norm(displacement, axis=1).max()), MAX_DISPLACEMENT_MM)
+        part = MAX_DISPLACEMENT_MM / max(
+            float(np.linalg.norm(displacement, axis=1).max()), MAX_DISPLACEMENT_MM
+        )
         step = self._search.collision_free_step(self.near_pairs(u), part * displacement)
         return part * self.domain.comm.allreduce(step, op=MPI.MIN)
 
     def smallest_distance_mm(self, u: Floats) -> float:
-        """Return the smallest distance between the two sides of a pair, infinite without pairs."""
+        """Return the smallest distance between the two sides of a pair, infinite
+        without pairs."""
         return self.domain.comm.allreduce(self.near_pairs(u).gap_mm, op=MPI.MIN)
 
     def pair_count(self, u: Floats) -> int:
@@ -203,31 +254,38 @@ class SelfContact:
         return self.domain.comm.allreduce(len(self.near_pairs(u).pairs))
 
     def pressure(self, u: Floats) -> Floats:
-        """Return the (n,) contact pressure in Pa at all vertices of the mesh, force per area, 0 off the surface."""
+        """Return the (n,) contact pressure in Pa at all vertices of the mesh, force per
+        area, 0 off the surface."""
         near = self.near_pairs(u)
         forces, areas = np.zeros_like(self._rest), np.zeros(len(self._rest))
         forces[near.part.vertices] = self._forces_of(near)
         # only the owner of a vertex is sure to have all faces around it
         owned = near.part.owned
-        areas[near.part.vertices[owned]] = np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2
-        pressure = np.linalg.norm(self.domain.sum_over_ranks(forces), axis=1) / self.domain.sum_over_ranks(areas)
+        areas[near.part.vertices[owned]] = (
+            np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2
+        )
+        pressure = np.linalg.norm(
+            self.domain.sum_over_ranks(forces), axis=1
+        ) / self.domain.sum_over_ranks(areas)
         values = np.zeros(len(self.domain.positions))
         values[self.surface.nodes] = pressure[: len(self.surface.nodes)]
         return values
 
 
 def contact_distance_mm(lengths: Floats) -> float:
-    """Return the contact distance d̂ in mm for a surface whose edges have (e,) lengths in mm."""
+    """Return the contact distance d̂ in mm for a surface whose edges have (e,) lengths
+    in mm."""
     by_mean = DISTANCE_PER_MEAN_EDGE * float(lengths.mean())
     by_short = DISTANCE_PER_SHORT_EDGE * float(np.quantile(lengths, SHORT_EDGES))
     return min(by_mean, by_short)
 
 
 def small_gap_mm(gaps: Floats) -> float:
-    """Return the gap that limits the contact distance, from those (n,) of all vertices, infinite where none is near.
+    """Return the gap that limits the contact distance, from those (n,) of all vertices,
+    infinite where none is near.
 
-    It is the smallest, unless few vertices are nearer than a quarter of the gap of the next one: then it is that
-    quarter. These few are pressed apart in the first step.
+    It is the smallest, unless few vertices are nearer than a quarter of the gap of the
+    next one: then it is that quarter. These few are pressed apart in the first step.
     """
     few = int(min(max(FEW_VERTICES, FEW_SHARE * len(gaps)), MAX_FEW_SHARE * len(gaps)))
     return max(float(gaps.min()), FEW_BELOW * float(np.partition(gaps, few)[few]))
@@ -236,6 +294,11 @@ def small_gap_mm(gaps: Floats) -> float:
 def stiffening(gap: float) -> float:
     """Return the stiffness of a step's barrier, as a multiple of the initial one.
 
-    `gap` is the smallest gap at the step's start as a fraction of the contact distance, infinite where nothing is near.
+    `gap` is the smallest gap at the step's start as a fraction of the contact distance,
+    infinite where nothing is near.
     """
-    return 1.0 if gap >= STIFFEN_BELOW else min((STIFFEN_BELOW / max(gap, 1e-9)) ** 0.5, MAX_STIFFENING)
+    return (
+        1.0
+        if gap >= STIFFEN_BELOW
+        else min((STIFFEN_BELOW / max(gap, 1e-9)) ** 0.5, MAX_STIFFENING)
+    )

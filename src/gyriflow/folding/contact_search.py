@@ -1,4 +1,5 @@
-"""Search for near pairs of vertices, edges and faces, and collision detection, with the IPC Toolkit."""
+"""Search for near pairs of vertices, edges and faces, and collision detection, with the
+IPC Toolkit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,19 +13,23 @@ from ..geometry.triangles import Floats
 from .contact_surface import SurfacePart, part_of_surface
 
 CANDIDATE_MARGIN_MM = 0.05
-"""Displacement of the surface after which candidates for pairs are searched for again."""
+"""Displacement of the surface after which candidates for pairs are searched for
+again."""
 PART_MARGIN_MM = 1.0
-"""Displacement of the surface after which each rank determines its part of the surface again."""
+"""Displacement of the surface after which each rank determines its part of the surface
+again."""
 MAX_CLOSING = 0.9
 """Largest fraction of a gap by which a step may close it."""
 CCD = ipctk.AdditiveCCD(conservative_rescaling=MAX_CLOSING)
-"""Continuous collision detection (Li et al. 2021) that leaves a tenth of each pair's distance. Interval bisection, the
-alternative, takes minutes if flat surfaces meet face to face."""
+"""Continuous collision detection (Li et al. 2021) that leaves a tenth of each pair's
+distance. Interval bisection, the alternative, takes minutes if flat surfaces meet face
+to face."""
 
 PARALLEL_TOL = 1e-6
 """Sine of the angle below which two edges count as parallel."""
 MIN_STEP = 1e-9
-"""Smaller collision-free steps are due to parallel edges whose distance is computed as zero."""
+"""Smaller collision-free steps are due to parallel edges whose distance is computed as
+zero."""
 
 
 class EdgePair(Protocol):
@@ -36,26 +41,33 @@ class EdgePair(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SearchRange:
-    """The range of a search: positions (s, 3) in mm between which the surface moves, and half the distance searched."""
+    """The range of a search: positions (s, 3) in mm between which the surface moves,
+    and half the distance searched."""
 
     first: Floats
     last: Floats
     reach: float
 
     def covers(self, distance_mm: float, *positions: Floats) -> bool:
-        """Return whether the search has found all pairs within a distance at other positions."""
+        """Return whether the search has found all pairs within a distance at other
+        positions."""
         margin = self.reach - distance_mm / 2
         if np.isinf(margin):
             return True
-        low, high = np.minimum(self.first, self.last) - margin, np.maximum(self.first, self.last) + margin
+        low, high = (
+            np.minimum(self.first, self.last) - margin,
+            np.maximum(self.first, self.last) + margin,
+        )
         return all(bool((at >= low).all() and (at <= high).all()) for at in positions)
 
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
-    """A rank's own pairs within the contact distance, for (s, 3) positions in mm of the whole surface.
+    """A rank's own pairs within the contact distance, for (s, 3) positions in mm of the
+    whole surface.
 
-    `mesh` is the rank's part for the IPC Toolkit, with areas as at the step's start; `part_positions` (p, 3) in mm.
+    `mesh` is the rank's part for the IPC Toolkit, with areas as at the step's start;
+    `part_positions` (p, 3) in mm.
     """
 
     positions: Floats
@@ -69,26 +81,36 @@ class NearPairs:
         """The smallest distance between the pairs, infinite without any."""
         if not len(self.pairs):
             return np.inf
-        return float(np.sqrt(self.pairs.compute_minimum_distance(self.mesh, self.part_positions)))
+        return float(
+            np.sqrt(self.pairs.compute_minimum_distance(self.mesh, self.part_positions))
+        )
 
     def distance_mm(self, i: int) -> float:
         """Return the distance between the two sides of pair `i`."""
-        # ipctk's pairs do not keep their list alive: a pair with a name may outlive it, and then reads freed memory
-        places = self.pairs[i].dof(self.part_positions, self.mesh.edges, self.mesh.faces)
+        # ipctk's pairs do not keep their list alive: a pair with a name may outlive it,
+        # and then reads freed memory
+        places = self.pairs[i].dof(
+            self.part_positions, self.mesh.edges, self.mesh.faces
+        )
         return float(np.sqrt(self.pairs[i].compute_distance(places)))
 
     def vertices_of_pairs(self) -> list[list[int]]:
         """Return the vertices of each pair, as numbers of the part's vertices."""
-        corners = [self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces) for i in range(len(self.pairs))]
+        corners = [
+            self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces)
+            for i in range(len(self.pairs))
+        ]
         # negative numbers stand for missing vertices
         return [[vertex for vertex in pair if vertex >= 0] for pair in corners]
 
 
 class ContactSearch:
-    """A rank's search for pairs within a distance, in one step that begins with the surface at `rest_mm` (s, 3).
+    """A rank's search for pairs within a distance, in one step that begins with the
+    surface at `rest_mm` (s, 3).
 
-    The rank's part of the surface and the candidates for pairs are cached, from the `previous` step on, as long as they
-    cover the positions: this saves time and changes no result. `owned` (s,) is the mask of the rank's vertices.
+    The rank's part of the surface and the candidates for pairs are cached, from the
+    `previous` step on, as long as they cover the positions: this saves time and changes
+    no result. `owned` (s,) is the mask of the rank's vertices.
     """
 
     def __init__(
@@ -99,9 +121,18 @@ class ContactSearch:
         distance_mm: float,
         previous: "ContactSearch | None" = None,
     ) -> None:
-        self._faces, self._owned, self._rest, self._distance = faces, owned, rest_mm, distance_mm
-        self._part: tuple[SurfacePart, SearchRange] | None = previous._part if previous else None
-        self._candidates: tuple[ipctk.Candidates, SearchRange] | None = previous._candidates if previous else None
+        self._faces, self._owned, self._rest, self._distance = (
+            faces,
+            owned,
+            rest_mm,
+            distance_mm,
+        )
+        self._part: tuple[SurfacePart, SearchRange] | None = (
+            previous._part if previous else None
+        )
+        self._candidates: tuple[ipctk.Candidates, SearchRange] | None = (
+            previous._candidates if previous else None
+        )
         self._mesh: ipctk.CollisionMesh | None = None
         self._broad_phase = ipctk.LBVH()
 
@@ -119,7 +150,8 @@ class ContactSearch:
         return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
 
     def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
-        """Return the largest fraction, at most 1, of a displacement (s, 3) in mm from `start` without a collision."""
+        """Return the largest fraction, at most 1, of a displacement (s, 3) in mm from
+        `start` without a collision."""
         # everything that is not a pair is farther away than the contact distance
         gap = min(self._distance, start.gap_mm)
         if 2 * float(np.linalg.norm(displacement, axis=1).max()) <= MAX_CLOSING * gap:
@@ -128,7 +160,8 @@ class ContactSearch:
         part, mesh = self.part_at(first, last)
         candidates = self._candidates_at(first, last)
         if candidates is None and np.abs(displacement).max() <= PART_MARGIN_MM:
-            # the initial guess of a step is close to its solution, so the whole step needs no other search
+            # the initial guess of a step is close to its solution, so the whole step
+            # needs no other search
             part, mesh, candidates = self._search(first, last)
         ends = part.restrict(first), part.restrict(last)
         if candidates is None:
@@ -136,39 +169,61 @@ class ContactSearch:
                 mesh, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=CCD
             )
         else:
-            step = candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD)
+            step = candidates.compute_collision_free_stepsize(
+                mesh, *ends, narrow_phase_ccd=CCD
+            )
         if step < MIN_STEP:
             if candidates is None:
                 part, mesh, candidates = self._search(first, last)
             candidates = drop_distant_parallel_edges(candidates, part.edges, *ends)
-            step = candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD)
+            step = candidates.compute_collision_free_stepsize(
+                mesh, *ends, narrow_phase_ccd=CCD
+            )
         return float(step)
 
     def part_at(self, *positions: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh]:
-        """Return a part of the surface with all pairs of the rank, at each of the given (s, 3) positions in mm."""
+        """Return a part of the surface with all pairs of the rank, at each of the given
+        (s, 3) positions in mm."""
         if self._part is None or not self._part[1].covers(self._distance, *positions):
-            displacement = max(float(np.abs(at - positions[0]).max()) for at in positions)
+            displacement = max(
+                float(np.abs(at - positions[0]).max()) for at in positions
+            )
             # a single rank has the whole surface
             margin = np.inf if self._owned.all() else max(PART_MARGIN_MM, displacement)
-            covered = SearchRange(positions[0], positions[0], self._distance / 2 + margin)
-            self._part = part_of_surface(positions[0], self._faces, self._owned, 2 * covered.reach), covered
+            covered = SearchRange(
+                positions[0], positions[0], self._distance / 2 + margin
+            )
+            self._part = (
+                part_of_surface(
+                    positions[0], self._faces, self._owned, 2 * covered.reach
+                ),
+                covered,
+            )
             # candidates refer to vertex numbers of the old part
             self._mesh, self._candidates = None, None
         part = self._part[0]
         if self._mesh is None:
-            self._mesh = ipctk.CollisionMesh(part.restrict(self._rest), part.edges, part.faces)
+            self._mesh = ipctk.CollisionMesh(
+                part.restrict(self._rest), part.edges, part.faces
+            )
         return part, self._mesh
 
     def _candidates_at(self, *positions: Floats) -> ipctk.Candidates | None:
-        if self._candidates is None or not self._candidates[1].covers(self._distance, *positions):
+        if self._candidates is None or not self._candidates[1].covers(
+            self._distance, *positions
+        ):
             return None
         return self._candidates[0]
 
-    def _search(self, first: Floats, last: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh, ipctk.Candidates]:
+    def _search(
+        self, first: Floats, last: Floats
+    ) -> tuple[SurfacePart, ipctk.CollisionMesh, ipctk.Candidates]:
         part, mesh = self.part_at(first, last)
         reach = self._distance / 2 + CANDIDATE_MARGIN_MM
         candidates = ipctk.Candidates()
-        candidates.build(mesh, part.restrict(first), part.restrict(last), reach, self._broad_phase)
+        candidates.build(
+            mesh, part.restrict(first), part.restrict(last), reach, self._broad_phase
+        )
         self._candidates = candidates, SearchRange(first, last, reach)
         return part, mesh, candidates
 
@@ -176,32 +231,43 @@ class ContactSearch:
 def drop_parallel_edges(
     pairs: ipctk.NormalCollisions, edges: NDArray[np.integer], positions: Floats
 ) -> ipctk.NormalCollisions:
-    """Return the pairs without those of two edges (e, 2) that are parallel, at positions (p, 3) of their vertices.
+    """Return the pairs without those of two edges (e, 2) that are parallel, at
+    positions (p, 3) of their vertices.
 
-    Parallel edges do not repel each other (Li et al. 2020, section 5.1): their ends do, which are pairs of their own.
-    The distance between two edges that are parallel but for round-off may be computed as zero, however far apart they
-    are on one line, and then their barrier would be infinite.
+    Parallel edges do not repel each other (Li et al. 2020, section 5.1): their ends do,
+    which are pairs of their own. The distance between two edges that are parallel but
+    for round-off may be computed as zero, however far apart they are on one line, and
+    then their barrier would be infinite.
     """
     are_parallel = parallel_edges(pairs.ee_collisions, edges, positions)
     if not are_parallel.any():
         return pairs
-    # a new object, since items of the old lists read the memory of their list when they are released
+    # a new object, since items of the old lists read the memory of their list when they
+    # are released
     result = ipctk.NormalCollisions()
     result.use_area_weighting = pairs.use_area_weighting
     result.vv_collisions = pairs.vv_collisions
     result.ev_collisions = pairs.ev_collisions
-    result.ee_collisions = [pair for pair, drop in zip(pairs.ee_collisions, are_parallel, strict=True) if not drop]
+    result.ee_collisions = [
+        pair
+        for pair, drop in zip(pairs.ee_collisions, are_parallel, strict=True)
+        if not drop
+    ]
     result.fv_collisions = pairs.fv_collisions
     return result
 
 
 def drop_distant_parallel_edges(
-    candidates: ipctk.Candidates, edges: NDArray[np.integer], first: Floats, last: Floats
+    candidates: ipctk.Candidates,
+    edges: NDArray[np.integer],
+    first: Floats,
+    last: Floats,
 ) -> ipctk.Candidates:
-    """Return the candidates without those of parallel edges that cannot meet between positions `first` and `last`.
+    """Return the candidates without those of parallel edges that cannot meet between
+    positions `first` and `last`.
 
-    Positions are (p, 3). Parallel edges are as far apart as their ends, and cannot meet if their vertices move less
-    than half of that, apart from their mean displacement.
+    Positions are (p, 3). Parallel edges are as far apart as their ends, and cannot meet
+    if their vertices move less than half of that, apart from their mean displacement.
     """
     pairs = candidates.ee_candidates
     are_parallel = parallel_edges(pairs, edges, first)
@@ -218,10 +284,16 @@ def drop_distant_parallel_edges(
     return result
 
 
-def parallel_edges(pairs: Sequence[EdgePair], edges: NDArray[np.integer], positions: Floats) -> NDArray[np.bool_]:
-    """Return for each pair whether its two edges (e, 2) are parallel at (p, 3) positions of their vertices."""
-    numbers = np.array([(pair.edge0_id, pair.edge1_id) for pair in pairs], dtype=np.int64).reshape(-1, 2)
-    # of the edges in pairs only, which are few: this is called at each evaluation of forces
+def parallel_edges(
+    pairs: Sequence[EdgePair], edges: NDArray[np.integer], positions: Floats
+) -> NDArray[np.bool_]:
+    """Return for each pair whether its two edges (e, 2) are parallel at (p, 3)
+    positions of their vertices."""
+    numbers = np.array(
+        [(pair.edge0_id, pair.edge1_id) for pair in pairs], dtype=np.int64
+    ).reshape(-1, 2)
+    # of the edges in pairs only, which are few: this is called at each evaluation of
+    # forces
     ends = positions[edges[numbers]]
     directions = ends[:, :, 1] - ends[:, :, 0]
     first = directions[:, 0]
@@ -232,7 +304,8 @@ def parallel_edges(pairs: Sequence[EdgePair], edges: NDArray[np.integer], positi
 
 
 def can_meet(first: Floats, last: Floats) -> bool:
-    """Return whether two parallel edges may meet, from (4, 3) places of their ends before and after a motion."""
+    """Return whether two parallel edges may meet, from (4, 3) places of their ends
+    before and after a motion."""
     distances = [
         ipctk.point_edge_distance(first[0], first[2], first[3]),
         ipctk.point_edge_distance(first[1], first[2], first[3]),

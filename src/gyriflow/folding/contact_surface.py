@@ -1,8 +1,10 @@
-"""The contact surface: its positions on every rank, and sums over ranks, which each compute on a part of it.
+"""The contact surface: its positions on every rank, and sums over ranks, which each
+compute on a part of it.
 
-Each rank owns a compact set of vertices and has a part of the surface: all faces that can come near its own. A pair of
-vertices, edges or faces near each other belongs to the owner of one of its vertices. That rank has all faces at the
-vertices of the pair, so that area weights and contributions of several faces are those of the whole surface.
+Each rank owns a compact set of vertices and has a part of the surface: all faces that
+can come near its own. A pair of vertices, edges or faces near each other belongs to the
+owner of one of its vertices. That rank has all faces at the vertices of the pair, so
+that area weights and contributions of several faces are those of the whole surface.
 """
 
 from dataclasses import dataclass
@@ -23,8 +25,9 @@ from .domain import Domain, gather
 class SurfacePart:
     """A rank's part of a surface.
 
-    The (p,) numbers of its vertices in the whole surface, ascending; (f, 3) faces and (e, 2) edges by numbers of these,
-    each edge once; and which of its vertices the rank owns.
+    The (p,) numbers of its vertices in the whole surface, ascending; (f, 3) faces and
+    (e, 2) edges by numbers of these, each edge once; and which of its vertices the rank
+    owns.
     """
 
     vertices: NDArray[np.int64]
@@ -33,13 +36,16 @@ class SurfacePart:
     owned: NDArray[np.bool_]
 
     def restrict(self, values: Floats) -> Floats:
-        """Return the (p, 3) values at the part's vertices from those of the whole surface, in Fortran order."""
+        """Return the (p, 3) values at the part's vertices from those of the whole
+        surface, in Fortran order."""
         return np.asfortranarray(values[self.vertices])
 
     def owned_pairs(self, pairs: ipctk.NormalCollisions) -> ipctk.NormalCollisions:
-        """Return the pairs that belong to this rank; each pair of the surface belongs to one rank.
+        """Return the pairs that belong to this rank; each pair of the surface belongs
+        to one rank.
 
-        The vertex that decides is the lower of two, the one opposite an edge or a face, or the lowest of two edges.
+        The vertex that decides is the lower of two, the one opposite an edge or a face,
+        or the lowest of two edges.
         """
         if self.owned.all():
             return pairs
@@ -47,17 +53,30 @@ class SurfacePart:
         lowest: list[int] = list(self.edges[:, 0])
         result = ipctk.NormalCollisions()
         result.use_area_weighting = pairs.use_area_weighting
-        result.vv_collisions = [pair for pair in pairs.vv_collisions if owned[min(pair.vertex0_id, pair.vertex1_id)]]
-        result.ev_collisions = [pair for pair in pairs.ev_collisions if owned[pair.vertex_id]]
-        result.ee_collisions = [
-            pair for pair in pairs.ee_collisions if owned[min(lowest[pair.edge0_id], lowest[pair.edge1_id])]
+        result.vv_collisions = [
+            pair
+            for pair in pairs.vv_collisions
+            if owned[min(pair.vertex0_id, pair.vertex1_id)]
         ]
-        result.fv_collisions = [pair for pair in pairs.fv_collisions if owned[pair.vertex_id]]
+        result.ev_collisions = [
+            pair for pair in pairs.ev_collisions if owned[pair.vertex_id]
+        ]
+        result.ee_collisions = [
+            pair
+            for pair in pairs.ee_collisions
+            if owned[min(lowest[pair.edge0_id], lowest[pair.edge1_id])]
+        ]
+        result.fv_collisions = [
+            pair for pair in pairs.fv_collisions if owned[pair.vertex_id]
+        ]
         return result
 
 
 def part_of_surface(
-    positions: Floats, faces: NDArray[np.integer], owned: NDArray[np.bool_], reach: float
+    positions: Floats,
+    faces: NDArray[np.integer],
+    owned: NDArray[np.bool_],
+    reach: float,
 ) -> SurfacePart:
     """Return the part of a surface that has all pairs of the (n,) `owned` vertices.
 
@@ -79,20 +98,25 @@ def part_of_surface(
     numbers = numbers.reshape(-1, 3)
     sides = edges(TriangleMesh(positions[vertices], numbers))[0]
     return SurfacePart(
-        vertices, np.asfortranarray(numbers, dtype=np.int32), np.asfortranarray(sides, dtype=np.int32), owned[vertices]
+        vertices,
+        np.asfortranarray(numbers, dtype=np.int32),
+        np.asfortranarray(sides, dtype=np.int32),
+        owned[vertices],
     )
 
 
 class ContactSurface:
-    """The pial surface as flat triangles; `facets` (f, 3) are its faces as vertex indices of the mesh.
+    """The pial surface as flat triangles; `facets` (f, 3) are its faces as vertex
+    indices of the mesh.
 
-    A face of a quadratic element becomes 16 triangles whose vertices are interpolated between its nodes. With only four
-    triangles between the nodes, a uniform pressure would give non-uniform nodal forces, and waves as long as an
-    element.
+    A face of a quadratic element becomes 16 triangles whose vertices are interpolated
+    between its nodes. With only four triangles between the nodes, a uniform pressure
+    would give non-uniform nodal forces, and waves as long as an element.
 
-    Attributes: the mesh vertices on the surface, `nodes` (n,); the triangles, `faces` (f, 3), by the numbers of the
-    surface's own s vertices; and `weights` (s, n), which interpolate from the nodes to these s vertices. The first n of
-    the s vertices are the nodes themselves.
+    Attributes: the mesh vertices on the surface, `nodes` (n,); the triangles, `faces`
+    (f, 3), by the numbers of the surface's own s vertices; and `weights` (s, n), which
+    interpolate from the nodes to these s vertices. The first n of the s vertices are
+    the nodes themselves.
     """
 
     def __init__(self, domain: Domain, facets: NDArray[np.int64]) -> None:
@@ -110,30 +134,46 @@ class ContactSurface:
         self._part: SurfacePart | None = None
 
     def reference_mm(self) -> Floats:
-        """Return the (s, 3) positions in mm of the mesh before the displacement of the step."""
+        """Return the (s, 3) positions in mm of the mesh before the displacement of the
+        step."""
         return np.asarray(self.weights @ self.domain.positions[self.nodes] * MM_PER_M)
 
     def displacement_mm(self, u: Floats) -> Floats:
-        """Return the (s, 3) displacements in mm from those of the local nodes (k, 3) in m."""
-        return np.asarray(self.weights @ gather(self.domain.comm, u[self._local], self._gathered_rows) * MM_PER_M)
+        """Return the (s, 3) displacements in mm from those of the local nodes (k, 3) in
+        m."""
+        return np.asarray(
+            self.weights
+            @ gather(self.domain.comm, u[self._local], self._gathered_rows)
+            * MM_PER_M
+        )
 
     def nodal_sum(self, part: SurfacePart, values: Floats) -> Floats:
-        """Return the (n, 3) sum over all ranks of (p, 3) values on their parts, moved to the nodes."""
+        """Return the (n, 3) sum over all ranks of (p, 3) values on their parts, moved
+        to the nodes."""
         self._interpolate(part)
         return self.domain.sum_over_ranks(self._part_weights.T @ values)
 
     def add_to(self, out: Floats, nodal: Floats) -> None:
-        """Add (n, 3) values at the nodes to the owned components (3 · n_owned,) of a vector."""
+        """Add (n, 3) values at the nodes to the owned components (3 · n_owned,) of a
+        vector."""
         out.reshape(-1, 3)[self._local] += nodal[self._rows]
 
-    def matrix_sum(self, part: SurfacePart, matrix: sparse.csc_matrix | None) -> PETSc.Mat:
-        """Return the sum over ranks of their parts' symmetric (3p, 3p) matrices, as a matrix of all mesh nodes."""
+    def matrix_sum(
+        self, part: SurfacePart, matrix: sparse.csc_matrix | None
+    ) -> PETSc.Mat:
+        """Return the sum over ranks of their parts' symmetric (3p, 3p) matrices, as a
+        matrix of all mesh nodes."""
         comm, components = self.domain.comm, np.arange(3)
         rows_for: list[sparse.csr_matrix | None] = [None] * comm.size
         if matrix is not None:
             self._interpolate(part)
-            nodal = sparse.csr_matrix(self._part_to_nodes @ matrix @ self._nodes_to_part)
-            rows_for = [nodal[(3 * rows[:, None] + components).ravel()] for rows in self._rows_by_rank]
+            nodal = sparse.csr_matrix(
+                self._part_to_nodes @ matrix @ self._nodes_to_part
+            )
+            rows_for = [
+                nodal[(3 * rows[:, None] + components).ravel()]
+                for rows in self._rows_by_rank
+            ]
         # each rank receives the rows that it owns from all others
         own, rows_for[comm.rank] = rows_for[comm.rank], None
         received = [own, *comm.alltoall(rows_for)]
@@ -146,12 +186,15 @@ class ContactSurface:
         node, component = np.divmod(rows.indices, 3)
         columns = (3 * self._columns[node] + component).astype(PETSc.IntType)
         size = (3 * self.domain.n_owned, 3 * len(self.domain.positions))
-        result = PETSc.Mat().createAIJ((size, size), bsize=3, csr=(start, columns, rows.data), comm=comm)
+        result = PETSc.Mat().createAIJ(
+            (size, size), bsize=3, csr=(start, columns, rows.data), comm=comm
+        )
         result.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         return result
 
     def _interpolate(self, part: SurfacePart) -> None:
-        """Set the matrices between the nodes and a part, unless they are those of the last call."""
+        """Set the matrices between the nodes and a part, unless they are those of the
+        last call."""
         if self._part is not part:
             self._part, self._part_weights = part, self.weights[part.vertices]
             components = sparse.kron(self._part_weights, np.eye(3), format="csr")

@@ -1,7 +1,9 @@
-"""The distributed mesh of the solver, and the map between its numbering and that of the mesh file.
+"""The distributed mesh of the solver, and the map between its numbering and that of the
+mesh file.
 
-Every rank also holds the positions of all vertices in the file's order, so that searches on the pial surface give the
-same result on every rank and output needs no further communication.
+Every rank also holds the positions of all vertices in the file's order, so that
+searches on the pial surface give the same result on every rank and output needs no
+further communication.
 """
 
 import os
@@ -26,8 +28,13 @@ from ..geometry.tetrahedra import (
 from ..geometry.triangles import Floats
 from ..units import M_PER_MM
 
-# Scotch reads these when it first partitions a mesh; without them runs are not reproducible
-for name in ("SCOTCH_RANDOM_FIXED_SEED", "SCOTCH_DETERMINISTIC", "SCOTCH_PTHREAD_NUMBER"):
+# Scotch reads these when it first partitions a mesh; without them runs are not
+# reproducible
+for name in (
+    "SCOTCH_RANDOM_FIXED_SEED",
+    "SCOTCH_DETERMINISTIC",
+    "SCOTCH_PTHREAD_NUMBER",
+):
     os.environ.setdefault(name, "1")
 
 # dolfinx numbers the nodes on edges from the last edge to the first
@@ -37,22 +44,28 @@ GRADIENTS_AT_NODES = shape_slopes(NODE_COORDINATES)
 
 
 def gather(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
-    """Return on every rank the (n, ...) values of all ranks; `order` (n,) has the index of each, rank by rank."""
+    """Return on every rank the (n, ...) values of all ranks; `order` (n,) has the index
+    of each, rank by rank."""
     shape = values.shape[1:]
     received, result = np.empty((len(order), *shape)), np.empty((len(order), *shape))
-    comm.Allgatherv(np.ascontiguousarray(values), (received, comm.allgather(values.size)))
+    comm.Allgatherv(
+        np.ascontiguousarray(values), (received, comm.allgather(values.size))
+    )
     result[order] = received
     return result
 
 
 def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
-    """Divide (n, 3) points into `count` boxes with nearly equal numbers of points; return the box (n,) of each point.
+    """Divide (n, 3) points into `count` boxes with nearly equal numbers of points;
+    return the box (n,) of each point.
 
-    A box is split across its longest side, in proportion to the counts on both sides, and so on (recursive coordinate
-    bisection, Berger and Bokhari 1987).
+    A box is split across its longest side, in proportion to the counts on both sides,
+    and so on (recursive coordinate bisection, Berger and Bokhari 1987).
     """
     box = np.zeros(len(positions), dtype=np.int64)
-    stack: list[tuple[NDArray[np.int64], int, int]] = [(np.arange(len(positions)), 0, count)]
+    stack: list[tuple[NDArray[np.int64], int, int]] = [
+        (np.arange(len(positions)), 0, count)
+    ]
     while stack:
         inside, first, number = stack.pop()
         if number == 1 or not len(inside):
@@ -69,13 +82,16 @@ def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
 class Domain:
     """A tetrahedral mesh distributed over the ranks of a communicator, in metres.
 
-    Here, a vertex is a node of the mesh file: a corner of elements or, in quadratic elements (`order` 2), a node on an
-    edge. `mesh` is the updated reference, which moves with every step; `space` is that of displacements in m on it.
+    Here, a vertex is a node of the mesh file: a corner of elements or, in quadratic
+    elements (`order` 2), a node on an edge. `mesh` is the updated reference, which
+    moves with every step; `space` is that of displacements in m on it.
 
-    For all vertices in the file's order, equal on every rank: `positions` (n, 3) in m, the connected `part` of the mesh
-    (n,), and the global node `node_of_vertex` (n,). For the local nodes, the first `n_owned` owned and the
-    others ghosts: the vertex `vertex_of_node` (k,). For the local elements: their nodes in the file's order, `cells`
-    (c, 4) or (c, 10), their index in the file `tet_of_cell` (c,), and their `volumes` (c,) in m³.
+    For all vertices in the file's order, equal on every rank: `positions` (n, 3) in m,
+    the connected `part` of the mesh (n,), and the global node `node_of_vertex` (n,).
+    For the local nodes, the first `n_owned` owned and the others ghosts: the vertex
+    `vertex_of_node` (k,). For the local elements: their nodes in the file's order,
+    `cells` (c, 4) or (c, 10), their index in the file `tet_of_cell` (c,), and their
+    `volumes` (c,) in m³.
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
@@ -87,8 +103,12 @@ class Domain:
         cells = tets if comm.rank == 0 else np.empty((0, tets.shape[1]), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
         # no ghost cells
-        self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
-        self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", self.order, (3,)))
+        self.mesh = dolfinx.mesh.create_mesh(
+            comm, cells=cells, x=points, e=ufl.Mesh(element)
+        )
+        self.space = dolfinx.fem.functionspace(
+            self.mesh, ("Lagrange", self.order, (3,))
+        )
         nodes_of_cells = self.space.dofmap.list
         self.cells = np.ascontiguousarray(nodes_of_cells[:, FROM_DOLFINX[self.order]])
         self.n_owned = self.space.dofmap.index_map.size_local
@@ -97,22 +117,30 @@ class Domain:
         # one array per cell type
         (geometry_nodes,) = self.mesh.geometry.dofmaps
         self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes.ravel()
-        self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
+        self.vertex_of_node = self.mesh.geometry.input_global_indices[
+            self._geometry_node
+        ]
         self._shared = dolfinx.la.vector(self.space.dofmap.index_map, 3)
         self.part = connected_parts(mesh)
         self._measure(self.local(self.positions))
-        self.tet_of_cell = np.array(self.mesh.topology.original_cell_index[: len(self.cells)])
+        self.tet_of_cell = np.array(
+            self.mesh.topology.original_cell_index[: len(self.cells)]
+        )
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
-        self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.n_owned]))
+        self._order = np.concatenate(
+            comm.allgather(self.vertex_of_node[: self.n_owned])
+        )
         self.node_of_vertex = np.empty_like(self._order)
         self.node_of_vertex[self._order] = np.arange(len(self._order))
 
     def gather(self, owned_values: Floats) -> Floats:
-        """Return on every rank the (n, 3) vectors of all vertices from the (n_owned, 3) owned ones of each rank."""
+        """Return on every rank the (n, 3) vectors of all vertices from the (n_owned, 3)
+        owned ones of each rank."""
         return gather(self.comm, owned_values, self._order)
 
     def gather_cells(self, cell_values: Floats) -> Floats:
-        """Return on every rank the (m, ...) values of all elements in the file's order from the local (c, ...) ones."""
+        """Return on every rank the (m, ...) values of all elements in the file's order
+        from the local (c, ...) ones."""
         return gather(self.comm, cell_values, self._tets)
 
     def sum_over_ranks(self, values: Floats) -> Floats:
@@ -122,25 +150,31 @@ class Domain:
         return total
 
     def with_ghosts(self, owned: Floats) -> Floats:
-        """Return the (k, 3) vectors of the local nodes from the components (3 · n_owned,) of the owned ones."""
+        """Return the (k, 3) vectors of the local nodes from the components (3 ·
+        n_owned,) of the owned ones."""
         self._shared.array[: len(owned)] = owned
         self._shared.scatter_forward()
         return self._shared.array.reshape(-1, 3).copy()
 
     def dot(self, a: Floats, b: Floats) -> float:
-        """Return the dot product of two distributed vectors, given their owned components (3 · n_owned,)."""
+        """Return the dot product of two distributed vectors, given their owned
+        components (3 · n_owned,)."""
         return self.comm.allreduce(float(a @ b))
 
     def norm(self, owned: Floats) -> float:
-        """Return the Euclidean norm of a distributed vector, given its owned components."""
+        """Return the Euclidean norm of a distributed vector, given its owned
+        components."""
         return float(np.sqrt(self.dot(owned, owned)))
 
     def local(self, values: NDArray) -> NDArray:
         """Return the values of the local nodes from those of all vertices."""
         return values[self.vertex_of_node]
 
-    def owned_rows(self, vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the owned nodes (o,) that are among ascending vertices, and their places (o,) among these."""
+    def owned_rows(
+        self, vertices: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the owned nodes (o,) that are among ascending vertices, and their
+        places (o,) among these."""
         owned = self.vertex_of_node[: self.n_owned]
         place = np.searchsorted(vertices, owned).clip(max=len(vertices) - 1)
         local = np.flatnonzero(vertices[place] == owned)
@@ -161,59 +195,82 @@ class Domain:
     def _measure(self, node_positions: Floats) -> None:
         self.volumes = volumes_between(node_positions, self.cells)
         if self.order == 2:
-            self._determinants_at_nodes = jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
+            self._determinants_at_nodes = jacobians(
+                node_positions, self.cells, GRADIENTS_AT_NODES
+            )
             self._upper_bounds = coefficients(node_positions, self.cells).max(axis=1)
 
     def volume_ratios(self, node_positions: Floats) -> Floats:
         """Return det F after a move of the local nodes to (k, 3) positions in m.
 
-        It has one value in a linear element, (c, 1), and one at each node of a quadratic one, (c, 10).
+        It has one value in a linear element, (c, 1), and one at each node of a
+        quadratic one, (c, 10).
         """
         if self.order == 1:
             return (volumes_between(node_positions, self.cells) / self.volumes)[:, None]
-        return jacobians(node_positions, self.cells, GRADIENTS_AT_NODES) / self._determinants_at_nodes
+        return (
+            jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
+            / self._determinants_at_nodes
+        )
 
     def smallest_volume_ratio(self, node_positions: Floats) -> float:
         """Return a lower bound of det F after a move, over the elements of all ranks.
 
-        It is positive only if no element is inverted anywhere. In linear elements it is the smallest det F. In
-        quadratic ones, where det F varies, it is the ratio of a lower bound of the Jacobian determinant after the move
-        to an upper bound of that before.
+        It is positive only if no element is inverted anywhere. In linear elements it is
+        the smallest det F. In quadratic ones, where det F varies, it is the ratio of a
+        lower bound of the Jacobian determinant after the move to an upper bound of that
+        before.
         """
         if self.order == 1:
             return self.min_over_ranks(self.volume_ratios(node_positions))
-        return self.min_over_ranks(lower_bounds(node_positions, self.cells) / self._upper_bounds)
+        return self.min_over_ranks(
+            lower_bounds(node_positions, self.cells) / self._upper_bounds
+        )
 
     def min_over_ranks(self, local_values: Floats) -> float:
         """Return the smallest value of all ranks."""
         return self.comm.allreduce(float(local_values.min(initial=np.inf)), op=MPI.MIN)
 
-    def locate_minimum(self, values: Floats, indices: NDArray, positions: Floats) -> tuple[float, int, Floats]:
-        """Return the smallest of the local values over all ranks, with its index in the file and its position."""
+    def locate_minimum(
+        self, values: Floats, indices: NDArray, positions: Floats
+    ) -> tuple[float, int, Floats]:
+        """Return the smallest of the local values over all ranks, with its index in the
+        file and its position."""
         smallest = (np.inf, -1, np.full(3, np.nan))
         if len(values):
             i = int(values.argmin())
             smallest = (float(values[i]), int(indices[i]), positions[i])
         return min(self.comm.allgather(smallest), key=lambda entry: entry[:2])
 
-    def local_facets(self, facets: NDArray[np.int64], tags: NDArray[np.int64]) -> dolfinx.mesh.MeshTags:
-        """Return the tags (f,) of boundary facets (f, 3), vertex indices of the file, on the local facets.
+    def local_facets(
+        self, facets: NDArray[np.int64], tags: NDArray[np.int64]
+    ) -> dolfinx.mesh.MeshTags:
+        """Return the tags (f,) of boundary facets (f, 3), vertex indices of the file,
+        on the local facets.
 
-        The four triangles of a quadratic element's face have one tag. ValueError where the facets are not the boundary.
+        The four triangles of a quadratic element's face have one tag. ValueError where
+        the facets are not the boundary.
         """
-        faces, tags = whole_faces(facets, self.order), tags[:: PIECES_OF_ORDER[self.order]]
+        faces, tags = (
+            whole_faces(facets, self.order),
+            tags[:: PIECES_OF_ORDER[self.order]],
+        )
         topology = self.mesh.topology
         topology.create_entities(2)
         topology.create_connectivity(2, 3)
         local = dolfinx.mesh.exterior_facet_indices(topology)
         # the corners are the first three nodes
-        nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local).reshape(len(local), -1)[:, :3]
+        nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local).reshape(
+            len(local), -1
+        )[:, :3]
         local_faces = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
         count = len(self.positions)
         weights = np.array([count * count, count, 1], dtype=np.int64)
         keys, local_keys = np.sort(faces, axis=1) @ weights, local_faces @ weights
         order = np.argsort(keys)
-        index = order[np.minimum(np.searchsorted(keys, local_keys, sorter=order), len(order) - 1)]
+        index = order[
+            np.minimum(np.searchsorted(keys, local_keys, sorter=order), len(order) - 1)
+        ]
         if (keys[index] != local_keys).any():
             raise ValueError("the facets are not the boundary of the mesh")
         return dolfinx.mesh.meshtags(self.mesh, 2, local, tags[index].astype(np.int32))

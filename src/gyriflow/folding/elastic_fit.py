@@ -1,10 +1,13 @@
-"""Elastic registration with contact: deform a mesh towards a shape while elements stay valid and folds do not cross.
+"""Elastic registration with contact: deform a mesh towards a shape while elements stay
+valid and folds do not cross.
 
-A shape made by carrying vertices along a registration may turn elements inside out, or move one bank of a sulcus
-through the other. Here the body itself does the fitting: it takes the smoothed stretch of that shape as growth, springs
-draw its boundary there, and elasticity and the contact barrier keep elements positive and folds apart. It is the same
-solver as that of a simulation; the reference is updated after each step, so stress does not accumulate. The states that
-the body passes through are valid, too: where the straight way to a shape is not, some of them lie between.
+A shape made by carrying vertices along a registration may turn elements inside out, or
+move one bank of a sulcus through the other. Here the body itself does the fitting: it
+takes the smoothed stretch of that shape as growth, springs draw its boundary there, and
+elasticity and the contact barrier keep elements positive and folds apart. It is the
+same solver as that of a simulation; the reference is updated after each step, so stress
+does not accumulate. The states that the body passes through are valid, too: where the
+straight way to a shape is not, some of them lie between.
 """
 
 import logging
@@ -27,8 +30,21 @@ from ..geometry.flat_elements import open_flat_elements
 from ..geometry.jacobians import SLOPES, determinants, inverted_on_the_way
 from ..geometry.matching import faces_that_cross
 from ..geometry.straightening import may_fold_over, straighten_sides
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
-from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, signed_volume, vertex_areas
+from ..geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    has_volume,
+    linear_pieces,
+    volumes_between,
+)
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    Mask,
+    TriangleMesh,
+    signed_volume,
+    vertex_areas,
+)
 from ..mechanics.materials import MATERIALS
 from ..settings.terms import FREE
 from ..units import M_PER_MM, MM_PER_M
@@ -44,47 +60,57 @@ from .zones import Zones
 log = logging.getLogger(__name__)
 
 MODULUS_PA, POISSON_RATIO = 1000.0, 0.3
-"""Shear modulus and Poisson's ratio of the body that is fitted. The modulus only sets the unit of forces; a
-compressible body yields more evenly."""
+"""Shear modulus and Poisson's ratio of the body that is fitted. The modulus only sets
+the unit of forces; a compressible body yields more evenly."""
 BARRIER_PA = 1000.0
-"""Stiffness of the contact barrier: stiffer than in a simulation, since springs press folds together harder."""
+"""Stiffness of the contact barrier: stiffer than in a simulation, since springs press
+folds together harder."""
 SPRING_LENGTH_MM = 3.3
 CLOSE_SPRING_LENGTHS_MM = (0.2, 0.8)
-"""Shear modulus over the springs' stiffness, on the way to a shape, and close to it in turn: a spring holds as strongly
-as this depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
+"""Shear modulus over the springs' stiffness, on the way to a shape, and close to it in
+turn: a spring holds as strongly as this depth of tissue. Stiff springs over the whole
+way take more iterations and press elements flat."""
 FREED_SPRING_LENGTH_MM = 20.0
 """The same for springs around flat elements, which open while the rest is drawn."""
 MAX_PULL_MM = 1.0
-"""Largest distance over which close springs draw, if it is more than twice the root mean square: longer ones press
-elements flat, and the next draw draws further."""
+"""Largest distance over which close springs draw, if it is more than twice the root
+mean square: longer ones press elements flat, and the next draw draws further."""
 PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
 """Fractions of a straight way at which faces are checked for crossings."""
 MAX_WAY_HALVINGS = 3
 """Largest number of times that a way with faults is divided by a stop."""
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
-"""Lengths over which a displacement is smoothed around faults, round by round (the first two where the shape is that of
-an observed brain), and the distance from these, as a multiple of them."""
+"""Lengths over which a displacement is smoothed around faults, round by round (the
+first two where the shape is that of an observed brain), and the distance from these, as
+a multiple of them."""
 MIN_VOLUME_ON_WAY = 0.2
-"""Fraction of an element's volume that it should keep on the way from one shape to the next."""
+"""Fraction of an element's volume that it should keep on the way from one shape to the
+next."""
 MAX_LOG_STRETCH = 0.3
-"""Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
+"""Largest principal Hencky strain of a shape that is followed; larger ones, as of
+inverted elements, count as this."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 FLATTENING_ROUNDS = 3
-"""Rounds of averaging over neighbours of the strain that an element's own is compared with."""
+"""Rounds of averaging over neighbours of the strain that an element's own is compared
+with."""
 MIN_FLATTENING, MAX_FLATTENING = math.log(2.0), math.log(4.0)
-"""Loss of an element's volume (a logarithm), since the start and by comparison with those around it, from which a step
-opens it again, and from which it makes up for all of the difference."""
+"""Loss of an element's volume (a logarithm), since the start and by comparison with
+those around it, from which a step opens it again, and from which it makes up for all of
+the difference."""
 MAX_OPENING = 0.5
-"""Largest principal Hencky strain that a step takes back: with more stress the tangent cannot be made definite."""
+"""Largest principal Hencky strain that a step takes back: with more stress the tangent
+cannot be made definite."""
 MIN_VOLUME_LEFT, MAX_OUTER_MOVE_MM = 0.2, 0.1
-"""Fraction of their volume at the start below which elements are opened after a step, by moving vertices inside, and
-the largest move of vertices on the boundary for elements that have no others."""
+"""Fraction of their volume at the start below which elements are opened after a step,
+by moving vertices inside, and the largest move of vertices on the boundary for elements
+that have no others."""
 STRAIN_PER_STEP = 0.1
-"""Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
+"""Largest mean linear strain per step; more steps than one take longer and press
+elements flatter."""
 MAX_LEFT_MM = 3.0
-"""Largest distance, as a root mean square, at which a body may stay from a shape: the way to the next shape begins
-there."""
+"""Largest distance, as a root mean square, at which a body may stay from a shape: the
+way to the next shape begins there."""
 SETTINGS = NewtonSettings(
     newton_tolerance=2e-2,
     krylov_tolerance=1e-2,
@@ -93,11 +119,13 @@ SETTINGS = NewtonSettings(
     min_progress=0.01,
     keeps_iterates=True,
 )
-"""Loose tolerances and low limits: each iterate is a shape that the body can have, and the next step starts from it."""
+"""Loose tolerances and low limits: each iterate is a shape that the body can have, and
+the next step starts from it."""
 
 
 class Springs:
-    """Springs from the nodes on the boundary to their goals, a contribution to the energy of a step.
+    """Springs from the nodes on the boundary to their goals, a contribution to the
+    energy of a step.
 
     `vertices` (b,) are the ascending vertices of the mesh that have a spring.
     """
@@ -107,10 +135,13 @@ class Springs:
         self._local, self._rows = domain.owned_rows(vertices)
 
     def draw_to(self, goals_mm: Floats, areas_mm2: Floats, lengths_mm: Floats) -> None:
-        """Set the (b, 3) goals in mm, for a step from the present positions, and (b,) areas and lengths of springs."""
+        """Set the (b, 3) goals in mm, for a step from the present positions, and (b,)
+        areas and lengths of springs."""
         weights = MODULUS_PA / (lengths_mm * M_PER_MM) * areas_mm2 * M_PER_MM**2
         self._weights = weights[self._rows, None]
-        self._gaps = (self._domain.positions[self._vertices] - goals_mm * M_PER_MM)[self._rows]
+        self._gaps = (self._domain.positions[self._vertices] - goals_mm * M_PER_MM)[
+            self._rows
+        ]
 
     def energy(self, u: Floats) -> float:
         local = 0.5 * float((self._weights * (u[self._local] + self._gaps) ** 2).sum())
@@ -136,8 +167,9 @@ class Springs:
 class ElasticFit:
     """A brain's mesh that is drawn to one shape after the other, on one process.
 
-    `positions_mm` (n, 3) are those of its vertices now. Quadratic elements are fitted as their linear pieces and then
-    straightened where they would fold over. MeshError if the boundary of the mesh crosses itself.
+    `positions_mm` (n, 3) are those of its vertices now. Quadratic elements are fitted
+    as their linear pieces and then straightened where they would fold over. MeshError
+    if the boundary of the mesh crosses itself.
     """
 
     def __init__(self, mesh: TetrahedralMesh) -> None:
@@ -147,26 +179,49 @@ class ElasticFit:
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
         self._surface, self._used = boundary_surface(mesh)
-        self._pieces, self._start_volumes = pieces, volumes_between(mesh.vertices, pieces)
+        self._pieces, self._start_volumes = (
+            pieces,
+            volumes_between(mesh.vertices, pieces),
+        )
         is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
         self._inner_moves_mm = np.where(is_outer, 0.0, np.inf)
         self._outer_moves_mm = np.zeros(len(mesh.vertices))
         self._outer_moves_mm[pieces[is_outer[pieces].all(axis=1)]] = MAX_OUTER_MOVE_MM
         facets = self._used[self._surface.faces]
         whole = np.ones(len(mesh.vertices))
-        zones = Zones(facets, np.full(len(facets), FREE), whole, 0.0, (-math.inf, math.inf), free=True)
+        zones = Zones(
+            facets,
+            np.full(len(facets), FREE),
+            whole,
+            0.0,
+            (-math.inf, math.inf),
+            free=True,
+        )
         domain = self._domain = Domain(MPI.COMM_SELF, mesh)
-        self._problem = NonlinearProblem(domain, zones, MATERIALS["neo-hookean"](POISSON_RATIO))
+        self._problem = NonlinearProblem(
+            domain, zones, MATERIALS["neo-hookean"](POISSON_RATIO)
+        )
         self._contact = SelfContact(domain, facets, BARRIER_PA)
         self._springs = Springs(domain, self._used)
         self._problem.contributions += [self._contact, self._springs]
-        self._solver = NewtonSolver(self._problem, SETTINGS, residual_floor(mesh, MODULUS_PA))
-        self._elements = Elements(domain.cells, domain.vertex_of_node, self._problem.points)
+        self._solver = NewtonSolver(
+            self._problem, SETTINGS, residual_floor(mesh, MODULUS_PA)
+        )
+        self._elements = Elements(
+            domain.cells, domain.vertex_of_node, self._problem.points
+        )
         cells = self._elements.vertices[domain.cells]
         corners = mesh.vertices[cells]
-        self._inverse_edges = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
-        size, columns = (len(mesh.vertices), len(cells)), np.repeat(np.arange(len(cells)), 4)
-        self._incidence = sparse.csr_array((np.ones(4 * len(cells)), (cells.ravel(), columns)), shape=size)
+        self._inverse_edges = np.linalg.inv(
+            np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        )
+        size, columns = (
+            (len(mesh.vertices), len(cells)),
+            np.repeat(np.arange(len(cells)), 4),
+        )
+        self._incidence = sparse.csr_array(
+            (np.ones(4 * len(cells)), (cells.ravel(), columns)), shape=size
+        )
 
     @property
     def boundary(self) -> TriangleMesh:
@@ -174,45 +229,67 @@ class ElasticFit:
         return TriangleMesh(self.positions_mm[self._used], self._surface.faces)
 
     def follow(self, shape: Floats) -> Floats:
-        """Move the body to near a shape (n, 3) in mm, which may have inverted elements; return its (n, 3) positions.
+        """Move the body to near a shape (n, 3) in mm, which may have inverted elements;
+        return its (n, 3) positions.
 
-        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. It stays
-        where it cannot go on; SolverError with the place if its boundary is still more than `MAX_LEFT_MM` from that of
-        the shape (root mean square).
+        The body grows by the shape's smoothed stretch while springs draw its boundary
+        to that of the shape. It stays where it cannot go on; SolverError with the place
+        if its boundary is still more than `MAX_LEFT_MM` from that of the shape (root
+        mean square).
         """
         boundary = self.boundary
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
-        ratio = signed_volume(TriangleMesh(goal[self._used], boundary.faces)) / signed_volume(boundary)
+        ratio = signed_volume(
+            TriangleMesh(goal[self._used], boundary.faces)
+        ) / signed_volume(boundary)
         logs = log_stretch(self._gradients(goal), limit=MAX_LOG_STRETCH)
         # of the whole, and of nine elements in ten
         mean_strain = (
-            max(abs(math.log(max(ratio, 1e-3))), float(np.quantile(np.linalg.norm(logs, axis=(1, 2)), 0.9))) / 3
+            max(
+                abs(math.log(max(ratio, 1e-3))),
+                float(np.quantile(np.linalg.norm(logs, axis=(1, 2)), 0.9)),
+            )
+            / 3
         )
         steps = max(1, math.ceil(mean_strain / STRAIN_PER_STEP))
         lengths = np.full(len(self._used), SPRING_LENGTH_MM)
         for left in range(steps, 0, -1):
             displacement = (goal - self.positions_mm) / left
-            logs = log_stretch(self._gradients(self.positions_mm + displacement), limit=MAX_LOG_STRETCH)
-            integrals = integrals_at_vertices(self.positions_mm, self._pieces, packed(logs))
-            strain = smooth_integrals(self.positions_mm, self._pieces, integrals, SMOOTHING_MM)
-            problem = self._step((self.positions_mm + displacement)[self._used], lengths, strain)
+            logs = log_stretch(
+                self._gradients(self.positions_mm + displacement), limit=MAX_LOG_STRETCH
+            )
+            integrals = integrals_at_vertices(
+                self.positions_mm, self._pieces, packed(logs)
+            )
+            strain = smooth_integrals(
+                self.positions_mm, self._pieces, integrals, SMOOTHING_MM
+            )
+            problem = self._step(
+                (self.positions_mm + displacement)[self._used], lengths, strain
+            )
         misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
         if problem and misfit_mm > MAX_LEFT_MM:
             raise SolverError(
-                "a shape cannot be reached without turning elements inside out or folds into each other",
+                "a shape cannot be reached without turning elements inside out or folds"
+                " into each other",
                 found=f"{misfit_mm:.1f} mm from it (root mean square): {problem}",
                 expected=f"at most {MAX_LEFT_MM:g} mm",
-                remedy="Look at the labels or surfaces of this week and the one before at that place.",
+                remedy=(
+                    "Look at the labels or surfaces of this week and the one before at"
+                    " that place."
+                ),
             )
         self._straighten()
         return self._move(np.linalg.inv(motion))
 
     def draw(self, goals: Floats) -> Floats:
-        """Draw the boundary towards (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
+        """Draw the boundary towards (b, 3) goals in mm close to it, without growth;
+        return the (n, 3) positions in mm.
 
-        What cannot be drawn further stays where it is. Springs that fold curved elements over are softened; where soft
-        ones do, too, the body stays as it is, with a warning.
+        What cannot be drawn further stays where it is. Springs that fold curved
+        elements over are softened; where soft ones do, too, the body stays as it is,
+        with a warning.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
@@ -235,65 +312,96 @@ class ElasticFit:
         return start
 
     def move_to(self, shape: Floats) -> Floats:
-        """Move the body to a shape (n, 3) in mm that it can nearly have; return its (n, 3) positions in mm.
+        """Move the body to a shape (n, 3) in mm that it can nearly have; return its (n,
+        3) positions in mm.
 
-        Where elements would be inverted or faces cross on the straight way, the displacement is smoothed around them,
-        over lengths that increase; the body follows the shape, and is drawn to it, if faults remain.
+        Where elements would be inverted or faces cross on the straight way, the
+        displacement is smoothed around them, over lengths that increase; the body
+        follows the shape, and is drawn to it, if faults remain.
         """
         motion = self._fit(shape, self.positions_mm)
-        untangled, faults = self._untangled(self.positions_mm, transform_points(shape, motion), UNTANGLING_MM)
+        untangled, faults = self._untangled(
+            self.positions_mm, transform_points(shape, motion), UNTANGLING_MM
+        )
         if not len(faults):
-            self.positions_mm, self._moved_straight = self._opened_after(self.positions_mm, untangled), True
+            self.positions_mm, self._moved_straight = (
+                self._opened_after(self.positions_mm, untangled),
+                True,
+            )
             return self._move(np.linalg.inv(motion))
-        log.info("%d faults remain on the way to a shape: the body follows it", len(faults))
+        log.info(
+            "%d faults remain on the way to a shape: the body follows it", len(faults)
+        )
         self.follow(shape)
         return self.draw(shape[self._used])
 
-    def _untangled(self, before: Floats, after: Floats, lengths_mm: Sequence[float]) -> tuple[Floats, Floats]:
-        """Return the aligned shape `after`, changed around faults on the straight way to it, and those that remain.
+    def _untangled(
+        self, before: Floats, after: Floats, lengths_mm: Sequence[float]
+    ) -> tuple[Floats, Floats]:
+        """Return the aligned shape `after`, changed around faults on the straight way
+        to it, and those that remain.
 
         Elements that lose most of their volume count as faults in the first round only.
         """
-        sizes, displacement, least = vertex_sizes(before, self._pieces), after - before, MIN_VOLUME_ON_WAY
+        sizes, displacement, least = (
+            vertex_sizes(before, self._pieces),
+            after - before,
+            MIN_VOLUME_ON_WAY,
+        )
         for length in lengths_mm:
             faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
                 break
             distance, _ = cKDTree(faults).query(before)
             near = np.exp(-((distance / (UNTANGLING_REACH * length)) ** 2))[:, None]
-            smooth = smooth_integrals(before, self._pieces, sizes[:, None] * displacement, length)
+            smooth = smooth_integrals(
+                before, self._pieces, sizes[:, None] * displacement, length
+            )
             displacement, least = displacement + near * (smooth - displacement), 0.0
         else:
             faults = self._faults_between(before, before + displacement)
         return before + displacement, faults
 
     def way_from(self, before: Floats) -> list[tuple[float, Floats]]:
-        """Return the shapes (n, 3) to pass on the way from an earlier shape to that of now, and the fraction of each.
+        """Return the shapes (n, 3) to pass on the way from an earlier shape to that of
+        now, and the fraction of each.
 
-        There are none where no element is inverted and no faces cross on the straight way, if need be after a change of
-        the shape of now around the faults. Else they are states that the body has passed through since this was last
-        called; elements and faces with faults between two of them that follow each other are warned of.
+        There are none where no element is inverted and no faces cross on the straight
+        way, if need be after a change of the shape of now around the faults. Else they
+        are states that the body has passed through since this was last called; elements
+        and faces with faults between two of them that follow each other are warned of.
         """
         passed, self._passed = self._passed, []
         if self._moved_straight:
             return []
         motion = self._fit(self.positions_mm, before)
-        places, stops = self._stops(before, transform_points(self.positions_mm, motion), passed)
+        places, stops = self._stops(
+            before, transform_points(self.positions_mm, motion), passed
+        )
         # changes around faults flatten elements
         places = self._opened_after(stops[-1] if stops else before, places)
-        self.positions_mm = transform_points(places, self._fit(places, self.positions_mm))
+        self.positions_mm = transform_points(
+            places, self._fit(places, self.positions_mm)
+        )
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
         parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)
         return [(float(part), shape) for part, shape in zip(parts, stops, strict=False)]
 
     def _stops(
-        self, before: Floats, after: Floats, passed: Sequence[Floats], halvings: int = MAX_WAY_HALVINGS
+        self,
+        before: Floats,
+        after: Floats,
+        passed: Sequence[Floats],
+        halvings: int = MAX_WAY_HALVINGS,
     ) -> tuple[Floats, list[Floats]]:
-        """Return the shape `after`, changed around faults, and the shapes to pass before it."""
+        """Return the shape `after`, changed around faults, and the shapes to pass
+        before it."""
         untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
         # a change that flattens elements is the last resort
-        needs_stop = len(faults) > 0 or self._flat_count(untangled) > self._flat_count(after)
+        needs_stop = len(faults) > 0 or self._flat_count(untangled) > self._flat_count(
+            after
+        )
         i = self._halfway(before, after, passed) if needs_stop and halvings else None
         if i is not None:
             # each shape is fitted to the one before, as on the path
@@ -311,8 +419,12 @@ class ElasticFit:
         return untangled, []
 
     def _near_flat_elements(self) -> Mask:
-        """Return (b,) whether a vertex of the boundary is a corner of a flat element or of one that touches it."""
-        is_flat = volumes_between(self.positions_mm, self._pieces) < MIN_VOLUME_LEFT * self._start_volumes
+        """Return (b,) whether a vertex of the boundary is a corner of a flat element or
+        of one that touches it."""
+        is_flat = (
+            volumes_between(self.positions_mm, self._pieces)
+            < MIN_VOLUME_LEFT * self._start_volumes
+        )
         is_near = np.zeros(len(self.positions_mm), dtype=bool)
         is_near[self._pieces[is_flat]] = True
         is_near[self._pieces[is_near[self._pieces].any(axis=1)]] = True
@@ -322,21 +434,35 @@ class ElasticFit:
         volumes = volumes_between(places, self._pieces)
         return int((volumes < MIN_VOLUME_LEFT / 2 * self._start_volumes).sum())
 
-    def _halfway(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> int | None:
-        """Return the number of the valid state that is nearest to the middle between two shapes; None without any."""
-        ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
+    def _halfway(
+        self, before: Floats, after: Floats, passed: Sequence[Floats]
+    ) -> int | None:
+        """Return the number of the valid state that is nearest to the middle between
+        two shapes; None without any."""
+        ways = [
+            abs(self._distance(before, shape) - self._distance(shape, after))
+            for shape in passed
+        ]
         for number in np.argsort(ways):
             # where curved elements fold over, their linear pieces may be valid
             if has_volume(passed[number], self._tets).all():
                 return int(number)
         return None
 
-    def _faults_between(self, before: Floats, after: Floats, least: float = 0.0) -> Floats:
-        """Return the (k, 3) places before, of elements that are inverted and faces that cross on the straight way."""
+    def _faults_between(
+        self, before: Floats, after: Floats, least: float = 0.0
+    ) -> Floats:
+        """Return the (k, 3) places before, of elements that are inverted and faces that
+        cross on the straight way."""
         inverted = inverted_on_the_way(before, after, self._tets, least)
-        places, faces = [before[self._tets[inverted]].mean(axis=1)], self._used[self._surface.faces]
+        places, faces = (
+            [before[self._tets[inverted]].mean(axis=1)],
+            self._used[self._surface.faces],
+        )
         for part in PARTS_OF_WAY:
-            surface = TriangleMesh(((1 - part) * before + part * after)[self._used], self._surface.faces)
+            surface = TriangleMesh(
+                ((1 - part) * before + part * after)[self._used], self._surface.faces
+            )
             places.append(before[faces[faces_that_cross(surface)]].mean(axis=1))
         return np.concatenate(places)
 
@@ -345,15 +471,19 @@ class ElasticFit:
         return rigid_fit(shape, onto, vertex_sizes(onto, self._pieces))
 
     def _distance(self, first: Floats, second: Floats) -> float:
-        """Return how far all but a hundredth of the boundary moves between two shapes, without rigid motion."""
+        """Return how far all but a hundredth of the boundary moves between two shapes,
+        without rigid motion."""
         moves = transform_points(second, self._fit(second, first)) - first
         return float(np.quantile(np.linalg.norm(moves[self._used], axis=1), 0.99))
 
     def _gradients(self, goal: Floats) -> Floats:
-        return deformation_gradients(self.positions_mm, goal, self._pieces, SLOPES[None])[:, 0]
+        return deformation_gradients(
+            self.positions_mm, goal, self._pieces, SLOPES[None]
+        )[:, 0]
 
     def _straighten(self) -> None:
-        """Straighten the edges of curved elements that fold over; SolverError where that does not make them valid."""
+        """Straighten the edges of curved elements that fold over; SolverError where
+        that does not make them valid."""
         if self._tets is self._pieces:
             return
         places = straighten_sides(self.positions_mm, self._tets)
@@ -362,7 +492,10 @@ class ElasticFit:
             raise SolverError(
                 "a shape cannot be reached with curved elements that are valid",
                 found=f"{int(bad.sum())} elements fold over",
-                remedy="Mesh with smaller elements (mesh.surface_edge_mm) or linear ones (mesh.order: 1).",
+                remedy=(
+                    "Mesh with smaller elements (mesh.surface_edge_mm) or linear ones"
+                    " (mesh.order: 1)."
+                ),
             )
         self.positions_mm = places
 
@@ -371,10 +504,11 @@ class ElasticFit:
         return self.positions_mm
 
     def _step(self, goals: Floats, lengths: Floats, strain: Floats | None) -> str:
-        """Grow by a strain (n, 6) and draw the boundary to goals (b, 3); return why the step did not converge, or "".
+        """Grow by a strain (n, 6) and draw the boundary to goals (b, 3); return why the
+        step did not converge, or "".
 
-        The body moves as far as the iteration went: each iterate lowers the energy, inverts no element, and crosses no
-        faces.
+        The body moves as far as the iteration went: each iterate lowers the energy,
+        inverts no element, and crosses no faces.
         """
         domain, problem, self._moved_straight = self._domain, self._problem, False
         domain.place(self.positions_mm * M_PER_MM)
@@ -384,7 +518,9 @@ class ElasticFit:
         inverse = np.tile(np.eye(3), (*shape, 1, 1))
         if strain is not None:
             nodal = strain[self._elements.vertices][self._elements.cells]
-            inverse = inverse_exponential(unpacked(problem.points.interpolation @ nodal))
+            inverse = inverse_exponential(
+                unpacked(problem.points.interpolation @ nodal)
+            )
         # as one body, also if its parts are not connected
         one_part = np.zeros_like(domain.part)
         moduli, reason = np.full(shape, MODULUS_PA), ""
@@ -400,7 +536,9 @@ class ElasticFit:
                 break
         start = self.positions_mm
         for displacement in self._solver.iterates:
-            self.positions_mm = start + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
+            self.positions_mm = (
+                start + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
+            )
             self._passed.append(self.positions_mm)
         opened = self._opened(self.positions_mm)
         if opened is not self.positions_mm:
@@ -409,59 +547,84 @@ class ElasticFit:
         return reason
 
     def _opened(self, places: Floats) -> Floats:
-        """Return positions (n, 3) at which flat elements are opened, as far as moves inside and small ones outside can.
+        """Return positions (n, 3) at which flat elements are opened, as far as moves
+        inside and small ones outside can.
 
         No state is lost, since none is in the elements.
         """
         arguments = self._pieces, self._start_volumes
-        opened = open_flat_elements(places, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT)
+        opened = open_flat_elements(
+            places, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT
+        )
         # elements without a vertex inside need a small move of the boundary
-        moved = open_flat_elements(opened, *arguments, self._outer_moves_mm, MIN_VOLUME_LEFT)
+        moved = open_flat_elements(
+            opened, *arguments, self._outer_moves_mm, MIN_VOLUME_LEFT
+        )
         if moved is not opened:
             surface = TriangleMesh(moved[self._used], self._surface.faces)
             opened = opened if len(faces_that_cross(surface)) else moved
         return opened
 
     def _opened_after(self, before: Floats, places: Floats) -> Floats:
-        """Return the positions of `_opened`, or those given where these have fewer faults on the way from before."""
+        """Return the positions of `_opened`, or those given where these have fewer
+        faults on the way from before."""
         opened = self._opened(places)
         if opened is places:
             return places
-        is_worse = len(self._faults_between(before, opened)) > len(self._faults_between(before, places))
+        is_worse = len(self._faults_between(before, opened)) > len(
+            self._faults_between(before, places)
+        )
         return places if is_worse else opened
 
     def _flattening(self) -> Floats:
-        """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them, which a step takes back.
+        """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them,
+        which a step takes back.
 
-        The strain since the start is compared with that of the elements around. An element that has lost volume, and
-        more than these, is elastic as to the difference, while the body is without stress otherwise.
+        The strain since the start is compared with that of the elements around. An
+        element that has lost volume, and more than these, is elastic as to the
+        difference, while the body is without stress otherwise.
         """
         cells = self._elements.vertices[self._elements.cells]
         corners = self.positions_mm[cells]
         edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-        logs, volumes = log_stretch(edges @ self._inverse_edges, left=True), determinants(edges)
+        logs, volumes = (
+            log_stretch(edges @ self._inverse_edges, left=True),
+            determinants(edges),
+        )
         around = packed(logs)
         for _ in range(FLATTENING_ROUNDS):
-            at_vertices = self._incidence @ (volumes[:, None] * around) / (self._incidence @ volumes)[:, None]
+            at_vertices = (
+                self._incidence
+                @ (volumes[:, None] * around)
+                / (self._incidence @ volumes)[:, None]
+            )
             around = at_vertices[cells].mean(axis=1)
         excess = logs - unpacked(around)
-        lost = -np.maximum(np.trace(logs, axis1=1, axis2=2), np.trace(excess, axis1=1, axis2=2))
+        lost = -np.maximum(
+            np.trace(logs, axis1=1, axis2=2), np.trace(excess, axis1=1, axis2=2)
+        )
         flat = np.flatnonzero(lost > MIN_FLATTENING)
-        weight = np.minimum((lost[flat] - MIN_FLATTENING) / (MAX_FLATTENING - MIN_FLATTENING), 1.0)
+        weight = np.minimum(
+            (lost[flat] - MIN_FLATTENING) / (MAX_FLATTENING - MIN_FLATTENING), 1.0
+        )
         stretches = np.tile(np.eye(3), (len(cells), 1, 1, 1))
-        stretches[flat, 0] = exponential(weight[:, None, None] * excess[flat], MAX_OPENING)
+        stretches[flat, 0] = exponential(
+            weight[:, None, None] * excess[flat], MAX_OPENING
+        )
         return stretches
 
 
 def exponential(logs: Floats, limit: float) -> Floats:
-    """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the limit count as this."""
+    """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the
+    limit count as this."""
     values, axes = np.linalg.eigh(logs)
     values = np.exp(np.clip(values, -limit, limit))
     return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
 def inverse_exponential(logs: Floats) -> Floats:
-    """Return exp(−L) of small (..., 3, 3) matrices to fourth order in L: to 1e-7 for growth of a tenth."""
+    """Return exp(−L) of small (..., 3, 3) matrices to fourth order in L: to 1e-7 for
+    growth of a tenth."""
     result = np.eye(3) - logs / 4
     for order in (3, 2, 1):
         result = np.eye(3) - logs @ result / order

@@ -1,4 +1,5 @@
-"""Growth of tissue in a step: the interface of growth models to the solver, its tensor G, and growth by rates."""
+"""Growth of tissue in a step: the interface of growth models to the solver, its tensor
+G, and growth by rates."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -18,7 +19,8 @@ from .tissue import Elements, Tissue
 from .zones import Zones
 
 GROWTH_TOL = 1e-10
-"""Difference below which growth increments count as equal: a hundred-millionth of the cortex' growth in a step."""
+"""Difference below which growth increments count as equal: a hundred-millionth of the
+cortex' growth in a step."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +31,20 @@ class Size:
     volume_mm3: float
 
     def rates_to(self, after: "Size", step_s: float) -> Floats:
-        """Return the (2,) rates in 1/s of ln area and ln volume between the sizes before and after a step."""
-        return np.log([after.area_mm2 / self.area_mm2, after.volume_mm3 / self.volume_mm3]) / step_s
+        """Return the (2,) rates in 1/s of ln area and ln volume between the sizes
+        before and after a step."""
+        return (
+            np.log([after.area_mm2 / self.area_mm2, after.volume_mm3 / self.volume_mm3])
+            / step_s
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthInputs:
     """Inputs of growth that are constant through a run.
 
-    The mesh at its start, with the run's zones and maps; `total` adds up a count of elements over the ranks.
+    The mesh at its start, with the run's zones and maps; `total` adds up a count of
+    elements over the ranks.
     """
 
     mesh: TetrahedralMesh
@@ -62,8 +69,9 @@ class GrowthInputs:
 class StepStart:
     """The state a growth model sees at the start of a step.
 
-    The (n, 3) positions of all vertices, equal on every rank, the time since the start of the run, the length of the
-    step, and the `correction` that the last step has returned.
+    The (n, 3) positions of all vertices, equal on every rank, the time since the start
+    of the run, the length of the step, and the `correction` that the last step has
+    returned.
     """
 
     positions_mm: Floats
@@ -72,7 +80,8 @@ class StepStart:
     correction: Sequence[float] | None = None
 
     def week(self, p: FoldingParameters, part: float) -> float:
-        """Return the gestational week at a fraction of the step, from 0 at its start to 1 at its end."""
+        """Return the gestational week at a fraction of the step, from 0 at its start to
+        1 at its end."""
         return p.start_week + (self.time_s + part * self.step_s) / SECONDS_PER_GW
 
 
@@ -80,7 +89,8 @@ class StepStart:
 class StepGrowth(ABC):
     """Growth of tissue in one step.
 
-    `parameters` are those of the run, with the growth rates of this step, which are written to frames.
+    `parameters` are those of the run, with the growth rates of this step, which are
+    written to frames.
     """
 
     parameters: FoldingParameters
@@ -91,25 +101,37 @@ class StepGrowth(ABC):
         """Return G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
 
     def deformation(self, elements: Elements) -> Floats | None:
-        """Return R·G (c, q, 3, 3), the deformation of free tissue at the points of elements, None if it is by rates."""
+        """Return R·G (c, q, 3, 3), the deformation of free tissue at the points of
+        elements, None if it is by rates."""
         return None
 
     def mean_deformation(self, elements: Elements) -> Floats | None:
-        """Return the mean (c, 3, 3) of `deformation` over each element, None if growth is by rates."""
+        """Return the mean (c, 3, 3) of `deformation` over each element, None if growth
+        is by rates."""
         deformation = self.deformation(elements)
-        return None if deformation is None else np.einsum("q,cqij->cij", elements.points.weights, deformation)
+        return (
+            None
+            if deformation is None
+            else np.einsum("q,cqij->cij", elements.points.weights, deformation)
+        )
 
     def guess(self, fixed: NDArray[np.bool_]) -> Floats | None:
-        """Return the displacement (n, 3) in m of a free body, zero where it is fixed (n, 3); None if unknown."""
+        """Return the displacement (n, 3) in m of a free body, zero where it is fixed
+        (n, 3); None if unknown."""
         return None
 
     def correction(self, after: Size) -> tuple[float, ...] | None:
-        """Return the feedback to the next steps after a step that has reached a size, None without feedback."""
+        """Return the feedback to the next steps after a step that has reached a size,
+        None without feedback."""
         return None
 
     def row(self, after: Size) -> dict[str, Any]:
-        """Return the growth columns of the step table after a step that has reached a size."""
-        return {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
+        """Return the growth columns of the step table after a step that has reached a
+        size."""
+        return {
+            "area_cm2": after.area_mm2 * CM2_PER_MM2,
+            "volume_ml": after.volume_mm3 * ML_PER_MM3,
+        }
 
 
 StepModel = Callable[[StepStart], StepGrowth]
@@ -118,42 +140,66 @@ StepModel = Callable[[StepStart], StepGrowth]
 
 @dataclass(frozen=True, eq=False)
 class GrowthByRates(StepGrowth):
-    """Growth by the parameters' rates of cortex and core, taken in the middle of the step."""
+    """Growth by the parameters' rates of cortex and core, taken in the middle of the
+    step."""
 
     def inverse(self, tissue: Tissue) -> Floats:
         p, start = self.parameters, self.start
-        dg, dr = increments_at(p, tissue.weight, tissue.growing, tissue.maps, start.week(p, 0.5), start.step_s)
+        dg, dr = increments_at(
+            p,
+            tissue.weight,
+            tissue.growing,
+            tissue.maps,
+            start.week(p, 0.5),
+            start.step_s,
+        )
         # normals matter only where tangential and radial growth differ
         layered, normals = tissue.normals(np.abs(dg - dr) > GROWTH_TOL)
-        return layered_inverse(tissue.at_points(dg), tissue.at_points(dr), layered, normals)
+        return layered_inverse(
+            tissue.at_points(dg), tissue.at_points(dr), layered, normals
+        )
 
 
-def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float) -> tuple[Any, Any]:
-    """Return the tangential and radial growth increments dg and dr, as stretches minus 1.
+def increments(
+    w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float
+) -> tuple[Any, Any]:
+    """Return the tangential and radial growth increments dg and dr, as stretches minus
+    1.
 
-    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt, with the cortical weight w, g 1
-    where tissue grows and else 0, and rates in 1/s: tangential of the cortex (α_TAN), radial of the core (α_RAD), and
-    isotropic of the core (α_CORE).
+    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt,
+    with the cortical weight w, g 1 where tissue grows and else 0, and rates in 1/s:
+    tangential of the cortex (α_TAN), radial of the core (α_RAD), and isotropic of the
+    core (α_CORE).
     """
     isotropic = core * (1 - w)
-    return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + isotropic) * (g * step_s)
+    return (tangential * w + isotropic) * (g * step_s), (
+        radial * (1 - w) + isotropic
+    ) * (g * step_s)
 
 
 def increments_at(
     p: FoldingParameters, w: Floats, g: Floats, maps: Maps, week: float, step_s: float
 ) -> tuple[Floats, Floats]:
-    """Return the increments of a step by the parameters' rates at a week; `w`, `g` and maps are at the same points."""
+    """Return the increments of a step by the parameters' rates at a week; `w`, `g` and
+    maps are at the same points."""
     tangential, radial, core = (
         value_at(rate, week, maps)
-        for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
+        for rate in (
+            p.growth_rate_per_s,
+            p.radial_growth_rate_per_s,
+            p.core_growth_rate_per_s,
+        )
     )
     return increments(w, g, tangential, radial, core, step_s)
 
 
-def layered_inverse(dg: Floats, dr: Floats, layered: NDArray[np.bool_], normals: Floats) -> Floats:
+def layered_inverse(
+    dg: Floats, dr: Floats, layered: NDArray[np.bool_], normals: Floats
+) -> Floats:
     """Return G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
 
-    The elements of the mask `layered` (c,) have unit normals N (e, q, 3); others grow by dg in all directions.
+    The elements of the mask `layered` (c,) have unit normals N (e, q, 3); others grow
+    by dg in all directions.
     """
     inverse = (1 / (1 + dg))[..., None, None] * np.eye(3)
     radial = normals[..., :, None] * normals[..., None, :]

@@ -10,8 +10,12 @@ from .targets import growth_on_path, path_of_run
 
 BUILDERS: dict[str, Callable[[FoldingParameters, GrowthInputs], StepModel]] = {
     "rates": lambda p, inputs: partial(GrowthByRates, p),
-    "sizes": lambda p, inputs: partial(steered_growth, p, inputs, inputs.size(inputs.mesh.vertices)),
-    "shapes": lambda p, inputs: partial(growth_on_path, p, inputs, path_of_run(p, inputs)),
+    "sizes": lambda p, inputs: partial(
+        steered_growth, p, inputs, inputs.size(inputs.mesh.vertices)
+    ),
+    "shapes": lambda p, inputs: partial(
+        growth_on_path, p, inputs, path_of_run(p, inputs)
+    ),
 }
 """Functions that return a model, given the parameters and inputs of a run."""
 

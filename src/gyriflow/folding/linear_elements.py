@@ -1,4 +1,5 @@
-"""Energy, forces and stiffness of linear elements, two to four times as fast as code by FFCx."""
+"""Energy, forces and stiffness of linear elements, two to four times as fast as code by
+FFCx."""
 
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,17 @@ from ..mechanics.materials import Material, energy_code
 from .compilation import compiled, pointer
 from .domain import Domain
 
-DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u, void *H,
-                                 void *weight, void *forces, void *places, void *blocks);"""
+DECLARATION = """
+double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u,
+                void *H, void *weight, void *forces, void *places, void *blocks);
+"""
 
 
 class LinearElements:
     """The local elements of a domain.
 
-    Attributes set by the user: the `weight` (c, 1) in Pa and the tensor `H` (c, 1, 3, 3) of the step's energy
-    (`NonlinearProblem.set_step`).
+    Attributes set by the user: the `weight` (c, 1) in Pa and the tensor `H` (c, 1, 3,
+    3) of the step's energy (`NonlinearProblem.set_step`).
     """
 
     def __init__(self, domain: Domain, material: Material) -> None:
@@ -32,17 +35,33 @@ class LinearElements:
         self.weight: Floats
         self.H: Floats
 
-    def assemble(self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None) -> float:
-        """Return the energy in J at displacements u (k, 3) in m; add to the given forces in N and matrix in N/m.
+    def assemble(
+        self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None
+    ) -> float:
+        """Return the energy in J at displacements u (k, 3) in m; add to the given
+        forces in N and matrix in N/m.
 
         Blocks of the stiffness below the diagonal between owned nodes are omitted.
         """
         cells, nodes = self._domain.cells, self._domain.local(self._domain.positions)
         if matrix is not None and self._places is None:
-            places = sparse.csr_array((np.arange(len(matrix.indices), dtype=np.int32), matrix.indices, matrix.indptr))
-            rows, columns = np.repeat(cells, 4, axis=1).ravel(), np.tile(cells, 4).ravel()
+            places = sparse.csr_array(
+                (
+                    np.arange(len(matrix.indices), dtype=np.int32),
+                    matrix.indices,
+                    matrix.indptr,
+                )
+            )
+            rows, columns = (
+                np.repeat(cells, 4, axis=1).ravel(),
+                np.tile(cells, 4).ravel(),
+            )
             # blocks below the diagonal are needed only if one of their nodes is a ghost
-            needed = (columns >= rows) | (columns >= self._domain.n_owned) | (rows >= self._domain.n_owned)
+            needed = (
+                (columns >= rows)
+                | (columns >= self._domain.n_owned)
+                | (rows >= self._domain.n_owned)
+            )
             self._places = np.where(needed, places[rows, columns], -1)
         count, numbers = len(cells), nodes.size
         values = None if matrix is None else matrix.data
@@ -60,7 +79,9 @@ class LinearElements:
         ]
         return float(self._code.assemble(count, self._bulk_to_shear, *pointers))
 
-    def _pointer(self, array: NDArray | None, dtype: type, size: int, *, is_written: bool = False) -> Any:
+    def _pointer(
+        self, array: NDArray | None, dtype: type, size: int, *, is_written: bool = False
+    ) -> Any:
         if array is None:
             return self._interface.NULL
         return pointer(self._interface, array, dtype, size, is_written=is_written)

@@ -1,8 +1,10 @@
-"""Linear systems of Newton's method: conjugate gradients with a two-level additive Schwarz preconditioner.
+"""Linear systems of Newton's method: conjugate gradients with a two-level additive
+Schwarz preconditioner.
 
-At tolerances of a hundredth any good method needs about thirty products with the tangent, and the setup of multigrid
-costs more than that. The setup of this preconditioner takes the time of a few products: inverse diagonal blocks, and
-the rigid motions of some hundred parts of the mesh as the coarse level.
+At tolerances of a hundredth any good method needs about thirty products with the
+tangent, and the setup of multigrid costs more than that. The setup of this
+preconditioner takes the time of a few products: inverse diagonal blocks, and the rigid
+motions of some hundred parts of the mesh as the coarse level.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +22,8 @@ from .products import PartMotions, multiply_blocks
 from .tangent import Residual, Tangent, part_arms, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")
-"""Ways to solve a linear system: the second is tried where the first fails. A column of the step table."""
+"""Ways to solve a linear system: the second is tried where the first fails. A column of
+the step table."""
 PLAIN, SHIFTED = range(2)
 MAX_PARTS = 256
 """Parts of the mesh whose rigid motions are the coarse level."""
@@ -29,10 +32,16 @@ COARSE_LIFETIME = 8
 REGULARISATION = 1e-6
 """Shift of the coarse matrix, as a fraction of its mean diagonal entry."""
 _REASONS = PETSc.KSP.ConvergedReason
-INDEFINITE = (_REASONS.DIVERGED_INDEFINITE_MAT, _REASONS.DIVERGED_INDEFINITE_PC, _REASONS.DIVERGED_DTOL)
-"""PETSc's reasons if the tangent is not positive definite; the residual may grow (DTOL) before that is detected."""
+INDEFINITE = (
+    _REASONS.DIVERGED_INDEFINITE_MAT,
+    _REASONS.DIVERGED_INDEFINITE_PC,
+    _REASONS.DIVERGED_DTOL,
+)
+"""PETSc's reasons if the tangent is not positive definite; the residual may grow (DTOL)
+before that is detected."""
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
-"""Shifts of a tangent's diagonal, as fractions of it, tried in turn until the tangent is positive definite."""
+"""Shifts of a tangent's diagonal, as fractions of it, tried in turn until the tangent
+is positive definite."""
 
 
 class NotConvergedError(SolverError):
@@ -41,10 +50,11 @@ class NotConvergedError(SolverError):
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """A descent direction (k, 3) of the local nodes in m, and its slope, the derivative of the energy along it, in J.
+    """A descent direction (k, 3) of the local nodes in m, and its slope, the derivative
+    of the energy along it, in J.
 
-    In addition the iterations of the linear solve, its index in `RUNGS`, and whether the tangent was positive definite
-    without a shift (`convex`).
+    In addition the iterations of the linear solve, its index in `RUNGS`, and whether
+    the tangent was positive definite without a shift (`convex`).
     """
 
     values: Floats
@@ -55,9 +65,11 @@ class Direction:
 
 
 class TwoLevelPreconditioner:
-    """The sum D⁻¹ + Q (QᵀAQ)⁻¹ Qᵀ of block Jacobi and a coarse level: a two-level additive Schwarz method.
+    """The sum D⁻¹ + Q (QᵀAQ)⁻¹ Qᵀ of block Jacobi and a coarse level: a two-level
+    additive Schwarz method.
 
-    Q holds the rigid motions of parts of the mesh (Nicolaides 1987, for elasticity), A is the elastic part alone.
+    Q holds the rigid motions of parts of the mesh (Nicolaides 1987, for elasticity), A
+    is the elastic part alone.
     """
 
     def __init__(self, domain: Domain, tangent: Tangent) -> None:
@@ -68,23 +80,34 @@ class TwoLevelPreconditioner:
         self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
         self._part_of_vertex = bisect_points(domain.positions, count)
         self._part = self._part_of_vertex[self._vertex]
-        self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.n_owned)
+        self._own = slice(
+            first := domain.space.dofmap.index_map.local_range[0],
+            first + domain.n_owned,
+        )
         self._parts = int(self._part.max()) + 1
-        # the rows of the coarse inverse that this rank needs: motions of the parts that contain its nodes
-        self._moved = (6 * np.unique(self._part[self._own])[:, None] + np.arange(6)).ravel()
+        # the rows of the coarse inverse that this rank needs: motions of the parts that
+        # contain its nodes
+        self._moved = (
+            6 * np.unique(self._part[self._own])[:, None] + np.arange(6)
+        ).ravel()
         self._fixed = np.flatnonzero(tangent.elastic.matrix.fixed[self._own])
         self._made_at = -COARSE_LIFETIME
 
     def renew(self) -> None:
-        """Update the diagonal to the present tangent, and the coarse level after `COARSE_LIFETIME` tangents."""
-        self._inverse_diagonal = inverse_blocks(self._tangent.diagonal()).astype(np.float32)
+        """Update the diagonal to the present tangent, and the coarse level after
+        `COARSE_LIFETIME` tangents."""
+        self._inverse_diagonal = inverse_blocks(self._tangent.diagonal()).astype(
+            np.float32
+        )
         if self._tangent.elastic.assembled >= self._made_at + COARSE_LIFETIME:
             self._made_at = self._tangent.elastic.assembled
             self._set_coarse_level()
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y to the preconditioned x."""
-        coarse = self._domain.sum_over_ranks(self._motions.restrict(x.array_r, self._parts))
+        coarse = self._domain.sum_over_ranks(
+            self._motions.restrict(x.array_r, self._parts)
+        )
         coarse[self._moved] = self._inverse_coarse @ coarse.astype(np.float32)
         multiply_blocks(self._inverse_diagonal, x.array_r, y.array_w)
         self._motions.add(coarse, y.array_w)
@@ -99,23 +122,31 @@ class TwoLevelPreconditioner:
         modes = rigid_motions(arms)
         modes[matrix.fixed] = 0.0
         size, nodes = 6 * self._parts, np.arange(len(modes) + 1)
-        prolongation = sparse.bsr_matrix((modes, self._part, nodes), shape=(3 * len(modes), size))
+        prolongation = sparse.bsr_matrix(
+            (modes, self._part, nodes), shape=(3 * len(modes), size)
+        )
         own = modes[self._own], self._part[self._own], nodes[: self._domain.n_owned + 1]
-        restriction = sparse.bsr_matrix(own, shape=(3 * self._domain.n_owned, size)).T.tobsr((6, 3))
-        coarse = self._domain.sum_over_ranks((restriction @ (matrix.half() @ prolongation)).toarray())
+        restriction = sparse.bsr_matrix(
+            own, shape=(3 * self._domain.n_owned, size)
+        ).T.tobsr((6, 3))
+        coarse = self._domain.sum_over_ranks(
+            (restriction @ (matrix.half() @ prolongation)).toarray()
+        )
         coarse += coarse.T
         scale = np.trace(coarse) / size
         coarse[np.diag_indices(size)] += REGULARISATION * scale
         motions = self._tangent.motions
         if motions is not None:
-            # a stiffness against the removed motions, without which it would be singular
+            # a stiffness against the removed motions, without which it would be
+            # singular
             modes = self._domain.sum_over_ranks(restriction @ motions.modes)
             coarse += 10 * scale / np.linalg.norm(modes, 2) ** 2 * modes @ modes.T
         self._inverse_coarse = inverse_matrix(coarse)[self._moved].astype(np.float32)
 
 
 def inverse_blocks(blocks: Floats) -> Floats:
-    """Return the inverses of (n, 3, 3) symmetric blocks, as `positive_inverses` if they are indefinite."""
+    """Return the inverses of (n, 3, 3) symmetric blocks, as `positive_inverses` if they
+    are indefinite."""
     a, b, c = blocks.swapaxes(0, 1)
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     determinants = np.einsum("ni,ni->n", a, cofactors[:, 0])
@@ -126,7 +157,8 @@ def inverse_blocks(blocks: Floats) -> Floats:
 
 
 def inverse_matrix(matrix: Floats) -> Floats:
-    """Return the inverse of a (k, k) symmetric matrix, as `positive_inverses` if it is indefinite."""
+    """Return the inverse of a (k, k) symmetric matrix, as `positive_inverses` if it is
+    indefinite."""
     factor, failed = dpotrf(matrix, lower=1)
     if failed:
         return positive_inverses(matrix)
@@ -135,7 +167,8 @@ def inverse_matrix(matrix: Floats) -> Floats:
 
 
 def positive_inverses(matrices: Floats) -> Floats:
-    """Return inverses of (..., k, k) symmetric matrices with the absolute values of their eigenvalues."""
+    """Return inverses of (..., k, k) symmetric matrices with the absolute values of
+    their eigenvalues."""
     values, directions = np.linalg.eigh(matrices)
     sizes = np.abs(values)
     sizes = np.maximum(sizes, REGULARISATION * sizes.max(axis=-1, keepdims=True))
@@ -145,7 +178,8 @@ def positive_inverses(matrices: Floats) -> Floats:
 class LinearSolver:
     """Solver of the linear systems of a problem; a solve ends after `max_iterations`.
 
-    It keeps the preconditioner and the last shift: they affect how a direction is found, not the solution of a step.
+    It keeps the preconditioner and the last shift: they affect how a direction is
+    found, not the solution of a step.
     """
 
     def __init__(self, problem: NonlinearProblem, max_iterations: int) -> None:
@@ -158,19 +192,23 @@ class LinearSolver:
         self._cg.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._cg.setTolerances(atol=0.0, max_it=max_iterations)
 
-    def solve(self, tangent: Tangent, residual: Residual, reduction: float, *, convexify: bool) -> Direction:
-        """Solve J d = −r for a descent direction d, with the tangent J and the residual r at the same displacement.
+    def solve(
+        self, tangent: Tangent, residual: Residual, reduction: float, *, convexify: bool
+    ) -> Direction:
+        """Solve J d = −r for a descent direction d, with the tangent J and the residual
+        r at the same displacement.
 
-        `reduction` is the relative tolerance of the solve. An indefinite J is shifted; with `convexify`, the stiffness
-        of contact in it is first made semidefinite. NotConvergedError if no shift helps.
+        `reduction` is the relative tolerance of the solve. An indefinite J is shifted;
+        with `convexify`, the stiffness of contact in it is first made semidefinite.
+        NotConvergedError if no shift helps.
         """
         iterations = 0
         self._cg.setTolerances(rtol=reduction)
         # a tangent after an indefinite one may still be indefinite
         first = max(self._level - 1, 0)
         if convexify and not self._problem.convex:
-            # surfaces pressed together tend to slide sideways, which makes the tangent indefinite; with semidefinite
-            # contact it rarely is, but it is not exact
+            # surfaces pressed together tend to slide sideways, which makes the tangent
+            # indefinite; with semidefinite contact it rarely is, but it is not exact
             if first == 0:
                 reason, direction = self._run(tangent, residual)
                 iterations += direction.iterations
@@ -183,16 +221,23 @@ class LinearSolver:
             reason, direction = self._run(tangent, residual)
             tangent.shift_diagonal(0.0)
             iterations += direction.iterations
-            # conjugate gradients that end early have a descent direction as well (Dembo and Steihaug 1983)
+            # conjugate gradients that end early have a descent direction as well (Dembo
+            # and Steihaug 1983)
             if reason > 0 or reason == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT:
                 self._level = level
-                return replace(direction, iterations=iterations, rung=SHIFTED if level else PLAIN, convex=level == 0)
+                return replace(
+                    direction,
+                    iterations=iterations,
+                    rung=SHIFTED if level else PLAIN,
+                    convex=level == 0,
+                )
             if reason not in INDEFINITE:
                 break
         raise NotConvergedError("the linear solver found no descent direction")
 
     def _run(self, tangent: Tangent, residual: Residual) -> tuple[int, Direction]:
-        """Return PETSc's convergence reason, 0 if the direction does not descend, and the direction."""
+        """Return PETSc's convergence reason, 0 if the direction does not descend, and
+        the direction."""
         if self._preconditioner is None:
             self._preconditioner = TwoLevelPreconditioner(self._problem.domain, tangent)
             multilevel = self._cg.getPC()
@@ -204,7 +249,13 @@ class LinearSolver:
         self._right.array_w[:] = residual.owned
         self._cg.solve(self._right, self._solution)
         owned = -self._solution.array_r
-        self._problem.clear_fixed(owned)  # fixed components are zero only to within the tolerance
+        self._problem.clear_fixed(
+            owned
+        )  # fixed components are zero only to within the tolerance
         slope = self._problem.domain.dot(owned, residual.owned)
         reason = self._cg.getConvergedReason() if slope < 0 else 0  # False for NaN
-        return reason, Direction(self._problem.domain.with_ghosts(owned), slope, self._cg.getIterationNumber())
+        return reason, Direction(
+            self._problem.domain.with_ghosts(owned),
+            slope,
+            self._cg.getIterationNumber(),
+        )

@@ -1,4 +1,5 @@
-"""Newton's method for the displacement of one step: inexact linear solves, each followed by a line search."""
+"""Newton's method for the displacement of one step: inexact linear solves, each
+followed by a line search."""
 
 import math
 from collections.abc import Sequence
@@ -16,25 +17,28 @@ from .tangent import Residual, Tangent
 ENERGY_ROUND_OFF = 1e-12
 """Relative round-off of an energy, a sum over elements."""
 MIN_RESOLVED = 1e-6
-"""Relative change below which energies cannot be compared: round-off at strains of a ten-thousandth."""
+"""Relative change below which energies cannot be compared: round-off at strains of a
+ten-thousandth."""
 MAX_ITERATIONS_FACTOR = 10
 """Iterations allowed in all, as a multiple of `max_newton`."""
 STAGNATION_FACTOR = 10.0
-"""Below this multiple of the tolerance, an iteration that does not halve the residual is followed by one with the exact
-tangent."""
+"""Below this multiple of the tolerance, an iteration that does not halve the residual
+is followed by one with the exact tangent."""
 MAX_FORCING = 0.1
 """Largest forcing term: relative tolerance of a linear solve far from the solution."""
 ARMIJO = 1e-4
-"""Fraction of the decrease predicted by the slope that a line search requires (Armijo 1966)."""
+"""Fraction of the decrease predicted by the slope that a line search requires (Armijo
+1966)."""
 
 
 @dataclass(frozen=True)
 class NewtonSettings:
     """Tolerances and limits of the iteration.
 
-    `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side: see
-    `forcing_term`. An iteration that lowers the energy by more than the fraction `min_progress` does not count towards
-    `max_newton`. `keeps_iterates` is for those who need the way to a solution.
+    `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the
+    linear right-hand side: see `forcing_term`. An iteration that lowers the energy by
+    more than the fraction `min_progress` does not count towards `max_newton`.
+    `keeps_iterates` is for those who need the way to a solution.
     """
 
     newton_tolerance: float = 1e-4
@@ -50,9 +54,9 @@ class NewtonSettings:
 class Solution:
     """A step's displacement (k, 3) of the local nodes in m, and the work it took.
 
-    In addition the iterations, the highest index in `RUNGS` of a linear solve, and the residual relative to that at
-    zero displacement. `converged` is True if this is below the tolerance, False if round-off prevented further
-    progress.
+    In addition the iterations, the highest index in `RUNGS` of a linear solve, and the
+    residual relative to that at zero displacement. `converged` is True if this is below
+    the tolerance, False if round-off prevented further progress.
     """
 
     displacement: Floats
@@ -67,8 +71,8 @@ class Solution:
 class Iterate:
     """An iterate: its residual at its displacement, and its energy in J if computed.
 
-    `progress` is the relative decrease of the energy in the iteration, if computed. `exhausted` is True if round-off
-    prevents further progress.
+    `progress` is the relative decrease of the energy in the iteration, if computed.
+    `exhausted` is True if round-off prevents further progress.
     """
 
     residual: Residual
@@ -78,17 +82,20 @@ class Iterate:
 
 
 def residual_floor(mesh: TetrahedralMesh, modulus_pa: float) -> float:
-    """Return the residual in N that counts as solved in a mesh in mm, whatever that at zero displacement."""
+    """Return the residual in N that counts as solved in a mesh in mm, whatever that at
+    zero displacement."""
     edge_m = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
     return 1e-11 * modulus_pa * edge_m**2 * math.sqrt(len(mesh.vertices))
 
 
 def forcing_term(final: float, left: float, tightest: float) -> float:
-    """Return the forcing term of inexact Newton, the relative tolerance of a linear solve (Eisenstat and Walker 1996).
+    """Return the forcing term of inexact Newton, the relative tolerance of a linear
+    solve (Eisenstat and Walker 1996).
 
-    `final` is the tolerance that would end the step. `left` is the fraction of the residual that remained after the
-    last iteration (after the next one, about its square remains, however accurate the linear solve). `tightest` is the
-    tolerance for fast convergence.
+    `final` is the tolerance that would end the step. `left` is the fraction of the
+    residual that remained after the last iteration (after the next one, about its
+    square remains, however accurate the linear solve). `tightest` is the tolerance for
+    fast convergence.
     """
     if left**2 > MAX_FORCING:
         return max(MAX_FORCING, final)
@@ -100,27 +107,33 @@ def forcing_term(final: float, left: float, tightest: float) -> float:
 class NewtonSolver:
     """Newton's method for the steps of a run.
 
-    State that it keeps between steps affects how a solution is found, and changes the solution within the tolerance
-    only.
+    State that it keeps between steps affects how a solution is found, and changes the
+    solution within the tolerance only.
 
-    A residual below `residual_floor`, in N, counts as solved even if that at zero displacement is hardly larger. `last`
-    is the residual of the current step's last iterate, even if the solve failed. `inverted` is det F (c, p) of the
-    local elements in its last trial that inverted an element, None if there was none. `iterates` are the displacements
-    (k, 3) of the current step's iterates, if they are kept.
+    A residual below `residual_floor`, in N, counts as solved even if that at zero
+    displacement is hardly larger. `last` is the residual of the current step's last
+    iterate, even if the solve failed. `inverted` is det F (c, p) of the local elements
+    in its last trial that inverted an element, None if there was none. `iterates` are
+    the displacements (k, 3) of the current step's iterates, if they are kept.
     """
 
-    def __init__(self, problem: NonlinearProblem, settings: NewtonSettings, residual_floor: float) -> None:
+    def __init__(
+        self, problem: NonlinearProblem, settings: NewtonSettings, residual_floor: float
+    ) -> None:
         self.problem = problem
         self.settings = settings
         self.residual_floor = residual_floor
         self.linear_solver = LinearSolver(problem, settings.max_krylov)
-        self._first_left = 0.0  # fraction of the residual after the first iteration of the last step
+        self._first_left = (
+            0.0  # fraction of the residual after the first iteration of the last step
+        )
         self.last: Residual | None = None
         self.inverted: Floats | None = None
         self.iterates: list[Floats] = []
 
     def solve(self, *guesses: Floats) -> Solution:
-        """Return the displacement of the step, starting from the first useful one of the guesses (k, 3) in m.
+        """Return the displacement of the step, starting from the first useful one of
+        the guesses (k, 3) in m.
 
         NotConvergedError if the residual does not fall below the tolerance.
         """
@@ -130,12 +143,18 @@ class NewtonSolver:
         if not np.isfinite(at_rest.norm):
             raise NotConvergedError("the forces at zero displacement are not finite")
         tolerance = max(settings.newton_tolerance * at_rest.norm, self.residual_floor)
-        iterate = Iterate(at_rest if at_rest.norm <= tolerance else self._first(guesses, at_rest))
+        iterate = Iterate(
+            at_rest if at_rest.norm <= tolerance else self._first(guesses, at_rest)
+        )
         solution, before, stalled = Solution(iterate.residual.displacement), np.inf, 0
         while (norm := iterate.residual.norm) > tolerance and not iterate.exhausted:
             self.last = iterate.residual
-            # where folds snap through or slide along each other, the energy decreases long before the residual does
-            if max(stalled, solution.newton / MAX_ITERATIONS_FACTOR) >= settings.max_newton:
+            # where folds snap through or slide along each other, the energy decreases
+            # long before the residual does
+            if (
+                max(stalled, solution.newton / MAX_ITERATIONS_FACTOR)
+                >= settings.max_newton
+            ):
                 raise NotConvergedError(
                     "Newton's method did not converge",
                     found=f"residual {norm:.2e} N after {solution.newton} iterations",
@@ -143,18 +162,35 @@ class NewtonSolver:
                 )
             solution.newton += 1
             stagnates = before / 2 < norm <= STAGNATION_FACTOR * tolerance
-            left = norm / before if solution.newton > 1 else max(norm / at_rest.norm, self._first_left)
-            forcing = forcing_term(0.4 * tolerance / norm, left, settings.krylov_tolerance)
-            # a lagged tangent with an error below the forcing term is as good as a new one
-            tangent = problem.tangent(iterate.residual, within=0.0 if stagnates else forcing)
+            left = (
+                norm / before
+                if solution.newton > 1
+                else max(norm / at_rest.norm, self._first_left)
+            )
+            forcing = forcing_term(
+                0.4 * tolerance / norm, left, settings.krylov_tolerance
+            )
+            # a lagged tangent with an error below the forcing term is as good as a new
+            # one
+            tangent = problem.tangent(
+                iterate.residual, within=0.0 if stagnates else forcing
+            )
             try:
-                iterate = self._iterate(iterate, tangent, forcing, solution, convexify=not stagnates)
+                iterate = self._iterate(
+                    iterate, tangent, forcing, solution, convexify=not stagnates
+                )
             except NotConvergedError:
                 tightest = settings.krylov_tolerance
                 if not tangent.elastic.lagged and forcing <= tightest:
                     raise
                 tangent = problem.tangent(iterate.residual)
-                iterate = self._iterate(iterate, tangent, min(forcing, tightest), solution, convexify=not stagnates)
+                iterate = self._iterate(
+                    iterate,
+                    tangent,
+                    min(forcing, tightest),
+                    solution,
+                    convexify=not stagnates,
+                )
             stalled += iterate.progress < settings.min_progress
             if settings.keeps_iterates:
                 self.iterates.append(iterate.residual.displacement)
@@ -168,7 +204,8 @@ class NewtonSolver:
         return solution
 
     def _first(self, guesses: Sequence[Floats], at_rest: Residual) -> Residual:
-        """Return the first residual at a guess that is below half of that at rest, else the residual at rest."""
+        """Return the first residual at a guess that is below half of that at rest, else
+        the residual at rest."""
         problem = self.problem
         for guess in map(problem.without_rigid_motion, guesses):
             u = problem.max_step(at_rest.displacement, guess) * guess
@@ -179,16 +216,29 @@ class NewtonSolver:
         return at_rest
 
     def _iterate(
-        self, iterate: Iterate, tangent: Tangent, forcing: float, solution: Solution, *, convexify: bool
+        self,
+        iterate: Iterate,
+        tangent: Tangent,
+        forcing: float,
+        solution: Solution,
+        *,
+        convexify: bool,
     ) -> Iterate:
-        direction = self.linear_solver.solve(tangent, iterate.residual, forcing, convexify=convexify)
+        direction = self.linear_solver.solve(
+            tangent, iterate.residual, forcing, convexify=convexify
+        )
         solution.krylov += direction.iterations
         solution.rung = max(solution.rung, direction.rung)
         return self._line_search(iterate, direction)
 
     def _line_search(self, iterate: Iterate, direction: Direction) -> Iterate:
-        """Halve the step along a direction until it lowers the energy and inverts no element; return that iterate."""
-        problem, start, norm = self.problem, iterate.residual.displacement, iterate.residual.norm
+        """Halve the step along a direction until it lowers the energy and inverts no
+        element; return that iterate."""
+        problem, start, norm = (
+            self.problem,
+            iterate.residual.displacement,
+            iterate.residual.norm,
+        )
         slope, convex, before = direction.slope, direction.convex, iterate.energy
         owned = direction.values[: problem.domain.n_owned].ravel()
         if not problem.convex:
@@ -201,7 +251,8 @@ class NewtonSolver:
             if problem.smallest_volume_ratio(u) > 0:
                 trial = problem.residual(u)
                 finite = np.isfinite(trial.norm)
-                # a convex energy whose slope nearly vanishes at the trial has fallen by about half of the initial slope
+                # a convex energy whose slope nearly vanishes at the trial has fallen by
+                # about half of the initial slope
                 flat = abs(problem.domain.dot(owned, trial.owned)) <= 0.1 * abs(slope)
                 if convex and finite and trial.norm < norm and flat:
                     return Iterate(trial)
@@ -209,8 +260,15 @@ class NewtonSolver:
                 energy = problem.energy(u)
                 lower = finite and energy <= before + ARMIJO * length * slope
                 # if the energy's change is within round-off, the residual decides
-                if lower or (trial.norm < norm and abs(energy - before) <= ENERGY_ROUND_OFF * abs(before)):
-                    return Iterate(trial, energy, (before - energy) / max(abs(before), np.finfo(float).tiny))
+                if lower or (
+                    trial.norm < norm
+                    and abs(energy - before) <= ENERGY_ROUND_OFF * abs(before)
+                ):
+                    return Iterate(
+                        trial,
+                        energy,
+                        (before - energy) / max(abs(before), np.finfo(float).tiny),
+                    )
             else:
                 self.inverted = problem.volume_ratios(u)
             length /= 2
@@ -219,16 +277,26 @@ class NewtonSolver:
         raise NotConvergedError("the line search found no step that lowers the energy")
 
     def worst_places(self) -> str:
-        """Return where a failed solve was worst: the most compressed element and the largest residual, in mm."""
+        """Return where a failed solve was worst: the most compressed element and the
+        largest residual, in mm."""
         problem, domain = self.problem, self.problem.domain
         last = self.last or problem.residual(problem.rest())
         before = domain.local(domain.positions)
-        ratios = problem.volume_ratios(last.displacement) if self.inverted is None else self.inverted
+        ratios = (
+            problem.volume_ratios(last.displacement)
+            if self.inverted is None
+            else self.inverted
+        )
         forces = -np.linalg.norm(last.owned.reshape(-1, 3), axis=1)
         centres = before[domain.corners].mean(axis=1) * MM_PER_M
-        ratio, tet, centre = domain.locate_minimum(ratios.min(axis=1), domain.tet_of_cell, centres)
-        force, vertex, position = domain.locate_minimum(forces, domain.vertex_of_node, before * MM_PER_M)
+        ratio, tet, centre = domain.locate_minimum(
+            ratios.min(axis=1), domain.tet_of_cell, centres
+        )
+        force, vertex, position = domain.locate_minimum(
+            forces, domain.vertex_of_node, before * MM_PER_M
+        )
         return (
-            f"smallest det F {ratio:.3g} in element {tet} at {np.round(centre, 1).tolist()} mm, "
-            f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(position, 1).tolist()} mm"
+            f"smallest det F {ratio:.3g} in element {tet} at"
+            f" {np.round(centre, 1).tolist()} mm, largest residual {-force:.2e} N at"
+            f" vertex {vertex} at {np.round(position, 1).tolist()} mm"
         )

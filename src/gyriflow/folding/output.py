@@ -21,11 +21,13 @@ from .zones import Zones
 
 log = logging.getLogger(__name__)
 GROWTH_SMOOTHING_MM = 0.4
-"""Length over which the map of growth towards shapes is smoothed; growth itself is not."""
+"""Length over which the map of growth towards shapes is smoothed; growth itself is
+not."""
 
 
 def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
-    """Print a line without buffering, so that a log is always up to date, and log its `event`, if any."""
+    """Print a line without buffering, so that a log is always up to date, and log its
+    `event`, if any."""
     print(text, flush=True)
     if event:
         log_event(event, **facts)
@@ -47,7 +49,9 @@ def write_events(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         handler = logging.FileHandler(path, mode="w")
     except OSError as error:
-        raise StorageError("cannot be written", path=path, found=error.strerror) from None
+        raise StorageError(
+            "cannot be written", path=path, found=error.strerror
+        ) from None
     log.setLevel(logging.INFO)
     log.addHandler(handler)
 
@@ -61,22 +65,33 @@ def layer_fields(
     names: Iterable[str],
     log_growth: Floats | None = None,
 ) -> dict[str, NDArray]:
-    """Return the fields of a shape at its vertices, for names of the parameter `fields`.
+    """Return the fields of a shape at its vertices, for names of the parameter
+    `fields`.
 
-    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth is computed from its logarithm (n,
-    6) if given, else from the rates of the parameters.
+    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth is
+    computed from its logarithm (n, 6) if given, else from the rates of the parameters.
     """
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
     weight = cortical_weight(distance, value_at(parameters.thickness_mm, week, maps))
     if log_growth is None:
-        increments = increments_at(parameters, weight, zones.growth, maps, week, parameters.step_s)
-        growth = dict(zip(("tangential_growth_per_step", "radial_growth_per_step"), increments, strict=True))
+        increments = increments_at(
+            parameters, weight, zones.growth, maps, week, parameters.step_s
+        )
+        growth = dict(
+            zip(
+                ("tangential_growth_per_step", "radial_growth_per_step"),
+                increments,
+                strict=True,
+            )
+        )
     else:
         growth = growth_components(log_growth, search.nearest_normals(positions_mm))
     # a vertex gets the highest of its facets' zones
     zone = np.zeros(len(positions_mm), dtype=np.int32)
-    np.maximum.at(zone, zones.facets.ravel(), np.repeat(zones.facet_zone, 3).astype(np.int32))
+    np.maximum.at(
+        zone, zones.facets.ravel(), np.repeat(zones.facet_zone, 3).astype(np.int32)
+    )
     mu = shear_modulus(parameters, weight, maps, week)
     material = MATERIALS[parameters.material](parameters.poisson_ratio)
     fields: dict[str, dict[str, NDArray]] = {
@@ -85,16 +100,29 @@ def layer_fields(
         "growth": growth,
         "shear_modulus": {"shear_modulus_pa": mu},
         "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * mu},
-        "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in names else {},
+        "normal": (
+            {"pial_normal": search.nearest_normals(positions_mm)}
+            if "normal" in names
+            else {}
+        ),
         "zones": {"zone": zone, "growing": zones.growth},
     }
-    return {name: values for key in names if key in fields for name, values in fields[key].items()}
+    return {
+        name: values
+        for key in names
+        if key in fields
+        for name, values in fields[key].items()
+    }
 
 
-def log_growth_at_vertices(positions_mm: Floats, inputs: GrowthInputs, growth: Floats) -> Floats:
-    """Return the logarithm (n, 6) of growth at (n, 3) positions, from the deformation (m, 3, 3) of elements by growth.
+def log_growth_at_vertices(
+    positions_mm: Floats, inputs: GrowthInputs, growth: Floats
+) -> Floats:
+    """Return the logarithm (n, 6) of growth at (n, 3) positions, from the deformation
+    (m, 3, 3) of elements by growth.
 
-    It is smoothed over `GROWTH_SMOOTHING_MM`, and its axes are those of the tissue as it is now.
+    It is smoothed over `GROWTH_SMOOTHING_MM`, and its axes are those of the tissue as
+    it is now.
     """
     logs = packed(log_stretch(growth, left=True))
     logs = np.repeat(logs, len(inputs.pieces) // len(logs), axis=0)
@@ -103,10 +131,11 @@ def log_growth_at_vertices(positions_mm: Floats, inputs: GrowthInputs, growth: F
 
 
 def growth_components(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
-    """Return tangential and radial growth and its main direction, from the logarithm (n, 6) and unit normals (n, 3).
+    """Return tangential and radial growth and its main direction, from the logarithm
+    (n, 6) and unit normals (n, 3).
 
-    The main direction is the tangential one of largest growth; the length of its vector is the difference to the growth
-    across it.
+    The main direction is the tangential one of largest growth; the length of its vector
+    is the difference to the growth across it.
     """
     tensors, radial = unpacked(log_growth), normals[:, :, None] * normals[:, None, :]
     tangential = np.eye(3) - radial

@@ -1,4 +1,5 @@
-"""The discrete problem of one step: energy, residual and tangent on the updated reference."""
+"""The discrete problem of one step: energy, residual and tangent on the updated
+reference."""
 
 from functools import cached_property
 from typing import Literal, Protocol
@@ -23,16 +24,18 @@ from .tangent import ElasticMatrix, LaggedTangent, Residual, RigidMotions, Tange
 from .zones import Zones
 
 PLANE_PENALTY_PA_PER_M = 5.0e5
-"""Pressure of the fissure's planes per depth of penetration, ε_N of the FetalFoldSim paper, whose contact they are."""
+"""Pressure of the fissure's planes per depth of penetration, ε_N of the FetalFoldSim
+paper, whose contact they are."""
 FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""
 
 
 class Contribution(Protocol):
-    """A further term of the energy, such as contact, as a function of displacements u (k, 3) of the local nodes in m.
+    """A further term of the energy, such as contact, as a function of displacements u
+    (k, 3) of the local nodes in m.
 
-    The energy is in J and the same on all ranks; forces are its derivative by the owned components, in N; stiffness is
-    in N/m, None if it is zero.
+    The energy is in J and the same on all ranks; forces are its derivative by the owned
+    components, in N; stiffness is in N/m, None if it is zero.
     """
 
     def energy(self, u: Floats) -> float: ...
@@ -44,16 +47,23 @@ class Contribution(Protocol):
 class NonlinearProblem:
     """Energy, residual and tangent of one step, as functions of the displacement.
 
-    Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the mesh as it is placed. All else
-    that differs between steps is set by `set_step`.
+    Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the
+    mesh as it is placed. All else that differs between steps is set by `set_step`.
 
     With `has_planes`, planes at the fissure press back by `PLANE_PENALTY_PA_PER_M`.
 
-    Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
-    `points` of each element.
+    Attributes: further `contributions` to the energy, whether the body is `free` of
+    supports, and the q integration `points` of each element.
     """
 
-    def __init__(self, domain: Domain, zones: Zones, material: Material, *, has_planes: bool = False) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        zones: Zones,
+        material: Material,
+        *,
+        has_planes: bool = False,
+    ) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
         # the coefficient of compiled forms; each evaluation sets it
@@ -63,12 +73,22 @@ class NonlinearProblem:
         # reference coordinates, and parts of the regular element's volume
         self._rule = self.points.barycentric[:, 1:].copy(), self.points.weights / 6
         self._weight, self._H = self._field_at_points(()), self._field_at_points((3, 3))
-        self._undeformed = np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1))
+        self._undeformed = np.tile(
+            np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1)
+        )
         F = ufl.Identity(3) + ufl.grad(self._u)
         Fe = F * self._H
         # a constant, so that another value needs no new form
-        moduli = self._weight, dolfinx.fem.Constant(domain.mesh, material.bulk_to_shear_ratio) * self._weight
-        self._tensors = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
+        moduli = (
+            self._weight,
+            dolfinx.fem.Constant(domain.mesh, material.bulk_to_shear_ratio)
+            * self._weight,
+        )
+        self._tensors = {
+            "deformation": F,
+            "elastic": Fe,
+            "stress": material.cauchy_stress(Fe, *moduli),
+        }
         self._expressions: dict[str, dolfinx.fem.Expression] = {}
         self._linear: LinearElements | None = None
         if domain.order == 1:
@@ -79,14 +99,17 @@ class NonlinearProblem:
         self._energy = energy + self._plane_energy(zones) if has_planes else energy
 
         (coupling,) = self._compiled(
-            ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * self._volume_measure()
+            ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space))
+            * self._volume_measure()
         )
         fixed = domain.local(zones.fixed)[: domain.n_owned]
         self._fixed_owned = np.flatnonzero(fixed.ravel())
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
         self.free = zones.free
-        elastic = LaggedTangent(ElasticMatrix(coupling, self._add_stiffness, fixed), domain)
+        elastic = LaggedTangent(
+            ElasticMatrix(coupling, self._add_stiffness, fixed), domain
+        )
         self._tangent = Tangent(elastic, domain)
         self.set_step(np.zeros(self._undeformed.shape[:2]), self._undeformed)
 
@@ -94,20 +117,32 @@ class NonlinearProblem:
         names = "quadrature_points", "quadrature_weights"
         # as tuples, since arrays are shortened in the names of compiled forms
         rule = [tuple(tuple(row) for row in self._rule[0]), tuple(self._rule[1])]
-        return ufl.dx(metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True)))
+        return ufl.dx(
+            metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True))
+        )
 
     def _plane_energy(self, zones: Zones) -> ufl.Form | int:
-        """Return ε/2 ⟨penetration⟩² per area: the left hemisphere stays below its plane, the right one above."""
+        """Return ε/2 ⟨penetration⟩² per area: the left hemisphere stays below its
+        plane, the right one above."""
         if not len(zones.vertices_of(LEFT_CONTACT, RIGHT_CONTACT)):
             return 0
         mesh = self.domain.mesh
         penalty = dolfinx.fem.Constant(mesh, PLANE_PENALTY_PA_PER_M)
-        left, right = (dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm)
+        left, right = (
+            dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm
+        )
         tags = self.domain.local_facets(zones.facets, zones.facet_zone)
-        ds = ufl.ds(domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": FACET_DEGREE[self.domain.order]})
+        ds = ufl.ds(
+            domain=mesh,
+            subdomain_data=tags,
+            metadata={"quadrature_degree": FACET_DEGREE[self.domain.order]},
+        )
         x = ufl.SpatialCoordinate(mesh)[0] + self._u[0]
         penetrations = (x - left, LEFT_CONTACT), (right - x, RIGHT_CONTACT)
-        return sum(penalty / 2 * ufl.max_value(depth, 0) ** 2 * ds(tag) for depth, tag in penetrations)
+        return sum(
+            penalty / 2 * ufl.max_value(depth, 0) ** 2 * ds(tag)
+            for depth, tag in penetrations
+        )
 
     def _compiled(self, *forms: ufl.Form) -> list[dolfinx.fem.Form]:
         with form_compiler(self.domain.comm) as options:
@@ -122,22 +157,32 @@ class NonlinearProblem:
         return self._compiled(self._energy, residual, ufl.derivative(residual, self._u))
 
     def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
-        element = basix.ufl.quadrature_element("tetrahedron", shape, points=self._rule[0], weights=self._rule[1])
-        return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
+        element = basix.ufl.quadrature_element(
+            "tetrahedron", shape, points=self._rule[0], weights=self._rule[1]
+        )
+        return dolfinx.fem.Function(
+            dolfinx.fem.functionspace(self.domain.mesh, element)
+        )
 
     def set_step(
-        self, mu: Floats, G_inverse: Floats, V: Floats | None = None, part: NDArray[np.int64] | None = None
+        self,
+        mu: Floats,
+        G_inverse: Floats,
+        V: Floats | None = None,
+        part: NDArray[np.int64] | None = None,
     ) -> None:
         """Set the coefficients of a step, on the mesh as it is placed now.
 
-        At the integration points of the local elements: the shear modulus (c, q) in Pa, the inverse (c, q, 3, 3) of the
-        growth tensor and the elastic left stretch V (c, q, 3, 3) that the mesh has, by default none.
-        `part` (n,) are numbers of the vertices' parts, by default the connected parts; in a free body the rigid motions
-        of each part are removed.
+        At the integration points of the local elements: the shear modulus (c, q) in Pa,
+        the inverse (c, q, 3, 3) of the growth tensor and the elastic left stretch V (c,
+        q, 3, 3) that the mesh has, by default none. `part` (n,) are numbers of the
+        vertices' parts, by default the connected parts; in a free body the rigid
+        motions of each part are removed.
 
-        The energy is the integral of ψ(F·H; w) over the mesh as it is placed, with H = V·G⁻¹ and w = μ/det V. That is
-        finite growth (Rodriguez et al. 1994) on the updated reference, per volume of the state without stress, since ψ
-        is proportional to μ.
+        The energy is the integral of ψ(F·H; w) over the mesh as it is placed, with H =
+        V·G⁻¹ and w = μ/det V. That is finite growth (Rodriguez et al. 1994) on the
+        updated reference, per volume of the state without stress, since ψ is
+        proportional to μ.
         """
         weight, H, self._volume = mu, G_inverse, np.ones((1, 1, 1, 1))
         if V is not None:
@@ -146,35 +191,51 @@ class NonlinearProblem:
         set_at_points(self._weight, weight)
         set_at_points(self._H, H)
         if self._linear:
-            self._linear.weight, self._linear.H = np.ascontiguousarray(weight), np.ascontiguousarray(H)
+            self._linear.weight, self._linear.H = (
+                np.ascontiguousarray(weight),
+                np.ascontiguousarray(H),
+            )
         self._tangent.elastic.forget()
         if self.free:
-            self._tangent.motions = RigidMotions(self.domain, self.domain.part if part is None else part)
+            self._tangent.motions = RigidMotions(
+                self.domain, self.domain.part if part is None else part
+            )
 
     def rest(self) -> Floats:
         """Return a displacement of zero."""
         return np.zeros((len(self.domain.vertex_of_node), 3))
 
     def without_rigid_motion(self, u: Floats) -> Floats:
-        """Return a displacement without the rigid motions of a free body; that of another body as it is."""
+        """Return a displacement without the rigid motions of a free body; that of
+        another body as it is."""
         if self._tangent.motions is None:
             return u
         owned = u[: self.domain.n_owned].flatten()
         self._tangent.motions.remove(owned)
         return self.domain.with_ghosts(owned)
 
-    def evaluate(self, name: Literal["deformation", "elastic", "stress"], u: Floats) -> Floats:
-        """Return (c, q, 3, 3) tensors at the integration points of the local elements; collective over the ranks.
+    def evaluate(
+        self, name: Literal["deformation", "elastic", "stress"], u: Floats
+    ) -> Floats:
+        """Return (c, q, 3, 3) tensors at the integration points of the local elements;
+        collective over the ranks.
 
-        `deformation` is the step's F, `elastic` its Fe = F·V·G⁻¹, and `stress` Cauchy's, in Pa, of ψ(Fe; μ).
+        `deformation` is the step's F, `elastic` its Fe = F·V·G⁻¹, and `stress`
+        Cauchy's, in Pa, of ψ(Fe; μ).
         """
         self._load(u)
         if name not in self._expressions:
             with form_compiler(self.domain.comm) as options:
-                expression = dolfinx.fem.Expression(self._tensors[name], self._rule[0], jit_options=options)
+                expression = dolfinx.fem.Expression(
+                    self._tensors[name], self._rule[0], jit_options=options
+                )
             self._expressions[name] = expression
         cells = np.arange(len(self.domain.cells), dtype=np.int32)
-        values = self._expressions[name].eval(self.domain.mesh, cells).reshape(len(cells), -1, 3, 3)
+        values = (
+            self._expressions[name]
+            .eval(self.domain.mesh, cells)
+            .reshape(len(cells), -1, 3, 3)
+        )
         return values * self._volume if name == "stress" else values
 
     def _load(self, u: Floats) -> Floats:
@@ -187,7 +248,9 @@ class NonlinearProblem:
         local = self._linear.assemble(u) if self._linear else 0.0
         if self._forms:
             local += float(np.real(dolfinx.fem.assemble_scalar(self._forms[0])))
-        return self.domain.comm.allreduce(local) + sum(part.energy(u) for part in self.contributions)
+        return self.domain.comm.allreduce(local) + sum(
+            part.energy(u) for part in self.contributions
+        )
 
     def residual(self, u: Floats) -> Residual:
         """Return the residual, zero where the displacement is fixed."""
@@ -220,24 +283,29 @@ class NonlinearProblem:
             dolfinx.fem.assemble_matrix(blocks, self._forms[2])
 
     def tangent(self, at: Residual, *, within: float = 0.0) -> Tangent:
-        """Return the tangent in N/m at a residual's displacement, with unit rows and columns of fixed components.
+        """Return the tangent in N/m at a residual's displacement, with unit rows and
+        columns of fixed components.
 
-        Its elastic part may be lagged, that is of an earlier iterate, if it predicts the change of the elastic forces
-        since then with a relative error of at most `within`. All calls return the same object.
+        Its elastic part may be lagged, that is of an earlier iterate, if it predicts
+        the change of the elastic forces since then with a relative error of at most
+        `within`. All calls return the same object.
         """
-        # petsc4py keeps objects that several ranks share until all ranks agree to destroy them
+        # petsc4py keeps objects that several ranks share until all ranks agree to
+        # destroy them
         PETSc.garbage_cleanup(self.domain.comm)
         self._tangent.elastic.update(at, within)
         self._tangent.parts = self._stiffness_parts(at.displacement, convex=False)
         return self._tangent
 
     def convexify(self, tangent: Tangent, u: Floats) -> None:
-        """Make the contributions' parts of the tangent at a displacement positive semidefinite."""
+        """Make the contributions' parts of the tangent at a displacement positive
+        semidefinite."""
         tangent.parts = self._stiffness_parts(u, convex=True)
 
     @property
     def convex(self) -> bool:
-        """True if the energy is convex except for large rotations, that is without contributions."""
+        """True if the energy is convex except for large rotations, that is without
+        contributions."""
         return not self.contributions
 
     def _stiffness_parts(self, u: Floats, *, convex: bool) -> list[PETSc.Mat]:
@@ -247,15 +315,20 @@ class NonlinearProblem:
         return [part for part in parts if part is not None]
 
     def max_step(self, u: Floats, direction: Floats) -> float:
-        """Return the largest fraction, up to 1, of a direction (k, 3) in m that all contributions allow to add to u."""
-        return min((part.max_step(u, direction) for part in self.contributions), default=1.0)
+        """Return the largest fraction, up to 1, of a direction (k, 3) in m that all
+        contributions allow to add to u."""
+        return min(
+            (part.max_step(u, direction) for part in self.contributions), default=1.0
+        )
 
     def volume_ratios(self, u: Floats) -> Floats:
-        """Return det F of the local elements: (c, 1), or (c, 10) at the nodes of quadratic ones."""
+        """Return det F of the local elements: (c, 1), or (c, 10) at the nodes of
+        quadratic ones."""
         return self.domain.volume_ratios(self._moved(u))
 
     def smallest_volume_ratio(self, u: Floats) -> float:
-        """Return a lower bound of det F: positive only where no element is inverted anywhere."""
+        """Return a lower bound of det F: positive only where no element is inverted
+        anywhere."""
         return self.domain.smallest_volume_ratio(self._moved(u))
 
     def _moved(self, u: Floats) -> Floats:
@@ -265,4 +338,6 @@ class NonlinearProblem:
 def set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:
     """Set a field at integration points to (c, q, ...) values."""
     places = field.function_space.dofmap.list
-    field.x.array.reshape(-1, field.function_space.dofmap.bs)[places] = values.reshape(*places.shape, -1)
+    field.x.array.reshape(-1, field.function_space.dofmap.bs)[places] = values.reshape(
+        *places.shape, -1
+    )

@@ -1,6 +1,8 @@
-"""Products in each iteration of conjugate gradients, in C and single precision, which halves the memory traffic.
+"""Products in each iteration of conjugate gradients, in C and single precision, which
+halves the memory traffic.
 
-A linear solve leaves at least a thousandth of its right-hand side, so that seven digits are enough.
+A linear solve leaves at least a thousandth of its right-hand side, so that seven digits
+are enough.
 """
 
 from functools import cache
@@ -16,40 +18,55 @@ from numpy.typing import NDArray
 from ..geometry.triangles import Floats, Ints
 from .compilation import compiled, pointer
 
-DECLARATION = """void to_single_blocks(long count, void *entries, void *values, void *blocks);
-                 void to_single_vectors(long count, void *x, void *single);
-                 void multiply(long owned, void *ends, void *columns, void *blocks, void *x, void *sums, void *y);
-                 void restrict_to_parts(long count, void *part, void *arms, void *x, void *loads);
-                 void add_motions(long count, void *part, void *arms, void *motions, void *y);
-                 void multiply_blocks(long count, void *blocks, void *x, void *y);"""
+DECLARATION = """
+void to_single_blocks(long count, void *entries, void *values, void *blocks);
+void to_single_vectors(long count, void *x, void *single);
+void multiply(long owned, void *ends, void *columns, void *blocks, void *x, void *sums,
+              void *y);
+void restrict_to_parts(long count, void *part, void *arms, void *x, void *loads);
+void add_motions(long count, void *part, void *arms, void *motions, void *y);
+void multiply_blocks(long count, void *blocks, void *x, void *y);
+"""
 
 
 @cache
 def _library() -> tuple[Any, Any]:
-    return compiled(MPI.COMM_SELF, DECLARATION, Path(__file__).with_suffix(".c").read_text())
+    return compiled(
+        MPI.COMM_SELF, DECLARATION, Path(__file__).with_suffix(".c").read_text()
+    )
 
 
-def _call(function: str, count: int, *arrays: tuple[NDArray, type, int], written: NDArray) -> None:
-    """Call a function with arrays, the type of each and the least number of its values; one of them is `written`."""
+def _call(
+    function: str, count: int, *arrays: tuple[NDArray, type, int], written: NDArray
+) -> None:
+    """Call a function with arrays, the type of each and the least number of its values;
+    one of them is `written`."""
     interface, code = _library()
     pointers = []
     for array, dtype, size in arrays:
-        pointers.append(pointer(interface, array, dtype, size, is_written=array is written))
+        pointers.append(
+            pointer(interface, array, dtype, size, is_written=array is written)
+        )
     getattr(code, function)(count, *pointers)
 
 
 class SymmetricProducts:
-    """Products of a rank's rows of a symmetric matrix that is distributed over the ranks.
+    """Products of a rank's rows of a symmetric matrix that is distributed over the
+    ranks.
 
-    Its (b,) blocks are ascending by their row `nodes`, with local `columns` in the map `column_map`: those of owned
-    columns on and above the diagonal, and all of ghost columns.
+    Its (b,) blocks are ascending by their row `nodes`, with local `columns` in the map
+    `column_map`: those of owned columns on and above the diagonal, and all of ghost
+    columns.
     """
 
-    def __init__(self, column_map: IndexMap, nodes: Ints, columns: NDArray[np.int32]) -> None:
+    def __init__(
+        self, column_map: IndexMap, nodes: Ints, columns: NDArray[np.int32]
+    ) -> None:
         self._owned = column_map.size_local
         self._columns = columns.astype(np.int32)
         self._ends = np.searchsorted(nodes, np.arange(self._owned + 1)).astype(np.int32)
-        # the C code reads vectors of four numbers, also at the last row of the last block
+        # the C code reads vectors of four numbers, also at the last row of the last
+        # block
         self._blocks = np.zeros(9 * len(nodes) + 1, dtype=np.float32)
         self._x = dolfinx.la.vector(column_map, 4, dtype=np.float32)
         self._sums = np.zeros((self._owned, 4), dtype=np.float32)
@@ -91,13 +108,15 @@ class SymmetricProducts:
 
 
 class PartMotions:
-    """Rigid motions of parts, for nodes in the (k,) `part`s at (k, 3) `arms` from the parts' centres."""
+    """Rigid motions of parts, for nodes in the (k,) `part`s at (k, 3) `arms` from the
+    parts' centres."""
 
     def __init__(self, part: Ints, arms: NDArray[np.float32]) -> None:
         self._part, self._arms = part.astype(np.int32), arms
 
     def restrict(self, x: Floats, parts: int) -> Floats:
-        """Return the forces and torques (6 · parts,) on the parts from the forces (3 · k,) on the nodes."""
+        """Return the forces and torques (6 · parts,) on the parts from the forces (3 ·
+        k,) on the nodes."""
         loads = np.zeros(6 * parts)
         count = len(self._part)
         _call(
@@ -112,7 +131,8 @@ class PartMotions:
         return loads
 
     def add(self, motions: Floats, y: Floats) -> None:
-        """Add translations and rotations (6 · parts,) of the parts to the displacements (3 · k,) of the nodes."""
+        """Add translations and rotations (6 · parts,) of the parts to the displacements
+        (3 · k,) of the nodes."""
         count = len(self._part)
         _call(
             "add_motions",

@@ -1,4 +1,5 @@
-"""A whole run: from the start or a checkpoint to the last output week, with frames, step table and summary."""
+"""A whole run: from the start or a checkpoint to the last output week, with frames,
+step table and summary."""
 
 import math
 import resource
@@ -23,7 +24,13 @@ from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 from ..units import MM_PER_M, SECONDS_PER_GW, week_tag
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .output import GROWTH_SMOOTHING_MM, layer_fields, log_growth_at_vertices, print_line, warn
+from .output import (
+    GROWTH_SMOOTHING_MM,
+    layer_fields,
+    log_growth_at_vertices,
+    print_line,
+    warn,
+)
 from .simulation import Folding, advance
 from .steering import missed_curves
 from .step_fields import step_fields
@@ -45,19 +52,29 @@ def run(
     *,
     may_diverge: bool = False,
 ) -> None:
-    """Simulate a brain from the first to the last output week; write frames, step table and summary into `out`.
+    """Simulate a brain from the first to the last output week; write frames, step table
+    and summary into `out`.
 
-    The run resumes from a checkpoint in `out` of this mesh and these parameters. A run that diverges raises
-    SolverError; if it `may_diverge`, it ends with the output weeks that it has reached, and its summary gives the
-    reason.
+    The run resumes from a checkpoint in `out` of this mesh and these parameters. A run
+    that diverges raises SolverError; if it `may_diverge`, it ends with the output weeks
+    that it has reached, and its summary gives the reason.
     """
     began = time.monotonic()
     folding = Folding(comm, mesh, zones, parameters, maps)
     key = run_key(mesh, parameters, maps)
     folder = out / f"checkpoint-{key}"
-    state, message = comm.bcast(load_state(folder, key, parameters) if comm.rank == 0 else None, root=0)
+    state, message = comm.bcast(
+        load_state(folder, key, parameters) if comm.rank == 0 else None, root=0
+    )
     if comm.rank == 0:
-        for note in filter(None, (message, *delete_old_checkpoints(out, folder), shortened_step_note(parameters))):
+        for note in filter(
+            None,
+            (
+                message,
+                *delete_old_checkpoints(out, folder),
+                shortened_step_note(parameters),
+            ),
+        ):
             print_line(note)
     if state is None:
         state = State.at_start(folding.start, parameters.step_s)
@@ -69,7 +86,9 @@ def run(
     if comm.rank == 0:
         reached = parameters.start_week + state.time_s / SECONDS_PER_GW
         weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
-        join_frames(out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks])
+        join_frames(
+            out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks]
+        )
         seconds = time.monotonic() - began
         summary = {
             "tets": len(mesh.tets),
@@ -82,7 +101,16 @@ def run(
             "peak_memory_MiB": memory,
             "weeks": weeks,
             "radius_ratio_01": [
-                float(np.quantile(radius_ratios(TetrahedralMesh(read_positions(out / FRAMES, week), mesh.tets)), 0.01))
+                float(
+                    np.quantile(
+                        radius_ratios(
+                            TetrahedralMesh(
+                                read_positions(out / FRAMES, week), mesh.tets
+                            )
+                        ),
+                        0.01,
+                    )
+                )
                 for week in weeks
             ],
             "reached_week": reached,
@@ -93,7 +121,10 @@ def run(
         write_json(out / SUMMARY, summary)
         shutil.rmtree(folder)
         quality, is_bad = quality_note(mesh, state.positions * MM_PER_M, reached)
-        for note, is_warning in ((shrinkage_note(state.rows), False), (quality, is_bad)):
+        for note, is_warning in (
+            (shrinkage_note(state.rows), False),
+            (quality, is_bad),
+        ):
             if note:
                 (warn if is_warning else print_line)(note)
         if diverged is not None:
@@ -102,8 +133,11 @@ def run(
         print_line(ended, "end", week=reached, error=diverged)
 
 
-def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_diverge: bool) -> tuple[State, str | None]:
-    """Run to the end and return the last state; write a frame per output week and a checkpoint per step into `folder`.
+def simulate(
+    folding: Folding, state: State, folder: Path, key: str, *, may_diverge: bool
+) -> tuple[State, str | None]:
+    """Run to the end and return the last state; write a frame per output week and a
+    checkpoint per step into `folder`.
 
     If a run that `may_diverge` diverges, return the last good state and the reason.
     """
@@ -124,19 +158,29 @@ def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_dive
             if rank == 0:
                 if arrived:
                     since = [row for row in state.rows if row["week"] > week_before]
-                    for warning in filter(None, (missed_curves(state.rows[-1]), *missed_targets(since))):
+                    for warning in filter(
+                        None, (missed_curves(state.rows[-1]), *missed_targets(since))
+                    ):
                         warn(warning)
                 write_checkpoint(folder / "state.h5", key, state)
-                report_step(state, p.end_week, (time.monotonic() - resumed) / (len(state.rows) - resumed_after))
+                report_step(
+                    state,
+                    p.end_week,
+                    (time.monotonic() - resumed) / (len(state.rows) - resumed_after),
+                )
     return state, None
 
 
 def save_frame(folding: Folding, state: State, week: float, folder: Path) -> State:
-    """Write the frame of a week and return the state to continue with; collective over the ranks."""
+    """Write the frame of a week and return the state to continue with; collective over
+    the ranks."""
     names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
     pressure, elements = step_fields(folding, names)
-    # a mean over the steps since the last frame; before the first step, the growth of that step
-    growth = folding.grown(state, solved.growth) if state.growth is None else state.growth
+    # a mean over the steps since the last frame; before the first step, the growth of
+    # that step
+    growth = (
+        folding.grown(state, solved.growth) if state.growth is None else state.growth
+    )
     steps = state.growth_s / p.step_s or 1.0
     if folding.domain.comm.rank == 0:
         fields = {"positions": state.positions * MM_PER_M}
@@ -145,24 +189,39 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
         rates, positions = solved.growth.parameters, fields["positions"]
         logs: Floats | None = None
         if growth is not None:
-            logs = np.asarray(log_growth_at_vertices(positions, folding.inputs, growth) / steps)
-        fields |= layer_fields(positions, folding.zones, rates, folding.maps, week, names, logs)
+            logs = np.asarray(
+                log_growth_at_vertices(positions, folding.inputs, growth) / steps
+            )
+        fields |= layer_fields(
+            positions, folding.zones, rates, folding.maps, week, names, logs
+        )
         smoothing = {} if logs is None else {"growth_smoothing_mm": GROWTH_SMOOTHING_MM}
-        write_frame(frame_path(folder, week), week, fields | pressure, elements, smoothing)
+        write_frame(
+            frame_path(folder, week), week, fields | pressure, elements, smoothing
+        )
     return replace(state, growth=None, growth_s=0.0)
 
 
 def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
-    """Print the progress line of the last step: week, iterations, displacement, time."""
+    """Print the progress line of the last step: week, iterations, displacement,
+    time."""
     row = state.rows[-1]
     left_s = seconds_per_step * (end_week - row["week"]) * SECONDS_PER_GW / state.step_s
     minutes, seconds = divmod(round(left_s), 60)
     line = (
-        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  "
-        f"krylov {row['krylov']:3d}  max|u| {row['max_u_mm']:.3f} mm  min J {row['min_J']:.3f}  "
-        f"{row['seconds']:.2f} s  left {minutes}:{seconds:02d}"
+        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton"
+        f" {row['newton']}  krylov {row['krylov']:3d}  max|u| {row['max_u_mm']:.3f} mm "
+        f" min J {row['min_J']:.3f}  {row['seconds']:.2f} s  left"
+        f" {minutes}:{seconds:02d}"
     )
-    print_line(line, "step", week=row["week"], end_week=end_week, step=row["step"], left_s=left_s)
+    print_line(
+        line,
+        "step",
+        week=row["week"],
+        end_week=end_week,
+        step=row["step"],
+        left_s=left_s,
+    )
 
 
 def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
@@ -171,41 +230,77 @@ def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
         "steps": len(rows),
         "newton": sum(row["newton"] for row in rows),
         "krylov": sum(row["krylov"] for row in rows),
-        "seconds_per_step": float(np.median([row["seconds"] for row in rows])) if rows else math.nan,
+        "seconds_per_step": (
+            float(np.median([row["seconds"] for row in rows])) if rows else math.nan
+        ),
         "min_J": min((row["min_J"] for row in rows), default=math.nan),
     }
 
 
-def quality_note(mesh: TetrahedralMesh, positions: Floats, week: float) -> tuple[str, bool]:
-    """Return a note if elements are flatter than any may be at the start, else an empty text, and if they are many."""
-    before, ratios = (radius_ratios(TetrahedralMesh(places, mesh.tets)) for places in (mesh.vertices, positions))
+def quality_note(
+    mesh: TetrahedralMesh, positions: Floats, week: float
+) -> tuple[str, bool]:
+    """Return a note if elements are flatter than any may be at the start, else an empty
+    text, and if they are many."""
+    before, ratios = (
+        radius_ratios(TetrahedralMesh(places, mesh.tets))
+        for places in (mesh.vertices, positions)
+    )
     flat = int((ratios < min(MIN_RADIUS_RATIO, float(before.min()))).sum())
     if not flat:
         return "", False
     text = (
-        f"at GW {week:g} {flat} of {len(ratios)} elements are flatter than a mesh may be at the start (radius ratio "
-        f"{ratios.min():.3f} of {MIN_RADIUS_RATIO:g}): stress and curvature are less accurate there"
+        f"at GW {week:g} {flat} of {len(ratios)} elements are flatter than a mesh may"
+        f" be at the start (radius ratio {ratios.min():.3f} of {MIN_RADIUS_RATIO:g}):"
+        " stress and curvature are less accurate there"
     )
     return text, flat > MAX_FLAT_SHARE * len(ratios)
 
 
-def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
+def load_state(
+    folder: Path, key: str, parameters: FoldingParameters
+) -> tuple[State | None, str]:
     """Return the state to resume from, or None, and a message for the user.
 
-    A checkpoint is used only if the frames of all output weeks that it has passed exist, and if growth towards shapes,
-    whose mean is written, has been added up since one of them.
+    A checkpoint is used only if the frames of all output weeks that it has passed
+    exist, and if growth towards shapes, whose mean is written, has been added up since
+    one of them.
     """
     state, message = read_checkpoint(folder / "state.h5", key)
     if state is None:
         return state, message
     end_s = seconds_to(parameters.end_week, parameters)
-    passed = [week for week in parameters.output_weeks if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)]
+    passed = [
+        week
+        for week in parameters.output_weeks
+        if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)
+    ]
     if not all(frame_path(folder, week).exists() for week in passed):
-        return None, f"the checkpoint {folder} lacks frames of some output weeks: not used, the run starts again"
+        return (
+            None,
+            (
+                f"the checkpoint {folder} lacks frames of some output weeks: not used,"
+                " the run starts again"
+            ),
+        )
     since = state.time_s - state.growth_s
-    if parameters.targets and min(abs(seconds_to(week, parameters) - since) for week in passed) > 1e-6 * since:
-        return None, f"the checkpoint {folder} is of a run with other output weeks: not used, the run starts again"
-    within = tuple(row for row in state.rows if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9))
+    if (
+        parameters.targets
+        and min(abs(seconds_to(week, parameters) - since) for week in passed)
+        > 1e-6 * since
+    ):
+        return (
+            None,
+            (
+                f"the checkpoint {folder} is of a run with other output weeks: not"
+                " used, the run starts again"
+            ),
+        )
+    within = tuple(
+        row
+        for row in state.rows
+        if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9)
+    )
     return replace(state, rows=within), message
 
 
@@ -220,20 +315,28 @@ def seconds_to(week: float, parameters: FoldingParameters) -> float:
 
 
 def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
-    """Delete all but the newest two checkpoints of other meshes or parameters, and return messages about these two."""
+    """Delete all but the newest two checkpoints of other meshes or parameters, and
+    return messages about these two."""
     folders = [path for path in out.glob("checkpoint-*") if path != own]
     folders.sort(key=lambda path: path.stat().st_mtime, reverse=True)
     for folder in folders[2:]:
         shutil.rmtree(folder, ignore_errors=True)
-    return [f"{path} belongs to another mesh or other parameters: kept but not used" for path in folders[:2]]
+    return [
+        f"{path} belongs to another mesh or other parameters: kept but not used"
+        for path in folders[:2]
+    ]
 
 
 def shortened_step_note(parameters: FoldingParameters) -> str:
-    """Return a note if the time step does not divide the time between two outputs, else an empty text."""
+    """Return a note if the time step does not divide the time between two outputs, else
+    an empty text."""
     step = parameters.step_s
     for a, b in pairwise(parameters.output_weeks):
         if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:
-            return f"step_s {step:g} does not divide the time from GW {a:g} to {b:g}: the last step there is shortened"
+            return (
+                f"step_s {step:g} does not divide the time from GW {a:g} to {b:g}: the"
+                " last step there is shortened"
+            )
     return ""
 
 

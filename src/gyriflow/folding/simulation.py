@@ -1,4 +1,5 @@
-"""Time stepping: in each step growth, layers and a Newton solve; steps whose solve fails are halved."""
+"""Time stepping: in each step growth, layers and a Newton solve; steps whose solve
+fails are halved."""
 
 import math
 import time
@@ -36,14 +37,16 @@ from .zones import Zones
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
 MIN_STRAIGHTNESS = 0.4
-"""Straightness of a curved element (`geometry.straightening`) above which its inner sides stay as they are."""
+"""Straightness of a curved element (`geometry.straightening`) above which its inner
+sides stay as they are."""
 MAX_STEP_VOLUME_RATIO = 3.0
 """Largest growth in volume by rates in one step: more is not resolved in time."""
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedStep:
-    """A step: its displacement (k, 3) of the local nodes in m, its length, and how tissue grew."""
+    """A step: its displacement (k, 3) of the local nodes in m, its length, and how
+    tissue grew."""
 
     displacement: Floats
     step_s: float
@@ -53,8 +56,9 @@ class SolvedStep:
 class Folding:
     """A brain that folds: the solver's objects, made once, and its steps.
 
-    `mesh` is the start brain in RAS+ mm, whole on every rank; maps are at its vertices. `start` are its positions in m.
-    `solved` is the last accepted step; at first, one without displacement.
+    `mesh` is the start brain in RAS+ mm, whole on every rank; maps are at its vertices.
+    `start` are its positions in m. `solved` is the last accepted step; at first, one
+    without displacement.
     """
 
     def __init__(
@@ -81,40 +85,62 @@ class Folding:
         self.contact: SelfContact | None = None
         if p.contact.kind == "global":
             barrier_pa = STIFFNESS_PER_MODULUS * stiffest
-            self.contact = SelfContact(self.domain, zones.facets, barrier_pa, stiffens=p.stress_memory_gw > 0)
+            self.contact = SelfContact(
+                self.domain, zones.facets, barrier_pa, stiffens=p.stress_memory_gw > 0
+            )
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.solver.newton_tolerance)
         self.solver = NewtonSolver(self.problem, newton, residual_floor(mesh, stiffest))
         self.inputs = GrowthInputs(mesh, zones, self.maps, comm.allreduce)
         self.model = growth_model(p, self.inputs)
-        self.solved = SolvedStep(self.problem.rest(), p.step_s, self.model(StepStart(mesh.vertices, 0.0, p.step_s)))
-        self.elements = Elements(self.domain.cells, self.domain.vertex_of_node, self.problem.points)
+        self.solved = SolvedStep(
+            self.problem.rest(),
+            p.step_s,
+            self.model(StepStart(mesh.vertices, 0.0, p.step_s)),
+        )
+        self.elements = Elements(
+            self.domain.cells, self.domain.vertex_of_node, self.problem.points
+        )
         self._pial = np.unique(zones.cortex_facets)
-        # with stress memory, or growth that is recorded by element, tissue must stay in its element
+        # with stress memory, or growth that is recorded by element, tissue must stay in
+        # its element
         has_free_nodes = mesh.order == 2 and not p.keeps_stretch and not p.targets
         self._inner_sides = InnerSides.of(mesh) if has_free_nodes else None
 
     def step(self, state: State, step_s: float) -> State:
-        """Return the state after a step of a given length, with a new row of the step table.
+        """Return the state after a step of a given length, with a new row of the step
+        table.
 
         NotConvergedError if the step is too large.
         """
         began = time.monotonic()
         tissue, growth = self.begin(state, step_s)
         free = growth.guess(self.zones.fixed)
-        guesses = state.initial_guesses(step_s) if free is None else [free, *state.initial_guesses(step_s)]
+        guesses = (
+            state.initial_guesses(step_s)
+            if free is None
+            else [free, *state.initial_guesses(step_s)]
+        )
         solution = self.solver.solve(*map(self.domain.local, guesses))
         u = solution.displacement
         displacement = self.domain.gather(u[: self.domain.n_owned])
         positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
-        thickness = value_at(self.parameters.thickness_mm, growth.start.week(self.parameters, 0.5), self.maps)
+        thickness = value_at(
+            self.parameters.thickness_mm,
+            growth.start.week(self.parameters, 0.5),
+            self.maps,
+        )
         stretch = None
         if self.parameters.keeps_stretch:
-            stretch = self.domain.gather_cells(packed(left_stretch(self.problem.evaluate("elastic", u))))
+            stretch = self.domain.gather_cells(
+                packed(left_stretch(self.problem.evaluate("elastic", u)))
+            )
         row = {
             "step": len(state.rows) + 1,
-            "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
+            "week": (
+                self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW
+            ),
             "dt_s": step_s,
             **self._solution_row(solution, displacement),
             **self._contact_row(u, positions),
@@ -126,17 +152,20 @@ class Folding:
         }
         self.solved = SolvedStep(u, step_s, growth)
         grown = self.grown(state, growth)
-        after = state.after(displacement, step_s, row, stretch, growth.correction(size), grown)
+        after = state.after(
+            displacement, step_s, row, stretch, growth.correction(size), grown
+        )
         if self._inner_sides is not None:
             after = replace(after, positions=self.straighten(after.positions))
         row["seconds"] = time.monotonic() - began
         return after
 
     def straighten(self, positions: Floats) -> Floats:
-        """Return (n, 3) positions in m with straighter inner sides of elements that are about to fold over.
+        """Return (n, 3) positions in m with straighter inner sides of elements that are
+        about to fold over.
 
-        Nothing pulls the inner nodes of tissue without stress back, so that sides bow until a corner of their element
-        turns over.
+        Nothing pulls the inner nodes of tissue without stress back, so that sides bow
+        until a corner of their element turns over.
         """
         straight = None
         if self.domain.comm.rank == 0 and self._inner_sides is not None:
@@ -145,12 +174,17 @@ class Folding:
         return self.domain.comm.bcast(straight, root=0)
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, StepGrowth]:
-        """Set up the problem of a step; return its tissue, with the parameters at mid-step, and its growth."""
-        start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.correction)
+        """Set up the problem of a step; return its tissue, with the parameters at
+        mid-step, and its growth."""
+        start = StepStart(
+            state.positions * MM_PER_M, state.time_s, step_s, state.correction
+        )
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
         if domain.positions is not state.positions:
             domain.place(state.positions)
-        tissue = Tissue.of(self.elements, state.positions, self.zones, self.maps, p, week)
+        tissue = Tissue.of(
+            self.elements, state.positions, self.zones, self.maps, p, week
+        )
         part = domain.part
         if self.contact is not None:
             self.contact.begin_step()
@@ -158,27 +192,45 @@ class Folding:
                 part = self.contact.join_touching(part)
         stretch = None
         if state.stretch is not None:
-            before, step_gw = unpacked(state.stretch[domain.tet_of_cell]), step_s / SECONDS_PER_GW
-            stretch = relaxed(before, step_gw, p.stress_memory_gw, keeps_volume=p.relaxation == "shape")
+            before, step_gw = (
+                unpacked(state.stretch[domain.tet_of_cell]),
+                step_s / SECONDS_PER_GW,
+            )
+            stretch = relaxed(
+                before,
+                step_gw,
+                p.stress_memory_gw,
+                keeps_volume=p.relaxation == "shape",
+            )
         growth = self.model(start)
         mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
         inverse = growth.inverse(tissue)
         self.problem.set_step(mu, inverse, stretch, part)
-        ratio = 1.0 if p.targets else 1.0 / domain.min_over_ranks(np.linalg.det(inverse))
+        ratio = (
+            1.0 if p.targets else 1.0 / domain.min_over_ranks(np.linalg.det(inverse))
+        )
         if ratio > MAX_STEP_VOLUME_RATIO:
-            raise NotConvergedError(f"tissue grows to {ratio:.1f} times its volume in one step")
+            raise NotConvergedError(
+                f"tissue grows to {ratio:.1f} times its volume in one step"
+            )
         return tissue, growth
 
     def grown(self, state: State, growth: StepGrowth) -> Floats | None:
-        """Return the deformation (m, 3, 3) of all elements by growth before and in a step, None if it is by rates."""
+        """Return the deformation (m, 3, 3) of all elements by growth before and in a
+        step, None if it is by rates."""
         mean = growth.mean_deformation(self.elements)
         if mean is None:
             return None
         grown = self.domain.gather_cells(mean)
         return grown if state.growth is None else grown @ state.growth
 
-    def _solution_row(self, solution: Solution, displacement: Floats) -> dict[str, float]:
-        u, length = solution.displacement, np.linalg.norm(displacement, axis=1) * MM_PER_M
+    def _solution_row(
+        self, solution: Solution, displacement: Floats
+    ) -> dict[str, float]:
+        u, length = (
+            solution.displacement,
+            np.linalg.norm(displacement, axis=1) * MM_PER_M,
+        )
         ratios = self.problem.volume_ratios(u)
         return {
             "newton": solution.newton,
@@ -196,7 +248,9 @@ class Folding:
 
     def _contact_row(self, u: Floats, positions: Floats) -> dict[str, float]:
         if self.contact is None:
-            return {"plane_penetration_mm": self.zones.penetration_mm(positions * MM_PER_M)}
+            return {
+                "plane_penetration_mm": self.zones.penetration_mm(positions * MM_PER_M)
+            }
         distance = self.contact.smallest_distance_mm(u)
         return {
             "contact_distance_mm": self.contact.distance_mm,
@@ -208,7 +262,8 @@ class Folding:
 
 
 def advance(folding: Folding, state: State, until_s: float) -> State:
-    """Return the state after one accepted step towards `until_s`; the step is halved while its solve fails.
+    """Return the state after one accepted step towards `until_s`; the step is halved
+    while its solve fails.
 
     SolverError if the smallest step fails too.
     """
@@ -226,10 +281,14 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             half = min(state.step_s, step_s) / 2
             if half < smallest * (1 - 1e-9):
                 raise SolverError(
-                    f"the step at GW {p.start_week + state.time_s / SECONDS_PER_GW:.3f} fails even with {step_s:g} s",
+                    f"the step at GW {p.start_week + state.time_s / SECONDS_PER_GW:.3f}"
+                    f" fails even with {step_s:g} s",
                     found=f"{error}; {folding.solver.worst_places()}",
-                    remedy="The last good state is kept: the same command with an earlier folding.end_week or more "
-                    "folding.solver.max_halvings resumes from it. A finer mesh or less growth may help.",
+                    remedy=(
+                        "The last good state is kept: the same command with an earlier"
+                        " folding.end_week or more folding.solver.max_halvings resumes"
+                        " from it. A finer mesh or less growth may help."
+                    ),
                 ) from None
             if folding.domain.comm.rank == 0:
                 print_line(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
@@ -237,7 +296,11 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             continue
         if folding.domain.comm.rank == 0:
             has_layers = p.growth.definition.has_layers
-            coarse = resolution_warning(after.rows, folding.domain.order) if has_layers else ""
+            coarse = (
+                resolution_warning(after.rows, folding.domain.order)
+                if has_layers
+                else ""
+            )
             for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
                 warn(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
@@ -246,27 +309,36 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
 
 
 def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
-    """Return a cortical thickness over the mean edge length of the elements in the cortex; NaN if there are none.
+    """Return a cortical thickness over the mean edge length of the elements in the
+    cortex; NaN if there are none.
 
-    `distance` (k,) is from the local nodes to the pial surface, in m like the thickness.
+    `distance` (k,) is from the local nodes to the pial surface, in m like the
+    thickness.
     """
     inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
     nodes = domain.local(domain.positions)
-    lengths = sum(float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum()) for i, j in EDGES)
+    lengths = sum(
+        float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum())
+        for i, j in EDGES
+    )
     total, count = domain.comm.allreduce(np.array([lengths, len(EDGES) * len(inside)]))
     return float(thickness * count / total) if count else math.nan
 
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:
-    """Return a warning at the first step with too few elements through the cortex, else an empty text."""
+    """Return a warning at the first step with too few elements through the cortex, else
+    an empty text."""
     coarse = [is_too_coarse(order, row["elements_through_cortex"]) for row in rows[-2:]]
     was_coarse = len(rows) > 1 and coarse[0]
     if was_coarse or not coarse[-1]:
         return ""
-    start = f"from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
+    start = (
+        f"from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
+    )
     return (
-        f"{start} fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the cortex, so folds may be mesh noise: "
-        "reduce mesh.surface_edge_mm to resolve the growing cortex longer"
+        f"{start} fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the"
+        " cortex, so folds may be mesh noise: reduce mesh.surface_edge_mm to resolve"
+        " the growing cortex longer"
     )
 
 
@@ -275,6 +347,6 @@ def unconverged_warning(row: dict) -> str:
     if row["converged"]:
         return ""
     return (
-        f"step {row['step']} ends at {row['residual']:.1e} of its initial residual, above "
-        "folding.solver.newton_tolerance: round-off prevents further progress"
+        f"step {row['step']} ends at {row['residual']:.1e} of its initial residual,"
+        " above folding.solver.newton_tolerance: round-off prevents further progress"
     )

@@ -28,19 +28,31 @@ def start_regions(
 ) -> Regions:
     """Return the regions of a run on its start mesh, with the fields of the first step.
 
-    `left_faces` returns the mask of the left faces of the mesh's boundary; it is not called for a single hemisphere.
-    InputError if maps or zones are impossible.
+    `left_faces` returns the mask of the left faces of the mesh's boundary; it is not
+    called for a single hemisphere. InputError if maps or zones are impossible.
     """
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
     inputs = GrowthInputs(mesh, zones, maps)
-    growth = growth_model(parameters, inputs)(StepStart(mesh.vertices, 0.0, parameters.step_s))
+    growth = growth_model(parameters, inputs)(
+        StepStart(mesh.vertices, 0.0, parameters.step_s)
+    )
     points = IntegrationPoints.for_order(mesh.order)
-    grown = growth.mean_deformation(Elements(mesh.tets, np.arange(len(mesh.vertices)), points))
-    logs = None if grown is None else log_growth_at_vertices(mesh.vertices, inputs, grown)
+    grown = growth.mean_deformation(
+        Elements(mesh.tets, np.arange(len(mesh.vertices)), points)
+    )
+    logs = (
+        None if grown is None else log_growth_at_vertices(mesh.vertices, inputs, grown)
+    )
     fields = layer_fields(
-        mesh.vertices, zones, growth.parameters, maps, parameters.start_week, REGION_FIELDS, log_growth=logs
+        mesh.vertices,
+        zones,
+        growth.parameters,
+        maps,
+        parameters.start_week,
+        REGION_FIELDS,
+        log_growth=logs,
     )
     if parameters.side is None:
         on_left = left_faces(TriangleMesh(mesh.vertices, zones.facets))

@@ -1,7 +1,9 @@
-"""Growth by sizes: the rates of cortex and core are set in each step so that pial area and volume follow two curves.
+"""Growth by sizes: the rates of cortex and core are set in each step so that pial area
+and volume follow two curves.
 
-All of the volume growth is realised, since the mean stress in an unsupported body is zero. Only a part of tangential
-growth becomes pial area; the shortfall of a step is corrected in the next one (feedback control).
+All of the volume growth is realised, since the mean stress in an unsupported body is
+zero. Only a part of tangential growth becomes pial area; the shortfall of a step is
+corrected in the next one (feedback control).
 """
 
 from dataclasses import dataclass
@@ -28,10 +30,12 @@ CURVE_TOL = 0.005
 
 @dataclass(frozen=True, eq=False)
 class SteeredStep(GrowthByRates):
-    """Growth of a step with rates set so that the size `before` becomes the size `target`.
+    """Growth of a step with rates set so that the size `before` becomes the size
+    `target`.
 
-    `free_rates` (2,) are the rates of the logarithms of area and volume, in 1/s, of unconstrained growth; `limited` is
-    True if the bounds of the rates prevent the brain from following its curves.
+    `free_rates` (2,) are the rates of the logarithms of area and volume, in 1/s, of
+    unconstrained growth; `limited` is True if the bounds of the rates prevent the brain
+    from following its curves.
     """
 
     before: Size
@@ -40,7 +44,9 @@ class SteeredStep(GrowthByRates):
     limited: bool
 
     def correction(self, after: Size) -> tuple[float, ...]:
-        return tuple(map(float, self.before.rates_to(after, self.start.step_s) - self.free_rates))
+        return tuple(
+            map(float, self.before.rates_to(after, self.start.step_s) - self.free_rates)
+        )
 
     def row(self, after: Size) -> dict[str, Any]:
         realised = self.before.rates_to(after, self.start.step_s)
@@ -49,82 +55,148 @@ class SteeredStep(GrowthByRates):
             "volume_aim_ml": self.target.volume_mm3 * ML_PER_MM3,
             "growth_rate_per_s": self.parameters.growth_rate_per_s,
             "core_growth_rate_per_s": self.parameters.core_growth_rate_per_s,
-            "realised_share": float(realised[0] / self.free_rates[0]) if self.free_rates[0] else np.nan,
+            "realised_share": (
+                float(realised[0] / self.free_rates[0])
+                if self.free_rates[0]
+                else np.nan
+            ),
             "growth_limited": int(self.limited),
         }
 
 
-def steered_growth(p: FoldingParameters, inputs: GrowthInputs, at_start: Size, start: StepStart) -> SteeredStep:
+def steered_growth(
+    p: FoldingParameters, inputs: GrowthInputs, at_start: Size, start: StepStart
+) -> SteeredStep:
     """Return the growth by sizes of a step of a run with a size `at_start`."""
     week = start.week(p, 1.0)
     before = inputs.size(start.positions_mm)
     target = Size(
-        blended(p.growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, p.start_week, week) / CM2_PER_MM2,
-        blended(p.growth.volume_ml, at_start.volume_mm3 * ML_PER_MM3, p.start_week, week) / ML_PER_MM3,
+        blended(p.growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, p.start_week, week)
+        / CM2_PER_MM2,
+        blended(
+            p.growth.volume_ml, at_start.volume_mm3 * ML_PER_MM3, p.start_week, week
+        )
+        / ML_PER_MM3,
     )
     gain, radial = free_growth(p, start.positions_mm, inputs, week)
-    required = before.rates_to(target, start.step_s) - radial - (start.correction or (0.0, 0.0))
+    required = (
+        before.rates_to(target, start.step_s)
+        - radial
+        - (start.correction or (0.0, 0.0))
+    )
     *rates, limited = steered_rates(required, gain, (0.0, MAX_RATE_PER_S))
-    p = p.model_copy(update={"growth_rate_per_s": rates[0], "core_growth_rate_per_s": rates[1]})
+    p = p.model_copy(
+        update={"growth_rate_per_s": rates[0], "core_growth_rate_per_s": rates[1]}
+    )
     return SteeredStep(p, start, before, target, gain @ rates + radial, bool(limited))
 
 
-def steered_rates(required: Floats, gain: Floats, bounds: tuple[float, float]) -> tuple[float, float, bool]:
-    """Return the rates of cortex and core, and whether bounds prevent the brain from following its curves.
+def steered_rates(
+    required: Floats, gain: Floats, bounds: tuple[float, float]
+) -> tuple[float, float, bool]:
+    """Return the rates of cortex and core, and whether bounds prevent the brain from
+    following its curves.
 
-    The rate of the cortex is set by the area, then that of the core by the remaining volume. If bounds exclude both
-    curves, that of the volume is followed. `required` are the (2,) rates of the logarithms of area and volume, `gain`
-    (2, 2) what unit rates of cortex and core add to them (`free_growth`). SolverError if cortex or core adds no volume.
+    The rate of the cortex is set by the area, then that of the core by the remaining
+    volume. If bounds exclude both curves, that of the volume is followed. `required`
+    are the (2,) rates of the logarithms of area and volume, `gain` (2, 2) what unit
+    rates of cortex and core add to them (`free_growth`). SolverError if cortex or core
+    adds no volume.
     """
     cortex_volume, core_volume = gain[1]
     if min(cortex_volume, core_volume) <= 0:
         raise SolverError(
-            "growth by sizes finds no rates", found="tissue that does not grow", expected="a growing core"
+            "growth by sizes finds no rates",
+            found="tissue that does not grow",
+            expected="a growing core",
         )
-    mean, ideal = required[1] / (cortex_volume + core_volume), required[0] / max(gain[0, 0], 1e-9)
-    # on a ball tangential growth adds no area: feedback raises it until the core no longer grows
+    mean, ideal = (
+        required[1] / (cortex_volume + core_volume),
+        required[0] / max(gain[0, 0], 1e-9),
+    )
+    # on a ball tangential growth adds no area: feedback raises it until the core no
+    # longer grows
     cortex = np.clip(ideal, *bounds)
     core = np.clip((required[1] - cortex_volume * cortex) / core_volume, *bounds)
     # the cortex makes up for a core at its bound
     cortex = np.clip((required[1] - core_volume * core) / cortex_volume, *bounds)
-    return float(cortex), float(core), abs(cortex - ideal) > 1e-9 * (abs(mean) + abs(ideal))
+    return (
+        float(cortex),
+        float(core),
+        abs(cortex - ideal) > 1e-9 * (abs(mean) + abs(ideal)),
+    )
 
 
-def free_growth(p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs, week: float) -> tuple[Floats, Floats]:
-    """Return the rates of the logarithms of area and volume of unconstrained growth at (n, 3) positions.
+def free_growth(
+    p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs, week: float
+) -> tuple[Floats, Floats]:
+    """Return the rates of the logarithms of area and volume of unconstrained growth at
+    (n, 3) positions.
 
-    A (2, 2) array for unit rates of cortex and core (columns), and the (2,) rates in 1/s of radial growth.
+    A (2, 2) array for unit rates of cortex and core (columns), and the (2,) rates in
+    1/s of radial growth.
     """
     zones, thickness = inputs.zones, value_at(p.thickness_mm, week, inputs.maps)
-    distance = PialSearch(positions_mm, zones.cortex_facets).distance(positions_mm, WEIGHT_REACH * np.max(thickness))
-    weight, volumes = cortical_weight(distance, thickness), volumes_between(positions_mm, inputs.pieces)
+    distance = PialSearch(positions_mm, zones.cortex_facets).distance(
+        positions_mm, WEIGHT_REACH * np.max(thickness)
+    )
+    weight, volumes = (
+        cortical_weight(distance, thickness),
+        volumes_between(positions_mm, inputs.pieces),
+    )
 
     def volume_rate(tangential: float, radial: float | Floats, core: float) -> float:
         dg, dr = increments(weight, zones.growth, tangential, radial, core, 1.0)
-        return float((2 * dg + dr)[inputs.pieces].mean(axis=1) @ volumes / volumes.sum())
+        return float(
+            (2 * dg + dr)[inputs.pieces].mean(axis=1) @ volumes / volumes.sum()
+        )
 
     faces = zones.measured_facets
     areas = np.linalg.norm(area_vectors(TriangleMesh(positions_mm, faces)), axis=1)
     surface = 2 * float(zones.growth[faces].mean(axis=1) @ areas / areas.sum())
-    radial = volume_rate(0.0, value_at(p.radial_growth_rate_per_s, week, inputs.maps), 0.0)
-    return np.array([[surface, 0.0], [volume_rate(1.0, 0.0, 0.0), volume_rate(0.0, 0.0, 1.0)]]), np.array([0.0, radial])
+    radial = volume_rate(
+        0.0, value_at(p.radial_growth_rate_per_s, week, inputs.maps), 0.0
+    )
+    return np.array(
+        [[surface, 0.0], [volume_rate(1.0, 0.0, 0.0), volume_rate(0.0, 0.0, 1.0)]]
+    ), np.array([0.0, radial])
 
 
 def missed_curves(row: dict[str, Any]) -> str:
-    """Return a warning if a row of the step table is more than `CURVE_TOL` off a curve, else an empty text."""
+    """Return a warning if a row of the step table is more than `CURVE_TOL` off a curve,
+    else an empty text."""
     if row.get("area_aim_cm2") is None:
         return ""
-    errors = {"area": row["area_cm2"] / row["area_aim_cm2"] - 1, "volume": row["volume_ml"] / row["volume_aim_ml"] - 1}
-    parts = [f"{name} {100 * error:+.1f} % off its curve" for name, error in errors.items() if abs(error) > CURVE_TOL]
-    reason = ": no growth rates within their bounds follow both curves" if row.get("growth_limited") else ""
-    return f"at GW {row['week']:g} the brain is {' and '.join(parts)}{reason}" if parts else ""
+    errors = {
+        "area": row["area_cm2"] / row["area_aim_cm2"] - 1,
+        "volume": row["volume_ml"] / row["volume_aim_ml"] - 1,
+    }
+    parts = [
+        f"{name} {100 * error:+.1f} % off its curve"
+        for name, error in errors.items()
+        if abs(error) > CURVE_TOL
+    ]
+    reason = (
+        ": no growth rates within their bounds follow both curves"
+        if row.get("growth_limited")
+        else ""
+    )
+    return (
+        f"at GW {row['week']:g} the brain is {' and '.join(parts)}{reason}"
+        if parts
+        else ""
+    )
 
 
 def blended(curve: Any, at_start: float, start_week: float, week: float) -> float:
-    """Return the value at a week of a {week: value} curve, for a brain with another value at the start.
+    """Return the value at a week of a {week: value} curve, for a brain with another
+    value at the start.
 
-    The logarithm is linear between the weeks; the difference at the start decreases linearly to 0 in `JOINING_GW`.
+    The logarithm is linear between the weeks; the difference at the start decreases
+    linearly to 0 in `JOINING_GW`.
     """
     difference = max(0.0, 1.0 - (week - start_week) / JOINING_GW)
-    value, first = np.interp([week, start_week], list(curve), np.log(list(curve.values())))
+    value, first = np.interp(
+        [week, start_week], list(curve), np.log(list(curve.values()))
+    )
     return float(np.exp(value + difference * (np.log(at_start) - first)))

@@ -1,4 +1,5 @@
-"""Deformation gradients of elements, their stretches, and symmetric tensors stored as six values."""
+"""Deformation gradients of elements, their stretches, and symmetric tensors stored as
+six values."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,8 @@ UPPER = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 
 
 def packed(tensors: Floats) -> Floats:
-    """Return the (..., 6) values xx, yy, zz, xy, xz, yz of (..., 3, 3) symmetric tensors."""
+    """Return the (..., 6) values xx, yy, zz, xy, xz, yz of (..., 3, 3) symmetric
+    tensors."""
     return tensors[..., UPPER[0], UPPER[1]]
 
 
@@ -25,23 +27,32 @@ def unpacked(values: Floats) -> Floats:
     return tensors
 
 
-def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats) -> Floats:
-    """Return the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
+def deformation_gradients(
+    before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats
+) -> Floats:
+    """Return the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of
+    tetrahedra at points inside them.
 
-    Positions of the nodes are (k, 3) in one unit, `cells` (c, n) their indices; the elements have a volume before.
-    `slopes` (q, n, 3) are the gradients of the nodes' shape functions in the regular element, at the points.
+    Positions of the nodes are (k, 3) in one unit, `cells` (c, n) their indices; the
+    elements have a volume before. `slopes` (q, n, 3) are the gradients of the nodes'
+    shape functions in the regular element, at the points.
     """
     found = np.empty((len(cells), len(slopes), 3, 3))
     across = slopes.transpose(0, 2, 1)
     for chunk in chunks(len(cells)):
         # the transposed maps from the regular element: those after = those before · Fᵀ
-        first, second = (np.matmul(across, x[cells[chunk]][:, None]) for x in (before, after))
+        first, second = (
+            np.matmul(across, x[cells[chunk]][:, None]) for x in (before, after)
+        )
         found[chunk] = np.linalg.solve(first, second).swapaxes(-1, -2)
     return found
 
 
-def inverse_stretch(F: Floats, power: Floats | float = 1.0, limit: float = np.inf) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return U^−power (..., 3, 3) of F = R·U, with one power for all or one for each, and where U is limited.
+def inverse_stretch(
+    F: Floats, power: Floats | float = 1.0, limit: float = np.inf
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return U^−power (..., 3, 3) of F = R·U, with one power for all or one for each,
+    and where U is limited.
 
     Principal values of ln U beyond the `limit` count as this.
     """
@@ -53,24 +64,31 @@ def inverse_stretch(F: Floats, power: Floats | float = 1.0, limit: float = np.in
 
 
 def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floats:
-    """Return the Hencky strain (..., 3, 3): ln U of F = R·U, in axes before F, or the `left` ln V of F = V·R.
+    """Return the Hencky strain (..., 3, 3): ln U of F = R·U, in axes before F, or the
+    `left` ln V of F = V·R.
 
     Principal values beyond the `limit` count as this.
     """
     turned = F.swapaxes(-1, -2)
     squares, axes = np.linalg.eigh(F @ turned if left else turned @ F)
-    logs = np.clip(0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH)), -limit, limit)
+    logs = np.clip(
+        0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH)), -limit, limit
+    )
     return np.asarray((axes * logs[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
 def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
-    """Return V^power (..., 3, 3) of Fe = V·R; an isotropic material does not depend on the rotation R."""
+    """Return V^power (..., 3, 3) of Fe = V·R; an isotropic material does not depend on
+    the rotation R."""
     squares, axes = np.linalg.eigh(Fe @ Fe.swapaxes(-1, -2))
     return (axes * squares[..., None, :] ** (power / 2)) @ axes.swapaxes(-1, -2)
 
 
-def relaxed(V: Floats, step_gw: float, memory_gw: float, *, keeps_volume: bool = False) -> Floats:
-    """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as exp(−t/τ), with τ = `memory_gw`.
+def relaxed(
+    V: Floats, step_gw: float, memory_gw: float, *, keeps_volume: bool = False
+) -> Floats:
+    """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as
+    exp(−t/τ), with τ = `memory_gw`.
 
     With `keeps_volume` only the deviator of ln V decays.
     """

@@ -1,8 +1,10 @@
-"""The tangent of an iterate: its products with displacements, and the blocks on its diagonal.
+"""The tangent of an iterate: its products with displacements, and the blocks on its
+diagonal.
 
-The elastic part has the same sparsity pattern at every iterate. Contact couples other nodes each time and is a small
-matrix of its own; no solver needs all entries in one matrix. In a free body, which no support holds, rigid motions are
-removed from all products (inertia relief).
+The elastic part has the same sparsity pattern at every iterate. Contact couples other
+nodes each time and is a small matrix of its own; no solver needs all entries in one
+matrix. In a free body, which no support holds, rigid motions are removed from all
+products (inertia relief).
 """
 
 from collections.abc import Callable, Sequence
@@ -21,15 +23,20 @@ from .products import PartMotions, SymmetricProducts
 
 
 def part_arms(positions: Floats, part: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return (n, 3) positions relative to the centres of their parts (n,), divided by the largest component of all."""
+    """Return (n, 3) positions relative to the centres of their parts (n,), divided by
+    the largest component of all."""
     counts = np.bincount(part)
-    centres = np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1) / np.maximum(counts, 1)[:, None]
+    centres = (
+        np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1)
+        / np.maximum(counts, 1)[:, None]
+    )
     arms = positions - centres[part]
     return np.asarray(arms / np.abs(arms).max(), dtype=np.float32)
 
 
 def rigid_motions(arms: NDArray[np.float32]) -> Floats:
-    """Return the (n, 3, 6) translations of points and their rotations about centres, from (n, 3) arms."""
+    """Return the (n, 3, 6) translations of points and their rotations about centres,
+    from (n, 3) arms."""
     motions = np.zeros((len(arms), 3, 6))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -39,7 +46,8 @@ def rigid_motions(arms: NDArray[np.float32]) -> Floats:
 
 
 class RigidMotions:
-    """Translations and rotations of parts of the mesh, where it is now; `part` (n,) is the part of each vertex."""
+    """Translations and rotations of parts of the mesh, where it is now; `part` (n,) is
+    the part of each vertex."""
 
     def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
         vertices = domain.vertex_of_node[: domain.n_owned]
@@ -47,30 +55,46 @@ class RigidMotions:
         arms, part = part_arms(domain.positions, part)[vertices], part[vertices]
         self._motions = PartMotions(part, arms)
         motions = rigid_motions(arms)
-        by_part = [np.where((part == number)[:, None, None], motions, 0.0) for number in range(self._parts)]
-        self.modes: Floats = np.concatenate(by_part, axis=2).reshape(-1, 6 * self._parts)
-        self._inverse_gram = np.linalg.inv(domain.sum_over_ranks(self.modes.T @ self.modes))
+        by_part = [
+            np.where((part == number)[:, None, None], motions, 0.0)
+            for number in range(self._parts)
+        ]
+        self.modes: Floats = np.concatenate(by_part, axis=2).reshape(
+            -1, 6 * self._parts
+        )
+        self._inverse_gram = np.linalg.inv(
+            domain.sum_over_ranks(self.modes.T @ self.modes)
+        )
 
     def remove(self, values: Floats) -> None:
         """Remove the rigid motions from the owned components of a vector, in place."""
-        amounts = self._domain.sum_over_ranks(self._motions.restrict(values, self._parts))
+        amounts = self._domain.sum_over_ranks(
+            self._motions.restrict(values, self._parts)
+        )
         self._motions.add(-self._inverse_gram @ amounts, values)
 
 
 class ElasticMatrix:
-    """The elastic tangent as 3 × 3 blocks, in a matrix of dolfinx, which is filled twice as fast as PETSc's.
+    """The elastic tangent as 3 × 3 blocks, in a matrix of dolfinx, which is filled
+    twice as fast as PETSc's.
 
-    Blocks below the diagonal between owned nodes are not read, since the matrix is symmetric; `add` may omit them.
+    Blocks below the diagonal between owned nodes are not read, since the matrix is
+    symmetric; `add` may omit them.
 
-    `coupling` is a form with the same sparsity pattern, `add` adds the blocks at a displacement, and `fixed` (owned, 3)
-    is the mask of the owned nodes' components whose rows and columns are those of the unit matrix. The attribute
-    `fixed` (all nodes, 3) is the same for all global nodes. `products` multiplies the matrix with vectors. The (b,)
-    blocks of the owned rows are stored row by row: `nodes` are their rows, as local nodes, `columns` their columns, as
-    global nodes; `row_ends` (owned + 1,) are the first block of each row and the end of the last one.
+    `coupling` is a form with the same sparsity pattern, `add` adds the blocks at a
+    displacement, and `fixed` (owned, 3) is the mask of the owned nodes' components
+    whose rows and columns are those of the unit matrix. The attribute `fixed` (all
+    nodes, 3) is the same for all global nodes. `products` multiplies the matrix with
+    vectors. The (b,) blocks of the owned rows are stored row by row: `nodes` are their
+    rows, as local nodes, `columns` their columns, as global nodes; `row_ends` (owned +
+    1,) are the first block of each row and the end of the last one.
     """
 
     def __init__(
-        self, coupling: dolfinx.fem.Form, add: Callable[[Floats, MatrixCSR], None], fixed: NDArray[np.bool_]
+        self,
+        coupling: dolfinx.fem.Form,
+        add: Callable[[Floats, MatrixCSR], None],
+        fixed: NDArray[np.bool_],
     ) -> None:
         self._add = add
         self._blocks = dolfinx.fem.create_matrix(coupling, block_mode=BlockMode.compact)
@@ -88,10 +112,16 @@ class ElasticMatrix:
         self._fixed_entries = np.flatnonzero(is_fixed)
         self._fixed_diagonal = np.einsum("bii->bi", is_fixed)[self._diagonal]
         # without the mirror images of blocks within a rank
-        self._stored = np.flatnonzero((self.columns >= rows) | (local_columns >= owned)).astype(np.int32)
-        self.products = SymmetricProducts(column_map, self.nodes[self._stored], local_columns[self._stored])
+        self._stored = np.flatnonzero(
+            (self.columns >= rows) | (local_columns >= owned)
+        ).astype(np.int32)
+        self.products = SymmetricProducts(
+            column_map, self.nodes[self._stored], local_columns[self._stored]
+        )
         # so that these blocks and their transposes add up to the matrix
-        self._half_weights = np.where((rows == self.columns) | (local_columns >= owned), 0.5, 1.0)[self._stored]
+        self._half_weights = np.where(
+            (rows == self.columns) | (local_columns >= owned), 0.5, 1.0
+        )[self._stored]
 
     def assemble(self, u: Floats) -> None:
         """Assemble the tangent at a displacement (k, 3) of the local nodes in m."""
@@ -104,11 +134,14 @@ class ElasticMatrix:
         self.products.take(values, self._stored)
 
     def half(self) -> sparse.bsr_matrix:
-        """Return the owned rows of a matrix that adds up to this one with its transpose."""
+        """Return the owned rows of a matrix that adds up to this one with its
+        transpose."""
         ends = np.searchsorted(self.nodes[self._stored], np.arange(len(self.row_ends)))
         blocks = self.values[self._stored] * self._half_weights[:, None, None]
         shape = 3 * (len(self.row_ends) - 1), 3 * len(self.fixed)
-        return sparse.bsr_matrix((blocks, self.columns[self._stored], ends), shape=shape)
+        return sparse.bsr_matrix(
+            (blocks, self.columns[self._stored], ends), shape=shape
+        )
 
     @property
     def values(self) -> Floats:
@@ -123,9 +156,11 @@ class ElasticMatrix:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """The residual at a displacement (k, 3) of the local nodes in m: `owned` components (3 · n_owned,) and norm in N.
+    """The residual at a displacement (k, 3) of the local nodes in m: `owned` components
+    (3 · n_owned,) and norm in N.
 
-    `elastic` are the forces of the elements alone; in a free body, their resultant is not removed.
+    `elastic` are the forces of the elements alone; in a free body, their resultant is
+    not removed.
     """
 
     displacement: Floats
@@ -135,9 +170,11 @@ class Residual:
 
 
 class LaggedTangent:
-    """The elastic tangent, kept from one displacement to the next while it predicts how forces change.
+    """The elastic tangent, kept from one displacement to the next while it predicts how
+    forces change.
 
-    It is `lagged` while the tangent in use is that of an earlier displacement; `assembled` counts assemblies.
+    It is `lagged` while the tangent in use is that of an earlier displacement;
+    `assembled` counts assemblies.
     """
 
     def __init__(self, matrix: ElasticMatrix, domain: Domain) -> None:
@@ -148,11 +185,13 @@ class LaggedTangent:
         self._last: Residual | None = None
 
     def forget(self) -> None:
-        """Require that the next tangent is assembled, since mesh, stiffness, growth or stretch have changed."""
+        """Require that the next tangent is assembled, since mesh, stiffness, growth or
+        stretch have changed."""
         self._last = None
 
     def update(self, at: Residual, within: float) -> None:
-        """Assemble the tangent at a displacement, unless it `predicts` the elastic forces there."""
+        """Assemble the tangent at a displacement, unless it `predicts` the elastic
+        forces there."""
         self.lagged = within > 0 and self.predicts(at, within)
         if not self.lagged:
             self.matrix.assemble(at.displacement)
@@ -160,10 +199,13 @@ class LaggedTangent:
         self._last = at
 
     def predicts(self, at: Residual, within: float) -> bool:
-        """Return whether it predicts how elastic forces changed since the last update, to a relative error `within`."""
+        """Return whether it predicts how elastic forces changed since the last update,
+        to a relative error `within`."""
         if self._last is None:
             return False
-        change = (at.displacement - self._last.displacement)[: self._domain.n_owned].ravel()
+        change = (at.displacement - self._last.displacement)[
+            : self._domain.n_owned
+        ].ravel()
         predicted = np.empty_like(change)
         self.matrix.products.multiply(change, predicted)
         error = predicted + self._last.elastic - at.elastic
@@ -171,10 +213,11 @@ class LaggedTangent:
 
 
 class Tangent:
-    """The tangent of one iterate, which acts on displacements as a PETSc matrix of type python.
+    """The tangent of one iterate, which acts on displacements as a PETSc matrix of type
+    python.
 
-    All iterates share one symmetric `matrix`. Further `parts`, in N/m, have no entries in rows and columns of fixed
-    components. `motions` are removed from all products.
+    All iterates share one symmetric `matrix`. Further `parts`, in N/m, have no entries
+    in rows and columns of fixed components. `motions` are removed from all products.
     """
 
     def __init__(self, elastic: LaggedTangent, domain: Domain) -> None:
@@ -183,13 +226,20 @@ class Tangent:
         self.motions: RigidMotions | None = None
         self._shift: Floats | None = None
         size = 3 * domain.n_owned, 3 * len(domain.positions)
-        self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=domain.comm)
+        self.matrix = PETSc.Mat().createPython(
+            (size, size), context=self, comm=domain.comm
+        )
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.matrix.setUp()
 
     def shift_diagonal(self, part: float) -> None:
-        """Shift the diagonal by a fraction of its absolute values in all further products; 0 removes the shift."""
-        self._shift = part * np.abs(np.einsum("nii->ni", self._diagonal())).ravel() if part else None
+        """Shift the diagonal by a fraction of its absolute values in all further
+        products; 0 removes the shift."""
+        self._shift = (
+            part * np.abs(np.einsum("nii->ni", self._diagonal())).ravel()
+            if part
+            else None
+        )
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y to the product with x."""

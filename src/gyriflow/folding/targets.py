@@ -1,8 +1,11 @@
-"""Growth towards known shapes: in each step the growth that keeps the brain on a path through its targets.
+"""Growth towards known shapes: in each step the growth that keeps the brain on a path
+through its targets.
 
-This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the result. docs/model.md has the
-equations. Each element takes the stretch of its own way along the path X*(t), so that growth is compatible: a body that
-touches nothing follows the path without stress. Feedback with a time constant corrects the misfit that contact leaves.
+This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the
+result. docs/model.md has the equations. Each element takes the stretch of its own way
+along the path X*(t), so that growth is compatible: a body that touches nothing follows
+the path without stress. Feedback with a time constant corrects the misfit that contact
+leaves.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,27 +31,35 @@ from .tissue import Elements, Tissue
 FEEDBACK_GW = 0.2
 """Time constant with which growth takes the brain back to its path."""
 FEEDBACK_SMOOTHING_MM = 1.0
-"""Length over which that feedback is smoothed: next to folds that press on each other the misfit is rough."""
+"""Length over which that feedback is smoothed: next to folds that press on each other
+the misfit is rough."""
 FEEDBACK_FROM_MM = 1e-4
-"""Misfit (root mean square) below which feedback is off: that of the solver's tolerance."""
+"""Misfit (root mean square) below which feedback is off: that of the solver's
+tolerance."""
 DAY_S = 86_400.0
 MAX_LOG_STRETCH = 0.7
-"""Largest principal Hencky strain of an element's growth in a step: to half or twice its length."""
+"""Largest principal Hencky strain of an element's growth in a step: to half or twice
+its length."""
 MAX_SHRINKAGE_PER_DAY = 0.1
-"""Loss of an element's volume in a day above which it is reported: so fast is error of the registration, not tissue."""
+"""Loss of an element's volume in a day above which it is reported: so fast is error of
+the registration, not tissue."""
 MAX_MISFIT_MM = 0.2
-"""Misfit (root mean square) above which a run is warned of: about that of surfaces extracted from labels."""
+"""Misfit (root mean square) above which a run is warned of: about that of surfaces
+extracted from labels."""
 WEEK_TOL_GW = 1e-6
 """Time before a target at which it counts as reached."""
 
 
 @dataclass(frozen=True, eq=False)
 class TargetGrowth(StepGrowth):
-    """Growth of a step towards a shape: the stretch U of each element on its way to `goal_mm` (n, 3).
+    """Growth of a step towards a shape: the stretch U of each element on its way to
+    `goal_mm` (n, 3).
 
-    `misfit_mm` is the root mean square distance to the path at the start of the step, without rigid motion. Elements
-    whose stretch is beyond `MAX_LOG_STRETCH` grow by that, and those that the goal inverts do not grow; `inverse`
-    counts both as `held`, with `total` over the ranks. `shrinking` elements lose more than `MAX_SHRINKAGE_PER_DAY`.
+    `misfit_mm` is the root mean square distance to the path at the start of the step,
+    without rigid motion. Elements whose stretch is beyond `MAX_LOG_STRETCH` grow by
+    that, and those that the goal inverts do not grow; `inverse` counts both as `held`,
+    with `total` over the ranks. `shrinking` elements lose more than
+    `MAX_SHRINKAGE_PER_DAY`.
     """
 
     goal_mm: Floats
@@ -61,13 +72,19 @@ class TargetGrowth(StepGrowth):
         elements = tissue.elements
         is_valid = has_volume(self.goal_mm[elements.vertices], elements.cells)
         grows = np.where(is_valid, tissue.at_points(tissue.growing).T, 0.0).T
-        inverse, is_limited = inverse_stretch(self.deformation(elements), grows, MAX_LOG_STRETCH)
+        inverse, is_limited = inverse_stretch(
+            self.deformation(elements), grows, MAX_LOG_STRETCH
+        )
         self.held.append(self.total(int((~is_valid | is_limited.any(axis=1)).sum())))
         return inverse
 
     def deformation(self, elements: Elements) -> Floats:
-        before, after = (x[elements.vertices] for x in (self.start.positions_mm, self.goal_mm))
-        return deformation_gradients(before, after, elements.cells, elements.points.gradients)
+        before, after = (
+            x[elements.vertices] for x in (self.start.positions_mm, self.goal_mm)
+        )
+        return deformation_gradients(
+            before, after, elements.cells, elements.points.gradients
+        )
 
     def guess(self, fixed: NDArray[np.bool_]) -> Floats:
         return np.where(fixed, 0.0, (self.goal_mm - self.start.positions_mm) * M_PER_MM)
@@ -78,7 +95,8 @@ class TargetGrowth(StepGrowth):
 
 
 def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
-    """Return the path of a run from its start mesh through the targets, in any pose, that its maps contain.
+    """Return the path of a run from its start mesh through the targets, in any pose,
+    that its maps contain.
 
     InputError if the targets end before the run does.
     """
@@ -92,15 +110,24 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
     return path_through(weeks, shapes, inputs.mesh, p.step_s / SECONDS_PER_GW, p.stops)
 
 
-def shapes_of_run(p: FoldingParameters, maps: Maps, positions_mm: Floats) -> tuple[list[float], list[Floats]]:
-    """Return the ascending weeks and (n, 3) shapes in mm of a run: that at its start, and the targets in its maps."""
+def shapes_of_run(
+    p: FoldingParameters, maps: Maps, positions_mm: Floats
+) -> tuple[list[float], list[Floats]]:
+    """Return the ascending weeks and (n, 3) shapes in mm of a run: that at its start,
+    and the targets in its maps."""
     weeks = sorted(week for week in p.targets if week > p.start_week + WEEK_TOL_GW)
-    targets = [np.stack([maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1) for week in weeks]
+    targets = [
+        np.stack([maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1)
+        for week in weeks
+    ]
     return [p.start_week, *weeks], [positions_mm, *targets]
 
 
-def growth_on_path(p: FoldingParameters, inputs: GrowthInputs, path: Path, start: StepStart) -> TargetGrowth:
-    """Return the growth of a step: that of the path, and of the part of the misfit that feedback makes up for."""
+def growth_on_path(
+    p: FoldingParameters, inputs: GrowthInputs, path: Path, start: StepStart
+) -> TargetGrowth:
+    """Return the growth of a step: that of the path, and of the part of the misfit that
+    feedback makes up for."""
     tets, positions, pieces = inputs.mesh.tets, start.positions_mm, inputs.pieces
     week, end = (min(start.week(p, part), float(path.weeks[-1])) for part in (0.0, 1.0))
     sizes = vertex_sizes(positions, pieces)
@@ -111,34 +138,47 @@ def growth_on_path(p: FoldingParameters, inputs: GrowthInputs, path: Path, start
     goal = later - misfit
     if misfit_mm > FEEDBACK_FROM_MM:
         back = (1 - np.exp((week - end) / FEEDBACK_GW)) * misfit
-        goal += smooth_integrals(positions, pieces, sizes[:, None] * back, FEEDBACK_SMOOTHING_MM)
+        goal += smooth_integrals(
+            positions, pieces, sizes[:, None] * back, FEEDBACK_SMOOTHING_MM
+        )
     ratios = volumes_between(goal, tets) / volumes_between(positions, tets)
-    shrinking = (ratios > 0) & (ratios < 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S)
+    shrinking = (ratios > 0) & (
+        ratios < 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S
+    )
     return TargetGrowth(p, start, goal, misfit_mm, int(shrinking.sum()), inputs.total)
 
 
 def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Return warnings if the steps since the last output week did not follow their path."""
+    """Return warnings if the steps since the last output week did not follow their
+    path."""
     if not rows or "to_path_mm" not in rows[-1]:
         return []
     last, warnings = rows[-1], []
     if last["to_path_mm"] > MAX_MISFIT_MM:
-        distance = f"{last['to_path_mm']:.2f} mm from its target shape (root mean square)"
-        warnings.append(f"at GW {last['week']:g} the brain is {distance}: contact or stiffness prevents the growth")
+        distance = (
+            f"{last['to_path_mm']:.2f} mm from its target shape (root mean square)"
+        )
+        warnings.append(
+            f"at GW {last['week']:g} the brain is {distance}: contact or stiffness"
+            " prevents the growth"
+        )
     if held := max(row["held_elements"] for row in rows):
         warnings.append(
-            f"up to GW {last['week']:g} {held} elements grow less than their path asks for, which bends or inverts them"
+            f"up to GW {last['week']:g} {held} elements grow less than their path asks"
+            " for, which bends or inverts them"
         )
     return warnings
 
 
 def shrinkage_note(rows: Sequence[dict[str, Any]]) -> str:
-    """Return a note if elements shrank faster than tissue can in any of the steps, else an empty text."""
+    """Return a note if elements shrank faster than tissue can in any of the steps, else
+    an empty text."""
     shrinking = max((row.get("shrinking_elements", 0) for row in rows), default=0)
     if not shrinking:
         return ""
     least = min(row["min_J"] for row in rows)
     return (
-        f"up to {shrinking} elements lose more than {MAX_SHRINKAGE_PER_DAY:.0%} of their volume in a day (least det F "
-        f"of a step {least:.2f}): an error of the registration, not of tissue"
+        f"up to {shrinking} elements lose more than {MAX_SHRINKAGE_PER_DAY:.0%} of"
+        f" their volume in a day (least det F of a step {least:.2f}): an error of the"
+        " registration, not of tissue"
     )

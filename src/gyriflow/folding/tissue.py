@@ -1,4 +1,5 @@
-"""The tissue of a step: the depth of a rank's elements, where they grow, and the normals of the pial surface there."""
+"""The tissue of a step: the depth of a rank's elements, where they grow, and the
+normals of the pial surface there."""
 
 from dataclasses import dataclass
 
@@ -16,7 +17,8 @@ from .zones import Zones
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """A rank's elements: their local nodes `cells` (c, 4) or (c, 10), and the mesh's `vertices` (k,) that these are.
+    """A rank's elements: their local nodes `cells` (c, 4) or (c, 10), and the mesh's
+    `vertices` (k,) that these are.
 
     All elements have the same integration `points`.
     """
@@ -30,13 +32,15 @@ class Elements:
 class Tissue:
     """The tissue of a rank's elements in a step.
 
-    The cortical `weight`, `growing` (1, else 0) and the parameters' `maps` are values at the nodes (k,) of linear
-    elements, and at the integration points (c, q) of quadratic ones, since the cortical weight may fall from 1 to 0
-    within a quadratic element. There depth is interpolated by the shape functions, and growth and maps, which may jump
-    between nodes, linearly.
+    The cortical `weight`, `growing` (1, else 0) and the parameters' `maps` are values
+    at the nodes (k,) of linear elements, and at the integration points (c, q) of
+    quadratic ones, since the cortical weight may fall from 1 to 0 within a quadratic
+    element. There depth is interpolated by the shape functions, and growth and maps,
+    which may jump between nodes, linearly.
 
-    `depth` (k,) is the distance in m of the nodes, at `nodes` (k, 3), to the pial surface. `nearest` are the pial
-    vertices (k,) nearest to the nodes of linear elements, or the pial normals (k, 3) there for quadratic ones.
+    `depth` (k,) is the distance in m of the nodes, at `nodes` (k, 3), to the pial
+    surface. `nearest` are the pial vertices (k,) nearest to the nodes of linear
+    elements, or the pial normals (k, 3) there for quadratic ones.
     """
 
     elements: Elements
@@ -50,16 +54,30 @@ class Tissue:
 
     @classmethod
     def of(
-        cls, elements: Elements, positions: Floats, zones: Zones, maps: Maps, p: FoldingParameters, week: float
+        cls,
+        elements: Elements,
+        positions: Floats,
+        zones: Zones,
+        maps: Maps,
+        p: FoldingParameters,
+        week: float,
     ) -> "Tissue":
-        """Return the tissue at (n, 3) positions of all vertices in m, with the cortical thickness of a week.
+        """Return the tissue at (n, 3) positions of all vertices in m, with the cortical
+        thickness of a week.
 
         Maps are (n,) at all vertices.
         """
         points, cells = elements.points, elements.cells
-        pial, nodes = PialSearch(positions, zones.cortex_facets), positions[elements.vertices]
+        pial, nodes = (
+            PialSearch(positions, zones.cortex_facets),
+            positions[elements.vertices],
+        )
         # the maximum over the whole mesh, so that all ranks search equally far
-        reach = WEIGHT_REACH * float(np.max(value_at(p.thickness_mm, week, maps))) * M_PER_MM
+        reach = (
+            WEIGHT_REACH
+            * float(np.max(value_at(p.thickness_mm, week, maps)))
+            * M_PER_MM
+        )
         growing = zones.growth[elements.vertices]
         maps = {name: maps[name][elements.vertices] for name in p.varying_maps}
         nearest: NDArray
@@ -70,37 +88,57 @@ class Tissue:
         else:
             depth, nearest = pial.distance_and_normals(nodes, reach)
             growing = growing[cells] @ points.piecewise_linear.T
-            maps = {name: values[cells] @ points.piecewise_linear.T for name, values in maps.items()}
+            maps = {
+                name: values[cells] @ points.piecewise_linear.T
+                for name, values in maps.items()
+            }
             value_depth = np.maximum(depth[cells] @ points.interpolation.T, 0.0)
-        weight = cortical_weight(value_depth * MM_PER_M, value_at(p.thickness_mm, week, maps))
+        weight = cortical_weight(
+            value_depth * MM_PER_M, value_at(p.thickness_mm, week, maps)
+        )
         return cls(elements, nodes, depth, pial, nearest, weight, growing, maps)
 
     def at_points(self, values: Floats) -> Floats:
-        """Return (..., c, q) values at the integration points from values like `weight`."""
+        """Return (..., c, q) values at the integration points from values like
+        `weight`."""
         points = self.elements.points
-        return values[..., self.elements.cells] @ points.interpolation.T if points.order == 1 else values
+        return (
+            values[..., self.elements.cells] @ points.interpolation.T
+            if points.order == 1
+            else values
+        )
 
     def normals(self, needed: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
-        """Return the mask (c,) of elements that need a normal at a node or point, and their unit normals (e, q, 3).
+        """Return the mask (c,) of elements that need a normal at a node or point, and
+        their unit normals (e, q, 3).
 
         A linear element has one normal, that of the pial vertex nearest to its centre.
         """
         cells, points = self.elements.cells, self.elements.points
         if points.order == 1:
             mask = np.asarray(needed[cells].any(axis=1))
-            normals = self.pial.normals_from(self.nodes[cells[mask]].mean(axis=1), self.nearest[cells[mask]])
+            normals = self.pial.normals_from(
+                self.nodes[cells[mask]].mean(axis=1), self.nearest[cells[mask]]
+            )
             return mask, np.repeat(normals[:, None], len(points.weights), axis=1)
         mask = np.asarray(needed.any(axis=1))
         return mask, interpolated_normals(self.nearest[cells[mask]], points)
 
 
 def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
-    """Return the (c, q, 3) unit normals at the points of elements from those (c, k, 3) at their nodes.
+    """Return the (c, q, 3) unit normals at the points of elements from those (c, k, 3)
+    at their nodes.
 
-    The sign of a normal does not count, since walls that face each other have opposite ones: all are turned to the side
-    of the first before they are interpolated. If the result nearly vanishes, the nearest node's normal is taken.
+    The sign of a normal does not count, since walls that face each other have opposite
+    ones: all are turned to the side of the first before they are interpolated. If the
+    result nearly vanishes, the nearest node's normal is taken.
     """
-    turned = normals * np.where(np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0, -1.0, 1.0)[:, :, None]
+    turned = (
+        normals
+        * np.where(np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0, -1.0, 1.0)[
+            :, :, None
+        ]
+    )
     mean = np.matmul(points.interpolation, turned)
     length = np.linalg.norm(mean, axis=2, keepdims=True)
     nearest = turned[:, points.piecewise_linear.argmax(axis=1)]

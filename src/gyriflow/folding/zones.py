@@ -1,7 +1,7 @@
 """Zones of the brain: facets in contact, clamped facets, and vertices that grow.
 
-They are set on the mesh at the start of a run and do not change. This module imports no solver, so that figures of the
-zones do not need one.
+They are set on the mesh at the start of a run and do not change. This module imports no
+solver, so that figures of the zones do not need one.
 """
 
 from dataclasses import dataclass
@@ -21,10 +21,11 @@ Tags = dict[str, NDArray[np.int32]]
 GAP_MM = 2.5
 """Largest width of the fissure, as in the FetalFoldSim paper."""
 MAX_BETWEEN_PLANES = 0.01
-"""Largest share of the pial area between the contact planes, where walls would have no contact."""
+"""Largest share of the pial area between the contact planes, where walls would have no
+contact."""
 MAX_WALL_MM, MIN_WALL_COSINE = 2.0, 0.7
-"""The medial wall of a single hemisphere: its largest distance to the innermost point, and the smallest cosine of the
-angle between its normal and the left-right axis."""
+"""The medial wall of a single hemisphere: its largest distance to the innermost point,
+and the smallest cosine of the angle between its normal and the left-right axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,20 +35,24 @@ class Zones:
     Attributes
     ----------
     facets
-        Pial facets (f, 3), outward, as vertex indices; the four of a quadratic element's face are consecutive.
+        Pial facets (f, 3), outward, as vertex indices; the four of a quadratic
+        element's face are consecutive.
     facet_zone
-        FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES (f,); BASE, SIDE_X or SIDE_Y on flat cuts, which
-        have no cortex; MEDIAL_WALL on the wall of a single hemisphere towards the missing one.
+        FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES (f,); BASE, SIDE_X
+        or SIDE_Y on flat cuts, which have no cortex; MEDIAL_WALL on the wall of a
+        single hemisphere towards the missing one.
     growth
         1 at vertices (n,) that grow, else 0.
     fissure_x_mm, planes_mm
-        Position of the fissure, and of the planes that the left and the right hemisphere may not pass.
+        Position of the fissure, and of the planes that the left and the right
+        hemisphere may not pass.
     free
         Whether the body has no support, so that its rigid motions have to be removed.
     anchors
-        Vertices (k,), and the mask (k, 3) of their components that are fixed in addition to the zones, so that a body
-        whose only support is a sliding wall has no rigid motion. They carry no force, since just as many components are
-        fixed as there are such motions.
+        Vertices (k,), and the mask (k, 3) of their components that are fixed in
+        addition to the zones, so that a body whose only support is a sliding wall has
+        no rigid motion. They carry no force, since just as many components are fixed as
+        there are such motions.
     """
 
     facets: NDArray[np.int64]
@@ -63,19 +68,22 @@ class Zones:
         return np.unique(self.facets[np.isin(self.facet_zone, zones)])
 
     def penetration_mm(self, positions: Floats) -> float:
-        """Return the largest distance of the fissure's walls beyond their planes, for (n, 3) positions in mm."""
+        """Return the largest distance of the fissure's walls beyond their planes, for
+        (n, 3) positions in mm."""
         left = positions[self.vertices_of(terms.LEFT_CONTACT), 0] - self.planes_mm[0]
         right = self.planes_mm[1] - positions[self.vertices_of(terms.RIGHT_CONTACT), 0]
         return float(max(left.max(initial=0.0), right.max(initial=0.0)))
 
     @property
     def cortex_facets(self) -> NDArray[np.int64]:
-        """The (c, 3) facets with cortex under them: all but flat cuts and the medial wall of a single hemisphere."""
+        """The (c, 3) facets with cortex under them: all but flat cuts and the medial
+        wall of a single hemisphere."""
         return self.facets[~np.isin(self.facet_zone, terms.FLAT_CUTS)]
 
     @property
     def measured_facets(self) -> NDArray[np.int64]:
-        """The (k, 3) facets whose area is measured: with the medial wall, without the cuts of synthetic shapes."""
+        """The (k, 3) facets whose area is measured: with the medial wall, without the
+        cuts of synthetic shapes."""
         return self.facets[~np.isin(self.facet_zone, terms.SHAPE_CUTS)]
 
     @property
@@ -96,7 +104,8 @@ class Zones:
 def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floats]:
     """Return the smallest and largest coordinates (3,) of a brain.
 
-    The single hemisphere `side` is completed by its mirror image at its innermost point.
+    The single hemisphere `side` is completed by its mirror image at its innermost
+    point.
     """
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     width = high[0] - low[0]
@@ -107,37 +116,54 @@ def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floa
     return low, high
 
 
-def medial_wall_facets(mesh: TetrahedralMesh, facets: NDArray[np.int64], side: Side) -> NDArray[np.bool_]:
-    """Return the mask (f,) of the facets of a single hemisphere that face the missing one, near its innermost point."""
+def medial_wall_facets(
+    mesh: TetrahedralMesh, facets: NDArray[np.int64], side: Side
+) -> NDArray[np.bool_]:
+    """Return the mask (f,) of the facets of a single hemisphere that face the missing
+    one, near its innermost point."""
     x = mesh.vertices[:, 0] if side == "left" else -mesh.vertices[:, 0]
-    facing = face_normals(TriangleMesh(mesh.vertices, facets))[:, 0] * (1.0 if side == "left" else -1.0)
+    facing = face_normals(TriangleMesh(mesh.vertices, facets))[:, 0] * (
+        1.0 if side == "left" else -1.0
+    )
     near = (x[facets] > x.max() - MAX_WALL_MM).all(axis=1)
     return on_whole_faces(near & (facing > MIN_WALL_COSINE), mesh.order)
 
 
-def _wall_anchors(vertices: Floats, wall: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _wall_anchors(
+    vertices: Floats, wall: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     yz = vertices[wall][:, 1:]
     central = int(((yz - yz.mean(axis=0)) ** 2).sum(axis=1).argmin())
     farthest = int(np.abs(yz[:, 0] - yz[central, 0]).argmax())
     # against translations along y and z, and the rotation about x
-    return wall[[central, farthest]], np.array([[False, True, True], [False, False, True]])
+    return wall[[central, farthest]], np.array(
+        [[False, True, True], [False, False, True]]
+    )
 
 
-def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,) are the ends of the brain."""
+def inside_ellipsoid(
+    vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats
+) -> NDArray[np.bool_]:
+    """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,)
+    are the ends of the brain."""
     extent = high - low
     centre = (low + high) / 2 + np.array([0.0, *ellipsoid.shift]) * extent
-    return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(axis=1) <= 1
+    return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(
+        axis=1
+    ) <= 1
 
 
-def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: float = GAP_MM) -> Zones:
+def zones_of_run(
+    mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: float = GAP_MM
+) -> Zones:
     """Return the zones of a brain in RAS+ mm for the parameters of a run.
 
-    The planes are a quarter of `gap_mm`, the width of the fissure, left and right of its middle; with contact `planes`
-    nearer, where the fissure is narrower: see `planes_distance`. With any kind of contact, facets near the fissure are
-    not clamped; with `planes`, the `medial_vertices` do not grow. The ellipsoid without growth is given in fractions
-    of the brain's extents (Tallinen et al. 2016). A single hemisphere has a MEDIAL_WALL, and may not pass the plane of
-    that wall.
+    The planes are a quarter of `gap_mm`, the width of the fissure, left and right of
+    its middle; with contact `planes` nearer, where the fissure is narrower: see
+    `planes_distance`. With any kind of contact, facets near the fissure are not
+    clamped; with `planes`, the `medial_vertices` do not grow. The ellipsoid without
+    growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single
+    hemisphere has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
     p = parameters
     fissure_x_mm, support, side = p.fissure_x_mm, p.support, p.side
@@ -156,16 +182,23 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: f
     static = inside_ellipsoid(mesh.vertices, ellipsoid, low, high)
 
     def all_of_face(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the mask (f,) of facets on elements' faces with a mask that is True at all vertices (f, 3)."""
+        """Return the mask (f,) of facets on elements' faces with a mask that is True at
+        all vertices (f, 3)."""
         return on_whole_faces(np.asarray(mask.all(axis=1)), mesh.order)
 
     zone = np.full(len(facets), terms.FREE)
     if support == "ellipsoid":
         zone[all_of_face(static[facets])] = terms.CLAMPED
     if p.contact.kind != "none":
-        zone[all_of_face((facet_x > left_plane) & (facet_x < right_plane))] = terms.BETWEEN_PLANES
-        zone[all_of_face((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))] = terms.LEFT_CONTACT
-        zone[all_of_face((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))] = terms.RIGHT_CONTACT
+        zone[all_of_face((facet_x > left_plane) & (facet_x < right_plane))] = (
+            terms.BETWEEN_PLANES
+        )
+        zone[
+            all_of_face((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))
+        ] = terms.LEFT_CONTACT
+        zone[
+            all_of_face((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))
+        ] = terms.RIGHT_CONTACT
     anchors = None
     if side is not None:
         zone[medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
@@ -177,25 +210,44 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: f
     if ellipsoid.kind != "none":
         growth[static] = 0.0
         if side is None:
-            growth[bridge_vertices(mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge)] = 0.0
+            growth[
+                bridge_vertices(
+                    mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
+                )
+            ] = 0.0
             if p.contact.kind == "planes":
-                growth[medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)] = 0.0
+                growth[medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)] = (
+                    0.0
+                )
     free = support == "free" and side is None
-    return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, anchors)
+    return Zones(
+        facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, anchors
+    )
 
 
-def planes_distance(vertices: Floats, facets: NDArray[np.int64], fissure_x_mm: float) -> float:
-    """Return the distance in mm from the middle of the fissure that has `MAX_BETWEEN_PLANES` of the area within."""
+def planes_distance(
+    vertices: Floats, facets: NDArray[np.int64], fissure_x_mm: float
+) -> float:
+    """Return the distance in mm from the middle of the fissure that has
+    `MAX_BETWEEN_PLANES` of the area within."""
     farthest = np.abs(vertices[facets, 0] - fissure_x_mm).max(axis=1)
     nearest_first = np.argsort(farthest)
     within = np.cumsum(face_areas(TriangleMesh(vertices, facets))[nearest_first])
-    return float(farthest[nearest_first][np.searchsorted(within, MAX_BETWEEN_PLANES * within[-1])])
+    return float(
+        farthest[nearest_first][
+            np.searchsorted(within, MAX_BETWEEN_PLANES * within[-1])
+        ]
+    )
 
 
 def bridge_vertices(
-    mesh: TetrahedralMesh, facets: NDArray[np.int64], left_plane: float, right_plane: float
+    mesh: TetrahedralMesh,
+    facets: NDArray[np.int64],
+    left_plane: float,
+    right_plane: float,
 ) -> NDArray[np.int64]:
-    """Return the vertices of the elements whose deepest vertex lies between the planes, each once."""
+    """Return the vertices of the elements whose deepest vertex lies between the planes,
+    each once."""
     x = mesh.vertices[:, 0]
     depth = PialSearch(mesh.vertices, facets).distance(mesh.vertices)[mesh.tets]
     # of several equally deep vertices, all must lie between the planes
@@ -207,48 +259,74 @@ def bridge_vertices(
 def medial_vertices(
     mesh: TetrahedralMesh, fissure_x_mm: float, left_plane: float, right_plane: float
 ) -> NDArray[np.int64]:
-    """Return the vertices, each once, of the elements whose most medial vertex lies between the planes.
+    """Return the vertices, each once, of the elements whose most medial vertex lies
+    between the planes.
 
-    Walls between the planes have no contact; the prototype of the FetalFoldSim paper does not let them grow.
+    Walls between the planes have no contact; the prototype of the FetalFoldSim paper
+    does not let them grow.
     """
     x = mesh.vertices[mesh.tets, 0]
     medial = np.where(x.mean(axis=1) > fissure_x_mm, x.min(axis=1), x.max(axis=1))
     return np.unique(mesh.tets[(medial > left_plane) & (medial < right_plane)])
 
 
-def model_fields(zones: Zones, positions: Floats, p: FoldingParameters, week: float) -> dict[str, Floats]:
-    """Return the fields of a run without maps at its nodes, whose `positions` (n, 3) of a week are in mm.
+def model_fields(
+    zones: Zones, positions: Floats, p: FoldingParameters, week: float
+) -> dict[str, Floats]:
+    """Return the fields of a run without maps at its nodes, whose `positions` (n, 3) of
+    a week are in mm.
 
-    They are positions, weight (of the cortex), growing (0 or 1), increment (tangential growth in a step) and the
-    normals (n, 3) of the pial surface at the nearest points.
+    They are positions, weight (of the cortex), growing (0 or 1), increment (tangential
+    growth in a step) and the normals (n, 3) of the pial surface at the nearest points.
     """
     pial = PialSearch(positions, zones.cortex_facets)
-    weight = cortical_weight(pial.distance(positions), value_at(p.thickness_mm, week, {}))
-    increment = value_at(p.growth_rate_per_s, week, {}) * p.step_s * weight * zones.growth
+    weight = cortical_weight(
+        pial.distance(positions), value_at(p.thickness_mm, week, {})
+    )
+    increment = (
+        value_at(p.growth_rate_per_s, week, {}) * p.step_s * weight * zones.growth
+    )
     fields = {"weight": weight, "growing": zones.growth, "increment": increment}
-    return {"positions": positions, **fields, "normals": pial.nearest_normals(positions)}
+    return {
+        "positions": positions,
+        **fields,
+        "normals": pial.nearest_normals(positions),
+    }
 
 
 def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
     """Return the (m,) tags of the elements.
 
-    `hemisphere` is LEFT or RIGHT by the element's centroid, or BRIDGE between the two contact planes. `growing` is 1 if
-    any of its vertices grows, else 0. `layer` is CORTEX if the mean cortical `weight` (n,) of its vertices is above a
-    half, else CORE.
+    `hemisphere` is LEFT or RIGHT by the element's centroid, or BRIDGE between the two
+    contact planes. `growing` is 1 if any of its vertices grows, else 0. `layer` is
+    CORTEX if the mean cortical `weight` (n,) of its vertices is above a half, else
+    CORE.
     """
     x = mesh.vertices[mesh.corners, 0].mean(axis=1)
     left, right = zones.planes_mm
     return {
-        "hemisphere": np.select([x <= left, x >= right], [terms.LEFT, terms.RIGHT], terms.BRIDGE).astype(np.int32),
+        "hemisphere": (
+            np.select(
+                [x <= left, x >= right], [terms.LEFT, terms.RIGHT], terms.BRIDGE
+            ).astype(np.int32)
+        ),
         "growing": (zones.growth[mesh.tets].max(axis=1) > 0).astype(np.int32),
-        "layer": np.where(weight[mesh.tets].mean(axis=1) > 0.5, terms.CORTEX, terms.CORE).astype(np.int32),
+        "layer": (
+            np.where(
+                weight[mesh.tets].mean(axis=1) > 0.5, terms.CORTEX, terms.CORE
+            ).astype(np.int32)
+        ),
     }
 
 
 def facet_tags(zones: Zones, on_left: NDArray[np.bool_]) -> Tags:
-    """Return the (f,) tags of `zones.facets`: `zone`, and `hemisphere`, LEFT for the mask `on_left`, else RIGHT.
+    """Return the (f,) tags of `zones.facets`: `zone`, and `hemisphere`, LEFT for the
+    mask `on_left`, else RIGHT.
 
     The fissure may be curved, so that no plane separates the hemispheres.
     """
     side = np.where(on_left, terms.LEFT, terms.RIGHT)
-    return {"zone": zones.facet_zone.astype(np.int32), "hemisphere": side.astype(np.int32)}
+    return {
+        "zone": zones.facet_zone.astype(np.int32),
+        "hemisphere": side.astype(np.int32),
+    }

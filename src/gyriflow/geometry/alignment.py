@@ -1,4 +1,5 @@
-"""Rigid registration: of matched points, and of surfaces by iterative closest points."""
+"""Rigid registration: of matched points, and of surfaces by iterative closest
+points."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -10,20 +11,25 @@ from scipy.spatial.transform import Rotation
 
 from .triangles import Floats, TriangleMesh, face_normals, transformed
 
-CUBE_ROTATIONS: Floats = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
-"""The 24 rotations of a cube, the identity first. Every rotation is within 63 degrees of one of them."""
+CUBE_ROTATIONS: Floats = np.array(
+    sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn))
+)
+"""The 24 rotations of a cube, the identity first. Every rotation is within 63 degrees
+of one of them."""
 
 IDENTITY: Floats = np.eye(3)
 MIRROR: Floats = np.diag([-1.0, 1.0, 1.0, 1.0])
 """The (4, 4) reflection that exchanges left and right in RAS coordinates."""
 
 Planes = tuple[Floats, Floats, Floats, Floats | None]
-"""Points, unit normals of their target planes, signed distances to these along the normals, and weights."""
+"""Points, unit normals of their target planes, signed distances to these along the
+normals, and weights."""
 
 
 @dataclass(frozen=True, eq=False)
 class RigidFit:
-    """A rigid motion p → rotation p + shift that registers a shape to another, and the residual distance."""
+    """A rigid motion p → rotation p + shift that registers a shape to another, and the
+    residual distance."""
 
     rotation: Floats
     shift: Floats
@@ -31,14 +37,17 @@ class RigidFit:
 
 
 N_POINTS, MAX_ROUNDS, MOVE_TOL_MM = 4000, 60, 0.005
-"""Iterative closest points: points of either surface, rounds, and the motion at which they end."""
+"""Iterative closest points: points of either surface, rounds, and the motion at which
+they end."""
 
 STALL_ROUNDS, STALL_TOL = 5, 1e-3
-"""Surfaces that differ never stop moving, so rounds also end when this many reduced the distance by less than this."""
+"""Surfaces that differ never stop moving, so rounds also end when this many reduced the
+distance by less than this."""
 
 
 def motion(rotation: ArrayLike = IDENTITY, shift: ArrayLike = 0.0) -> Floats:
-    """Return the (4, 4) motion p → rotation p + shift. The default of each is the identity."""
+    """Return the (4, 4) motion p → rotation p + shift. The default of each is the
+    identity."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, shift
     return matrix
@@ -50,14 +59,18 @@ def angle_deg(rotation: Floats) -> float:
 
 
 def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
-    """Return the (4, 4) least-squares motion of (n, 3) points onto others (Kabsch 1976, 10.1107/S0567739476001873)."""
-    source, target = (np.average(group, axis=0, weights=weights) for group in (points, onto))
+    """Return the (4, 4) least-squares motion of (n, 3) points onto others (Kabsch 1976,
+    10.1107/S0567739476001873)."""
+    source, target = (
+        np.average(group, axis=0, weights=weights) for group in (points, onto)
+    )
     turn, _ = Rotation.align_vectors(onto - target, points - source, weights=weights)
     return motion(turn.as_matrix(), target - turn.apply(source))
 
 
 def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floats:
-    """Return the (n, 3) displacement from `first` to `second` after the latter is rigidly aligned to the former."""
+    """Return the (n, 3) displacement from `first` to `second` after the latter is
+    rigidly aligned to the former."""
     back = rigid_fit(second, first, weights)
     return np.asarray(second @ back[:3, :3].T + back[:3, 3] - first)
 
@@ -65,15 +78,19 @@ def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floa
 def step_towards_planes(
     points: Floats, normals: Floats, distances: Floats, weights: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Return the rotation and shift that minimise the squared distances of (n, 3) points from planes.
+    """Return the rotation and shift that minimise the squared distances of (n, 3)
+    points from planes.
 
-    One step of Chen and Medioni 1992. The planes have unit `normals` and lie at signed `distances` (n,) along these.
-    Undetermined directions, such as the rotations of a sphere, are not changed.
+    One step of Chen and Medioni 1992. The planes have unit `normals` and lie at signed
+    `distances` (n,) along these. Undetermined directions, such as the rotations of a
+    sphere, are not changed.
     """
     centre = points.mean(axis=0)
     rows = np.hstack([np.cross(points - centre, normals), normals])
     size = np.ones(len(points)) if weights is None else np.sqrt(weights)
-    turn, move = np.split(np.linalg.lstsq(rows * size[:, None], distances * size, rcond=1e-6)[0], 2)
+    turn, move = np.split(
+        np.linalg.lstsq(rows * size[:, None], distances * size, rcond=1e-6)[0], 2
+    )
     rotation = Rotation.from_rotvec(turn).as_matrix()
     return rotation, centre + move - rotation @ centre
 
@@ -85,9 +102,11 @@ def follow_planes(
     rounds: int,
     is_converged: Callable[[Floats, Floats, Floats], bool],
 ) -> tuple[Floats, Floats]:
-    """Return the rotation and shift after at most `rounds` steps of iterative closest points.
+    """Return the rotation and shift after at most `rounds` steps of iterative closest
+    points.
 
-    `planes` gives the moved points and their planes; `is_converged` gets a step's points, rotation and shift.
+    `planes` gives the moved points and their planes; `is_converged` gets a step's
+    points, rotation and shift.
     """
     for _ in range(rounds):
         points, normals, distances, weights = planes(rotation, shift)
@@ -112,10 +131,14 @@ def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floa
 
 
 def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
-    """Return the (4, 4) rigid motion that aligns a surface to one in a similar pose: point to plane, both ways."""
+    """Return the (4, 4) rigid motion that aligns a surface to one in a similar pose:
+    point to plane, both ways."""
     history: list[float] = []
     nearest_of_a, nearest_of_b = _nearest_planes(mesh), _nearest_planes(onto)
-    points_a, points_b = (surface.vertices[:: max(1, len(surface.vertices) // N_POINTS)] for surface in (mesh, onto))
+    points_a, points_b = (
+        surface.vertices[:: max(1, len(surface.vertices) // N_POINTS)]
+        for surface in (mesh, onto)
+    )
 
     def planes(rotation: Floats, shift: Floats) -> Planes:
         moved = points_a @ rotation.T + shift
@@ -124,7 +147,9 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         on_a, normals_a = nearest_of_a((points_b - shift) @ rotation)
         points = np.concatenate([moved, on_a @ rotation.T + shift])
         normals = np.concatenate([normals_b, normals_a @ rotation.T])
-        distances = np.einsum("ij,ij->i", np.concatenate([on_b, points_b]) - points, normals)
+        distances = np.einsum(
+            "ij,ij->i", np.concatenate([on_b, points_b]) - points, normals
+        )
         history.append(float(np.linalg.norm(distances)))
         return points, normals, distances, None
 
@@ -133,7 +158,9 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         if before and min(last) > (1 - STALL_TOL) * min(before):
             return True
         moved = points[: len(points_a)]
-        return bool(np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < MOVE_TOL_MM)
+        return bool(
+            np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < MOVE_TOL_MM
+        )
 
     shift = points_b.mean(axis=0) - points_a.mean(axis=0)
     return motion(*follow_planes(np.eye(3), shift, planes, MAX_ROUNDS, is_converged))
@@ -151,20 +178,32 @@ def fits_from_all_sides(
     candidates: int,
     distinct_deg: float,
 ) -> list[RigidFit]:
-    """Return refined fits of an alignment whose initial rotation is unknown, that from the first start first.
+    """Return refined fits of an alignment whose initial rotation is unknown, that from
+    the first start first.
 
-    A coarse fit from each (3, 3) rotation of `starts` finds the local minima. That from the first start and the best
-    `candidates` of those that differ by more than `distinct_deg` are refined.
+    A coarse fit from each (3, 3) rotation of `starts` finds the local minima. That from
+    the first start and the best `candidates` of those that differ by more than
+    `distinct_deg` are refined.
     """
     coarse = [coarse_fit(start) for start in starts]
     distinct: list[int] = []
     for i in map(int, np.argsort([fit.residual for fit in coarse], kind="stable")):
-        if all(angle_deg(coarse[i].rotation @ coarse[j].rotation.T) > distinct_deg for j in distinct):
+        if all(
+            angle_deg(coarse[i].rotation @ coarse[j].rotation.T) > distinct_deg
+            for j in distinct
+        ):
             distinct.append(i)
     return [refine(coarse[i]) for i in dict.fromkeys([0, *distinct[:candidates]])]
 
 
-def residual_ratio(fits: Iterable[RigidFit], best: RigidFit, distinct_deg: float) -> float:
-    """Return the least residual in another pose over that of the best fit, ∞ without; near 1 it is ambiguous."""
-    alternatives = [fit.residual for fit in fits if angle_deg(fit.rotation @ best.rotation.T) > distinct_deg]
+def residual_ratio(
+    fits: Iterable[RigidFit], best: RigidFit, distinct_deg: float
+) -> float:
+    """Return the least residual in another pose over that of the best fit, ∞ without;
+    near 1 it is ambiguous."""
+    alternatives = [
+        fit.residual
+        for fit in fits
+        if angle_deg(fit.rotation @ best.rotation.T) > distinct_deg
+    ]
     return float(min(alternatives, default=np.inf) / best.residual)

@@ -1,4 +1,5 @@
-"""Correspondence between the points of two brains: a smooth deformation, or surfaces with the same vertices."""
+"""Correspondence between the points of two brains: a smooth deformation, or surfaces
+with the same vertices."""
 
 from dataclasses import dataclass
 
@@ -13,8 +14,9 @@ from .triangles import Floats, TriangleMesh, frozen, transformed
 class Deformation:
     """The map p → A(p + u(p)) from one brain's space to another's, both in RAS+ mm.
 
-    A is the affine (4, 4) `matrix`, u the (i, j, k, 3) `displacement` in mm on a grid in the first brain's space. The
-    grid's `affine` (4, 4) leads from indices to RAS+ mm. u is interpolated linearly, and constant outside the grid.
+    A is the affine (4, 4) `matrix`, u the (i, j, k, 3) `displacement` in mm on a grid
+    in the first brain's space. The grid's `affine` (4, 4) leads from indices to RAS+
+    mm. u is interpolated linearly, and constant outside the grid.
     """
 
     matrix: Floats
@@ -25,12 +27,16 @@ class Deformation:
         object.__setattr__(self, "matrix", frozen(self.matrix, np.float64, 4))
         object.__setattr__(self, "affine", frozen(self.affine, np.float64, 4))
         if self.displacement.ndim != 4 or self.displacement.shape[3] != 3:
-            raise ValueError(f"expected an (i, j, k, 3) displacement, found shape {self.displacement.shape}")
+            raise ValueError(
+                "expected an (i, j, k, 3) displacement, found shape"
+                f" {self.displacement.shape}"
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class MatchedSurfaces:
-    """The first brain's surface in mm, and the (n, 3) positions of its vertices in the second brain."""
+    """The first brain's surface in mm, and the (n, 3) positions of its vertices in the
+    second brain."""
 
     first: TriangleMesh
     second: Floats
@@ -38,29 +44,44 @@ class MatchedSurfaces:
     def __post_init__(self) -> None:
         object.__setattr__(self, "second", frozen(self.second, np.float64, 3))
         if self.second.shape != self.first.vertices.shape:
-            raise ValueError(f"expected {len(self.first.vertices)} matched vertices, found {len(self.second)}")
+            raise ValueError(
+                f"expected {len(self.first.vertices)} matched vertices, found"
+                f" {len(self.second)}"
+            )
 
 
 Correspondence = Deformation | MatchedSurfaces
 """Result of a registration, or of matched surfaces."""
 
 
-def transform_points(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
+def transform_points(
+    points: NDArray[np.number], matrix: NDArray[np.floating]
+) -> Floats:
     """Apply a (4, 4) affine map to (n, 3) points."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
 
 
 def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
-    """Return the (3, …) fractional voxel indices of (…, 3) points in mm, for a volume's (4, 4) affine."""
-    return np.moveaxis(transform_points(points, np.linalg.inv(np.asarray(affine, dtype=float))), -1, 0)
+    """Return the (3, …) fractional voxel indices of (…, 3) points in mm, for a volume's
+    (4, 4) affine."""
+    return np.moveaxis(
+        transform_points(points, np.linalg.inv(np.asarray(affine, dtype=float))), -1, 0
+    )
 
 
-def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Correspondence:
-    """Return the correspondence of two brains after (4, 4) rigid motions of the first and of the second."""
+def between_moved(
+    pair: Correspondence, first: Floats, second: Floats
+) -> Correspondence:
+    """Return the correspondence of two brains after (4, 4) rigid motions of the first
+    and of the second."""
     if isinstance(pair, MatchedSurfaces):
-        return MatchedSurfaces(transformed(pair.first, first), transform_points(pair.second, second))
+        return MatchedSurfaces(
+            transformed(pair.first, first), transform_points(pair.second, second)
+        )
     turned = (pair.displacement @ first[:3, :3].T).astype(pair.displacement.dtype)
-    return Deformation(second @ pair.matrix @ np.linalg.inv(first), turned, first @ pair.affine)
+    return Deformation(
+        second @ pair.matrix @ np.linalg.inv(first), turned, first @ pair.affine
+    )
 
 
 def carry(deformation: Deformation, points: Floats) -> Floats:
@@ -68,13 +89,18 @@ def carry(deformation: Deformation, points: Floats) -> Floats:
     index = voxel_index(points, deformation.affine)
     moved = np.array(points, dtype=np.float64)
     for axis in range(3):
-        moved[:, axis] += map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest")
+        moved[:, axis] += map_coordinates(
+            deformation.displacement[..., axis], index, order=1, mode="nearest"
+        )
     return transform_points(moved, deformation.matrix)
 
 
 def determinants(deformation: Deformation) -> Floats:
-    """Return the (i, j, k) local change of volume on the map's grid (central differences); ≤ 0 where it folds."""
+    """Return the (i, j, k) local change of volume on the map's grid (central
+    differences); ≤ 0 where it folds."""
     slopes = np.gradient(deformation.displacement.astype(np.float64), axis=(0, 1, 2))
     gradient = np.stack(list(slopes), axis=-1)
     gradient = gradient @ np.linalg.inv(deformation.affine[:3, :3])
-    return np.asarray(np.linalg.det(np.eye(3) + gradient) * np.linalg.det(deformation.matrix[:3, :3]))
+    return np.asarray(
+        np.linalg.det(np.eye(3) + gradient) * np.linalg.det(deformation.matrix[:3, :3])
+    )

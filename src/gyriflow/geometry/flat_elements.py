@@ -1,8 +1,9 @@
-"""Flat tetrahedra inside a body, opened by moving as few vertices by as little as possible.
+"""Flat tetrahedra inside a body, opened by moving as few vertices by as little as
+possible.
 
-The volume of a tetrahedron is a linear function of the place of one of its vertices, so the place at which the flattest
-of the elements around a vertex is largest is found by a linear program (Amenta, Bern and Eppstein 1999, J. Algorithms
-30, 302-322).
+The volume of a tetrahedron is a linear function of the place of one of its vertices, so
+the place at which the flattest of the elements around a vertex is largest is found by a
+linear program (Amenta, Bern and Eppstein 1999, J. Algorithms 30, 302-322).
 """
 
 import numpy as np
@@ -15,17 +16,24 @@ from .triangles import Floats
 ROUNDS = 3
 """Rounds over the flat elements: one may open only after another."""
 COST_PER_MM = 1e-3
-"""Relative volume that a displacement of 1 mm has to gain: a vertex moves no further than that needs."""
+"""Relative volume that a displacement of 1 mm has to gain: a vertex moves no further
+than that needs."""
 
 
 def open_flat_elements(
-    positions: Floats, tets: NDArray[np.integer], start_volumes: Floats, longest_mm: Floats, least: float
+    positions: Floats,
+    tets: NDArray[np.integer],
+    start_volumes: Floats,
+    longest_mm: Floats,
+    least: float,
 ) -> Floats:
-    """Return (n, 3) positions in mm at which elements have the fraction `least` of their volume, where possible.
+    """Return (n, 3) positions in mm at which elements have the fraction `least` of
+    their volume, where possible.
 
-    `tets` are (m, 4) linear elements of positive volume, `start_volumes` (m,) in mm³ those of which this is a fraction.
-    A vertex moves by at most `longest_mm` (n,) along each axis. No element below this fraction loses volume unless a
-    flatter one at the same vertex gains.
+    `tets` are (m, 4) linear elements of positive volume, `start_volumes` (m,) in mm³
+    those of which this is a fraction. A vertex moves by at most `longest_mm` (n,) along
+    each axis. No element below this fraction loses volume unless a flatter one at the
+    same vertex gains.
     """
     places, left_mm = positions, longest_mm.copy()
     for _ in range(ROUNDS):
@@ -40,23 +48,42 @@ def open_flat_elements(
         near = np.flatnonzero(np.isin(tets, vertices).any(axis=1))
         for vertex in dict.fromkeys(vertices.tolist()):
             around = near[(tets[near] == vertex).any(axis=1)]
-            move = _best_move(places, vertex, tets[around], start_volumes[around], left_mm[vertex], least)
+            move = _best_move(
+                places,
+                vertex,
+                tets[around],
+                start_volumes[around],
+                left_mm[vertex],
+                least,
+            )
             places[vertex] += move
             left_mm[vertex] -= np.abs(move).max()
     return places
 
 
 def _best_move(
-    places: Floats, vertex: int, around: NDArray[np.integer], start_volumes: Floats, longest_mm: float, least: float
+    places: Floats,
+    vertex: int,
+    around: NDArray[np.integer],
+    start_volumes: Floats,
+    longest_mm: float,
+    least: float,
 ) -> Floats:
-    """Return the displacement (3,) in mm of a vertex of the elements around it that opens the flattest of them."""
+    """Return the displacement (3,) in mm of a vertex of the elements around it that
+    opens the flattest of them."""
     volumes = volumes_between(places, around)
     corner = (around == vertex).argmax(axis=1)
     opposite = places[np.take_along_axis(around, np.array(FACES)[corner], axis=1)]
-    gradients = -np.cross(opposite[:, 1] - opposite[:, 0], opposite[:, 2] - opposite[:, 0]) / 6
-    # unknowns: displacement along x, y, z, the smallest ratio, and the largest component of the displacement
+    gradients = (
+        -np.cross(opposite[:, 1] - opposite[:, 0], opposite[:, 2] - opposite[:, 0]) / 6
+    )
+    # unknowns: displacement along x, y, z, the smallest ratio, and the largest
+    # component of the displacement
     count = len(around)
-    stay_open = np.column_stack([-gradients, start_volumes, np.zeros(count)]) / start_volumes[:, None]
+    stay_open = (
+        np.column_stack([-gradients, start_volumes, np.zeros(count)])
+        / start_volumes[:, None]
+    )
     sides = np.vstack([np.eye(3), -np.eye(3)])
     bound_move = np.column_stack([sides, np.zeros(6), -np.ones(6)])
     found = linprog(

@@ -15,20 +15,25 @@ from .tetrahedra import TetrahedralMesh, linear_pieces
 from .triangles import Floats, Ints
 
 MAX_VELOCITY_RATIO = 3.0
-"""Largest velocity at a week as a multiple of the smaller mean velocity on either side of it: the bound within which a
-cubic does not overshoot (Fritsch and Carlson 1980, doi 10.1137/0717021)."""
+"""Largest velocity at a week as a multiple of the smaller mean velocity on either side
+of it: the bound within which a cubic does not overshoot (Fritsch and Carlson 1980, doi
+10.1137/0717021)."""
 STRAIGHT_MM = 5.0
-"""Distance from an element that would be inverted within which the path is straight (Gaussian)."""
+"""Distance from an element that would be inverted within which the path is straight
+(Gaussian)."""
 STRAIGHTENING_ROUNDS = 3
 MIN_SPACING_GW = 0.5
-"""Time between two observed shapes below which growth from one to the other is within registration noise."""
+"""Time between two observed shapes below which growth from one to the other is within
+registration noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A path through k shapes (n, 3) in mm at ascending weeks: a cubic between each two.
+    """A path through k shapes (n, 3) in mm at ascending weeks: a cubic between each
+    two.
 
-    `inverted` (k − 1, m) are the elements that it still inverts between two shapes, in pieces of a step.
+    `inverted` (k − 1, m) are the elements that it still inverts between two shapes, in
+    pieces of a step.
     """
 
     weeks: Floats
@@ -46,11 +51,13 @@ def path_through(
     step_gw: float = 1 / 7,
     stops: Collection[float] = (),
 ) -> Path:
-    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, for a run with steps of `step_gw`.
+    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, for a run
+    with steps of `step_gw`.
 
-    Each shape is aligned rigidly to the one before; shapes at almost the same time are merged (`merged_shapes`).
-    `stops` are weeks of shapes that were not observed. Velocities are `limited_velocities`; near elements that a step
-    would invert the path is straight from shape to shape, so that the velocity may jump at the weeks.
+    Each shape is aligned rigidly to the one before; shapes at almost the same time are
+    merged (`merged_shapes`). `stops` are weeks of shapes that were not observed.
+    Velocities are `limited_velocities`; near elements that a step would invert the path
+    is straight from shape to shape, so that the velocity may jump at the weeks.
     """
     sizes = vertex_sizes(shapes[0], linear_pieces(mesh))
     aligned = [shapes[0]]
@@ -58,20 +65,32 @@ def path_through(
         aligned.append(transform_points(shape, rigid_fit(shape, aligned[-1], sizes)))
     at, places = merged_shapes(np.asarray(weeks, dtype=float), np.stack(aligned), stops)
     velocities = limited_velocities(at, places)
-    # by interval, since velocities may differ on the two sides of a week: control points of Bernstein's polynomials
+    # by interval, since velocities may differ on the two sides of a week: control
+    # points of Bernstein's polynomials
     lengths = np.diff(at)[:, None, None]
     first, last = places[:-1], places[1:]
-    control = np.stack([first, first + velocities[:-1] * lengths / 3, last - velocities[1:] * lengths / 3, last])
+    control = np.stack(
+        [
+            first,
+            first + velocities[:-1] * lengths / 3,
+            last - velocities[1:] * lengths / 3,
+            last,
+        ]
+    )
     inverted = []
     for i, length in enumerate(np.diff(at)):
         steps = max(1, int(np.ceil(length / step_gw - 1e-6)))
         ends = np.arange(steps + 1) / steps
-        straight = control[0, i] + np.array([1 / 3, 2 / 3])[:, None, None] * (control[3, i] - control[0, i])
+        straight = control[0, i] + np.array([1 / 3, 2 / 3])[:, None, None] * (
+            control[3, i] - control[0, i]
+        )
         for _ in range(STRAIGHTENING_ROUNDS):
             faults = _inverted_between(control[:, i], ends, mesh)
             if not len(faults):
                 break
-            distance, _ = cKDTree(places[i][mesh.corners[faults]].mean(axis=1)).query(places[i])
+            distance, _ = cKDTree(places[i][mesh.corners[faults]].mean(axis=1)).query(
+                places[i]
+            )
             near = np.exp(-((distance / STRAIGHT_MM) ** 2))[:, None]
             control[1:3, i] += near * (straight - control[1:3, i])
         else:
@@ -92,25 +111,38 @@ def _inverted_between(control: Floats, ends: Floats, mesh: TetrahedralMesh) -> I
     return np.flatnonzero(found)
 
 
-def merged_shapes(weeks: Floats, places: Floats, stops: Collection[float] = ()) -> tuple[Floats, Floats]:
-    """Return weeks and (k, n, 3) places, with shapes closer than `MIN_SPACING_GW` moved onto one line in time.
+def merged_shapes(
+    weeks: Floats, places: Floats, stops: Collection[float] = ()
+) -> tuple[Floats, Floats]:
+    """Return weeks and (k, n, 3) places, with shapes closer than `MIN_SPACING_GW` moved
+    onto one line in time.
 
-    The line passes through the mean of these shapes, at the start of the path through the start itself, with the mean
-    velocity to their neighbours: one scan too many does not bend the path. Stops next to them are left out.
+    The line passes through the mean of these shapes, at the start of the path through
+    the start itself, with the mean velocity to their neighbours: one scan too many does
+    not bend the path. Stops next to them are left out.
     """
     observed = np.flatnonzero(~np.isin(weeks, list(stops)))
-    groups = np.split(observed, np.flatnonzero(np.diff(weeks[observed]) >= MIN_SPACING_GW) + 1)
+    groups = np.split(
+        observed, np.flatnonzero(np.diff(weeks[observed]) >= MIN_SPACING_GW) + 1
+    )
     if len(groups) == 1 or max(map(len, groups)) == 1:
         return weeks, places
-    means = [(float(weeks[group].mean()), places[group].mean(axis=0)) for group in groups]
+    means = [
+        (float(weeks[group].mean()), places[group].mean(axis=0)) for group in groups
+    ]
     means[0] = (float(weeks[0]), places[0])
     merged = places.copy()
     kept = np.ones(len(weeks), dtype=bool)
     for number, group in enumerate(groups):
         if len(group) > 1:
-            (early, first), (late, last) = means[max(number - 1, 0)], means[min(number + 1, len(groups) - 1)]
+            (early, first), (late, last) = (
+                means[max(number - 1, 0)],
+                means[min(number + 1, len(groups) - 1)],
+            )
             week, mean = means[number]
-            merged[group] = mean + ((weeks[group] - week) / (late - early))[:, None, None] * (last - first)
+            merged[group] = mean + ((weeks[group] - week) / (late - early))[
+                :, None, None
+            ] * (last - first)
             before, after = np.searchsorted(observed, [group[0], group[-1]]) + [-1, 1]
             end = observed[after] if after < len(observed) else group[-1] + 1
             around = slice(observed[max(before, 0)], end)
@@ -119,9 +151,11 @@ def merged_shapes(weeks: Floats, places: Floats, stops: Collection[float] = ()) 
 
 
 def limited_velocities(weeks: Floats, places: Floats) -> Floats:
-    """Return the (k, n, 3) velocities at k weeks of points on their way through (k, n, 3) places.
+    """Return the (k, n, 3) velocities at k weeks of points on their way through (k, n,
+    3) places.
 
-    It is the parabola's through a place and its neighbours, the mean velocity at the ends, limited in length.
+    It is the parabola's through a place and its neighbours, the mean velocity at the
+    ends, limited in length.
     """
     velocities = np.gradient(places, weeks, axis=0)
     speed = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(weeks)[:, None]

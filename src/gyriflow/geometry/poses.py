@@ -1,4 +1,5 @@
-"""Pose of a brain: rigid motions from the coordinates of its files to its posed surface, and their evidence."""
+"""Pose of a brain: rigid motions from the coordinates of its files to its posed
+surface, and their evidence."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -20,10 +21,12 @@ CONVENTIONS: dict[str, Floats] = {"ras": np.eye(4), "lps": LPS_TO_RAS}
 class Pose:
     """Rigid motions (4, 4) in mm that pose a brain, and their evidence.
 
-    `world` leads from the world of the brain's volumes, RAS+, to its surface; correspondences refer to these worlds.
-    `files` lead from the coordinates of its surface files: "left" and "right" for hemispheres, and "whole". `by` is the
-    origin of the pose: "file", "shape", "configuration", "default", or parts of the labels. `together` is False if the
-    hemispheres were posed separately. `evidence` has angles, residuals and distances, in plain values for JSON.
+    `world` leads from the world of the brain's volumes, RAS+, to its surface;
+    correspondences refer to these worlds. `files` lead from the coordinates of its
+    surface files: "left" and "right" for hemispheres, and "whole". `by` is the origin
+    of the pose: "file", "shape", "configuration", "default", or parts of the labels.
+    `together` is False if the hemispheres were posed separately. `evidence` has angles,
+    residuals and distances, in plain values for JSON.
     """
 
     world: Floats = field(default_factory=lambda: np.eye(4))
@@ -39,15 +42,22 @@ class Pose:
         return np.asarray(np.linalg.inv(self.world))
 
     def of_file(self, side: str = "whole") -> Floats:
-        """Return the (4, 4) motion from the coordinates of a surface file to the surface."""
+        """Return the (4, 4) motion from the coordinates of a surface file to the
+        surface."""
         return self.files.get(side, self.files.get("whole", self.world))
 
     def of_volume(self, path: str) -> Floats:
-        """Return the (4, 4) motion from the brain's volumes to its surface; InputError if the sides have two."""
+        """Return the (4, 4) motion from the brain's volumes to its surface; InputError
+        if the sides have two."""
         if self.together:
             return self.world
-        problem = "a volume cannot belong to a brain whose hemispheres were posed separately"
-        remedy = "Give the values per vertex (GIFTI), on surfaces of the brain, or hemispheres posed as one brain."
+        problem = (
+            "a volume cannot belong to a brain whose hemispheres were posed separately"
+        )
+        remedy = (
+            "Give the values per vertex (GIFTI), on surfaces of the brain, or"
+            " hemispheres posed as one brain."
+        )
         raise InputError(problem, path=path, remedy=remedy)
 
     def then(self, matrix: Floats) -> "Pose":
@@ -58,18 +68,36 @@ class Pose:
     def plain(self) -> dict[str, Any]:
         """Return the pose in plain values for JSON."""
         files = {name: pose.tolist() for name, pose in self.files.items()}
-        plain = {"by": self.by, "together": self.together, "world": self.world.tolist(), "files": files}
-        return plain | {"evidence": dict(self.evidence), "warnings": list(self.warnings)}
+        plain = {
+            "by": self.by,
+            "together": self.together,
+            "world": self.world.tolist(),
+            "files": files,
+        }
+        return plain | {
+            "evidence": dict(self.evidence),
+            "warnings": list(self.warnings),
+        }
 
 
 def pose_from(plain: Mapping[str, Any]) -> Pose:
     """Return the pose from its plain values (see `Pose.plain`)."""
     files = {name: np.array(pose) for name, pose in plain["files"].items()}
     warnings = tuple(plain["warnings"])
-    return Pose(np.array(plain["world"]), files, plain["by"], plain["together"], plain["evidence"], warnings)
+    return Pose(
+        np.array(plain["world"]),
+        files,
+        plain["by"],
+        plain["together"],
+        plain["evidence"],
+        warnings,
+    )
 
 
 def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) -> Pose:
-    """Return the pose of a file that a (3, 3) rotation brings to RAS+; the brain's volumes are in RAS+ already."""
+    """Return the pose of a file that a (3, 3) rotation brings to RAS+; the brain's
+    volumes are in RAS+ already."""
     whole = motion(rotation)
-    return Pose(whole @ CONVENTIONS[coordinates], {"whole": whole}, by, warnings=warnings)
+    return Pose(
+        whole @ CONVENTIONS[coordinates], {"whole": whole}, by, warnings=warnings
+    )

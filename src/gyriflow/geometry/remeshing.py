@@ -1,4 +1,5 @@
-"""Remeshing of surfaces with even triangles, and removal of self-intersections, by MeshLab's filters."""
+"""Remeshing of surfaces with even triangles, and removal of self-intersections, by
+MeshLab's filters."""
 
 import numpy as np
 import pymeshlab
@@ -13,27 +14,37 @@ SHARP_DEG = 30.0
 
 
 def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """Return the (m,) mask of faces that cut others; unlike in `faces_that_cross`, contacts do not count."""
+    """Return the (m,) mask of faces that cut others; unlike in `faces_that_cross`,
+    contacts do not count."""
     document = in_meshlab(mesh)
     document.compute_selection_by_self_intersections_per_face()
     return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
 
 
 def remesh(
-    mesh: TriangleMesh, edge_length_mm: float, rounds: int = REMESHING_ROUNDS, sharp_deg: float = SHARP_DEG
+    mesh: TriangleMesh,
+    edge_length_mm: float,
+    rounds: int = REMESHING_ROUNDS,
+    sharp_deg: float = SHARP_DEG,
 ) -> TriangleMesh:
-    """Return the surface with even triangles of an edge length (mm); edges sharper than `sharp_deg` are kept."""
+    """Return the surface with even triangles of an edge length (mm); edges sharper than
+    `sharp_deg` are kept."""
     document = in_meshlab(mesh)
     length = pymeshlab.PureValue(edge_length_mm)
     # MeshLab remembers `selectedonly` of an earlier call
     document.meshing_isotropic_explicit_remeshing(
-        iterations=rounds, targetlen=length, featuredeg=sharp_deg, checksurfdist=False, selectedonly=False
+        iterations=rounds,
+        targetlen=length,
+        featuredeg=sharp_deg,
+        checksurfdist=False,
+        selectedonly=False,
     )
     return from_meshlab(document)
 
 
 def decimate(mesh: TriangleMesh, vertices: int) -> TriangleMesh:
-    """Return the surface with about so many vertices, by quadric edge collapse; its topology and boundary are kept."""
+    """Return the surface with about so many vertices, by quadric edge collapse; its
+    topology and boundary are kept."""
     document = in_meshlab(mesh)
     document.meshing_decimation_quadric_edge_collapse(
         targetfacenum=2 * vertices,
@@ -47,7 +58,8 @@ def decimate(mesh: TriangleMesh, vertices: int) -> TriangleMesh:
 
 
 def untangle(mesh: TriangleMesh) -> tuple[TriangleMesh, int, int]:
-    """Remove self-intersections by Laplacian smoothing of the faces concerned, ever wider, in the same topology.
+    """Remove self-intersections by Laplacian smoothing of the faces concerned, ever
+    wider, in the same topology.
 
     Also return the number of self-intersecting faces before, and of those that remain.
     """
@@ -61,7 +73,9 @@ def untangle(mesh: TriangleMesh) -> tuple[TriangleMesh, int, int]:
         for _ in range(1 + round_ // 2):
             document.apply_selection_dilatation()
         document.compute_selection_transfer_face_to_vertex()
-        document.apply_coord_laplacian_smoothing(stepsmoothnum=2, cotangentweight=False, selected=True)
+        document.apply_coord_laplacian_smoothing(
+            stepsmoothnum=2, cotangentweight=False, selected=True
+        )
         mesh = from_meshlab(document)
     return mesh, counts[0], counts[-1]
 

@@ -13,7 +13,8 @@ from .triangles import Floats, Ints, Mask
 ROUNDS = 6
 """Number of rounds in which nodes are moved."""
 FULL_ROUNDS = 4
-"""Number of rounds after these in which nodes are moved to the middles of their sides."""
+"""Number of rounds after these in which nodes are moved to the middles of their
+sides."""
 PARTS = (1.0, 0.5, 0.25)
 """Parts of the way to the middle of its side that an inner node may move in a round."""
 MIN_GAIN = 1e-3
@@ -21,10 +22,12 @@ MIN_GAIN = 1e-3
 
 
 def straighten_sides(positions: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return (n, 3) positions with straighter sides of (m, 10) elements that may fold over.
+    """Return (n, 3) positions with straighter sides of (m, 10) elements that may fold
+    over.
 
-    In each round the nodes of their sides move halfway to the middle of the side, in the last ones fully: that may bend
-    elements around. Elements with inverted corners still fold over.
+    In each round the nodes of their sides move halfway to the middle of the side, in
+    the last ones fully: that may bend elements around. Elements with inverted corners
+    still fold over.
     """
     places = positions.copy()
     for number in range(ROUNDS + FULL_ROUNDS):
@@ -33,12 +36,15 @@ def straighten_sides(positions: Floats, tets: NDArray[np.integer]) -> Floats:
             break
         middles = bent[:, 4:]
         straight = places[bent[:, EDGES]].mean(axis=2)
-        places[middles] = straight if number >= ROUNDS else (straight + places[middles]) / 2
+        places[middles] = (
+            straight if number >= ROUNDS else (straight + places[middles]) / 2
+        )
     return places
 
 
 def may_fold_over(positions: Floats, tets: NDArray[np.integer]) -> Mask:
-    """Return (m,) whether (m, 10) elements may fold over, or a linear piece between their nodes is inverted."""
+    """Return (m,) whether (m, 10) elements may fold over, or a linear piece between
+    their nodes is inverted."""
     volumes = volumes_between(positions, tets[:, PIECES].reshape(-1, 4))
     has_inverted_piece = (volumes <= 0).reshape(len(tets), -1).any(axis=1)
     return has_inverted_piece | (lower_bounds(positions, tets) <= 0)
@@ -48,8 +54,8 @@ def may_fold_over(positions: Floats, tets: NDArray[np.integer]) -> Mask:
 class InnerSides:
     """The sides of a mesh's (m, 10) elements that are not on its surface.
 
-    `ends` (n, 2) are the ends of the side in whose middle a node lies, -1 for corners and on the surface; `around`
-    (n, m) has the elements around each node.
+    `ends` (n, 2) are the ends of the side in whose middle a node lies, -1 for corners
+    and on the surface; `around` (n, m) has the elements around each node.
     """
 
     tets: Ints
@@ -64,29 +70,38 @@ class InnerSides:
         ends[boundary_faces(mesh)[0]] = -1
         elements = np.repeat(np.arange(len(mesh.tets)), mesh.tets.shape[1])
         shape = len(mesh.vertices), len(mesh.tets)
-        around = sparse.coo_array((np.ones(len(elements), dtype=bool), (mesh.tets.ravel(), elements)), shape=shape)
+        around = sparse.coo_array(
+            (np.ones(len(elements), dtype=bool), (mesh.tets.ravel(), elements)),
+            shape=shape,
+        )
         return cls(mesh.tets, ends, around.tocsr())
 
     def straighten(self, positions: Floats, least: float) -> Floats:
-        """Return (n, 3) positions with straighter inner sides of elements whose `straightness` is at most `least`.
+        """Return (n, 3) positions with straighter inner sides of elements whose
+        `straightness` is at most `least`.
 
-        A node moves only as far as this makes the least straight of the elements around it straighter: where the
-        surface is bowed, straight sides inside may be worse.
+        A node moves only as far as this makes the least straight of the elements around
+        it straighter: where the surface is bowed, straight sides inside may be worse.
         """
         places = positions.copy()
         for _ in range(ROUNDS):
             bent = straightness(places, self.tets) <= least
             nodes = np.unique(self.tets[bent])
-            moved = [self._move(places, node) for node in nodes[self.ends[nodes, 0] >= 0]]
+            moved = [
+                self._move(places, node) for node in nodes[self.ends[nodes, 0] >= 0]
+            ]
             if not any(moved):
                 break
         return places
 
     def _move(self, places: Floats, node: int) -> bool:
-        """Move a node towards the middle of its side if that straightens the elements around; return whether it did."""
+        """Move a node towards the middle of its side if that straightens the elements
+        around; return whether it did."""
         start = places[node].copy()
         way = places[self.ends[node]].mean(axis=0) - start
-        elements = self.tets[self.around.indices[self.around.indptr[node] : self.around.indptr[node + 1]]]
+        elements = self.tets[
+            self.around.indices[self.around.indptr[node] : self.around.indptr[node + 1]]
+        ]
         best, best_part = straightness(places, elements).min(), 0.0
         for part in PARTS:
             places[node] = start + part * way
@@ -98,9 +113,12 @@ class InnerSides:
 
 
 def straightness(positions: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return how straight the sides of (m, 10) elements are: 1 if all are straight, at most 0 if one may fold over.
+    """Return how straight the sides of (m, 10) elements are: 1 if all are straight, at
+    most 0 if one may fold over.
 
     It is the lower bound of the Jacobian determinant in an element over the mean.
     """
     means = 6 * np.abs(volumes_between(positions, tets))
-    return np.asarray(lower_bounds(positions, tets) / np.maximum(means, np.finfo(float).tiny))
+    return np.asarray(
+        lower_bounds(positions, tets) / np.maximum(means, np.finfo(float).tiny)
+    )

@@ -28,7 +28,8 @@ def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """A triangle surface: (n, 3) vertices in mm, and (m, 3) faces, their indices counter-clockwise from outside."""
+    """A triangle surface: (n, 3) vertices in mm, and (m, 3) faces, their indices
+    counter-clockwise from outside."""
 
     vertices: Floats
     faces: Ints
@@ -36,7 +37,9 @@ class TriangleMesh:
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, np.float64, 3))
         object.__setattr__(self, "faces", frozen(self.faces, np.int64, 3))
-        if len(self.faces) and not 0 <= self.faces.min() <= self.faces.max() < len(self.vertices):
+        if len(self.faces) and not 0 <= self.faces.min() <= self.faces.max() < len(
+            self.vertices
+        ):
             raise ValueError("a face has a vertex index out of range")
 
 
@@ -62,7 +65,8 @@ def area(mesh: TriangleMesh) -> float:
 
 
 def signed_volume(mesh: TriangleMesh) -> float:
-    """Return the enclosed volume in mm³, negative if the faces are oriented inward (divergence theorem)."""
+    """Return the enclosed volume in mm³, negative if the faces are oriented inward
+    (divergence theorem)."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
@@ -73,7 +77,8 @@ def area_cm2(mesh: TriangleMesh) -> float:
 
 
 def volume_ml(mesh: TriangleMesh) -> float:
-    """Return the volume that a closed mesh in mm encloses, in mL; negative where its faces look inwards."""
+    """Return the volume that a closed mesh in mm encloses, in mL; negative where its
+    faces look inwards."""
     return signed_volume(mesh) * ML_PER_MM3
 
 
@@ -92,23 +97,28 @@ def scatter_to_vertices(mesh: TriangleMesh, face_values: NDArray) -> Floats:
     """Return per vertex the sum of (m,) or (m, k) values over its faces."""
     corner = np.repeat(np.arange(len(mesh.faces)), 3)
     incidence = scipy.sparse.csr_matrix(
-        (np.ones(corner.size), (mesh.faces.ravel(), corner)), shape=(len(mesh.vertices), len(mesh.faces))
+        (np.ones(corner.size), (mesh.faces.ravel(), corner)),
+        shape=(len(mesh.vertices), len(mesh.faces)),
     )
     return incidence @ face_values
 
 
 def vertex_normals(mesh: TriangleMesh) -> Floats:
-    """Return the (n, 3) unit vertex normals: area-weighted means of the normals of adjacent faces."""
+    """Return the (n, 3) unit vertex normals: area-weighted means of the normals of
+    adjacent faces."""
     return unit(scatter_to_vertices(mesh, area_vectors(mesh)))
 
 
 def vertex_areas(mesh: TriangleMesh) -> Floats:
     """Return the (n,) areas of the vertices in mm²: a third of each adjacent face."""
-    return np.asarray(scatter_to_vertices(mesh, face_areas(mesh)) / 3.0, dtype=np.float64)
+    return np.asarray(
+        scatter_to_vertices(mesh, face_areas(mesh)) / 3.0, dtype=np.float64
+    )
 
 
 def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
-    """Return the (e, 2) undirected edges, each once and sorted, and the (e,) number of faces at each."""
+    """Return the (e, 2) undirected edges, each once and sorted, and the (e,) number of
+    faces at each."""
     pairs = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     # one number per edge: much faster than comparing rows
     count = len(mesh.vertices)
@@ -122,31 +132,40 @@ def mean_edge_length(mesh: TriangleMesh) -> float:
 
 
 def edge_lengths(vertices: Floats, pairs: NDArray[np.integer]) -> Floats:
-    """Return the (e,) lengths of edges given as (e, 2) vertex indices, in the vertices' unit."""
-    return np.asarray(np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1))
+    """Return the (e,) lengths of edges given as (e, 2) vertex indices, in the vertices'
+    unit."""
+    return np.asarray(
+        np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1)
+    )
 
 
 def mean_length(vertices: Floats, pairs: NDArray[np.integer]) -> float:
-    """Return the mean length of edges given as (e, 2) vertex indices, in the vertices' unit."""
+    """Return the mean length of edges given as (e, 2) vertex indices, in the vertices'
+    unit."""
     return float(edge_lengths(vertices, pairs).mean())
 
 
 def is_closed(mesh: TriangleMesh) -> bool:
-    """Return whether every edge has exactly two faces that run along it in opposite directions."""
+    """Return whether every edge has exactly two faces that run along it in opposite
+    directions."""
     directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    if not len(directed) or len(np.unique(directed @ [len(mesh.vertices), 1])) != len(directed):
+    if not len(directed) or len(np.unique(directed @ [len(mesh.vertices), 1])) != len(
+        directed
+    ):
         return False
     _, counts = edges(mesh)
     return bool((counts == 2).all())
 
 
 def euler_number(mesh: TriangleMesh) -> int:
-    """Return vertices − edges + faces, counting used vertices only: 2 for each closed surface without handles."""
+    """Return vertices − edges + faces, counting used vertices only: 2 for each closed
+    surface without handles."""
     return int(len(np.unique(mesh.faces)) - len(edges(mesh)[0]) + len(mesh.faces))
 
 
 def face_components(mesh: TriangleMesh) -> Ints:
-    """Return the (m,) number of the connected component of each face, the largest area first (0)."""
+    """Return the (m,) number of the connected component of each face, the largest area
+    first (0)."""
     label = connected(mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2), len(mesh.vertices))
     _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
     order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
@@ -154,10 +173,12 @@ def face_components(mesh: TriangleMesh) -> Ints:
 
 
 def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
-    """Split a surface into manifold sheets at edges of more than two faces, and at vertices where sheets meet.
+    """Split a surface into manifold sheets at edges of more than two faces, and at
+    vertices where sheets meet.
 
-    At such an edge two faces belong to one sheet if they use it in opposite directions and have the inside between
-    them: those with the smallest sum of angles inside are paired. A manifold surface is returned unchanged.
+    At such an edge two faces belong to one sheet if they use it in opposite directions
+    and have the inside between them: those with the smallest sum of angles inside are
+    paired. A manifold surface is returned unchanged.
     """
     faces, count = mesh.faces, len(mesh.vertices)
     # half-edge 3 f + k starts at corner k of face f
@@ -175,22 +196,40 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
         axis = (high - low) / np.linalg.norm(high - low)
         arms = [mesh.vertices[apex[side]] - low for side in (around[:1], *sides)]
         radial = arms[0][0] - (arms[0][0] @ axis) * axis
-        backward, forward = (np.arctan2(arm @ np.cross(axis, radial), arm @ radial) for arm in arms[1:])
+        backward, forward = (
+            np.arctan2(arm @ np.cross(axis, radial), arm @ radial) for arm in arms[1:]
+        )
         inside = (forward - backward[:, None] - COINCIDENCE_TOL) % (2.0 * np.pi)
         matched = scipy.optimize.linear_sum_assignment(inside)
         if inside[matched].sum() <= 2.0 * np.pi:
-            pairs.append(np.stack([side[index] for side, index in zip(sides, matched, strict=True)], axis=1))
+            pairs.append(
+                np.stack(
+                    [side[index] for side, index in zip(sides, matched, strict=True)],
+                    axis=1,
+                )
+            )
         else:
             ambiguous.append(sides)
     # where faces overlap, faces of the same sheet elsewhere are paired
     sheet = connected(np.concatenate(pairs) // 3, len(faces))
     for sides in ambiguous:
-        matched = scipy.optimize.linear_sum_assignment(sheet[sides[0] // 3][:, None] != sheet[sides[1] // 3])
-        pairs.append(np.stack([side[index] for side, index in zip(sides, matched, strict=True)], axis=1))
+        matched = scipy.optimize.linear_sum_assignment(
+            sheet[sides[0] // 3][:, None] != sheet[sides[1] // 3]
+        )
+        pairs.append(
+            np.stack(
+                [side[index] for side, index in zip(sides, matched, strict=True)],
+                axis=1,
+            )
+        )
     edge, partner = np.concatenate(pairs).T
     is_opposite = start[edge] != start[partner]
-    joined = np.where(is_opposite, [following[partner], partner], [partner, following[partner]])
-    corner = connected(np.concatenate([[edge, following[edge]], joined]).reshape(2, -1).T, faces.size)
+    joined = np.where(
+        is_opposite, [following[partner], partner], [partner, following[partner]]
+    )
+    corner = connected(
+        np.concatenate([[edge, following[edge]], joined]).reshape(2, -1).T, faces.size
+    )
     _, first = np.unique(corner, return_index=True)
     if len(first) == len(np.unique(faces)):
         return mesh
@@ -198,29 +237,37 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def connected(pairs: NDArray[np.integer], count: int) -> Ints:
-    """Return the (count,) number of the connected component of each of `count` nodes, from (k, 2) links."""
-    graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    """Return the (count,) number of the connected component of each of `count` nodes,
+    from (k, 2) links."""
+    graph = scipy.sparse.coo_matrix(
+        (np.ones(len(pairs)), pairs.T), shape=(count, count)
+    )
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
 def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:
-    """Return the (n - 2, 3) faces of the smallest area that close a hole with the (n,) vertices `loop`, in order.
+    """Return the (n - 2, 3) faces of the smallest area that close a hole with the (n,)
+    vertices `loop`, in order.
 
-    No edge of the surface is used inside the patch (Barequet and Sharir 1995, doi 10.1016/0167-8396(94)00011-G).
+    No edge of the surface is used inside the patch (Barequet and Sharir 1995, doi
+    10.1016/0167-8396(94)00011-G).
     """
     count, points = len(loop), mesh.vertices[loop]
     place = np.full(len(mesh.vertices), -1)
     place[loop] = np.arange(count)
     pairs = np.sort(place[edges(mesh)[0]], axis=1)
     low, high = pairs[pairs[:, 0] >= 0].T
-    # smallest area that the loop from vertex i to j and the edge j-i enclose, and the third vertex of the face there
+    # smallest area that the loop from vertex i to j and the edge j-i enclose, and the
+    # third vertex of the face there
     cost, third = np.zeros((count, count)), np.zeros((count, count), dtype=int)
     for gap in range(2, count):
         first = np.arange(count - gap)
         middle = first[:, None] + np.arange(1, gap)
         a, b, c = points[first][:, None], points[middle], points[first + gap][:, None]
         areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
-        totals = cost[first[:, None], middle] + cost[middle, first[:, None] + gap] + areas
+        totals = (
+            cost[first[:, None], middle] + cost[middle, first[:, None] + gap] + areas
+        )
         third[first, first + gap] = first + 1 + totals.argmin(axis=1)
         cost[first, first + gap] = totals.min(axis=1)
         if gap < count - 1:
@@ -240,7 +287,9 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
     try:
         hull = scipy.spatial.ConvexHull(mesh.vertices)
     except scipy.spatial.QhullError as error:
-        raise MeshError("the surface has no convex hull", remedy="It must enclose a volume") from error
+        raise MeshError(
+            "the surface has no convex hull", remedy="It must enclose a volume"
+        ) from error
     faces = np.asarray(hull.simplices, dtype=np.int64)
     a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
@@ -250,7 +299,8 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def submesh(mesh: TriangleMesh, keep: NDArray[np.bool_]) -> tuple[TriangleMesh, Ints]:
-    """Return the surface of the faces where the (m,) mask `keep` holds, and its vertices' indices in `mesh`."""
+    """Return the surface of the faces where the (m,) mask `keep` holds, and its
+    vertices' indices in `mesh`."""
     used, faces = np.unique(mesh.faces[keep], return_inverse=True)
     return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3)), used
 
@@ -260,7 +310,9 @@ def merged(*meshes: TriangleMesh) -> TriangleMesh:
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     return TriangleMesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]),
+        np.concatenate(
+            [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]
+        ),
     )
 
 

@@ -1,7 +1,8 @@
 """Carry points, surfaces, meshes and regions from brain to brain.
 
-Brains correspond by registration, which carries any point, or by surfaces that have the same vertices in every week,
-such as those of a surface atlas, which carry surfaces and meshes.
+Brains correspond by registration, which carries any point, or by surfaces that have the
+same vertices in every week, such as those of a surface atlas, which carry surfaces and
+meshes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,16 +12,31 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.alignment import angle_deg, rigid_fit
-from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, transform_points
+from ..geometry.deformations import (
+    Correspondence,
+    Deformation,
+    MatchedSurfaces,
+    carry,
+    transform_points,
+)
 from ..geometry.matching import labels_at, match_points, values_at
-from ..geometry.triangles import Floats, TriangleMesh, flipped, signed_volume, vertex_areas, vertex_normals
+from ..geometry.triangles import (
+    Floats,
+    TriangleMesh,
+    flipped,
+    signed_volume,
+    vertex_areas,
+    vertex_normals,
+)
 
 MAX_DISTANCE_MM = 2.0
-"""Largest mean distance of a mesh's surface from the matched surface that it follows."""
+"""Largest mean distance of a mesh's surface from the matched surface that it
+follows."""
 MAX_TURN_DEG = 30.0
 """Largest rotation between the matched vertices of two posed brains."""
 MAX_SCATTER = 0.3
-"""Largest root mean square distance of matched vertices after alignment and scaling, as a share of the size."""
+"""Largest root mean square distance of matched vertices after alignment and scaling, as
+a share of the size."""
 MAX_OUTSIDE = 0.001
 """Largest share of points that may lie outside the grid of a displacement."""
 
@@ -30,51 +46,85 @@ def outward(mesh: TriangleMesh) -> TriangleMesh:
     return flipped(mesh) if signed_volume(mesh) < 0 else mesh
 
 
-def match_surfaces(first: TriangleMesh, second: TriangleMesh) -> tuple[MatchedSurfaces, dict[str, float]]:
-    """Match the surfaces of two posed brains by vertex number; return the match and measures of its quality.
+def match_surfaces(
+    first: TriangleMesh, second: TriangleMesh
+) -> tuple[MatchedSurfaces, dict[str, float]]:
+    """Match the surfaces of two posed brains by vertex number; return the match and
+    measures of its quality.
 
-    Triangles may be in any order and orientation. The measures are vertices, turn_deg, scatter (root mean square
-    distance of the vertices after a similarity transform, as a share of the root mean square radius) and area_ratio.
+    Triangles may be in any order and orientation. The measures are vertices, turn_deg,
+    scatter (root mean square distance of the vertices after a similarity transform, as
+    a share of the root mean square radius) and area_ratio.
 
-    InputError if vertices or triangles differ, or if vertices with the same number are different places: equal
-    triangles alone do not imply correspondence.
+    InputError if vertices or triangles differ, or if vertices with the same number are
+    different places: equal triangles alone do not imply correspondence.
     """
-    if len(first.vertices) != len(second.vertices) or not np.array_equal(_triangles(first), _triangles(second)):
+    if len(first.vertices) != len(second.vertices) or not np.array_equal(
+        _triangles(first), _triangles(second)
+    ):
         raise InputError(
             "the surfaces have different vertices or triangles",
             found=f"{len(second.vertices)} vertices and {len(second.faces)} triangles",
-            expected=f"the same {len(first.vertices)} vertices and {len(first.faces)} triangles in both",
-            remedy="Set growth.matched_surfaces to false, or leave out the brain that differs.",
+            expected=(
+                f"the same {len(first.vertices)} vertices and {len(first.faces)}"
+                " triangles in both"
+            ),
+            remedy=(
+                "Set growth.matched_surfaces to false, or leave out the brain that"
+                " differs."
+            ),
         )
     first = outward(first)
     weights = vertex_areas(first)
     motion = rigid_fit(first.vertices, second.vertices, weights)
-    aligned = (first.vertices - np.average(first.vertices, axis=0, weights=weights)) @ motion[:3, :3].T
+    aligned = (
+        first.vertices - np.average(first.vertices, axis=0, weights=weights)
+    ) @ motion[:3, :3].T
     target = second.vertices - np.average(second.vertices, axis=0, weights=weights)
-    sizes = [np.sqrt(np.average((places**2).sum(axis=1), weights=weights)) for places in (aligned, target)]
-    variance = np.average(((aligned / sizes[0] - target / sizes[1]) ** 2).sum(axis=1), weights=weights)
+    sizes = [
+        np.sqrt(np.average((places**2).sum(axis=1), weights=weights))
+        for places in (aligned, target)
+    ]
+    variance = np.average(
+        ((aligned / sizes[0] - target / sizes[1]) ** 2).sum(axis=1), weights=weights
+    )
     numbers = {
         "vertices": float(len(first.vertices)),
         "turn_deg": angle_deg(motion[:3, :3]),
         "scatter": float(np.sqrt(variance)),
-        "area_ratio": float(vertex_areas(TriangleMesh(second.vertices, first.faces)).sum() / weights.sum()),
+        "area_ratio": float(
+            vertex_areas(TriangleMesh(second.vertices, first.faces)).sum()
+            / weights.sum()
+        ),
     }
     if numbers["turn_deg"] > MAX_TURN_DEG or numbers["scatter"] > MAX_SCATTER:
         raise InputError(
-            "the surfaces have the same triangles, but their vertices do not correspond",
-            found=f"a rotation of {numbers['turn_deg']:.0f}° between them, and a scatter of {numbers['scatter']:.2f}",
-            expected=f"at most {MAX_TURN_DEG:g}° between posed brains, and {MAX_SCATTER:g} of the size",
-            remedy="Set growth.matched_surfaces to false, or give surfaces whose vertices are matched.",
+            "the surfaces have the same triangles, but their vertices do not"
+            " correspond",
+            found=(
+                f"a rotation of {numbers['turn_deg']:.0f}° between them, and a scatter"
+                f" of {numbers['scatter']:.2f}"
+            ),
+            expected=(
+                f"at most {MAX_TURN_DEG:g}° between posed brains, and {MAX_SCATTER:g}"
+                " of the size"
+            ),
+            remedy=(
+                "Set growth.matched_surfaces to false, or give surfaces whose vertices"
+                " are matched."
+            ),
         )
     return MatchedSurfaces(first, second.vertices), numbers
 
 
 def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
-    """Return the (w + 1, n, 3) positions of a surface's vertices that follow w pairs of matched surfaces.
+    """Return the (w + 1, n, 3) positions of a surface's vertices that follow w pairs of
+    matched surfaces.
 
-    Each vertex keeps its offset from the nearest point of the first matched surface with an agreeing normal; offsets
-    rotate with the whole surface. The surface is that of the same brain in the first week, with other triangles.
-    InputError if it is far from the first matched surface.
+    Each vertex keeps its offset from the nearest point of the first matched surface
+    with an agreeing normal; offsets rotate with the whole surface. The surface is that
+    of the same brain in the first week, with other triangles. InputError if it is far
+    from the first matched surface.
     """
     faces = chain[0].first.faces
     surfaces = np.stack([chain[0].first.vertices, *(pair.second for pair in chain)])
@@ -83,14 +133,25 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
     if match.distance_mm.mean() > MAX_DISTANCE_MM:
         raise InputError(
             "the surface does not belong to the first matched surface",
-            found=f"{match.distance_mm.mean():.2f} mm from it on average, {match.distance_mm.max():.2f} mm at most",
+            found=(
+                f"{match.distance_mm.mean():.2f} mm from it on average,"
+                f" {match.distance_mm.max():.2f} mm at most"
+            ),
             expected=f"at most {MAX_DISTANCE_MM:g} mm on average",
             remedy="Both must have the same pose and week.",
         )
-    offsets, weights = mesh.vertices - values_at(match, start.vertices), vertex_areas(start)
-    turns = [rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces]
+    offsets, weights = (
+        mesh.vertices - values_at(match, start.vertices),
+        vertex_areas(start),
+    )
+    turns = [
+        rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces
+    ]
     return np.stack(
-        [values_at(match, surface) + offsets @ turn.T for surface, turn in zip(surfaces, turns, strict=True)]
+        [
+            values_at(match, surface) + offsets @ turn.T
+            for surface, turn in zip(surfaces, turns, strict=True)
+        ]
     )
 
 
@@ -99,49 +160,67 @@ def _triangles(mesh: TriangleMesh) -> NDArray[np.integer]:
 
 
 def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:
-    """Return the (w + 1, n, 3) positions of (n, 3) points: the given ones, and carried through w deformations in turn.
+    """Return the (w + 1, n, 3) positions of (n, 3) points: the given ones, and carried
+    through w deformations in turn.
 
     InputError if points leave the grids of the deformations.
     """
     positions = [points]
     for number, deformation in enumerate(deformations):
-        _require_on_grid(deformation, positions[-1], f"interval {number + 1} of {len(deformations)}")
+        _require_on_grid(
+            deformation, positions[-1], f"interval {number + 1} of {len(deformations)}"
+        )
         positions.append(carry(deformation, positions[-1]))
     return np.stack(positions)
 
 
 def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floats:
-    """Return the (n, 3) positions of a surface's vertices in the last brain; unchanged without correspondences."""
+    """Return the (n, 3) positions of a surface's vertices in the last brain; unchanged
+    without correspondences."""
     if not between:
         return mesh.vertices
     matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
     if matched:
         return np.asarray(follow_surfaces(mesh, matched)[-1])
-    return np.asarray(carry_over_weeks(mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)])[-1])
+    return np.asarray(
+        carry_over_weeks(
+            mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)]
+        )[-1]
+    )
 
 
 def carry_regions(
-    labels: NDArray[np.integer], source: TriangleMesh, target: TriangleMesh, between: Correspondence
+    labels: NDArray[np.integer],
+    source: TriangleMesh,
+    target: TriangleMesh,
+    between: Correspondence,
 ) -> NDArray[np.int64]:
     """Transfer the region labels of the (n,) vertices of `source` to those of `target`.
 
-    The source is carried into the target's space. Each vertex of the target gets the label of the nearest point whose
-    normal agrees.
+    The source is carried into the target's space. Each vertex of the target gets the
+    label of the nearest point whose normal agrees.
     """
     if isinstance(between, Deformation):
         _require_on_grid(between, source.vertices, "the surface")
     shape = TriangleMesh(carry_surface(source, [between]), source.faces)
-    return labels_at(match_points(target.vertices, vertex_normals(target), shape), labels)
+    return labels_at(
+        match_points(target.vertices, vertex_normals(target), shape), labels
+    )
 
 
 def maps_on_template(
-    maps: Mapping[str, NDArray], surface: TriangleMesh, template: TriangleMesh, between: Sequence[Correspondence]
+    maps: Mapping[str, NDArray],
+    surface: TriangleMesh,
+    template: TriangleMesh,
+    between: Sequence[Correspondence],
 ) -> dict[str, NDArray]:
-    """Resample maps at the vertices of a brain's surface to the (n,) vertices of a template.
+    """Resample maps at the vertices of a brain's surface to the (n,) vertices of a
+    template.
 
-    The template is carried into the brain's space. Each of its vertices gets the value at the nearest point whose
-    normal agrees, interpolated linearly, or the nearest value of an integer map. `template_distance_mm` is the distance
-    of that point. `between` leads from the template to the brain; empty if these are the same.
+    The template is carried into the brain's space. Each of its vertices gets the value
+    at the nearest point whose normal agrees, interpolated linearly, or the nearest
+    value of an integer map. `template_distance_mm` is the distance of that point.
+    `between` leads from the template to the brain; empty if these are the same.
     """
     for pair in between:
         if isinstance(pair, Deformation):
@@ -149,7 +228,11 @@ def maps_on_template(
     shape = TriangleMesh(carry_surface(template, between), template.faces)
     match = match_points(shape.vertices, vertex_normals(shape), surface)
     at_template: dict[str, NDArray] = {
-        name: labels_at(match, values) if (values == np.round(values)).all() else values_at(match, values)
+        name: (
+            labels_at(match, values)
+            if (values == np.round(values)).all()
+            else values_at(match, values)
+        )
         for name, values in maps.items()
     }
     return {**at_template, "template_distance_mm": match.distance_mm}
@@ -160,10 +243,18 @@ def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> Non
     last = np.array(deformation.displacement.shape[:3]) - 1
     outside = ((index < 0) | (index > last)).any(axis=1)
     if outside.mean() > MAX_OUTSIDE:
-        distance = np.linalg.norm((index - np.clip(index, 0, last)) @ deformation.affine[:3, :3].T, axis=1)
+        distance = np.linalg.norm(
+            (index - np.clip(index, 0, last)) @ deformation.affine[:3, :3].T, axis=1
+        )
         raise InputError(
             f"points lie outside the grid of the registration ({what})",
-            found=f"{np.count_nonzero(outside)} of {len(points)} points, up to {distance.max():.3g} mm",
+            found=(
+                f"{np.count_nonzero(outside)} of {len(points)} points, up to"
+                f" {distance.max():.3g} mm"
+            ),
             expected="points inside the brain that was registered",
-            remedy="The surface or mesh belongs to another brain, or is not in the pose of the registered volume.",
+            remedy=(
+                "The surface or mesh belongs to another brain, or is not in the pose of"
+                " the registered volume."
+            ),
         )

@@ -1,4 +1,5 @@
-"""Smooth curves of area, volume and thickness over gestational weeks: fitted to series of brains, or given as a table.
+"""Smooth curves of area, volume and thickness over gestational weeks: fitted to series
+of brains, or given as a table.
 
 Runs follow them, or are compared with them.
 """
@@ -23,7 +24,8 @@ from ..settings.growth import SIZES
 log = logging.getLogger(__name__)
 
 DEGREES_OF_FREEDOM = 4.0
-"""Degrees of freedom of a fitted curve: a size, a growth rate, its change, and a little more."""
+"""Degrees of freedom of a fitted curve: a size, a growth rate, its change, and a little
+more."""
 SPACING_WEEKS = 0.1
 """Spacing of the points at which a fitted curve is stored."""
 MIN_SCATTER = 0.005
@@ -36,7 +38,8 @@ ROUNDS = 50
 KNOT_INTERVALS = 12
 Z_95 = 1.96
 THICKNESS = "thickness_mm"
-"""Column of the table of areas with the mean cortical thickness, if known. Thickness may decrease."""
+"""Column of the table of areas with the mean cortical thickness, if known. Thickness
+may decrease."""
 SPACING_GW = 0.25
 """Spacing of the weeks at which a run stores a curve."""
 
@@ -45,9 +48,10 @@ SPACING_GW = 0.25
 class Curve:
     """A positive quantity over the weeks.
 
-    Its logarithm is a monotone cubic (Fritsch and Butland 1984) through the points at ascending weeks (k,), and is
-    extrapolated with the growth rate at the ends. Values (k,) are in any unit; `sd` (k,) is the standard deviation of
-    the logarithm, NaN if it is unknown, 0 for a given table.
+    Its logarithm is a monotone cubic (Fritsch and Butland 1984) through the points at
+    ascending weeks (k,), and is extrapolated with the growth rate at the ends. Values
+    (k,) are in any unit; `sd` (k,) is the standard deviation of the logarithm, NaN if
+    it is unknown, 0 for a given table.
     """
 
     weeks: Floats
@@ -57,7 +61,8 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class CurveFit:
-    """A curve, the (n,) weeks and measured values that it was fitted to, and their weights: 0 for an outlier."""
+    """A curve, the (n,) weeks and measured values that it was fitted to, and their
+    weights: 0 for an outlier."""
 
     curve: Curve
     weeks: Floats
@@ -76,19 +81,29 @@ def rate(curve: Curve, week: ArrayLike) -> Floats:
 
 
 def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the bounds of the 95 % interval of a curve at weeks. Its width is constant beyond the ends."""
+    """Return the bounds of the 95 % interval of a curve at weeks. Its width is constant
+    beyond the ends."""
     sd = np.interp(np.asarray(week, dtype=float), curve.weeks, curve.sd)
     middle = value(curve, week)
     return middle * np.exp(-Z_95 * sd), middle * np.exp(Z_95 * sd)
 
 
 def tabulated(
-    weeks: Sequence[float], values: Sequence[float], *, name: str = "curve", may_shrink: bool = False
+    weeks: Sequence[float],
+    values: Sequence[float],
+    *,
+    name: str = "curve",
+    may_shrink: bool = False,
 ) -> Curve:
-    """Return the curve through a given table, such as a norm; InputError if a value is invalid or decreases."""
+    """Return the curve through a given table, such as a norm; InputError if a value is
+    invalid or decreases."""
     weeks_, values_ = _checked(weeks, values, name)
     if len(np.unique(weeks_)) < len(weeks_):
-        raise InputError(f"the {name} has a week twice", found=weeks_.tolist(), expected="one value for each week")
+        raise InputError(
+            f"the {name} has a week twice",
+            found=weeks_.tolist(),
+            expected="one value for each week",
+        )
     if not may_shrink and (np.diff(values_) < 0).any():
         _refuse_shrinking(name, weeks_[1:][np.diff(values_) < 0])
     return Curve(weeks_, values_, np.zeros(len(weeks_)))
@@ -105,15 +120,17 @@ def fitted(
 ) -> CurveFit:
     """Fit a smooth curve to measured weeks, robust against single outliers.
 
-    The growth rate (derivative of the logarithm) is a quadratic spline, not negative unless `may_shrink`, with a
-    penalty on its second differences (on its first ones below three degrees of freedom; P-splines, Eilers and Marx
-    1996). The penalty leaves `degrees_of_freedom`, at most one less than the number of weeks. With at least twice as
-    many weeks, outliers lose their weight (Tukey's biweight, started from least absolute deviations), but with
-    `keeps_first` not those of the first week, the reference of all growth. The standard deviation is Bayesian
-    (Wahba 1983), from the scatter of the weeks about the curve.
+    The growth rate (derivative of the logarithm) is a quadratic spline, not negative
+    unless `may_shrink`, with a penalty on its second differences (on its first ones
+    below three degrees of freedom; P-splines, Eilers and Marx 1996). The penalty leaves
+    `degrees_of_freedom`, at most one less than the number of weeks. With at least twice
+    as many weeks, outliers lose their weight (Tukey's biweight, started from least
+    absolute deviations), but with `keeps_first` not those of the first week, the
+    reference of all growth. The standard deviation is Bayesian (Wahba 1983), from the
+    scatter of the weeks about the curve.
 
-    At least two different weeks and positive sizes are needed; several brains may share a week. InputError for other
-    values, and if the sizes decrease without `may_shrink`.
+    At least two different weeks and positive sizes are needed; several brains may share
+    a week. InputError for other values, and if the sizes decrease without `may_shrink`.
     """
     weeks_, values_ = _checked(weeks, values, name)
     count = len(np.unique(weeks_))
@@ -137,40 +154,66 @@ def fitted(
     free[1:] = may_shrink | (coefficients[1:] > 1e-8)
     normal = (design.T * weights) @ design + strength * penalty
     covariance = np.linalg.pinv(normal[np.ix_(free, free)])
-    sd = spread * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows[:, free], covariance, rows[:, free]), 0.0))
+    sd = spread * np.sqrt(
+        np.maximum(
+            np.einsum("ij,jk,ik->i", rows[:, free], covariance, rows[:, free]), 0.0
+        )
+    )
     outliers = weeks_[weights < 0.5]
     if len(outliers):
-        log.warning("%s: weeks %s are outliers of the curve", name, ", ".join(f"{week:g}" for week in outliers))
-    return CurveFit(Curve(at, np.exp(rows @ coefficients), sd), weeks_, values_, weights)
+        log.warning(
+            "%s: weeks %s are outliers of the curve",
+            name,
+            ", ".join(f"{week:g}" for week in outliers),
+        )
+    return CurveFit(
+        Curve(at, np.exp(rows @ coefficients), sd), weeks_, values_, weights
+    )
 
 
 def errors(fits: Mapping[str, CurveFit]) -> pd.DataFrame:
-    """Return the errors of curves at the weeks that they were fitted to, a row per quantity and measured value.
+    """Return the errors of curves at the weeks that they were fitted to, a row per
+    quantity and measured value.
 
-    Columns are quantity, week, measured, curve, low, high (95 % interval), error (curve over measured value, minus 1)
-    and weight.
+    Columns are quantity, week, measured, curve, low, high (95 % interval), error (curve
+    over measured value, minus 1) and weight.
     """
     tables = []
     for name, fit in fits.items():
         low, high = interval(fit.curve, fit.weeks)
         middle = value(fit.curve, fit.weeks)
-        columns = {"week": fit.weeks, "measured": fit.measured, "curve": middle, "low": low, "high": high}
+        columns = {
+            "week": fit.weeks,
+            "measured": fit.measured,
+            "curve": middle,
+            "low": low,
+            "high": high,
+        }
         columns |= {"error": middle / fit.measured - 1, "weight": fit.weights}
         tables.append(pd.DataFrame({"quantity": name} | columns))
     return pd.concat(tables, ignore_index=True)
 
 
 def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
-    """Return curves as a table: quantity, week, value, low, high (95 % interval), rate_per_week."""
+    """Return curves as a table: quantity, week, value, low, high (95 % interval),
+    rate_per_week."""
     tables = []
     for name, curve in curves.items():
         low, high = interval(curve, curve.weeks)
         columns = {"week": curve.weeks, "value": curve.values, "low": low, "high": high}
-        tables.append(pd.DataFrame({"quantity": name} | columns | {"rate_per_week": rate(curve, curve.weeks)}))
+        tables.append(
+            pd.DataFrame(
+                {"quantity": name}
+                | columns
+                | {"rate_per_week": rate(curve, curve.weeks)}
+            )
+        )
     return pd.concat(tables, ignore_index=True)
 
 
-def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool) -> Floats:
+def _solve(
+    design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool
+) -> Floats:
     # eigenvalues of a strong penalty that should be 0 are not, because of round-off
     sizes, directions = np.linalg.eigh(penalty)
     root = (directions * np.sqrt(np.clip(sizes, 1e-10, None))).T
@@ -183,20 +226,34 @@ def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_s
 
 
 def _robust_weights(
-    design: Floats, logs: Floats, penalty: Floats, strength: float, degrees: float, may_shrink: bool
+    design: Floats,
+    logs: Floats,
+    penalty: Floats,
+    strength: float,
+    degrees: float,
+    may_shrink: bool,
 ) -> Floats:
     count = len(logs)
     weights = np.ones(count)
     if count < MIN_WEEKS_PER_DEGREE * degrees:
         return weights
     for _ in range(ROUNDS):
-        residuals = logs - design @ _solve(design, logs, weights, strength * penalty, may_shrink)
+        residuals = logs - design @ _solve(
+            design, logs, weights, strength * penalty, may_shrink
+        )
         weights = 1.0 / np.maximum(np.abs(residuals), MIN_SCATTER)
         weights *= count / weights.sum()
     for _ in range(ROUNDS):
-        scale = max(1.4826 * float(np.median(np.abs(residuals))) * np.sqrt(count / (count - degrees)), MIN_SCATTER)
+        scale = max(
+            1.4826
+            * float(np.median(np.abs(residuals)))
+            * np.sqrt(count / (count - degrees)),
+            MIN_SCATTER,
+        )
         weights = np.clip(1 - (residuals / (TUKEY * scale)) ** 2, 0, None) ** 2
-        residuals = logs - design @ _solve(design, logs, weights, strength * penalty, may_shrink)
+        residuals = logs - design @ _solve(
+            design, logs, weights, strength * penalty, may_shrink
+        )
     return weights
 
 
@@ -208,9 +265,15 @@ def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     return logs(inside) + rates * (at - inside), rates
 
 
-def _checked(weeks: Sequence[float], values: Sequence[float], name: str) -> tuple[Floats, Floats]:
+def _checked(
+    weeks: Sequence[float], values: Sequence[float], name: str
+) -> tuple[Floats, Floats]:
     weeks_, values_ = np.asarray(weeks, dtype=float), np.asarray(values, dtype=float)
-    good = weeks_.shape == values_.shape and np.isfinite([*weeks_, *values_]).all() and (values_ > 0).all()
+    good = (
+        weeks_.shape == values_.shape
+        and np.isfinite([*weeks_, *values_]).all()
+        and (values_ > 0).all()
+    )
     if not good or len(np.unique(weeks_)) < 2:
         raise InputError(
             f"the {name} cannot be fitted to these weeks",
@@ -231,10 +294,12 @@ def _refuse_shrinking(name: str, weeks: Floats) -> None:
 
 
 def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:
-    """Fit curves to the measured sizes of each series of brains; return them by series and quantity.
+    """Fit curves to the measured sizes of each series of brains; return them by series
+    and quantity.
 
-    `areas` has the columns series, week, area_cm2, volume_ml and, if known, `THICKNESS`; each series has two weeks or
-    more. A curve of thickness needs brains of two weeks with a thickness.
+    `areas` has the columns series, week, area_cm2, volume_ml and, if known,
+    `THICKNESS`; each series has two weeks or more. A curve of thickness needs brains of
+    two weeks with a thickness.
     """
     fits: dict[str, dict[str, CurveFit]] = {}
     for name, brains in areas.groupby("series", sort=False):
@@ -243,32 +308,47 @@ def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:
             complete = brains.dropna(subset=quantity)
             if quantity in SIZES or len(complete["week"].unique()) > 1:
                 fits[str(name)][quantity] = fitted(
-                    *complete[["week", quantity]].to_numpy().T, name=quantity, may_shrink=quantity == THICKNESS
+                    *complete[["week", quantity]].to_numpy().T,
+                    name=quantity,
+                    may_shrink=quantity == THICKNESS,
                 )
     return fits
 
 
 def followed_sizes(
-    growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float], shrink: bool
+    growth: Mapping[str, Any],
+    curves: pd.DataFrame | None,
+    series: str | None,
+    weeks: Sequence[float],
+    shrink: bool,
 ) -> dict[str, dict[float, float]]:
-    """Return the sizes that a run follows, {quantity: {week: value}}, every quarter of a week.
+    """Return the sizes that a run follows, {quantity: {week: value}}, every quarter of
+    a week.
 
-    For each of `SIZES` and the thickness that the run follows, `growth` has `measured` or a table of values by week,
-    which may decrease if `shrink`. `curves`, with the columns series, quantity, week and value, are needed for
-    `measured`; InputError if the start brain's `series` is not in them. `weeks` are the output weeks of the run.
+    For each of `SIZES` and the thickness that the run follows, `growth` has `measured`
+    or a table of values by week, which may decrease if `shrink`. `curves`, with the
+    columns series, quantity, week and value, are needed for `measured`; InputError if
+    the start brain's `series` is not in them. `weeks` are the output weeks of the run.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in [name for name in (*SIZES, THICKNESS) if growth.get(name) is not None]:
+    for quantity in [
+        name for name in (*SIZES, THICKNESS) if growth.get(name) is not None
+    ]:
         source = growth[quantity]
         if source == "measured":
             curve = _measured_curve(curves, series, quantity)
         else:
             by_week = {float(week): number for week, number in source.items()}
             shrinks = shrink or quantity == THICKNESS
-            curve = tabulated(list(by_week), list(by_week.values()), name=quantity, may_shrink=shrinks)
+            curve = tabulated(
+                list(by_week), list(by_week.values()), name=quantity, may_shrink=shrinks
+            )
         sizes = value(curve, at)
-        tables[quantity] = {round(float(week), 6): float(size) for week, size in zip(at, sizes, strict=True)}
+        tables[quantity] = {
+            round(float(week), 6): float(size)
+            for week, size in zip(at, sizes, strict=True)
+        }
     return tables
 
 
@@ -281,41 +361,75 @@ def run_parameters(
     curves: pd.DataFrame | None,
     series: str | None,
 ) -> dict[str, Any]:
-    """Return the parameters of a run as its `params.yaml` has them, with measured sizes as numbers by week.
+    """Return the parameters of a run as its `params.yaml` has them, with measured sizes
+    as numbers by week.
 
-    `settings` are its own, `weeks` its output weeks, `surface` is the report of the start brain's surface, and
-    `target_sizes` are those of the shapes that it grows towards, by week, the start first; empty where there are none.
-    `stops` are those of the weeks without an observed brain. Curves and series are as for `followed_sizes`.
+    `settings` are its own, `weeks` its output weeks, `surface` is the report of the
+    start brain's surface, and `target_sizes` are those of the shapes that it grows
+    towards, by week, the start first; empty where there are none. `stops` are those of
+    the weeks without an observed brain. Curves and series are as for `followed_sizes`.
     """
     growth = {**settings["growth"], **target_sizes}
     targets = list(next(iter(target_sizes.values()), ()))[1:]
-    shapes = {"targets": {week: target_map(week) for week in targets}, "stops": list(stops)} if target_sizes else {}
+    shapes = (
+        {"targets": {week: target_map(week) for week in targets}, "stops": list(stops)}
+        if target_sizes
+        else {}
+    )
     sizes = followed_sizes(growth, curves, series, weeks, shrink=bool(target_sizes))
     thickness = {THICKNESS: {"weeks": sizes[THICKNESS]}} if THICKNESS in sizes else {}
-    start = {"start_week": weeks[0], "output_weeks": list(weeks), "fissure_x_mm": surface["fissure_x_mm"]}
-    return {**start, "side": surface.get("side"), **settings, **shapes, "growth": growth | sizes, **thickness}
+    start = {
+        "start_week": weeks[0],
+        "output_weeks": list(weeks),
+        "fissure_x_mm": surface["fissure_x_mm"],
+    }
+    return {
+        **start,
+        "side": surface.get("side"),
+        **settings,
+        **shapes,
+        "growth": growth | sizes,
+        **thickness,
+    }
 
 
 def sizes_on_curves(
-    growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float]
+    growth: Mapping[str, Any],
+    curves: pd.DataFrame | None,
+    series: str | None,
+    weeks: Sequence[float],
 ) -> dict[float, dict[str, float]]:
-    """Return by week the `SIZES` that a run should have had, or those of the observed brains; empty if unknown.
+    """Return by week the `SIZES` that a run should have had, or those of the observed
+    brains; empty if unknown.
 
-    `growth` is the section of the run's parameters, with tables of the sizes if it followed any. `curves` has the
-    columns series, quantity, week and value; InputError where it is given without the start brain's `series`.
+    `growth` is the section of the run's parameters, with tables of the sizes if it
+    followed any. `curves` has the columns series, quantity, week and value; InputError
+    where it is given without the start brain's `series`.
     """
     if SIZES[0] in growth:
-        found = [tabulated(list(growth[name]), list(growth[name].values()), may_shrink=True) for name in SIZES]
+        found = [
+            tabulated(list(growth[name]), list(growth[name].values()), may_shrink=True)
+            for name in SIZES
+        ]
     elif curves is not None:
         found = [_measured_curve(curves, series, name) for name in SIZES]
     else:
         found = []
     by_name = dict(zip(SIZES, found, strict=False))
-    return {week: {name: float(value(curve, week)) for name, curve in by_name.items()} for week in weeks}
+    return {
+        week: {name: float(value(curve, week)) for name, curve in by_name.items()}
+        for week in weeks
+    }
 
 
-def _measured_curve(curves: pd.DataFrame | None, series: str | None, quantity: str) -> Curve:
-    table = pd.DataFrame(columns=["series", "quantity", "week", "value"]) if curves is None else curves
+def _measured_curve(
+    curves: pd.DataFrame | None, series: str | None, quantity: str
+) -> Curve:
+    table = (
+        pd.DataFrame(columns=["series", "quantity", "week", "value"])
+        if curves is None
+        else curves
+    )
     series_rows = table[table["series"] == series]
     rows = series_rows[series_rows["quantity"] == quantity]
     if not len(rows):
@@ -324,7 +438,12 @@ def _measured_curve(curves: pd.DataFrame | None, series: str | None, quantity: s
             if len(series_rows)
             else "the start brain is in no series of brains of two weeks or more"
         )
-        remedy = "List brains of other weeks, or give growth a table such as {area_cm2: {21: 99, 30: 252}}"
-        raise InputError(f"no measured curve of {quantity} to follow", found=reason, remedy=remedy)
+        remedy = (
+            "List brains of other weeks, or give growth a table such as {area_cm2: {21:"
+            " 99, 30: 252}}"
+        )
+        raise InputError(
+            f"no measured curve of {quantity} to follow", found=reason, remedy=remedy
+        )
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
     return Curve(weeks, values, np.zeros(len(rows)))

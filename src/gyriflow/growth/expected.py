@@ -1,4 +1,5 @@
-"""Predict a brain's later shapes: carry its mesh along an atlas' path and keep its individual differences."""
+"""Predict a brain's later shapes: carry its mesh along an atlas' path and keep its
+individual differences."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,28 +9,49 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import Deformation, carry, transform_points
-from ..geometry.diffusion import cell_sizes, diffuse, harmonic_continuation, vertex_sizes
+from ..geometry.diffusion import (
+    cell_sizes,
+    diffuse,
+    harmonic_continuation,
+    vertex_sizes,
+)
 from ..geometry.paths import path_through
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh
 from ..settings.growth import BEFORE_GW
-from .atlas_path import MIN_AGE_SPACING_GW, AtlasAges, AtlasPath, positions_at, resample_by_size
-from .series_shapes import FittedBody, SeriesShapes, WeekShape, fit_body, fit_onto_surface, tissue_below, with_stops
+from .atlas_path import (
+    MIN_AGE_SPACING_GW,
+    AtlasAges,
+    AtlasPath,
+    positions_at,
+    resample_by_size,
+)
+from .series_shapes import (
+    FittedBody,
+    SeriesShapes,
+    WeekShape,
+    fit_body,
+    fit_onto_surface,
+    tissue_below,
+    with_stops,
+)
 
 DIFFERENCE_SMOOTHING_MM = 8.0
-"""Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do not predict later folds."""
+"""Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do
+not predict later folds."""
 FADING_GW = 4.0
-"""Time constant with which finer differences fade: of 1, 4 and 16 weeks the best for synthetic individuals
-(docs/science.md)."""
+"""Time constant with which finer differences fade: of 1, 4 and 16 weeks the best for
+synthetic individuals (docs/science.md)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
     """The predicted shapes of a mesh at all `weeks`, and the atlas' ages by size.
 
-    A path through the `shapes`, stops included, also gives those at the weeks `between`. The baselines are simpler
-    predictions of the boundary's vertices (m, 3): `atlas`, the atlas' own brain, and `atlas_deformed`, that brain with
-    the whole individual difference.
+    A path through the `shapes`, stops included, also gives those at the weeks
+    `between`. The baselines are simpler predictions of the boundary's vertices (m, 3):
+    `atlas`, the atlas' own brain, and `atlas_deformed`, that brain with the whole
+    individual difference.
     """
 
     weeks: list[float]
@@ -48,16 +70,21 @@ def place_in_atlas(
     *,
     open_sulci: bool = False,
 ) -> Floats:
-    """Return the (n, 3) places of a mesh's vertices inside the atlas' brain, with its boundary fitted to the atlas'.
+    """Return the (n, 3) places of a mesh's vertices inside the atlas' brain, with its
+    boundary fitted to the atlas'.
 
-    `pair` is the registration to that brain, whose mesh is `atlas`. A body makes the map, so that no element is
-    inverted.
+    `pair` is the registration to that brain, whose mesh is `atlas`. A body makes the
+    map, so that no element is inverted.
     """
     (boundary, used), (surface, _) = boundary_surface(mesh), boundary_surface(atlas)
     inner = tissue_below(boundary, boundary, pair) if open_sulci else None
     places = carry(pair, mesh.vertices)
-    goals = fit_onto_surface(TriangleMesh(places[used], boundary.faces), surface, inner=inner)
-    shape = places + harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)(goals - places[used])
+    goals = fit_onto_surface(
+        TriangleMesh(places[used], boundary.faces), surface, inner=inner
+    )
+    shape = places + harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)(
+        goals - places[used]
+    )
     body = make_body(mesh)
     fit_body(body, shape, (surface, inner), used, open_sulci=open_sulci)
     return body.positions_mm
@@ -73,23 +100,34 @@ def expected_positions(
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
     fading_gw: float = FADING_GW,
 ) -> Floats:
-    """Return the (w + 1, n, 3) positions in mm of a mesh at its start and those predicted for w later weeks.
+    """Return the (w + 1, n, 3) positions in mm of a mesh at its start and those
+    predicted for w later weeks.
 
-    The brain moves as the atlas does from the atlas' shape at the start week. Its individual difference from the atlas
-    grows in proportion to the size as far as it is smooth (SD `smoothing_mm`; all of it with 0); finer differences fade
-    with the time constant `fading_gw`.
+    The brain moves as the atlas does from the atlas' shape at the start week. Its
+    individual difference from the atlas grows in proportion to the size as far as it is
+    smooth (SD `smoothing_mm`; all of it with 0); finer differences fade with the time
+    constant `fading_gw`.
 
-    `mesh` is that of the start brain in mm, `atlas` (k, n, 3) the positions of its vertices in the atlas' k ascending
-    `atlas_weeks`.
+    `mesh` is that of the start brain in mm, `atlas` (k, n, 3) the positions of its
+    vertices in the atlas' k ascending `atlas_weeks`.
 
-    InputError if the start is long before the first week of the atlas, or not before the last one.
+    InputError if the start is long before the first week of the atlas, or not before
+    the last one.
     """
-    if len(atlas_weeks) < 2 or not atlas_weeks[0] - BEFORE_GW <= start_week < atlas_weeks[-1]:
+    if (
+        len(atlas_weeks) < 2
+        or not atlas_weeks[0] - BEFORE_GW <= start_week < atlas_weeks[-1]
+    ):
         first, last = atlas_weeks[0], atlas_weeks[-1]
         raise InputError(
             "the atlas does not cover the growth of a brain of this week",
-            found=f"a start at {start_week:g} GW and an atlas of {first:g} to {last:g} GW",
-            expected=f"two weeks or more, and a start from {first - BEFORE_GW:g} GW to before {last:g} GW",
+            found=(
+                f"a start at {start_week:g} GW and an atlas of {first:g} to {last:g} GW"
+            ),
+            expected=(
+                f"two weeks or more, and a start from {first - BEFORE_GW:g} GW to"
+                f" before {last:g} GW"
+            ),
         )
     pieces = linear_pieces(mesh)
     sizes = vertex_sizes(mesh.vertices, pieces)
@@ -106,7 +144,9 @@ def expected_positions(
         places = positions_at(week, atlas, atlas_weeks, sizes)
         scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
         fading = np.exp((start_week - week) / fading_gw)
-        positions.append(aligned(places, start) + scale * (smooth + fading * (difference - smooth)))
+        positions.append(
+            aligned(places, start) + scale * (smooth + fading * (difference - smooth))
+        )
     return np.stack(positions)
 
 
@@ -126,23 +166,30 @@ def predict_shapes(
     fading_gw: float = FADING_GW,
     open_sulci: bool = False,
 ) -> Prediction:
-    """Predict the shapes of a mesh from its week to that of the atlas after the end week, and at further weeks.
+    """Predict the shapes of a mesh from its week to that of the atlas after the end
+    week, and at further weeks.
 
-    The mesh is carried into the brain of `pair_week` of the atlas and along the atlas' path, whose brains count at
-    their age by size (`resample_by_size`). One body follows the prediction from week to week of the atlas, so that no
-    element is inverted and no faces cross. Curve, ages and the weeks that the body passes are those of the atlas, and
-    the path ends two weeks of the atlas after the end: so a shape does not depend on what else is predicted.
+    The mesh is carried into the brain of `pair_week` of the atlas and along the atlas'
+    path, whose brains count at their age by size (`resample_by_size`). One body follows
+    the prediction from week to week of the atlas, so that no element is inverted and no
+    faces cross. Curve, ages and the weeks that the body passes are those of the atlas,
+    and the path ends two weeks of the atlas after the end: so a shape does not depend
+    on what else is predicted.
 
-    `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm` and `fading_gw` vary in an
-    ensemble; `norm_ml` as for `ages_by_size`.
+    `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm`
+    and `fading_gw` vary in an ensemble; `norm_ml` as for `ages_by_size`.
     """
     used = boundary_surface(mesh)[1]
-    inside = place_in_atlas(mesh, pair, path.mesh(pair_week), make_body, open_sulci=open_sulci)
+    inside = place_in_atlas(
+        mesh, pair, path.mesh(pair_week), make_body, open_sulci=open_sulci
+    )
     carried, ages = path.carry(inside, pair_week), path.ages(norm_ml)
     knots = path.knots(ages)
     at = ages.weeks - age_shift_gw
     grown = resample_by_size(mesh, carried, ages.weeks, ages, knots)
-    later = [round(float(week), 2) for week in at if week > start_week + MIN_AGE_SPACING_GW]
+    later = [
+        round(float(week), 2) for week in at if week > start_week + MIN_AGE_SPACING_GW
+    ]
     later = later[: int(np.searchsorted(later, end_week)) + 2]
     individual = {"smoothing_mm": smoothing_mm, "fading_gw": fading_gw}
     expected = expected_positions(mesh, start_week, grown, at, later, **individual)
@@ -154,11 +201,25 @@ def predict_shapes(
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
     between = sorted({*further_weeks} - {*found.weeks})
-    by_week = dict(zip(found.weeks, found.positions, strict=True)) | {week: way(week) for week in between}
+    by_week = dict(zip(found.weeks, found.positions, strict=True)) | {
+        week: way(week) for week in between
+    }
     weeks = sorted(by_week)
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    baselines = {"atlas": [positions_at(week, carried, path.shapes.weeks, sizes)[used] for week in weeks]}
+    baselines = {
+        "atlas": [
+            positions_at(week, carried, path.shapes.weeks, sizes)[used]
+            for week in weeks
+        ]
+    }
     individual["smoothing_mm"] = 0
     differing = expected_positions(mesh, start_week, grown, at, weeks[1:], **individual)
     baselines["atlas_deformed"] = [places[used] for places in differing]
-    return Prediction(weeks, np.stack([by_week[week] for week in weeks]), found, between, baselines, ages)
+    return Prediction(
+        weeks,
+        np.stack([by_week[week] for week in weeks]),
+        found,
+        between,
+        baselines,
+        ages,
+    )

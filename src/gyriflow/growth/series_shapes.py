@@ -1,4 +1,5 @@
-"""Shapes of a mesh through the weeks of its own series: carried from brain to brain, and fitted to each surface."""
+"""Shapes of a mesh through the weeks of its own series: carried from brain to brain,
+and fitted to each surface."""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
@@ -9,48 +10,79 @@ import numpy as np
 
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry
 from ..geometry.diffusion import diffuse, harmonic_continuation
-from ..geometry.matching import match_layers, match_points, match_surface, nearest_on, surface_distance, values_at
+from ..geometry.matching import (
+    match_layers,
+    match_points,
+    match_surface,
+    nearest_on,
+    surface_distance,
+    values_at,
+)
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
-from ..geometry.triangles import Floats, Ints, TriangleMesh, area_cm2, vertex_areas, vertex_normals, volume_ml
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    area_cm2,
+    vertex_areas,
+    vertex_normals,
+    volume_ml,
+)
 from .carrying import carry_over_weeks, follow_surfaces
 
 log = logging.getLogger(__name__)
 
 INNER_MM = 2.0
-"""Depth below a surface of the tissue that distinguishes the banks of a sulcus: about that of the cortex."""
+"""Depth below a surface of the tissue that distinguishes the banks of a sulcus: about
+that of the cortex."""
 PULL_MM = (4.0, 2.5, 1.5, 1.0)
 """Smoothing (SD, mm) of the pull towards a surface, round by round."""
 PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
 REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
-"""Largest distance over which a surface pulls: to points matched by normals, and by the tissue below."""
+"""Largest distance over which a surface pulls: to points matched by normals, and by the
+tissue below."""
 FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
-"""Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
+"""Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before
+it with open sulci."""
 MAX_OPENING_DRAWS, OPENED_MM, MAX_GAP_LEFT = 6, 0.06, 0.9
-"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square), or
-where more than this fraction of the distance was left by the last one."""
+"""Largest number of these draws; they end when the boundary is closer than this to its
+goals (root mean square), or where more than this fraction of the distance was left by
+the last one."""
 MAX_MISFIT_MM = 0.25
-"""Mean distance of a body from the surface or shape it is fitted to above which a warning is logged."""
+"""Mean distance of a body from the surface or shape it is fitted to above which a
+warning is logged."""
 CONTINUATION_TOL = 1e-4
 """Relative tolerance of the harmonic continuation that a body follows."""
 Target = tuple[TriangleMesh, Floats | None]
-"""A surface, and where the tissue below the vertices that are fitted to it is in its brain (n, 3), if it counts."""
+"""A surface, and where the tissue below the vertices that are fitted to it is in its
+brain (n, 3), if it counts."""
 
 
 def fit_onto_surface(
-    moving: TriangleMesh, surface: TriangleMesh, pull_mm: Sequence[float] = PULL_MM, inner: Floats | None = None
+    moving: TriangleMesh,
+    surface: TriangleMesh,
+    pull_mm: Sequence[float] = PULL_MM,
+    inner: Floats | None = None,
 ) -> Floats:
-    """Deform a surface smoothly onto another one close to it; return its (n, 3) vertices in mm.
+    """Deform a surface smoothly onto another one close to it; return its (n, 3)
+    vertices in mm.
 
-    Each round pulls the vertices to the nearest points of the other surface whose normals agree. Vertices of the other
-    surface also pull their nearest points, so that the fundus of a sulcus has an effect although it is nearest to no
-    vertex. The pull is smoothed along the moving surface, in each round over `pull_mm`.
+    Each round pulls the vertices to the nearest points of the other surface whose
+    normals agree. Vertices of the other surface also pull their nearest points, so that
+    the fundus of a sulcus has an effect although it is nearest to no vertex. The pull
+    is smoothed along the moving surface, in each round over `pull_mm`.
 
-    With `inner` (n, 3), where the tissue `INNER_MM` below the vertices is in the brain of the other surface, points are
-    matched by that, too (`match_layers`). So a fold without a slit opens to both banks of a sulcus.
+    With `inner` (n, 3), where the tissue `INNER_MM` below the vertices is in the brain
+    of the other surface, points are matched by that, too (`match_layers`). So a fold
+    without a slit opens to both banks of a sulcus.
     """
     vertices, faces = moving.vertices, moving.faces
-    normals, areas, below = vertex_normals(surface), vertex_areas(surface), points_below(surface)
+    normals, areas, below = (
+        vertex_normals(surface),
+        vertex_areas(surface),
+        points_below(surface),
+    )
     reach_mm = REACH_MM if inner is None else REACH_BY_TISSUE_MM
     for spread in pull_mm:
         moved = TriangleMesh(vertices, faces)
@@ -63,16 +95,24 @@ def fit_onto_surface(
             backward = match_layers(surface.vertices, normals, below, moved, inner)
         weight = moved_areas * (forward.agrees & (forward.distance_mm < reach_mm))
         pull = (values_at(forward, surface.vertices) - vertices) * weight[:, None]
-        shares = backward.weights * (areas * (backward.agrees & (backward.distance_mm < reach_mm)))[:, None]
+        shares = (
+            backward.weights
+            * (areas * (backward.agrees & (backward.distance_mm < reach_mm)))[:, None]
+        )
         misfit = surface.vertices - values_at(backward, vertices)
         np.add.at(weight, backward.corners, shares)
         np.add.at(pull, backward.corners, shares[..., None] * misfit[:, None])
-        pulled = np.column_stack([pull, weight]) / np.maximum(moved_areas, 1e-9)[:, None]
+        pulled = (
+            np.column_stack([pull, weight]) / np.maximum(moved_areas, 1e-9)[:, None]
+        )
         smooth = diffuse(vertices, faces, pulled, spread, PULL_TOL)
         move = smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
-        # a mean of pulls is at most as long as these; near obtuse faces smoothed weights may be zero or negative
+        # a mean of pulls is at most as long as these; near obtuse faces smoothed
+        # weights may be zero or negative
         length = np.linalg.norm(move, axis=1, keepdims=True)
-        vertices = vertices + move * np.minimum(1.0, reach_mm / np.maximum(length, 1e-9))
+        vertices = vertices + move * np.minimum(
+            1.0, reach_mm / np.maximum(length, 1e-9)
+        )
     return np.asarray(vertices)
 
 
@@ -82,7 +122,8 @@ def points_below(surface: TriangleMesh) -> Floats:
 
 
 class FittedBody(Protocol):
-    """A mesh that is drawn to shapes, without inverted elements and crossing faces (`folding.elastic_fit`)."""
+    """A mesh that is drawn to shapes, without inverted elements and crossing faces
+    (`folding.elastic_fit`)."""
 
     positions_mm: Floats
 
@@ -96,7 +137,8 @@ class FittedBody(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class WeekShape:
-    """The (n, 3) positions in mm of a mesh at a week, of an observed brain or of a stop on the way to it."""
+    """The (n, 3) positions in mm of a mesh at a week, of an observed brain or of a stop
+    on the way to it."""
 
     week: float
     positions: Floats
@@ -105,7 +147,8 @@ class WeekShape:
 
 @dataclass(frozen=True, eq=False)
 class SeriesShapes:
-    """The (w, n, 3) positions in mm of a mesh at w weeks; `stops` are those of the weeks without an observed brain."""
+    """The (w, n, 3) positions in mm of a mesh at w weeks; `stops` are those of the
+    weeks without an observed brain."""
 
     weeks: list[float]
     positions: Floats
@@ -127,7 +170,8 @@ class SeriesShapes:
 
 
 def with_stops(before: WeekShape, week: float, body: FittedBody) -> list[WeekShape]:
-    """Return the shape of a body at a week, after the stops on its way from the shape before."""
+    """Return the shape of a body at a week, after the stops on its way from the shape
+    before."""
     stops = {}
     for fraction, positions in body.way_from(before.positions):
         stop_week = round(before.week + fraction * (week - before.week), 2)
@@ -137,23 +181,41 @@ def with_stops(before: WeekShape, week: float, body: FittedBody) -> list[WeekSha
     return [*stops.values(), WeekShape(week, body.positions_mm)]
 
 
-def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints, *, open_sulci: bool) -> None:
-    """Let a body follow a shape, and fit its boundary to a target; `used` are the vertices of the boundary.
+def fit_body(
+    body: FittedBody,
+    shape: Floats,
+    target: Target | None,
+    used: Ints,
+    *,
+    open_sulci: bool,
+) -> None:
+    """Let a body follow a shape, and fit its boundary to a target; `used` are the
+    vertices of the boundary.
 
-    With `open_sulci` it is drawn several times, until it is close or hardly comes closer.
+    With `open_sulci` it is drawn several times, until it is close or hardly comes
+    closer.
     """
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
-        left_mm = float(np.sqrt(3 * np.mean((body.boundary.vertices - shape[used]) ** 2)))
+        left_mm = float(
+            np.sqrt(3 * np.mean((body.boundary.vertices - shape[used]) ** 2))
+        )
         if left_mm > MAX_MISFIT_MM:
-            log.warning("a body stays %.2f mm (root mean square) from a shape that it cannot reach", left_mm)
+            log.warning(
+                "a body stays %.2f mm (root mean square) from a shape that it cannot"
+                " reach",
+                left_mm,
+            )
         return
     surface, inner = target
     gap_mm = np.inf
     for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
-        last_mm, gap_mm = gap_mm, float(np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2)))
+        last_mm, gap_mm = (
+            gap_mm,
+            float(np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2))),
+        )
         if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
@@ -171,26 +233,31 @@ def follow_series(
     earlier: SeriesShapes | None = None,
     after_week: Callable[[SeriesShapes], None] | None = None,
 ) -> SeriesShapes:
-    """Carry a mesh's vertices through the brains of its series with its boundary fitted to theirs.
+    """Carry a mesh's vertices through the brains of its series with its boundary fitted
+    to theirs.
 
-    Registration smooths: it carries a surface to within half a millimetre of the brain's own and flattens its folds.
-    Therefore the boundary is fitted to that brain's surface week by week, and the inside is continued harmonically.
-    Matched surfaces need no fit: the boundary keeps its place relative to them.
+    Registration smooths: it carries a surface to within half a millimetre of the
+    brain's own and flattens its folds. Therefore the boundary is fitted to that brain's
+    surface week by week, and the inside is continued harmonically. Matched surfaces
+    need no fit: the boundary keeps its place relative to them.
 
-    Such a shape may have inverted elements and a boundary that crosses itself. A `body` of this mesh follows it week by
-    week to a shape without these, and is fitted to the surface once more from there; the next week starts from it.
+    Such a shape may have inverted elements and a boundary that crosses itself. A `body`
+    of this mesh follows it week by week to a shape without these, and is fitted to the
+    surface once more from there; the next week starts from it.
 
-    With `open_sulci` the surfaces have slits that registration by labels does not show. Then points are matched by the
-    tissue below them, too, and a body is drawn to its surface several times.
+    With `open_sulci` the surfaces have slits that registration by labels does not show.
+    Then points are matched by the tissue below them, too, and a body is drawn to its
+    surface several times.
 
-    The mesh belongs to the first of the `weeks`, `pairs` lead from each brain to the next, all by registration or all
-    by matched surfaces, and `surfaces` are the pial surfaces of the later brains, all in the spaces of these
-    correspondences.
+    The mesh belongs to the first of the `weeks`, `pairs` lead from each brain to the
+    next, all by registration or all by matched surfaces, and `surfaces` are the pial
+    surfaces of the later brains, all in the spaces of these correspondences.
 
-    `after_week` gets all shapes so far whenever one of a week is made. With such shapes as `earlier` an interrupted
-    series goes on.
+    `after_week` gets all shapes so far whenever one of a week is made. With such shapes
+    as `earlier` an interrupted series goes on.
 
-    InputError if points leave the grid of a registration, or if the boundary is far from matched surfaces.
+    InputError if points leave the grid of a registration, or if the boundary is far
+    from matched surfaces.
     """
     boundary, used = boundary_surface(mesh)
     pieces = linear_pieces(mesh)
@@ -205,15 +272,21 @@ def follow_series(
     for week, (places, goals, target) in zip(weeks[n_done + 1 :], carried, strict=True):
         before = shapes[-1]
         if target is not None:
-            goals = fit_onto_surface(TriangleMesh(goals, boundary.faces), target[0], PULL_MM, target[1])
+            goals = fit_onto_surface(
+                TriangleMesh(goals, boundary.faces), target[0], PULL_MM, target[1]
+            )
         if body is not None:
             # on the shape of the week before, which has no inverted elements
-            extend = harmonic_continuation(before.positions, pieces, used, CONTINUATION_TOL)
+            extend = harmonic_continuation(
+                before.positions, pieces, used, CONTINUATION_TOL
+            )
         shape = places + extend(goals - places[used])
         if body is None:
             shapes.append(WeekShape(week, shape))
         else:
-            fit_body(body, shape, target, used, open_sulci=open_sulci and target is not None)
+            fit_body(
+                body, shape, target, used, open_sulci=open_sulci and target is not None
+            )
             if target is not None:
                 warn_of_misfit(body.boundary, target[0], week)
             shapes += with_stops(before, week, body)
@@ -230,7 +303,8 @@ def _carried(
     surfaces: Sequence[TriangleMesh],
     open_sulci: bool,
 ) -> Iterator[tuple[Floats, Floats, Target | None]]:
-    """Yield for each week that has no shape yet the (n, 3) places of the last shape, the boundary's, and its target."""
+    """Yield for each week that has no shape yet the (n, 3) places of the last shape,
+    the boundary's, and its target."""
     first = sum(not shape.is_stop for shape in shapes) - 1
     if matched := [pair for pair in pairs if isinstance(pair, MatchedSurfaces)]:
         for moved in follow_surfaces(boundary, matched)[first + 1 :]:
@@ -241,34 +315,62 @@ def _carried(
         assert isinstance(pair, Deformation)
         places = carry_over_weeks(now, [pair])[-1]
         before = TriangleMesh(now[used], boundary.faces)
-        # below the observed surface: with the body's normals its roughness would add up from week to week
-        inner = tissue_below(before, surfaces[number - 1] if number else before, pair) if open_sulci else None
+        # below the observed surface: with the body's normals its roughness would add up
+        # from week to week
+        inner = (
+            tissue_below(before, surfaces[number - 1] if number else before, pair)
+            if open_sulci
+            else None
+        )
         yield places, places[used], (surfaces[number], inner)
 
 
-def tissue_below(boundary: TriangleMesh, observed: TriangleMesh, pair: Deformation) -> Floats:
-    """Return the (n, 3) places, after a registration, of the tissue below the vertices of a boundary before it."""
-    return carry(pair, values_at(match_surface(boundary, observed), points_below(observed)))
+def tissue_below(
+    boundary: TriangleMesh, observed: TriangleMesh, pair: Deformation
+) -> Floats:
+    """Return the (n, 3) places, after a registration, of the tissue below the vertices
+    of a boundary before it."""
+    return carry(
+        pair, values_at(match_surface(boundary, observed), points_below(observed))
+    )
 
 
 def misfit_mm(boundary: TriangleMesh, surface: TriangleMesh) -> tuple[float, float]:
-    """Return the mean distance of a boundary and a surface, and the larger quantile at 95 % of both ways."""
+    """Return the mean distance of a boundary and a surface, and the larger quantile at
+    95 % of both ways."""
     ways = ((boundary, surface), (surface, boundary))
-    return surface_distance((nearest_on(first.vertices, second)[0], vertex_areas(first)) for first, second in ways)
+    return surface_distance(
+        (nearest_on(first.vertices, second)[0], vertex_areas(first))
+        for first, second in ways
+    )
 
 
 def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -> None:
-    """Log the distance of a body's boundary from the surface that it is fitted to, as a warning if it is large."""
+    """Log the distance of a body's boundary from the surface that it is fitted to, as a
+    warning if it is large."""
     mean, far = misfit_mm(boundary, surface)
-    log.info("GW %g: %.3f mm from the observed surface on average, 95 %% below %.2f mm", week, mean, far)
+    log.info(
+        "GW %g: %.3f mm from the observed surface on average, 95 %% below %.2f mm",
+        week,
+        mean,
+        far,
+    )
     if mean > MAX_MISFIT_MM:
-        text = "the shape at GW %g stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body "
+        text = (
+            "the shape at GW %g stays %.2f mm from the observed surface on average (95"
+            " %% below %.2f mm): the body "
+        )
         text += "cannot reach all of it without inverted elements or crossing folds"
         log.warning(text, week, mean, far)
 
 
-def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats] | Floats) -> dict[str, Floats]:
+def sizes_of(
+    mesh: TetrahedralMesh, positions: Sequence[Floats] | Floats
+) -> dict[str, Floats]:
     """Return area_cm2 and volume_ml (w,) of a mesh's boundary at w positions (n, 3)."""
     boundary, used = boundary_surface(mesh)
     surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
-    return {"area_cm2": np.array(list(map(area_cm2, surfaces))), "volume_ml": np.array(list(map(volume_ml, surfaces)))}
+    return {
+        "area_cm2": np.array(list(map(area_cm2, surfaces))),
+        "volume_ml": np.array(list(map(volume_ml, surfaces))),
+    }

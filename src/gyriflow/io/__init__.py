@@ -1,1 +1,2 @@
-"""The only room that opens files: label volumes, surfaces, tetrahedral meshes, frames, tables."""
+"""The only room that opens files: label volumes, surfaces, tetrahedral meshes, frames,
+tables."""

@@ -18,25 +18,46 @@ Report = Callable[[str], None]
 
 
 def require_checksums(recorded: Mapping[str, tuple[str, str]]) -> None:
-    """Raise InputError where a file is not that of an atlas: by its path `recorded` has the atlas and the SHA-256."""
+    """Raise InputError where a file is not that of an atlas: by its path `recorded` has
+    the atlas and the SHA-256."""
     for path, (atlas, sha256) in recorded.items():
         if sha256_of(path) != sha256:
-            remedy = "Delete it, and it is fetched; or give a changed file as a brain of your own under brains."
-            raise InputError(f"is not the file of {atlas}", path=path, expected=f"the SHA-256 {sha256}", remedy=remedy)
+            remedy = (
+                "Delete it, and it is fetched; or give a changed file as a brain of"
+                " your own under brains."
+            )
+            raise InputError(
+                f"is not the file of {atlas}",
+                path=path,
+                expected=f"the SHA-256 {sha256}",
+                remedy=remedy,
+            )
 
 
-def fetch(path: AnyPath, url: str, report: Report, *, sha256: str | None = None, size: int | None = None) -> None:
-    """Fetch a file from a URL, check it and put it under `path`, or check the one there, which is never replaced.
+def fetch(
+    path: AnyPath,
+    url: str,
+    report: Report,
+    *,
+    sha256: str | None = None,
+    size: int | None = None,
+) -> None:
+    """Fetch a file from a URL, check it and put it under `path`, or check the one
+    there, which is never replaced.
 
-    `report` gets a line about the file. Without a checksum, a GIFTI or NIfTI file has to be readable to its end. There
-    has to be room for the size in bytes, if known. StorageError otherwise, with nothing new under `path`.
+    `report` gets a line about the file. Without a checksum, a GIFTI or NIfTI file has
+    to be readable to its end. There has to be room for the size in bytes, if known.
+    StorageError otherwise, with nothing new under `path`.
     """
     import pooch
 
     path = Path(path)
     pooch.get_logger().setLevel("WARNING")
-    # without compression on the way, which would be undone in files that are compressed themselves
-    by_http = pooch.HTTPDownloader(timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"})
+    # without compression on the way, which would be undone in files that are compressed
+    # themselves
+    by_http = pooch.HTTPDownloader(
+        timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"}
+    )
 
     def download(url: str, output_file: str, caller: pooch.Pooch) -> None:
         by_http(url, output_file, caller)
@@ -50,10 +71,17 @@ def fetch(path: AnyPath, url: str, report: Report, *, sha256: str | None = None,
         path.parent.mkdir(parents=True, exist_ok=True)
         free = shutil.disk_usage(path.parent).free
         if size is not None and free < size:
-            raise StorageError(f"no room for {size} bytes; {free} are free", path=path.parent)
+            raise StorageError(
+                f"no room for {size} bytes; {free} are free", path=path.parent
+            )
         files = {"registry": {path.name: None}, "urls": {path.name: url}}
-        pooch.create(path.parent, "", retry_if_failed=TRIES - 1, **files).fetch(path.name, downloader=download)
-    report(f"{path}: SHA-256 {sha256_of(path)}" + ("" if sha256 else " as downloaded; no checksum is known"))
+        pooch.create(path.parent, "", retry_if_failed=TRIES - 1, **files).fetch(
+            path.name, downloader=download
+        )
+    report(
+        f"{path}: SHA-256 {sha256_of(path)}"
+        + ("" if sha256 else " as downloaded; no checksum is known")
+    )
 
 
 def _check(path: Path, name: str, sha256: str | None) -> None:
@@ -85,23 +113,36 @@ def _refused(path: Path, url: str) -> Iterator[None]:
     try:
         yield
     except requests.RequestException as error:
-        remedy = f"Run the same command again to continue, or put the file into {path.parent} by hand."
-        raise StorageError("cannot be fetched", path=url, found=_cause(error), remedy=remedy) from error
+        remedy = (
+            "Run the same command again to continue, or put the file into"
+            f" {path.parent} by hand."
+        )
+        raise StorageError(
+            "cannot be fetched", path=url, found=_cause(error), remedy=remedy
+        ) from error
     except ValueError as error:
         if path.exists():
             remedy = "It was left as it is. Move it away, and the file is fetched."
-            raise StorageError("is not the file of the atlas", path=path, found=error, remedy=remedy) from error
+            raise StorageError(
+                "is not the file of the atlas", path=path, found=error, remedy=remedy
+            ) from error
         remedy = "Check the address, and whether the network asks for a login."
         problem = "the server sent something else than the file"
-        raise StorageError(problem, path=url, found=error, expected=path.name, remedy=remedy) from error
+        raise StorageError(
+            problem, path=url, found=error, expected=path.name, remedy=remedy
+        ) from error
     except OSError as error:
-        raise StorageError(f"cannot be written or read: {error.strerror or error}", path=path) from error
+        raise StorageError(
+            f"cannot be written or read: {error.strerror or error}", path=path
+        ) from error
 
 
 def _cause(error: Exception) -> str:
     reason: object = error
     while isinstance(reason, Exception):
-        inner = getattr(reason, "reason", None) or (reason.args[0] if reason.args else None)
+        inner = getattr(reason, "reason", None) or (
+            reason.args[0] if reason.args else None
+        )
         if not isinstance(inner, Exception):
             break
         reason = inner

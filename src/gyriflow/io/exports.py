@@ -18,14 +18,22 @@ from ..quantities import VERTEX_MAPS
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
 from .made_files import making_files, require_own_data_set
-from .surfaces import Layer, read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
+from .surfaces import (
+    Layer,
+    read_pose,
+    read_surface,
+    read_vertex_maps,
+    write_surface,
+    write_vertex_maps,
+)
 from .volumes import LabelVolume, write_label_volume
 
 BIDS_VERSION = "1.10.0"
 OF_STUDY = ("participants", "metrics_wide", "metrics_long")
 """Tables of all subjects."""
 IGNORED = """\
-# BIDS has no names for surfaces and the maps on them yet: these are those that its proposal BEP011 has for them
+# BIDS has no names for surfaces and the maps on them yet: these are those that its
+# proposal BEP011 has for them
 *.surf.gii
 *.shape.gii
 {kinds}
@@ -40,15 +48,18 @@ figures
 README = """\
 # gyriflow derivatives
 
-Pial surfaces of fetal brains, maps of folding on them, and simulated brains of later weeks, made by gyriflow {version}.
+Pial surfaces of fetal brains, maps of folding on them, and simulated brains of later
+weeks, made by gyriflow {version}.
 
-- `*_pial.surf.gii`: surfaces, in the world coordinates (RAS+ mm) of the input's volumes; `*_curv.shape.gii` and others:
-  a map with a value at each of their vertices, described with its unit in the file `.json` of its name. Those of a
-  `space-` are at the vertices of the pial surfaces of that subject and session.
-- `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each. `*_dseg.nii.gz` are their labels
-  in the grid of the start's: `dseg.tsv`.
-- `participants.tsv` and `sessions.tsv`: gestational ages in weeks. `metrics_wide.tsv` has a row for each brain,
-  `metrics_long.tsv` one for each number; `metrics_wide.json` has units.
+- `*_pial.surf.gii`: surfaces, in the world coordinates (RAS+ mm) of the input's
+  volumes; `*_curv.shape.gii` and others: a map with a value at each of their vertices,
+  described with its unit in the file `.json` of its name. Those of a `space-` are at
+  the vertices of the pial surfaces of that subject and session.
+- `desc-…`: simulated brains of a run at a week; `descriptions.tsv` has a row for each.
+  `*_dseg.nii.gz` are their labels in the grid of the start's: `dseg.tsv`.
+- `participants.tsv` and `sessions.tsv`: gestational ages in weeks. `metrics_wide.tsv`
+  has a row for each brain, `metrics_long.tsv` one for each number; `metrics_wide.json`
+  has units.
 """
 PEOPLE = {
     "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
@@ -73,17 +84,20 @@ EXPORTED_TISSUES = ((1, "cerebrum within the cortex"), (2, "cortex"))
 OF_INPUT = {"Description": "As in the tables of the input"}
 SESSION = re.compile(r"_ses-([A-Za-z0-9]+)")
 Place = tuple[Path, str]
-"""What the paths of a brain's files begin with, and the entity `desc-` of simulated brains."""
+"""What the paths of a brain's files begin with, and the entity `desc-` of simulated
+brains."""
 BidsNames = Mapping[str, tuple[str, str | None]]
-"""Subject and session of each measured brain, None where the study needs no sessions."""
+"""Subject and session of each measured brain, None where the study needs no
+sessions."""
 
 
 class ExportedBrain(NamedTuple):
     """A brain at a week and its files by side; regions may be empty.
 
-    The run is "real" for observed brains; simulated ones have brain, subject and covariates of their start.
-    `template_maps` are at another brain's vertices. Simulated brains of labels have a `volume`: the start's `labels`,
-    whose grid is used, and `surface` and `thickness` of the whole brain.
+    The run is "real" for observed brains; simulated ones have brain, subject and
+    covariates of their start. `template_maps` are at another brain's vertices.
+    Simulated brains of labels have a `volume`: the start's `labels`, whose grid is
+    used, and `surface` and `thickness` of the whole brain.
     """
 
     # a tuple: Snakemake sees no change in parameters of other classes
@@ -110,98 +124,158 @@ def export_bids(
     version: str,
     columns: Mapping[str, tuple[str, str]],
 ) -> None:
-    """Write a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
+    """Write a BIDS derivative: a file for each map, simulated brains under
+    `desc-RUNgwWEEK`, tables as TSV.
 
-    Brains of no named session have their week's, where a subject has several. Surfaces lie in the world of the brain's
-    volumes, unless its sides were posed separately. `tables` have the columns subject, run and week; `columns` has
-    description and unit of each in `metrics_wide`. InputError where two subjects, runs or brains would have one name.
+    Brains of no named session have their week's, where a subject has several. Surfaces
+    lie in the world of the brain's volumes, unless its sides were posed separately.
+    `tables` have the columns subject, run and week; `columns` has description and unit
+    of each in `metrics_wide`. InputError where two subjects, runs or brains would have
+    one name.
     """
     folder = Path(folder)
     observed = [brain for brain in brains if brain.run == MEASURED]
-    require_bids_names([brain.subject for brain in observed], [brain.run for brain in brains])
+    require_bids_names(
+        [brain.subject for brain in observed], [brain.run for brain in brains]
+    )
     names = _subjects_and_sessions(observed)
     space, reference = _template(observed, names)
     places = _places(folder, brains, names)
     sidecars: dict[str, dict[str, Any]] = {}
     for brain, place in zip(brains, places, strict=True):
         pose = read_pose(brain.report)
-        sidecars |= _write_surfaces(place, brain, pose.inverse if pose.together else np.eye(4))
+        sidecars |= _write_surfaces(
+            place, brain, pose.inverse if pose.together else np.eye(4)
+        )
         sidecars |= _write_maps(place, brain, space, reference)
         if brain.volume and pose.together:
             write_label_volume(LABELS_FILE.format(*place), _labels(brain, pose.inverse))
-            _write_tsv(folder / "dseg.tsv", pd.DataFrame(EXPORTED_TISSUES, columns=["index", "name"]))
+            _write_tsv(
+                folder / "dseg.tsv",
+                pd.DataFrame(EXPORTED_TISSUES, columns=["index", "name"]),
+            )
     for suffix, sidecar in sidecars.items():
         write_json(folder / f"{suffix}.json", sidecar)
     kinds = "\n".join(f"/{suffix}.json" for suffix in sorted(sidecars))
     write_text(folder / ".bidsignore", IGNORED.format(kinds=kinds))
     write_text(folder / "README.md", README.format(version=version))
     if descriptions := _descriptions(brains, places):
-        _write_tsv(folder / "descriptions.tsv", pd.DataFrame(descriptions.items(), columns=["desc_id", "description"]))
+        _write_tsv(
+            folder / "descriptions.tsv",
+            pd.DataFrame(descriptions.items(), columns=["desc_id", "description"]),
+        )
     _write_people(folder, observed, names)
     for name, table in tables.items():
         ids = [names[brain] for brain in table["subject"]]
-        table = table.rename(columns=_column_of_input).rename(columns={"subject": "brain"})
+        table = table.rename(columns=_column_of_input).rename(
+            columns={"subject": "brain"}
+        )
         table.insert(0, "participant_id", [subject for subject, _ in ids])
         table.insert(1, "session_id", [session for _, session in ids])
         _write_tsv(folder / f"{name}.tsv", table)
     wide = COLUMNS.copy()
     for name in map(str, tables.get("metrics_wide", ())):
         wide.setdefault(_column_of_input(name), OF_INPUT)
-    wide |= {name: {"Description": text, "Units": bids_unit(unit)} for name, (text, unit) in columns.items()}
+    wide |= {
+        name: {"Description": text, "Units": bids_unit(unit)}
+        for name, (text, unit) in columns.items()
+    }
     wide.pop("subject", None)
     write_json(folder / "metrics_wide.json", wide)
     write_json(folder / "metrics_long.json", COLUMNS | COLUMNS_OF_NUMBERS)
-    made_by = {"Name": "gyriflow", "Version": version, "Description": "Pial surfaces, maps and simulations of folding"}
-    dataset = {"Name": "gyriflow", "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative", "GeneratedBy": [made_by]}
+    made_by = {
+        "Name": "gyriflow",
+        "Version": version,
+        "Description": "Pial surfaces, maps and simulations of folding",
+    }
+    dataset = {
+        "Name": "gyriflow",
+        "BIDSVersion": BIDS_VERSION,
+        "DatasetType": "derivative",
+        "GeneratedBy": [made_by],
+    }
     # the last file: where it is there, all is
     write_json(folder / "dataset_description.json", dataset)
 
 
-def labels_file(folder: AnyPath, brain: ExportedBrain, brains: Sequence[ExportedBrain]) -> str:
-    """Return the file to which `export_bids` writes the labels of a simulated brain, given all brains."""
-    names = _subjects_and_sessions([observed for observed in brains if observed.run == MEASURED])
+def labels_file(
+    folder: AnyPath, brain: ExportedBrain, brains: Sequence[ExportedBrain]
+) -> str:
+    """Return the file to which `export_bids` writes the labels of a simulated brain,
+    given all brains."""
+    names = _subjects_and_sessions(
+        [observed for observed in brains if observed.run == MEASURED]
+    )
     return LABELS_FILE.format(*_places(Path(folder), [brain], names)[0])
 
 
-def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> list[Place]:
+def _places(
+    folder: Path, brains: Sequence[ExportedBrain], names: BidsNames
+) -> list[Place]:
     taken: dict[tuple[str, str], ExportedBrain] = {}
     places = []
     for brain in brains:
         subject, session = names[brain.brain]
         stem = "_".join(filter(None, (subject, session)))
         simulated = f"_desc-{bids_label(brain.run)}gw{brain.week:.2f}".replace(".", "")
-        place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
+        place = (
+            folder / subject / (session or "") / "anat" / stem,
+            "" if brain.run == MEASURED else simulated,
+        )
         places.append(place)
         on_disk = folder_name(stem), folder_name(place[1])
         if (first := taken.setdefault(on_disk, brain)) is not brain:
-            brains_and_runs = f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"
+            brains_and_runs = (
+                f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"
+            )
             expected = "ids and runs that differ in their letters and digits"
-            raise InputError(f"two brains have the same BIDS name {stem}", found=brains_and_runs, expected=expected)
+            raise InputError(
+                f"two brains have the same BIDS name {stem}",
+                found=brains_and_runs,
+                expected=expected,
+            )
     return places
 
 
-def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[Place]) -> dict[str, str]:
+def _descriptions(
+    brains: Sequence[ExportedBrain], places: Sequence[Place]
+) -> dict[str, str]:
     descriptions = {
-        desc[1:]: f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
+        desc[
+            1:
+        ]: f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
         for brain, (_, desc) in zip(brains, places, strict=True)
         if desc
     }
     if any(brain.white for brain in brains):
-        descriptions["desc-white"] = "Map on the white surface; those without it are on the pial one"
+        descriptions["desc-white"] = (
+            "Map on the white surface; those without it are on the pial one"
+        )
     return descriptions
 
 
-def _write_surfaces(place: Place, brain: ExportedBrain, back: Floats) -> dict[str, dict[str, Any]]:
+def _write_surfaces(
+    place: Place, brain: ExportedBrain, back: Floats
+) -> dict[str, dict[str, Any]]:
     prefix, simulated = place
-    kinds: dict[str, tuple[Mapping[Side, str], str, Layer]] = {"pial": (brain.surfaces, simulated, "Pial")}
+    kinds: dict[str, tuple[Mapping[Side, str], str, Layer]] = {
+        "pial": (brain.surfaces, simulated, "Pial")
+    }
     kinds |= {"white": (brain.white, "", "GrayWhite")} if brain.white else {}
     for kind, (files, desc, layer) in kinds.items():
         for side, path in files.items():
             named = f"{prefix}_hemi-{side[0].upper()}{desc}_{kind}.surf.gii"
-            write_surface(named, transformed(read_surface(path), back), STRUCTURES[side], layer)
+            write_surface(
+                named, transformed(read_surface(path), back), STRUCTURES[side], layer
+            )
     for side, path in brain.regions.items():
-        _copy(path, f"{prefix}_hemi-{side[0].upper()}{simulated or '_desc-regions'}_dseg.label.gii")
-    return {kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"} for kind in kinds}
+        desc = simulated or "_desc-regions"
+        named = f"{prefix}_hemi-{side[0].upper()}{desc}_dseg.label.gii"
+        _copy(path, named)
+    return {
+        kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"}
+        for kind in kinds
+    }
 
 
 def _write_maps(
@@ -220,21 +294,40 @@ def _write_maps(
             for name, values in read_vertex_maps(path).items():
                 quantity = VERTEX_MAPS[name]
                 suffix, sign = quantity.bids_suffix, quantity.export_sign
-                described = {"Description": quantity.description, "Units": bids_unit(quantity.unit)}
-                sidecars["_".join(filter(None, (entity, suffix)))] = {**described, **more}
+                described = {
+                    "Description": quantity.description,
+                    "Units": bids_unit(quantity.unit),
+                }
+                sidecars["_".join(filter(None, (entity, suffix)))] = {
+                    **described,
+                    **more,
+                }
                 density = f"_{entity}_den-{len(values)}" if entity else ""
-                named = f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
-                write_vertex_maps(named, {suffix if sign < 0 else name: sign * values}, STRUCTURES[side])
+                named = (
+                    f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
+                )
+                write_vertex_maps(
+                    named,
+                    {suffix if sign < 0 else name: sign * values},
+                    STRUCTURES[side],
+                )
     return sidecars
 
 
-def _template(observed: Sequence[ExportedBrain], names: BidsNames) -> tuple[str, dict[str, Any]]:
-    template = next((brain for brain in observed if brain.brain == brain.template), None)
+def _template(
+    observed: Sequence[ExportedBrain], names: BidsNames
+) -> tuple[str, dict[str, Any]]:
+    template = next(
+        (brain for brain in observed if brain.brain == brain.template), None
+    )
     if template is None:
         return "", {}
     stem = "_".join(filter(None, names[template.brain]))
     place = "/".join(filter(None, (*names[template.brain], "anat", stem)))
-    surfaces = {side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii" for side in template.surfaces}
+    surfaces = {
+        side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii"
+        for side in template.surfaces
+    }
     return f"space-{bids_label(stem)}", {"SpatialReference": surfaces}
 
 
@@ -242,50 +335,94 @@ def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
     start = brain.volume["labels"].read()
     mesh = transformed(read_surface(brain.volume["surface"]), back)
     (thickness,) = read_vertex_maps(brain.volume["thickness"]).values()
-    return LabelVolume(layer_labels(mesh, thickness, start.labels.shape, start.affine), start.affine)
+    return LabelVolume(
+        layer_labels(mesh, thickness, start.labels.shape, start.affine), start.affine
+    )
 
 
 def publish_derivatives(
-    exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool
+    exported: AnyPath,
+    folder: AnyPath,
+    source: AnyPath,
+    brains: Sequence[str],
+    whole: bool,
 ) -> None:
-    """Bring the BIDS derivative of a study to another folder; files there that gyriflow has not made stay.
+    """Bring the BIDS derivative of a study to another folder; files there that gyriflow
+    has not made stay.
 
-    Beside each subject's files come the quality pages of its `brains`, with the `whole` study its tables, report and
-    methods. `source` is the data set that it was made of, which `SourceDatasets` then names by its DOI or its folder.
+    Beside each subject's files come the quality pages of its `brains`, with the `whole`
+    study its tables, report and methods. `source` is the data set that it was made of,
+    which `SourceDatasets` then names by its DOI or its folder.
     """
     exported, folder, source = Path(exported), Path(folder), Path(source)
     require_own_data_set(folder)
     files = {str(path.relative_to(exported)): path for path in files_below(exported)}
     subjects = {name.partition("/")[0] for name in files if "/" in name}
-    study_tables = [name for name in files if "/" not in name and Path(name).stem in OF_STUDY and not whole]
+    study_tables = [
+        name
+        for name in files
+        if "/" not in name and Path(name).stem in OF_STUDY and not whole
+    ]
     pages = {
-        f"{brain.split('_')[0]}/figures/{brain}_quality.png": f"brains/{brain}/figures/quality.png" for brain in brains
+        f"{brain.split('_')[0]}/figures/{brain}_quality.png": (
+            f"brains/{brain}/figures/quality.png"
+        )
+        for brain in brains
     }
     # brains of an atlas have pages, too, to which the report leads
     report = exported.parent / "report"
-    names = [*(str(path.relative_to(report)) for path in report.glob("**/*.html")), "methods.rst"]
+    names = [
+        *(str(path.relative_to(report)) for path in report.glob("**/*.html")),
+        "methods.rst",
+    ]
     pages |= {name: f"report/{name}" for name in names if whole}
-    files |= {target: path for target, page in pages.items() if (path := exported.parent / page).is_file()}
+    files |= {
+        target: path
+        for target, page in pages.items()
+        if (path := exported.parent / page).is_file()
+    }
     with making_files(folder, exported.with_name(".published-files.json"), *subjects):
         for name in files.keys() - study_tables:
             _copy(files[name], folder / name)
     description = source / "dataset_description.json"
     source_description = read_json(description) if description.is_file() else {}
     doi = str(source_description.get("DatasetDOI", ""))
-    url = doi if doi.startswith(("doi:", "http")) else f"doi:{doi}" if doi else source.resolve().as_uri()
+    url = (
+        doi
+        if doi.startswith(("doi:", "http"))
+        else f"doi:{doi}"
+        if doi
+        else source.resolve().as_uri()
+    )
     described = read_json(exported / "dataset_description.json")
-    write_json(folder / "dataset_description.json", described | {"SourceDatasets": [{"URL": url}]})
+    write_json(
+        folder / "dataset_description.json",
+        described | {"SourceDatasets": [{"URL": url}]},
+    )
 
 
 def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
     subjects = {brain.brain: bids_subject(brain.subject) for brain in brains}
-    sessions = {brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}" for brain in brains}
-    several = max(Counter(brain.subject for brain in brains).values(), default=0) > 1 or any(sessions.values())
-    week = {brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None for brain in brains}
-    return {brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain]) for brain in brains}
+    sessions = {
+        brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}"
+        for brain in brains
+    }
+    several = max(
+        Counter(brain.subject for brain in brains).values(), default=0
+    ) > 1 or any(sessions.values())
+    week = {
+        brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None
+        for brain in brains
+    }
+    return {
+        brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain])
+        for brain in brains
+    }
 
 
-def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> None:
+def _write_people(
+    folder: Path, brains: Sequence[ExportedBrain], names: BidsNames
+) -> None:
     # covariates that differ between a subject's brains are those of sessions
     first = list(OWN_COLUMNS)
     people = pd.DataFrame(
@@ -296,18 +433,28 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsName
     most = people.groupby("participant_id").nunique(dropna=False).max()
     tables = {"participants": people.drop(columns="session_id")}
     if people["session_id"].notna().any():
-        varying = [name for name in people if name in first[1:] or most.get(name, 0) > 1]
-        tables = {"participants": people.drop(columns=varying).drop_duplicates(), "sessions": people[varying]}
+        varying = [
+            name for name in people if name in first[1:] or most.get(name, 0) > 1
+        ]
+        tables = {
+            "participants": people.drop(columns=varying).drop_duplicates(),
+            "sessions": people[varying],
+        }
         for subject, part in people.groupby("participant_id"):
             _write_tsv(folder / str(subject) / f"{subject}_sessions.tsv", part[varying])
     _write_tsv(folder / "participants.tsv", tables["participants"])
     for name, table in tables.items():
-        columns = {str(key): PEOPLE.get(str(key), OF_INPUT) for key in table if key not in first[:2]}
+        columns = {
+            str(key): PEOPLE.get(str(key), OF_INPUT)
+            for key in table
+            if key not in first[:2]
+        }
         write_json(folder / f"{name}.json", columns)
 
 
 def _column_of_input(name: str) -> str:
-    """Return the column of a covariate, which may be named like a column of the export itself."""
+    """Return the column of a covariate, which may be named like a column of the export
+    itself."""
     return f"{name}_of_input" if name in OWN_COLUMNS else name
 
 
@@ -318,7 +465,9 @@ def bids_unit(unit: str) -> str:
 
 def _write_tsv(path: Path, table: pd.DataFrame) -> None:
     with atomic_write(path) as temporary:
-        table.to_csv(temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a")
+        table.to_csv(
+            temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a"
+        )
 
 
 def _copy(source: AnyPath, target: AnyPath) -> None:

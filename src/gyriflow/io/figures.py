@@ -20,15 +20,17 @@ DPI = 200
 """Resolution of pictures as PNG, in dots per inch."""
 
 TABLE_LOOK = (
-    "body { font: 13px sans-serif } p { max-width: 60em } table { border-collapse: collapse; margin: 1em 0 } "
-    "caption { text-align: left; font-weight: bold; padding: 4px 0 } "
-    "th, td { text-align: left; border-bottom: 1px solid #ddd; padding: 3px 10px } td.number { text-align: right }"
+    "body { font: 13px sans-serif } p { max-width: 60em } table { border-collapse:"
+    " collapse; margin: 1em 0 } caption { text-align: left; font-weight: bold; padding:"
+    " 4px 0 } th, td { text-align: left; border-bottom: 1px solid #ddd; padding: 3px"
+    " 10px } td.number { text-align: right }"
 )
 """How tables look in a page of their own."""
 
 
 def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
-    """Write a figure as pixels, `DPI` to the inch, and as vectors; pictures keep their pixels."""
+    """Write a figure as pixels, `DPI` to the inch, and as vectors; pictures keep their
+    pixels."""
     with atomic_write(png) as temporary:
         figure.savefig(temporary, dpi=DPI)
     for picture in figure.findobj(AxesImage):
@@ -40,12 +42,18 @@ def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
 
 def write_html(path: AnyPath, body: str) -> None:
     """Write a page with the given content, tables first of all."""
-    head = f'<!DOCTYPE html>\n<html lang="en">\n<meta charset="utf-8">\n<style>{TABLE_LOOK}</style>'
+    head = (
+        '<!DOCTYPE html>\n<html lang="en">\n<meta'
+        f' charset="utf-8">\n<style>{TABLE_LOOK}</style>'
+    )
     write_text(path, f"{head}\n{body}\n</html>\n")
 
 
-def picture_addresses(paths: Sequence[AnyPath], budget_bytes: float) -> list[tuple[str, float]]:
-    """Return pictures as data addresses (WebP) that together fit `budget_bytes`, and their widths in print (inches)."""
+def picture_addresses(
+    paths: Sequence[AnyPath], budget_bytes: float
+) -> list[tuple[str, float]]:
+    """Return pictures as data addresses (WebP) that together fit `budget_bytes`, and
+    their widths in print (inches)."""
     for width in WIDTHS:
         coded = [_coded(path, width) for path in paths]
         if sum(len(address) for address, _ in coded) <= budget_bytes:
@@ -55,12 +63,20 @@ def picture_addresses(paths: Sequence[AnyPath], budget_bytes: float) -> list[tup
 
 def _coded(path: AnyPath, width: int) -> tuple[str, float]:
     with Image.open(path) as picture:
-        image, inches = picture.convert("RGB"), float(picture.width / picture.info["dpi"][0])
+        image, inches = (
+            picture.convert("RGB"),
+            float(picture.width / picture.info["dpi"][0]),
+        )
     if image.width > width:
-        image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
+        image = image.resize(
+            (width, round(image.height * width / image.width)), Image.Resampling.LANCZOS
+        )
     content = BytesIO()
     image.save(content, "WEBP", quality=QUALITY, method=4)
-    return f"data:image/webp;base64,{b64encode(content.getvalue()).decode('ascii')}", inches
+    return (
+        f"data:image/webp;base64,{b64encode(content.getvalue()).decode('ascii')}",
+        inches,
+    )
 
 
 def read_body(path: AnyPath) -> str:

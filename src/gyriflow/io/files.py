@@ -1,4 +1,5 @@
-"""Files that appear whole or not at all: temporary names and renames, JSON, tables, HDF5; and fingerprints of files."""
+"""Files that appear whole or not at all: temporary names and renames, JSON, tables,
+HDF5; and fingerprints of files."""
 
 import csv
 import gzip
@@ -34,25 +35,78 @@ PAIR = re.compile(r"\.(?:hdr|img)(\.gz)?$", re.IGNORECASE)
 PAIR_ENDINGS = (".hdr", ".img", ".HDR", ".IMG")
 EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
 TEXT_COLUMNS = (
-    *("subject", "brain", "from_brain", "to_brain", "start", "real", "run", "series", "study", "sides", "page"),
-    *("population", "real_population", "source", "hemisphere", "region", "tissue", "structure", "nodes", "metric"),
-    *("measure", "quantity", "proxy", "unit", "model", "kind", "growth_of", "parameter", "result", "place", "pose_by"),
-    *("verdict", "cause", "outcome", "flag", "resolution", "level", "message", "warnings", "stage", "rule"),
+    *(
+        "subject",
+        "brain",
+        "from_brain",
+        "to_brain",
+        "start",
+        "real",
+        "run",
+        "series",
+        "study",
+        "sides",
+        "page",
+    ),
+    *(
+        "population",
+        "real_population",
+        "source",
+        "hemisphere",
+        "region",
+        "tissue",
+        "structure",
+        "nodes",
+        "metric",
+    ),
+    *(
+        "measure",
+        "quantity",
+        "proxy",
+        "unit",
+        "model",
+        "kind",
+        "growth_of",
+        "parameter",
+        "result",
+        "place",
+        "pose_by",
+    ),
+    *(
+        "verdict",
+        "cause",
+        "outcome",
+        "flag",
+        "resolution",
+        "level",
+        "message",
+        "warnings",
+        "stage",
+        "rule",
+    ),
 )
-"""The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids."""
+"""The columns of text in the tables that gyriflow writes, also where all texts look
+like numbers, such as ids."""
 
 
 def companion_files(path: AnyPath) -> list[str]:
-    """Return the further files that readers open with a file: the second of a pair, the external data of GIFTI."""
+    """Return the further files that readers open with a file: the second of a pair, the
+    external data of GIFTI."""
     path, names = Path(path), set[bytes]()
     if pair := PAIR.search(path.name):
-        return [str(path.with_name(path.name[: pair.start()] + end + (pair[1] or ""))) for end in PAIR_ENDINGS]
+        return [
+            str(path.with_name(path.name[: pair.start()] + end + (pair[1] or "")))
+            for end in PAIR_ENDINGS
+        ]
     if path.name.lower().endswith((".gii", ".gii.gz")):
         opener: Any = gzip.open if path.name.lower().endswith(".gz") else Path.open
         # damaged files are reported by their readers
         with suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
             names = set(EXTERNAL.findall(file.read()))
-    return [str(path.parent / html.unescape(name.decode(errors="replace"))) for name in sorted(names)]
+    return [
+        str(path.parent / html.unescape(name.decode(errors="replace")))
+        for name in sorted(names)
+    ]
 
 
 def _start_of(path: AnyPath) -> bytes:
@@ -68,8 +122,11 @@ def require_content(path: AnyPath) -> None:
 
 
 @contextmanager
-def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN) -> Iterator[None]:
-    """Turn what a reader raises into an InputError: the file cannot be read as `kind`, or is of another format."""
+def reading(
+    path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN
+) -> Iterator[None]:
+    """Turn what a reader raises into an InputError: the file cannot be read as `kind`,
+    or is of another format."""
     require_content(path)
     try:
         yield
@@ -84,19 +141,33 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
         reason = f"no such file{hint_for_missing(Path(path))}" if is_missing else error
         if foreign := foreign_format(path, _start_of(path)):
             reason, remedy = f"it is {foreign.name}", foreign.remedy
-        raise InputError(f"cannot be read as {kind}: {reason}", path=path, expected=expected, remedy=remedy) from error
+        raise InputError(
+            f"cannot be read as {kind}: {reason}",
+            path=path,
+            expected=expected,
+            remedy=remedy,
+        ) from error
 
 
 def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> None:
-    """Raise InputError where some of a file's (n,) or (n, k) values, such as the coordinates of vertices, are none."""
-    bad = int(np.count_nonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim)))))
+    """Raise InputError where some of a file's (n,) or (n, k) values, such as the
+    coordinates of vertices, are none."""
+    bad = int(
+        np.count_nonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
+    )
     if bad:
-        raise InputError(f"has NaN or infinite {what}", path=path, found=f"{bad} {of}", expected="none")
+        raise InputError(
+            f"has NaN or infinite {what}",
+            path=path,
+            found=f"{bad} {of}",
+            expected="none",
+        )
 
 
 @contextmanager
 def atomic_write(path: AnyPath) -> Iterator[Path]:
-    """Yield a temporary path that replaces `path` if the block succeeds; StorageError if the system refuses."""
+    """Yield a temporary path that replaces `path` if the block succeeds; StorageError
+    if the system refuses."""
     path = Path(path)
     temporary = path.with_name(f".{uuid.uuid4().hex[:12]}.{path.name}")
     try:
@@ -104,7 +175,11 @@ def atomic_write(path: AnyPath) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise StorageError(f"cannot be written: {error.strerror or error}", path=path, remedy=_remedy(path)) from error
+        raise StorageError(
+            f"cannot be written: {error.strerror or error}",
+            path=path,
+            remedy=_remedy(path),
+        ) from error
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -115,10 +190,16 @@ def _remedy(path: Path) -> str:
     for folder in path.parents:
         if folder.is_symlink() and not folder.exists():
             target = folder.readlink()
-            return f"{folder} is a link to {target}, which does not exist: make that folder or remove the link."
+            return (
+                f"{folder} is a link to {target}, which does not exist: make that"
+                " folder or remove the link."
+            )
         if folder.is_file():
             return f"{folder} is a file in place of a folder: rename it."
-    return "Free disk space or choose a folder that can be written (--directory); earlier files are unchanged."
+    return (
+        "Free disk space or choose a folder that can be written (--directory); earlier"
+        " files are unchanged."
+    )
 
 
 def _plain(value: Any) -> Any:
@@ -165,48 +246,92 @@ def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
 
 
 def read_text_table(path: AnyPath) -> list[dict[str, str]]:
-    """Return the rows of a table with a heading, separated by tabs, semicolons or commas, as texts by column.
+    """Return the rows of a table with a heading, separated by tabs, semicolons or
+    commas, as texts by column.
 
-    UTF-8 or UTF-16, and Excel's first line `sep=;`. InputError otherwise, and if a column has two values in a row.
+    UTF-8 or UTF-16, and Excel's first line `sep=;`. InputError otherwise, and if a
+    column has two values in a row.
     """
     with reading(path, "a table of text", "text in UTF-8 or UTF-16", remedy=None):
         content = Path(path).read_bytes()
         # Excel's "Unicode text"
-        text = content.decode("utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
+        text = content.decode(
+            "utf-16"
+            if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
+            else "utf-8-sig"
+        )
         if not text.strip():
-            raise InputError("is empty", path=path, expected="a heading and a row for each brain")
+            raise InputError(
+                "is empty", path=path, expected="a heading and a row for each brain"
+            )
         # Excel's own line about the separator, which it does not show
         if named := re.match(r"sep=(.)\s*\n", text, re.IGNORECASE):
             text = text[named.end() :]
-        separator = next((mark for mark in "\t;," if mark in text.partition("\n")[0]), "\t")
-        lines = csv.reader(text.splitlines(keepends=True), delimiter=named[1] if named else separator)
-        head, *body = [cells for cells in ([cell.strip() for cell in line] for line in lines) if any(cells)]
+        separator = next(
+            (mark for mark in "\t;," if mark in text.partition("\n")[0]), "\t"
+        )
+        lines = csv.reader(
+            text.splitlines(keepends=True), delimiter=named[1] if named else separator
+        )
+        head, *body = [
+            cells
+            for cells in ([cell.strip() for cell in line] for line in lines)
+            if any(cells)
+        ]
     # R writes names of rows in a first column without a heading
-    has_names = separator == "\t" and bool(body) and all(len(cells) > len(head) and cells[len(head)] for cells in body)
+    has_names = (
+        separator == "\t"
+        and bool(body)
+        and all(len(cells) > len(head) and cells[len(head)] for cells in body)
+    )
     rows = []
     for number, cells in enumerate((cells[has_names:] for cells in body), start=2):
         if any(cells[len(head) :]):
-            found, expected = f"{len(cells)} cells in row {number}", f"{len(head)}, as in the heading"
-            raise InputError("has a row that is longer than its heading", path=path, found=found, expected=expected)
+            found, expected = (
+                f"{len(cells)} cells in row {number}",
+                f"{len(head)}, as in the heading",
+            )
+            raise InputError(
+                "has a row that is longer than its heading",
+                path=path,
+                found=found,
+                expected=expected,
+            )
         row: dict[str, str] = {}
         # columns whose names differ only in case are one
         names: dict[str, str] = {}
         for name, value in zip(head, [*cells, *[""] * len(head)], strict=False):
             if not value.isprintable():
-                problem = f"has a line break or another character that is not printed in row {number}, {name}"
-                raise InputError(problem, path=path, found=repr(value), expected="one line of text in each cell")
+                problem = (
+                    "has a line break or another character that is not printed in row"
+                    f" {number}, {name}"
+                )
+                raise InputError(
+                    problem,
+                    path=path,
+                    found=repr(value),
+                    expected="one line of text in each cell",
+                )
             first = names.setdefault(name.lower(), name)
             if row.setdefault(first, value) != value:
                 found = f"{row[first]} and {value} in row {number}"
-                raise InputError(f"has two columns {name}", path=path, found=found, expected="one value")
+                raise InputError(
+                    f"has two columns {name}",
+                    path=path,
+                    found=found,
+                    expected="one value",
+                )
         rows.append(row)
     if not rows:
-        raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
+        raise InputError(
+            "has no rows", path=path, expected="a heading and a row for each brain"
+        )
     return rows
 
 
 def read_table(path: AnyPath) -> "pd.DataFrame":
-    """Return a table of `write_table`, the `TEXT_COLUMNS` as text; InputError where it is missing or torn."""
+    """Return a table of `write_table`, the `TEXT_COLUMNS` as text; InputError where it
+    is missing or torn."""
     import pandas as pd
 
     with reading(path, "a CSV table", remedy=None):
@@ -224,11 +349,13 @@ def read_tables(paths: Iterable[AnyPath]) -> "pd.DataFrame":
 
 @contextmanager
 def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
-    """Yield an HDF5 file to be filled, which takes its place when the block ends well; StorageError where it can't."""
+    """Yield an HDF5 file to be filled, which takes its place when the block ends well;
+    StorageError where it can't."""
     import h5py
 
     with atomic_write(path) as temporary:
-        # in memory first: HDF5 crashes later on where a write of its own has failed, as on a full disk
+        # in memory first: HDF5 crashes later on where a write of its own has failed, as
+        # on a full disk
         with h5py.File(temporary.name, "w", driver="core", backing_store=False) as file:
             yield file
             file.flush()
@@ -237,8 +364,11 @@ def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
 
 
 @contextmanager
-def reading_hdf5(path: AnyPath, what: str, expected: str, remedy: str | None = None) -> Iterator["h5py.File"]:
-    """Yield an HDF5 file to be read; InputError for whatever goes wrong in the block, with what it should be."""
+def reading_hdf5(
+    path: AnyPath, what: str, expected: str, remedy: str | None = None
+) -> Iterator["h5py.File"]:
+    """Yield an HDF5 file to be read; InputError for whatever goes wrong in the block,
+    with what it should be."""
     import h5py
 
     with reading(path, what, expected, remedy), h5py.File(path) as file:
@@ -251,57 +381,84 @@ def sha256_of(path: AnyPath) -> str:
         with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        raise StorageError("cannot be read", path=path, found=error.strerror or error) from error
+        raise StorageError(
+            "cannot be read", path=path, found=error.strerror or error
+        ) from error
 
 
-def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return SHA-256, size, times and `companion_files` of each file that can be read, companions included, by path.
+def contents(
+    files: Iterable[AnyPath], earlier: Mapping[str, Any]
+) -> dict[str, list[Any]]:
+    """Return SHA-256, size, times and `companion_files` of each file that can be read,
+    companions included, by path.
 
-    Files with the size (bytes) and times of writing and change (ns) of an `earlier` result are not read again.
+    Files with the size (bytes) and times of writing and change (ns) of an `earlier`
+    result are not read again.
     """
     by_path: dict[str, list[Any]] = {}
     paths = list(map(str, files))
     for path in paths:
         with suppress(OSError, StorageError):
             state = Path(path).stat()
-            # a file that was moved here keeps its time of writing, not that of its last change
+            # a file that was moved here keeps its time of writing, not that of its last
+            # change
             current = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
             found = earlier.get(path, [])
-            by_path[path] = found if found[1:-1] == current else [sha256_of(path), *current, companion_files(path)]
-            paths += [companion for companion in by_path[path][-1] if companion not in paths]
+            by_path[path] = (
+                found
+                if found[1:-1] == current
+                else [sha256_of(path), *current, companion_files(path)]
+            )
+            paths += [
+                companion for companion in by_path[path][-1] if companion not in paths
+            ]
     return by_path
 
 
 def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
-    """Return for each file that is there its SHA-256, its size in bytes and when it was last written (UTC)."""
+    """Return for each file that is there its SHA-256, its size in bytes and when it was
+    last written (UTC)."""
     by_path = {}
     for path, (sha256, size, written_ns, *_) in contents(files, {}).items():
-        written = datetime.fromtimestamp(written_ns // 10**9, UTC).isoformat(timespec="seconds")
+        written = datetime.fromtimestamp(written_ns // 10**9, UTC).isoformat(
+            timespec="seconds"
+        )
         by_path[path] = {"sha256": sha256, "bytes": size, "written": written}
     return by_path
 
 
 def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
-    """Return the files of a folder and those in it, in order, without hidden ones and folders of some names."""
+    """Return the files of a folder and those in it, in order, without hidden ones and
+    folders of some names."""
 
     def is_included(path: Path) -> bool:
-        return not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
+        return not any(
+            part.startswith(".") or part in left_out
+            for part in path.relative_to(folder).parts
+        )
 
     return [path for path in files_below(folder) if is_included(path)]
 
 
 def files_below(folder: AnyPath) -> list[Path]:
-    """Return all files below a folder, in order, links followed once; unreadable folders stand for theirs."""
+    """Return all files below a folder, in order, links followed once; unreadable
+    folders stand for theirs."""
     entered: set[str] = set()
     found: list[Path] = []
 
     def add_unreadable(error: OSError) -> None:
         found.extend([Path(error.filename)] * isinstance(error, PermissionError))
 
-    for place, folders, names in os.walk(folder, onerror=add_unreadable, followlinks=True):
+    for place, folders, names in os.walk(
+        folder, onerror=add_unreadable, followlinks=True
+    ):
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
-        folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []
+        folders[:] = (
+            sorted(folders, key=lambda name: (here / name).is_symlink())
+            if real not in entered
+            else []
+        )
         # links without a target are reported by their readers
         files = [here / name for name in names if real not in entered]
         found += [file for file in files if file.is_file() or not file.exists()]

@@ -1,8 +1,9 @@
-"""Frames of a simulation: one HDF5 file, with an XDMF file that ParaView opens as a time series.
+"""Frames of a simulation: one HDF5 file, with an XDMF file that ParaView opens as a
+time series.
 
-It has `tets` (m, 4) or (m, 10), and for each output week a group `week_21.00` with `positions` (n, 3) in mm, fields at
-the vertices, and in `cell_fields` those of elements. Positions, the basis of metrics, are in double
-precision, fields in single.
+It has `tets` (m, 4) or (m, 10), and for each output week a group `week_21.00` with
+`positions` (n, 3) in mm, fields at the vertices, and in `cell_fields` those of
+elements. Positions, the basis of metrics, are in double precision, fields in single.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,8 +39,9 @@ def write_frame(
 ) -> None:
     """Write the frame of a gestational week to a file of its own.
 
-    Fields at the vertices are `positions` (n, 3) in mm and further arrays (n,) or (n, 3); those of the elements, in the
-    order of the run's mesh, are (m,), (m, 3) or (m, 9). `attributes` are numbers that hold for the whole frame.
+    Fields at the vertices are `positions` (n, 3) in mm and further arrays (n,) or (n,
+    3); those of the elements, in the order of the run's mesh, are (m,), (m, 3) or (m,
+    9). `attributes` are numbers that hold for the whole frame.
     """
     with new_hdf5(path) as file:
         frame = file.create_group(group_name(week))
@@ -55,7 +57,8 @@ def _single(values: NDArray) -> NDArray:
 
 
 def join_frames(path: AnyPath, tets: NDArray, frames: Sequence[AnyPath]) -> None:
-    """Join the files of single frames of (m, 4) or (m, 10) tetrahedra, by time, into `path` (.h5) and a .xdmf."""
+    """Join the files of single frames of (m, 4) or (m, 10) tetrahedra, by time, into
+    `path` (.h5) and a .xdmf."""
     path = Path(path)
     with new_hdf5(path) as file:
         file["tets"] = tets.astype(np.int32)
@@ -74,22 +77,48 @@ def _time_series(data_name: str, file: h5py.File) -> str:
         names = set(frame) - {POSITIONS, CELL_FIELDS}
         fields = {field: (frame[field], f"{where}/{field}") for field in sorted(names)}
         cell_fields = frame.get(CELL_FIELDS, {})
-        cell_data = {field: (values, f"{where}/{CELL_FIELDS}/{field}") for field, values in cell_fields.items()}
-        cells, points = (tets, f"{data_name}:/tets"), (frame[POSITIONS], f"{where}/{POSITIONS}")
-        grids.append(grid(name, cells, points, fields, cell_data, float(name.removeprefix("week_"))))
-    return f'<Grid Name="folding" GridType="Collection" CollectionType="Temporal">{"".join(grids)}</Grid>'
+        cell_data = {
+            field: (values, f"{where}/{CELL_FIELDS}/{field}")
+            for field, values in cell_fields.items()
+        }
+        cells, points = (
+            (tets, f"{data_name}:/tets"),
+            (frame[POSITIONS], f"{where}/{POSITIONS}"),
+        )
+        grids.append(
+            grid(
+                name,
+                cells,
+                points,
+                fields,
+                cell_data,
+                float(name.removeprefix("week_")),
+            )
+        )
+    return (
+        '<Grid Name="folding" GridType="Collection"'
+        f' CollectionType="Temporal">{"".join(grids)}</Grid>'
+    )
 
 
 def _reading(path: AnyPath) -> AbstractContextManager[h5py.File]:
-    return reading_hdf5(path, "frames of a simulation", "a whole HDF5 file of a run", "Simulate the run again.")
+    return reading_hdf5(
+        path,
+        "frames of a simulation",
+        "a whole HDF5 file of a run",
+        "Simulate the run again.",
+    )
 
 
 def _weeks(file: h5py.File) -> list[float]:
-    return sorted(float(name.removeprefix("week_")) for name in file if name.startswith("week_"))
+    return sorted(
+        float(name.removeprefix("week_")) for name in file if name.startswith("week_")
+    )
 
 
 def read_weeks(path: AnyPath) -> list[float]:
-    """Return the gestational weeks of the frames, ascending; InputError, as of all readers here, for a torn file."""
+    """Return the gestational weeks of the frames, ascending; InputError, as of all
+    readers here, for a torn file."""
     with _reading(path) as file:
         return _weeks(file)
 
@@ -101,23 +130,37 @@ def read_tets(path: AnyPath) -> NDArray[np.int64]:
 
 
 def read_field(path: AnyPath, week: float, field: str) -> NDArray:
-    """Return a field at the vertices at a week; InputError, which names the weeks there are, where there is none."""
+    """Return a field at the vertices at a week; InputError, which names the weeks there
+    are, where there is none."""
     with _reading(path) as file:
         name = f"{group_name(week)}/{field}"
         if name not in file:
-            raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {_weeks(file)}")
+            raise InputError(
+                f"has no {field} of week {week}",
+                path=path,
+                found=f"weeks {_weeks(file)}",
+            )
         return file[name][:]
 
 
-def read_pial_frames(path: AnyPath) -> dict[float, tuple[TriangleMesh, dict[str, NDArray]]]:
-    """Return by week the outer surface of the mesh in mm, with the fields at its vertices by name."""
+def read_pial_frames(
+    path: AnyPath,
+) -> dict[float, tuple[TriangleMesh, dict[str, NDArray]]]:
+    """Return by week the outer surface of the mesh in mm, with the fields at its
+    vertices by name."""
     frames: dict[float, tuple[TriangleMesh, dict[str, NDArray]]] = {}
     with _reading(path) as file:
         tets = file["tets"][:].astype(np.int64)
         for week in _weeks(file):
-            values = {name: data[:] for name, data in file[group_name(week)].items() if name != CELL_FIELDS}
+            values = {
+                name: data[:]
+                for name, data in file[group_name(week)].items()
+                if name != CELL_FIELDS
+            }
             if not frames:
-                surface, pial = boundary_surface(TetrahedralMesh(values[POSITIONS], tets))
+                surface, pial = boundary_surface(
+                    TetrahedralMesh(values[POSITIONS], tets)
+                )
             fields = {name: field[pial] for name, field in values.items()}
             frames[week] = TriangleMesh(fields.pop(POSITIONS), surface.faces), fields
     return frames

@@ -14,14 +14,18 @@ UNLOCKABLE: set[str] = set()
 
 
 def lock_file(file: IO, *, wait: bool = False) -> bool:
-    """Lock an open file until it is closed (`wait` for it, or return False); without locks, warn once and go on."""
+    """Lock an open file until it is closed (`wait` for it, or return False); without
+    locks, warn once and go on."""
     try:
         _lock(file, wait)
     except BlockingIOError:
         return False
     except OSError as error:
         if not UNLOCKABLE:
-            problem = f"this file system has no locks ({error.strerror}): start one run in a folder at a time"
+            problem = (
+                f"this file system has no locks ({error.strerror}): start one run in a"
+                " folder at a time"
+            )
             print(f"gyriflow: warning: {file.name}: {problem}", file=sys.stderr)
         UNLOCKABLE.add(file.name)
     return True

@@ -1,4 +1,5 @@
-"""The origin of a file that studies share: a description that names files, and a key of it with their contents."""
+"""The origin of a file that studies share: a description that names files, and a key of
+it with their contents."""
 
 import hashlib
 import json
@@ -10,24 +11,30 @@ from .files import contents
 
 
 def origin_key(origin: Any, contents_by_path: Mapping[str, str]) -> str | None:
-    """Return a hash of nested lists and mappings, with contents in place of the absolute paths of files.
+    """Return a hash of nested lists and mappings, with contents in place of the
+    absolute paths of files.
 
-    `contents_by_path` are those of `joined_contents`. None if that of a file is unknown.
+    `contents_by_path` are those of `joined_contents`. None if that of a file is
+    unknown.
     """
     try:
         described = _with_contents(origin, contents_by_path)
     except KeyError:
         return None
-    return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:12]
+    return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[
+        :12
+    ]
 
 
 def present_key(origin: Any) -> str | None:
-    """Return the key of an origin with the contents that its files have now; None if one cannot be read."""
+    """Return the key of an origin with the contents that its files have now; None if
+    one cannot be read."""
     return origin_key(origin, joined_contents(contents(_paths_in(origin), {})))
 
 
 def joined_contents(found: Mapping[str, Any]) -> dict[str, str]:
-    """Return the SHA-256 of each file of `io.files.contents`, followed by those of its companions, by path."""
+    """Return the SHA-256 of each file of `io.files.contents`, followed by those of its
+    companions, by path."""
     joined = {}
     for path, facts in found.items():
         group = dict.fromkeys([path, *facts[-1]])
@@ -37,7 +44,9 @@ def joined_contents(found: Mapping[str, Any]) -> dict[str, str]:
 
 def _with_contents(value: Any, contents_by_path: Mapping[str, str]) -> Any:
     if isinstance(value, dict):
-        return {key: _with_contents(item, contents_by_path) for key, item in value.items()}
+        return {
+            key: _with_contents(item, contents_by_path) for key, item in value.items()
+        }
     if isinstance(value, list | tuple):
         return [_with_contents(item, contents_by_path) for item in value]
     return contents_by_path[value] if _is_path(value) else value

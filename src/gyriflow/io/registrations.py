@@ -1,4 +1,5 @@
-"""Correspondences between brains, and meshes carried along them, in HDF5 files of the project's own, RAS+ mm."""
+"""Correspondences between brains, and meshes carried along them, in HDF5 files of the
+project's own, RAS+ mm."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -18,18 +19,27 @@ from .files import AnyPath, new_hdf5, reading_hdf5
 REGISTER_AGAIN = "Register the brains, or match their surfaces, again."
 
 
-def write_correspondence(path: AnyPath, pair: Correspondence, report: Mapping[str, Any]) -> None:
+def write_correspondence(
+    path: AnyPath, pair: Correspondence, report: Mapping[str, Any]
+) -> None:
     """Write what takes one brain to another, and the `report` as JSON in an attribute.
 
-    A deformation has matrix (4, 4), displacement (i, j, k, 3) in mm and affine (4, 4) of its grid: a point p goes to
-    matrix (p + displacement(p)). Matched surfaces have first (n, 3) and second (n, 3) in mm, and faces (m, 3).
+    A deformation has matrix (4, 4), displacement (i, j, k, 3) in mm and affine (4, 4)
+    of its grid: a point p goes to matrix (p + displacement(p)). Matched surfaces have
+    first (n, 3) and second (n, 3) in mm, and faces (m, 3).
     """
     with new_hdf5(path) as file:
         if isinstance(pair, Deformation):
             file["matrix"], file["affine"] = pair.matrix, pair.affine
-            large: dict[str, NDArray] = {"displacement": pair.displacement.astype(np.float32)}
+            large: dict[str, NDArray] = {
+                "displacement": pair.displacement.astype(np.float32)
+            }
         else:
-            large = {"first": pair.first.vertices, "second": pair.second, "faces": pair.first.faces}
+            large = {
+                "first": pair.first.vertices,
+                "second": pair.second,
+                "faces": pair.first.faces,
+            }
         for name, values in large.items():
             file.create_dataset(name, data=values, compression="gzip", shuffle=True)
         file.attrs["report"] = json.dumps(dict(report))
@@ -37,21 +47,33 @@ def write_correspondence(path: AnyPath, pair: Correspondence, report: Mapping[st
 
 def read_correspondence(path: AnyPath) -> Correspondence:
     """Return what `write_correspondence` has written; InputError for other files."""
-    expected = "an HDF5 file with matrix, displacement and affine, or with first, second and faces"
-    with reading_hdf5(path, "a correspondence of brains", expected, REGISTER_AGAIN) as file:
+    expected = (
+        "an HDF5 file with matrix, displacement and affine, or with first, second and"
+        " faces"
+    )
+    with reading_hdf5(
+        path, "a correspondence of brains", expected, REGISTER_AGAIN
+    ) as file:
         if "faces" in file:
-            return MatchedSurfaces(TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:])
-        return Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
+            return MatchedSurfaces(
+                TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:]
+            )
+        return Deformation(
+            file["matrix"][:], file["displacement"][:], file["affine"][:]
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class WeeklyShapes:
-    """The shapes that a mesh has, or is to have, at (w,) ascending gestational weeks, its own first.
+    """The shapes that a mesh has, or is to have, at (w,) ascending gestational weeks,
+    its own first.
 
-    `positions` (w, n, 3) are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of the boundary;
-    `surfaces` by name w arrays (m, 3), in mm, of simpler predictions of it. `ages` is the table of an atlas' ages by
-    size, if used. `stops` are weeks without an observed brain, `between` those on the path through the others. `tets`
-    are the elements of a mesh without a file. `made_from` stands for everything that an atlas' path is made from.
+    `positions` (w, n, 3) are in mm, in any pose; `sizes` ("area_cm2", "volume_ml":
+    (w,)) those of the boundary; `surfaces` by name w arrays (m, 3), in mm, of simpler
+    predictions of it. `ages` is the table of an atlas' ages by size, if used. `stops`
+    are weeks without an observed brain, `between` those on the path through the others.
+    `tets` are the elements of a mesh without a file. `made_from` stands for everything
+    that an atlas' path is made from.
     """
 
     weeks: Floats
@@ -70,29 +92,46 @@ class WeeklyShapes:
         return np.flatnonzero(~np.isin(self.weeks, self.between))
 
     def index(self, week: float) -> int:
-        """Return the number of a week among those of the shapes; InputError where it is missing."""
+        """Return the number of a week among those of the shapes; InputError where it is
+        missing."""
         found = np.flatnonzero(self.weeks == week)
         if not len(found):
             weeks = ", ".join(f"{week:g}" for week in self.weeks)
             raise InputError(
-                f"the mesh has no shape at {week:g} GW", found=f"shapes at {weeks} GW", remedy=REGISTER_AGAIN
+                f"the mesh has no shape at {week:g} GW",
+                found=f"shapes at {weeks} GW",
+                remedy=REGISTER_AGAIN,
             )
         return int(found[0])
 
 
 def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
-    """Write the data sets weeks, stops, between, positions, tets, sizes/{name}, surfaces/{name} and ages/{column}.
+    """Write the data sets weeks, stops, between, positions, tets, sizes/{name},
+    surfaces/{name} and ages/{column}.
 
     `made_from` is an attribute of the file.
     """
     with new_hdf5(path) as file:
-        for name, weeks in {"weeks": shapes.weeks, "stops": shapes.stops, "between": shapes.between}.items():
+        for name, weeks in {
+            "weeks": shapes.weeks,
+            "stops": shapes.stops,
+            "between": shapes.between,
+        }.items():
             file[name] = np.asarray(weeks, dtype=np.float64)
-        places = {"positions": shapes.positions} | {f"surfaces/{name}": at for name, at in shapes.surfaces.items()}
+        places = {"positions": shapes.positions} | {
+            f"surfaces/{name}": at for name, at in shapes.surfaces.items()
+        }
         for name, values in places.items():
-            file.create_dataset(name, data=np.asarray(values, dtype=np.float32), compression="gzip", shuffle=True)
+            file.create_dataset(
+                name,
+                data=np.asarray(values, dtype=np.float32),
+                compression="gzip",
+                shuffle=True,
+            )
         if shapes.tets is not None:
-            file.create_dataset("tets", data=shapes.tets, compression="gzip", shuffle=True)
+            file.create_dataset(
+                "tets", data=shapes.tets, compression="gzip", shuffle=True
+            )
         for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
         if shapes.ages is not None:
@@ -102,26 +141,51 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
 
 
 def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
-    """Read what `write_weekly_shapes` has written; InputError where the file is none of it."""
+    """Read what `write_weekly_shapes` has written; InputError where the file is none of
+    it."""
     expected = "an HDF5 file with weeks and positions"
-    with reading_hdf5(path, "shapes of a mesh by week", expected, "Make them again.") as file:
+    with reading_hdf5(
+        path, "shapes of a mesh by week", expected, "Make them again."
+    ) as file:
         sizes = {name: values[:] for name, values in file.get("sizes", {}).items()}
-        surfaces = {name: list(at[:].astype(np.float64)) for name, at in file.get("surfaces", {}).items()}
-        ages = pd.DataFrame({name: values[:] for name, values in file["ages"].items()}) if "ages" in file else None
+        surfaces = {
+            name: list(at[:].astype(np.float64))
+            for name, at in file.get("surfaces", {}).items()
+        }
+        ages = (
+            pd.DataFrame({name: values[:] for name, values in file["ages"].items()})
+            if "ages" in file
+            else None
+        )
         positions = file["positions"][:].astype(np.float64)
         stops, between = (file[name][:].tolist() for name in ("stops", "between"))
         tets = file["tets"][:] if "tets" in file else None
         made_from = file.attrs["made_from"]
-        return WeeklyShapes(file["weeks"][:], positions, sizes, surfaces, ages, stops, between, tets, made_from)
+        return WeeklyShapes(
+            file["weeks"][:],
+            positions,
+            sizes,
+            surfaces,
+            ages,
+            stops,
+            between,
+            tets,
+            made_from,
+        )
 
 
 def stored_name(brain: str, key: str) -> str:
-    """Return the file name under which studies find the path of an atlas, of a first brain and with a key."""
+    """Return the file name under which studies find the path of an atlas, of a first
+    brain and with a key."""
     return f"{brain}-{key}.h5"
 
 
 def read_path_key(path: AnyPath) -> str | None:
-    """Return `made_from` of weekly shapes without reading these; None for other or damaged files."""
-    with suppress(InputError), reading_hdf5(path, "shapes of a mesh by week", "an HDF5 file") as file:
+    """Return `made_from` of weekly shapes without reading these; None for other or
+    damaged files."""
+    with (
+        suppress(InputError),
+        reading_hdf5(path, "shapes of a mesh by week", "an HDF5 file") as file,
+    ):
         return file.attrs["made_from"]
     return None

@@ -1,4 +1,5 @@
-"""Triangle surfaces in mm, of the formats in `FORMATS`, and maps and labels at their vertices (GIFTI).
+"""Triangle surfaces in mm, of the formats in `FORMATS`, and maps and labels at their
+vertices (GIFTI).
 
 Coordinates are transformed to scanner space if the file defines their space.
 """
@@ -16,7 +17,14 @@ from xml.etree import ElementTree
 import nibabel as nib
 import numpy as np
 from nibabel.freesurfer.io import read_geometry
-from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiLabel, GiftiLabelTable, GiftiMetaData
+from nibabel.gifti import (
+    GiftiCoordSystem,
+    GiftiDataArray,
+    GiftiImage,
+    GiftiLabel,
+    GiftiLabelTable,
+    GiftiMetaData,
+)
 from nibabel.nifti1 import intent_codes
 from numpy.typing import NDArray
 
@@ -32,29 +40,38 @@ log = logging.getLogger(__name__)
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 Layer = Literal["Pial", "GrayWhite"]
-SIDES_BY_STRUCTURE: dict[str, Side] = {structure: side for side, structure in STRUCTURES.items()}
+SIDES_BY_STRUCTURE: dict[str, Side] = {
+    structure: side for side, structure in STRUCTURES.items()
+}
 SURFACE_NAMES = f"a file that ends in {', '.join(SURFACE_SUFFIXES)}"
 RawSurface = tuple[Floats, NDArray, str | None, str | None]
-"""Points and faces of a file, the space of the points and the structure (each None if the file has none)."""
+"""Points and faces of a file, the space of the points and the structure (each None if
+the file has none)."""
 System = tuple[str, str, Floats]
 """A space of coordinates, the space that a matrix leads to, and the (4, 4) matrix."""
 
 
 def read_surface(path: AnyPath, side: str | None = None) -> TriangleMesh:
-    """Return the surface of a file of any format in `FORMATS`, in the order of corners of the file.
+    """Return the surface of a file of any format in `FORMATS`, in the order of corners
+    of the file.
 
-    GIFTI and FreeSurfer coordinates go to scanner space if the file defines how. InputError for invalid files,
-    coordinates of another space than the subject's, and the other hemisphere than `side`.
+    GIFTI and FreeSurfer coordinates go to scanner space if the file defines how.
+    InputError for invalid files, coordinates of another space than the subject's, and
+    the other hemisphere than `side`.
     """
     mesh, _, structure = surface_space_structure(path)
     require_side(path, structure, side)
     return mesh
 
 
-def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, str | None]:
-    """Return a surface as `read_surface` does, the space of its coordinates and its structure, None if unknown.
+def surface_space_structure(
+    path: AnyPath,
+) -> tuple[TriangleMesh, str | None, str | None]:
+    """Return a surface as `read_surface` does, the space of its coordinates and its
+    structure, None if unknown.
 
-    Such as "NIFTI_XFORM_SCANNER_ANAT" and "CortexLeft", from the file's content or its name.
+    Such as "NIFTI_XFORM_SCANNER_ANAT" and "CortexLeft", from the file's content or its
+    name.
     """
     path = Path(path)
     found = format_of(path, "surface")
@@ -62,78 +79,142 @@ def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, st
     read = SURFACE_READERS[found.name if found else "FreeSurfer"]
     with reading(path, "a surface", SURFACE_NAMES):
         vertices, faces, space, structure = read(path)
-    if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
-        shapes = f"points of shape {vertices.shape}, faces of shape {faces.shape}" if faces.size else "no faces"
-        raise InputError("holds no surface", path=path, found=shapes, expected="(n, 3) points and (m, 3) faces")
-    require_finite(vertices, path, "coordinates", "vertices")
-    if not (np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)) or (
-        np.abs(faces - np.rint(faces)).max() > 1e-3
+    if (
+        vertices.ndim != 2
+        or faces.ndim != 2
+        or vertices.shape[1] != 3
+        or faces.shape[1] != 3
+        or not faces.size
     ):
+        shapes = (
+            f"points of shape {vertices.shape}, faces of shape {faces.shape}"
+            if faces.size
+            else "no faces"
+        )
+        raise InputError(
+            "holds no surface",
+            path=path,
+            found=shapes,
+            expected="(n, 3) points and (m, 3) faces",
+        )
+    require_finite(vertices, path, "coordinates", "vertices")
+    if not (
+        np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)
+    ) or (np.abs(faces - np.rint(faces)).max() > 1e-3):
         indices = f"indices {faces.min():.6g} to {faces.max():.6g}"
         expected = f"whole numbers from 0 to {len(vertices) - 1}"
-        raise InputError("has faces that name vertices which do not exist", path=path, found=indices, expected=expected)
-    return TriangleMesh(vertices, np.rint(faces).astype(np.int64)), space, structure or structure_in_name(path)
+        raise InputError(
+            "has faces that name vertices which do not exist",
+            path=path,
+            found=indices,
+            expected=expected,
+        )
+    return (
+        TriangleMesh(vertices, np.rint(faces).astype(np.int64)),
+        space,
+        structure or structure_in_name(path),
+    )
 
 
 def structure_in_name(path: AnyPath) -> str | None:
-    """Return the structure of the hemisphere that a file's name has, such as `lh.pial` or `sub-01_hemi-R_dseg.gii`."""
+    """Return the structure of the hemisphere that a file's name has, such as `lh.pial`
+    or `sub-01_hemi-R_dseg.gii`."""
     side = side_in_name(Path(path).name)
     return STRUCTURES[side] if side else None
 
 
 def require_side(path: AnyPath, structure: str | None, side: str | None) -> None:
-    """Raise InputError if a file's structure is the other hemisphere than `side`, "left" or "right"."""
+    """Raise InputError if a file's structure is the other hemisphere than `side`,
+    "left" or "right"."""
     expected = next((name for key, name in STRUCTURES.items() if key == side), None)
     if expected and structure in STRUCTURES.values() and structure != expected:
         other = next(key for key, name in STRUCTURES.items() if name == structure)
-        remedy = f"Give it as the {other} one. If you know that it is the {side} one, correct the file's own side "
+        remedy = (
+            f"Give it as the {other} one. If you know that it is the {side} one,"
+            " correct the file's own side "
+        )
         remedy += "(AnatomicalStructurePrimary, or its name)."
-        raise InputError("is the other hemisphere", path=path, found=structure, expected=expected, remedy=remedy)
+        raise InputError(
+            "is the other hemisphere",
+            path=path,
+            found=structure,
+            expected=expected,
+            remedy=remedy,
+        )
 
 
-def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
-    """Return two hemispheres as `read_surface`, and whether both files name one space; warn if they differ."""
+def read_hemispheres(
+    left: AnyPath, right: AnyPath
+) -> tuple[TriangleMesh, TriangleMesh, bool]:
+    """Return two hemispheres as `read_surface`, and whether both files name one space;
+    warn if they differ."""
     read = [surface_space_structure(path) for path in (left, right)]
     for path, (_, _, structure), side in zip((left, right), read, SIDES, strict=True):
         require_side(path, structure, side)
     meshes, spaces, _ = zip(*read, strict=True)
     if spaces[0] != spaces[1]:
-        words = " and ".join(f"{path} {space or 'no space'}" for path, space in zip((left, right), spaces, strict=True))
-        log.warning("the files of the hemispheres name different spaces: %s; are they in the same coordinates?", words)
+        words = " and ".join(
+            f"{path} {space or 'no space'}"
+            for path, space in zip((left, right), spaces, strict=True)
+        )
+        log.warning(
+            "the files of the hemispheres name different spaces: %s; are they in the"
+            " same coordinates?",
+            words,
+        )
     return meshes[0], meshes[1], spaces[0] is not None and spaces[0] == spaces[1]
 
 
 def write_surface(
-    path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None, layer: Layer | None = None
+    path: AnyPath,
+    mesh: TriangleMesh,
+    structure: Structure | None = None,
+    layer: Layer | None = None,
 ) -> None:
-    """Write a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
+    """Write a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the
+    suffix of `path`."""
     suffix = Path(path).suffix.lower()
     if suffix in (".stl", ".ply", ".obj", ".off"):
-        import trimesh  # takes a second, as pyvista does below, which most readers need not wait for
+        # takes a second, as pyvista does below, which most readers need not wait for
+        import trimesh
 
         body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
         with atomic_write(path) as temporary:
             body.export(temporary)
         return
     if suffix != ".gii":
-        raise InputError("unknown kind of surface file", path=path, expected=".gii, .stl, .ply, .obj or .off")
+        raise InputError(
+            "unknown kind of surface file",
+            path=path,
+            expected=".gii, .stl, .ply, .obj or .off",
+        )
     points = GiftiDataArray(
         mesh.vertices.astype(np.float32),
         intent="NIFTI_INTENT_POINTSET",
-        coordsys=GiftiCoordSystem("NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_SCANNER_ANAT", np.eye(4)),
+        coordsys=GiftiCoordSystem(
+            "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_SCANNER_ANAT", np.eye(4)
+        ),
         meta=GiftiMetaData({"GeometricType": "Anatomical"} | _named(structure, layer)),
     )
     triangles = GiftiDataArray(
         mesh.faces.astype(np.int32),
         intent="NIFTI_INTENT_TRIANGLE",
-        meta=GiftiMetaData({"TopologicalType": "Closed" if is_closed(mesh) else "Open"}),
+        meta=GiftiMetaData(
+            {"TopologicalType": "Closed" if is_closed(mesh) else "Open"}
+        ),
     )
     with atomic_write(path) as temporary:
         nib.save(GiftiImage(darrays=[points, triangles]), temporary)
 
 
-def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, right: TriangleMesh | None) -> None:
-    """Write a brain's surface and its hemispheres to `files`: `whole`, `left` and `right` if present, `stl`."""
+def write_brain(
+    files: Any,
+    whole: TriangleMesh,
+    left: TriangleMesh | None,
+    right: TriangleMesh | None,
+) -> None:
+    """Write a brain's surface and its hemispheres to `files`: `whole`, `left` and
+    `right` if present, `stl`."""
     write_surface(files.whole, whole)
     for side, mesh in zip(SIDES, (left, right), strict=True):
         if mesh is not None:
@@ -142,74 +223,132 @@ def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, righ
         write_surface(stl, whole)
 
 
-def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Structure | None = None) -> None:
-    """Write named (n,) per-vertex values as a GIFTI shape file (.shape.gii, float32)."""
+def write_vertex_maps(
+    path: AnyPath, maps: dict[str, NDArray], structure: Structure | None = None
+) -> None:
+    """Write named (n,) per-vertex values as a GIFTI shape file (.shape.gii,
+    float32)."""
     arrays = [
-        GiftiDataArray(np.asarray(values, np.float32), intent="NIFTI_INTENT_SHAPE", meta=GiftiMetaData({"Name": name}))
+        GiftiDataArray(
+            np.asarray(values, np.float32),
+            intent="NIFTI_INTENT_SHAPE",
+            meta=GiftiMetaData({"Name": name}),
+        )
         for name, values in maps.items()
     ]
     with atomic_write(path) as temporary:
-        nib.save(GiftiImage(darrays=arrays, meta=GiftiMetaData(_named(structure))), temporary)
+        nib.save(
+            GiftiImage(darrays=arrays, meta=GiftiMetaData(_named(structure))), temporary
+        )
 
 
 def _named(structure: Structure | None, layer: Layer | None = None) -> dict[str, str]:
-    names = {"AnatomicalStructurePrimary": structure, "AnatomicalStructureSecondary": layer}
+    names = {
+        "AnatomicalStructurePrimary": structure,
+        "AnatomicalStructureSecondary": layer,
+    }
     return {key: name for key, name in names.items() if name}
 
 
 def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
     """Return the named per-vertex values of a GIFTI shape file."""
     arrays = enumerate(load_gifti(path).darrays)
-    return {array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float) for n, array in arrays}
+    return {
+        array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float)
+        for n, array in arrays
+    }
 
 
-def read_surface_map(path: AnyPath, surface_path: AnyPath, side: str | None = None) -> tuple[TriangleMesh, Floats]:
+def read_surface_map(
+    path: AnyPath, surface_path: AnyPath, side: str | None = None
+) -> tuple[TriangleMesh, Floats]:
     """Return a surface and the values of a GIFTI shape or func file at its vertices.
 
-    InputError for invalid files, more than one array, another number of values than of vertices, NaN and infinite
-    values, STL surfaces, which do not number vertices, and other hemispheres than the surface's or `side`.
+    InputError for invalid files, more than one array, another number of values than of
+    vertices, NaN and infinite values, STL surfaces, which do not number vertices, and
+    other hemispheres than the surface's or `side`.
     """
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
         problem = "cannot have a map, since STL files do not number their vertices"
-        expected = f"the file that {path} was made on, of a format that numbers vertices, such as GIFTI"
+        expected = (
+            f"the file that {path} was made on, of a format that numbers vertices, such"
+            " as GIFTI"
+        )
         raise InputError(problem, path=surface_path, expected=expected)
     surface, _, structure = surface_space_structure(surface_path)
     image = load_gifti(path)
     arrays = image.darrays
-    if len(arrays) != 1 or arrays[0].data.dtype.kind not in "biuf" or arrays[0].data.size != len(arrays[0].data):
-        kinds = [f"{intent_codes.niistring[array.intent]} {array.data.shape}" for array in arrays]
-        problem, expected = "is not a map of one value per vertex", "one array of numbers (.shape.gii, .func.gii)"
-        raise InputError(problem, path=path, found=", ".join(kinds) or "none", expected=expected)
+    if (
+        len(arrays) != 1
+        or arrays[0].data.dtype.kind not in "biuf"
+        or arrays[0].data.size != len(arrays[0].data)
+    ):
+        kinds = [
+            f"{intent_codes.niistring[array.intent]} {array.data.shape}"
+            for array in arrays
+        ]
+        problem, expected = (
+            "is not a map of one value per vertex",
+            "one array of numbers (.shape.gii, .func.gii)",
+        )
+        raise InputError(
+            problem, path=path, found=", ".join(kinds) or "none", expected=expected
+        )
     require_side(surface_path, structure, side)
-    require_side(path, structure_of(image, path), side or SIDES_BY_STRUCTURE.get(structure or ""))
+    require_side(
+        path, structure_of(image, path), side or SIDES_BY_STRUCTURE.get(structure or "")
+    )
     values = np.asarray(arrays[0].data, dtype=float).ravel()
     if len(values) != len(surface.vertices):
         expected = f"{len(surface.vertices)}, the number of vertices of {surface_path}"
-        raise InputError("does not belong to its surface", path=path, found=f"{len(values)} values", expected=expected)
+        raise InputError(
+            "does not belong to its surface",
+            path=path,
+            found=f"{len(values)} values",
+            expected=expected,
+        )
     require_finite(values, path, "values", "vertices")
     return surface, values
 
 
-def read_surface_maps(paths: Sequence[AnyPath], surface_paths: Sequence[AnyPath]) -> tuple[TriangleMesh, Floats]:
-    """Return surfaces, two are left and right, as one and their maps, each read as by `read_surface_map`."""
+def read_surface_maps(
+    paths: Sequence[AnyPath], surface_paths: Sequence[AnyPath]
+) -> tuple[TriangleMesh, Floats]:
+    """Return surfaces, two are left and right, as one and their maps, each read as by
+    `read_surface_map`."""
     sides = SIDES if len(paths) == 2 else (None,)
-    pieces = [read_surface_map(*files) for files in zip(paths, surface_paths, sides, strict=True)]
-    return merged(*(surface for surface, _ in pieces)), np.concatenate([values for _, values in pieces])
+    pieces = [
+        read_surface_map(*files)
+        for files in zip(paths, surface_paths, sides, strict=True)
+    ]
+    return merged(*(surface for surface, _ in pieces)), np.concatenate(
+        [values for _, values in pieces]
+    )
 
 
 def load_gifti(path: AnyPath) -> GiftiImage:
-    """Return the image of a GIFTI file; InputError where it is missing, truncated or of another kind."""
+    """Return the image of a GIFTI file; InputError where it is missing, truncated or of
+    another kind."""
     with reading(path, "GIFTI", "a whole .gii file"):
         image = nib.load(path)
     if not isinstance(image, GiftiImage):
-        raise InputError("is not a GIFTI file", path=path, found=type(image).__name__, expected="a .gii file")
+        raise InputError(
+            "is not a GIFTI file",
+            path=path,
+            found=type(image).__name__,
+            expected="a .gii file",
+        )
     return image
 
 
 def structure_of(image: GiftiImage, path: AnyPath) -> str | None:
-    """Return the structure that a GIFTI file names, in its arrays, as a whole or in its name, or None."""
-    named = (meta.get("AnatomicalStructurePrimary") for meta in (*(array.meta for array in image.darrays), image.meta))
+    """Return the structure that a GIFTI file names, in its arrays, as a whole or in its
+    name, or None."""
+    named = (
+        meta.get("AnatomicalStructurePrimary")
+        for meta in (*(array.meta for array in image.darrays), image.meta)
+    )
     return next(filter(None, named), None) or structure_in_name(path)
 
 
@@ -217,18 +356,31 @@ def _read_gifti_surface(path: Path) -> RawSurface:
     image = load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
-    if len(points) != 1 or len(triangles) != 1 or not len(points[0].data) or not len(triangles[0].data):
+    if (
+        len(points) != 1
+        or len(triangles) != 1
+        or not len(points[0].data)
+        or not len(triangles[0].data)
+    ):
         arrays = f"{len(points)} arrays of points, {len(triangles)} of triangles"
-        raise InputError("holds no surface", path=path, found=arrays, expected="one of each (.surf.gii)")
+        raise InputError(
+            "holds no surface",
+            path=path,
+            found=arrays,
+            expected="one of each (.surf.gii)",
+        )
     matrix, space = _to_scanner_space(_coordinate_systems(path), path)
     if space is None:
         _warn_of_tkr_ras(points[0].meta, path)
-    vertices = np.asarray(points[0].data, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
+    vertices = (
+        np.asarray(points[0].data, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
+    )
     return vertices, np.asarray(triangles[0].data), space, structure_of(image, path)
 
 
 def _read_with_trimesh(path: Path) -> RawSurface:
-    # VTK's readers of these formats crash on damaged PLY files and do not triangulate polygons
+    # VTK's readers of these formats crash on damaged PLY files and do not triangulate
+    # polygons
     import trimesh
 
     # process=True joins equal vertices: STL stores each corner of each face
@@ -245,7 +397,10 @@ def _read_obj(path: Path) -> RawSurface:
     with path.open("rb") as file:
         start = file.read(START_BYTES)
     if start.startswith(b"p") and b"\0" in start:
-        problem, expected = "is a binary .obj file of the MNI", "its form as text, or another format such as GIFTI"
+        problem, expected = (
+            "is a binary .obj file of the MNI",
+            "its form as text, or another format such as GIFTI",
+        )
         raise InputError(problem, path=path, expected=expected)
     return _read_mni_obj(path) if MNI_OBJ.match(start) else _read_with_trimesh(path)
 
@@ -253,8 +408,9 @@ def _read_obj(path: Path) -> RawSurface:
 def _read_mni_obj(path: Path) -> RawSurface:
     """Return vertices and faces of a text file of the MNI (BICPL's polygons).
 
-    After `P`, five properties of light and the number of points follow the points, their normals, the number of faces,
-    colours, the end of each face in the list of corners, and that list.
+    After `P`, five properties of light and the number of points follow the points,
+    their normals, the number of faces, colours, the end of each face in the list of
+    corners, and that list.
     """
     words = path.read_text(encoding="ascii").split()
     n_points = int(words[6])
@@ -265,7 +421,11 @@ def _read_mni_obj(path: Path) -> RawSurface:
     place += 2 + 4 * n_colours
     ends = np.array(words[place : place + n_faces], dtype=np.int64)
     if not np.array_equal(ends, 3 * np.arange(1, n_faces + 1)):
-        raise InputError("has faces that are no triangles", path=path, expected="three corners of each face")
+        raise InputError(
+            "has faces that are no triangles",
+            path=path,
+            expected="three corners of each face",
+        )
     place += n_faces
     corners = np.array(words[place : place + 3 * n_faces], dtype=np.int64)
     return points, corners.reshape(n_faces, 3), None, None
@@ -277,8 +437,11 @@ def read_pose(path: AnyPath) -> Pose:
 
 
 def connectivity(path: Path) -> tuple[int, int, str]:
-    """Return a surface file's numbers of vertices and triangles, and a digest of the triangles in any order."""
-    return _connectivity(path, (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None)
+    """Return a surface file's numbers of vertices and triangles, and a digest of the
+    triangles in any order."""
+    return _connectivity(
+        path, (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None
+    )
 
 
 @cache
@@ -286,19 +449,36 @@ def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]
     mesh = read_surface(path)
     triangles = np.sort(mesh.faces, axis=1)
     triangles = triangles[np.lexsort(triangles.T)]
-    return len(mesh.vertices), len(mesh.faces), hashlib.sha256(triangles.tobytes()).hexdigest()
+    return (
+        len(mesh.vertices),
+        len(mesh.faces),
+        hashlib.sha256(triangles.tobytes()).hexdigest(),
+    )
 
 
 UNNAMED = ("", "???", "unknown", "Unknown", "none")
 """Names in label tables for vertices without a region."""
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#F0E442")
+COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#8C6D31",
+    "#F0E442",
+)
 
 
-def read_vertex_labels(path: AnyPath, side: str | None = None) -> tuple[Ints, dict[int, str]]:
-    """Return the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
+def read_vertex_labels(
+    path: AnyPath, side: str | None = None
+) -> tuple[Ints, dict[int, str]]:
+    """Return the (n,) labels of a GIFTI label file and the names of its table, without
+    those of no region.
 
-    InputError for other files, non-integer values, and the other hemisphere than `side`.
+    InputError for other files, non-integer values, and the other hemisphere than
+    `side`.
     """
     image = load_gifti(path)
     require_side(path, structure_of(image, path), side)
@@ -306,32 +486,62 @@ def read_vertex_labels(path: AnyPath, side: str | None = None) -> tuple[Ints, di
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
         shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
         expected = "one label for each vertex (.label.gii)"
-        raise InputError("is not a label file", path=path, found=shapes, expected=expected)
+        raise InputError(
+            "is not a label file", path=path, found=shapes, expected=expected
+        )
     values = np.asarray(arrays[0].data)
     require_finite(values, path, "labels", "vertices")
     labels = np.rint(values).astype(np.int64)
     if np.abs(values - labels).max(initial=0.0) > 1e-3:
         raise InputError("contains non-integer values", path=path, expected="labels")
-    names = {int(key): str(name).strip() for key, name in image.labeltable.get_labels_as_dict().items()}
-    return labels, {key: name for key, name in names.items() if key != NO_REGION and name not in UNNAMED}
+    names = {
+        int(key): str(name).strip()
+        for key, name in image.labeltable.get_labels_as_dict().items()
+    }
+    return labels, {
+        key: name
+        for key, name in names.items()
+        if key != NO_REGION and name not in UNNAMED
+    }
 
 
 def write_vertex_labels(
-    path: AnyPath, labels: NDArray[np.integer], names: Mapping[int, str], structure: Structure | None = None
+    path: AnyPath,
+    labels: NDArray[np.integer],
+    names: Mapping[int, str],
+    structure: Structure | None = None,
 ) -> None:
-    """Write (n,) labels, 0 for no region, with their names as a GIFTI label file (.label.gii)."""
+    """Write (n,) labels, 0 for no region, with their names as a GIFTI label file
+    (.label.gii)."""
     table = GiftiLabelTable()
     for number, name in {NO_REGION: "???", **names}.items():
-        colour = "#FFFFFF" if number == NO_REGION else COLOURS[(number - 1) % len(COLOURS)]
-        red, green, blue = (int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5))
-        entry = GiftiLabel(key=int(number), red=red, green=green, blue=blue, alpha=float(number != NO_REGION))
+        colour = (
+            "#FFFFFF" if number == NO_REGION else COLOURS[(number - 1) % len(COLOURS)]
+        )
+        red, green, blue = (
+            int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)
+        )
+        entry = GiftiLabel(
+            key=int(number),
+            red=red,
+            green=green,
+            blue=blue,
+            alpha=float(number != NO_REGION),
+        )
         entry.label = name  # type: ignore[attr-defined]
         table.labels.append(entry)
     array = GiftiDataArray(
-        np.asarray(labels, dtype=np.int32), intent="NIFTI_INTENT_LABEL", meta=GiftiMetaData({"Name": "regions"})
+        np.asarray(labels, dtype=np.int32),
+        intent="NIFTI_INTENT_LABEL",
+        meta=GiftiMetaData({"Name": "regions"}),
     )
     with atomic_write(path) as temporary:
-        nib.save(GiftiImage(darrays=[array], labeltable=table, meta=GiftiMetaData(_named(structure))), temporary)
+        nib.save(
+            GiftiImage(
+                darrays=[array], labeltable=table, meta=GiftiMetaData(_named(structure))
+            ),
+            temporary,
+        )
 
 
 UNKNOWN = "NIFTI_XFORM_UNKNOWN"
@@ -339,7 +549,8 @@ SCANNER = "NIFTI_XFORM_SCANNER_ANAT"
 SUBJECT_SPACES = (SCANNER, "NIFTI_XFORM_ALIGNED_ANAT")
 RIGID = 1e-3
 C_RAS = ("VolGeomC_R", "VolGeomC_A", "VolGeomC_S")
-"""FreeSurfer's metadata of points in GIFTI: where the centre of their volume is in scanner space, in mm."""
+"""FreeSurfer's metadata of points in GIFTI: where the centre of their volume is in
+scanner space, in mm."""
 
 
 def _coordinate_systems(path: AnyPath) -> list[System]:
@@ -347,61 +558,102 @@ def _coordinate_systems(path: AnyPath) -> list[System]:
     with nib.openers.ImageOpener(str(path), "rb") as stream:
         root = ElementTree.parse(stream).getroot()
     systems: list[System] = []
-    points = [array for array in root.iter("DataArray") if array.get("Intent") in ("NIFTI_INTENT_POINTSET", "1008")]
-    for element in (element for array in points for element in array.iter("CoordinateSystemTransformMatrix")):
+    points = [
+        array
+        for array in root.iter("DataArray")
+        if array.get("Intent") in ("NIFTI_INTENT_POINTSET", "1008")
+    ]
+    for element in (
+        element
+        for array in points
+        for element in array.iter("CoordinateSystemTransformMatrix")
+    ):
         numbers = (element.findtext("MatrixData") or "").split()
-        data, to = ((element.findtext(tag) or UNKNOWN).strip() for tag in ("DataSpace", "TransformedSpace"))
+        data, to = (
+            (element.findtext(tag) or UNKNOWN).strip()
+            for tag in ("DataSpace", "TransformedSpace")
+        )
         try:
             matrix = np.array(numbers, dtype=float).reshape(4, 4)
         except ValueError as error:
             problem = "has an invalid coordinate-system matrix"
-            raise InputError(problem, path=path, found=f"{len(numbers)} entries") from error
+            raise InputError(
+                problem, path=path, found=f"{len(numbers)} entries"
+            ) from error
         require_finite(matrix, path, "entries in a coordinate system", "rows")
         systems.append((data, to, matrix))
     return systems
 
 
-def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str | None]:
-    """Return the (4, 4) matrix that brings coordinates to scanner space, and the space they are in then.
+def _to_scanner_space(
+    systems: list[System], path: AnyPath
+) -> tuple[Floats, str | None]:
+    """Return the (4, 4) matrix that brings coordinates to scanner space, and the space
+    they are in then.
 
-    A rigid matrix into scanner or aligned space is applied; others, as to MNI space of other size, are logged.
-    InputError for matrices into scanner space that change sizes.
+    A rigid matrix into scanner or aligned space is applied; others, as to MNI space of
+    other size, are logged. InputError for matrices into scanner space that change
+    sizes.
     """
-    moving = [system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)]
+    moving = [
+        system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)
+    ]
     space = next((data for data, _, _ in systems if data in SUBJECT_SPACES), None)
     if space is not None:
         for _, to, _ in moving:
-            log.warning("%s: the coordinates are in %s already; its matrix to %s was not applied", path, space, to)
+            log.warning(
+                "%s: the coordinates are in %s already; its matrix to %s was not"
+                " applied",
+                path,
+                space,
+                to,
+            )
         return np.eye(4), space
     into_subject = (system for system in moving if system[1] in SUBJECT_SPACES)
-    for data, to, matrix in sorted(into_subject, key=lambda system: SUBJECT_SPACES.index(system[1])):
+    for data, to, matrix in sorted(
+        into_subject, key=lambda system: SUBJECT_SPACES.index(system[1])
+    ):
         rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)
         if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
-            problem = f"has a coordinate-system matrix from {data} to {to} that changes sizes or mirrors"
-            raise InputError(problem, path=path, found=f"\n{matrix}\n", expected="a rigid motion")
-        log.warning("%s: the coordinate-system matrix of the file was applied, to %s", path, to)
+            problem = (
+                f"has a coordinate-system matrix from {data} to {to} that changes sizes"
+                " or mirrors"
+            )
+            raise InputError(
+                problem, path=path, found=f"\n{matrix}\n", expected="a rigid motion"
+            )
+        log.warning(
+            "%s: the coordinate-system matrix of the file was applied, to %s", path, to
+        )
         return matrix, to
     for _, to, matrix in moving:
         size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
-        text = "%s: its matrix to %s, which scales by %.3g, was not applied, to keep the subject's own size"
+        text = (
+            "%s: its matrix to %s, which scales by %.3g, was not applied, to keep the"
+            " subject's own size"
+        )
         log.warning(text, path, to, size)
     if moving:
         return np.eye(4), None
     named = next((to for data, to, _ in systems if UNKNOWN not in (data, to)), None)
-    return np.eye(4), named or next((to for _, to, _ in systems if to in SUBJECT_SPACES), None)
+    return np.eye(4), named or next(
+        (to for _, to, _ in systems if to in SUBJECT_SPACES), None
+    )
 
 
 def _warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
-    # FreeSurfer's converter writes the volume's centre with the points, whatever their space
+    # FreeSurfer's converter writes the volume's centre with the points, whatever their
+    # space
     try:
         centre = [float(metadata[key]) for key in C_RAS]
     except (KeyError, ValueError):
         return
     if any(abs(place) > 1e-3 for place in centre):
         text = (
-            "%s: does not define its space: coordinates may be relative to the centre of FreeSurfer's volume "
-            "(tkr RAS), off volumes in scanner space by C_RAS = (%g, %g, %g) mm. Before volumes of regions or maps are "
-            "used with it, convert it anew with mris_convert --to-scanner"
+            "%s: does not define its space: coordinates may be relative to the centre"
+            " of FreeSurfer's volume (tkr RAS), off volumes in scanner space by C_RAS ="
+            " (%g, %g, %g) mm. Before volumes of regions or maps are used with it,"
+            " convert it anew with mris_convert --to-scanner"
         )
         log.warning(text, path, *centre)
 
@@ -411,24 +663,43 @@ REAL_RAS = b"\0\0\0\2\0\0\0\1"
 
 
 def _read_freesurfer_surface(path: Path) -> RawSurface:
-    """Return vertices (mm) and faces of a FreeSurfer file such as lh.pial, their space and structure.
+    """Return vertices (mm) and faces of a FreeSurfer file such as lh.pial, their space
+    and structure.
 
-    From the volume's centre (tkr RAS) they go to scanner space by the geometry at the end of the file, if it is there.
+    From the volume's centre (tkr RAS) they go to scanner space by the geometry at the
+    end of the file, if it is there.
     """
     # its warnings are about missing geometry, which is reported
     with warnings.catch_warnings(action="ignore", category=UserWarning):
         vertices, faces, info = read_geometry(str(path), read_metadata=True)
     # two lines, the numbers of vertices and faces, and these
     start = re.match(rb"[^\n]*\n[^\n]*\n", content := path.read_bytes())
-    if start and content.startswith(REAL_RAS, start.end() + 8 + 12 * (len(vertices) + len(faces))):
+    if start and content.startswith(
+        REAL_RAS, start.end() + 8 + 12 * (len(vertices) + len(faces))
+    ):
         return np.asarray(vertices, dtype=float), faces, SCANNER, None
-    if not str(info.get("valid", "")).startswith("1") or not {"xras", "yras", "zras", "cras"} <= set(info):
-        log.warning("%s: has no volume geometry: its coordinates are relative to the volume's centre (tkr RAS)", path)
+    if not str(info.get("valid", "")).startswith("1") or not {
+        "xras",
+        "yras",
+        "zras",
+        "cras",
+    } <= set(info):
+        log.warning(
+            "%s: has no volume geometry: its coordinates are relative to the volume's"
+            " centre (tkr RAS)",
+            path,
+        )
         return np.asarray(vertices, dtype=float), faces, None, None
     axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
-    # tkr RAS has the axes of a coronal volume, with columns to the left, rows down, slices forward
+    # tkr RAS has the axes of a coronal volume, with columns to the left, rows down,
+    # slices forward
     rotation = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    return np.asarray(vertices @ rotation.T + info["cras"], dtype=float), faces, SCANNER, None
+    return (
+        np.asarray(vertices @ rotation.T + info["cras"], dtype=float),
+        faces,
+        SCANNER,
+        None,
+    )
 
 
 SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {

@@ -1,8 +1,10 @@
-"""Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files hold mm.
+"""Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files
+hold mm.
 
-A run's start mesh has its regions in one file, for ParaView as two blocks: `mesh`, the elements with fields and tags,
-and `facets`, the pial triangles. dolfinx reads tags by `read_meshtags(mesh, NAME, xpath="/Xdmf/Domain[2]")`: this
-second domain has a grid for each tag, since dolfinx before 0.10 reads a grid's first only.
+A run's start mesh has its regions in one file, for ParaView as two blocks: `mesh`, the
+elements with fields and tags, and `facets`, the pial triangles. dolfinx reads tags by
+`read_meshtags(mesh, NAME, xpath="/Xdmf/Domain[2]")`: this second domain has a grid for
+each tag, since dolfinx before 0.10 reads a grid's first only.
 """
 
 from collections.abc import Iterable, Mapping
@@ -34,23 +36,33 @@ def grid(
     cell_fields: Mapping[str, Stored],
     time: float | None = None,
 ) -> str:
-    """Return the XDMF grid of a mesh of triangles or tetrahedra (of 4 or 10 nodes), with its fields by name."""
+    """Return the XDMF grid of a mesh of triangles or tetrahedra (of 4 or 10 nodes),
+    with its fields by name."""
     kind, count = XDMF_TOPOLOGY[cells[0].shape[1]], len(cells[0])
     parts = [] if time is None else [f'<Time Value="{time}"/>']
-    parts.append(f'<Topology TopologyType="{kind}" NumberOfElements="{count}">{_data_item(*cells)}</Topology>')
+    parts.append(
+        f'<Topology TopologyType="{kind}"'
+        f' NumberOfElements="{count}">{_data_item(*cells)}</Topology>'
+    )
     parts.append(f'<Geometry GeometryType="XYZ">{_data_item(*points)}</Geometry>')
     for centre, fields in (("Node", vertex_fields), ("Cell", cell_fields)):
         for field, (values, where) in fields.items():
             kind = XDMF_ATTRIBUTE[1 if values.ndim == 1 else values.shape[1]]
             item = _data_item(values, where)
-            parts.append(f'<Attribute Name="{field}" AttributeType="{kind}" Center="{centre}">{item}</Attribute>')
+            parts.append(
+                f'<Attribute Name="{field}" AttributeType="{kind}"'
+                f' Center="{centre}">{item}</Attribute>'
+            )
     return f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>'
 
 
 def _data_item(values: NDArray, where: str) -> str:
     shape = " ".join(map(str, values.shape))
     kind, size = XDMF_NUMBER[values.dtype.kind], values.dtype.itemsize
-    return f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="{size}" Format="HDF">{where}</DataItem>'
+    return (
+        f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="{size}"'
+        f' Format="HDF">{where}</DataItem>'
+    )
 
 
 def document(*domains: str) -> str:
@@ -60,27 +72,42 @@ def document(*domains: str) -> str:
 
 
 def write_tetrahedral_mesh(
-    path: AnyPath, mesh: TetrahedralMesh, cell_fields: Mapping[str, NDArray] | None = None
+    path: AnyPath,
+    mesh: TetrahedralMesh,
+    cell_fields: Mapping[str, NDArray] | None = None,
 ) -> None:
-    """Write a mesh in mm, with fields (m,) or (m, 3) of its elements by name, to `path` (.xdmf) and its .h5 file."""
+    """Write a mesh in mm, with fields (m,) or (m, 3) of its elements by name, to `path`
+    (.xdmf) and its .h5 file."""
     data = Path(path).with_suffix(".h5")
-    fields = {name: (np.asarray(values), f"{data.name}:/Cell/{name}") for name, values in (cell_fields or {}).items()}
+    fields = {
+        name: (np.asarray(values), f"{data.name}:/Cell/{name}")
+        for name, values in (cell_fields or {}).items()
+    }
     with new_hdf5(data) as file:
         file["tets"], file["vertices"] = mesh.tets, mesh.vertices
         for name, (values, _) in fields.items():
             file[f"Cell/{name}"] = values
-    cells, points = (mesh.tets, f"{data.name}:/tets"), (mesh.vertices, f"{data.name}:/vertices")
+    cells, points = (
+        (mesh.tets, f"{data.name}:/tets"),
+        (mesh.vertices, f"{data.name}:/vertices"),
+    )
     write_text(path, document(grid("mesh", cells, points, {}, fields)))
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
-    """Read a mesh of `write_tetrahedral_mesh`; InputError for other files, and flat or inverted elements."""
+    """Read a mesh of `write_tetrahedral_mesh`; InputError for other files, and flat or
+    inverted elements."""
     data = Path(path).with_suffix(".h5")
     with reading_hdf5(data, "a tetrahedral mesh", "XDMF with its .h5 file") as file:
         mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
     require_finite(mesh.vertices, data, "coordinates", "points")
     if wrong := int((signed_volumes(mesh) <= 0).sum()):
-        raise InputError("has elements without a positive volume", path=data, found=wrong, expected="none")
+        raise InputError(
+            "has elements without a positive volume",
+            path=data,
+            found=wrong,
+            expected="none",
+        )
     return mesh
 
 
@@ -89,9 +116,11 @@ Tags = Mapping[str, NDArray[np.int32]]
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """A tetrahedral mesh in mm with (f, 3) facets of its boundary, and fields (n,) or (n, 3) at its vertices by name.
+    """A tetrahedral mesh in mm with (f, 3) facets of its boundary, and fields (n,) or
+    (n, 3) at its vertices by name.
 
-    Tags by name are (m,) of elements and (f,) of facets, which dolfinx reads as `facet_NAME` if both have the name.
+    Tags by name are (m,) of elements and (f,) of facets, which dolfinx reads as
+    `facet_NAME` if both have the name.
     """
 
     mesh: TetrahedralMesh
@@ -115,36 +144,62 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
         for name, field in regions.fields.items():
             file[f"fields/{name}"] = field
 
-    def part(name: str, kind: str, names: Iterable[str], fields: Mapping[str, NDArray]) -> str:
-        cell_data = {tag: (np.asarray(tags[kind][tag], np.int32), f"{data.name}:/{kind}_tags/{tag}") for tag in names}
-        vertex_data = {field: (values, f"{data.name}:/fields/{field}") for field, values in fields.items()}
+    def part(
+        name: str, kind: str, names: Iterable[str], fields: Mapping[str, NDArray]
+    ) -> str:
+        cell_data = {
+            tag: (
+                np.asarray(tags[kind][tag], np.int32),
+                f"{data.name}:/{kind}_tags/{tag}",
+            )
+            for tag in names
+        }
+        vertex_data = {
+            field: (values, f"{data.name}:/fields/{field}")
+            for field, values in fields.items()
+        }
         points = regions.mesh.vertices, f"{data.name}:/vertices"
-        return grid(name, (cells[kind], f"{data.name}:/{kind}"), points, vertex_data, cell_data)
+        return grid(
+            name, (cells[kind], f"{data.name}:/{kind}"), points, vertex_data, cell_data
+        )
 
-    blocks = part("mesh", "tets", tags["tets"], regions.fields) + part("facets", "facets", tags["facets"], {})
+    blocks = part("mesh", "tets", tags["tets"], regions.fields) + part(
+        "facets", "facets", tags["facets"], {}
+    )
     single = [part(name, "tets", [name], {}) for name in tags["tets"]]
-    single += [part(f"facet_{name}" if name in tags["tets"] else name, "facets", [name], {}) for name in tags["facets"]]
+    single += [
+        part(f"facet_{name}" if name in tags["tets"] else name, "facets", [name], {})
+        for name in tags["facets"]
+    ]
     write_text(path, document(blocks, "".join(single)))
 
 
 def read_regions(path: AnyPath) -> Regions:
-    """Read regions written by `write_regions` to `path`; InputError if its .h5 file is missing or invalid."""
+    """Read regions written by `write_regions` to `path`; InputError if its .h5 file is
+    missing or invalid."""
     data = Path(path).with_suffix(".h5")
     with reading_hdf5(data, "regions", "regions.h5 of a run") as file:
         mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
         kinds = ("fields", "tets_tags", "facets_tags")
-        groups = [{name: values[:] for name, values in file[kind].items()} for kind in kinds]
+        groups = [
+            {name: values[:] for name, values in file[kind].items()} for kind in kinds
+        ]
         return Regions(mesh, file["facets"][:], *groups)
 
 
 def write_maps(path: AnyPath, maps: Mapping[str, Floats]) -> None:
-    """Write named (n,) values at the vertices of a mesh to an HDF5 file, a data set each."""
+    """Write named (n,) values at the vertices of a mesh to an HDF5 file, a data set
+    each."""
     with new_hdf5(path) as file:
         for name, values in maps.items():
             file[name] = np.asarray(values, dtype=np.float64)
 
 
 def read_maps(path: AnyPath) -> dict[str, Floats]:
-    """Return the named (n,) values of a file of `write_maps`; InputError where it is missing or torn."""
+    """Return the named (n,) values of a file of `write_maps`; InputError where it is
+    missing or torn."""
     with reading_hdf5(path, "maps", "an HDF5 file") as file:
-        return {name: np.asarray(values[:], dtype=np.float64) for name, values in file.items()}
+        return {
+            name: np.asarray(values[:], dtype=np.float64)
+            for name, values in file.items()
+        }

@@ -1,4 +1,5 @@
-"""Volumes of labels and other numbers in NIfTI (and MGH) files, always in RAS+ mm and with axes in that order."""
+"""Volumes of labels and other numbers in NIfTI (and MGH) files, always in RAS+ mm and
+with axes in that order."""
 
 import gzip
 import logging
@@ -31,8 +32,9 @@ MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
 WHICH_MATRIX = (
-    "Find out which one holds, for example from the scan that was labelled, and name it with the brain's affine_from: "
-    "qform or sform. The wrong one may exchange left and right."
+    "Find out which one holds, for example from the scan that was labelled, and name it"
+    " with the brain's affine_from: qform or sform. The wrong one may exchange left and"
+    " right."
 )
 # labels stored as floats or with a slope may differ by this from whole numbers
 MAX_LABEL_ERROR = 0.05
@@ -48,9 +50,11 @@ MAX_COMPRESSION = 1100
 
 @dataclass(frozen=True, eq=False)
 class LabelVolume:
-    """The (i, j, k) tissue label of each voxel, and the (4, 4) affine from voxel indices to RAS+ positions in mm.
+    """The (i, j, k) tissue label of each voxel, and the (4, 4) affine from voxel
+    indices to RAS+ positions in mm.
 
-    As read, i, j and k increase to the right, to the front and upwards, however the file stores them.
+    As read, i, j and k increase to the right, to the front and upwards, however the
+    file stores them.
     """
 
     labels: NDArray[np.int32]
@@ -61,11 +65,15 @@ class LabelVolume:
         """The volume of each label in mL, without the background."""
         numbers, voxels = np.unique(self.labels[self.labels > 0], return_counts=True)
         voxel_ml = float(abs(np.linalg.det(self.affine[:3, :3]))) * ML_PER_MM3
-        return {int(number): int(count) * voxel_ml for number, count in zip(numbers, voxels, strict=True)}
+        return {
+            int(number): int(count) * voxel_ml
+            for number, count in zip(numbers, voxels, strict=True)
+        }
 
 
 class LabelSource(NamedTuple):
-    """A file of tissue labels, which of NIfTI's two matrices counts, and what its labels mean."""
+    """A file of tissue labels, which of NIfTI's two matrices counts, and what its
+    labels mean."""
 
     # a tuple: Snakemake sees no change in parameters of other classes
     path: str
@@ -77,11 +85,15 @@ class LabelSource(NamedTuple):
         return read_label_volume(self.path, self.affine_from, cropped=cropped)
 
 
-def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:
-    """Return the label volume of a NIfTI or MGH file, in RAS+ mm, ending a voxel beyond its labels if `cropped`.
+def read_label_volume(
+    path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False
+) -> LabelVolume:
+    """Return the label volume of a NIfTI or MGH file, in RAS+ mm, ending a voxel beyond
+    its labels if `cropped`.
 
-    `affine_from` selects one of NIfTI's matrices; "auto" takes the one that is set and refuses two that disagree.
-    InputError for invalid files, non-integer values, NaN, and ambiguous orientation.
+    `affine_from` selects one of NIfTI's matrices; "auto" takes the one that is set and
+    refuses two that disagree. InputError for invalid files, non-integer values, NaN,
+    and ambiguous orientation.
     """
     values, affine = read_values(path, affine_from, "labels")
     if cropped:
@@ -89,7 +101,9 @@ def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, crop
     return LabelVolume(_whole_numbers(values, path), affine)
 
 
-def _without_empty_border(values: NDArray[np.number], affine: Floats) -> tuple[NDArray[np.number], Floats]:
+def _without_empty_border(
+    values: NDArray[np.number], affine: Floats
+) -> tuple[NDArray[np.number], Floats]:
     box = []
     for axis, size in enumerate(values.shape):
         filled = np.flatnonzero(values.any(axis=tuple({0, 1, 2} - {axis})))
@@ -102,7 +116,8 @@ def _without_empty_border(values: NDArray[np.number], affine: Floats) -> tuple[N
 
 
 class VolumeHeader(NamedTuple):
-    """Numbers of voxels along three axes, their sizes in mm, the unit ("unknown": mm) and space, such as "mni"."""
+    """Numbers of voxels along three axes, their sizes in mm, the unit ("unknown": mm)
+    and space, such as "mni"."""
 
     shape: tuple[int, ...]
     voxel_mm: tuple[float, ...]
@@ -111,21 +126,30 @@ class VolumeHeader(NamedTuple):
 
 
 def read_header(path: AnyPath) -> VolumeHeader:
-    """Return the header of a volume without reading its values; InputError if it cannot be read."""
+    """Return the header of a volume without reading its values; InputError if it cannot
+    be read."""
     image, unit, space = _load(path), "mm", "scanner"
     if isinstance(image, nib.Nifti1Pair):
         unit = _length_unit(image.header, path)
-        names = [image.header.get_value_label(f"{name}_code") for name in ("sform", "qform")]
+        names = [
+            image.header.get_value_label(f"{name}_code") for name in ("sform", "qform")
+        ]
         space = next((name for name in names if name != "unknown"), "unknown")
     size = MM_PER_NIFTI_UNIT[unit] * np.array(image.header.get_zooms()[:3], dtype=float)
-    return VolumeHeader(tuple(map(int, image.shape[:3])), tuple(map(float, size)), unit, space)
+    return VolumeHeader(
+        tuple(map(int, image.shape[:3])), tuple(map(float, size)), unit, space
+    )
 
 
-def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
-    """Return the (i, j, k) values of a NIfTI or MGH file, and the (4, 4) matrix to RAS+ positions in mm.
+def read_values(
+    path: AnyPath, affine_from: AffineSource, content: str
+) -> tuple[NDArray[np.number], Floats]:
+    """Return the (i, j, k) values of a NIfTI or MGH file, and the (4, 4) matrix to RAS+
+    positions in mm.
 
-    Values have the type in which they are stored; their axes are brought to the order right, front, up.
-    `content` names the values in messages. InputError for invalid files, other numbers of axes, unclear orientation.
+    Values have the type in which they are stored; their axes are brought to the order
+    right, front, up. `content` names the values in messages. InputError for invalid
+    files, other numbers of axes, unclear orientation.
     """
     image = _load(path, content)
     with reading(path, "an image", _expected(content)):
@@ -134,20 +158,37 @@ def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple
         values = _stored_values(image, path)
     shape = tuple(n for axis, n in enumerate(values.shape) if axis < 3 or n != 1)
     if len(shape) != 3 or values.dtype.kind not in "biuf":
-        form, problem = f"shape {values.shape}, type {values.dtype}", f"is not a volume of {content}"
+        form, problem = (
+            f"shape {values.shape}, type {values.dtype}",
+            f"is not a volume of {content}",
+        )
         expected = "three axes (further ones of length 1) of numbers"
         raise InputError(problem, path=path, found=form, expected=expected)
     affine = np.array(_affine(image, affine_from, path), dtype=float)
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
-    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
-        raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
+    if (
+        not np.isfinite(affine).all()
+        or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod()
+        or not sizes.all()
+    ):
+        raise InputError(
+            "has no usable affine",
+            path=path,
+            found=f"\n{affine}\n",
+            expected="an invertible matrix",
+        )
     if sizes.max() > ANISOTROPY_WARNED * sizes.min():
-        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes)
+        log.warning(
+            "%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes
+        )
     return _in_canonical_order(values.reshape(shape), affine)
 
 
-def _in_canonical_order(values: NDArray[np.number], affine: Floats) -> tuple[NDArray[np.number], Floats]:
-    """Return a volume with the axes that are closest to RAS+, and its affine: results must not depend on storage."""
+def _in_canonical_order(
+    values: NDArray[np.number], affine: Floats
+) -> tuple[NDArray[np.number], Floats]:
+    """Return a volume with the axes that are closest to RAS+, and its affine: results
+    must not depend on storage."""
     axes = nib.io_orientation(affine)
     reordered = nib.apply_orientation(values, axes)
     canonical = affine @ nib.orientations.inv_ornt_aff(axes, values.shape)
@@ -156,8 +197,13 @@ def _in_canonical_order(values: NDArray[np.number], affine: Floats) -> tuple[NDA
     return reordered, canonical
 
 
-VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {"NIfTI": nib.load, "NIfTI pair": nib.load, "MGH": nib.load}
-"""The reader of each format of volumes; it returns an image of nibabel, in mm if it is not NIfTI."""
+VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {
+    "NIfTI": nib.load,
+    "NIfTI pair": nib.load,
+    "MGH": nib.load,
+}
+"""The reader of each format of volumes; it returns an image of nibabel, in mm if it is
+not NIfTI."""
 
 
 def _load(path: AnyPath, content: str = "numbers") -> SpatialImage:
@@ -166,7 +212,12 @@ def _load(path: AnyPath, content: str = "numbers") -> SpatialImage:
         # nibabel recognises other formats by their contents
         image = VOLUME_READERS[found.name if found else "NIfTI"](path)
         if not isinstance(image, SpatialImage):
-            raise InputError("is not a volume", path=path, found=type(image).__name__, expected=_expected(content))
+            raise InputError(
+                "is not a volume",
+                path=path,
+                found=type(image).__name__,
+                expected=_expected(content),
+            )
     return image
 
 
@@ -174,16 +225,24 @@ def _expected(content: str) -> str:
     return f"a whole volume of {content} ({', '.join(VOLUME_SUFFIXES)})"
 
 
-def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> tuple[Floats, Floats]:
-    """Return (i, j, k) values of a NIfTI or MGH file, NaN if undefined, and the affine, as `read_label_volume`."""
+def read_volume_map(
+    path: AnyPath, affine_from: AffineSource = "auto"
+) -> tuple[Floats, Floats]:
+    """Return (i, j, k) values of a NIfTI or MGH file, NaN if undefined, and the affine,
+    as `read_label_volume`."""
     values, affine = read_values(path, affine_from, "numbers")
     return values.astype(float), affine
 
 
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
-    """Write a label volume as NIfTI in mm, in the smallest integer type that holds its labels."""
+    """Write a label volume as NIfTI in mm, in the smallest integer type that holds its
+    labels."""
     labels = volume.labels
-    kind = np.min_scalar_type(int(labels.max(initial=0))) if labels.min(initial=0) >= 0 else np.int32
+    kind = (
+        np.min_scalar_type(int(labels.max(initial=0)))
+        if labels.min(initial=0) >= 0
+        else np.int32
+    )
     image = nib.Nifti1Image(labels.astype(kind), volume.affine)
     image.header.set_xyzt_units("mm")
     image.set_sform(volume.affine, code="scanner")
@@ -203,13 +262,19 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
     packed = data.name.lower().endswith(PACKED_SUFFIXES)
     size = data.stat().st_size
     if needed < 0 or needed > size * (MAX_COMPRESSION if packed else 1):
-        expected = f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}"
+        expected = (
+            f"{needed} bytes for {' x '.join(map(str, image.shape))} values of"
+            f" {image.get_data_dtype()}"
+        )
         problem = "is shorter than its header specifies"
-        raise InputError(problem, path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN)
+        raise InputError(
+            problem, path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN
+        )
 
 
 def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
-    """Return the values of an image; compressed files are read to the end, so that checksums are verified."""
+    """Return the values of an image; compressed files are read to the end, so that
+    checksums are verified."""
     packed: dict[str, Any] = {}
     with ExitStack() as opened:
         for part, holder in image.file_map.items():
@@ -217,8 +282,12 @@ def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
             if name.endswith(PACKED_SUFFIXES):
                 # nibabel's own reader of gzip may not verify checksums
                 opener: Any = gzip.open if name.endswith(GZIP_SUFFIXES) else ImageOpener
-                packed[part] = FileHolder(fileobj=opened.enter_context(opener(holder.filename)))
-        values = np.asanyarray(type(image).from_file_map({**image.file_map, **packed}).dataobj)
+                packed[part] = FileHolder(
+                    fileobj=opened.enter_context(opener(holder.filename))
+                )
+        values = np.asanyarray(
+            type(image).from_file_map({**image.file_map, **packed}).dataobj
+        )
         for holder in packed.values():
             try:
                 while holder.fileobj.read(2**20):
@@ -226,20 +295,35 @@ def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
             except gzip.BadGzipFile as error:
                 if not str(error).startswith("Not a gzipped file"):
                     raise
-                log.warning("%s: further data follow the compressed data; they are ignored, as by gzip", path)
+                log.warning(
+                    "%s: further data follow the compressed data; they are ignored, as"
+                    " by gzip",
+                    path,
+                )
     return values
 
 
 def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Floats:
-    # a single NIfTI file is a special kind of pair to nibabel, and a pair a special kind of Analyze
+    # a single NIfTI file is a special kind of pair to nibabel, and a pair a special
+    # kind of Analyze
     if isinstance(image, nib.Nifti1Pair):
         return _nifti_affine(image, affine_from, path)
     if isinstance(image, nib.AnalyzeImage):
-        problem = "is in the Analyze format, which holds no orientation, so left and right are unknown"
-        raise InputError(problem, path=path, expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)")
+        problem = (
+            "is in the Analyze format, which holds no orientation, so left and right"
+            " are unknown"
+        )
+        raise InputError(
+            problem,
+            path=path,
+            expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)",
+        )
     if isinstance(image, nib.MGHImage) and not _has_directions(path):
         problem = "has no valid directions (goodRASFlag), so left and right are unknown"
-        remedy = "Set them as in the scan that was labelled, for example with mri_convert --in_orientation."
+        remedy = (
+            "Set them as in the scan that was labelled, for example with mri_convert"
+            " --in_orientation."
+        )
         raise InputError(problem, path=path, found=0, expected=1, remedy=remedy)
     return image.affine
 
@@ -248,17 +332,26 @@ def _has_directions(path: AnyPath) -> bool:
     # nibabel takes FreeSurfer's usual ones where they are not valid, and sets the flag
     opener: Any = gzip.open if str(path).lower().endswith(GZIP_SUFFIXES) else open
     with opener(path, "rb") as file:
-        return int.from_bytes(file.read(GOOD_RAS_OFFSET + 2)[GOOD_RAS_OFFSET:], "big") == 1
+        return (
+            int.from_bytes(file.read(GOOD_RAS_OFFSET + 2)[GOOD_RAS_OFFSET:], "big") == 1
+        )
 
 
-def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath) -> Floats:
+def _nifti_affine(
+    image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath
+) -> Floats:
     header = image.header
     needed = ("sform", "qform") if affine_from == "auto" else (affine_from,)
     try:
         matrices = {name: getattr(header, f"get_{name}")() for name in needed}
     except (HeaderDataError, ValueError) as error:
-        remedy = "If the sform holds, as in the scan that was labelled, set affine_from: sform."
-        raise InputError(f"has a broken qform: {error}", path=path, remedy=remedy) from error
+        remedy = (
+            "If the sform holds, as in the scan that was labelled, set affine_from:"
+            " sform."
+        )
+        raise InputError(
+            f"has a broken qform: {error}", path=path, remedy=remedy
+        ) from error
     codes = {"sform": int(header["sform_code"]), "qform": int(header["qform_code"])}
     unit = _length_unit(header, path)
     if unit == "unknown":
@@ -270,15 +363,24 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
     present = [name for name, code in codes.items() if code > 0]
     if not present:
         problem = "neither qform nor sform is set, so left and right are unknown"
-        raise InputError(problem, path=path, expected="a code > 0 of one", remedy=WHICH_MATRIX)
+        raise InputError(
+            problem, path=path, expected="a code > 0 of one", remedy=WHICH_MATRIX
+        )
     if len(present) == 2:
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
         difference = matrices["sform"] - matrices["qform"]
-        ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]])).reshape(3, -1)
-        distance = float(np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max())
+        ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]])).reshape(
+            3, -1
+        )
+        distance = float(
+            np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max()
+        )
         if not distance <= AGREEMENT_VOXELS * voxel:
             problem = f"qform and sform disagree by up to {distance:.3g} {unit}"
-            both = "".join(f"\n{name} (code {codes[name]})\n{matrices[name]}" for name in ("qform", "sform"))
+            both = "".join(
+                f"\n{name} (code {codes[name]})\n{matrices[name]}"
+                for name in ("qform", "sform")
+            )
             raise InputError(problem, path=path, found=f"{both}\n", remedy=WHICH_MATRIX)
     return scale * matrices[present[0]]
 
@@ -290,8 +392,13 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
     except KeyError:
         unit = ""
     if unit not in MM_PER_NIFTI_UNIT:
-        problem, expected = "has a unit of length that is not in NIfTI", "2 (mm), 1 (metres), 3 (micrometres) or 0"
-        raise InputError(problem, path=path, found=f"xyzt_units {code}", expected=expected)
+        problem, expected = (
+            "has a unit of length that is not in NIfTI",
+            "2 (mm), 1 (metres), 3 (micrometres) or 0",
+        )
+        raise InputError(
+            problem, path=path, found=f"xyzt_units {code}", expected=expected
+        )
     return unit
 
 
@@ -300,17 +407,44 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
         require_finite(values.ravel(), path, "values", "voxels")
         errors = np.abs(values - np.rint(values))
         # values that all round to zero were divided by their slope
-        broken = (errors > MAX_LABEL_ERROR) | (not np.rint(values).any() and values != 0)
+        broken = (errors > MAX_LABEL_ERROR) | (
+            not np.rint(values).any() and values != 0
+        )
         if broken.any():
-            problem = f"contains values that are not labels, whole numbers within {MAX_LABEL_ERROR:g}"
-            broken_values = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
-            remedy = "Resample labels with nearest neighbour. gyriflow does not segment images."
+            problem = (
+                "contains values that are not labels, whole numbers within"
+                f" {MAX_LABEL_ERROR:g}"
+            )
+            broken_values = (
+                f"{np.count_nonzero(broken)} voxels, for example"
+                f" {values[broken][0]:.4g}"
+            )
+            remedy = (
+                "Resample labels with nearest neighbour. gyriflow does not segment"
+                " images."
+            )
             raise InputError(problem, path=path, found=broken_values, remedy=remedy)
         if (error := errors.max(initial=0)) > 1e-3:
-            log.warning("%s: labels differ by up to %.3g from whole numbers and were rounded", path, error)
+            log.warning(
+                "%s: labels differ by up to %.3g from whole numbers and were rounded",
+                path,
+                error,
+            )
         values = np.rint(values)
-    least, largest, bounds = values.min(initial=0), values.max(initial=0), np.iinfo(np.int32)
+    least, largest, bounds = (
+        values.min(initial=0),
+        values.max(initial=0),
+        np.iinfo(np.int32),
+    )
     if least < bounds.min or largest > bounds.max:
-        span, expected = f"{least:.6g} to {largest:.6g}", f"whole numbers up to {bounds.max}"
-        raise InputError("contains values that are not tissue labels", path=path, found=span, expected=expected)
+        span, expected = (
+            f"{least:.6g} to {largest:.6g}",
+            f"whole numbers up to {bounds.max}",
+        )
+        raise InputError(
+            "contains values that are not tissue labels",
+            path=path,
+            found=span,
+            expected=expected,
+        )
     return values.astype(np.int32)

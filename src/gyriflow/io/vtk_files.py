@@ -1,4 +1,5 @@
-"""Surfaces in VTK files, read in a process of its own, since VTK's readers may crash on damaged files."""
+"""Surfaces in VTK files, read in a process of its own, since VTK's readers may crash on
+damaged files."""
 
 import io
 import os
@@ -13,30 +14,42 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 LEGACY_SURFACE = re.compile(
-    rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*BINARY\s+DATASET\s+POLYDATA\s+POINTS\s+(\d+)\s+(float|double)\s*?\n"
+    rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*BINARY\s+DATASET\s+POLYDATA"
+    rb"\s+POINTS\s+(\d+)\s+(float|double)\s*?\n"
 )
 LEGACY_POLYGONS = re.compile(rb"\s*POLYGONS\s+(\d+)\s+(\d+)\s*?\n")
 
 
 def read_vtk(path: Path) -> tuple[NDArray, NDArray]:
-    """Return (n, 3) points and (m, 3) triangles of a VTK surface (.vtk, .vtp); InputError for other content."""
+    """Return (n, 3) points and (m, 3) triangles of a VTK surface (.vtk, .vtp);
+    InputError for other content."""
     if arrays := _little_endian_surface(path.read_bytes()):
         return arrays
     process = subprocess.run(
         [sys.executable, "-m", __name__, str(path)],
         capture_output=True,
         check=False,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "PYTHONSAFEPATH": "1"},
+        env=os.environ
+        | {
+            "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+            "PYTHONSAFEPATH": "1",
+        },
     )
     if process.returncode:
-        *_, words = [f"VTK's reader ended with code {process.returncode}", *process.stderr.decode().splitlines()]
-        raise InputError("holds no surface", path=path, found=words, expected="triangles (PolyData)")
+        *_, words = [
+            f"VTK's reader ended with code {process.returncode}",
+            *process.stderr.decode().splitlines(),
+        ]
+        raise InputError(
+            "holds no surface", path=path, found=words, expected="triangles (PolyData)"
+        )
     with np.load(io.BytesIO(process.stdout)) as arrays:
         return arrays["points"], arrays["faces"]
 
 
 def _little_endian_surface(content: bytes) -> tuple[NDArray, NDArray] | None:
-    """Return the arrays of a legacy file in little-endian order, as MRtrix writes it against the rules, or None."""
+    """Return the arrays of a legacy file in little-endian order, as MRtrix writes it
+    against the rules, or None."""
     if (head := LEGACY_SURFACE.match(content)) is None:
         return None
     kind = np.dtype("<f4" if head[2] == b"float" else "<f8")
@@ -44,7 +57,9 @@ def _little_endian_surface(content: bytes) -> tuple[NDArray, NDArray] | None:
     polygons = LEGACY_POLYGONS.match(content, end)
     if polygons is None or int(polygons[2]) != 4 * int(polygons[1]):
         return None
-    cells = np.frombuffer(content, "<i4", int(polygons[2]), polygons.end()).reshape(-1, 4)
+    cells = np.frombuffer(content, "<i4", int(polygons[2]), polygons.end()).reshape(
+        -1, 4
+    )
     if (cells[:, 0] != 3).any():
         return None
     return np.frombuffer(content[head.end() : end], kind).reshape(-1, 3), cells[:, 1:]
@@ -57,7 +72,11 @@ def _send_surface(path: str) -> None:
 
     data = pv.read(path)
     # VTK may crash on damaged cells, so these are read without its filters
-    if not isinstance(data, pv.PolyData) or not data.n_points or not data.is_all_triangles:
+    if (
+        not isinstance(data, pv.PolyData)
+        or not data.n_points
+        or not data.is_all_triangles
+    ):
         sys.exit(type(data).__name__)
     sent = io.BytesIO()
     np.savez(sent, points=data.points, faces=data.regular_faces)

@@ -1,4 +1,5 @@
-"""YAML files: configurations, read strictly, the parameters of a run, and the label schemes of the folder `schemes`."""
+"""YAML files: configurations, read strictly, the parameters of a run, and the label
+schemes of the folder `schemes`."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -13,16 +14,24 @@ from ..settings.schemes import SCHEME_FILES, LabelScheme, SchemeSettings
 from .files import AnyPath, require_content, write_text
 
 MAX_VALUES = 1_000_000
-"""How many values a file may have, so that a few lines of nested aliases don't fill the memory."""
+"""How many values a file may have, so that a few lines of nested aliases don't fill the
+memory."""
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Loader that refuses duplicate keys, since YAML would silently keep the last one."""
+    """Loader that refuses duplicate keys, since YAML would silently keep the last
+    one."""
 
 
 def _size(value: Any, sizes: dict[int, int]) -> int:
     if id(value) not in sizes:
-        inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+        inner = (
+            value.values()
+            if isinstance(value, dict)
+            else value
+            if isinstance(value, list)
+            else ()
+        )
         sizes[id(value)] = 1 + sum(_size(item, sizes) for item in inner)
     return sizes[id(value)]
 
@@ -32,10 +41,16 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
     for key, _ in node.value:
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode):
-            raise yaml.constructor.ConstructorError(None, None, "keys must be scalars", key.start_mark)
+            raise yaml.constructor.ConstructorError(
+                None, None, "keys must be scalars", key.start_mark
+            )
         kind = key.tag.rpartition(":")[2]
-        if kind in ("bool", "null") or (kind == "int" and not re.fullmatch(r"-?(0|[1-9]\d*)", key.value)):
-            problem = f"the key {key.value} is another value to YAML; write it in quotes"
+        if kind in ("bool", "null") or (
+            kind == "int" and not re.fullmatch(r"-?(0|[1-9]\d*)", key.value)
+        ):
+            problem = (
+                f"the key {key.value} is another value to YAML; write it in quotes"
+            )
             raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
         if key.value in first and key.tag != "tag:yaml.org,2002:merge":
             problem = f"duplicate key {key.value!r} (first on line {first[key.value]})"
@@ -49,15 +64,20 @@ _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _m
 
 
 def read_yaml(path: AnyPath) -> Any:
-    """Return the content of a YAML (or JSON) file; InputError where it is missing, malformed or names a key twice."""
+    """Return the content of a YAML (or JSON) file; InputError where it is missing,
+    malformed or names a key twice."""
     require_content(path)
     try:
-        content = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
+        content = yaml.load(
+            Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader
+        )
         size = _size(content, {})
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("cannot be read", path=path, found=error) from error
     except RecursionError as error:
-        raise InputError("is nested too deeply", path=path, expected="a configuration") from error
+        raise InputError(
+            "is nested too deeply", path=path, expected="a configuration"
+        ) from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f", line {mark.line + 1}" if mark else ""
@@ -68,16 +88,33 @@ def read_yaml(path: AnyPath) -> Any:
         problem = f"has a value that YAML cannot read: {error}"
         raise InputError(problem, path=path, remedy="Put texts in quotes.") from error
     if size > MAX_VALUES:
-        raise InputError("has too many values, aliases written out", path=path, found=size, expected=MAX_VALUES)
+        raise InputError(
+            "has too many values, aliases written out",
+            path=path,
+            found=size,
+            expected=MAX_VALUES,
+        )
     return content
 
 
 def read_keys(path: AnyPath) -> dict[str, Any]:
-    """Return the keys of a YAML (or JSON) file with their values; InputError where it has none."""
+    """Return the keys of a YAML (or JSON) file with their values; InputError where it
+    has none."""
     content = read_yaml(path)
     if not isinstance(content, dict):
-        kind = "nothing" if content is None else "a list" if isinstance(content, list) else repr(content)
-        raise InputError("is not a mapping", path=path, found=kind, expected="keys with values, such as `week: 21`")
+        kind = (
+            "nothing"
+            if content is None
+            else "a list"
+            if isinstance(content, list)
+            else repr(content)
+        )
+        raise InputError(
+            "is not a mapping",
+            path=path,
+            found=kind,
+            expected="keys with values, such as `week: 21`",
+        )
     return content
 
 
@@ -92,7 +129,8 @@ def write_yaml(path: AnyPath, content: Any) -> None:
 
 
 class Schemes(Mapping[str, LabelScheme]):
-    """The schemes by name, each read on first use; InputError if a file is not a scheme."""
+    """The schemes by name, each read on first use; InputError if a file is not a
+    scheme."""
 
     def __init__(self) -> None:
         self._known: dict[str, LabelScheme] = {}

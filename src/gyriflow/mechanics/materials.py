@@ -1,4 +1,5 @@
-"""Material laws of tissue. A law is one class here, and its name in the configuration; its energy density also in C."""
+"""Material laws of tissue. A law is one class here, and its name in the configuration;
+its energy density also in C."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -14,8 +15,8 @@ from ufl.variable import Label, Variable
 class Material(ABC):
     """An isotropic hyperelastic material, defined by its energy density.
 
-    Energies are per volume of the updated reference, without the factor det Fg, as in the paper. Poisson's ratio ν is
-    the same in all tissue.
+    Energies are per volume of the updated reference, without the factor det Fg, as in
+    the paper. Poisson's ratio ν is the same in all tissue.
     """
 
     poisson_ratio: float
@@ -29,7 +30,8 @@ class Material(ABC):
     @staticmethod
     @abstractmethod
     def energy_of_invariants(I1: Expr, J: Expr, mu: Expr, K: Expr) -> Expr:
-        """Return ψ in Pa of I₁ = tr(Feᵀ·Fe) and J = det Fe; μ and K, in Pa, are the moduli of small strains."""
+        """Return ψ in Pa of I₁ = tr(Feᵀ·Fe) and J = det Fe; μ and K, in Pa, are the
+        moduli of small strains."""
 
     @classmethod
     def energy_density(cls, Fe: Expr, mu: Expr, K: Expr) -> Expr:
@@ -37,10 +39,12 @@ class Material(ABC):
         return cls.energy_of_invariants(ufl.inner(Fe, Fe), ufl.det(Fe), mu, K)
 
     def cauchy_stress(self, Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Return the Cauchy stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of the state without stress.
+        """Return the Cauchy stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of
+        the state without stress.
 
-        The energy that the model minimises is per volume before the step's growth (docs/model.md), so that the stress
-        in its equilibrium is smaller by the factor det Fg, by less than 2 % in a step of the reference parameters.
+        The energy that the model minimises is per volume before the step's growth
+        (docs/model.md), so that the stress in its equilibrium is smaller by the factor
+        det Fg, by less than 2 % in a step of the reference parameters.
         """
         # a fixed label, since a new one in each process would be compiled again
         Fe = Variable(Fe, Label(0))
@@ -48,7 +52,8 @@ class Material(ABC):
 
 
 class NeoHookean(Material):
-    """The slightly compressible neo-Hookean material of the paper, with separate energies of shape and volume."""
+    """The slightly compressible neo-Hookean material of the paper, with separate
+    energies of shape and volume."""
 
     name = "neo-hookean"
 
@@ -59,7 +64,8 @@ class NeoHookean(Material):
 
 
 class CompressibleNeoHookean(Material):
-    """The compressible neo-Hookean material (Bonet and Wood 2008, §6.4.3), with (J − 1)² instead of (ln J)².
+    """The compressible neo-Hookean material (Bonet and Wood 2008, §6.4.3), with (J −
+    1)² instead of (ln J)².
 
     Its energy is not split into those of shape and volume.
     """
@@ -72,12 +78,15 @@ class CompressibleNeoHookean(Material):
         return mu / 2 * (I1 - 3 - 2 * ufl.ln(J)) + (K - 2 * mu / 3) / 2 * (J - 1) ** 2
 
 
-MATERIALS: dict[str, type[Material]] = {law.name: law for law in (NeoHookean, CompressibleNeoHookean)}
+MATERIALS: dict[str, type[Material]] = {
+    law.name: law for law in (NeoHookean, CompressibleNeoHookean)
+}
 """Material laws by their names in the configuration."""
 
 
 def energy_code(material: Material) -> str:
-    """Return C functions of I1, J, mu and K: psi in Pa, and psi_I, psi_J, psi_II, psi_IJ, psi_JJ.
+    """Return C functions of I1, J, mu and K: psi in Pa, and psi_I, psi_J, psi_II,
+    psi_IJ, psi_JJ.
 
     They are for `folding/linear_elements.c`.
     """
@@ -87,7 +96,11 @@ def energy_code(material: Material) -> str:
     psi = material.energy_of_invariants(**variables)
     slopes = ufl.diff(psi, I1), ufl.diff(psi, J)
     functions = dict(zip(("psi", "psi_I", "psi_J"), (psi, *slopes), strict=True))
-    functions |= {"psi_II": ufl.diff(slopes[0], I1), "psi_IJ": ufl.diff(slopes[0], J), "psi_JJ": ufl.diff(slopes[1], J)}
+    functions |= {
+        "psi_II": ufl.diff(slopes[0], I1),
+        "psi_IJ": ufl.diff(slopes[0], J),
+        "psi_JJ": ufl.diff(slopes[1], J),
+    }
     names = {variable: name for name, variable in variables.items()}
     law = [
         f"static inline double {name}(double I1, double J, double mu, double K) "
@@ -102,5 +115,13 @@ def _in_c(value: Expr, names: dict[Expr, str]) -> str:
         return names[value]
     if not value.ufl_operands:
         return repr(float(value))
-    forms = {"Sum": "({}+{})", "Product": "({}*{})", "Division": "({}/{})", "Power": "pow({},{})", "Ln": "log({})"}
-    return forms[type(value).__name__].format(*(_in_c(part, names) for part in value.ufl_operands))
+    forms = {
+        "Sum": "({}+{})",
+        "Product": "({}*{})",
+        "Division": "({}/{})",
+        "Power": "pow({},{})",
+        "Ln": "log({})",
+    }
+    return forms[type(value).__name__].format(
+        *(_in_c(part, names) for part in value.ufl_operands)
+    )

@@ -1,1 +1,2 @@
-"""From a closed surface to a tetrahedral mesh, fine in the cortex and coarse in the core."""
+"""From a closed surface to a tetrahedral mesh, fine in the cortex and coarse in the
+core."""

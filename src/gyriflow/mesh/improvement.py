@@ -4,7 +4,12 @@ import logging
 
 import numpy as np
 
-from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh, boundary_surface, radius_ratios
+from ..geometry.tetrahedra import (
+    MIN_RADIUS_RATIO,
+    TetrahedralMesh,
+    boundary_surface,
+    radius_ratios,
+)
 from ..geometry.triangles import Floats, Ints
 
 log = logging.getLogger(__name__)
@@ -21,10 +26,12 @@ MAX_SURFACE_STEP = 0.05
 
 
 def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
-    """Return a linear mesh whose flattest elements are improved; the mesh itself if none is flat.
+    """Return a linear mesh whose flattest elements are improved; the mesh itself if
+    none is flat.
 
-    A vertex is moved from the opposite face or along the line between middle edges if that raises the least radius
-    ratio around it; vertices of the surface move less than a twentieth of an edge.
+    A vertex is moved from the opposite face or along the line between middle edges if
+    that raises the least radius ratio around it; vertices of the surface move less than
+    a twentieth of an edge.
     """
     flat = np.flatnonzero(radius_ratios(mesh) < MIN_RADIUS_RATIO)
     if not 0 < len(flat) <= MAX_FLAT:
@@ -36,21 +43,30 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
         for _ in range(ROUNDS):
             if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break
-            moves = [_best_move(vertices, mesh.tets, element, vertex, on_surface) for vertex in mesh.tets[element]]
+            moves = [
+                _best_move(vertices, mesh.tets, element, vertex, on_surface)
+                for vertex in mesh.tets[element]
+            ]
             if not any(moves):
                 break
             _, vertex, place = max(filter(None, moves), key=lambda move: move[0])
             vertices[vertex] = place
     improved = TetrahedralMesh(vertices, mesh.tets)
     before, after = (float(radius_ratios(m)[flat].min()) for m in (mesh, improved))
-    log.info("%d flat elements improved, least radius ratio from %.4f to %.4f", len(flat), before, after)
+    log.info(
+        "%d flat elements improved, least radius ratio from %.4f to %.4f",
+        len(flat),
+        before,
+        after,
+    )
     return improved
 
 
 def _best_move(
     vertices: Floats, tets: Ints, element: int, vertex: int, on_surface: Floats
 ) -> tuple[float, int, Floats] | None:
-    """Return the gain of the least ratio around a vertex by its best move, the vertex and its place, None without."""
+    """Return the gain of the least ratio around a vertex by its best move, the vertex
+    and its place, None without."""
     star = tets[(tets == vertex).any(axis=1)]
     others = vertices[tets[element][tets[element] != vertex]]
     normal = np.cross(others[1] - others[0], others[2] - others[0])
@@ -67,7 +83,9 @@ def _best_move(
                 trial = vertices[star].copy()
                 place = vertices[vertex] + sign * size * edge / length * direction
                 trial[star == vertex] = place
-                ratio = _ratios(trial.reshape(-1, 3), np.arange(star.size).reshape(-1, 4)).min()
+                ratio = _ratios(
+                    trial.reshape(-1, 3), np.arange(star.size).reshape(-1, 4)
+                ).min()
                 if ratio > least and (best is None or ratio - least > best[0]):
                     best = (float(ratio - least), int(vertex), place)
     return best
@@ -77,4 +95,6 @@ def _ratios(vertices: Floats, tets: Ints) -> Floats:
     """Return the radius ratios of elements, negative for inverted ones."""
     corners = vertices[tets]
     signs = np.sign(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-    return signs * radius_ratios(TetrahedralMesh(corners.reshape(-1, 3), np.arange(tets.size).reshape(-1, 4)))
+    return signs * radius_ratios(
+        TetrahedralMesh(corners.reshape(-1, 3), np.arange(tets.size).reshape(-1, 4))
+    )

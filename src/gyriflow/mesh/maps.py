@@ -1,4 +1,5 @@
-"""Maps over a brain brought onto the vertices of its tetrahedral mesh: from surfaces and from volumes."""
+"""Maps over a brain brought onto the vertices of its tetrahedral mesh: from surfaces
+and from volumes."""
 
 import logging
 from collections.abc import Mapping
@@ -10,49 +11,80 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.matching import barycentric, nearest_on
-from ..geometry.triangles import Floats, Ints, TriangleMesh, corners, face_areas, transformed
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    corners,
+    face_areas,
+    transformed,
+)
 
 log = logging.getLogger(__name__)
 
 FARTHEST_MM = 5.0
 QUANTILE = 0.95
-"""A map's surface may be this far from the mesh's: all surfaces of one brain are nearer, but where they are cut."""
+"""A map's surface may be this far from the mesh's: all surfaces of one brain are
+nearer, but where they are cut."""
 NEIGHBOURS = 8
 TIE = 1e-9
 """Relative difference below which two distances count as equal."""
 
 
 def vertex_map_on_mesh(
-    mesh_vertices_mm: Floats, pial_facets: Ints, surface: TriangleMesh, values: Floats, path: str | None = None
+    mesh_vertices_mm: Floats,
+    pial_facets: Ints,
+    surface: TriangleMesh,
+    values: Floats,
+    path: str | None = None,
 ) -> Floats:
     """Return a map on a surface as (n,) values at the vertices of a mesh.
 
-    Vertices on the mesh's surface, of `pial_facets` (f, 3), take the value at the nearest point of `surface`, linear in
-    its triangles; inner ones that of the nearest of these vertices, ties going to smaller coordinates. All is in the
-    mesh's coordinates. InputError, with the `path`, where a twentieth of the mesh's surface is more than 5 mm from the
-    map's.
+    Vertices on the mesh's surface, of `pial_facets` (f, 3), take the value at the
+    nearest point of `surface`, linear in its triangles; inner ones that of the nearest
+    of these vertices, ties going to smaller coordinates. All is in the mesh's
+    coordinates. InputError, with the `path`, where a twentieth of the mesh's surface is
+    more than 5 mm from the map's.
     """
     pial = np.unique(pial_facets)
     points = mesh_vertices_mm[pial]
     surface = _solid(surface)
     distance, faces, nearest = nearest_on(points, surface)
     far = float(np.quantile(distance, QUANTILE))
-    log.info("the surface of %s is %.2f mm from the mesh's (median; 95 %%: %.2f mm)", path, np.median(distance), far)
+    log.info(
+        "the surface of %s is %.2f mm from the mesh's (median; 95 %%: %.2f mm)",
+        path,
+        np.median(distance),
+        far,
+    )
     if far > FARTHEST_MM:
         problem = "the surface of a map lies far from that of the start brain's mesh"
-        found = f"{far:.1f} mm for a twentieth of the mesh's surface, {np.median(distance):.1f} mm for half of it"
-        raise InputError(problem, path=path, found=found, expected=f"at most {FARTHEST_MM:g} mm")
-    on_pial = np.einsum("ij,ij->i", barycentric(nearest, corners(surface)[faces]), values[surface.faces[faces]])
+        found = (
+            f"{far:.1f} mm for a twentieth of the mesh's surface,"
+            f" {np.median(distance):.1f} mm for half of it"
+        )
+        raise InputError(
+            problem, path=path, found=found, expected=f"at most {FARTHEST_MM:g} mm"
+        )
+    on_pial = np.einsum(
+        "ij,ij->i",
+        barycentric(nearest, corners(surface)[faces]),
+        values[surface.faces[faces]],
+    )
     mapped = on_pial[_nearest_vertices(mesh_vertices_mm, points)]
     mapped[pial] = on_pial
     return mapped
 
 
-def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike, path: str | None = None) -> Floats:
-    """Return a volume's (n,) values at the vertices of a mesh, linear between the centres of voxels.
+def volume_map_on_mesh(
+    mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike, path: str | None = None
+) -> Floats:
+    """Return a volume's (n,) values at the vertices of a mesh, linear between the
+    centres of voxels.
 
-    `data` are (i, j, k), `affine` (4, 4) leads to the mesh's coordinates. InputError, with the volume's `path`, if
-    vertices lie outside it, or between voxels with NaN or infinite values.
+    `data` are (i, j, k), `affine` (4, 4) leads to the mesh's coordinates. InputError,
+    with the volume's `path`, if vertices lie outside it, or between voxels with NaN or
+    infinite values.
     """
     matrix = np.asarray(affine, dtype=float)
     index = np.linalg.solve(matrix[:3, :3], (mesh_vertices_mm - matrix[:3, 3]).T).T
@@ -61,37 +93,71 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     outside = np.linalg.norm((index - covered) @ matrix[:3, :3].T, axis=1)
     expected = f"values at all {len(index)} vertices of the start brain's mesh"
     if (outside > 0).any():
-        found = f"{int((outside > 0).sum())} vertices outside it, by up to {outside.max():.1f} mm"
-        raise InputError("a map's volume does not cover the start brain", path=path, found=found, expected=expected)
+        found = (
+            f"{int((outside > 0).sum())} vertices outside it, by up to"
+            f" {outside.max():.1f} mm"
+        )
+        raise InputError(
+            "a map's volume does not cover the start brain",
+            path=path,
+            found=found,
+            expected=expected,
+        )
     values = map_coordinates(data, index.T, order=1, mode="nearest")
     undefined = ~np.isfinite(values)
     if undefined.any():
         problem = "a map has no number in parts of the start brain"
         found = f"{int(undefined.sum())} vertices at voxels that are NaN or infinite"
-        remedy = "Fill these voxels, and a voxel or two around the brain, for example with the nearest values."
-        raise InputError(problem, path=path, found=found, expected=expected, remedy=remedy)
+        remedy = (
+            "Fill these voxels, and a voxel or two around the brain, for example with"
+            " the nearest values."
+        )
+        raise InputError(
+            problem, path=path, found=found, expected=expected, remedy=remedy
+        )
     return values
 
 
 def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:
-    """Raise InputError where (n,) values of a map are not within the bounds (gt, ge, le) of its parameter."""
+    """Raise InputError where (n,) values of a map are not within the bounds (gt, ge,
+    le) of its parameter."""
     holds = {"gt": np.greater, "ge": np.greater_equal, "le": np.less_equal}
     signs = {"gt": ">", "ge": "≥", "le": "≤"}
-    outside = ~np.logical_and.reduce([holds[name](values, bound) for name, bound in bounds.items()])
+    outside = ~np.logical_and.reduce(
+        [holds[name](values, bound) for name, bound in bounds.items()]
+    )
     if outside.any():
         wrong = values[outside]
-        found = f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to {wrong.max():g}"
-        expected = " and ".join(f"{signs[name]} {bound:g}" for name, bound in bounds.items())
-        raise InputError("holds values that the parameter cannot have", path=path, found=found, expected=expected)
+        found = (
+            f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to"
+            f" {wrong.max():g}"
+        )
+        expected = " and ".join(
+            f"{signs[name]} {bound:g}" for name, bound in bounds.items()
+        )
+        raise InputError(
+            "holds values that the parameter cannot have",
+            path=path,
+            found=found,
+            expected=expected,
+        )
 
 
-def move_to_mesh(points: Floats, surface: TriangleMesh, pose: ArrayLike) -> TriangleMesh:
-    """Return the surface of a map where it is nearest to (k, 3) points on the mesh on average.
+def move_to_mesh(
+    points: Floats, surface: TriangleMesh, pose: ArrayLike
+) -> TriangleMesh:
+    """Return the surface of a map where it is nearest to (k, 3) points on the mesh on
+    average.
 
-    Surfaces of the input are moved like the brain, by its (4, 4) pose; those that gyriflow made have been already.
+    Surfaces of the input are moved like the brain, by its (4, 4) pose; those that
+    gyriflow made have been already.
     """
     moved = transformed(surface, pose)
-    return min(moved, surface, key=lambda candidate: nearest_on(points, _solid(candidate))[0].mean())
+    return min(
+        moved,
+        surface,
+        key=lambda candidate: nearest_on(points, _solid(candidate))[0].mean(),
+    )
 
 
 def _solid(surface: TriangleMesh) -> TriangleMesh:
@@ -100,7 +166,10 @@ def _solid(surface: TriangleMesh) -> TriangleMesh:
 
 def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:
     count = min(NEIGHBOURS, len(vertices))
-    gaps, candidates = (values.reshape(len(points), count) for values in cKDTree(vertices).query(points, k=count))
+    gaps, candidates = (
+        values.reshape(len(points), count)
+        for values in cKDTree(vertices).query(points, k=count)
+    )
     rank = np.empty(len(vertices), dtype=np.int64)
     rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
     tied = gaps <= gaps[:, :1] * (1 + TIE)

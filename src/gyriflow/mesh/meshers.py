@@ -1,6 +1,8 @@
-"""The meshers, each in a process of its own with a time limit: fTetWild (pytetwild) and TetGen (within libigl).
+"""The meshers, each in a process of its own with a time limit: fTetWild (pytetwild) and
+TetGen (within libigl).
 
-`python -m gyriflow.mesh.meshers NAME` is that process: arrays come in on standard input and leave on standard output.
+`python -m gyriflow.mesh.meshers NAME` is that process: arrays come in on standard input
+and leave on standard output.
 """
 
 import io
@@ -21,22 +23,29 @@ from ..geometry.tetrahedra import TetrahedralMesh
 log = logging.getLogger(__name__)
 
 LAST_WORDS = 1000
-"""So many of the last characters that a mesher prints stand in the message of its failure; all of them are logged."""
+"""So many of the last characters that a mesher prints stand in the message of its
+failure; all of them are logged."""
 
 RADIUS_EDGE_RATIO = 1.3
-"""TetGen's bound on circumradius over shortest edge: from here on edges grow as fast as elements stay good."""
+"""TetGen's bound on circumradius over shortest edge: from here on edges grow as fast as
+elements stay good."""
 STOP_ENERGY = 50
-"""Largest AMIPS energy at which fTetWild stops improving elements before it sizes them, which improves them again; that
-of the regular element is 3."""
+"""Largest AMIPS energy at which fTetWild stops improving elements before it sizes them,
+which improves them again; that of the regular element is 3."""
 OPTIMISED_DEG = 140
-"""Dihedral angles beyond this are what TetGen improves last; with its own 165 slivers stay."""
+"""Dihedral angles beyond this are what TetGen improves last; with its own 165 slivers
+stay."""
 
 
-def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> TetrahedralMesh:
-    """Return the mesh that a mesher, "pytetwild" or "tetgen", makes in a process of its own; its lines are logged.
+def run_mesher(
+    name: str, arrays: Mapping[str, Any], time_limit_s: float
+) -> TetrahedralMesh:
+    """Return the mesh that a mesher, "pytetwild" or "tetgen", makes in a process of its
+    own; its lines are logged.
 
-    `arrays` are `vertices` (n, 3) and `faces` (m, 3) of the surface, and what the mesher needs besides. MeshError where
-    it is missing, dies or takes longer than `time_limit_s`, with its last words.
+    `arrays` are `vertices` (n, 3) and `faces` (m, 3) of the surface, and what the
+    mesher needs besides. MeshError where it is missing, dies or takes longer than
+    `time_limit_s`, with its last words.
     """
     sent = io.BytesIO()
     np.savez(sent, **arrays)
@@ -54,14 +63,19 @@ def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> Tet
         raise MeshError(
             f"the mesher {name} failed with exit code {code}",
             found=last or "no message",
-            remedy="A negative code is a signal: -9 means that memory ran out. A module that cannot be imported has "
-            "to be installed in the version of envs/requirements.txt.",
+            remedy=(
+                "A negative code is a signal: -9 means that memory ran out. A module"
+                " that cannot be imported has to be installed in the version of"
+                " envs/requirements.txt."
+            ),
         )
     with np.load(io.BytesIO(output)) as received:
         return TetrahedralMesh(received["vertices"], received["tets"])
 
 
-def _run(name: str, sent: bytes, folder: str, time_limit_s: float) -> tuple[int | None, bytes, list[str]]:
+def _run(
+    name: str, sent: bytes, folder: str, time_limit_s: float
+) -> tuple[int | None, bytes, list[str]]:
     words: list[str] = []
     reading, printing = os.pipe()
 
@@ -116,9 +130,12 @@ def _pytetwild(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 def _tetgen(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     from igl.copyleft import tetgen
 
-    # p: inside of the surface, Y: the surface as it is, q: quality, a: largest volume, o: last improvements
+    # p: inside of the surface, Y: the surface as it is, q: quality, a: largest volume,
+    # o: last improvements
     flags = f"pYq{RADIUS_EDGE_RATIO}a{float(arrays['volume']):.6f}o/{OPTIMISED_DEG}"
-    vertices, tets, *_ = tetgen.tetrahedralize(arrays["vertices"], arrays["faces"], flags=flags)
+    vertices, tets, *_ = tetgen.tetrahedralize(
+        arrays["vertices"], arrays["faces"], flags=flags
+    )
     return vertices, tets
 
 

@@ -1,6 +1,8 @@
-"""Quadratic elements whose outer nodes are moved onto the smooth surface, as far as elements stay sound.
+"""Quadratic elements whose outer nodes are moved onto the smooth surface, as far as
+elements stay sound.
 
-Facets are bumps of the size of an element, which grow with the cortex if nodes stay on the middles of edges.
+Facets are bumps of the size of an element, which grow with the cortex if nodes stay on
+the middles of edges.
 """
 
 import logging
@@ -12,7 +14,14 @@ from ..geometry import tetrahedra
 from ..geometry.jacobians import coefficients
 from ..geometry.matching import MIN_NORMAL_COSINE, faces_that_cross, nearest_on
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..geometry.triangles import Floats, Mask, TriangleMesh, edges, face_normals, vertex_normals
+from ..geometry.triangles import (
+    Floats,
+    Mask,
+    TriangleMesh,
+    edges,
+    face_normals,
+    vertex_normals,
+)
 from .quality import jacobian_ratios
 
 log = logging.getLogger(__name__)
@@ -27,16 +36,19 @@ WORSE = 0.5
 
 
 def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
-    """Return a linear mesh as quadratic elements whose outer nodes lie on a smooth surface (mm) where they can.
+    """Return a linear mesh as quadratic elements whose outer nodes lie on a smooth
+    surface (mm) where they can.
 
-    Corners move first, with straight sides; then nodes on the middles of outer edges. Where an element would become
-    unsound, or the surface cross itself, moves are halved and then given up.
+    Corners move first, with straight sides; then nodes on the middles of outer edges.
+    Where an element would become unsound, or the surface cross itself, moves are halved
+    and then given up.
     """
     before = tetrahedra.radius_ratios(mesh)
 
     def spoilt(placed: TetrahedralMesh) -> Mask:
         return np.asarray(
-            (tetrahedra.signed_volumes(placed) <= 0) | (tetrahedra.radius_ratios(placed) < WORSE * before)
+            (tetrahedra.signed_volumes(placed) <= 0)
+            | (tetrahedra.radius_ratios(placed) < WORSE * before)
         )
 
     straight = tetrahedra.quadratic(_move(mesh, *_project(mesh, surface), spoilt)[0])
@@ -49,9 +61,14 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
 
     result, left = _move(straight, target, middles, unsound)
     log.info(
-        "quadratic elements: %d of %d nodes on middles of outer edges on the surface, least ratio of Jacobians %.2f",
+        "quadratic elements: %d of %d nodes on middles of outer edges on the surface,"
+        " least ratio of Jacobians %.2f",
         int(left.sum()),
-        int((np.unique(tetrahedra.boundary_faces(straight)[0]) >= len(mesh.vertices)).sum()),
+        int(
+            (
+                np.unique(tetrahedra.boundary_faces(straight)[0]) >= len(mesh.vertices)
+            ).sum()
+        ),
         jacobian_ratios(result).min(),
     )
     return result
@@ -65,7 +82,10 @@ def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask
     shortest = np.full(len(outer), np.inf)
     np.minimum.at(shortest, ends.ravel(), np.repeat(length, 2))
     # the wall of a sulcus may be nearer to a node than the place it comes from
-    agrees = np.einsum("ij,ij->i", vertex_normals(boundary), face_normals(surface)[face]) >= MIN_NORMAL_COSINE
+    agrees = (
+        np.einsum("ij,ij->i", vertex_normals(boundary), face_normals(surface)[face])
+        >= MIN_NORMAL_COSINE
+    )
     near = agrees & (distance <= FARTHEST * shortest)
     target, way = mesh.vertices.copy(), np.zeros(len(mesh.vertices), dtype=bool)
     target[outer[near]] = place[near]
@@ -74,7 +94,10 @@ def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask
 
 
 def _move(
-    mesh: TetrahedralMesh, target: Floats, way: Mask, unsound: Callable[[TetrahedralMesh], Mask]
+    mesh: TetrahedralMesh,
+    target: Floats,
+    way: Mask,
+    unsound: Callable[[TetrahedralMesh], Mask],
 ) -> tuple[TetrahedralMesh, Mask]:
     part = way.astype(float)
     triangles, _ = tetrahedra.boundary_faces(mesh)
@@ -82,9 +105,13 @@ def _move(
     faces = local.reshape(-1, 3)
     crossed = faces_that_cross(TriangleMesh(mesh.vertices[used], faces))
     for round_ in range(3 * HALVINGS):
-        placed = TetrahedralMesh(mesh.vertices + part[:, None] * (target - mesh.vertices), mesh.tets)
+        placed = TetrahedralMesh(
+            mesh.vertices + part[:, None] * (target - mesh.vertices), mesh.tets
+        )
         bad = mesh.tets[unsound(placed)].ravel()
-        new = np.setdiff1d(faces_that_cross(TriangleMesh(placed.vertices[used], faces)), crossed)
+        new = np.setdiff1d(
+            faces_that_cross(TriangleMesh(placed.vertices[used], faces)), crossed
+        )
         bad = np.unique(np.concatenate([bad, triangles[new].ravel()]))
         bad = bad[part[bad] > 0]
         if not len(bad):

@@ -1,4 +1,5 @@
-"""Quality of a mesh: shape of its elements, how well its surface and narrow gaps are kept, and limits."""
+"""Quality of a mesh: shape of its elements, how well its surface and narrow gaps are
+kept, and limits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ QUANTILE = 0.99
 GAP_MM = 3.0
 """Walls that face each other within this distance are those of a gap."""
 PARALLEL = -0.9
-"""Cosine between the normals of walls that face each other; less opposed ones meet at the bottom of a gap."""
+"""Cosine between the normals of walls that face each other; less opposed ones meet at
+the bottom of a gap."""
 OFF_MM = 1e-4
 """A ray starts so far above its own face."""
 STILL_OPEN = 0.5
@@ -29,16 +31,19 @@ STILL_OPEN = 0.5
 # in reverse, these are the opposite ones
 SIDES_OF_ELEMENT = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 MIN_JACOBIAN_RATIO = 0.1
-"""Least accepted Jacobian determinant of a quadratic element over its mean: 1 straight, 0 folded over."""
+"""Least accepted Jacobian determinant of a quadratic element over its mean: 1 straight,
+0 folded over."""
 MIN_GAP_KEPT = 0.95
-"""Least accepted part of the fissure and other gaps, by the area of their walls, that stays open."""
+"""Least accepted part of the fissure and other gaps, by the area of their walls, that
+stays open."""
 
 
 @dataclass(frozen=True, eq=False)
 class GapWalls:
     """Faces of a closed surface that face a parallel wall across a narrow gap.
 
-    The (g, 3) `middle` of the gap in mm, the face's `normal` and `area` (mm²), and the `width` (g,) to the wall in mm.
+    The (g, 3) `middle` of the gap in mm, the face's `normal` and `area` (mm²), and the
+    `width` (g,) to the wall in mm.
     """
 
     middle: Floats
@@ -50,8 +55,9 @@ class GapWalls:
 def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
     """Return how far two surfaces are from each other, in mm.
 
-    Within `hausdorff99` lies 99 % of either's area; `hausdorff` is the largest distance. Every face is sampled at the
-    centroids of its four parts, and for the largest distance at its corners.
+    Within `hausdorff99` lies 99 % of either's area; `hausdorff` is the largest
+    distance. Every face is sampled at the centroids of its four parts, and for the
+    largest distance at its corners.
     """
     ways = [_distances(mesh, target), _distances(target, mesh)]
     return {
@@ -61,33 +67,53 @@ def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
 
 
 def gap_walls(mesh: TriangleMesh) -> GapWalls:
-    """Return the walls of narrow gaps of a closed surface: rays from centroids meet parallel walls within 3 mm."""
+    """Return the walls of narrow gaps of a closed surface: rays from centroids meet
+    parallel walls within 3 mm."""
     normals = triangles.face_normals(mesh)
     start = triangles.corners(mesh).mean(axis=1) + OFF_MM * normals
     face, distance = _first_hits(mesh, start, normals)
     facing = face >= 0
-    facing[facing] = np.einsum("ij,ij->i", normals[facing], normals[face[facing]]) < PARALLEL
+    facing[facing] = (
+        np.einsum("ij,ij->i", normals[facing], normals[face[facing]]) < PARALLEL
+    )
     half = 0.5 * distance[facing, None] * normals[facing]
     return GapWalls(
-        start[facing] + half, normals[facing], OFF_MM + distance[facing], triangles.face_areas(mesh)[facing]
+        start[facing] + half,
+        normals[facing],
+        OFF_MM + distance[facing],
+        triangles.face_areas(mesh)[facing],
     )
 
 
 def gap_summary(walls: GapWalls) -> dict[str, float | None]:
-    """Return the area of gaps' walls, and below which widths in mm 1 % and half of it lies (None without a gap).
+    """Return the area of gaps' walls, and below which widths in mm 1 % and half of it
+    lies (None without a gap).
 
     The minimum is not given, since the width is 0 at the bottom of every gap.
     """
     widths: list[float | None] = [None, None]
     if len(walls.width):
-        widths = [*map(float, np.quantile(walls.width, [0.01, 0.5], weights=walls.area, method="inverted_cdf"))]
-    return {"percentile1": widths[0], "median": widths[1], "area_mm2": float(walls.area.sum())}
+        widths = [
+            *map(
+                float,
+                np.quantile(
+                    walls.width, [0.01, 0.5], weights=walls.area, method="inverted_cdf"
+                ),
+            )
+        ]
+    return {
+        "percentile1": widths[0],
+        "median": widths[1],
+        "area_mm2": float(walls.area.sum()),
+    }
 
 
 def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
-    """Return the share of the walls' area before which another surface leaves the gap open; None without a gap.
+    """Return the share of the walls' area before which another surface leaves the gap
+    open; None without a gap.
 
-    There its middle is outside the closed surface `mesh`, whose gap is at least half as wide.
+    There its middle is outside the closed surface `mesh`, whose gap is at least half as
+    wide.
     """
     if not len(walls.width):
         return None
@@ -97,52 +123,86 @@ def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
         face, distance = _first_hits(mesh, walls.middle, sign * walls.normal)
         width += np.where(face >= 0, distance, GAP_MM)
     outside = igl.fast_winding_number(mesh.vertices, mesh.faces, walls.middle) < 0.5
-    return float(walls.area[outside & (width >= STILL_OPEN * walls.width)].sum() / walls.area.sum())
+    return float(
+        walls.area[outside & (width >= STILL_OPEN * walls.width)].sum()
+        / walls.area.sum()
+    )
 
 
-def _first_hits(mesh: TriangleMesh, start: Floats, direction: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _first_hits(
+    mesh: TriangleMesh, start: Floats, direction: Floats
+) -> tuple[NDArray[np.int64], Floats]:
     rays = igl.embree.EmbreeIntersector()
-    rays.init(np.asfortranarray(mesh.vertices, dtype=np.float32), np.asfortranarray(mesh.faces, dtype=np.int32), True)
+    rays.init(
+        np.asfortranarray(mesh.vertices, dtype=np.float32),
+        np.asfortranarray(mesh.faces, dtype=np.int32),
+        True,
+    )
     hits = [
         rays.intersectRay_first(origin, towards, 0.0, GAP_MM)
-        for origin, towards in zip(start.astype(np.float32), direction.astype(np.float32), strict=True)
+        for origin, towards in zip(
+            start.astype(np.float32), direction.astype(np.float32), strict=True
+        )
     ]
-    return np.array([hit[0] for hit in hits], dtype=np.int64), np.array([hit[1] for hit in hits], dtype=np.float64)
+    return np.array([hit[0] for hit in hits], dtype=np.int64), np.array(
+        [hit[1] for hit in hits], dtype=np.float64
+    )
 
 
 def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats]:
     a, b, c = triangles.corners(mesh).transpose(1, 0, 2)
-    centroids = [(a + b + c) / 3, (4 * a + b + c) / 6, (a + 4 * b + c) / 6, (a + b + 4 * c) / 6]
+    centroids = [
+        (a + b + c) / 3,
+        (4 * a + b + c) / 6,
+        (a + 4 * b + c) / 6,
+        (a + b + 4 * c) / 6,
+    ]
     distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), target)
-    return distance, np.concatenate([np.tile(triangles.face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
+    return distance, np.concatenate(
+        [np.tile(triangles.face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))]
+    )
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Return (m,) lower bounds of elements' determinants over the mean: 1 straight, not positive if folded."""
+    """Return (m,) lower bounds of elements' determinants over the mean: 1 straight, not
+    positive if folded."""
     if mesh.order == 1:
         return np.ones(len(mesh.tets))
-    return lower_bounds(mesh.vertices, mesh.tets) / (6 * tetrahedra.signed_volumes(mesh))
+    return lower_bounds(mesh.vertices, mesh.tets) / (
+        6 * tetrahedra.signed_volumes(mesh)
+    )
 
 
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Return the (m, 6) angles in degrees between the faces at each edge, taken as flat between corners."""
+    """Return the (m, 6) angles in degrees between the faces at each edge, taken as flat
+    between corners."""
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
-    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, reversed(SIDES_OF_ELEMENT), strict=True)):
+    for i, ((a, b), (c, d)) in enumerate(
+        zip(SIDES_OF_ELEMENT, reversed(SIDES_OF_ELEMENT), strict=True)
+    ):
         edge = corner[:, b] - corner[:, a]
         first, second = (np.cross(edge, corner[:, k] - corner[:, a]) for k in (c, d))
         sine = np.linalg.norm(np.cross(first, second), axis=1)
-        angles[:, i] = np.degrees(np.arctan2(sine, np.einsum("ij,ij->i", first, second)))
+        angles[:, i] = np.degrees(
+            np.arctan2(sine, np.einsum("ij,ij->i", first, second))
+        )
     return angles
 
 
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
-    """Return counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
+    """Return counts, extreme and mean qualities, edge lengths and areas of a mesh,
+    ready for JSON.
 
-    `surface` is the one that was filled; distance, change of volume and gaps are relative to it (see `fidelity`).
-    Quadratic elements are measured on the triangles between nodes. `gap_kept` is None without gaps.
+    `surface` is the one that was filled; distance, change of volume and gaps are
+    relative to it (see `fidelity`). Quadratic elements are measured on the triangles
+    between nodes. `gap_kept` is None without gaps.
     """
-    ratios, angles, volumes = tetrahedra.radius_ratios(mesh), dihedral_angles(mesh), tetrahedra.signed_volumes(mesh)
+    ratios, angles, volumes = (
+        tetrahedra.radius_ratios(mesh),
+        dihedral_angles(mesh),
+        tetrahedra.signed_volumes(mesh),
+    )
     boundary, _ = tetrahedra.boundary_surface(mesh)
     walls = gap_walls(surface)
     return {
@@ -155,7 +215,10 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "smallest_pial_face_mm2": float(triangles.face_areas(boundary).min()),
         "crossing_faces": crossing_faces(boundary),
         "surface_distance_mm": fidelity(boundary, surface),
-        "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(boundary))},
+        "gap_mm": {
+            "input": gap_summary(walls),
+            "mesh": gap_summary(gap_walls(boundary)),
+        },
         "gap_kept": gap_kept(walls, boundary),
         "volume_mm3": float(volumes.sum()),
         "volume_change": float(volumes.sum() / triangles.signed_volume(surface) - 1),
@@ -178,9 +241,11 @@ def refuse_bad_mesh(
     max_surface_distance_mm: float,
     max_volume_change: float = 0.01,
 ) -> None:
-    """Raise MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
+    """Raise MeshError where a mesh with this `quality_summary` passes one of the
+    limits, all of them named.
 
-    It has the number of bad elements and the worst place. `path` is where the mesh can be looked at.
+    It has the number of bad elements and the worst place. `path` is where the mesh can
+    be looked at.
     """
     faults = []
     for name, values, least in (
@@ -189,27 +254,59 @@ def refuse_bad_mesh(
     ):
         bad, worst = values < least, values.argmin()
         if bad.any():
-            place = np.round(mesh.vertices[mesh.corners[worst]].mean(axis=0), 1).tolist()
-            fault = f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at {place} mm"
+            place = np.round(
+                mesh.vertices[mesh.corners[worst]].mean(axis=0), 1
+            ).tolist()
+            fault = (
+                f"{int(bad.sum())} of {len(bad)} elements with {name} to"
+                f" {values[worst]:.4g} at {place} mm"
+            )
             faults.append((fault, f"{name} at least {least:g}"))
-    change, distance = summary["volume_change"], summary["surface_distance_mm"]["hausdorff99"]
+    change, distance = (
+        summary["volume_change"],
+        summary["surface_distance_mm"]["hausdorff99"],
+    )
     if abs(change) > max_volume_change:
-        fault = f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} % against the surface's"
+        fault = (
+            f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} %"
+            " against the surface's"
+        )
         faults.append((fault, f"at most {100 * max_volume_change:g} %"))
     if distance > max_surface_distance_mm:
-        fault = f"a surface {distance:.3f} mm from the one that was filled (99 % of it is nearer)"
-        faults.append((fault, f"at most {max_surface_distance_mm:g} mm (mesh.max_surface_distance_mm)"))
+        fault = (
+            f"a surface {distance:.3f} mm from the one that was filled (99 % of it is"
+            " nearer)"
+        )
+        faults.append(
+            (
+                fault,
+                (
+                    f"at most {max_surface_distance_mm:g} mm"
+                    " (mesh.max_surface_distance_mm)"
+                ),
+            )
+        )
     if summary["gap_kept"] is not None and summary["gap_kept"] < MIN_GAP_KEPT:
-        fault = f"narrow gaps, such as the fissure, open along {100 * summary['gap_kept']:.0f} % of their walls"
+        fault = (
+            "narrow gaps, such as the fissure, open along"
+            f" {100 * summary['gap_kept']:.0f} % of their walls"
+        )
         faults.append((fault, f"at least {100 * MIN_GAP_KEPT:g} %"))
     if summary["crossing_faces"]:
-        faults.append((f"{summary['crossing_faces']} faces of its surface that cross others", "none that cross"))
+        faults.append(
+            (
+                f"{summary['crossing_faces']} faces of its surface that cross others",
+                "none that cross",
+            )
+        )
     if faults:
         raise MeshError(
             "the mesh is not good enough",
             path=path,
             found="; ".join(fault for fault, _ in faults),
             expected="; ".join(expected for _, expected in faults),
-            remedy="Mesh with another mesh.envelope_mm, other edge lengths or another mesh.mesher, or lower the gates "
-            "of mesh.",
+            remedy=(
+                "Mesh with another mesh.envelope_mm, other edge lengths or another"
+                " mesh.mesher, or lower the gates of mesh."
+            ),
         )

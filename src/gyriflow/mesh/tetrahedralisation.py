@@ -1,4 +1,5 @@
-"""Fill a closed surface with tetrahedra of given sizes, and refuse a mesh that does not match its inside."""
+"""Fill a closed surface with tetrahedra of given sizes, and refuse a mesh that does not
+match its inside."""
 
 import logging
 from typing import Any
@@ -11,8 +12,20 @@ from scipy.spatial import cKDTree
 from ..errors import MeshError
 from ..geometry.matching import crossing_faces
 from ..geometry.remeshing import remesh, untangle
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, grid, signed_volumes
-from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
+from ..geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    grid,
+    signed_volumes,
+)
+from ..geometry.triangles import (
+    TriangleMesh,
+    edges,
+    euler_number,
+    face_components,
+    is_closed,
+    signed_volume,
+)
 from ..settings.terms import Mesher
 from .improvement import improve_flat_elements
 from .meshers import run_mesher
@@ -26,15 +39,20 @@ FINE_DEPTH_EDGES = 2.5
 EDGE_GROWTH = 0.5
 """... and grow by this part of each mm below."""
 OTHER_VOLUME = 0.05
-"""A mesh whose volume differs by more than this part is that of another shape; nearer ones are left to the gates."""
+"""A mesh whose volume differs by more than this part is that of another shape; nearer
+ones are left to the gates."""
 REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 """Volume of the regular tetrahedron, in edges cubed."""
 
 
 def edge_length_at(
-    depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, order: int = 1
+    depth: NDArray[np.float64],
+    surface_edge_mm: float,
+    core_edge_mm: float,
+    order: int = 1,
 ) -> NDArray[np.float64]:
-    """Return edge lengths in mm of elements at depths in mm; deep down, nodes of both orders have the same distance."""
+    """Return edge lengths in mm of elements at depths in mm; deep down, nodes of both
+    orders have the same distance."""
     below = np.maximum(depth - FINE_DEPTH_EDGES / order * surface_edge_mm, 0.0)
     return np.minimum(surface_edge_mm + order * EDGE_GROWTH * below, core_edge_mm)
 
@@ -42,16 +60,29 @@ def edge_length_at(
 def background_mesh(
     surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
-    """Return a regular tetrahedral grid over the inside of the surface and the edge lengths in mm at its vertices.
+    """Return a regular tetrahedral grid over the inside of the surface and the edge
+    lengths in mm at its vertices.
 
-    fTetWild also fills the box around it with elements as long as those of the core, which are removed in the end.
+    fTetWild also fills the box around it with elements as long as those of the core,
+    which are removed in the end.
     """
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
-    counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
-    background = grid([start + spacing * np.arange(count) for start, count in zip(low, counts, strict=True)])
+    counts = (
+        np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int)
+        + 1
+    )
+    background = grid(
+        [
+            start + spacing * np.arange(count)
+            for start, count in zip(low, counts, strict=True)
+        ]
+    )
     depth = cKDTree(surface.vertices).query(background.vertices)[0]
-    inside = igl.fast_winding_number(surface.vertices, surface.faces, background.vertices) > 0.5
+    inside = (
+        igl.fast_winding_number(surface.vertices, surface.faces, background.vertices)
+        > 0.5
+    )
     near = background.tets[(inside | (depth < spacing))[background.tets].any(axis=1)]
     lengths = edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
     return TetrahedralMesh(background.vertices, near), lengths
@@ -67,13 +98,16 @@ def tetrahedralise(
     mesher: Mesher = "pytetwild",
     order: int = 1,
 ) -> TetrahedralMesh:
-    """Return a tetrahedral mesh of the inside of a closed, outward surface in mm, of one or more components.
+    """Return a tetrahedral mesh of the inside of a closed, outward surface in mm, of
+    one or more components.
 
-    `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the surface and deep inside, for linear
-    elements (`order` 1) and quadratic ones (2), which are curved to follow the surface. "pytetwild" (fTetWild) makes a
-    surface within `envelope_mm`, and sizes elements by depth; "tetgen" keeps the remeshed surface exactly, and elements
-    grow from it as fast as their quality allows. MeshError where the surface is open or inside out, the mesher fails or
-    takes longer than `time_limit_s`, or its mesh is not the inside of the surface.
+    `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the
+    surface and deep inside, for linear elements (`order` 1) and quadratic ones (2),
+    which are curved to follow the surface. "pytetwild" (fTetWild) makes a surface
+    within `envelope_mm`, and sizes elements by depth; "tetgen" keeps the remeshed
+    surface exactly, and elements grow from it as fast as their quality allows.
+    MeshError where the surface is open or inside out, the mesher fails or takes longer
+    than `time_limit_s`, or its mesh is not the inside of the surface.
     """
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
@@ -83,7 +117,11 @@ def tetrahedralise(
     arrays: dict[str, Any]
     if mesher == "tetgen":
         even = even_surface(surface, edge)
-        arrays = {"vertices": even.vertices, "faces": even.faces, "volume": REGULAR_VOLUME * core**3}
+        arrays = {
+            "vertices": even.vertices,
+            "faces": even.faces,
+            "volume": REGULAR_VOLUME * core**3,
+        }
     else:
         background, lengths = background_mesh(surface, edge, core, order)
         arrays = {
@@ -93,7 +131,9 @@ def tetrahedralise(
             "bg_tets": background.tets,
             "bg_values": lengths,
             "edge": core,
-            "epsilon": envelope_mm / float(np.linalg.norm(np.ptp(surface.vertices, axis=0))),
+            "epsilon": (
+                envelope_mm / float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+            ),
         }
     mesh = improve_flat_elements(run_mesher(mesher, arrays, time_limit_s))
     _refuse_other_shape(mesh, surface)
@@ -101,17 +141,26 @@ def tetrahedralise(
 
 
 def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
-    """Remesh a surface with even triangles, fit to bound a mesh as it is; MeshError where it cuts itself."""
+    """Remesh a surface with even triangles, fit to bound a mesh as it is; MeshError
+    where it cuts itself."""
     even = remesh(surface, edge_mm)
     crossing = crossing_faces(even)
     if crossing:
         even, _, _ = untangle(even)
         crossing = crossing_faces(even)
-    log.info("surface remeshed to %d faces, edges of %.3f mm, %d faces cross", len(even.faces), edge_mm, crossing)
+    log.info(
+        "surface remeshed to %d faces, edges of %.3f mm, %d faces cross",
+        len(even.faces),
+        edge_mm,
+        crossing,
+    )
     if crossing:
         raise MeshError(
             "the surface cuts itself and cannot be kept as it is",
-            found=f"{crossing} faces that cross others after remeshing to edges of {edge_mm:.2f} mm",
+            found=(
+                f"{crossing} faces that cross others after remeshing to edges of"
+                f" {edge_mm:.2f} mm"
+            ),
             expected="none",
         )
     return even
@@ -133,4 +182,6 @@ def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
         f"Euler number {euler[0]} instead of {euler[1]}": euler[0] != euler[1],
     }
     if faults := [text for text, wrong in problems.items() if wrong]:
-        raise MeshError("the mesh is not the inside of the surface", found="; ".join(faults))
+        raise MeshError(
+            "the mesh is not the inside of the surface", found="; ".join(faults)
+        )

@@ -1,1 +1,2 @@
-"""Metrics of folding: curvature, spectrum, gyrification, displacement, and distance between surfaces."""
+"""Metrics of folding: curvature, spectrum, gyrification, displacement, and distance
+between surfaces."""

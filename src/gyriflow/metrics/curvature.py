@@ -1,4 +1,5 @@
-"""Curvature of triangle surfaces, from quadrics fitted round each vertex, and its integrals over a surface.
+"""Curvature of triangle surfaces, from quadrics fitted round each vertex, and its
+integrals over a surface.
 
 Normals are outward, so that gyri are positive and sulci negative.
 """
@@ -13,33 +14,50 @@ from scipy import sparse
 from scipy.special import jv
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, Ints, TriangleMesh, edges, mean_edge_length, unit, vertex_areas, vertex_normals
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    edges,
+    mean_edge_length,
+    unit,
+    vertex_areas,
+    vertex_normals,
+)
 from ..settings.terms import CURVATURE_RADIUS_MM
 
 RESOLVED_RADII = 4.0
-"""The shortest wavelength of folds that count as resolved, in radii. ∫ H² is short there by 3 % for folds a quarter as
-deep as long, by 21 % for shallow ones; by 17 and 43 % at 2.6 radii, by 58 and 74 % at 1.7."""
+"""The shortest wavelength of folds that count as resolved, in radii. ∫ H² is short
+there by 3 % for folds a quarter as deep as long, by 21 % for shallow ones; by 17 and 43
+% at 2.6 radii, by 58 and 74 % at 1.7."""
 
 log = logging.getLogger(__name__)
 EDGES_PER_RADIUS = 2.0
-"""Radius of the smallest ball in edges: with fewer neighbours a quadric follows the noise."""
+"""Radius of the smallest ball in edges: with fewer neighbours a quadric follows the
+noise."""
 NOT_MUCH_LARGER = 1.1
-"""A radius that is so many times larger than that asked for is used without a warning."""
+"""A radius that is so many times larger than that asked for is used without a
+warning."""
 MAX_FAILED_SHARE = 0.01
 CHUNK = 1024
-"""Vertices worked on at once: the arrays of their neighbours then stay in the processor's cache."""
+"""Vertices worked on at once: the arrays of their neighbours then stay in the
+processor's cache."""
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Shares of the area at which its distribution over mean curvature is given."""
 _POWERS = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0))
 _MONOMIALS = sorted({(a + c, b + d) for a, b in _POWERS for c, d in _POWERS})
-_NORMAL_EQUATIONS = np.array([[_MONOMIALS.index((a + c, b + d)) for a, b in _POWERS] for c, d in _POWERS])
+_NORMAL_EQUATIONS = np.array(
+    [[_MONOMIALS.index((a + c, b + d)) for a, b in _POWERS] for c, d in _POWERS]
+)
 
 
 class Curvature(NamedTuple):
-    """Curvature per vertex of a surface with n vertices, and the (n,) radius of the ball that each is fitted in.
+    """Curvature per vertex of a surface with n vertices, and the (n,) radius of the
+    ball that each is fitted in.
 
-    `maximum` and `minimum` (n,) are the principal curvatures κ1 ≥ κ2 in 1/mm, both 1/R on a sphere of radius R.
-    `reliable` (n,) is False where the ball reaches the boundary of an open surface, or no quadric could be fitted.
+    `maximum` and `minimum` (n,) are the principal curvatures κ1 ≥ κ2 in 1/mm, both 1/R
+    on a sphere of radius R. `reliable` (n,) is False where the ball reaches the
+    boundary of an open surface, or no quadric could be fitted.
     """
 
     maximum: Floats
@@ -59,141 +77,220 @@ class Curvature(NamedTuple):
 
     @property
     def shape_index(self) -> Floats:
-        """The (n,) shape index 2/π·atan2(κ1 + κ2, κ1 − κ2): −1 sulcal pit, 0 saddle, +1 gyral node.
+        """The (n,) shape index 2/π·atan2(κ1 + κ2, κ1 − κ2): −1 sulcal pit, 0 saddle, +1
+        gyral node.
 
         Koenderink and van Doorn 1992, with outward normals; 0 on a plane.
         """
-        return 2.0 / np.pi * np.arctan2(self.maximum + self.minimum, self.maximum - self.minimum)
+        return (
+            2.0
+            / np.pi
+            * np.arctan2(self.maximum + self.minimum, self.maximum - self.minimum)
+        )
 
     @property
     def curvedness(self) -> Floats:
-        """The (n,) curvedness √((κ1² + κ2²)/2) in 1/mm (Koenderink and van Doorn 1992)."""
+        """The (n,) curvedness √((κ1² + κ2²)/2) in 1/mm (Koenderink and van Doorn
+        1992)."""
         return np.sqrt(0.5 * (self.maximum**2 + self.minimum**2))
 
 
-def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> Curvature:
-    """Return the curvature from quadrics fitted to the surface within `radius_mm` of each vertex.
+def curvature(
+    mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM
+) -> Curvature:
+    """Return the curvature from quadrics fitted to the surface within `radius_mm` of
+    each vertex.
 
-    The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
-    curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
-    local edges are longer than half of `radius_mm`, the ball grows to two of them, with a warning if it is more than a
-    tenth larger. MeshError where a vertex in a hundred has no usable neighbourhood.
+    The quadric is a local height function with slope (Cazals and Pouget 2005 call it a
+    jet of degree 2); its principal curvatures are those at the vertex's foot. It need
+    not pass through the vertex, which averages noise out. Where the local edges are
+    longer than half of `radius_mm`, the ball grows to two of them, with a warning if it
+    is more than a tenth larger. MeshError where a vertex in a hundred has no usable
+    neighbourhood.
     """
     finest = EDGES_PER_RADIUS * mean_edge_length(mesh)
     if finest > NOT_MUCH_LARGER * radius_mm:
-        log.warning("the mesh is too coarse for curvature at a radius of %.3g mm: %.3g mm is used", radius_mm, finest)
+        log.warning(
+            "the mesh is too coarse for curvature at a radius of %.3g mm: %.3g mm is"
+            " used",
+            radius_mm,
+            finest,
+        )
     radii = np.maximum(radius_mm, EDGES_PER_RADIUS * _edge_lengths(mesh))
     coefficients, fitted, one_sided = _quadrics(mesh, radii)
     failed = int(np.count_nonzero(~fitted))
     if failed > MAX_FAILED_SHARE * len(mesh.vertices):
-        failures = f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood"
-        raise MeshError("no curvature can be fitted", found=failures, remedy="Repair or remesh the surface.")
+        failures = (
+            f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood"
+        )
+        raise MeshError(
+            "no curvature can be fitted",
+            found=failures,
+            remedy="Repair or remesh the surface.",
+        )
     a, b, c, d, e, _ = coefficients.T
-    # first and second fundamental form of the height function; outward normals make a cap negative
+    # first and second fundamental form of the height function; outward normals make a
+    # cap negative
     stretch = 1.0 + d**2 + e**2
     mean = -((1.0 + e**2) * a - d * e * b + (1.0 + d**2) * c) / stretch**1.5
     gaussian = (4.0 * a * c - b**2) / stretch**2
     half_difference = np.sqrt(np.maximum(mean**2 - gaussian, 0.0))
-    return Curvature(mean + half_difference, mean - half_difference, fitted & ~one_sided, radii)
+    return Curvature(
+        mean + half_difference, mean - half_difference, fitted & ~one_sided, radii
+    )
 
 
 def kept_curvature(wavelength_mm: Floats, radius_mm: float) -> Floats:
-    """Return the share of its mean curvature that a shallow wave keeps in the quadric fit: 384 J₄(k)/k⁴, k = 2πr/λ.
+    """Return the share of its mean curvature that a shallow wave keeps in the quadric
+    fit: 384 J₄(k)/k⁴, k = 2πr/λ.
 
-    Exact for many vertices in the ball of radius r, and within 0.04 for the coarsest mesh, with two edges to a radius.
-    Folds whose depth is a quarter of their length keep more.
+    Exact for many vertices in the ball of radius r, and within 0.04 for the coarsest
+    mesh, with two edges to a radius. Folds whose depth is a quarter of their length
+    keep more.
     """
     k = np.maximum(2.0 * np.pi * radius_mm / np.asarray(wavelength_mm), 0.01)
     return np.asarray(384.0 * jv(4, k) / k**4)
 
 
 def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]:
-    """Return integrals over a surface with (n,) areas of the vertices in mm², |k₁| the larger principal curvature.
+    """Return integrals over a surface with (n,) areas of the vertices in mm², |k₁| the
+    larger principal curvature.
 
-    intrinsic_curvature_index is 1/4π ∫ max(K, 0) dA, 1 for all convex surfaces, and folding_index 1/4π ∫ |k₁|(|k₁| −
-    |k₂|) dA, 0 for a sphere (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102). mean_curvature_norm is the L² norm
-    1/4π ∫ H² dA and gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1 for a sphere (Batchelor et al.
-    2002, IEEE Trans. Med. Imaging 21, 953-965).
+    intrinsic_curvature_index is 1/4π ∫ max(K, 0) dA, 1 for all convex surfaces, and
+    folding_index 1/4π ∫ |k₁|(|k₁| − |k₂|) dA, 0 for a sphere (Van Essen and Drury 1997,
+    J. Neurosci. 17, 7079-7102). mean_curvature_norm is the L² norm 1/4π ∫ H² dA and
+    gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1 for a sphere
+    (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
     """
     smaller, larger = np.sort(np.abs([curvature.maximum, curvature.minimum]), axis=0)
     integrals = {
         "intrinsic_curvature_index": np.maximum(curvature.gaussian, 0.0) @ areas,
         "folding_index": (larger * (larger - smaller)) @ areas,
         "mean_curvature_norm": curvature.mean**2 @ areas,
-        "gaussian_curvature_norm": np.sqrt(areas.sum() * (curvature.gaussian**2 @ areas)),
+        "gaussian_curvature_norm": np.sqrt(
+            areas.sum() * (curvature.gaussian**2 @ areas)
+        ),
     }
     return {name: float(value) / (4.0 * np.pi) for name, value in integrals.items()}
 
 
 def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, float]:
-    """Return the mean curvatures in 1/mm below which 5, 25, 50, 75 and 95 % of the area are, by name."""
-    values = np.quantile(curvature.mean, QUANTILES, weights=areas, method="inverted_cdf")
+    """Return the mean curvatures in 1/mm below which 5, 25, 50, 75 and 95 % of the area
+    are, by name."""
+    values = np.quantile(
+        curvature.mean, QUANTILES, weights=areas, method="inverted_cdf"
+    )
     names = (f"mean_curvature_q{round(100 * share):02d}" for share in QUANTILES)
     return dict(zip(names, map(float, values), strict=True))
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
     pairs, _ = edges(mesh)
-    lengths = np.repeat(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2)
+    lengths = np.repeat(
+        np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2
+    )
     size = len(mesh.vertices)
-    return np.bincount(pairs.ravel(), lengths, size) / np.maximum(np.bincount(pairs.ravel(), minlength=size), 1)
+    return np.bincount(pairs.ravel(), lengths, size) / np.maximum(
+        np.bincount(pairs.ravel(), minlength=size), 1
+    )
 
 
-def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return quadrics over the tangent planes of n vertices, by weighted least squares in a ball round each.
+def _quadrics(
+    mesh: TriangleMesh, radii_mm: Floats
+) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return quadrics over the tangent planes of n vertices, by weighted least squares
+    in a ball round each.
 
-    The ball contains the vertices that edges inside it link to its centre, so not the other wall of a sulcus. The
-    weight is area × cosine × (1 − d²/radius²). The area of the vertex is projected onto the tangent plane: the sum is
-    like an integral and does not depend on the mesh. The weight falls to zero at the rim, and vertices whose normal
-    differs by more than 90° do not count. The tangent plane is that of the weighted mean of the normals.
+    The ball contains the vertices that edges inside it link to its centre, so not the
+    other wall of a sulcus. The weight is area × cosine × (1 − d²/radius²). The area of
+    the vertex is projected onto the tangent plane: the sum is like an integral and does
+    not depend on the mesh. The weight falls to zero at the rim, and vertices whose
+    normal differs by more than 90° do not count. The tangent plane is that of the
+    weighted mean of the normals.
 
-    Returns the (n, 6) coefficients of z = a x² + b x y + c y² + d x + e y + f in mm, z along the outward normal, 0
-    where nothing could be fitted; whether (n,) the neighbours determine a quadric; and whether (n,) the ball holds a
-    vertex of the boundary of an open surface.
+    Returns the (n, 6) coefficients of z = a x² + b x y + c y² + d x + e y + f in mm, z
+    along the outward normal, 0 where nothing could be fitted; whether (n,) the
+    neighbours determine a quadric; and whether (n,) the ball holds a vertex of the
+    boundary of an open surface.
     """
     (pairs, uses), size = edges(mesh), len(mesh.vertices)
-    both = np.concatenate([pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)])
-    links = sparse.csr_matrix((np.ones(len(both), dtype=bool), both.T), shape=(size, size))
+    both = np.concatenate(
+        [pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)]
+    )
+    links = sparse.csr_matrix(
+        (np.ones(len(both), dtype=bool), both.T), shape=(size, size)
+    )
     boundary = np.isin(np.arange(size), pairs[uses == 1])
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)
     fits = [
-        (*_fit(mesh.vertices, normals, areas, radii_mm, centres, balls), balls @ boundary)
+        (
+            *_fit(mesh.vertices, normals, areas, radii_mm, centres, balls),
+            balls @ boundary,
+        )
         for centres, balls in _balls(mesh.vertices, radii_mm, links)
     ]
-    coefficients, fitted, one_sided = (np.concatenate(parts) for parts in zip(*fits, strict=True))
+    coefficients, fitted, one_sided = (
+        np.concatenate(parts) for parts in zip(*fits, strict=True)
+    )
     return coefficients, fitted, one_sided
 
 
-def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
+def _balls(
+    vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix
+) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
     for start in range(0, len(vertices), CHUNK):
         centres = np.arange(start, min(start + CHUNK, len(vertices)))
         reached = np.zeros((len(centres), len(vertices)), dtype=bool)
-        found, ring = [], sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr")
+        found, ring = (
+            [],
+            sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr"),
+        )
         while ring.nnz:
-            row, column = np.repeat(np.arange(len(centres)), np.diff(ring.indptr)), ring.indices
+            row, column = (
+                np.repeat(np.arange(len(centres)), np.diff(ring.indptr)),
+                ring.indices,
+            )
             offset = vertices[column] - vertices[centres[row]]
-            is_new = ~reached[row, column] & (np.einsum("ij,ij->i", offset, offset) < radii_mm[centres[row]] ** 2)
+            is_new = ~reached[row, column] & (
+                np.einsum("ij,ij->i", offset, offset) < radii_mm[centres[row]] ** 2
+            )
             row, column = row[is_new], column[is_new]
             reached[row, column] = True
             found.append((row, column))
-            ring = sparse.csr_matrix((np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape) @ links
+            ring = (
+                sparse.csr_matrix(
+                    (np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape
+                )
+                @ links
+            )
         row, column = np.concatenate(found, axis=1)
-        ball = sparse.csr_matrix((np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape)
+        ball = sparse.csr_matrix(
+            (np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape
+        )
         yield centres, ball
 
 
 def _fit(
-    vertices: Floats, normals: Floats, areas: Floats, radii_mm: Floats, centres: Ints, balls: sparse.csr_matrix
+    vertices: Floats,
+    normals: Floats,
+    areas: Floats,
+    radii_mm: Floats,
+    centres: Ints,
+    balls: sparse.csr_matrix,
 ) -> tuple[Floats, NDArray[np.bool_]]:
     near, starts, counts = balls.indices, balls.indptr[:-1], np.diff(balls.indptr)
     scale = np.repeat(radii_mm[centres], counts)
-    offset = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[:, None]
+    offset = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[
+        :, None
+    ]
     facing = normals[near]
     share = areas[near] * (1.0 - np.einsum("ij,ij->i", offset, offset))
 
     upright = normals[centres]
     for _ in range(2):
-        weights = share * np.maximum(np.einsum("ij,ij->i", facing, np.repeat(upright, counts, axis=0)), 0.0)
+        weights = share * np.maximum(
+            np.einsum("ij,ij->i", facing, np.repeat(upright, counts, axis=0)), 0.0
+        )
         upright = unit(np.add.reduceat(weights[:, None] * facing, starts))
     tangent = unit(np.cross(upright, np.eye(3)[np.abs(upright).argmin(axis=1)]))
     frames = np.stack([tangent, np.cross(upright, tangent), upright], axis=1)
@@ -203,7 +300,10 @@ def _fit(
     for a, b in _MONOMIALS:
         if (a, b) not in powers:
             powers[a, b] = powers[a - 1, b] * x if a else powers[a, b - 1] * y
-    columns = [*(powers[key] for key in _MONOMIALS), *(powers[key] * z for key in _POWERS)]
+    columns = [
+        *(powers[key] for key in _MONOMIALS),
+        *(powers[key] * z for key in _POWERS),
+    ]
     sums = np.stack([np.add.reduceat(column, starts) for column in columns], axis=1)
     sums /= np.maximum(sums[:, [_MONOMIALS.index((0, 0))]], np.finfo(float).tiny)
 
@@ -211,7 +311,9 @@ def _fit(
     values = np.linalg.eigvalsh(matrices)
     fitted = values[:, 0] > 1e-9 * np.abs(values[:, -1])
     coefficients = np.zeros((len(centres), 6))
-    coefficients[fitted] = np.linalg.solve(matrices[fitted], right[fitted, :, None])[..., 0]
+    coefficients[fitted] = np.linalg.solve(matrices[fitted], right[fitted, :, None])[
+        ..., 0
+    ]
     # back from units of the radius
     coefficients *= radii_mm[centres, None] ** np.array([-1, -1, -1, 0, 0, 1])
     return coefficients, fitted

@@ -1,4 +1,5 @@
-"""Hull and envelope of pial surfaces, sulcal depth below the envelope, and gyrification indices."""
+"""Hull and envelope of pial surfaces, sulcal depth below the envelope, and gyrification
+indices."""
 
 from dataclasses import dataclass
 
@@ -12,84 +13,127 @@ from scipy.spatial import cKDTree
 from ..errors import MeshError
 from ..geometry.matching import nearest_on
 from ..geometry.remeshing import from_meshlab, in_meshlab, pymeshlab
-from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, face_normals, vertex_normals
+from ..geometry.triangles import (
+    Floats,
+    TriangleMesh,
+    area,
+    corners,
+    face_areas,
+    face_normals,
+    vertex_normals,
+)
 
 ENVELOPE_RADIUS_MM = 5.0
 """The envelope bridges sulci narrower than twice this radius."""
 ENVELOPE_OFFSET_MM = 0.1
 """Distance at which the envelope is first wrapped round the surface."""
 PIECE_MM = 2.0
-"""Size of the pieces that are classed as lying over the cut or over the pial surface."""
+"""Size of the pieces that are classed as lying over the cut or over the pial
+surface."""
 ABOVE_MM = 0.3
-"""Height above a piece at which the line into it begins: the envelope is in places below the surface."""
+"""Height above a piece at which the line into it begins: the envelope is in places
+below the surface."""
 LOCAL_RADIUS_MM = 10.0
-"""Radius of the patches of the local index: two of the widest sulci that the envelope bridges."""
+"""Radius of the patches of the local index: two of the widest sulci that the envelope
+bridges."""
 
 
 def cap(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the surface with every boundary closed, the faces that close it after its own.
+    """Return the surface with every boundary closed, the faces that close it after its
+    own.
 
-    Each boundary gets a fan of faces from its centroid. A cut in a plane is closed by that part of the plane. A closed
-    surface is returned as it is. MeshError where a boundary is not a closed line.
+    Each boundary gets a fan of faces from its centroid. A cut in a plane is closed by
+    that part of the plane. A closed surface is returned as it is. MeshError where a
+    boundary is not a closed line.
     """
     directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = len(mesh.vertices)
-    alone = ~np.isin(directed[:, 0] * size + directed[:, 1], directed[:, 1] * size + directed[:, 0])
+    alone = ~np.isin(
+        directed[:, 0] * size + directed[:, 1], directed[:, 1] * size + directed[:, 0]
+    )
     rim = directed[alone]
     if not len(rim):
         return mesh
-    if not np.array_equal(np.bincount(rim[:, 0], minlength=size), np.bincount(rim[:, 1], minlength=size)):
-        raise MeshError("the boundary of the surface is not made of closed lines", remedy="Repair the surface")
+    if not np.array_equal(
+        np.bincount(rim[:, 0], minlength=size), np.bincount(rim[:, 1], minlength=size)
+    ):
+        raise MeshError(
+            "the boundary of the surface is not made of closed lines",
+            remedy="Repair the surface",
+        )
     vertices, local = np.unique(rim, return_inverse=True)
     local = local.reshape(-1, 2)
-    links = sparse.coo_matrix((np.ones(len(rim)), (local[:, 0], local[:, 1])), shape=(len(vertices),) * 2)
+    links = sparse.coo_matrix(
+        (np.ones(len(rim)), (local[:, 0], local[:, 1])), shape=(len(vertices),) * 2
+    )
     number, label = connected_components(links, directed=False)
-    centres = np.stack([mesh.vertices[vertices[label == k]].mean(axis=0) for k in range(number)])
+    centres = np.stack(
+        [mesh.vertices[vertices[label == k]].mean(axis=0) for k in range(number)]
+    )
     fan = np.column_stack([rim[:, ::-1], size + label[local[:, 0]]])
-    return TriangleMesh(np.concatenate([mesh.vertices, centres]), np.concatenate([mesh.faces, fan]))
+    return TriangleMesh(
+        np.concatenate([mesh.vertices, centres]), np.concatenate([mesh.faces, fan])
+    )
 
 
 def envelope(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a closed surface that follows the outer folds and bridges sulci narrower than twice `ENVELOPE_RADIUS_MM`.
+    """Return a closed surface that follows the outer folds and bridges sulci narrower
+    than twice `ENVELOPE_RADIUS_MM`.
 
-    It is an alpha wrap (Portaneri et al. 2022, in pymeshlab) of the capped surface, moved back onto it by the offset
-    that the wrap needs. The area of a sphere comes out 0.3 % small.
+    It is an alpha wrap (Portaneri et al. 2022, in pymeshlab) of the capped surface,
+    moved back onto it by the offset that the wrap needs. The area of a sphere comes out
+    0.3 % small.
     """
     document = in_meshlab(cap(mesh))
-    alpha, offset = pymeshlab.PureValue(ENVELOPE_RADIUS_MM), pymeshlab.PureValue(ENVELOPE_OFFSET_MM)
+    alpha, offset = (
+        pymeshlab.PureValue(ENVELOPE_RADIUS_MM),
+        pymeshlab.PureValue(ENVELOPE_OFFSET_MM),
+    )
     document.generate_alpha_wrap(alpha=alpha, offset=offset)
     outside = from_meshlab(document)
-    return TriangleMesh(outside.vertices - ENVELOPE_OFFSET_MM * vertex_normals(outside), outside.faces)
+    return TriangleMesh(
+        outside.vertices - ENVELOPE_OFFSET_MM * vertex_normals(outside), outside.faces
+    )
 
 
 def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
-    """Return the (n,) straight distance in mm from each vertex outwards to the closed surface around; 0 outside it.
+    """Return the (n,) straight distance in mm from each vertex outwards to the closed
+    surface around; 0 outside it.
 
-    Around is the convex hull of the hemisphere: of the measures that were compared it is nearest to the
-    known depths of shapes, and does not jump when the lips of a fissure close.
+    Around is the convex hull of the hemisphere: of the measures that were compared it
+    is nearest to the known depths of shapes, and does not jump when the lips of a
+    fissure close.
     """
     signed, *_ = igl.signed_distance(
-        mesh.vertices, around.vertices, around.faces, igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+        mesh.vertices,
+        around.vertices,
+        around.faces,
+        igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
     )
     return np.maximum(-signed, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A surface around a pial surface in small pieces, without those over a cut: (k, 3) centres in mm, areas in mm²."""
+    """A surface around a pial surface in small pieces, without those over a cut: (k, 3)
+    centres in mm, areas in mm²."""
 
     centres: Floats
     areas: Floats
 
 
 def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
-    """Return a surface around `mesh` in pieces of 2 mm, without what lies over the cuts that `mesh` is open at.
+    """Return a surface around `mesh` in pieces of 2 mm, without what lies over the cuts
+    that `mesh` is open at.
 
-    A piece is left out where a line into it, along its normal, meets a cap first. The nearest point would be wrong near
-    the rim of a cut: a piece that spans a recess of the cut may be nearer to its banks, and one over the wall of a neck
-    nearer to the cut.
+    A piece is left out where a line into it, along its normal, meets a cap first. The
+    nearest point would be wrong near the rim of a cut: a piece that spans a recess of
+    the cut may be nearer to its banks, and one over the wall of a neck nearer to the
+    cut.
     """
-    vertices, faces = trimesh.remesh.subdivide_to_size(surface.vertices, surface.faces, PIECE_MM, max_iter=20)
+    vertices, faces = trimesh.remesh.subdivide_to_size(
+        surface.vertices, surface.faces, PIECE_MM, max_iter=20
+    )
     small = TriangleMesh(vertices, faces)
     centres, areas = corners(small).mean(axis=1), face_areas(small)
     closed = cap(mesh)
@@ -106,26 +150,34 @@ def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
 
 
 def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> float:
-    """Return the area of surfaces over that of the hulls or envelopes around them, cuts left out of both.
+    """Return the area of surfaces over that of the hulls or envelopes around them, cuts
+    left out of both.
 
-    The index of a brain is that of its two hemispheres, each in its own hull: a hull around both would bridge the
-    fissure between them and count it as folding.
+    The index of a brain is that of its two hemispheres, each in its own hull: a hull
+    around both would bridge the fissure between them and count it as folding.
     """
     return sum(map(area, meshes)) / sum(float(pieces.areas.sum()) for pieces in around)
 
 
 def local_gyrification_index(mesh: TriangleMesh, around: Pieces) -> Floats:
-    """Return the (n,) area of the pial surface over that of the envelope, round each vertex.
+    """Return the (n,) area of the pial surface over that of the envelope, round each
+    vertex.
 
-    As Schaer et al. 2008 (IEEE Trans. Med. Imaging 27, 161-170), a patch of the envelope, here all within
-    `LOCAL_RADIUS_MM` of the point nearest to the vertex, is compared with the part of the pial surface that is
-    nearest to that patch. Patches of 25 mm, as for adults, would hold half a fetal hemisphere.
+    As Schaer et al. 2008 (IEEE Trans. Med. Imaging 27, 161-170), a patch of the
+    envelope, here all within `LOCAL_RADIUS_MM` of the point nearest to the vertex, is
+    compared with the part of the pial surface that is nearest to that patch. Patches of
+    25 mm, as for adults, would hold half a fetal hemisphere.
     """
     tree = cKDTree(around.centres)
     _, home = tree.query(corners(mesh).mean(axis=1))
     pial = np.bincount(home, face_areas(mesh), len(around.centres))
     _, nearest = tree.query(mesh.vertices)
     used, back = np.unique(nearest, return_inverse=True)
-    near = tree.sparse_distance_matrix(cKDTree(around.centres[used]), LOCAL_RADIUS_MM, output_type="ndarray")
-    sums = [np.bincount(near["j"], values[near["i"]], len(used)) for values in (pial, around.areas)]
+    near = tree.sparse_distance_matrix(
+        cKDTree(around.centres[used]), LOCAL_RADIUS_MM, output_type="ndarray"
+    )
+    sums = [
+        np.bincount(near["j"], values[near["i"]], len(used))
+        for values in (pial, around.areas)
+    ]
     return (sums[0] / sums[1])[back]

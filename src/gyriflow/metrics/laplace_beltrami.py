@@ -1,4 +1,5 @@
-"""Modes of the Laplace-Beltrami operator of a triangle surface, K φ = λ M φ, with a count that none is missing."""
+"""Modes of the Laplace-Beltrami operator of a triangle surface, K φ = λ M φ, with a
+count that none is missing."""
 
 from dataclasses import dataclass
 
@@ -25,7 +26,8 @@ DENSE_VERTICES = 1000
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The lowest modes of a surface: (k,) ascending eigenvalues λ in mm⁻², the first 0, and (n, k) functions in mm⁻¹.
+    """The lowest modes of a surface: (k,) ascending eigenvalues λ in mm⁻², the first 0,
+    and (n, k) functions in mm⁻¹.
 
     The functions, as columns, are M-orthonormal: φᵢᵀ M φⱼ = δᵢⱼ.
     """
@@ -34,17 +36,23 @@ class Modes:
     functions: Floats
 
 
-def laplacian(mesh: TriangleMesh, mass: MassMatrix = "mean") -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
-    """Return the (n, n) stiffness K (no unit) and mass M (mm²) of linear finite elements.
+def laplacian(
+    mesh: TriangleMesh, mass: MassMatrix = "mean"
+) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
+    """Return the (n, n) stiffness K (no unit) and mass M (mm²) of linear finite
+    elements.
 
-    With the consistent mass matrix eigenvalues are too large by about (kh)²/12, for waves of number k on edges h; with
-    the lumped one too small by as much. Their `mean` cancels this (Ainsworth and Wajid 2010, SIAM J. Numer. Anal. 48,
-    346-371). `consistent` is as in LaPy. The boundary of an open surface is free (Neumann). MeshError where a vertex
-    has no face.
+    With the consistent mass matrix eigenvalues are too large by about (kh)²/12, for
+    waves of number k on edges h; with the lumped one too small by as much. Their `mean`
+    cancels this (Ainsworth and Wajid 2010, SIAM J. Numer. Anal. 48, 346-371).
+    `consistent` is as in LaPy. The boundary of an open surface is free (Neumann).
+    MeshError where a vertex has no face.
     """
     unused = len(mesh.vertices) - len(np.unique(mesh.faces))
     if unused:
-        raise MeshError("vertices without a face have no Laplacian", found=unused, expected=0)
+        raise MeshError(
+            "vertices without a face have no Laplacian", found=unused, expected=0
+        )
     stiffness = stiffness_matrix(mesh.vertices, mesh.faces)
     matrix = igl.massmatrix(mesh.vertices, mesh.faces, igl.MASSMATRIX_TYPE_FULL)
     if mass == "mean":
@@ -53,28 +61,54 @@ def laplacian(mesh: TriangleMesh, mass: MassMatrix = "mean") -> tuple[sparse.csc
 
 
 def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> float:
-    """Return λ1, the lowest eigenvalue above 0, in mm⁻²; MeshError where the surface is not in one piece."""
+    """Return λ1, the lowest eigenvalue above 0, in mm⁻²; MeshError where the surface is
+    not in one piece."""
     shift, size = -_spacing(mass), stiffness.shape[0]
-    inverse = LinearOperator((size, size), _factorised(stiffness, mass, shift).solve, dtype=np.float64)
+    inverse = LinearOperator(
+        (size, size), _factorised(stiffness, mass, shift).solve, dtype=np.float64
+    )
     start = np.random.default_rng(1).standard_normal(size)
-    values = eigsh(stiffness, 2, mass, sigma=shift, OPinv=inverse, v0=start, return_eigenvectors=False)
-    # the constant is the only mode at 0 of a connected surface; Weyl's spacing gives the scale
+    values = eigsh(
+        stiffness,
+        2,
+        mass,
+        sigma=shift,
+        OPinv=inverse,
+        v0=start,
+        return_eigenvectors=False,
+    )
+    # the constant is the only mode at 0 of a connected surface; Weyl's spacing gives
+    # the scale
     if values.max() < -1e-6 * shift:
-        raise MeshError("the surface is not in one piece", remedy="Remove all but its largest piece.")
+        raise MeshError(
+            "the surface is not in one piece",
+            remedy="Remove all but its largest piece.",
+        )
     return float(values.max())
 
 
-def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int) -> Modes:
-    """Return the `count` lowest modes of K φ = λ M φ, by `modes_below` a limit that has at least as many below it.
+def lowest_modes(
+    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int
+) -> Modes:
+    """Return the `count` lowest modes of K φ = λ M φ, by `modes_below` a limit that has
+    at least as many below it.
 
     SolverError for a count that the surface does not have, and where a mode is missed.
     """
     size = stiffness.shape[0]
     largest = size if size <= DENSE_VERTICES else size // 2
     if not 1 <= count <= largest:
-        raise SolverError("impossible number of modes", found=count, expected=f"1 to {largest} for {size} vertices")
+        raise SolverError(
+            "impossible number of modes",
+            found=count,
+            expected=f"1 to {largest} for {size} vertices",
+        )
     if size <= DENSE_VERTICES:
-        return Modes(*linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1)))
+        return Modes(
+            *linalg.eigh(
+                stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1)
+            )
+        )
     needed, top = count + 2, (count + 6) * _spacing(mass)
     while (most := count_below(stiffness, mass, top)) < count:
         top *= 1.01 * needed / max(most, needed // 4)
@@ -82,12 +116,18 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     return Modes(modes.eigenvalues[:count], modes.functions[:, :count])
 
 
-def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float, count: int | None = None) -> Modes:
+def modes_below(
+    stiffness: sparse.csc_matrix,
+    mass: sparse.csc_matrix,
+    value: float,
+    count: int | None = None,
+) -> Modes:
     """Return all modes of K φ = λ M φ with λ below `value` (mm⁻²).
 
-    Spectrum slicing with shift and invert: the inertia of K − λM at the ends of a slice gives the number of its
-    eigenvalues, so that none can be missed (Grimes, Lewis and Simon 1994, SIAM J. Matrix Anal. Appl. 15, 228-272).
-    `count` is that of `count_below`, if known. SolverError where a mode is missed.
+    Spectrum slicing with shift and invert: the inertia of K − λM at the ends of a slice
+    gives the number of its eigenvalues, so that none can be missed (Grimes, Lewis and
+    Simon 1994, SIAM J. Matrix Anal. Appl. 15, 228-272). `count` is that of
+    `count_below`, if known. SolverError where a mode is missed.
     """
     if count is None:
         count = count_below(stiffness, mass, value)
@@ -106,16 +146,27 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
     for i in range(n_slices):
         low, high = ends[i], ends[i + 1]
         try:
-            slices.append(_modes_between(stiffness, mass, low, high, counts[i + 1] - counts[i]))
+            slices.append(
+                _modes_between(stiffness, mass, low, high, counts[i + 1] - counts[i])
+            )
         except (linalg.LinAlgError, RuntimeError) as error:
-            problem = f"the modes with λ from {low:g} to {high:g} mm⁻² could not be found"
+            problem = (
+                f"the modes with λ from {low:g} to {high:g} mm⁻² could not be found"
+            )
             raise SolverError(problem, found=str(error), remedy=SLIVERS) from error
     eigenvalues = np.concatenate([modes.eigenvalues for modes in slices])
     return Modes(eigenvalues, np.hstack([modes.functions for modes in slices]))
 
 
-def _modes_between(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: float, high: float, count: int) -> Modes:
-    """Return the `count` modes with low < λ < high, by block Lanczos with (K − σM)⁻¹ M and σ in the middle.
+def _modes_between(
+    stiffness: sparse.csc_matrix,
+    mass: sparse.csc_matrix,
+    low: float,
+    high: float,
+    count: int,
+) -> Modes:
+    """Return the `count` modes with low < λ < high, by block Lanczos with (K − σM)⁻¹ M
+    and σ in the middle.
 
     SolverError where not all are found.
     """
@@ -127,7 +178,9 @@ def _modes_between(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: f
     # the operator in the basis: its upper triangle
     projected = np.zeros((max_vectors, max_vectors))
 
-    block, _ = _orthonormalised(np.random.default_rng(1).standard_normal((size, BLOCK)), mass)
+    block, _ = _orthonormalised(
+        np.random.default_rng(1).standard_normal((size, BLOCK)), mass
+    )
     next_check = 2 * count + 4 * BLOCK
     found = 0
     for used in range(BLOCK, max_vectors + 1, BLOCK):
@@ -153,7 +206,8 @@ def _modes_between(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: f
         if found == count == np.count_nonzero(is_inside):
             order = np.argsort(eigenvalues[is_inside])
             functions = basis[:, :used] @ vectors[:, is_inside][:, order]
-            # Rayleigh's quotient is more exact than 1/θ where the shift is near an eigenvalue
+            # Rayleigh's quotient is more exact than 1/θ where the shift is near an
+            # eigenvalue
             return Modes(np.sum(functions * (stiffness @ functions), axis=0), functions)
     problem = f"not all modes with λ from {low:g} to {high:g} mm⁻² were found"
     raise SolverError(problem, found=found, expected=count, remedy=SLIVERS)
@@ -170,8 +224,11 @@ def _spacing(mass: sparse.csc_matrix) -> float:
     return float(4.0 * np.pi / mass.sum())
 
 
-def _factorised(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: float) -> SuperLU:
-    # this order of columns is not SuperLU's own: its larger panels and relaxed supernodes take ten times as long
+def _factorised(
+    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: float
+) -> SuperLU:
+    # this order of columns is not SuperLU's own: its larger panels and relaxed
+    # supernodes take ten times as long
     return splu(
         sparse.csc_matrix(stiffness - shift * mass),
         permc_spec="MMD_AT_PLUS_A",
@@ -182,12 +239,19 @@ def _factorised(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: fl
     )
 
 
-def count_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> int:
-    """Return the number of eigenvalues below `value` (mm⁻²), from the inertia of K − value·M.
+def count_below(
+    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float
+) -> int:
+    """Return the number of eigenvalues below `value` (mm⁻²), from the inertia of K −
+    value·M.
 
-    With pivots on the diagonal, P(K − value·M)Pᵀ = L U with U = D Lᵀ, so D has the signs of the eigenvalues.
+    With pivots on the diagonal, P(K − value·M)Pᵀ = L U with U = D Lᵀ, so D has the
+    signs of the eigenvalues.
     """
     factors = _factorised(stiffness, mass, value)
     if not np.array_equal(factors.perm_r, factors.perm_c):
-        raise SolverError("no inertia: a pivot off the diagonal was taken", found=f"shift {value:g} mm⁻²")
+        raise SolverError(
+            "no inertia: a pivot off the diagonal was taken",
+            found=f"shift {value:g} mm⁻²",
+        )
     return int(np.count_nonzero(factors.U.diagonal() < 0))

@@ -1,4 +1,5 @@
-"""Norms of published curves and of measured brains over gestational weeks, and the scores of brains against them."""
+"""Norms of published curves and of measured brains over gestational weeks, and the
+scores of brains against them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,27 +21,41 @@ QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 WINDOW_GW = 0.5
 """Brains are scored up to this long before the norm's first week and after its last."""
 FEW_SUBJECTS, FEW_CENTILES = 30, (5.0, 95.0)
-"""With fewer subjects, centiles end at these, and norms without one of them are fitted again."""
+"""With fewer subjects, centiles end at these, and norms without one of them are fitted
+again."""
 MAX_ONE_STEP_Z = 1.5
-"""Other norms are fitted again without a subject that is beyond this z or has several scans; else it is removed by one
-Newton step."""
+"""Other norms are fitted again without a subject that is beyond this z or has several
+scans; else it is removed by one Newton step."""
 MIN_SPREAD = 1e-6
 """Smallest spread of a norm over its values for which there are scores."""
 CURVE_POINTS = 41
 """Number of points of a norm's curve."""
 OTHER_SIDES = "other hemispheres"
 """Flag of a brain whose hemispheres are not those of the reference brains."""
-SCORES = ("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "centile_high", "brains", "flag")
+SCORES = (
+    "expected",
+    "sd",
+    "z",
+    "z_low",
+    "z_high",
+    "centile",
+    "centile_low",
+    "centile_high",
+    "brains",
+    "flag",
+)
 """Columns of `measured_scores` that follow the value and its unit."""
 
 
 @dataclass(frozen=True)
 class PublishedNorm:
-    """A published curve: mean and standard deviation as polynomials of the week, highest power first.
+    """A published curve: mean and standard deviation as polynomials of the week,
+    highest power first.
 
-    It is valid from the first to the last of `weeks`. The volumes are those of `labels` of a label `scheme`, in
-    `subjects` brains (None if the source does not give their number). `tissue` is the closest field of `LabelScheme`
-    for brains of other schemes ("" if no field is close); `side` is the structure's hemisphere, None if it is in
+    It is valid from the first to the last of `weeks`. The volumes are those of `labels`
+    of a label `scheme`, in `subjects` brains (None if the source does not give their
+    number). `tissue` is the closest field of `LabelScheme` for brains of other schemes
+    ("" if no field is close); `side` is the structure's hemisphere, None if it is in
     both.
     """
 
@@ -57,13 +72,19 @@ class PublishedNorm:
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
     """Return the norms of a file of `norms/`, by structure."""
-    shared = {key: data[key] for key in ("weeks", "unit", "subjects", "scheme") if key in data}
-    return {name: PublishedNorm(**shared, **entry) for name, entry in data["structures"].items()}
+    shared = {
+        key: data[key] for key in ("weeks", "unit", "subjects", "scheme") if key in data
+    }
+    return {
+        name: PublishedNorm(**shared, **entry)
+        for name, entry in data["structures"].items()
+    }
 
 
 @dataclass(frozen=True)
 class LabelledBrain:
-    """A measured brain, the volume in mL of each of its labels, and the label scheme."""
+    """A measured brain, the volume in mL of each of its labels, and the label
+    scheme."""
 
     subject: str
     week: float
@@ -72,16 +93,21 @@ class LabelledBrain:
     volumes: Mapping[int, float]
 
 
-def published_scores(brain: LabelledBrain, norms: Mapping[str, PublishedNorm]) -> pd.DataFrame:
+def published_scores(
+    brain: LabelledBrain, norms: Mapping[str, PublishedNorm]
+) -> pd.DataFrame:
     """Return the scores of the volumes of a brain's structures against published norms.
 
-    With another label scheme than the norm's, a structure is the scheme's tissue that is closest to it, such as the
-    cortex. A structure without voxels, or without labels in the scheme, is left out.
+    With another label scheme than the norm's, a structure is the scheme's tissue that
+    is closest to it, such as the cortex. A structure without voxels, or without labels
+    in the scheme, is left out.
 
-    Columns subject, structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal
-    distribution, 0 to 100), brains (in the norm; NaN if its source does not give their number), flag ("ok"; "other
-    labels": the norm was measured with another label scheme; "outside the norm's weeks"; "one hemisphere" if the brain
-    lacks a hemisphere of the norm). Expected, z and centile are NaN with the last two flags.
+    Columns subject, structure, week, value, unit, expected, sd, z = (value −
+    expected)/sd, centile (of the normal distribution, 0 to 100), brains (in the norm;
+    NaN if its source does not give their number), flag ("ok"; "other labels": the norm
+    was measured with another label scheme; "outside the norm's weeks"; "one hemisphere"
+    if the brain lacks a hemisphere of the norm). Expected, z and centile are NaN with
+    the last two flags.
     """
     rows = []
     for name, norm in norms.items():
@@ -95,13 +121,38 @@ def published_scores(brain: LabelledBrain, norms: Mapping[str, PublishedNorm]) -
             flag = "one hemisphere"
         elif not norm.weeks[0] <= brain.week <= norm.weeks[1]:
             flag = "outside the norm's weeks"
-        row = {"structure": name, "value": value, "unit": norm.unit, "brains": norm.subjects, "flag": flag}
+        row = {
+            "structure": name,
+            "value": value,
+            "unit": norm.unit,
+            "brains": norm.subjects,
+            "flag": flag,
+        }
         if flag in {"ok", "other labels"}:
-            expected, sd = (float(np.polyval(np.array(curve), brain.week)) for curve in (norm.mean, norm.sd))
+            expected, sd = (
+                float(np.polyval(np.array(curve), brain.week))
+                for curve in (norm.mean, norm.sd)
+            )
             z = (value - expected) / sd
-            row |= {"expected": expected, "sd": sd, "z": z, "centile": 100 * stats.norm.cdf(z)}
+            row |= {
+                "expected": expected,
+                "sd": sd,
+                "z": z,
+                "centile": 100 * stats.norm.cdf(z),
+            }
         rows.append(row)
-    columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
+    columns = [
+        "structure",
+        "week",
+        "value",
+        "unit",
+        "expected",
+        "sd",
+        "z",
+        "centile",
+        "brains",
+        "flag",
+    ]
     table = pd.DataFrame(rows, columns=["subject", *columns]).astype({"brains": float})
     return table.assign(subject=brain.subject, week=brain.week)
 
@@ -114,11 +165,20 @@ def volume_tables(
     Columns subject, run ("real"), week, label, tissue, volume_mL.
     """
     rows = [
-        (brain.subject, MEASURED, brain.week, label, brain.scheme.labels.get(label, ""), volume)
+        (
+            brain.subject,
+            MEASURED,
+            brain.week,
+            label,
+            brain.scheme.labels.get(label, ""),
+            volume,
+        )
         for brain in brains
         for label, volume in brain.volumes.items()
     ]
-    scores = pd.concat([published_scores(brain, norms) for brain in brains], ignore_index=True)
+    scores = pd.concat(
+        [published_scores(brain, norms) for brain in brains], ignore_index=True
+    )
     return pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"]), scores
 
 
@@ -126,8 +186,9 @@ def volume_tables(
 class CohortNorms:
     """The norms of a cohort by hemisphere and metric, with their units.
 
-    `made_with` are the settings that the numbers depend on. If the brains are not `individuals` but averages, as in an
-    atlas, their scatter is not that of individuals.
+    `made_with` are the settings that the numbers depend on. If the brains are not
+    `individuals` but averages, as in an atlas, their scatter is not that of
+    individuals.
     """
 
     norms: Mapping[tuple[str, str], tuple[str, WeeklyNorm]]
@@ -135,7 +196,8 @@ class CohortNorms:
     made_with: Mapping[str, Any]
 
     def volumes_ml(self, weeks: Sequence[float]) -> Floats:
-        """Return the median volumes (k,) of whole brains in mL at weeks, NaN outside those of the norm."""
+        """Return the median volumes (k,) of whole brains in mL at weeks, NaN outside
+        those of the norm."""
         if ("whole", "volume") not in self.norms:
             return np.full(len(weeks), np.nan)
         norm, at = self.norms["whole", "volume"][1], np.asarray(weeks, dtype=float)
@@ -146,17 +208,30 @@ class CohortNorms:
     def plain(self) -> dict[str, Any]:
         """The norms as plain values for JSON."""
         keys = ("hemisphere", "metric", "unit")
-        rows = [dict(zip(keys, (*name, unit), strict=True)) | norm.plain for name, (unit, norm) in self.norms.items()]
+        rows = [
+            dict(zip(keys, (*name, unit), strict=True)) | norm.plain
+            for name, (unit, norm) in self.norms.items()
+        ]
         subjects = max((norm.subjects for _, norm in self.norms.values()), default=0)
         method = "LMS (Cole and Green 1992); sex and site are ignored"
-        facts = {"subjects": subjects, "individuals": self.individuals, "method": method}
+        facts = {
+            "subjects": subjects,
+            "individuals": self.individuals,
+            "method": method,
+        }
         return {**facts, "made_with": dict(self.made_with), "norms": rows}
 
 
 def cohort_from_plain(content: Mapping[str, Any]) -> CohortNorms:
     """Return the norms that `CohortNorms.plain` gives as plain values."""
     rows = [dict(row) for row in content["norms"]]
-    norms = {(row.pop("hemisphere"), row.pop("metric")): (row.pop("unit"), norm_from_plain(row)) for row in rows}
+    norms = {
+        (row.pop("hemisphere"), row.pop("metric")): (
+            row.pop("unit"),
+            norm_from_plain(row),
+        )
+        for row in rows
+    }
     return CohortNorms(norms, content["individuals"], content["made_with"])
 
 
@@ -169,9 +244,10 @@ def cohort_norms(
 ) -> CohortNorms:
     """Fit norms to the metrics of reference brains.
 
-    `metrics` has the columns subject (the brain), run, week, hemisphere, metric, value, unit, and person (the subject
-    scanned; may be absent if no one was scanned twice). All scans of a subject together have the weight of one.
-    Metrics with fewer subjects than `min_norm_subjects` have no norm.
+    `metrics` has the columns subject (the brain), run, week, hemisphere, metric, value,
+    unit, and person (the subject scanned; may be absent if no one was scanned twice).
+    All scans of a subject together have the weight of one. Metrics with fewer subjects
+    than `min_norm_subjects` have no norm.
     """
     norms = {}
     for name, brains in _by_metric(metrics, reference):
@@ -183,27 +259,45 @@ def cohort_norms(
 def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
     values = brains["value"].to_numpy(dtype=float)
     is_positive = not METRICS[metric].is_signed and bool((values > 0).all())
-    return fit_norm(brains["week"].to_numpy(float), values, brains["person"], is_positive=is_positive)
+    return fit_norm(
+        brains["week"].to_numpy(float),
+        values,
+        brains["person"],
+        is_positive=is_positive,
+    )
 
 
-def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms) -> pd.DataFrame:
-    """Return the scores of brains against the norms of reference brains, at each brain's own week.
+def measured_scores(
+    metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms
+) -> pd.DataFrame:
+    """Return the scores of brains against the norms of reference brains, at each
+    brain's own week.
 
-    A brain of the reference is compared with the other subjects. `reference` is empty for norms from a file.
+    A brain of the reference is compared with the other subjects. `reference` is empty
+    for norms from a file.
 
-    Columns subject, run, week, hemisphere, metric, value, unit, expected (median), sd (half the distance between z = −1
-    and 1), z and centile (0 to 100) as those of a new subject with the uncertainty of the norm, z_low, z_high,
-    centile_low, centile_high (90 % intervals of those in the population), brains (subjects of the norm), flag: "ok";
-    "few brains" (centiles end at 5 and 95); `SPREAD_UNKNOWN` (only expected is given); "outside the reference's weeks",
-    "too few brains", "other hemispheres" (than the reference), "not positive" (as all values of the norm are) or "no
-    spread" (of the norm), whose scores are NaN.
+    Columns subject, run, week, hemisphere, metric, value, unit, expected (median), sd
+    (half the distance between z = −1 and 1), z and centile (0 to 100) as those of a new
+    subject with the uncertainty of the norm, z_low, z_high, centile_low, centile_high
+    (90 % intervals of those in the population), brains (subjects of the norm), flag:
+    "ok"; "few brains" (centiles end at 5 and 95); `SPREAD_UNKNOWN` (only expected is
+    given); "outside the reference's weeks", "too few brains", "other hemispheres" (than
+    the reference), "not positive" (as all values of the norm are) or "no spread" (of
+    the norm), whose scores are NaN.
     """
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     by_metric = dict(_by_metric(metrics, reference))
-    # the whole of a brain with one hemisphere is that hemisphere: it has half of the volume and area of others
-    sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
+    # the whole of a brain with one hemisphere is that hemisphere: it has half of the
+    # volume and area of others
+    sides = metrics.groupby(BRAIN)["hemisphere"].transform(
+        lambda names: " ".join(sorted(set(names)))
+    )
     is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
-    expected = sides[is_reference] if len(reference) else [" ".join(sorted({side for side, _ in cohort.norms}))]
+    expected = (
+        sides[is_reference]
+        if len(reference)
+        else [" ".join(sorted({side for side, _ in cohort.norms}))]
+    )
     table = _with_norm(metrics.assign(is_comparable=sides.isin(expected)))
     rows = []
     for row in table.to_dict("records"):
@@ -211,29 +305,58 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
         brains = by_metric.get(key)
         if brains is None and key not in cohort.norms:
             continue
-        is_own = row["run"] == MEASURED and brains is not None and (brains["person"] == row["person"]).any()
+        is_own = (
+            row["run"] == MEASURED
+            and brains is not None
+            and (brains["person"] == row["person"]).any()
+        )
         score = {"brains": 0, "flag": OTHER_SIDES}
         if row["is_comparable"]:
-            score = _score(key, row["week"], row["value"], cohort, brains if is_own else None, row["person"])
+            score = _score(
+                key,
+                row["week"],
+                row["value"],
+                cohort,
+                brains if is_own else None,
+                row["person"],
+            )
         rows.append(row | score)
     return pd.DataFrame(rows, columns=[*names, *SCORES])
 
 
 def _score(
-    key: tuple[str, str], week: float, value: float, cohort: CohortNorms, brains: pd.DataFrame | None, person: str
+    key: tuple[str, str],
+    week: float,
+    value: float,
+    cohort: CohortNorms,
+    brains: pd.DataFrame | None,
+    person: str,
 ) -> dict[str, Any]:
-    """Return the `SCORES` of a value; `brains` are those of the norm if the person is one of its subjects."""
+    """Return the `SCORES` of a value; `brains` are those of the norm if the person is
+    one of its subjects."""
     if key not in cohort.norms:
-        return {"brains": 0 if brains is None else brains["person"].nunique(), "flag": "too few brains"}
+        return {
+            "brains": 0 if brains is None else brains["person"].nunique(),
+            "flag": "too few brains",
+        }
     norm = cohort.norms[key][1]
     is_small = norm.subjects < FEW_SUBJECTS
     if brains is not None:
         is_own = brains["person"] == person
         own, others = brains[is_own], brains[~is_own]
-        if (subjects := others["person"].nunique()) < min_norm_subjects(individuals=cohort.individuals):
+        if (subjects := others["person"].nunique()) < min_norm_subjects(
+            individuals=cohort.individuals
+        ):
             return {"brains": subjects, "flag": "too few brains"}
-        is_single, scan = len(brains) == norm.subjects, (float(own["week"].iloc[0]), float(own["value"].iloc[0]))
-        if is_single and not is_small and abs(norm.scores(*scan)[0][0]) <= MAX_ONE_STEP_Z:
+        is_single, scan = (
+            len(brains) == norm.subjects,
+            (float(own["week"].iloc[0]), float(own["value"].iloc[0])),
+        )
+        if (
+            is_single
+            and not is_small
+            and abs(norm.scores(*scan)[0][0]) <= MAX_ONE_STEP_Z
+        ):
             norm = norm.without(*scan)
         else:
             norm = _fit(others, key[1])
@@ -241,7 +364,10 @@ def _score(
     if not norm.first - WINDOW_GW <= week <= norm.last + WINDOW_GW:
         return score | {"flag": "outside the reference's weeks"}
     if not cohort.individuals:
-        return score | {"flag": SPREAD_UNKNOWN, "expected": float(norm.values([week], 0.0)[0])}
+        return score | {
+            "flag": SPREAD_UNKNOWN,
+            "expected": float(norm.values([week], 0.0)[0]),
+        }
     if norm.is_positive and value <= 0:
         return score | {"flag": "not positive"}
     low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
@@ -256,32 +382,63 @@ def _score(
 
 
 def _with_norm(metrics: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows with a value of a metric that has norms, with the column person."""
+    """Return the rows with a value of a metric that has norms, with the column
+    person."""
     has_norm = metrics["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)
     rows = metrics[has_norm & metrics["value"].notna()]
     return rows if "person" in rows else rows.assign(person=rows["subject"])
 
 
-def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
-    rows = _with_norm(metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)])
+def _by_metric(
+    metrics: pd.DataFrame, reference: Sequence[str]
+) -> list[tuple[Any, pd.DataFrame]]:
+    rows = _with_norm(
+        metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)]
+    )
     return list(rows.groupby(["hemisphere", "metric"], sort=False))
 
 
 def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
     """Return the curve of each metric over the weeks of its norm.
 
-    Columns hemisphere, metric, unit, week, brains, expected (median), expected_low, expected_high (its 90 % interval),
-    sd and the quantiles q05, q25, q50, q75, q95 of individuals. Those of averages are NaN.
+    Columns hemisphere, metric, unit, week, brains, expected (median), expected_low,
+    expected_high (its 90 % interval), sd and the quantiles q05, q25, q50, q75, q95 of
+    individuals. Those of averages are NaN.
     """
-    columns = ["hemisphere", "metric", "unit", "week", "brains", "expected", "expected_low", "expected_high", "sd"]
+    columns = [
+        "hemisphere",
+        "metric",
+        "unit",
+        "week",
+        "brains",
+        "expected",
+        "expected_low",
+        "expected_high",
+        "sd",
+    ]
     parts = [pd.DataFrame(columns=[*columns, *QUANTILES])]
     for (hemisphere, metric), (unit, norm) in cohort.norms.items():
-        weeks = np.linspace(norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1)
+        weeks = np.linspace(
+            norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1
+        )
         low, expected, high = (norm.values(weeks, z) for z in (-1.0, 0.0, 1.0))
-        band = {"hemisphere": hemisphere, "metric": metric, "unit": unit, "week": weeks, "brains": norm.subjects}
+        band = {
+            "hemisphere": hemisphere,
+            "metric": metric,
+            "unit": unit,
+            "week": weeks,
+            "brains": norm.subjects,
+        }
         first, last = norm.median_interval(weeks)
         band |= {"expected": expected, "expected_low": first, "expected_high": last}
-        spread = {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
+        spread = {
+            name: norm.values(weeks, float(stats.norm.ppf(q)))
+            for name, q in QUANTILES.items()
+        }
         spread |= {"sd": 0.5 * (high - low)}
-        parts.append(pd.DataFrame(band | (spread if cohort.individuals else dict.fromkeys(spread, np.nan))))
+        parts.append(
+            pd.DataFrame(
+                band | (spread if cohort.individuals else dict.fromkeys(spread, np.nan))
+            )
+        )
     return pd.concat(parts[1:] or parts, ignore_index=True)[[*columns, *QUANTILES]]

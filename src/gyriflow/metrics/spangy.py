@@ -1,7 +1,8 @@
-"""Spectral analysis of gyrification (SpAnGy): the power of a folding proxy in bands of spatial frequency.
+"""Spectral analysis of gyrification (SpAnGy): the power of a folding proxy in bands of
+spatial frequency.
 
-Germanaud et al. 2012, "Larger is twistier", NeuroImage 63, 1257-1272. Which modes a spectrum is made of, its bands, and
-how far two spectra are from each other.
+Germanaud et al. 2012, "Larger is twistier", NeuroImage 63, 1257-1272. Which modes a
+spectrum is made of, its bands, and how far two spectra are from each other.
 """
 
 from dataclasses import dataclass
@@ -15,27 +16,45 @@ from scipy import linalg, sparse
 from ..geometry.matching import interpolation, match_surface
 from ..geometry.remeshing import decimate
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, vertex_areas
-from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand, MassMatrix
+from ..settings.terms import (
+    FOLD_BANDS,
+    MEASURED,
+    MIN_KEPT_CURVATURE,
+    PROXIES,
+    LastBand,
+    MassMatrix,
+)
 from .curvature import kept_curvature
-from .laplace_beltrami import count_below, first_eigenvalue, laplacian, lowest_modes, modes_below
+from .laplace_beltrami import (
+    count_below,
+    first_eigenvalue,
+    laplacian,
+    lowest_modes,
+    modes_below,
+)
 
 type SpangyModes = int | LastBand
 
 BANDS = 6
-"""The bands are B0 to B6; B4, B5 and B6 go with primary, secondary and tertiary folds."""
+"""The bands are B0 to B6; B4, B5 and B6 go with primary, secondary and tertiary
+folds."""
 PARTS = 16
-"""Parts of a band, each a sixteenth of an octave of wavelength, whose powers are given for distances of spectra."""
+"""Parts of a band, each a sixteenth of an octave of wavelength, whose powers are given
+for distances of spectra."""
 PART_POWERS = [f"power_{part:02d}of{PARTS}" for part in range(1, PARTS + 1)]
 HEMISPHERE = ["subject", "run", "week", "hemisphere"]
 """The columns that name a hemisphere in the tables of a study."""
 OPEN_AND_CLOSED = "open and closed hemispheres"
-"""Flag of a distance between an open hemisphere and a closed one: closing a cut makes L 5 to 7 % shorter."""
+"""Flag of a distance between an open hemisphere and a closed one: closing a cut makes L
+5 to 7 % shorter."""
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
 VERTICES_PER_WAVELENGTH = 8.0
-"""Edges per shortest wave on the surface that modes are computed on; `benchmarks/spectra.py` compares other numbers."""
+"""Edges per shortest wave on the surface that modes are computed on;
+`benchmarks/spectra.py` compares other numbers."""
 LONGEST_EDGE_MM = 1.8
-"""Edges of that surface at most: longer ones do not follow the banks of sulci, whatever the waves."""
+"""Edges of that surface at most: longer ones do not follow the banks of sulci, whatever
+the waves."""
 WORTHWHILE = 0.8
 """A coarser surface is made if it has at most this share of the vertices."""
 
@@ -44,15 +63,19 @@ WORTHWHILE = 0.8
 class Spectrum:
     """A folding proxy on the k modes of a surface with n vertices.
 
-    `eigenvalues` λ (k,) are in mm⁻², `coefficients` (k,) in the proxy's unit times mm, `band` (k,) the band of each
-    mode, −1 beyond the last one. `dominant_band` (n,) is the signed dominant band, −6 to 6, among the complete bands, 0
-    where none is; `captured` the share of the proxy's power ∫f² that the modes hold, 1 if all (Parseval).
+    `eigenvalues` λ (k,) are in mm⁻², `coefficients` (k,) in the proxy's unit times mm,
+    `band` (k,) the band of each mode, −1 beyond the last one. `dominant_band` (n,) is
+    the signed dominant band, −6 to 6, among the complete bands, 0 where none is;
+    `captured` the share of the proxy's power ∫f² that the modes hold, 1 if all
+    (Parseval).
 
-    `bands` has a row per band: band, wavelength_min_mm, wavelength_max_mm, modes, power (unit of the proxy squared
-    times mm²; NaN without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0), complete
-    (the modes reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are),
-    kept_curvature (of a shallow wave of the band's middle length, see `curvature.kept_curvature`), resolved (that is at
-    least 80 %), is_open (the surface has an edge), and `PART_POWERS`, the band's power from long to short waves.
+    `bands` has a row per band: band, wavelength_min_mm, wavelength_max_mm, modes, power
+    (unit of the proxy squared times mm²; NaN without modes), relative_power (share of
+    those of B1 to B6 that have modes; NaN for B0), complete (the modes reach the band's
+    upper limit), denominator_complete (all bands that relative powers are shares of
+    are), kept_curvature (of a shallow wave of the band's middle length, see
+    `curvature.kept_curvature`), resolved (that is at least 80 %), is_open (the surface
+    has an edge), and `PART_POWERS`, the band's power from long to short waves.
     """
 
     eigenvalues: Floats
@@ -66,24 +89,28 @@ class Spectrum:
 def weyl_number(area_mm2: float, first: float) -> int:
     """Return the number of modes up to band B6 by Weyl's law, N = A·λmax/4π.
 
-    WL6 = WL0/2⁶ with WL0 = 2π/√λ1, and λmax = 2π/WL6², the formula printed in the FetalFoldSim paper; it is 2π times
-    smaller than (2π/WL6)² = 4⁶·λ1, the upper limit of B6.
+    WL6 = WL0/2⁶ with WL0 = 2π/√λ1, and λmax = 2π/WL6², the formula printed in the
+    FetalFoldSim paper; it is 2π times smaller than (2π/WL6)² = 4⁶·λ1, the upper limit
+    of B6.
     """
     return round(area_mm2 * first * 4.0**BANDS / (8.0 * np.pi**2))
 
 
 def band_limits(first: float) -> Floats:
-    """Return the (7,) limits of the bands B1 to B6 in mm⁻²: Bk holds λ1·4^(k−1) ≤ λ < λ1·4^k."""
+    """Return the (7,) limits of the bands B1 to B6 in mm⁻²: Bk holds λ1·4^(k−1) ≤ λ <
+    λ1·4^k."""
     return first * 4.0 ** np.arange(BANDS + 1, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """The k modes that spectra of a surface with n vertices are made of, on the surface or on a copy with m vertices.
+    """The k modes that spectra of a surface with n vertices are made of, on the surface
+    or on a copy with m vertices.
 
-    `eigenvalues` λ (k,) are in mm⁻², `functions` (m, k) in mm⁻¹; `first` is λ1 of the surface, `reach` the λ below
-    which no mode is missing. `places` (n, m) takes values from the copy to the surface, where `energy` (n, n) gives ∫f²
-    in mm², and the functions are orthonormal.
+    `eigenvalues` λ (k,) are in mm⁻², `functions` (m, k) in mm⁻¹; `first` is λ1 of the
+    surface, `reach` the λ below which no mode is missing. `places` (n, m) takes values
+    from the copy to the surface, where `energy` (n, n) gives ∫f² in mm², and the
+    functions are orthonormal.
     """
 
     eigenvalues: Floats
@@ -106,20 +133,35 @@ class Basis:
         return band
 
 
-def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "mean") -> Basis:
+def spectral_basis(
+    mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "mean"
+) -> Basis:
     """Return the modes that a hemisphere's spectra are made of.
 
-    The name of a band stands for all modes up to its end; that none is missing there is known by inertia, so that no
-    mode of the next band is needed to show it. They are at most half as many as there are vertices. A number is taken
-    as it is. With the `mean` mass matrix they are computed on a copy with only as many vertices as the shortest wave
-    needs, and powers are sums over the surface's vertices; neither has an error of order (kh)². `consistent` is as in
-    LaPy: on the surface as it is, with powers by the same matrix. MeshError where the surface is not in one piece.
+    The name of a band stands for all modes up to its end; that none is missing there is
+    known by inertia, so that no mode of the next band is needed to show it. They are at
+    most half as many as there are vertices. A number is taken as it is. With the `mean`
+    mass matrix they are computed on a copy with only as many vertices as the shortest
+    wave needs, and powers are sums over the surface's vertices; neither has an error of
+    order (kh)². `consistent` is as in LaPy: on the surface as it is, with powers by the
+    same matrix. MeshError where the surface is not in one piece.
     """
     stiffness, matrix = laplacian(mesh, mass)
-    first, places = first_eigenvalue(stiffness, matrix), sparse.eye(len(mesh.vertices), format="csr")
-    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(vertex_areas(mesh)))
+    first, places = (
+        first_eigenvalue(stiffness, matrix),
+        sparse.eye(len(mesh.vertices), format="csr"),
+    )
+    energy = (
+        matrix
+        if mass == "consistent"
+        else sparse.csc_matrix(sparse.diags(vertex_areas(mesh)))
+    )
     by_name = isinstance(choice, str)
-    end = float(band_limits(first)[int(str(choice)[1:])]) if by_name else 4.0 * np.pi * int(choice) / area(mesh)
+    end = (
+        float(band_limits(first)[int(str(choice)[1:])])
+        if by_name
+        else 4.0 * np.pi * int(choice) / area(mesh)
+    )
     edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
     needed = ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
@@ -132,36 +174,56 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
     else:
         modes = lowest_modes(stiffness, matrix, number if by_name else int(choice))
         reach = float(modes.eigenvalues[-1])
-    # interpolated modes are not quite orthonormal on the surface: the nearest that are (Löwdin 1950)
-    values, vectors = linalg.eigh(modes.functions.T @ ((places.T @ energy @ places) @ modes.functions))
+    # interpolated modes are not quite orthonormal on the surface: the nearest that are
+    # (Löwdin 1950)
+    values, vectors = linalg.eigh(
+        modes.functions.T @ ((places.T @ energy @ places) @ modes.functions)
+    )
     functions = modes.functions @ ((vectors / np.sqrt(values)) @ vectors.T)
     is_open = bool((edges(mesh)[1] == 1).any())
     return Basis(modes.eigenvalues, functions, places, energy, first, reach, is_open)
 
 
 def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
-    """Return the band spectrum of a folding proxy, (n,) values per vertex of the surface.
+    """Return the band spectrum of a folding proxy, (n,) values per vertex of the
+    surface.
 
-    `radius_mm` is the radius of the curvature fit. The dominant band is as in Germanaud et al. 2012, from the part of
-    the proxy in each of B1 to B6: at a vertex where the proxy is positive the band with the largest part, elsewhere the
-    one with the smallest, with a minus sign.
+    `radius_mm` is the radius of the curvature fit. The dominant band is as in Germanaud
+    et al. 2012, from the part of the proxy in each of B1 to B6: at a vertex where the
+    proxy is positive the band with the largest part, elsewhere the one with the
+    smallest, with a minus sign.
     """
     functions, band = basis.functions, basis.band
     coefficients = functions.T @ (basis.places.T @ (basis.energy @ proxy))
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
-    if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
-        parts = np.stack([functions[:, band == k] @ coefficients[band == k] for k in whole], axis=1)
+    if len(
+        whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()
+    ):
+        parts = np.stack(
+            [functions[:, band == k] @ coefficients[band == k] for k in whole], axis=1
+        )
         parts = basis.places @ parts
-        dominant = np.where(proxy > 0, whole[parts.argmax(axis=1)], -whole[parts.argmin(axis=1)])
-    captured = float(np.sum(coefficients**2) / (proxy @ (basis.energy @ proxy))) if proxy.any() else 1.0
+        dominant = np.where(
+            proxy > 0, whole[parts.argmax(axis=1)], -whole[parts.argmin(axis=1)]
+        )
+    captured = (
+        float(np.sum(coefficients**2) / (proxy @ (basis.energy @ proxy)))
+        if proxy.any()
+        else 1.0
+    )
     return Spectrum(basis.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
 def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.DataFrame:
     limits, powers = band_limits(basis.first), coefficients**2
     numbers = np.array([np.count_nonzero(basis.band == k) for k in range(BANDS + 1)])
-    power = np.array([np.sum(powers[basis.band == k]) if numbers[k] else np.nan for k in range(BANDS + 1)])
+    power = np.array(
+        [
+            np.sum(powers[basis.band == k]) if numbers[k] else np.nan
+            for k in range(BANDS + 1)
+        ]
+    )
     total = np.nansum(power[1:])
     wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
     complete = np.concatenate([[True], limits[1:] <= basis.reach * (1.0 + ROUNDING)])
@@ -169,7 +231,9 @@ def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.Data
     share = kept_curvature(np.sqrt(wavelengths[1:] * wavelengths[:-1]), radius_mm)
     inside = basis.band > 0
     octaves = np.maximum(np.log2(basis.eigenvalues[inside] / basis.first) / 2, 0.0)
-    parts = np.bincount((PARTS * octaves).astype(int), powers[inside], PARTS * BANDS).reshape(BANDS, PARTS)
+    parts = np.bincount(
+        (PARTS * octaves).astype(int), powers[inside], PARTS * BANDS
+    ).reshape(BANDS, PARTS)
     table = pd.DataFrame(
         {
             "band": np.arange(BANDS + 1),
@@ -177,7 +241,9 @@ def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.Data
             "wavelength_max_mm": wavelengths[:-1],
             "modes": numbers,
             "power": power,
-            "relative_power": np.append(np.nan, power[1:] / total if total > 0 else 0 * power[1:]),
+            "relative_power": np.append(
+                np.nan, power[1:] / total if total > 0 else 0 * power[1:]
+            ),
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
             "kept_curvature": share,
@@ -190,7 +256,8 @@ def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.Data
 
 @dataclass(frozen=True, eq=False)
 class _Profile:
-    """A hemisphere's power over wavelength: log2 of L in mm, the power of each part of B1 to B6, and its bands."""
+    """A hemisphere's power over wavelength: log2 of L in mm, the power of each part of
+    B1 to B6, and its bands."""
 
     longest: float
     powers: Floats
@@ -199,28 +266,39 @@ class _Profile:
     is_open: bool
 
     def cumulative(self, octaves: Floats, end: float) -> Floats:
-        """Return the share of the power of waves longer than 2^octaves mm, of those longer than 2^end."""
+        """Return the share of the power of waves longer than 2^octaves mm, of those
+        longer than 2^end."""
         edges = self.longest - np.arange(len(self.powers) + 1) / PARTS
         sums = np.append(0.0, np.cumsum(self.powers))
-        return np.interp(octaves, edges[::-1], sums[::-1]) / np.interp(end, edges[::-1], sums[::-1])
+        return np.interp(octaves, edges[::-1], sums[::-1]) / np.interp(
+            end, edges[::-1], sums[::-1]
+        )
 
 
 def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
-    """Return how far the spectrum of each hemisphere is from those of the same side of all measured brains.
+    """Return how far the spectrum of each hemisphere is from those of the same side of
+    all measured brains.
 
-    The distance is the area between the cumulative power of both over log2 of the wavelength, in octaves: how far power
-    has to be moved on average, 1 if all waves are half as long. It has no edges between bands. Each curve is the share
-    of the power of waves down to the end of a band Bk, of the two brains the one at the longer wave. There is one up to
-    B4, up to B5 and up to B6, each between all pairs whose bands are complete and resolved in both.
+    The distance is the area between the cumulative power of both over log2 of the
+    wavelength, in octaves: how far power has to be moved on average, 1 if all waves are
+    half as long. It has no edges between bands. Each curve is the share of the power of
+    waves down to the end of a band Bk, of the two brains the one at the longer wave.
+    There is one up to B4, up to B5 and up to B6, each between all pairs whose bands are
+    complete and resolved in both.
 
-    Spectra have the columns subject, run ("real" for measured brains), week, hemisphere, proxy, and those of
-    `Spectrum.bands`; those of mean curvature are compared. A measured brain is not compared with itself.
+    Spectra have the columns subject, run ("real" for measured brains), week,
+    hemisphere, proxy, and those of `Spectrum.bands`; those of mean curvature are
+    compared. A measured brain is not compared with itself.
 
-    Columns subject, run, week, hemisphere, real (the measured brain), real_week, proxy, metric (spectral_distance_B4,
-    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok", `OPEN_AND_CLOSED`, or the reason
-    for a missing value: "B5 B6 not resolved" or "B6 cut off", not complete, in one of the two).
+    Columns subject, run, week, hemisphere, real (the measured brain), real_week, proxy,
+    metric (spectral_distance_B4, spectral_distance_B4_to_B5,
+    spectral_distance_B4_to_B6), value, unit, flag ("ok", `OPEN_AND_CLOSED`, or the
+    reason for a missing value: "B5 B6 not resolved" or "B6 cut off", not complete, in
+    one of the two).
     """
-    rows = spectra[(spectra["proxy"] == PROXIES[0]) & (spectra["band"] > 0)].sort_values("band")
+    rows = spectra[
+        (spectra["proxy"] == PROXIES[0]) & (spectra["band"] > 0)
+    ].sort_values("band")
     profiles = {
         key: _Profile(
             float(np.log2(bands["wavelength_max_mm"].iloc[0])),
@@ -238,7 +316,19 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
         if other[1] == MEASURED and other[3] == key[3] and key != other
         for row in _distances(profile, observed)
     ]
-    return pd.DataFrame(found, columns=[*HEMISPHERE, "real", "real_week", "proxy", "metric", "value", "unit", "flag"])
+    return pd.DataFrame(
+        found,
+        columns=[
+            *HEMISPHERE,
+            "real",
+            "real_week",
+            "proxy",
+            "metric",
+            "value",
+            "unit",
+            "flag",
+        ],
+    )
 
 
 def _distances(a: _Profile, b: _Profile) -> list[tuple[str, float, str, str]]:
@@ -254,5 +344,12 @@ def _distances(a: _Profile, b: _Profile) -> list[tuple[str, float, str, str]]:
         between = np.abs(a.cumulative(octaves, end) - b.cumulative(octaves, end))
         value = np.nan if flag else float(np.trapezoid(between, octaves))
         name = "spectral_distance_B4" + (f"_to_B{last}" if last > FOLD_BANDS[0] else "")
-        rows.append((name, value, "octaves", flag or (OPEN_AND_CLOSED if a.is_open != b.is_open else "ok")))
+        rows.append(
+            (
+                name,
+                value,
+                "octaves",
+                flag or (OPEN_AND_CLOSED if a.is_open != b.is_open else "ok"),
+            )
+        )
     return rows

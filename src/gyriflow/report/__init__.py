@@ -1,1 +1,2 @@
-"""Figures and tables: data frames and meshes in, matplotlib figures, data frames and HTML out; opens no files."""
+"""Figures and tables: data frames and meshes in, matplotlib figures, data frames and
+HTML out; opens no files."""

@@ -26,23 +26,29 @@ def growth_chart(
     folding_rate_per_s: float | Mapping[float, float] | None = None,
     observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
-    """Draw cortical area and volume over weeks, and the tangential growth rate of each interval as bars.
+    """Draw cortical area and volume over weeks, and the tangential growth rate of each
+    interval as bars.
 
-    Series of brains share the panels of area and volume. Up to four series with rates have a panel of bars each, on one
-    scale.
+    Series of brains share the panels of area and volume. Up to four series with rates
+    have a panel of bars each, on one scale.
 
-    `areas` has the columns series, subject, week, area_cm2, volume_ml; `rates` series, from_week, to_week, rate_per_s
-    (1/s). `folding_rate_per_s` is the growth rate of the simulations in 1/s, drawn as a line over the bars: a number,
-    or values by week, linear in between and constant beyond.
+    `areas` has the columns series, subject, week, area_cm2, volume_ml; `rates` series,
+    from_week, to_week, rate_per_s (1/s). `folding_rate_per_s` is the growth rate of the
+    simulations in 1/s, drawn as a line over the bars: a number, or values by week,
+    linear in between and constant beyond.
     """
     names = list(dict.fromkeys(areas["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
     with_rates = rates["series"].unique()
     is_shared = len(with_rates) > MAX_RATE_PANELS
     panels = 1 if is_shared else len(with_rates)
-    figure, (area_axes, volume_axes, *rate_axes) = panel_figure(2 + panels, panel_in=2.4, foot_in=0.0)
+    figure, (area_axes, volume_axes, *rate_axes) = panel_figure(
+        2 + panels, panel_in=2.4, foot_in=0.0
+    )
     labels = {"area_cm2": "pial area (cm²)", "volume_ml": "volume (mL)"}
-    for axes, (column, label) in zip((area_axes, volume_axes), labels.items(), strict=True):
+    for axes, (column, label) in zip(
+        (area_axes, volume_axes), labels.items(), strict=True
+    ):
         _sizes_panel(axes, areas, column, colours)
         axes.set_ylabel(label)
         if len(names) == 1:
@@ -51,8 +57,14 @@ def growth_chart(
         _rates_together(rate_axes[0], rates, colours)
         return figure
     for axes, name in zip(rate_axes, with_rates, strict=True):
-        _rates_panel(axes, rates[rates["series"] == name], colours[name], folding_rate_per_s)
-        title = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 28)
+        _rates_panel(
+            axes, rates[rates["series"] == name], colours[name], folding_rate_per_s
+        )
+        title = (
+            "tangential growth rate"
+            if len(names) == 1
+            else wrap(f"tangential growth rate: {name}", 28)
+        )
         # the legend stands below the title
         axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
     limits = [axes.get_ylim() for axes in rate_axes]
@@ -61,25 +73,51 @@ def growth_chart(
     return figure
 
 
-def _sizes_panel(axes: Axes, areas: pd.DataFrame, column: str, colours: Mapping[str, str]) -> None:
+def _sizes_panel(
+    axes: Axes, areas: pd.DataFrame, column: str, colours: Mapping[str, str]
+) -> None:
     """Draw areas or volumes over weeks, a colour per series."""
     for number, (name, colour) in enumerate(reversed(list(colours.items()))):
         rows = areas[areas["series"] == name].sort_values("week")
-        # series often agree: smaller marks of later series stay visible within those of earlier ones
-        style: dict[str, Any] = {"markersize": 3 + 2.5 * number, "markerfacecolor": "white" if number else colour}
-        axes.plot(rows["week"], rows[column], "o-", color=colour, zorder=2 - 0.1 * number, label=name, **style)
+        # series often agree: smaller marks of later series stay visible within those of
+        # earlier ones
+        style: dict[str, Any] = {
+            "markersize": 3 + 2.5 * number,
+            "markerfacecolor": "white" if number else colour,
+        }
+        axes.plot(
+            rows["week"],
+            rows[column],
+            "o-",
+            color=colour,
+            zorder=2 - 0.1 * number,
+            label=name,
+            **style,
+        )
     from_zero(axes)
     week_axis(axes, areas["week"])
     if 1 < len(colours) <= len(SERIES_COLOURS):
         # in place of a title, so that it hides no curve
-        axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.01), borderaxespad=0, reverse=True)
+        axes.legend(
+            loc="lower left",
+            bbox_to_anchor=(-0.01, 1.01),
+            borderaxespad=0,
+            reverse=True,
+        )
 
 
-def _rates_together(axes: Axes, rates: pd.DataFrame, colours: Mapping[str, str]) -> None:
-    """Draw the growth rate of each interval of many series as a line from week to week."""
+def _rates_together(
+    axes: Axes, rates: pd.DataFrame, colours: Mapping[str, str]
+) -> None:
+    """Draw the growth rate of each interval of many series as a line from week to
+    week."""
     for name, colour in colours.items():
         for _, row in rates[rates["series"] == name].iterrows():
-            axes.plot([row["from_week"], row["to_week"]], [1e7 * row["rate_per_s"]] * 2, color=colour)
+            axes.plot(
+                [row["from_week"], row["to_week"]],
+                [1e7 * row["rate_per_s"]] * 2,
+                color=colour,
+            )
     axes.axhline(0, color="black", linewidth=0.6)
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.set_title("tangential growth rate")
@@ -87,15 +125,24 @@ def _rates_together(axes: Axes, rates: pd.DataFrame, colours: Mapping[str, str])
 
 
 def _rates_panel(
-    axes: Axes, rates: pd.DataFrame, colour: str, folding_rate_per_s: float | Mapping[float, float] | None
+    axes: Axes,
+    rates: pd.DataFrame,
+    colour: str,
+    folding_rate_per_s: float | Mapping[float, float] | None,
 ) -> None:
-    """Draw the growth rate of each interval of one series as a bar, and the simulated rate as a line."""
-    labels = [f"{first:g}–{last:g}" for first, last in zip(rates["from_week"], rates["to_week"], strict=True)]
+    """Draw the growth rate of each interval of one series as a bar, and the simulated
+    rate as a line."""
+    labels = [
+        f"{first:g}–{last:g}"
+        for first, last in zip(rates["from_week"], rates["to_week"], strict=True)
+    ]
     bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
     # in front of the line of the simulated rate
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     crowded = len(rates) > 8
-    texts = axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5, padding=2)
+    texts = axes.bar_label(
+        bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5, padding=2
+    )
     for text in texts:
         text.set(bbox=box, zorder=3, rotation=90 if crowded else 0)
     axes.axhline(0, color="black", linewidth=0.6)
@@ -112,11 +159,15 @@ def _rates_panel(
     axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
 
 
-def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]) -> None:
+def _folding_line(
+    axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]
+) -> None:
     """Draw the simulated growth rate over bars of equal width, one per interval."""
     style: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
     if not isinstance(rate_per_s, Mapping):
-        axes.axhline(rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **style)
+        axes.axhline(
+            rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **style
+        )
         return
     weeks = np.array(sorted(rate_per_s))
     values = 1e7 * np.array([rate_per_s[week] for week in weeks])

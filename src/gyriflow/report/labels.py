@@ -23,12 +23,15 @@ PARAMETER_TITLES = {
     "tets": "elements",
     "order": "order of the elements",
     "elements_through_cortex": "elements through the cortex at the start",
-    "element_error_percent": "error of the elements: fastest wave too slow by up to (%)",
+    "element_error_percent": (
+        "error of the elements: fastest wave too slow by up to (%)"
+    ),
     "newton": "Newton iterations",
     "seconds": "time of the solve (s)",
     "peak_memory_MiB": "memory (MiB)",
 }
-"""Titles of parameters, by their keys without the suffix of the unit. Other parameters keep their names."""
+"""Titles of parameters, by their keys without the suffix of the unit. Other parameters
+keep their names."""
 
 # suffixes of names, longer ones first, and the column `unit` of tables
 _ENDINGS = {
@@ -58,7 +61,9 @@ def metric_title(name: str) -> str:
 
 def map_title(name: str) -> str:
     """Return the title of the colour bar of a map, for example "sulcal depth (mm)"."""
-    return with_unit(VERTEX_MAPS[name].label, VERTEX_MAPS[name].ends or VERTEX_MAPS[name].unit)
+    return with_unit(
+        VERTEX_MAPS[name].label, VERTEX_MAPS[name].ends or VERTEX_MAPS[name].unit
+    )
 
 
 def plain(name: str) -> str:
@@ -72,7 +77,8 @@ def week_label(week: float) -> str:
 
 
 def column_label(key: Hashable) -> str:
-    """Return the heading of a column: a week, an interval of two weeks, or a name as it is."""
+    """Return the heading of a column: a week, an interval of two weeks, or a name as it
+    is."""
     match key:
         case (first, last):
             return f"{first:g}–{last:g} GW"
@@ -83,18 +89,25 @@ def column_label(key: Hashable) -> str:
 
 
 def parameter_label(key: str) -> str:
-    """Return the axis label of a parameter, with its unit, for example "cortical thickness (mm)"."""
+    """Return the axis label of a parameter, with its unit, for example "cortical
+    thickness (mm)"."""
     ending = next((ending for ending in _ENDINGS if key.endswith(ending)), "")
     name, unit = key.removesuffix(ending), _ENDINGS.get(ending)
     return with_unit(PARAMETER_TITLES.get(name, plain(name.replace(".", " "))), unit)
 
 
 def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a heading for each run of a sweep: its values with units, for example "1.5 mm".
+    """Return a heading for each run of a sweep: its values with units, for example "1.5
+    mm".
 
     If several keys are varied, each is named.
     """
-    return ["\n".join(_value_label(*item, alone=len(member) == 1) for item in member.items()) for member in values]
+    return [
+        "\n".join(
+            _value_label(*item, alone=len(member) == 1) for item in member.items()
+        )
+        for member in values
+    ]
 
 
 def _value_label(key: str, value: Any, *, alone: bool) -> str:

@@ -1,4 +1,5 @@
-"""Content of the report: one self-contained HTML page for a study, and one for each brain."""
+"""Content of the report: one self-contained HTML page for a study, and one for each
+brain."""
 
 import json
 import re
@@ -27,28 +28,44 @@ from ..settings.terms import (
     run_names,
 )
 from .labels import metric_title, plain, week_label
-from .tables import VERDICTS, accuracy_table, brain_table, centile_text, html_table, predicted_table, range_text
+from .tables import (
+    VERDICTS,
+    accuracy_table,
+    brain_table,
+    centile_text,
+    html_table,
+    predicted_table,
+    range_text,
+)
 
 PATH_PLACEHOLDER = "(file)"
 _SUFFIXES = (*ALL_SUFFIXES, ".yaml", ".yml", ".h5", ".csv", ".tsv", ".sif")
-_FILE_NAME = re.compile(rf"[/\\]|({'|'.join(map(re.escape, _SUFFIXES))})(\.gz)?$", re.IGNORECASE)
+_FILE_NAME = re.compile(
+    rf"[/\\]|({'|'.join(map(re.escape, _SUFFIXES))})(\.gz)?$", re.IGNORECASE
+)
 _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders of a file: they may contain names, so they are stripped."""
 KIND_NOTES = {"explained": ": its growth was measured on that brain"}
 """What the kind of a comparison means, where a reader may take it for a prediction."""
-NOT_COMPARED = "No simulation is compared: an observed brain of the same population and week is missing."
+NOT_COMPARED = (
+    "No simulation is compared: an observed brain of the same population and week is"
+    " missing."
+)
 MAX_PENETRATION_MM = 0.5
 """Penetration of the contact planes at the start above which the report warns."""
 
 
 def page_figures(
-    figures: Sequence[Mapping[str, Any]], contents: Mapping[str, str | tuple[str, float]]
+    figures: Sequence[Mapping[str, Any]],
+    contents: Mapping[str, str | tuple[str, float]],
 ) -> list[dict[str, Any]]:
-    """Return the figures and tables of a page: section, title, content (as `contents`), caption, first, technical.
+    """Return the figures and tables of a page: section, title, content (as `contents`),
+    caption, first, technical.
 
-    `figures` have name, section, title, caption in reStructuredText, technical, first, path and names of each; titles
-    and captions contain the names in braces. The first one that may be `first` is shown in the summary. `contents` are
-    by path HTML, or a picture's data URL and its width in inches.
+    `figures` have name, section, title, caption in reStructuredText, technical, first,
+    path and names of each; titles and captions contain the names in braces. The first
+    one that may be `first` is shown in the summary. `contents` are by path HTML, or a
+    picture's data URL and its width in inches.
     """
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
@@ -58,9 +75,17 @@ def page_figures(
     for figure in figures:
         names, content = figure["names"], contents[figure["path"]]
         # if all figures of a kind are of one brain, the page's title names it
-        keys = ("run", "study", "brain") if len(brains[figure["name"]]) > 1 else ("run", "study")
-        title = figure["title"].format(**{key: plain(name.removesuffix("_mm")) for key, name in names.items()})
-        title = " · ".join([title, *(name for key, name in names.items() if key in keys)])
+        keys = (
+            ("run", "study", "brain")
+            if len(brains[figure["name"]]) > 1
+            else ("run", "study")
+        )
+        title = figure["title"].format(
+            **{key: plain(name.removesuffix("_mm")) for key, name in names.items()}
+        )
+        title = " · ".join(
+            [title, *(name for key, name in names.items() if key in keys)]
+        )
         entries.append(
             {
                 "section": figure["section"],
@@ -74,11 +99,21 @@ def page_figures(
     return entries
 
 
-def sections(figures: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """Return the sections, each with its figures and tables, numbered consecutively, technical ones last."""
+def sections(
+    figures: Sequence[Mapping[str, Any]],
+) -> list[tuple[str, list[dict[str, Any]]]]:
+    """Return the sections, each with its figures and tables, numbered consecutively,
+    technical ones last."""
     ordered, numbers = sorted(figures, key=lambda item: item["technical"]), count(1)
     return [
-        (name, [{**item, "number": next(numbers)} for item in ordered if item["section"] == name])
+        (
+            name,
+            [
+                {**item, "number": next(numbers)}
+                for item in ordered
+                if item["section"] == name
+            ],
+        )
         for name in dict.fromkeys(item["section"] for item in figures)
     ]
 
@@ -87,9 +122,10 @@ def sections(figures: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[
 class Tables:
     """The tables of a study on its pages.
 
-    `quality`, `metrics` and `centiles` are as for `brain_rows`; `warnings` has the columns subject, run, step, level,
-    message. `runs` and `validation` are as for `scores_table`, None if nothing was simulated; `intervals` those of the
-    ensemble of the one prediction, if any.
+    `quality`, `metrics` and `centiles` are as for `brain_rows`; `warnings` has the
+    columns subject, run, step, level, message. `runs` and `validation` are as for
+    `scores_table`, None if nothing was simulated; `intervals` those of the ensemble of
+    the one prediction, if any.
     """
 
     quality: pd.DataFrame
@@ -103,7 +139,9 @@ class Tables:
     def __post_init__(self) -> None:
         # messages name files without their folders
         for name in ("quality", "warnings"):
-            object.__setattr__(self, name, getattr(self, name).replace(_FOLDERS, "", regex=True))
+            object.__setattr__(
+                self, name, getattr(self, name).replace(_FOLDERS, "", regex=True)
+            )
 
 
 def study_page(
@@ -117,28 +155,52 @@ def study_page(
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the report of a study.
 
-    Brains are as for `brain_rows`, figures the output of `page_figures`; `norm` is the name of the norm's brains.
-    `pictures` are data URL and width in inches of the small pictures of each brain that has a page, by its id.
-    `prediction` is the output of `Study.prediction_facts`, with `accuracy`, the content of `norms/predictions.yaml`,
+    Brains are as for `brain_rows`, figures the output of `page_figures`; `norm` is the
+    name of the norm's brains. `pictures` are data URL and width in inches of the small
+    pictures of each brain that has a page, by its id. `prediction` is the output of
+    `Study.prediction_facts`, with `accuracy`, the content of `norms/predictions.yaml`,
     and `tests`, the output of `compare.accuracy.prediction_facts`.
     """
     runs, validation, centiles = tables.runs, tables.validation, tables.centiles
-    title, sentence, scores = "Measured cortical folding", quality_verdict(tables.quality), ""
+    title, sentence, scores = (
+        "Measured cortical folding",
+        quality_verdict(tables.quality),
+        "",
+    )
     if runs is not None:
-        title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
+        title = (
+            f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
+        )
         sentence = accuracy_sentence(prediction) if prediction else NOT_COMPARED
         sentence = verdict(runs, validation, tables.warnings, sentence)
         if prediction and validation is not None and len(validation):
             sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
         # without observed brains, a prediction has no scores
-        scores = "" if prediction and validation is None else html_table(scores_table(runs, validation))
+        scores = (
+            ""
+            if prediction and validation is None
+            else html_table(scores_table(runs, validation))
+        )
     if prediction:
-        title = f"Prediction of {prediction['brain']} to {week_label(prediction['week'])}, by the growth of "
-        title += f"the atlas {atlas['name']}" if (atlas := prediction["atlas"]) else prediction["population"]
-        numbers = predicted_table(tables.metrics, prediction, centiles, tables.intervals)
+        title = (
+            f"Prediction of {prediction['brain']} to {week_label(prediction['week'])},"
+            " by the growth of "
+        )
+        title += (
+            f"the atlas {atlas['name']}"
+            if (atlas := prediction["atlas"])
+            else prediction["population"]
+        )
+        numbers = predicted_table(
+            tables.metrics, prediction, centiles, tables.intervals
+        )
         accuracy = accuracy_table(prediction["accuracy"])
         has_centiles = any("centile" in str(head) for head in numbers)
-        prediction = {**prediction, "numbers": html_table(numbers), "accuracy_table": html_table(accuracy)}
+        prediction = {
+            **prediction,
+            "numbers": html_table(numbers),
+            "accuracy_table": html_table(accuracy),
+        }
         prediction["individuals"] = norm if has_centiles else ""
     centiles = centiles[centiles["run"] == MEASURED]
     own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
@@ -153,23 +215,41 @@ def study_page(
         "alone": False,
         "numbers": "",
         "runs": scores,
-        "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
+        "brains": brain_rows(
+            brains, tables.quality, tables.metrics, centiles, pictures
+        ),
         "pictures": pictures,
         "norm": norm,
         "flags": flags,
         "spread_unknown": SPREAD_UNKNOWN,
-        "warnings": "" if tables.warnings.empty else html_table(group_warnings(tables.warnings)),
+        "warnings": (
+            "" if tables.warnings.empty else html_table(group_warnings(tables.warnings))
+        ),
         "weeks": next((item for item in figures if item["first"]), None),
         "sections": sections([item for item in figures if not item["first"]]),
     }
 
 
 def brain_page(
-    brain: Mapping[str, Any], tables: Tables, figures: Sequence[Mapping[str, Any]], *, norm: str
+    brain: Mapping[str, Any],
+    tables: Tables,
+    figures: Sequence[Mapping[str, Any]],
+    *,
+    norm: str,
 ) -> dict[str, Any]:
-    """Return the variables of the page's template for the page of an observed brain; parameters as for `study_page`."""
-    metrics, warnings = (table[table["subject"] == brain["id"]] for table in (tables.metrics, tables.warnings))
-    page = study_page([brain], replace(tables, warnings=warnings, runs=None), figures, norm=norm, pictures={})
+    """Return the variables of the page's template for the page of an observed brain;
+    parameters as for `study_page`."""
+    metrics, warnings = (
+        table[table["subject"] == brain["id"]]
+        for table in (tables.metrics, tables.warnings)
+    )
+    page = study_page(
+        [brain],
+        replace(tables, warnings=warnings, runs=None),
+        figures,
+        norm=norm,
+        pictures={},
+    )
     numbers = html_table(brain_table(metrics, tables.centiles))
     title = f"Measured cortical folding, {brain['id']}"
     return page | {"title": title, "verdict": "", "alone": True, "numbers": numbers}
@@ -187,37 +267,59 @@ def report_page(
 ) -> str:
     """Return the page from its Jinja template; values are escaped.
 
-    `parts` are the style sheet (`style`) and the scripts of the 3D view with their licence (`three`, `notice`,
-    `controls`, `viewer`), inserted unescaped. `view` is the output of `surfaces_view`, `provenance` that of `software`
-    with files (brain, what, sha256), `methods` reStructuredText, `configuration` text without paths, and `content` the
-    output of `study_page` or `brain_page`.
+    `parts` are the style sheet (`style`) and the scripts of the 3D view with their
+    licence (`three`, `notice`, `controls`, `viewer`), inserted unescaped. `view` is the
+    output of `surfaces_view`, `provenance` that of `software` with files (brain, what,
+    sha256), `methods` reStructuredText, `configuration` text without paths, and
+    `content` the output of `study_page` or `brain_page`.
     """
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     # a script must not contain its own end tag
     data = Markup(json.dumps(view, separators=(",", ":")).replace("</", "<\\/"))
-    inside = {name: Markup(text.replace("</script", "<\\/script")) for name, text in parts.items()}
+    inside = {
+        name: Markup(text.replace("</script", "<\\/script"))
+        for name, text in parts.items()
+    }
     page = environment.from_string(template)
-    origin = {"provenance": provenance, "methods": caption_html(methods), "configuration": configuration}
-    return page.render(**content, **inside, **origin, has_view=bool(view["groups"]), surfaces=data)
+    origin = {
+        "provenance": provenance,
+        "methods": caption_html(methods),
+        "configuration": configuration,
+    }
+    return page.render(
+        **content, **inside, **origin, has_view=bool(view["groups"]), surfaces=data
+    )
 
 
 def methods_text(template: str, **used: Any) -> str:
-    """Return the methods of a study as reStructuredText, with citations, from a template.
+    """Return the methods of a study as reStructuredText, with citations, from a
+    template.
 
-    The template gets `growth_sentence(run, number)`, the sentence of the run's growth model; `number` formats numbers.
+    The template gets `growth_sentence(run, number)`, the sentence of the run's growth
+    model; `number` formats numbers.
     """
 
     def growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
         return GROWTH_MODELS[run["parameters"]["growth"]["model"]].sentence(run, number)
 
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(template).render(growth_sentence=growth_sentence, **used)
+    return environment.from_string(template).render(
+        growth_sentence=growth_sentence, **used
+    )
 
 
 def caption_html(caption: str) -> Markup:
     """Return a caption in reStructuredText as HTML."""
-    settings = {"report_level": 5, "raw_enabled": False, "file_insertion_enabled": False}
-    return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
+    settings = {
+        "report_level": 5,
+        "raw_enabled": False,
+        "file_insertion_enabled": False,
+    }
+    return Markup(
+        publish_parts(caption, writer="html5", settings_overrides=settings)["body"]
+    )
 
 
 def brain_rows(
@@ -227,133 +329,227 @@ def brain_rows(
     centiles: pd.DataFrame,
     linked: Collection[str] = (),
 ) -> list[dict[str, Any]]:
-    """Return what a page says of each brain: its facts, its numbers, and its verdict with the cause or the warnings.
+    """Return what a page says of each brain: its facts, its numbers, and its verdict
+    with the cause or the warnings.
 
-    Numbers are by title of the metric, each with the text below it: `centile_text`. Brains have id, week, population,
-    source, licence, covariates and whether they are synthetic, as configured. `quality`, the table of quality control,
-    has the columns subject, verdict, cause, warnings; `metrics` and `centiles` are the study's. `linked` are the ids of
-    the brains whose source is on a page of their own.
+    Numbers are by title of the metric, each with the text below it: `centile_text`.
+    Brains have id, week, population, source, licence, covariates and whether they are
+    synthetic, as configured. `quality`, the table of quality control, has the columns
+    subject, verdict, cause, warnings; `metrics` and `centiles` are the study's.
+    `linked` are the ids of the brains whose source is on a page of their own.
     """
     judged = quality.set_index("subject").fillna("")
     measured, rated = (
-        table[(table["run"] == MEASURED) & (table["hemisphere"] == "whole") & table["value"].notna()]
+        table[
+            (table["run"] == MEASURED)
+            & (table["hemisphere"] == "whole")
+            & table["value"].notna()
+        ]
         for table in (metrics, centiles)
     )
-    values = dict(zip(zip(measured["subject"], measured["metric"], strict=True), measured["value"], strict=True))
-    texts = dict(zip(zip(rated["subject"], rated["metric"], strict=True), centile_text(rated), strict=True))
-    shown = [name for name in metrics_shown(Shown.BRAINS) if name in {metric for _, metric in values}]
+    values = dict(
+        zip(
+            zip(measured["subject"], measured["metric"], strict=True),
+            measured["value"],
+            strict=True,
+        )
+    )
+    texts = dict(
+        zip(
+            zip(rated["subject"], rated["metric"], strict=True),
+            centile_text(rated),
+            strict=True,
+        )
+    )
+    shown = [
+        name
+        for name in metrics_shown(Shown.BRAINS)
+        if name in {metric for _, metric in values}
+    ]
     rows = []
     for brain in brains:
         key = brain["id"]
         numbers = {
-            metric_title(name): (METRICS[name].text(values[key, name]), texts.get((key, name), ""))
-            if (key, name) in values
-            else ("–", "")
+            metric_title(name): (
+                (
+                    METRICS[name].text(values[key, name]),
+                    texts.get((key, name), ""),
+                )
+                if (key, name) in values
+                else ("–", "")
+            )
             for name in shown
         }
         is_linked, is_synthetic = key in linked, brain["synthetic"]
-        licence = brain["licence"] or ("made here" if is_synthetic else "" if is_linked else "your own data")
+        licence = brain["licence"] or (
+            "made here" if is_synthetic else "" if is_linked else "your own data"
+        )
         covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
-        facts = [week_label(brain["week"]), brain["population"] or ("synthetic" if is_synthetic else ""), *covariates]
+        facts = [
+            week_label(brain["week"]),
+            brain["population"] or ("synthetic" if is_synthetic else ""),
+            *covariates,
+        ]
         facts += ["" if is_linked else brain["source"], licence]
         cause = judged.loc[key, "cause"] or judged.loc[key, "warnings"]
-        described = {"facts": list(filter(None, facts)), "verdict": judged.loc[key, "verdict"], "cause": cause}
+        described = {
+            "facts": list(filter(None, facts)),
+            "verdict": judged.loc[key, "verdict"],
+            "cause": cause,
+        }
         rows.append({**brain, "numbers": numbers, **described})
     return rows
 
 
-def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
-    """Return a row for each run: how it ended, and its scores at the last week with an observed brain.
+def scores_table(
+    runs: pd.DataFrame, validation: pd.DataFrame | None = None
+) -> pd.DataFrame:
+    """Return a row for each run: how it ended, and its scores at the last week with an
+    observed brain.
 
-    `runs` has the columns run, subject, start_week, end_week, weeks, growth.model, min_J, elements_through_cortex,
-    order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm; `validation` is the study's
-    table.
+    `runs` has the columns run, subject, start_week, end_week, weeks, growth.model,
+    min_J, elements_through_cortex, order, least_elements_through_cortex,
+    unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
     """
     names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
     for name, (_, run) in zip(names, runs.iterrows(), strict=True):
         scores: Mapping[Any, Any] = {}
         if validation is not None:
-            own = validation[(validation["run"] == run["run"]) & (validation["start_week"] == run["start_week"])]
+            own = validation[
+                (validation["run"] == run["run"])
+                & (validation["start_week"] == run["start_week"])
+            ]
             scores = own.sort_values("week").iloc[-1] if len(own) else {}
         rows.append({"run": name, "verdict": run_verdict(run), **_scores(scores)})
     return pd.DataFrame(rows)
 
 
 def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
-    """Describe how accurate predictions over as many weeks were for brains with a later scan.
+    """Describe how accurate predictions over as many weeks were for brains with a later
+    scan.
 
     Where the atlas' own brain was better, that comes first.
     """
-    rows, weeks_ahead = pd.DataFrame(prediction["accuracy"]["rows"]), prediction["week"] - prediction["start_week"]
+    rows, weeks_ahead = (
+        pd.DataFrame(prediction["accuracy"]["rows"]),
+        prediction["week"] - prediction["start_week"],
+    )
     # the next longer horizon that was tested, or the longest
-    horizon = min((tested for tested in rows["horizon"] if tested >= weeks_ahead - 1e-6), default=rows["horizon"].max())
+    horizon = min(
+        (tested for tested in rows["horizon"] if tested >= weeks_ahead - 1e-6),
+        default=rows["horizon"].max(),
+    )
     models = rows[rows["horizon"] == horizon].groupby("model")
     run, atlas, scaled = (
-        f"{range_text(group['distance_mm'])} mm (r {range_text(group['r_shape_index'])})"
+        f"{range_text(group['distance_mm'])} mm (r"
+        f" {range_text(group['r_shape_index'])})"
         for group in map(models.get_group, ("run", "atlas", "scaled"))
     )
-    means = {name: models.get_group(name)[["distance_mm", "r_shape_index"]].mean() for name in ("run", "atlas")}
+    means = {
+        name: models.get_group(name)[["distance_mm", "r_shape_index"]].mean()
+        for name in ("run", "atlas")
+    }
     is_better = {
         "closer": means["atlas"]["distance_mm"] < means["run"]["distance_mm"],
-        "more similar in shape index": means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"],
+        "more similar in shape index": (
+            means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"]
+        ),
     }
     better = " and ".join(words for words, holds in is_better.items() if holds)
     advantage, simpler = prediction["tests"]["advantage"], ""
     if better and not advantage:
-        simpler = f" On average the atlas' own brain was {better}; it is stored with the prediction."
-    beyond = f" No test went as far as {weeks_ahead:.3g} weeks." if weeks_ahead > horizon + 1e-6 else ""
+        simpler = (
+            f" On average the atlas' own brain was {better}; it is stored with the"
+            " prediction."
+        )
+    beyond = (
+        f" No test went as far as {weeks_ahead:.3g} weeks."
+        if weeks_ahead > horizon + 1e-6
+        else ""
+    )
     return (
-        f"{advantage} This is a prediction, not a scan. "
-        f"In tests over {horizon:g} weeks, the mean distance from the observed brain "
-        f"and the correlation of shape index with it were {run} for predictions, {atlas} for the atlas' own brain and "
-        f"{scaled} for the scaled start.{simpler}{beyond} The test brains were averages of many normal fetuses; the "
-        "accuracy for a single fetus is unknown."
+        f"{advantage} This is a prediction, not a scan. In tests over {horizon:g}"
+        " weeks, the mean distance from the observed brain and the correlation of"
+        f" shape index with it were {run} for predictions, {atlas} for the atlas' own"
+        f" brain and {scaled} for the scaled start.{simpler}{beyond} The test brains"
+        " were averages of many normal fetuses; the accuracy for a single fetus is"
+        " unknown."
     ).lstrip()
 
 
 def quality_verdict(quality: pd.DataFrame) -> str:
     """Return a sentence with the number of brains by verdict of quality control."""
     counts = quality["verdict"].value_counts()
-    words = {name: name.replace("needs", "need" if counts.get(name, 0) > 1 else "needs") for name in VERDICTS}
+    words = {
+        name: name.replace("needs", "need" if counts.get(name, 0) > 1 else "needs")
+        for name in VERDICTS
+    }
     brains = f"{len(quality)} brain{'s' if len(quality) > 1 else ''}"
-    return f"{brains}: {', '.join(f'{counts[name]} {word}' for name, word in words.items() if name in counts)}."
+    parts = [f"{counts[name]} {word}" for name, word in words.items() if name in counts]
+    return f"{brains}: {', '.join(parts)}."
 
 
 def verdict(
-    runs: pd.DataFrame, validation: pd.DataFrame | None, warnings: pd.DataFrame, sentence: str = NOT_COMPARED
+    runs: pd.DataFrame,
+    validation: pd.DataFrame | None,
+    warnings: pd.DataFrame,
+    sentence: str = NOT_COMPARED,
 ) -> str:
-    """Return a sentence that compares the best run at the last week with the scaled start, and the worst warning.
+    """Return a sentence that compares the best run at the last week with the scaled
+    start, and the worst warning.
 
-    `runs` and `validation` are as for `scores_table`, `warnings` has the columns level and message. The `sentence` is
-    used if there is no observed brain.
+    `runs` and `validation` are as for `scores_table`, `warnings` has the columns level
+    and message. The `sentence` is used if there is no observed brain.
     """
     if validation is not None and len(validation):
         last = validation[validation["week"] == validation["week"].max()]
         best = last.sort_values("r_shape_index", ascending=False).iloc[0]
         sentence = (
-            f"At {week_label(best['week'])}, run {best['run']} agrees best with the observed brain "
-            f"({best['kind']}{KIND_NOTES.get(best['kind'], '')}): "
-            f"shape index r {best['r_shape_index']:.2f} (scaled start: {best['r_start_shape_index']:.2f}), distance "
-            f"{best['distance_mm']:.2f} mm."
+            f"At {week_label(best['week'])}, run {best['run']} agrees best with the"
+            f" observed brain ({best['kind']}{KIND_NOTES.get(best['kind'], '')}): shape"
+            f" index r {best['r_shape_index']:.2f} (scaled start:"
+            f" {best['r_start_shape_index']:.2f}), distance"
+            f" {best['distance_mm']:.2f} mm."
         ).replace("-", "−")
-    doubts = [text for _, run in runs.iterrows() for text in run_verdict(run).split("; ")[1:]]
-    worst = [*warnings.loc[warnings["level"] == "error", "message"], *doubts, *warnings["message"]]
-    return f"{sentence} {f'Worst warning: {worst[0].rstrip(".")}.' if worst else 'There were no warnings.'}"
+    doubts = [
+        text for _, run in runs.iterrows() for text in run_verdict(run).split("; ")[1:]
+    ]
+    worst = [
+        *warnings.loc[warnings["level"] == "error", "message"],
+        *doubts,
+        *warnings["message"],
+    ]
+    if not worst:
+        return f"{sentence} There were no warnings."
+    return f"{sentence} Worst warning: {worst[0].rstrip('.')}."
 
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and the limitations of its folds."""
     # the table has the list as JSON
-    reached, end, order = max(json.loads(run["weeks"])), float(run["end_week"]), int(run["order"])
-    words = [f"reached {week_label(reached)}" if reached >= end else f"ended at {week_label(reached)} of {end:g}"]
+    reached, end, order = (
+        max(json.loads(run["weeks"])),
+        float(run["end_week"]),
+        int(run["order"]),
+    )
+    words = [
+        (
+            f"reached {week_label(reached)}"
+            if reached >= end
+            else f"ended at {week_label(reached)} of {end:g}"
+        )
+    ]
     if run["min_J"] <= 0:
         words.append("elements inverted")
     has_layers = GROWTH_MODELS[run["growth.model"]].has_layers
     if has_layers:
         words += _coarseness(run, order)
     if run.get("initial_penetration_mm", 0.0) > MAX_PENETRATION_MM:
-        words.append(f"walls of the fissure start {run['initial_penetration_mm']:.2g} mm beyond their planes")
+        words.append(
+            f"walls of the fissure start {run['initial_penetration_mm']:.2g} mm beyond"
+            " their planes"
+        )
     if has_layers and run["elements_through_cortex"] > 0:
         error, text = element_error(order, run["elements_through_cortex"])
         words += [text] if error > LARGE_ELEMENT_ERROR else []
@@ -361,11 +557,15 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
 
 
 def _coarseness(run: Mapping[str, Any] | pd.Series, order: int) -> list[str]:
-    """Return a text if the elements of a run were too large for its cortex, at the start or later; else nothing."""
+    """Return a text if the elements of a run were too large for its cortex, at the
+    start or later; else nothing."""
     elements, week = run["elements_through_cortex"], run["unresolved_from_week"]
     needed = f"{ELEMENTS_NEEDED[order]:g} needed): folds may be artefacts"
     if is_too_coarse(order, elements):
-        return [f"cortex not resolved ({rounded_elements(elements):g} elements through it, {needed}"]
+        return [
+            f"cortex not resolved ({rounded_elements(elements):g} elements through it,"
+            f" {needed}"
+        ]
     if pd.notna(week):
         least = rounded_elements(run["least_elements_through_cortex"])
         down = f"down to {least:g} elements through it, {needed} from then on"
@@ -378,14 +578,26 @@ def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
 
     def text(name: str, pattern: str, factor: float = 1.0) -> str:
         value = validation.get(name, np.nan)
-        return "–" if pd.isna(value) else format(factor * value, pattern).replace("-", "−")
+        return (
+            "–" if pd.isna(value) else format(factor * value, pattern).replace("-", "−")
+        )
 
     def spread(name: str, pattern: str) -> str:
-        ends = " to ".join(text(f"{name}_{end}_shape_index", pattern) for end in ("low", "high"))
-        return f"{text(f'{name}_shape_index', pattern)} ({ends})" if len(validation) else "–"
+        ends = " to ".join(
+            text(f"{name}_{end}_shape_index", pattern) for end in ("low", "high")
+        )
+        return (
+            f"{text(f'{name}_shape_index', pattern)} ({ends})"
+            if len(validation)
+            else "–"
+        )
 
     return {
-        "observed brain": f"{week_label(validation['week'])}, {validation['kind']}" if len(validation) else "none",
+        "observed brain": (
+            f"{week_label(validation['week'])}, {validation['kind']}"
+            if len(validation)
+            else "none"
+        ),
         "distance (mm)": text("distance_mm", ".2f"),
         "r": spread("r", ".2f"),
         "r of the scaled start": text("r_start_shape_index", ".2f"),
@@ -400,11 +612,15 @@ def group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
     # steps of a brain have no run
     named = warnings[["subject", "run"]].astype(object).fillna("").astype(str)
     places = [", ".join(filter(None, place)) for place in named.itertuples(index=False)]
-    prefix = warnings["level"].map(lambda level: "" if level == "warning" else f"{level}: ")
+    prefix = warnings["level"].map(
+        lambda level: "" if level == "warning" else f"{level}: "
+    )
     rows = warnings.assign(message=prefix + warnings["message"])
     rows["brain, run"] = places
     groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
-    return groups.agg(lambda names: "; ".join(filter(None, dict.fromkeys(names)))).reset_index()
+    return groups.agg(
+        lambda names: "; ".join(filter(None, dict.fromkeys(names)))
+    ).reset_index()
 
 
 def hide_paths(value: Any) -> Any:

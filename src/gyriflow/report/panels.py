@@ -1,4 +1,5 @@
-"""Pictures of surfaces side by side at one scale, with views, scale bar and colour bar."""
+"""Pictures of surfaces side by side at one scale, with views, scale bar and colour
+bar."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,18 +14,31 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh, vertex_normals
-from .scene import PIXELS_PER_INCH, TISSUE, VIEWS, View, half_extents, is_visible, picture_axes, render, uniform_colours
+from .scene import (
+    PIXELS_PER_INCH,
+    TISSUE,
+    VIEWS,
+    View,
+    half_extents,
+    is_visible,
+    picture_axes,
+    render,
+    uniform_colours,
+)
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
-# sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
+# sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files
+# of 300 or 600
 _DOTS_PER_INCH = 300
-# space around the largest brain, so that brains in neighbouring rows and columns do not touch
+# space around the largest brain, so that brains in neighbouring rows and columns do not
+# touch
 _MARGIN = 1.12
 MAX_COLUMNS = 8
 LINES_MM = 4.0
 """Spacing of the lines along directions."""
 MIN_FACING_COSINE = 0.3
-"""Minimum cosine between a normal and the view for lines: closer to the outline they would be foreshortened."""
+"""Minimum cosine between a normal and the view for lines: closer to the outline they
+would be foreshortened."""
 _PANEL_IN = 1.75
 # no column is narrower than this part of the widest
 _NARROWEST = 0.7
@@ -42,9 +56,11 @@ _END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
 class Panel:
     """One surface of a grid.
 
-    `mesh` is the visible part and `colours` its (n, 3) or (m, 3) colours; `light` is `TISSUE` or `MAP` of the scene.
-    `mark` (3,) is a point of the surface marked by a ring, dotted if the point is on the far side; `directions` (n, 3)
-    are vectors at the vertices, drawn as lines on the surface (`direction_lines`). The caption stands below.
+    `mesh` is the visible part and `colours` its (n, 3) or (m, 3) colours; `light` is
+    `TISSUE` or `MAP` of the scene. `mark` (3,) is a point of the surface marked by a
+    ring, dotted if the point is on the far side; `directions` (n, 3) are vectors at the
+    vertices, drawn as lines on the surface (`direction_lines`). The caption stands
+    below.
     """
 
     mesh: TriangleMesh
@@ -58,7 +74,8 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A row of a grid: its label, its panels (None if there is nothing to show), and the text of empty panels."""
+    """A row of a grid: its label, its panels (None if there is nothing to show), and
+    the text of empty panels."""
 
     label: str
     panels: Sequence[Panel | None]
@@ -73,7 +90,13 @@ def plain_panel(mesh: TriangleMesh, colour: str) -> Panel:
 def round_length(limit_mm: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
     decade = 10.0 ** np.floor(np.log10(limit_mm))
-    return float(max(step * decade for step in (1, 2, 5) if step * decade <= limit_mm * (1 + 1e-9)))
+    return float(
+        max(
+            step * decade
+            for step in (1, 2, 5)
+            if step * decade <= limit_mm * (1 + 1e-9)
+        )
+    )
 
 
 def panel_grid(
@@ -83,11 +106,13 @@ def panel_grid(
     colour_bar: tuple[ScalarMappable, str] | None = None,
     legend: Sequence[Patch] = (),
 ) -> Figure:
-    """Draw rows of surfaces under column headings, all at one scale in mm, with a scale bar below.
+    """Draw rows of surfaces under column headings, all at one scale in mm, with a scale
+    bar below.
 
-    More than eight columns continue in a further block below. The row's label names the view, and the first panel of a
-    view has the letters of its ends. Several rows, or the panels of a single row, have the letters a, b, c … for the
-    caption. `colour_bar` is a colour scale and its label, `legend` the entries of a legend.
+    More than eight columns continue in a further block below. The row's label names the
+    view, and the first panel of a view has the letters of its ends. Several rows, or
+    the panels of a single row, have the letters a, b, c … for the caption. `colour_bar`
+    is a colour scale and its label, `legend` the entries of a legend.
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     lines = max(row.label.count("\n") for row in rows)
@@ -96,62 +121,134 @@ def panel_grid(
     widest_in = max(widths_in[block].sum() for block in blocks)
     width = _dots(max(SINGLE_COLUMN_IN, label_in + widest_in))
     left = _dots(label_in + (width - label_in - widest_in) / 2)
-    heads = [wrap(head, int(panel / _LETTER_IN)) for head, panel in zip(columns, widths_in, strict=True)]
+    heads = [
+        wrap(head, int(panel / _LETTER_IN))
+        for head, panel in zip(columns, widths_in, strict=True)
+    ]
     head_in = 0.2 + 0.12 * max(head.count("\n") for head in heads)
     # without rows that are empty in a block
-    drawn = [[row for row in rows if row.absent or any(row.panels[block])] for block in blocks]
+    drawn = [
+        [row for row in rows if row.absent or any(row.panels[block])]
+        for block in blocks
+    ]
     heights_in = [
-        _dots([head_in, *(height for row in block_rows for height in _heights_in(row, block, inches_per_mm))])
+        _dots(
+            [
+                head_in,
+                *(
+                    height
+                    for row in block_rows
+                    for height in _heights_in(row, block, inches_per_mm)
+                ),
+            ]
+        )
         for block, block_rows in zip(blocks, drawn, strict=True)
     ]
     legend_columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
-    foot_in = max(0.66 if colour_bar or legend else 0.46, 0.15 * -(-len(legend) // legend_columns) + 0.16)
+    foot_in = max(
+        0.66 if colour_bar or legend else 0.46,
+        0.15 * -(-len(legend) // legend_columns) + 0.16,
+    )
     total = _TOP_IN + _dots(foot_in) + sum(heights.sum() for heights in heights_in)
-    figure, top, letters = Figure(figsize=(width, total)), total - _TOP_IN, iter(ascii_lowercase)
+    figure, top, letters = (
+        Figure(figsize=(width, total)),
+        total - _TOP_IN,
+        iter(ascii_lowercase),
+    )
     for block, block_rows, heights in zip(blocks, drawn, heights_in, strict=True):
-        ends = {"left": left / width, "right": (left + widths_in[block].sum()) / width, "top": top / total}
+        ends = {
+            "left": left / width,
+            "right": (left + widths_in[block].sum()) / width,
+            "top": top / total,
+        }
         top -= heights.sum()
-        ratios = {"width_ratios": widths_in[block], "height_ratios": heights, "hspace": 0, "wspace": 0}
-        grid = GridSpec(len(heights), len(heads[block]), figure, bottom=top / total, **ends, **ratios)
+        ratios = {
+            "width_ratios": widths_in[block],
+            "height_ratios": heights,
+            "hspace": 0,
+            "wspace": 0,
+        }
+        grid = GridSpec(
+            len(heights),
+            len(heads[block]),
+            figure,
+            bottom=top / total,
+            **ends,
+            **ratios,
+        )
         for number, row in enumerate(block_rows):
             # pictures are between the headings or captions above and the captions below
-            cells = [figure.add_subplot(grid[2 * number + 1, column]) for column in range(len(heads[block]))]
-            widths_mm = [float(width_in / inches_per_mm) for width_in in widths_in[block]]
+            cells = [
+                figure.add_subplot(grid[2 * number + 1, column])
+                for column in range(len(heads[block]))
+            ]
+            widths_mm = [
+                float(width_in / inches_per_mm) for width_in in widths_in[block]
+            ]
             height_mm = float(heights[2 * number + 1] / inches_per_mm)
-            _draw_row(cells, row, row.panels[block], widths_mm, height_mm, inches_per_mm)
+            _draw_row(
+                cells, row, row.panels[block], widths_mm, height_mm, inches_per_mm
+            )
             # a letter for each row, or for each panel of a single row
             lettered = cells[:1] if len(rows) > 1 else cells if len(columns) > 1 else []
             for axes, letter in zip(lettered, letters, strict=False):
                 # next to the row's label, or above the letters of the ends
                 is_labelled = row.label and axes is cells[0]
-                align = {"ha": "right", "va": "top"} if is_labelled else {"ha": "left", "va": "bottom"}
-                _write(axes, letter, (0.0, 1.0), (-2, 2), fontsize=9, fontweight="bold", **align)
-            for axes, head in zip(cells if number == 0 else [], heads[block], strict=False):
+                align = (
+                    {"ha": "right", "va": "top"}
+                    if is_labelled
+                    else {"ha": "left", "va": "bottom"}
+                )
+                _write(
+                    axes,
+                    letter,
+                    (0.0, 1.0),
+                    (-2, 2),
+                    fontsize=9,
+                    fontweight="bold",
+                    **align,
+                )
+            for axes, head in zip(
+                cells if number == 0 else [], heads[block], strict=False
+            ):
                 _write(axes, head, (0.5, 1.0), (0, 36 * head_in), va="center")
     _draw_scale_bar(figure, rows, foot_in, widths_in.max(), inches_per_mm)
     if colour_bar:
         _draw_colour_bar(figure, *colour_bar)
     if legend:
-        figure.legend(handles=legend, ncols=legend_columns, loc="lower right", borderaxespad=0.2)
+        figure.legend(
+            handles=legend, ncols=legend_columns, loc="lower right", borderaxespad=0.2
+        )
     return figure
 
 
 def _columns(rows: Sequence[Row], room_in: float) -> tuple[Floats, list[slice], float]:
-    """Return the widths of all columns in inches, the columns of each block, and the scale in inches per mm."""
+    """Return the widths of all columns in inches, the columns of each block, and the
+    scale in inches per mm."""
     columns = zip(*(row.panels for row in rows), strict=True)
-    widest = np.array([max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in columns])
+    widest = np.array(
+        [
+            max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0)
+            for column in columns
+        ]
+    )
     widths_mm = 2 * _MARGIN * np.maximum(widest, _NARROWEST * widest.max())
     # blocks with as equal numbers of columns as possible
     size = -(-len(widths_mm) // -(-len(widths_mm) // MAX_COLUMNS))
     blocks = [slice(start, start + size) for start in range(0, len(widths_mm), size)]
-    inches_per_mm = min(_PANEL_IN / widths_mm.max(), room_in / max(widths_mm[block].sum() for block in blocks))
+    inches_per_mm = min(
+        _PANEL_IN / widths_mm.max(),
+        room_in / max(widths_mm[block].sum() for block in blocks),
+    )
     return _dots(widths_mm * inches_per_mm), blocks, inches_per_mm
 
 
 def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
     """Return the heights of a row's pictures and captions."""
     panels = [panel for panel in row.panels[block] if panel is not None]
-    tallest = max((half_extents(panel.mesh, panel.view)[1] for panel in panels), default=0.0)
+    tallest = max(
+        (half_extents(panel.mesh, panel.view)[1] for panel in panels), default=0.0
+    )
     # the label is written along the height
     label = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
     lines = max((len(panel.caption.splitlines()) for panel in panels), default=0)
@@ -164,11 +261,22 @@ def _dots(inches: Any) -> Any:
 
 
 def _write(
-    axes: Axes, text: str, at: tuple[float, float], shift_pt: tuple[float, float] = (0, 0), **style: Any
+    axes: Axes,
+    text: str,
+    at: tuple[float, float],
+    shift_pt: tuple[float, float] = (0, 0),
+    **style: Any,
 ) -> None:
     """Write at a place in fractions of a panel, shifted by points."""
     style = {"fontsize": 7, "ha": "center", "va": "center", **style}
-    axes.annotate(text, at, shift_pt, xycoords="axes fraction", textcoords="offset points", **style)
+    axes.annotate(
+        text,
+        at,
+        shift_pt,
+        xycoords="axes fraction",
+        textcoords="offset points",
+        **style,
+    )
 
 
 def _draw_row(
@@ -179,23 +287,39 @@ def _draw_row(
     height_mm: float,
     inches_per_mm: float,
 ) -> None:
-    """Draw the pictures of a row in its cells, whose sizes are given, with the row's label on the left."""
+    """Draw the pictures of a row in its cells, whose sizes are given, with the row's
+    label on the left."""
     previous = None
     _write(cells[0], row.label, (0.0, 0.5), (-4.3, 0), rotation=90, ha="right")
-    for index, (axes, panel, width_mm) in enumerate(zip(cells, panels, widths_mm, strict=True)):
+    for index, (axes, panel, width_mm) in enumerate(
+        zip(cells, panels, widths_mm, strict=True)
+    ):
         axes.set_label(f"{row.label}, column {index}")
         axes.set_axis_off()
         if panel is None:
             _write(axes, row.absent, (0.5, 0.5), fontsize=6.5)
             continue
         half = width_mm / 2, height_mm / 2
-        lines = None if panel.directions is None else direction_lines(panel.mesh, panel.directions, panel.view)
+        lines = (
+            None
+            if panel.directions is None
+            else direction_lines(panel.mesh, panel.directions, panel.view)
+        )
         image = render(
-            panel.mesh, panel.colours, panel.view, half, PIXELS_PER_INCH * inches_per_mm, light=panel.light, lines=lines
+            panel.mesh,
+            panel.colours,
+            panel.view,
+            half,
+            PIXELS_PER_INCH * inches_per_mm,
+            light=panel.light,
+            lines=lines,
         )
         axes.imshow(image, extent=(-half[0], half[0], -half[1], half[1]), aspect="auto")
         if panel.view != previous:
-            for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):
+            for place, align, end in (
+                (0.04, "left", panel.view.ends[0]),
+                (0.96, "right", panel.view.ends[1]),
+            ):
                 _write(axes, end, (place, 1.0), ha=align, va="top", fontsize=6)
         previous = panel.view
         if panel.mark is not None:
@@ -204,14 +328,21 @@ def _draw_row(
 
 
 def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
-    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of `LINES_MM` that faces a view.
+    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of
+    `LINES_MM` that faces a view.
 
     Vectors of length 1 or more give lines as long as a cube.
     """
     normals = vertex_normals(mesh)
-    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[1]
+    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[
+        1
+    ]
     vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
-    half = directions[vertices] * (LINES_MM / 2) / np.linalg.norm(directions[vertices], axis=1, keepdims=True).clip(1)
+    half = (
+        directions[vertices]
+        * (LINES_MM / 2)
+        / np.linalg.norm(directions[vertices], axis=1, keepdims=True).clip(1)
+    )
     # slightly above the surface, which would otherwise hide parts of them
     at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
     return np.stack([at - half, at + half], axis=1)
@@ -223,7 +354,11 @@ def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
     line = "-" if is_visible(panel.mesh, point, panel.view) else ":"
     for colour, thickness in (("white", 2.0), ("black", 1.0)):
         ring = Circle((right, up), 0.05 * np.ptp(axes.get_xlim()) / 2, fill=False)
-        ring.set(edgecolor=colour, linewidth=thickness, linestyle=line if colour == "black" else "-")
+        ring.set(
+            edgecolor=colour,
+            linewidth=thickness,
+            linestyle=line if colour == "black" else "-",
+        )
         ring.set(clip_on=False, zorder=5)
         axes.add_patch(ring)
 
@@ -239,17 +374,44 @@ def _draw_colour_bar(figure: Figure, scale: ScalarMappable, label: str) -> None:
 
 
 def _draw_scale_bar(
-    figure: Figure, rows: Sequence[Row], foot_in: float, widest_in: float, inches_per_mm: float
+    figure: Figure,
+    rows: Sequence[Row],
+    foot_in: float,
+    widest_in: float,
+    inches_per_mm: float,
 ) -> None:
     """Draw the scale bar, and below it what the letters of the views mean."""
     width, total = figure.get_size_inches()
-    length = round_length(min(0.6 * widest_in, _SCALE_SHARE * width - 2 * _EDGE_IN) / inches_per_mm)
-    axes = figure.add_axes((_EDGE_IN / width, (foot_in - 0.2) / total, length * inches_per_mm / width, 0.04 / total))
+    length = round_length(
+        min(0.6 * widest_in, _SCALE_SHARE * width - 2 * _EDGE_IN) / inches_per_mm
+    )
+    axes = figure.add_axes(
+        (
+            _EDGE_IN / width,
+            (foot_in - 0.2) / total,
+            length * inches_per_mm / width,
+            0.04 / total,
+        )
+    )
     axes.set_label("scale bar")
     axes.set_xlim(0, length)
     axes.axvspan(0, length, color="black", linewidth=0)
     axes.set_axis_off()
-    axes.text(0.0, -0.6, f"{length:g} mm", transform=axes.transAxes, ha="left", va="top", fontsize=7)
-    ends = {end for row in rows for panel in row.panels if panel for end in panel.view.ends}
-    words = ", ".join(f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends)
-    figure.text(_EDGE_IN / width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
+    axes.text(
+        0.0,
+        -0.6,
+        f"{length:g} mm",
+        transform=axes.transAxes,
+        ha="left",
+        va="top",
+        fontsize=7,
+    )
+    ends = {
+        end for row in rows for panel in row.panels if panel for end in panel.view.ends
+    }
+    words = ", ".join(
+        f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends
+    )
+    figure.text(
+        _EDGE_IN / width, 0.02 / total, words, ha="left", va="bottom", fontsize=6
+    )

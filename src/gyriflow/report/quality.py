@@ -1,4 +1,5 @@
-"""Quality control before the solve: a page and a verdict for each brain, and the table of all brains of a study."""
+"""Quality control before the solve: a page and a verdict for each brain, and the table
+of all brains of a study."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,13 +20,29 @@ from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
 from ..quantities import VERTEX_MAPS
 from ..settings.schemes import LabelScheme
-from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
+from .scene import (
+    VIEWS,
+    colour_scale,
+    half_extents,
+    paint,
+    render,
+    restricted,
+    uniform_colours,
+)
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
 from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_SURFACE_COLOUR, styled, wrap
 
-VERDICT_HEADINGS = {"fine": ("No warnings.", "#009E73"), "needs review": ("Warnings:", "#E69F00")}
+VERDICT_HEADINGS = {
+    "fine": ("No warnings.", "#009E73"),
+    "needs review": ("Warnings:", "#E69F00"),
+}
 """Heading above the warnings of a page, and colour of the verdict."""
-TISSUE_GROUPS = {1: "cortex", 2: "inside the cortex", 3: "ventricles", 4: "other labels"}
+TISSUE_GROUPS = {
+    1: "cortex",
+    2: "inside the cortex",
+    3: "ventricles",
+    4: "other labels",
+}
 """Groups of labels that share a colour, shown if there is no image."""
 TISSUE_COLOURS = ("#FFFFFF", "#B7A58B", "#E9E4DA", "#9CC3E0", "#E6E6E6")
 PIAL_COLOUR, INNER_COLOUR = "#D55E00", "#0072B2"
@@ -48,10 +65,12 @@ _BRIGHTEST = 0.995
 class QualityBrain:
     """The surfaces, thickness and volumes on a brain's page.
 
-    `pial` is the whole surface in RAS+ mm, `white` the white one in the same coordinates, `fissure_x_mm` the plane that
-    separates the hemispheres in medial views, and `thickness_mm` (n,) at the vertices of the surface, NaN where not
-    measured. `image` and `tissues` are the (i, j, k) grey values and groups of labels (`TISSUE_GROUPS`), each with the
-    (4, 4) affine from voxel index to the surface's coordinates.
+    `pial` is the whole surface in RAS+ mm, `white` the white one in the same
+    coordinates, `fissure_x_mm` the plane that separates the hemispheres in medial
+    views, and `thickness_mm` (n,) at the vertices of the surface, NaN where not
+    measured. `image` and `tissues` are the (i, j, k) grey values and groups of labels
+    (`TISSUE_GROUPS`), each with the (4, 4) affine from voxel index to the surface's
+    coordinates.
     """
 
     pial: TriangleMesh
@@ -62,8 +81,11 @@ class QualityBrain:
     tissues: tuple[NDArray[np.integer], Floats] | None = None
 
 
-def tissue_groups(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[np.uint8]:
-    """Return the (i, j, k) group of each voxel as in `TISSUE_GROUPS`; 0 is background."""
+def tissue_groups(
+    labels: NDArray[np.integer], scheme: LabelScheme
+) -> NDArray[np.uint8]:
+    """Return the (i, j, k) group of each voxel as in `TISSUE_GROUPS`; 0 is
+    background."""
     groups = np.where(labels > 0, 4, 0).astype(np.uint8)
     groups[np.isin(labels, scheme.cerebrum)] = 2
     groups[np.isin(labels, scheme.cortex)] = 1
@@ -72,24 +94,39 @@ def tissue_groups(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
 
 
 @styled
-def quality_page(brain: QualityBrain, row: Mapping[str, Any], warnings: Sequence[str]) -> Figure:
-    """Draw the page of a brain: three planes, the surface in four views, thickness in four views, and its warnings.
+def quality_page(
+    brain: QualityBrain, row: Mapping[str, Any], warnings: Sequence[str]
+) -> Figure:
+    """Draw the page of a brain: three planes, the surface in four views, thickness in
+    four views, and its warnings.
 
-    The outlines are drawn on the image, or on the labels if there is no image. The page ends below its last warning.
-    `row` is the output of `quality_row`.
+    The outlines are drawn on the image, or on the labels if there is no image. The page
+    ends below its last warning. `row` is the output of `quality_row`.
     """
-    lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
+    lines = [
+        line
+        for text in warnings
+        for line in wrap(f"• {text}", LINE_LETTERS).split("\n")
+    ]
     height_in = HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines)
     figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     heading, colour = VERDICT_HEADINGS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
     # lines break between facts only
-    facts = [f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}") for name, value in _facts(row).items()]
+    facts = [
+        f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}")
+        for name, value in _facts(row).items()
+    ]
     words = wrap("   ".join(facts), LINE_LETTERS)
     title = f"{row['subject']}, {row['week']:g} GW"
     figure.suptitle(title, x=0.015, ha="left", fontsize=10, fontweight="bold")
     box = {"boxstyle": "round,pad=0.3", "facecolor": colour, "edgecolor": "none"}
-    place: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": 10, "fontweight": "bold"}
+    place: dict[str, Any] = {
+        "ha": "right",
+        "va": "top",
+        "fontsize": 10,
+        "fontweight": "bold",
+    }
     figure.text(0.985, 0.985, row["verdict"].upper(), color="white", bbox=box, **place)
     figure.supxlabel("\n".join([heading, *lines]), **left)
     rows: Any = figure.subfigures(3, 1, height_ratios=ROWS_IN)
@@ -101,57 +138,121 @@ def quality_page(brain: QualityBrain, row: Mapping[str, Any], warnings: Sequence
     if brain.thickness_mm is None:
         _draw_views(thickness, brain, uniform, OTHER_VIEWS)
     else:
-        scale = colour_scale(VERTEX_MAPS["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True)
-        panels = _draw_views(thickness, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS)
-        unknown = "" if np.isfinite(brain.thickness_mm).all() else "\ngrey: not measured"
-        thickness.colorbar(scale, ax=panels).set_label(f"thickness (mm){unknown}", fontsize=6.5)
+        scale = colour_scale(
+            VERTEX_MAPS["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True
+        )
+        panels = _draw_views(
+            thickness, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS
+        )
+        unknown = (
+            "" if np.isfinite(brain.thickness_mm).all() else "\ngrey: not measured"
+        )
+        thickness.colorbar(scale, ax=panels).set_label(
+            f"thickness (mm){unknown}", fontsize=6.5
+        )
     for letter, part in zip("abc", rows, strict=True):
-        part.text(0.015, 0.85 if part is planes else 1.0, letter, ha="left", va="top", fontsize=9, fontweight="bold")
+        part.text(
+            0.015,
+            0.85 if part is planes else 1.0,
+            letter,
+            ha="left",
+            va="top",
+            fontsize=9,
+            fontweight="bold",
+        )
     return figure
 
 
 def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
-    """Draw three planes through the middle, the sagittal one through the middle of a hemisphere."""
+    """Draw three planes through the middle, the sagittal one through the middle of a
+    hemisphere."""
     low, high = brain.pial.vertices.min(axis=0), brain.pial.vertices.max(axis=0)
-    middle, fissure = (low + high) / 2, float(np.clip(brain.fissure_x_mm, low[0], high[0]))
+    middle, fissure = (
+        (low + high) / 2,
+        float(np.clip(brain.fissure_x_mm, low[0], high[0])),
+    )
     # the larger hemisphere, of equal ones the right one
     outer = high[0] if high[0] - fissure > 0.8 * (fissure - low[0]) else low[0]
     at = {"coronal": middle[1], "axial": middle[2], "sagittal": (fissure + outer) / 2}
     # pixel coordinates by axis, and the edges of the pictures
-    dots = [np.arange(begin - MARGIN_MM, end + MARGIN_MM, PIXEL_MM) for begin, end in zip(low, high, strict=True)]
+    dots = [
+        np.arange(begin - MARGIN_MM, end + MARGIN_MM, PIXEL_MM)
+        for begin, end in zip(low, high, strict=True)
+    ]
     ends = [(dots_of_axis[0], dots_of_axis[-1] + PIXEL_MM) for dots_of_axis in dots]
     tallest = max(np.ptp(ends[up]) for *_, up in PLANES.values())
     colour = "black" if brain.image is None else "white"
-    panels = figure.subplots(1, 3, width_ratios=[np.ptp(ends[right]) for _, right, _ in PLANES.values()])
+    panels = figure.subplots(
+        1, 3, width_ratios=[np.ptp(ends[right]) for _, right, _ in PLANES.values()]
+    )
     for axes, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
         points = np.empty((len(dots[up]), len(dots[right]), 3))
-        points[..., normal], points[..., right], points[..., up] = at[plane], dots[right], dots[up][:, None]
-        style: dict[str, Any] = {"origin": "lower", "extent": (*ends[right], *ends[up]), "interpolation": "none"}
+        points[..., normal], points[..., right], points[..., up] = (
+            at[plane],
+            dots[right],
+            dots[up][:, None],
+        )
+        style: dict[str, Any] = {
+            "origin": "lower",
+            "extent": (*ends[right], *ends[up]),
+            "interpolation": "none",
+        }
         if brain.image:
             values, affine = brain.image
             lit = values[np.isfinite(values) & (values > 0)]
             brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
-            grey = map_coordinates(np.nan_to_num(values), voxel_index(points, affine), order=1)
+            grey = map_coordinates(
+                np.nan_to_num(values), voxel_index(points, affine), order=1
+            )
             axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **style)
         if brain.tissues:
             groups, affine = brain.tissues
             index = voxel_index(points, affine)
             if not brain.image:
                 tissues = map_coordinates(groups, index, order=0, mode="constant")
-                axes.imshow(tissues, cmap=ListedColormap(TISSUE_COLOURS), vmin=-0.5, vmax=4.5, **style)
-            inside = map_coordinates(np.isin(groups, (2, 3)).astype(np.float32), index, order=1)
+                axes.imshow(
+                    tissues,
+                    cmap=ListedColormap(TISSUE_COLOURS),
+                    vmin=-0.5,
+                    vmax=4.5,
+                    **style,
+                )
+            inside = map_coordinates(
+                np.isin(groups, (2, 3)).astype(np.float32), index, order=1
+            )
             if (groups == 1).any() and inside.min() < 0.5 < inside.max():
-                grid = [np.linspace(*ends[axis], len(dots[axis])) for axis in (right, up)]
-                axes.contour(*grid, inside, levels=[0.5], colors=INNER_COLOUR, linewidths=0.6)
+                grid = [
+                    np.linspace(*ends[axis], len(dots[axis])) for axis in (right, up)
+                ]
+                axes.contour(
+                    *grid, inside, levels=[0.5], colors=INNER_COLOUR, linewidths=0.6
+                )
         if brain.white is not None:
             draw_outline(axes, brain.white, plane, at[plane], INNER_COLOUR)
         draw_outline(axes, brain.pial, plane, at[plane], PIAL_COLOUR)
         # all at one scale
-        axes.set(xlim=ends[right], ylim=(sum(ends[up]) / 2 + np.array([-0.5, 0.5]) * tallest), aspect="equal")
+        axes.set(
+            xlim=ends[right],
+            ylim=(sum(ends[up]) / 2 + np.array([-0.5, 0.5]) * tallest),
+            aspect="equal",
+        )
         axes.set_axis_off()
-        axes.set_title(f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2)
-        for x, end in zip((0.03, 0.97), "PA" if plane == "sagittal" else "LR", strict=True):
-            axes.text(x, 0.5, end, transform=axes.transAxes, ha="center", va="center", fontsize=6.5, color=colour)
+        axes.set_title(
+            f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2
+        )
+        for x, end in zip(
+            (0.03, 0.97), "PA" if plane == "sagittal" else "LR", strict=True
+        ):
+            axes.text(
+                x,
+                0.5,
+                end,
+                transform=axes.transAxes,
+                ha="center",
+                va="center",
+                fontsize=6.5,
+                color=colour,
+            )
     coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
     coronal.plot([left, left + SCALE_BAR_MM], [bottom] * 2, color=colour, linewidth=1.2)
     coronal.text(left, bottom + 1, f"{SCALE_BAR_MM:g} mm", fontsize=6, color=colour)
@@ -160,25 +261,50 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         keys.append(Patch(color=INNER_COLOUR, label="inner border of the cortex"))
     if brain.tissues and not brain.image:
         codes = np.unique(brain.tissues[0])
-        keys += [Patch(color=TISSUE_COLOURS[code], label=name) for code, name in TISSUE_GROUPS.items() if code in codes]
-    figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), fontsize=6, handlelength=1.0)
+        keys += [
+            Patch(color=TISSUE_COLOURS[code], label=name)
+            for code, name in TISSUE_GROUPS.items()
+            if code in codes
+        ]
+    figure.legend(
+        handles=keys,
+        loc="outside lower center",
+        ncols=len(keys),
+        fontsize=6,
+        handlelength=1.0,
+    )
 
 
-def _draw_views(figure: SubFigure, brain: QualityBrain, colours: Floats, names: Sequence[str]) -> list[Axes]:
+def _draw_views(
+    figure: SubFigure, brain: QualityBrain, colours: Floats, names: Sequence[str]
+) -> list[Axes]:
     """Draw a row of views at one scale, without views of a missing hemisphere."""
-    every = [half_extents(brain.pial, VIEWS[name]) for name in (*SHAPE_VIEWS, *OTHER_VIEWS)]
+    every = [
+        half_extents(brain.pial, VIEWS[name]) for name in (*SHAPE_VIEWS, *OTHER_VIEWS)
+    ]
     wide, tall = 1.04 * np.max(every, axis=0)
     panels = list(figure.subplots(1, len(names)))
     pixels_per_mm = PIXELS_PER_INCH * (FULL_WIDTH_IN - 0.7) / len(names) / (2 * wide)
     for axes, view in zip(panels, [VIEWS[name] for name in names], strict=True):
         axes.set_axis_off()
-        mesh, painted = restricted(brain.pial, colours, view.hemisphere, brain.fissure_x_mm)
+        mesh, painted = restricted(
+            brain.pial, colours, view.hemisphere, brain.fissure_x_mm
+        )
         if not len(mesh.faces):
             continue
         axes.imshow(render(mesh, painted, view, (wide, tall), pixels_per_mm))
         axes.set_title(view.name, fontsize=6.5, pad=1)
         for x, end in zip((0.05, 0.95), view.ends, strict=True):
-            axes.text(x, 0.97, end, transform=axes.transAxes, ha="center", va="top", fontsize=6, color=MUTED_COLOUR)
+            axes.text(
+                x,
+                0.97,
+                end,
+                transform=axes.transAxes,
+                ha="center",
+                va="top",
+                fontsize=6,
+                color=MUTED_COLOUR,
+            )
     return panels
 
 
@@ -191,16 +317,28 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
         "source": str(row["source"]),
         "hemispheres": " and ".join(sides),
         "area": f"{row['area_cm2']:.1f} cm² ({both})",
-        "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of the expected)",
-        "pose": f"by {row['pose_by']}, turned by {turned:.1f}°" if turned >= 0.05 else "as in the file",
+        "volume": (
+            f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} %"
+            " of the expected)"
+        ),
+        "pose": (
+            f"by {row['pose_by']}, turned by {turned:.1f}°"
+            if turned >= 0.05
+            else "as in the file"
+        ),
     }
     if row["asymmetry_mm"] is not None:
         facts["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
     if row["cut_share"] is not None:
         usual = f"usually at most {100 * row['usual_cut_share']:.0f} %"
-        facts["cut at the midline"] = f"{100 * row['cut_share']:.0f} % of the medial wall ({usual})"
+        facts["cut at the midline"] = (
+            f"{100 * row['cut_share']:.0f} % of the medial wall ({usual})"
+        )
     if thickness is not None:
-        facts["thickness"] = f"{thickness:.2f} mm (measured on {100 * row['thickness_measured_share']:.0f} %)"
+        facts["thickness"] = (
+            f"{thickness:.2f} mm (measured on"
+            f" {100 * row['thickness_measured_share']:.0f} %)"
+        )
     if row["area_ratio"] is not None:
         facts["area / area of a complete surface"] = f"{row['area_ratio']:.2f}"
     return facts
@@ -213,11 +351,13 @@ def quality_row(
     warnings: Sequence[str],
     expected_ml: float,
 ) -> dict[str, Any]:
-    """Return the row of a brain with a surface; its verdict is "needs review" if there are warnings, else "fine".
+    """Return the row of a brain with a surface; its verdict is "needs review" if there
+    are warnings, else "fine".
 
-    `labels` are subject, week, population, source, sides and page; `report` and `thickness` the contents of
-    `surface.json` and `thickness.json`. `expected_ml` is the approximate volume of a cerebrum of the week; half of it
-    is expected of a single hemisphere.
+    `labels` are subject, week, population, source, sides and page; `report` and
+    `thickness` the contents of `surface.json` and `thickness.json`. `expected_ml` is
+    the approximate volume of a cerebrum of the week; half of it is expected of a single
+    hemisphere.
     """
     area, sides = report["area_cm2"], str(labels["sides"]).split()
     pose = pose_from(report["pose"])
@@ -245,13 +385,19 @@ def quality_row(
 
 
 def quality_table(
-    rows: Sequence[Mapping[str, Any]], refused: Sequence[Mapping[str, Any]], order: Sequence[str]
+    rows: Sequence[Mapping[str, Any]],
+    refused: Sequence[Mapping[str, Any]],
+    order: Sequence[str],
 ) -> pd.DataFrame:
-    """Return the rows of all brains, outputs of `quality_row`, in an order of their ids.
+    """Return the rows of all brains, outputs of `quality_row`, in an order of their
+    ids.
 
     `refused` are labels and cause of refused brains.
     """
-    every = [*rows, *({**row, "verdict": "refused", "warning_count": 0} for row in refused)]
+    every = [
+        *rows,
+        *({**row, "verdict": "refused", "warning_count": 0} for row in refused),
+    ]
     table = pd.DataFrame(every).set_index("subject", drop=False)
     ids = [name for name in order if name in table.index]
     return table.loc[ids, [*table.columns.drop("page"), "page"]].reset_index(drop=True)

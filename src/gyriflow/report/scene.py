@@ -26,9 +26,10 @@ Image = NDArray[np.uint8]
 class View:
     """A view of a brain in RAS+ mm.
 
-    `towards` is the unit vector from the brain to the camera, `up` the one that points up in the picture; `ends` are
-    the letters of the picture's left and right ends (A anterior, P posterior, L left, R right). `hemisphere` is "left"
-    or "right" if only that one is shown, else "". The name is the label of the picture.
+    `towards` is the unit vector from the brain to the camera, `up` the one that points
+    up in the picture; `ends` are the letters of the picture's left and right ends (A
+    anterior, P posterior, L left, R right). `hemisphere` is "left" or "right" if only
+    that one is shown, else "". The name is the label of the picture.
     """
 
     name: str
@@ -54,7 +55,8 @@ VIEWS = {
 """The views by name. In the top view the brain's left is on the picture's left."""
 
 PIXELS_PER_INCH = 600
-"""Resolution of pictures of surfaces: as in PDF files, three times that of PNG files."""
+"""Resolution of pictures of surfaces: as in PDF files, three times that of PNG
+files."""
 
 PARTS = {"YlGnBu": (0.0, 0.85), "YlOrRd": (0.08, 0.85), "RdBu_r": (0.06, 0.94)}
 """Used parts of colour maps: their darkest ends could be mistaken for shade."""
@@ -66,9 +68,14 @@ TISSUE = {"ambient": 0.16, "diffuse": 0.84, "specular": 0.1}
 MAP = {"ambient": 0.58, "diffuse": 0.42, "specular": 0.0}
 """Light on maps, whose colours show values: shading only hints at the shape."""
 
-# lamps fixed to the camera, symmetric so that both hemispheres are shaded equally. The strongest is above, so that
-# shallow sulci of young brains are visible
-_LAMPS = (((0.0, 1.0, 0.8), 0.45), ((-1.0, 0.2, 0.5), 0.22), ((1.0, 0.2, 0.5), 0.22), ((0.0, 0.0, 1.0), 0.36))
+# lamps fixed to the camera, symmetric so that both hemispheres are shaded equally. The
+# strongest is above, so that shallow sulci of young brains are visible
+_LAMPS = (
+    ((0.0, 1.0, 0.8), 0.45),
+    ((-1.0, 0.2, 0.5), 0.22),
+    ((1.0, 0.2, 0.5), 0.22),
+    ((0.0, 0.0, 1.0), 0.36),
+)
 
 
 def picture_axes(view: View) -> tuple[Floats, Floats]:
@@ -86,7 +93,8 @@ def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
 def restricted(
     mesh: TriangleMesh, colours: Floats, hemisphere: str, fissure_x_mm: float
 ) -> tuple[TriangleMesh, Floats]:
-    """Return the faces on one side of the fissure's plane, all for "", and their (n, 3) vertex or (m, 3) face colours.
+    """Return the faces on one side of the fissure's plane, all for "", and their (n, 3)
+    vertex or (m, 3) face colours.
 
     A brain that lacks the hemisphere has no faces there.
     """
@@ -95,7 +103,9 @@ def restricted(
     left = corners(mesh).mean(axis=1)[:, 0] < fissure_x_mm
     keep = left if hemisphere == "left" else ~left
     part, vertices = submesh(mesh, keep)
-    return part, colours[vertices] if len(colours) == len(mesh.vertices) else colours[keep]
+    return part, (
+        colours[vertices] if len(colours) == len(mesh.vertices) else colours[keep]
+    )
 
 
 def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
@@ -103,11 +113,15 @@ def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
     return np.tile(np.array(to_rgb(colour)), (len(mesh.vertices), 1))
 
 
-def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -> ScalarMappable:
+def colour_scale(
+    colormap: str, low: float, high: float, *, cut: bool = False
+) -> ScalarMappable:
     """Return a colour scale; `cut` marks values above its upper end."""
     start, end = PARTS.get(colormap, (0.0, 1.0))
     shades = mpl.colormaps[colormap](np.linspace(start, end, 256))
-    colours = LinearSegmentedColormap.from_list(colormap, [tuple(shade) for shade in shades])
+    colours = LinearSegmentedColormap.from_list(
+        colormap, [tuple(shade) for shade in shades]
+    )
     colours.colorbar_extend = "max" if cut else "neither"  # type: ignore[assignment]
     return ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
 
@@ -123,12 +137,16 @@ def paint(values: Floats, scale: ScalarMappable) -> Floats:
 def is_visible(mesh: TriangleMesh, point: Floats, view: View) -> bool:
     """Return whether a point of the surface is visible in a view."""
     far = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
+    body = pv.PolyData.from_regular_faces(
+        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
+    )
     towards = np.array(view.towards)
     right, up = picture_axes(view)
     # slightly shifted: rays through vertices may pass between triangles
     point = point + 0.013 * right + 0.007 * up
-    hits, _ = body.ray_trace(origin=point + far * towards, end_point=point - 1e-3 * towards)
+    hits, _ = body.ray_trace(
+        origin=point + far * towards, end_point=point - 1e-3 * towards
+    )
     return bool(len(hits) == 0 or ((hits - point) @ towards).max() < SAME_PLACE_MM)
 
 
@@ -142,33 +160,57 @@ def render(
     light: Mapping[str, Any] = TISSUE,
     lines: Floats | None = None,
 ) -> Image:
-    """Return a picture (height, width, 3) of the surface on white, in parallel projection about the middle of its box.
+    """Return a picture (height, width, 3) of the surface on white, in parallel
+    projection about the middle of its box.
 
-    `colours` are (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1; `half_extents_mm` half the width
-    and half the height of the picture; `lines` (k, 2, 3) ends of lines, drawn unless the surface hides them.
+    `colours` are (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1;
+    `half_extents_mm` half the width and half the height of the picture; `lines` (k, 2,
+    3) ends of lines, drawn unless the surface hides them.
     """
     size = [max(2, round(2 * half * pixels_per_mm)) for half in half_extents_mm]
-    surface = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
+    surface = pv.PolyData.from_regular_faces(
+        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
+    )
     surface.point_data.active_normals = vertex_normals(mesh)
     bytes_ = np.clip(np.round(255 * np.asarray(colours)), 0, 255).astype(np.uint8)
-    attributes = surface.point_data if len(bytes_) == len(mesh.vertices) else surface.cell_data
+    attributes = (
+        surface.point_data if len(bytes_) == len(mesh.vertices) else surface.cell_data
+    )
     attributes["colour"] = bytes_
     plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
     try:
         plotter.set_background("white")  # type: ignore[arg-type]
         plotter.add_mesh(
-            surface, scalars="colour", rgb=True, interpolation="phong", specular_power=15, culling="back", **light
+            surface,
+            scalars="colour",
+            rgb=True,
+            interpolation="phong",
+            specular_power=15,
+            culling="back",
+            **light,
         )
         # the inside of a surface that is open where the hemispheres were separated
-        plotter.add_mesh(surface, color=NEUTRAL_COLOUR, ambient=0.6, diffuse=0.4, culling="front")
+        plotter.add_mesh(
+            surface, color=NEUTRAL_COLOUR, ambient=0.6, diffuse=0.4, culling="front"
+        )
         if lines is not None:
             ends = pv.line_segments_from_points(lines.reshape(-1, 3))
-            plotter.add_mesh(ends, color="black", line_width=0.005 * PIXELS_PER_INCH, lighting=False)
+            plotter.add_mesh(
+                ends, color="black", line_width=0.005 * PIXELS_PER_INCH, lighting=False
+            )
         for position, intensity in _LAMPS:
-            plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
+            plotter.add_light(
+                pv.Light(
+                    position=position, light_type="camera light", intensity=intensity
+                )
+            )
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
         distance = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-        plotter.camera_position = [tuple(middle + distance * np.array(view.towards)), tuple(middle), view.up]
+        plotter.camera_position = [
+            tuple(middle + distance * np.array(view.towards)),
+            tuple(middle),
+            view.up,
+        ]
         plotter.camera.parallel_projection = True
         plotter.camera.parallel_scale = half_extents_mm[1]
         plotter.renderer.ResetCameraClippingRange()

@@ -25,23 +25,35 @@ from .style import (
     wrap,
 )
 
-SIDE_STYLES = {"whole": ("o", RUN_COLOURS[0]), "left": ("<", RUN_COLOURS[0]), "right": (">", RUN_COLOURS[1])}
-SIDE_NAMES = {"whole": "whole brain", "left": "left hemisphere", "right": "right hemisphere"}
+SIDE_STYLES = {
+    "whole": ("o", RUN_COLOURS[0]),
+    "left": ("<", RUN_COLOURS[0]),
+    "right": (">", RUN_COLOURS[1]),
+}
+SIDE_NAMES = {
+    "whole": "whole brain",
+    "left": "left hemisphere",
+    "right": "right hemisphere",
+}
 
 
 @styled
 def validation_chart(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw by week how much better a run's curvature correlates with the observed brain's than the scaled start's.
+    """Draw by week how much better a run's curvature correlates with the observed
+    brain's than the scaled start's.
 
-    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted.
+    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open
+    ones predicted.
 
-    `validation` has the columns run, start_week, week, kind, and gain_…, gain_low_… and gain_high_… of each of
-    `COMPARED_MAPS`.
+    `validation` has the columns run, start_week, week, kind, and gain_…, gain_low_… and
+    gain_high_… of each of `COMPARED_MAPS`.
     """
     colours = run_colours(validation["run"], runs)
     figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
     for axes, measure in zip(panels, COMPARED_MAPS, strict=True):
-        for number, ((run, _), rows) in enumerate(validation.groupby(["run", "start_week"], sort=False)):
+        for number, ((run, _), rows) in enumerate(
+            validation.groupby(["run", "start_week"], sort=False)
+        ):
             line = rows.sort_values("week")
             shift = 0.03 * (number - (len(colours) - 1) / 2)
             _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
@@ -53,15 +65,23 @@ def validation_chart(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
     return figure
 
 
-def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any) -> None:
-    """Draw a gain with its interval; filled marks are explained weeks, open ones predicted."""
+def _gain_line(
+    axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any
+) -> None:
+    """Draw a gain with its interval; filled marks are explained weeks, open ones
+    predicted."""
     gain = rows[f"gain_{measure}"]
-    below, above = gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain
+    below, above = (
+        gain - rows[f"gain_low_{measure}"],
+        rows[f"gain_high_{measure}"] - gain,
+    )
     lengths = np.stack([below, above]).clip(min=0)
     axes.errorbar(x, gain, yerr=lengths, color=colour, linewidth=1.0, elinewidth=0.7)
     for kind, face in (("explained", colour), ("predicted", "white")):
         if (selected := rows["kind"] == kind).any():
-            axes.plot(x[selected], gain[selected], "o", color=colour, markerfacecolor=face)
+            axes.plot(
+                x[selected], gain[selected], "o", color=colour, markerfacecolor=face
+            )
 
 
 @styled
@@ -74,22 +94,29 @@ def nearest_chart(
     week: float,
     published: Mapping[str, Any] | None = None,
 ) -> Figure:
-    """Draw the distance of the runs of a sweep from the observed brain, over the varied parameter: a panel per measure.
+    """Draw the distance of the runs of a sweep from the observed brain, over the varied
+    parameter: a panel per measure.
 
-    Panels show the whole brain or both hemispheres; the nearest run has a ring and its value.
+    Panels show the whole brain or both hemispheres; the nearest run has a ring and its
+    value.
 
-    `comparison` has the columns subject, observed, hemisphere, measure, distance, unit, flag, resolution, and `varied`
-    with the parameter's values. If the flag or the resolution is not "ok", a distance is not reliable and its mark is
-    open. `subject` is the start brain, `observed` are the brains that it is compared with, at a `week`. The rows
-    `nearest` of `published` have parameter, week, measure, and the nearest value, drawn as a dashed line. InputError if
-    there is no distance.
+    `comparison` has the columns subject, observed, hemisphere, measure, distance, unit,
+    flag, resolution, and `varied` with the parameter's values. If the flag or the
+    resolution is not "ok", a distance is not reliable and its mark is open. `subject`
+    is the start brain, `observed` are the brains that it is compared with, at a `week`.
+    The rows `nearest` of `published` have parameter, week, measure, and the nearest
+    value, drawn as a dashed line. InputError if there is no distance.
     """
-    rows = comparison[(comparison["subject"] == subject) & comparison["observed"].isin(observed)].dropna(
-        subset="distance"
-    )
+    rows = comparison[
+        (comparison["subject"] == subject) & comparison["observed"].isin(observed)
+    ].dropna(subset="distance")
     if rows.empty:
-        raise InputError("no distance to an observed brain", found=f"{len(comparison)} rows")
-    rows = rows.assign(at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok"))
+        raise InputError(
+            "no distance to an observed brain", found=f"{len(comparison)} rows"
+        )
+    rows = rows.assign(
+        at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok")
+    )
     lines = {
         row["measure"]: row["value"]
         for row in (published or {"nearest": []})["nearest"]
@@ -103,29 +130,51 @@ def nearest_chart(
         sides = ["whole"] if (here["hemisphere"] == "whole").any() else list(SIDES)
         drawn |= set(sides)
         for side in sides:
-            _nearest_line(axes, here[here["hemisphere"] == side].sort_values("at"), *SIDE_STYLES[side])
+            _nearest_line(
+                axes,
+                here[here["hemisphere"] == side].sort_values("at"),
+                *SIDE_STYLES[side],
+            )
         axes.margins(y=0.25)
         # a band cut at Weyl's number is the same measure
         if (value := lines.get(measure.removesuffix("_weyl"))) is not None:
             axes.axvline(value, color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
         # distances of sizes are relative to the observed brain
-        unit = "share of the observed" if measure in metrics_shown(Shown.SIZE) else here["unit"].iloc[0]
+        unit = (
+            "share of the observed"
+            if measure in metrics_shown(Shown.SIZE)
+            else here["unit"].iloc[0]
+        )
         axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
         axes.set_xlabel(parameter_label(varied))
         if number % 3 == 0:
             axes.set_ylabel("distance from the observed brain")
     handles: list[Artist] = [
-        Line2D([], [], color=colour, marker=marker, markersize=4.5, label=SIDE_NAMES[side])
+        Line2D(
+            [], [], color=colour, marker=marker, markersize=4.5, label=SIDE_NAMES[side]
+        )
         for side, (marker, colour) in SIDE_STYLES.items()
         if side in drawn
     ]
     ring: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
-    handles.append(Line2D([], [], markersize=9, markerfacecolor="none", label="nearest", **ring))
+    handles.append(
+        Line2D([], [], markersize=9, markerfacecolor="none", label="nearest", **ring)
+    )
     if not rows["trusted"].all():
         label = "cut off, or not resolved"
-        handles.append(Line2D([], [], markersize=4.5, markerfacecolor="white", label=label, **ring))
+        handles.append(
+            Line2D([], [], markersize=4.5, markerfacecolor="white", label=label, **ring)
+        )
     if lines:
-        handles.append(Line2D([], [], color=MUTED_COLOUR, linestyle="--", label="nearest in the publication"))
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=MUTED_COLOUR,
+                linestyle="--",
+                label="nearest in the publication",
+            )
+        )
     run_legend(figure, {}, extra=handles)
     return figure
 
@@ -135,37 +184,70 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
         return
     axes.plot(rows["at"], rows["distance"], color=colour, linewidth=1.0)
     for trusted, part in rows.groupby("trusted"):
-        style: dict[str, Any] = {"markerfacecolor": colour if trusted else "white", "markersize": 4.5}
+        style: dict[str, Any] = {
+            "markerfacecolor": colour if trusted else "white",
+            "markersize": 4.5,
+        }
         axes.plot(part["at"], part["distance"], marker, color=colour, **style)
     sound = rows[rows["trusted"]]
     best = (sound if len(sound) else rows).sort_values("distance").iloc[0]
     place = best["at"], best["distance"]
-    axes.plot(*place, "o", markersize=11, markerfacecolor="none", color=colour, markeredgewidth=1.0)
-    below: dict[str, Any] = {"xytext": (0, -8), "textcoords": "offset points", "ha": "center", "va": "top"}
+    axes.plot(
+        *place,
+        "o",
+        markersize=11,
+        markerfacecolor="none",
+        color=colour,
+        markeredgewidth=1.0,
+    )
+    below: dict[str, Any] = {
+        "xytext": (0, -8),
+        "textcoords": "offset points",
+        "ha": "center",
+        "va": "top",
+    }
     axes.annotate(f"{best['at']:g}", place, fontsize=7, color=colour, **below)
 
 
 @styled
-def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str]) -> Figure:
+def calibration_chart(
+    runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str]
+) -> Figure:
     """Draw a panel for each parameter, with the scores of the runs and the optimum.
 
-    `runs` has the columns of the parameters, round, score (NaN: diverged); `optimum` parameter, value. `score` are the
-    terms of the score.
+    `runs` has the columns of the parameters, round, score (NaN: diverged); `optimum`
+    parameter, value. `score` are the terms of the score.
     """
     figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
     finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]
     # later rounds are darker
-    shades = dict(zip(sorted(set(runs["round"])), np.linspace(0.75, 0, runs["round"].nunique()), strict=True))
-    for axes, name, value in zip(panels, optimum["parameter"], optimum["value"], strict=True):
+    shades = dict(
+        zip(
+            sorted(set(runs["round"])),
+            np.linspace(0.75, 0, runs["round"].nunique()),
+            strict=True,
+        )
+    )
+    for axes, name, value in zip(
+        panels, optimum["parameter"], optimum["value"], strict=True
+    ):
         axes.axvline(value, color=RUN_COLOURS[1], linestyle="--", label="optimum")
         for number, shade in shades.items():
             rows = finished[finished["round"] == number]
-            style: dict[str, Any] = {"color": str(shade), "markeredgecolor": "black", "markeredgewidth": 0.4}
+            style: dict[str, Any] = {
+                "color": str(shade),
+                "markeredgecolor": "black",
+                "markeredgewidth": 0.4,
+            }
             axes.plot(rows[name], rows["score"], "o", label=f"round {number}", **style)
         if len(diverged):
             top = np.full(len(diverged), float(finished["score"].max()))
             axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
         axes.set_xlabel(parameter_label(name))
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
-    figure.legend(handles=panels[0].get_legend_handles_labels()[0], loc="outside lower center", ncols=5)
+    figure.legend(
+        handles=panels[0].get_legend_handles_labels()[0],
+        loc="outside lower center",
+        ncols=5,
+    )
     return figure

@@ -1,4 +1,5 @@
-"""Plane sections: superimposed outlines of surfaces, and fields of the model in its elements."""
+"""Plane sections: superimposed outlines of surfaces, and fields of the model in its
+elements."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +17,15 @@ from ..geometry.alignment import align
 from ..geometry.triangles import Floats, Ints, TriangleMesh
 from ..settings.terms import OBSERVED_BRAIN
 from .labels import week_label
-from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_COLOUR, SINGLE_COLUMN_IN, add_letters, run_colours, styled
+from .style import (
+    FULL_WIDTH_IN,
+    MUTED_COLOUR,
+    OBSERVED_COLOUR,
+    SINGLE_COLUMN_IN,
+    add_letters,
+    run_colours,
+    styled,
+)
 
 PLANES = {"coronal": (1, 0, 2), "axial": (2, 0, 1), "sagittal": (0, 1, 2)}
 """The axis normal to each plane, and those to the right and up in its picture."""
@@ -28,39 +37,67 @@ LEFT_IN, ABOVE_IN, MAX_PANEL_IN = 0.7, 0.9, 2.3
 """Space left of and above the panels of outlines, and the maximum width of a panel."""
 
 
-def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colour: str, thickness: float = 0.8) -> None:
+def draw_outline(
+    axes: Axes,
+    surface: TriangleMesh,
+    plane: str,
+    at: float,
+    colour: str,
+    thickness: float = 0.8,
+) -> None:
     """Draw the intersection of a surface with one of `PLANES` at a position in mm."""
     normal, right, up = PLANES[plane]
-    body = pv.PolyData.from_regular_faces(np.array(surface.vertices), np.array(surface.faces, dtype=int))
+    body = pv.PolyData.from_regular_faces(
+        np.array(surface.vertices), np.array(surface.faces, dtype=int)
+    )
     cut = body.slice(normal=np.eye(3)[normal], origin=np.eye(3)[normal] * at)
     segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
-    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=thickness, capstyle="round"))
+    axes.add_collection(
+        LineCollection(
+            list(segments), colors=colour, linewidths=thickness, capstyle="round"
+        )
+    )
 
 
-def _coronal_section(positions: Floats, tets: Ints, fields: Mapping[str, Floats]) -> pv.PolyData:
-    """Cut linear elements at the median y of their nodes: a polygon per element, with fields at its points."""
+def _coronal_section(
+    positions: Floats, tets: Ints, fields: Mapping[str, Floats]
+) -> pv.PolyData:
+    """Cut linear elements at the median y of their nodes: a polygon per element, with
+    fields at its points."""
     cells = np.insert(np.asarray(tets), 0, 4, axis=1)
-    body = pv.UnstructuredGrid(cells.ravel(), np.full(len(tets), pv.CellType.TETRA), np.asarray(positions))
+    body = pv.UnstructuredGrid(
+        cells.ravel(), np.full(len(tets), pv.CellType.TETRA), np.asarray(positions)
+    )
     for name, values in fields.items():
         body.point_data[name] = values
     # one polygon per element, not triangles
-    return body.slice(normal="y", origin=(0.0, float(np.median(positions[:, 1])), 0.0), generate_triangles=False)
+    return body.slice(
+        normal="y",
+        origin=(0.0, float(np.median(positions[:, 1])), 0.0),
+        generate_triangles=False,
+    )
 
 
 @styled
 def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> Figure:
     """Draw coronal sections through the elements of a run at its start and at its end.
 
-    Columns are the cortical weight with the elements, the growth zone (0 or 1), the tangential growth in a step, and
-    the normals in the cortex. `model` are the elements (m, 4) or (m, 10), and by week the arrays of
-    `folding.zones.model_fields` at their nodes.
+    Columns are the cortical weight with the elements, the growth zone (0 or 1), the
+    tangential growth in a step, and the normals in the cortex. `model` are the elements
+    (m, 4) or (m, 10), and by week the arrays of `folding.zones.model_fields` at their
+    nodes.
     """
     tets, weeks = model
     largest = max(float(fields["increment"].max()) for fields in weeks.values())
     figure = Figure(figsize=(FULL_WIDTH_IN, 4.2), layout="constrained")
     rows = figure.subplots(2, 4, sharex="row", sharey="row")
     scales = {"weight": 1.0, "growing": 1.0, "increment": largest}
-    titles = ("cortical weight", "growth zone", "tangential growth\nin a step", "normals")
+    titles = (
+        "cortical weight",
+        "growth zone",
+        "tangential growth\nin a step",
+        "normals",
+    )
     for row, week in zip(rows, (min(weeks), max(weeks)), strict=True):
         fields = dict(weeks[week])
         section = _coronal_section(fields.pop("positions"), tets[:, :4], fields)
@@ -68,7 +105,9 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
         polygons = [points[face] for face in section.irregular_faces]
         style: dict[str, Any] = {"linewidths": 0.05}
         for axes, (name, top) in zip(row, scales.items(), strict=False):
-            means = np.array([values[name][face].mean() for face in section.irregular_faces])
+            means = np.array(
+                [values[name][face].mean() for face in section.irregular_faces]
+            )
             colours: dict[str, Any] = {
                 "array": means,
                 "cmap": "YlGnBu",
@@ -76,17 +115,39 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
                 "edgecolors": "black",
             }
             axes.add_collection(PolyCollection(polygons, **colours, **style))
-        row[3].add_collection(PolyCollection(polygons, facecolors="none", edgecolors=MUTED_COLOUR, **style))
+        row[3].add_collection(
+            PolyCollection(
+                polygons, facecolors="none", edgecolors=MUTED_COLOUR, **style
+            )
+        )
         # arrows at one point of the cortex in each square
         _, first = np.unique(np.floor(points / ARROW_MM), axis=0, return_index=True)
         arrows = first[values["weight"][first] > 0.5]
         normals = values["normals"][arrows][:, [0, 2]] * ARROW_MM
-        row[3].quiver(*points[arrows].T, *normals.T, angles="xy", scale_units="xy", scale=1, width=0.005)
-        (left, bottom), (right, top) = points.min(axis=0) - ARROW_MM, points.max(axis=0) + ARROW_MM
+        row[3].quiver(
+            *points[arrows].T,
+            *normals.T,
+            angles="xy",
+            scale_units="xy",
+            scale=1,
+            width=0.005,
+        )
+        (left, bottom), (right, top) = (
+            points.min(axis=0) - ARROW_MM,
+            points.max(axis=0) + ARROW_MM,
+        )
         for axes in row:
             axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
             axes.set_axis_off()
-        row[0].text(-0.02, 0.5, week_label(week), transform=row[0].transAxes, rotation=90, ha="right", va="center")
+        row[0].text(
+            -0.02,
+            0.5,
+            week_label(week),
+            transform=row[0].transAxes,
+            rotation=90,
+            ha="right",
+            va="center",
+        )
     for axes, title in zip(rows[0], titles, strict=True):
         axes.set_title(title, fontsize=8)
     for column, top in enumerate(scales.values()):
@@ -103,49 +164,89 @@ def outlines_chart(
     *,
     observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
-    """Draw the outlines of runs over those of the observed brain, a row per plane, a column per week.
+    """Draw the outlines of runs over those of the observed brain, a row per plane, a
+    column per week.
 
-    The coronal and axial planes pass through the middle of the observed brain, the sagittal plane through its right
-    hemisphere. All panels have one scale. At most the last five weeks are shown. Surfaces in RAS+ mm are by run and
-    week, observed ones by week; those of runs are aligned rigidly with the observed brain of their week.
+    The coronal and axial planes pass through the middle of the observed brain, the
+    sagittal plane through its right hemisphere. All panels have one scale. At most the
+    last five weeks are shown. Surfaces in RAS+ mm are by run and week, observed ones by
+    week; those of runs are aligned rigidly with the observed brain of their week.
     """
     weeks, colours = sorted(observed)[-MAX_WEEKS:], run_colours(runs)
     runs = {
-        run: {week: align(mesh, observed[week]) for week, mesh in brains.items() if week in weeks}
+        run: {
+            week: align(mesh, observed[week])
+            for week, mesh in brains.items()
+            if week in weeks
+        }
         for run, brains in runs.items()
     }
-    drawn = [brains[week] for brains in (observed, *runs.values()) for week in weeks if week in brains]
+    drawn = [
+        brains[week]
+        for brains in (observed, *runs.values())
+        for week in weeks
+        if week in brains
+    ]
     low = np.min([mesh.vertices.min(axis=0) for mesh in drawn], axis=0) - 1
     high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1
     wide = max((high - low)[right] for _, right, _ in PLANES.values())
     tall = [(high - low)[up] for *_, up in PLANES.values()]
-    inches_per_mm = min((FULL_WIDTH_IN - LEFT_IN) / (len(weeks) * wide), MAX_PANEL_IN / wide)
+    inches_per_mm = min(
+        (FULL_WIDTH_IN - LEFT_IN) / (len(weeks) * wide), MAX_PANEL_IN / wide
+    )
     width = max(SINGLE_COLUMN_IN, LEFT_IN + inches_per_mm * len(weeks) * wide)
-    figure = Figure(figsize=(width, inches_per_mm * sum(tall) + ABOVE_IN), layout="constrained")
-    panels = figure.subplots(len(tall), len(weeks), squeeze=False, gridspec_kw={"height_ratios": tall})
+    figure = Figure(
+        figsize=(width, inches_per_mm * sum(tall) + ABOVE_IN), layout="constrained"
+    )
+    panels = figure.subplots(
+        len(tall), len(weeks), squeeze=False, gridspec_kw={"height_ratios": tall}
+    )
     for row, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
         centre = (low[right] + high[right]) / 2
         # a sagittal plane in the middle would only show the fissure
         part = 0.75 if plane == "sagittal" else 0.5
         for axes, week in zip(row, weeks, strict=True):
-            ends = observed[week].vertices[:, normal].min(), observed[week].vertices[:, normal].max()
+            ends = (
+                observed[week].vertices[:, normal].min(),
+                observed[week].vertices[:, normal].max(),
+            )
             at = float(ends[0] + part * (ends[1] - ends[0]))
             # wide enough to stay visible under a run
             draw_outline(axes, observed[week], plane, at, OBSERVED_COLOUR, 1.7)
             for run in runs:
                 if week in runs[run]:
                     draw_outline(axes, runs[run][week], plane, at, colours[run])
-            axes.set(xlim=(centre - wide / 2, centre + wide / 2), ylim=(low[up], high[up]), aspect="equal")
+            axes.set(
+                xlim=(centre - wide / 2, centre + wide / 2),
+                ylim=(low[up], high[up]),
+                aspect="equal",
+            )
             axes.set_axis_off()
-        row[0].text(-0.02, 0.5, plane, transform=row[0].transAxes, rotation=90, ha="right", va="center")
+        row[0].text(
+            -0.02,
+            0.5,
+            plane,
+            transform=row[0].transAxes,
+            rotation=90,
+            ha="right",
+            va="center",
+        )
     for axes, week in zip(panels[0], weeks, strict=True):
         axes.set_title(week_label(week), fontsize=8)
     foot = panels[-1, 0]
     start, bottom = foot.get_xlim()[0] + 2, low[PLANES["sagittal"][2]]
-    foot.plot([start, start + SCALE_BAR_MM], [bottom] * 2, color="black", linewidth=2, clip_on=False)
+    foot.plot(
+        [start, start + SCALE_BAR_MM],
+        [bottom] * 2,
+        color="black",
+        linewidth=2,
+        clip_on=False,
+    )
     foot.text(start, bottom - 1, f"{SCALE_BAR_MM:g} mm", va="top", fontsize=7)
     add_letters(panels[:, 0])
     named = {**colours, observed_name: OBSERVED_COLOUR}
-    handles = [Line2D([], [], color=colour, label=label) for label, colour in named.items()]
+    handles = [
+        Line2D([], [], color=colour, label=label) for label, colour in named.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure

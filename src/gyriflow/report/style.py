@@ -1,4 +1,5 @@
-"""The style of all figures: sizes for print, fonts, colour-blind-safe colours, headings."""
+"""The style of all figures: sizes for print, fonts, colour-blind-safe colours,
+headings."""
 
 import math
 import textwrap
@@ -21,12 +22,22 @@ SINGLE_COLUMN_IN = 3.5
 FULL_WIDTH_IN = 7.2
 """Width of a journal page, in inches."""
 
-RUN_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31")
-"""Okabe and Ito's colour-blind-safe colours, without black (observed brains) and yellow (too pale on white)."""
+RUN_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#8C6D31",
+)
+"""Okabe and Ito's colour-blind-safe colours, without black (observed brains) and yellow
+(too pale on white)."""
 OBSERVED_COLOUR = "#000000"
 MUTED_COLOUR = "#767676"
 RIGHT_COLOUR = "#E0B400"
-"""The right hemisphere and its contact: the paper's yellow, dark enough for lines on white."""
+"""The right hemisphere and its contact: the paper's yellow, dark enough for lines on
+white."""
 SIMULATED_SURFACE_COLOUR = "#8FB4DC"
 OBSERVED_SURFACE_COLOUR = "#EBD6B4"
 
@@ -66,17 +77,25 @@ styled = mpl.rc_context(MATPLOTLIB_SETTINGS)
 
 
 def panel_figure(
-    count: int, *, per_row: int = 3, panel_in: float = 1.9, foot_in: float = 0.7, **grid: Any
+    count: int,
+    *,
+    per_row: int = 3,
+    panel_in: float = 1.9,
+    foot_in: float = 0.7,
+    **grid: Any,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure and its panels, row by row, with letters.
 
-    A full row of `per_row` panels is as wide as a page; `panel_in` and `foot_in` are the heights of a row and of the
-    legend in inches. `grid` are further arguments of `Figure.subplots`.
+    A full row of `per_row` panels is as wide as a page; `panel_in` and `foot_in` are
+    the heights of a row and of the legend in inches. `grid` are further arguments of
+    `Figure.subplots`.
     """
     columns = min(per_row, count)
     lines = -(-count // columns)
     width_in = FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row)
-    figure = Figure(figsize=(width_in, foot_in + panel_in * lines), layout="constrained")
+    figure = Figure(
+        figsize=(width_in, foot_in + panel_in * lines), layout="constrained"
+    )
     panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
     for spare in panels[count:]:
         spare.remove()
@@ -85,22 +104,39 @@ def panel_figure(
 
 
 def add_letters(panels: Iterable[Axes]) -> None:
-    """Write a, b, c … at the upper left of panels, for the caption; nothing for a single panel."""
+    """Write a, b, c … at the upper left of panels, for the caption; nothing for a
+    single panel."""
     panels = list(panels)
     if len(panels) > 1:
         for axes, letter in zip(panels, ascii_lowercase, strict=False):
             # left of the title, which may be as wide as the panel
-            place: dict[str, Any] = {"xytext": (-12, 4), "xycoords": "axes fraction", "textcoords": "offset points"}
-            axes.annotate(letter, (0.0, 1.0), ha="right", va="bottom", fontweight="bold", fontsize=9, **place)
+            place: dict[str, Any] = {
+                "xytext": (-12, 4),
+                "xycoords": "axes fraction",
+                "textcoords": "offset points",
+            }
+            axes.annotate(
+                letter,
+                (0.0, 1.0),
+                ha="right",
+                va="bottom",
+                fontweight="bold",
+                fontsize=9,
+                **place,
+            )
 
 
 def wrap(text: str, letters: int) -> str:
     """Return text with lines broken between words to at most about so many letters."""
-    return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.split("\n"))
+    return "\n".join(
+        textwrap.fill(line, letters, break_long_words=False)
+        for line in text.split("\n")
+    )
 
 
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table with columns run and subject, with simulations named by `run_names`."""
+    """Return a table with columns run and subject, with simulations named by
+    `run_names`."""
     pairs = list(zip(table["run"], table["subject"], strict=True))
     simulated = [pair for pair in dict.fromkeys(pairs) if pair[0] != MEASURED]
     names = dict(zip(simulated, run_names(simulated), strict=True))
@@ -108,16 +144,20 @@ def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
-    """Return a colour for each simulated run that is present: distinct ones, or a sequential scale for many runs.
+    """Return a colour for each simulated run that is present: distinct ones, or a
+    sequential scale for many runs.
 
-    Figures of a study pass all of its `runs` in the same order, so that a run has the same colour in all figures.
+    Figures of a study pass all of its `runs` in the same order, so that a run has the
+    same colour in all figures.
     """
     drawn = set(present := list(present))
     names = [name for name in dict.fromkeys([*runs, *present]) if name != MEASURED]
     colours: dict[str, Any] = dict(zip(names, RUN_COLOURS, strict=False))
     if len(names) > len(RUN_COLOURS):
         scale = mpl.colormaps["viridis"]
-        colours = {name: scale(0.92 * i / (len(names) - 1)) for i, name in enumerate(names)}
+        colours = {
+            name: scale(0.92 * i / (len(names) - 1)) for i, name in enumerate(names)
+        }
     return {run: colour for run, colour in colours.items() if run in drawn}
 
 
@@ -125,14 +165,21 @@ def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
     """Label the horizontal axis as gestational weeks with whole weeks as ticks."""
     values = list(weeks)
     axes.set_xlabel("gestational age (GW)")
-    axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1))
+    axes.xaxis.set_major_locator(
+        mpl.ticker.MaxNLocator(
+            nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1
+        )
+    )
     # a single week is in the middle of the axis
-    margin = max(0.04 * (max(values) - min(values)), (1.08 - max(values) + min(values)) / 2)
+    margin = max(
+        0.04 * (max(values) - min(values)), (1.08 - max(values) + min(values)) / 2
+    )
     axes.set_xlim(min(values) - margin, max(values) + margin)
 
 
 def from_zero(axes: Axes) -> None:
-    """Start the vertical axis at zero and end it slightly above the data of all panels that share it."""
+    """Start the vertical axis at zero and end it slightly above the data of all panels
+    that share it."""
     tops = [panel.dataLim.ymax for panel in axes.get_shared_y_axes().get_siblings(axes)]
     # panels without data have an infinite top
     top = max((top for top in tops if math.isfinite(top)), default=0.0)
@@ -154,20 +201,29 @@ def run_legend(
     markers: Mapping[str, str] | None = None,
     extra: Sequence[Artist] = (),
 ) -> None:
-    """Draw a legend below the panels: runs, observed brains if named, subjects, and `extra` entries.
+    """Draw a legend below the panels: runs, observed brains if named, subjects, and
+    `extra` entries.
 
-    Runs have lines or `bars` of their `colours`; `markers` are by subject. The legend has as many columns as its
-    longest label allows, and the figure grows by its rows.
+    Runs have lines or `bars` of their `colours`; `markers` are by subject. The legend
+    has as many columns as its longest label allows, and the figure grows by its rows.
     """
     handles: list[Artist] = [
-        Patch(color=colour, label=run) if bars else Line2D([], [], color=colour, marker="o", label=run)
+        (
+            Patch(color=colour, label=run)
+            if bars
+            else Line2D([], [], color=colour, marker="o", label=run)
+        )
         for run, colour in colours.items()
     ]
     if observed_name:
         handles.append(star(observed_name))
-    handles += [star(subject, marker=marker, markersize=5) for subject, marker in (markers or {}).items()]
+    handles += [
+        star(subject, marker=marker, markersize=5)
+        for subject, marker in (markers or {}).items()
+    ]
     handles.extend(extra)
-    # a letter of the legend is about 0.065 in wide, the line before it and the gap behind 0.5 in
+    # a letter of the legend is about 0.065 in wide, the line before it and the gap
+    # behind 0.5 in
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)
     columns = max(1, min(len(handles), int(figure.get_figwidth() / longest)))
     lines = -(-len(handles) // columns)

@@ -11,8 +11,20 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from ..quantities import METRICS, Shown, metrics_shown
-from ..settings.terms import MEASURED, OBSERVED_BRAIN, SIDES, element_error, is_too_coarse
-from .labels import SIMPLER_PREDICTIONS, metric_title, parameter_label, plain, week_label
+from ..settings.terms import (
+    MEASURED,
+    OBSERVED_BRAIN,
+    SIDES,
+    element_error,
+    is_too_coarse,
+)
+from .labels import (
+    SIMPLER_PREDICTIONS,
+    metric_title,
+    parameter_label,
+    plain,
+    week_label,
+)
 from .style import run_colours, runs_by_name
 
 VERDICTS = ("fine", "needs review", "refused")
@@ -20,15 +32,35 @@ _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+| %| \([+−][\d.]+\))?|–")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TABLE = Environment(autoescape=True).from_string(
-    "<table><thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr></thead>\n<tbody>"
-    '{% for row in rows %}<tr>{% for kind, text in row %}<td class="{{ kind }}">{{ text }}</td>{% endfor %}</tr>\n'
-    "{% endfor %}</tbody></table>"
+    "<table><thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor"
+    " %}</tr></thead>\n<tbody>{% for row in rows %}<tr>{% for kind, text in row %}<td"
+    ' class="{{ kind }}">{{ text }}</td>{% endfor %}</tr>\n{% endfor %}</tbody></table>'
 )
 
 COMMON_PARAMETERS = (
-    *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "material", "poisson_ratio"),
-    *("growth_of", "growth_rate_per_s", "core_growth_rate_per_s", "stress_memory_gw", "support"),
-    *("contact.kind", "no_growth.kind", "step_s", "tets", "order", "elements_through_cortex", "element_error_percent"),
+    *(
+        "thickness_mm",
+        "shear_modulus_cortex_pa",
+        "shear_modulus_core_pa",
+        "material",
+        "poisson_ratio",
+    ),
+    *(
+        "growth_of",
+        "growth_rate_per_s",
+        "core_growth_rate_per_s",
+        "stress_memory_gw",
+        "support",
+    ),
+    *(
+        "contact.kind",
+        "no_growth.kind",
+        "step_s",
+        "tets",
+        "order",
+        "elements_through_cortex",
+        "element_error_percent",
+    ),
     *("steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are listed even if all runs share them."""
@@ -61,90 +93,148 @@ def _signed_metrics(rows: pd.DataFrame) -> pd.Series:
     return rows["metric"].map(lambda name: METRICS[name].is_signed).astype(bool)
 
 
-def metrics_table(metrics: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN) -> pd.DataFrame:
-    """Return the metrics of whole brains: the observed brain, each run, and each run's difference in %.
+def metrics_table(
+    metrics: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN
+) -> pd.DataFrame:
+    """Return the metrics of whole brains: the observed brain, each run, and each run's
+    difference in %.
 
-    The week is the last that runs and observed brains share, or the last of all. Quantiles and metrics of the
-    measurement itself are left out. `metrics` has the columns subject, run, week, hemisphere, metric, value, unit;
-    `run` is "real" for observed brains, several of which in a week give their mean. `observed_name` is the heading of
-    their column.
+    The week is the last that runs and observed brains share, or the last of all.
+    Quantiles and metrics of the measurement itself are left out. `metrics` has the
+    columns subject, run, week, hemisphere, metric, value, unit; `run` is "real" for
+    observed brains, several of which in a week give their mean. `observed_name` is the
+    heading of their column.
 
-    The rows are by metric (with its unit); cells without a value are NaN, without a difference "–".
+    The rows are by metric (with its unit); cells without a value are NaN, without a
+    difference "–".
     """
     rows = runs_by_name(_reported(metrics[metrics["hemisphere"] == "whole"]))
     observed = rows["run"] == MEASURED
-    week = max(set(rows.loc[observed, "week"]) & set(rows.loc[~observed, "week"]) or set(rows["week"]))
+    week = max(
+        set(rows.loc[observed, "week"]) & set(rows.loc[~observed, "week"])
+        or set(rows["week"])
+    )
     rows = rows[rows["week"] == week].assign(name=_named)
-    wide = rows.pivot_table("value", "name", "run", aggfunc="mean").reindex(dict.fromkeys(rows["name"]))
+    wide = rows.pivot_table("value", "name", "run", aggfunc="mean").reindex(
+        dict.fromkeys(rows["name"])
+    )
     # of what may be zero, a difference in per cent is meaningless
     is_signed = wide.index.isin(rows.loc[_signed_metrics(rows), "name"])
-    observed_values = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
+    observed_values = (
+        wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
+    )
     columns = {observed_name: observed_values}
     for run in run_colours(rows["run"]):
         differences = 100 * (wide[run] / observed_values - 1)
-        columns |= {run: wide[run], f"{run}, difference (%)": differences.map(_signed).where(~is_signed, "–")}
+        columns |= {
+            run: wide[run],
+            f"{run}, difference (%)": differences.map(_signed).where(~is_signed, "–"),
+        }
     return pd.DataFrame(columns).rename_axis(f"metric at {week_label(week)}")
 
 
 def _signed(percent: float, unit: str = "") -> str:
     """Return a difference in per cent with its sign; no sign if it rounds to zero."""
-    return "–" if np.isnan(percent) else f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0") + unit
+    return (
+        "–"
+        if np.isnan(percent)
+        else f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0") + unit
+    )
 
 
 def centile_text(centiles: pd.DataFrame) -> list[str]:
-    """Return the text of each row of centiles: "centile (interval), z", the difference from the norm in %, or "–"."""
-    differences = (centiles["value"] / centiles["expected"] - 1).where(~_signed_metrics(centiles))
+    """Return the text of each row of centiles: "centile (interval), z", the difference
+    from the norm in %, or "–"."""
+    differences = (centiles["value"] / centiles["expected"] - 1).where(
+        ~_signed_metrics(centiles)
+    )
     return [
-        f"{centile:.0f} ({low:.0f} to {high:.0f}), {z:+.1f}".replace("-", "−")
-        if np.isfinite(centile)
-        else _signed(100 * part, " %")
+        (
+            f"{centile:.0f} ({low:.0f} to {high:.0f}), {z:+.1f}".replace("-", "−")
+            if np.isfinite(centile)
+            else _signed(100 * part, " %")
+        )
         for centile, low, high, z, part in zip(
-            *(centiles[name] for name in ("centile", "centile_low", "centile_high", "z")), differences, strict=True
+            *(
+                centiles[name]
+                for name in ("centile", "centile_low", "centile_high", "z")
+            ),
+            differences,
+            strict=True,
         )
     ]
 
 
 def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
-    """Return the metrics of an observed brain, whole and by hemisphere, and the centiles of the whole brain.
+    """Return the metrics of an observed brain, whole and by hemisphere, and the
+    centiles of the whole brain.
 
-    `metrics` has the columns hemisphere, metric, value, unit, of this brain; `centiles`, of the study, subject, run,
-    hemisphere, metric, value, expected, z, centile, flag.
+    `metrics` has the columns hemisphere, metric, value, unit, of this brain;
+    `centiles`, of the study, subject, run, hemisphere, metric, value, expected, z,
+    centile, flag.
     """
     rows = _reported(metrics).assign(name=_named)
-    wide = rows.pivot_table("value", "name", "hemisphere", aggfunc="first").reindex(rows["name"].unique())
+    wide = rows.pivot_table("value", "name", "hemisphere", aggfunc="first").reindex(
+        rows["name"].unique()
+    )
     table = wide[[part for part in ("whole", *SIDES) if part in wide]]
-    own = (centiles["subject"] == metrics["subject"].iloc[0]) & (centiles["run"] == MEASURED)
+    own = (centiles["subject"] == metrics["subject"].iloc[0]) & (
+        centiles["run"] == MEASURED
+    )
     scores = centiles[own & (centiles["hemisphere"] == "whole")].assign(name=_named)
     if len(scores):
         scores = scores.assign(text=centile_text(scores)).set_index("name")
-        columns = {"centile (90 % interval), z; or difference": scores["text"], "note": scores["flag"]}
+        columns = {
+            "centile (90 % interval), z; or difference": scores["text"],
+            "note": scores["flag"],
+        }
         table = table.assign(norm=scores["expected"], **columns)
     return table.dropna(how="all").rename_axis("metric")
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
-    """Return the parameters of the runs with their units: a row per parameter, a column per run.
+    """Return the parameters of the runs with their units: a row per parameter, a column
+    per run.
 
-    `parameters` are by run and name. Those that differ between the runs come first, then `COMMON_PARAMETERS`. Nested
-    names are joined by dots. A curve over weeks is shown by its first and last values.
+    `parameters` are by run and name. Those that differ between the runs come first,
+    then `COMMON_PARAMETERS`. Nested names are joined by dots. A curve over weeks is
+    shown by its first and last values.
     """
-    flat = pd.DataFrame({run: pd.Series(_flatten(values), dtype=object) for run, values in parameters.items()})
+    flat = pd.DataFrame(
+        {
+            run: pd.Series(_flatten(values), dtype=object)
+            for run, values in parameters.items()
+        }
+    )
     texts = flat.map(_text)
     # absent, zero and no count as equal
-    differs = texts.ne(texts.iloc[:, 0], axis=0).any(axis=1) & ~texts.isin(["–", "0", "no"]).all(axis=1)
-    names = [*texts.index[differs], *(name for name in COMMON_PARAMETERS if name in texts.index and not differs[name])]
+    differs = texts.ne(texts.iloc[:, 0], axis=0).any(axis=1) & ~texts.isin(
+        ["–", "0", "no"]
+    ).all(axis=1)
+    names = [
+        *texts.index[differs],
+        *(
+            name
+            for name in COMMON_PARAMETERS
+            if name in texts.index and not differs[name]
+        ),
+    ]
     return texts.loc[names].rename(index=parameter_label).rename_axis("parameter")
 
 
-def resolution_over_steps(order: int, steps: pd.DataFrame, *, has_layers: bool) -> dict[str, float]:
-    """Return how well the steps of a run with elements of an order resolved the cortex, for the table of runs.
+def resolution_over_steps(
+    order: int, steps: pd.DataFrame, *, has_layers: bool
+) -> dict[str, float]:
+    """Return how well the steps of a run with elements of an order resolved the cortex,
+    for the table of runs.
 
-    `steps` has a row per step with the columns week and elements_through_cortex: NaN if no element has its centre in
-    the cortex, which counts as 0.
+    `steps` has a row per step with the columns week and elements_through_cortex: NaN if
+    no element has its centre in the cortex, which counts as 0.
 
-    Returns `order`, `element_error_percent` (`element_error` at the start), `least_elements_through_cortex`, and
-    `unresolved_from_week`, the first week with fewer elements than `ELEMENTS_NEEDED` (NaN if there is none). Of growth
-    without layers the error and that week are NaN.
+    Returns `order`, `element_error_percent` (`element_error` at the start),
+    `least_elements_through_cortex`, and `unresolved_from_week`, the first week with
+    fewer elements than `ELEMENTS_NEEDED` (NaN if there is none). Of growth without
+    layers the error and that week are NaN.
     """
     through = steps["elements_through_cortex"].fillna(0.0)
     error, first_week = math.nan, math.nan
@@ -161,18 +251,28 @@ def resolution_over_steps(order: int, steps: pd.DataFrame, *, has_layers: bool) 
 
 
 def resources(jobs: pd.DataFrame) -> pd.DataFrame:
-    """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
+    """Sum up jobs: a row per rule, a row per run of the simulations, the longest first,
+    and the sum of all.
 
-    A job occupies at least one core, so its core hours are the longer of wall and CPU time. `jobs` has the columns
-    rule, run, wall_s, cpu_s, memory_MiB: NaN if unknown; such jobs are counted, and add nothing to the sums.
+    A job occupies at least one core, so its core hours are the longer of wall and CPU
+    time. `jobs` has the columns rule, run, wall_s, cpu_s, memory_MiB: NaN if unknown;
+    such jobs are counted, and add nothing to the sums.
 
-    Columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job).
+    Columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest
+    job).
     """
     hours = jobs[["wall_s", "cpu_s"]].astype(float) / 3600
-    each = jobs.assign(hours=hours["wall_s"], core_hours=hours.max(axis=1), run=jobs["run"].fillna(""), jobs=1)
+    each = jobs.assign(
+        hours=hours["wall_s"],
+        core_hours=hours.max(axis=1),
+        run=jobs["run"].fillna(""),
+        jobs=1,
+    )
     totals = {"jobs": "sum", "hours": "sum", "core_hours": "sum", "memory_MiB": "max"}
     stages = each.groupby(["rule", "run"], sort=False, as_index=False).agg(totals)
-    stages = stages.rename(columns={"rule": "stage"}).sort_values("core_hours", ascending=False, kind="stable")
+    stages = stages.rename(columns={"rule": "stage"}).sort_values(
+        "core_hours", ascending=False, kind="stable"
+    )
     whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(totals)}])
     return pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
 
@@ -182,47 +282,93 @@ def atlas_ages_table(ages: pd.DataFrame) -> pd.DataFrame:
 
     `ages` has the columns stated_week, age_by_size, volume_ml and curve_ml.
     """
-    return ages.set_index("stated_week").rename(columns=plain).rename_axis("stated week (GW)").round(2)
+    return (
+        ages.set_index("stated_week")
+        .rename(columns=plain)
+        .rename_axis("stated week (GW)")
+        .round(2)
+    )
 
 
 def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
-    """Return the accuracy of predicted brains and of simpler predictions: a row per start, week and model.
+    """Return the accuracy of predicted brains and of simpler predictions: a row per
+    start, week and model.
 
     `prediction` is the study's prediction.csv.
     """
-    models = prediction["model"].map(lambda name: SIMPLER_PREDICTIONS.get(name, plain(name)))
-    table = prediction.assign(model=models.where(prediction["model"] != "run", prediction["run"]))
+    models = prediction["model"].map(
+        lambda name: SIMPLER_PREDICTIONS.get(name, plain(name))
+    )
+    table = prediction.assign(
+        model=models.where(prediction["model"] != "run", prediction["run"])
+    )
     # simpler predictions are the same for all runs
-    table = table.drop_duplicates(["start", "week", "model"]).set_index(["start", "week", "model"])
-    columns = ["r_shape_index", "distance_mm", "distance95_mm", "area_difference", "volume_difference"]
+    table = table.drop_duplicates(["start", "week", "model"]).set_index(
+        ["start", "week", "model"]
+    )
+    columns = [
+        "r_shape_index",
+        "distance_mm",
+        "distance95_mm",
+        "area_difference",
+        "volume_difference",
+    ]
     columns += ["crossing_faces", "roughness_ratio", "skill", "skill_low", "skill_high"]
-    return table[[*columns, "r_less_atlas", "r_less_atlas_low", "r_less_atlas_high"]].rename(columns=plain)
+    return table[
+        [*columns, "r_less_atlas", "r_less_atlas_low", "r_less_atlas_high"]
+    ].rename(columns=plain)
 
 
 def predicted_table(
-    metrics: pd.DataFrame, prediction: Mapping[str, Any], centiles: pd.DataFrame, intervals: pd.DataFrame | None = None
+    metrics: pd.DataFrame,
+    prediction: Mapping[str, Any],
+    centiles: pd.DataFrame,
+    intervals: pd.DataFrame | None = None,
 ) -> pd.DataFrame:
-    """Return the metrics of a predicted brain, its start and the atlas' brain, and the difference from the atlas in %.
+    """Return the metrics of a predicted brain, its start and the atlas' brain, and the
+    difference from the atlas in %.
 
-    Centiles stand below the values if there is a norm of individuals, and the interval of an ensemble next to them.
-    `metrics` is as for `metrics_table`, `centiles` as for `brain_table`; `prediction` is the output of
-    `Study.prediction_facts` with `tests`, that of `compare.accuracy.prediction_facts`; `intervals` that of
+    Centiles stand below the values if there is a norm of individuals, and the interval
+    of an ensemble next to them. `metrics` is as for `metrics_table`, `centiles` as for
+    `brain_table`; `prediction` is the output of `Study.prediction_facts` with `tests`,
+    that of `compare.accuracy.prediction_facts`; `intervals` that of
     `compare.accuracy.interval_table`.
     """
-    rows = metrics[(metrics["hemisphere"] == "whole") & metrics["metric"].isin(metrics_shown(Shown.PREDICTION))]
+    rows = metrics[
+        (metrics["hemisphere"] == "whole")
+        & metrics["metric"].isin(metrics_shown(Shown.PREDICTION))
+    ]
     rows = rows.assign(name=_named).set_index("name")
 
-    scores = centiles[(centiles["hemisphere"] == "whole") & centiles["centile"].notna()].assign(name=_named)
+    scores = centiles[
+        (centiles["hemisphere"] == "whole") & centiles["centile"].notna()
+    ].assign(name=_named)
     scores = scores.assign(text=centile_text(scores)).set_index("name")
 
-    def of_brain(table: pd.DataFrame, column: str, brain: str, run: str, when: str) -> pd.Series:
+    def of_brain(
+        table: pd.DataFrame, column: str, brain: str, run: str, when: str
+    ) -> pd.Series:
         at = table["week"] == prediction[when]
-        return table.loc[at & (table["subject"] == prediction[brain]) & (table["run"] == run), column]
+        return table.loc[
+            at & (table["subject"] == prediction[brain]) & (table["run"] == run), column
+        ]
 
     brains = {
-        f"start, {week_label(prediction['start_week'])}": ("brain", MEASURED, "start_week"),
-        f"predicted, {week_label(prediction['week'])}": ("brain", prediction["run"], "week"),
-        f"the atlas' own brain, {week_label(prediction['atlas_week'])}": ("atlas_brain", MEASURED, "atlas_week"),
+        f"start, {week_label(prediction['start_week'])}": (
+            "brain",
+            MEASURED,
+            "start_week",
+        ),
+        f"predicted, {week_label(prediction['week'])}": (
+            "brain",
+            prediction["run"],
+            "week",
+        ),
+        f"the atlas' own brain, {week_label(prediction['atlas_week'])}": (
+            "atlas_brain",
+            MEASURED,
+            "atlas_week",
+        ),
     }
     columns: dict[str, pd.Series] = {}
     for head, key in brains.items():
@@ -230,75 +376,122 @@ def predicted_table(
         if len(texts := of_brain(scores, "text", *key)):
             columns[f"{head}: centile (90 % interval), z"] = texts
         if intervals is not None and key[1] == prediction["run"]:
-            last = intervals[intervals["week"] == prediction["week"]].assign(name=_named).set_index("name")
+            last = (
+                intervals[intervals["week"] == prediction["week"]]
+                .assign(name=_named)
+                .set_index("name")
+            )
             ends = zip(last["low"], last["high"], strict=True)
-            columns["interval of ensemble and tests"] = pd.Series([f"{a:.4g} to {b:.4g}" for a, b in ends], last.index)
+            columns["interval of ensemble and tests"] = pd.Series(
+                [f"{a:.4g} to {b:.4g}" for a, b in ends], last.index
+            )
     predicted, atlas_brain = (columns[head] for head in list(brains)[1:])
-    columns["predicted less the atlas' (%)"] = (100 * (predicted / atlas_brain - 1)).map(_signed)
-    errors = {metric_title(metric): text for metric, text in prediction["tests"]["errors"].items()}
+    columns["predicted less the atlas' (%)"] = (
+        100 * (predicted / atlas_brain - 1)
+    ).map(_signed)
+    errors = {
+        metric_title(metric): text
+        for metric, text in prediction["tests"]["errors"].items()
+    }
     columns["error of such predictions"] = predicted.index.to_series().map(errors)
     return pd.DataFrame(columns).reindex(predicted.index).rename_axis("metric")
 
 
 def accuracy_table(accuracy: Mapping[str, Any]) -> pd.DataFrame:
-    """Return the accuracy of predictions and simpler predictions: a row per horizon, with the range over the starts.
+    """Return the accuracy of predictions and simpler predictions: a row per horizon,
+    with the range over the starts.
 
-    `accuracy` has rows (start, horizon in GW, model, distance_mm, r_shape_index, and area_difference and
-    volume_difference as fractions of the observed brain's), of models `run` and of `SIMPLER_PREDICTIONS`.
+    `accuracy` has rows (start, horizon in GW, model, distance_mm, r_shape_index, and
+    area_difference and volume_difference as fractions of the observed brain's), of
+    models `run` and of `SIMPLER_PREDICTIONS`.
     """
     table: dict[Any, dict[str, str]] = {}
-    for (horizon, model), rows in pd.DataFrame(accuracy["rows"]).groupby(["horizon", "model"]):
+    for (horizon, model), rows in pd.DataFrame(accuracy["rows"]).groupby(
+        ["horizon", "model"]
+    ):
         distance, r = range_text(rows["distance_mm"]), range_text(rows["r_shape_index"])
         if model == "run":
             errors = {
-                f"{size} (%)": range_text(100 * rows[f"{size}_difference"], "+.1f") for size in ("area", "volume")
+                f"{size} (%)": range_text(100 * rows[f"{size}_difference"], "+.1f")
+                for size in ("area", "volume")
             }
-            table[horizon] = {"prediction: distance (mm)": distance, "r": r} | errors | table.get(horizon, {})
+            table[horizon] = (
+                {"prediction: distance (mm)": distance, "r": r}
+                | errors
+                | table.get(horizon, {})
+            )
         else:
-            table.setdefault(horizon, {})[SIMPLER_PREDICTIONS[str(model)]] = f"{distance} mm, r {r}"
+            table.setdefault(horizon, {})[SIMPLER_PREDICTIONS[str(model)]] = (
+                f"{distance} mm, r {r}"
+            )
     return pd.DataFrame.from_dict(table, orient="index").rename_axis("weeks ahead")
 
 
 def range_text(values: pd.Series, pattern: str = ".2f") -> str:
-    """Return the minimum and the maximum as text, once if they are equal; a dash without numbers."""
-    ends = [format(value, pattern).replace("-", "−") for value in (values.min(), values.max()) if np.isfinite(value)]
+    """Return the minimum and the maximum as text, once if they are equal; a dash
+    without numbers."""
+    ends = [
+        format(value, pattern).replace("-", "−")
+        for value in (values.min(), values.max())
+        if np.isfinite(value)
+    ]
     return " to ".join(dict.fromkeys(ends)) or "–"
 
 
-def mesh_quality_table(quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]) -> pd.DataFrame:
-    """Return the quality of meshes: a row per measure with its limit, a column per brain.
+def mesh_quality_table(
+    quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]
+) -> pd.DataFrame:
+    """Return the quality of meshes: a row per measure with its limit, a column per
+    brain.
 
-    `quality` are the contents of the brains' quality.json by brain, `gates` the limits in the configuration, by their
-    keys in the section mesh.
+    `quality` are the contents of the brains' quality.json by brain, `gates` the limits
+    in the configuration, by their keys in the section mesh.
     """
     columns = {
-        brain: {**values, "surface_distance_mm": values["surface_distance_mm"]["hausdorff99"]}
+        brain: {
+            **values,
+            "surface_distance_mm": values["surface_distance_mm"]["hausdorff99"],
+        }
         for brain, values in quality.items()
     }
-    table = pd.DataFrame(columns, dtype=object).reindex(list(MESH_MEASURES)).rename(index=MESH_MEASURES)
-    table["limit"] = [gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}"))) for name in MESH_MEASURES]
+    table = (
+        pd.DataFrame(columns, dtype=object)
+        .reindex(list(MESH_MEASURES))
+        .rename(index=MESH_MEASURES)
+    )
+    table["limit"] = [
+        gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}")))
+        for name in MESH_MEASURES
+    ]
     return table.rename_axis("measure")
 
 
 def html_table(table: pd.DataFrame) -> Markup:
     """Return the table as HTML.
 
-    Text is escaped, numbers have four significant digits and are aligned right, missing values are dashes. The index
-    is shown if it has a name.
+    Text is escaped, numbers have four significant digits and are aligned right, missing
+    values are dashes. The index is shown if it has a name.
     """
     named = any(name is not None for name in table.index.names)
     flat = table.reset_index() if named else table
     texts = flat.map(lambda value: _text(value, 4))
     rows = [
-        [(_kind(name, value, text), text) for name, value, text in zip(flat, row, words, strict=True)]
-        for row, words in zip(flat.to_numpy(dtype=object), texts.to_numpy(), strict=True)
+        [
+            (_kind(name, value, text), text)
+            for name, value, text in zip(flat, row, words, strict=True)
+        ]
+        for row, words in zip(
+            flat.to_numpy(dtype=object), texts.to_numpy(), strict=True
+        )
     ]
     return Markup(_TABLE.render(heads=list(flat), rows=rows))
 
 
 def _kind(name: object, value: object, text: str) -> str:
     """Return the CSS class of a cell."""
-    if (isinstance(value, int | float | np.number) and not isinstance(value, bool)) or NUMBER.fullmatch(text):
+    if (
+        isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    ) or NUMBER.fullmatch(text):
         return "number"
     if isinstance(text, Markup):
         return "composed"
@@ -311,9 +504,15 @@ def _kind(name: object, value: object, text: str) -> str:
 def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
     flat: dict[str, object] = {}
     for name, value in values.items():
-        if isinstance(value, Mapping) and value and all(str(week).replace(".", "", 1).isdigit() for week in value):
+        if (
+            isinstance(value, Mapping)
+            and value
+            and all(str(week).replace(".", "", 1).isdigit() for week in value)
+        ):
             ends = [(week, value[week]) for week in sorted(value, key=float)]
-            flat[f"{prefix}{name}"] = " to ".join(f"{_text(at, 4)} at {week} GW" for week, at in (ends[0], ends[-1]))
+            flat[f"{prefix}{name}"] = " to ".join(
+                f"{_text(at, 4)} at {week} GW" for week, at in (ends[0], ends[-1])
+            )
         elif isinstance(value, Mapping):
             flat.update(_flatten(value, f"{prefix}{name}."))
         else:

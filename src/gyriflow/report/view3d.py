@@ -25,31 +25,56 @@ MIN_VERTICES = 500
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
 _DRAWN = [name for name, record in VERTEX_MAPS.items() if record.colours]
-# base64 writes three bytes as four letters; a vertex has about two triangles, of three indices of two bytes
-_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(_DRAWN), 12
+# base64 writes three bytes as four letters; a vertex has about two triangles, of three
+# indices of two bytes
+_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = (
+    4 / 3,
+    6 + len(_DRAWN),
+    12,
+)
 
 Timed = tuple[float, TriangleMesh, dict[str, Floats]]
 """A week, a surface in RAS+ mm and its maps by name; NaN for unknown values."""
 
 
 def surfaces_view(
-    runs: Mapping[str, Sequence[tuple[float, Halves]]], observed: Sequence[tuple[float, Halves]], *, observed_name: str
+    runs: Mapping[str, Sequence[tuple[float, Halves]]],
+    observed: Sequence[tuple[float, Halves]],
+    *,
+    observed_name: str,
 ) -> dict[str, Any]:
-    """Return the surfaces, decimated to fit the budget, with their maps and colour scales, for JSON.
+    """Return the surfaces, decimated to fit the budget, with their maps and colour
+    scales, for JSON.
 
-    A run's surfaces share their triangles, so that the view can interpolate between weeks, and have a map of the
-    displacement since the first week. Observed brains have their own triangles each week. Positions are in steps of
-    1/65535 of the box around all surfaces, values of maps in 254 steps of their scale.
+    A run's surfaces share their triangles, so that the view can interpolate between
+    weeks, and have a map of the displacement since the first week. Observed brains have
+    their own triangles each week. Positions are in steps of 1/65535 of the box around
+    all surfaces, values of maps in 254 steps of their scale.
 
-    Week and hemispheres are by week, those of a run with the same vertices: InputError if their numbers differ.
+    Week and hemispheres are by week, those of a run with the same vertices: InputError
+    if their numbers differ.
     """
-    simulated = {name: _with_displacement([_timed(*frame) for frame in frames]) for name, frames in runs.items()}
+    simulated = {
+        name: _with_displacement([_timed(*frame) for frame in frames])
+        for name, frames in runs.items()
+    }
     observed_frames = [_timed(*frame) for frame in observed]
-    everything = [frame for frames in simulated.values() for frame in frames] + observed_frames
+    everything = [
+        frame for frames in simulated.values() for frame in frames
+    ] + observed_frames
     if not everything:
         return {"groups": [], "maps": []}
-    bytes_per_vertex = len(everything) * _BYTES_PER_FRAME + (len(runs) + len(observed)) * _BYTES_PER_TRIANGULATION
-    vertices = int(np.clip(BUDGET_BYTES / _LETTERS_PER_BYTE / bytes_per_vertex, MIN_VERTICES, MAX_VERTICES))
+    bytes_per_vertex = (
+        len(everything) * _BYTES_PER_FRAME
+        + (len(runs) + len(observed)) * _BYTES_PER_TRIANGULATION
+    )
+    vertices = int(
+        np.clip(
+            BUDGET_BYTES / _LETTERS_PER_BYTE / bytes_per_vertex,
+            MIN_VERTICES,
+            MAX_VERTICES,
+        )
+    )
     low = np.min([mesh.vertices.min(axis=0) for _, mesh, _ in everything], axis=0)
     high = np.max([mesh.vertices.max(axis=0) for _, mesh, _ in everything], axis=0)
     box = low, float((high - low).max())
@@ -61,27 +86,61 @@ def surfaces_view(
     groups: list[dict[str, Any]] = []
     for run, frames in simulated.items():
         vertices_kept, faces = thin_out(frames[-1][1], vertices)
-        style = {"name": run, "kind": "simulated", "colour": SIMULATED_SURFACE_COLOUR, "faces": _text(faces, "<u2")}
-        groups.append(style | {"frames": [_frame(frame, vertices_kept, box, scales) for frame in frames]})
+        style = {
+            "name": run,
+            "kind": "simulated",
+            "colour": SIMULATED_SURFACE_COLOUR,
+            "faces": _text(faces, "<u2"),
+        }
+        groups.append(
+            style
+            | {
+                "frames": [
+                    _frame(frame, vertices_kept, box, scales) for frame in frames
+                ]
+            }
+        )
     if observed_frames:
         drawn = []
         for frame in observed_frames:
             vertices_kept, faces = thin_out(frame[1], vertices)
-            drawn.append(_frame(frame, vertices_kept, box, scales) | {"faces": _text(faces, "<u2")})
-        groups.append({"name": observed_name, "kind": "real", "colour": OBSERVED_SURFACE_COLOUR, "frames": drawn})
+            drawn.append(
+                _frame(frame, vertices_kept, box, scales)
+                | {"faces": _text(faces, "<u2")}
+            )
+        groups.append(
+            {
+                "name": observed_name,
+                "kind": "real",
+                "colour": OBSERVED_SURFACE_COLOUR,
+                "frames": drawn,
+            }
+        )
     maps = []
     for name, scale in scales.items():
         bottom, top = scale.get_clim()
-        colours = scale.to_rgba(np.linspace(bottom, top, _VALUE_LEVELS + 1), bytes=True)[:, :3]
+        colours = scale.to_rgba(
+            np.linspace(bottom, top, _VALUE_LEVELS + 1), bytes=True
+        )[:, :3]
         maps.append(
-            {"name": name, "label": map_title(name), "low": bottom, "high": top, "colours": _text(colours, "u1")}
+            {
+                "name": name,
+                "label": map_title(name),
+                "low": bottom,
+                "high": top,
+                "colours": _text(colours, "u1"),
+            }
         )
     return {"low": low.tolist(), "size": box[1], "groups": groups, "maps": maps}
 
 
 def _timed(week: float, halves: Halves) -> Timed:
     mesh, maps = whole_maps(halves)
-    return week, mesh, {name: values for name, values in maps.items() if VERTEX_MAPS[name].colours}
+    return (
+        week,
+        mesh,
+        {name: values for name, values in maps.items() if VERTEX_MAPS[name].colours},
+    )
 
 
 def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
@@ -89,33 +148,51 @@ def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
     for week, mesh, maps in frames:
         if mesh.vertices.shape != start.shape:
             count = f"{len(mesh.vertices)} vertices at {week:g} GW"
-            raise InputError("the surfaces of a run differ in size", found=count, expected=f"{len(start)} vertices")
+            raise InputError(
+                "the surfaces of a run differ in size",
+                found=count,
+                expected=f"{len(start)} vertices",
+            )
         maps["displacement_mm"] = np.linalg.norm(mesh.vertices - start, axis=1)
     return list(frames)
 
 
-def thin_out(mesh: TriangleMesh, vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the indices of about so many vertices to keep, and the (m, 3) triangles between them.
+def thin_out(
+    mesh: TriangleMesh, vertices: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the indices of about so many vertices to keep, and the (m, 3) triangles
+    between them.
 
-    Edges are collapsed onto existing vertices (Schroeder, Zarge & Lorensen 1992), so that maps and positions of other
-    weeks can be indexed by the kept vertices.
+    Edges are collapsed onto existing vertices (Schroeder, Zarge & Lorensen 1992), so
+    that maps and positions of other weeks can be indexed by the kept vertices.
     """
     if len(mesh.vertices) <= vertices:
         return np.arange(len(mesh.vertices)), np.asarray(mesh.faces, dtype=np.int64)
-    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
-    coarse = body.decimate_pro(1 - vertices / len(mesh.vertices), preserve_topology=True)
-    _, vertices_kept = cKDTree(mesh.vertices).query(np.asarray(coarse.points, dtype=float))
+    body = pv.PolyData.from_regular_faces(
+        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
+    )
+    coarse = body.decimate_pro(
+        1 - vertices / len(mesh.vertices), preserve_topology=True
+    )
+    _, vertices_kept = cKDTree(mesh.vertices).query(
+        np.asarray(coarse.points, dtype=float)
+    )
     return vertices_kept, np.asarray(coarse.regular_faces, dtype=np.int64)
 
 
 def _frame(
-    frame: Timed, vertices_kept: NDArray[np.int64], box: tuple[Floats, float], scales: Mapping[str, ScalarMappable]
+    frame: Timed,
+    vertices_kept: NDArray[np.int64],
+    box: tuple[Floats, float],
+    scales: Mapping[str, ScalarMappable],
 ) -> dict[str, Any]:
     (week, mesh, maps), (low, size) = frame, box
     values = {}
     for name, vertex_values in maps.items():
         bottom, top = scales[name].get_clim()
-        shares = (np.asarray(vertex_values, dtype=float)[vertices_kept] - bottom) / (top - bottom)
+        shares = (np.asarray(vertex_values, dtype=float)[vertices_kept] - bottom) / (
+            top - bottom
+        )
         levels = np.clip(np.round(shares * _VALUE_LEVELS), 0, _VALUE_LEVELS)
         values[name] = _text(np.where(np.isfinite(shares), levels, _UNKNOWN), "u1")
     places = np.round((mesh.vertices[vertices_kept] - low) / size * _POSITION_LEVELS)
@@ -123,4 +200,6 @@ def _frame(
 
 
 def _text(values: NDArray, kind: str) -> str:
-    return b64encode(np.ascontiguousarray(values.astype(kind)).tobytes()).decode("ascii")
+    return b64encode(np.ascontiguousarray(values.astype(kind)).tobytes()).decode(
+        "ascii"
+    )

@@ -1,7 +1,9 @@
-"""Charts over the weeks, a panel for each quantity: metrics, norms, regions, predictions, displacement, spectra.
+"""Charts over the weeks, a panel for each quantity: metrics, norms, regions,
+predictions, displacement, spectra.
 
-As in the other charts, `runs` are all runs of a study, which determine the colours, and `observed_name` is the name of
-observed brains. Spectra of the runs of a sweep have bars instead.
+As in the other charts, `runs` are all runs of a study, which determine the colours, and
+`observed_name` is the name of observed brains. Spectra of the runs of a sweep have bars
+instead.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,7 +42,8 @@ from .style import (
 )
 
 SUBJECT_MARKERS = ("s", "^", "D", "v", "P", "X", "<", ">")
-"""Markers of the subjects of a cohort. With more subjects, none has a marker of its own."""
+"""Markers of the subjects of a cohort. With more subjects, none has a marker of its
+own."""
 PUBLISHED_MARKERS = ("s", "^", "D", "v")
 NO_SUBJECTS: Mapping[str, str] = {}
 LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
@@ -56,9 +59,10 @@ _HATCH = "//////"
 class Layer:
     """Points of one look, in all panels that have some.
 
-    The rows have the columns panel, week, and the `value`: the name of a column, or those of the lower and the upper
-    edge of a band. If there is a column `trusted`, marks are open where it is False. `style` are the arguments of
-    `Axes.plot`, of a band those of `Axes.fill_between`.
+    The rows have the columns panel, week, and the `value`: the name of a column, or
+    those of the lower and the upper edge of a band. If there is a column `trusted`,
+    marks are open where it is False. `style` are the arguments of `Axes.plot`, of a
+    band those of `Axes.fill_between`.
     """
 
     rows: pd.DataFrame
@@ -67,16 +71,22 @@ class Layer:
 
 
 def weeks_chart(
-    titles: Mapping[str, str], layers: Sequence[Layer], weeks: Sequence[float] | pd.Series, **layout: Any
+    titles: Mapping[str, str],
+    layers: Sequence[Layer],
+    weeks: Sequence[float] | pd.Series,
+    **layout: Any,
 ) -> tuple[Figure, dict[str, Axes]]:
-    """Draw layers over the weeks, the first at the back, in a panel for each title; `layout` of `panel_figure`."""
+    """Draw layers over the weeks, the first at the back, in a panel for each title;
+    `layout` of `panel_figure`."""
     figure, panels = panel_figure(len(titles), **layout)
     for axes, (panel, title) in zip(panels, titles.items(), strict=True):
         for layer in layers:
             rows = layer.rows[layer.rows["panel"] == panel].sort_values("week")
             if isinstance(layer.value, tuple):
                 # without rows, columns are not numeric
-                weeks_at, low, high = (rows[column].astype(float) for column in ("week", *layer.value))
+                weeks_at, low, high = (
+                    rows[column].astype(float) for column in ("week", *layer.value)
+                )
                 axes.fill_between(weeks_at, low, high, linewidth=0, **layer.style)
             elif len(rows):
                 axes.plot(rows["week"], rows[layer.value], **layer.style)
@@ -92,7 +102,10 @@ def weeks_chart(
 def run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
     """Return the line of each run."""
     style = {"marker": "o", "markersize": 2.5}
-    return [Layer(rows[rows["run"] == run], {"color": colour, **style}) for run, colour in colours.items()]
+    return [
+        Layer(rows[rows["run"] == run], {"color": colour, **style})
+        for run, colour in colours.items()
+    ]
 
 
 def observed_marks(
@@ -104,39 +117,81 @@ def observed_marks(
     shades: Mapping[str, Any] = NO_SUBJECTS,
     **style: Any,
 ) -> list[Layer]:
-    """Return observed brains in their `shades`, else `colour`; scans of a subject are joined and have its marker."""
+    """Return observed brains in their `shades`, else `colour`; scans of a subject are
+    joined and have its marker."""
     layers = []
-    for person, scans in rows.groupby(rows["subject"].map(lambda brain: subjects.get(brain, "")), sort=False):
+    for person, scans in rows.groupby(
+        rows["subject"].map(lambda brain: subjects.get(brain, "")), sort=False
+    ):
         if person and len(set(scans["week"])) > 1:
             layers.append(Layer(scans.assign(trusted=True), JOINED))
         marker = markers.get(str(person), "*")
-        look = {"marker": marker, "markersize": 7 if marker == "*" else 4.5, "linestyle": "", "zorder": 3, **style}
-        for shade, part in scans.groupby(scans["subject"].map(lambda brain: shades.get(brain, colour)), sort=False):
+        look = {
+            "marker": marker,
+            "markersize": 7 if marker == "*" else 4.5,
+            "linestyle": "",
+            "zorder": 3,
+            **style,
+        }
+        for shade, part in scans.groupby(
+            scans["subject"].map(lambda brain: shades.get(brain, colour)), sort=False
+        ):
             layers.append(Layer(part, {"color": shade, **look}))
     return layers
 
 
 def subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
-    """Return the marker of each subject with observed brains; none if there are more subjects than markers."""
+    """Return the marker of each subject with observed brains; none if there are more
+    subjects than markers."""
     brains = rows.loc[rows["run"] == MEASURED, "subject"]
-    people = list(dict.fromkeys(subjects[brain] for brain in brains if brain in subjects))
-    return dict(zip(people, SUBJECT_MARKERS, strict=False)) if 1 < len(people) <= len(SUBJECT_MARKERS) else {}
+    people = list(
+        dict.fromkeys(subjects[brain] for brain in brains if brain in subjects)
+    )
+    return (
+        dict(zip(people, SUBJECT_MARKERS, strict=False))
+        if 1 < len(people) <= len(SUBJECT_MARKERS)
+        else {}
+    )
 
 
-def group_shades(groups: Mapping[str, str], colours: Mapping[str, Any]) -> tuple[dict[str, Any], list[Artist]]:
-    """Return the colour of each brain in a group, not used by any run, and the legend entries."""
+def group_shades(
+    groups: Mapping[str, str], colours: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[Artist]]:
+    """Return the colour of each brain in a group, not used by any run, and the legend
+    entries."""
     free = [colour for colour in RUN_COLOURS if colour not in colours.values()]
     group_colours = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
-    entries: list[Artist] = [star(name, colour, marker="o", markersize=5) for name, colour in group_colours.items()]
-    return {brain: group_colours[name] for brain, name in groups.items() if name in group_colours}, entries
+    entries: list[Artist] = [
+        star(name, colour, marker="o", markersize=5)
+        for name, colour in group_colours.items()
+    ]
+    return {
+        brain: group_colours[name]
+        for brain, name in groups.items()
+        if name in group_colours
+    }, entries
 
 
 def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str, str]]:
-    """Return the rows of metrics that are shown in a chart, and its titles; InputError if there are none."""
-    titles = {name: metric_title(name) for name in metrics_shown(where) if (metrics["metric"] == name).any()}
+    """Return the rows of metrics that are shown in a chart, and its titles; InputError
+    if there are none."""
+    titles = {
+        name: metric_title(name)
+        for name in metrics_shown(where)
+        if (metrics["metric"] == name).any()
+    }
     if not titles:
-        raise InputError("no metric to draw", found=sorted(set(metrics["metric"])), expected=metrics_shown(where))
-    return metrics[metrics["metric"].isin(titles)].assign(panel=lambda rows: rows["metric"]), titles
+        raise InputError(
+            "no metric to draw",
+            found=sorted(set(metrics["metric"])),
+            expected=metrics_shown(where),
+        )
+    return (
+        metrics[metrics["metric"].isin(titles)].assign(
+            panel=lambda rows: rows["metric"]
+        ),
+        titles,
+    )
 
 
 @styled
@@ -148,30 +203,42 @@ def metrics_chart(
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
-    """Draw a panel per metric of whole brains over weeks: runs as lines, observed brains as black stars.
+    """Draw a panel per metric of whole brains over weeks: runs as lines, observed
+    brains as black stars.
 
-    The scans of a subject are joined. Subjects have markers if there are at most eight; groups of brains have colours.
-    Metrics that the table lacks are left out.
+    The scans of a subject are joined. Subjects have markers if there are at most eight;
+    groups of brains have colours. Metrics that the table lacks are left out.
 
-    `metrics` has the columns subject, run, week, hemisphere, metric, value, unit; `run` is "real" for observed brains.
-    InputError if the table has none of the metrics. `subjects` are the subjects of brains, if known, `groups` their
-    values of a covariate, both by brain.
+    `metrics` has the columns subject, run, week, hemisphere, metric, value, unit; `run`
+    is "real" for observed brains. InputError if the table has none of the metrics.
+    `subjects` are the subjects of brains, if known, `groups` their values of a
+    covariate, both by brain.
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     rows, titles = _shown(whole, Shown.CHART)
     colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == MEASURED]
-    markers, (shades, entries) = subject_markers(whole, subjects), group_shades(groups, colours)
+    markers, (shades, entries) = (
+        subject_markers(whole, subjects),
+        group_shades(groups, colours),
+    )
     marks = observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
     figure, _ = weeks_chart(titles, [*run_lines(rows, colours), *marks], whole["week"])
     named = [*(subjects if markers else ()), *shades]
     has_stars = not observed["subject"].isin(named).all()
-    run_legend(figure, colours, observed_name=observed_name if has_stars else "", markers=markers, extra=entries)
+    run_legend(
+        figure,
+        colours,
+        observed_name=observed_name if has_stars else "",
+        markers=markers,
+        extra=entries,
+    )
     return figure
 
 
 @styled
 def intervals_chart(ensemble: pd.DataFrame) -> Figure:
-    """Draw the intervals of an ensemble over the weeks, a panel per metric, with its run and the observed brains.
+    """Draw the intervals of an ensemble over the weeks, a panel per metric, with its
+    run and the observed brains.
 
     `ensemble` has columns week, metric, run, low, high, observed.
     """
@@ -179,7 +246,11 @@ def intervals_chart(ensemble: pd.DataFrame) -> Figure:
     layers = [
         Layer(rows, {"color": NEUTRAL_COLOUR}, ("low", "high")),
         Layer(rows, {"color": RUN_COLOURS[0], "marker": "o", "markersize": 2.5}, "run"),
-        Layer(rows, {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""}, "observed"),
+        Layer(
+            rows,
+            {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""},
+            "observed",
+        ),
     ]
     figure, _ = weeks_chart(titles, layers, rows["week"], per_row=2)
     extra: list[Artist] = [Patch(color=NEUTRAL_COLOUR, label="interval")]
@@ -200,33 +271,53 @@ def norms_chart(
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
-    """Draw a panel per metric of whole brains: reference brains, their norm curve, other brains and runs.
+    """Draw a panel per metric of whole brains: reference brains, their norm curve,
+    other brains and runs.
 
-    Bands are between the 5th and 95th and the 25th and 75th centile, drawn if the spread of individuals is known. Stars
-    are observed brains: black in the reference, else coloured, as are groups. Lines are runs.
+    Bands are between the 5th and 95th and the 25th and 75th centile, drawn if the
+    spread of individuals is known. Stars are observed brains: black in the reference,
+    else coloured, as are groups. Lines are runs.
 
-    Metrics, subjects and groups are as for `metrics_chart`; `curves` has the columns hemisphere, metric, week,
-    expected, q05, q25, q75, q95, which were fitted to the `reference` brains. `brains` have the same hemispheres as the
-    reference: only they, and simulations from them, are drawn. InputError if the table has none of the metrics.
+    Metrics, subjects and groups are as for `metrics_chart`; `curves` has the columns
+    hemisphere, metric, week, expected, q05, q25, q75, q95, which were fitted to the
+    `reference` brains. `brains` have the same hemispheres as the reference: only they,
+    and simulations from them, are drawn. InputError if the table has none of the
+    metrics.
     """
-    whole = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)])
+    whole = runs_by_name(
+        metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)]
+    )
     rows, titles = _shown(whole, Shown.NORMS)
     norm = curves[(curves["hemisphere"] == "whole") & curves["metric"].isin(titles)]
     norm = norm.assign(panel=norm["metric"])
     colours = run_colours(whole["run"], runs)
-    markers, (shades, extra) = subject_markers(whole, subjects), group_shades(groups, colours)
+    markers, (shades, extra) = (
+        subject_markers(whole, subjects),
+        group_shades(groups, colours),
+    )
     observed = rows[rows["run"] == MEASURED]
-    own, others = (observed[observed["subject"].isin(reference) == is_own] for is_own in (True, False))
-    small: dict[str, Any] = {"markersize": 3.0} if own["subject"].nunique() > MANY_BRAINS else {}
-    line, thin = ({"color": MUTED_COLOUR, "linewidth": width, "zorder": 4} for width in (1.3, 0.6))
+    own, others = (
+        observed[observed["subject"].isin(reference) == is_own]
+        for is_own in (True, False)
+    )
+    small: dict[str, Any] = (
+        {"markersize": 3.0} if own["subject"].nunique() > MANY_BRAINS else {}
+    )
+    line, thin = (
+        {"color": MUTED_COLOUR, "linewidth": width, "zorder": 4} for width in (1.3, 0.6)
+    )
     layers = [
         Layer(norm, {"color": NEUTRAL_COLOUR, "alpha": 0.6}, ("q05", "q95")),
         Layer(norm, {"color": NEUTRAL_COLOUR}, ("q25", "q75")),
         Layer(norm, line, "expected"),
         *(Layer(norm, thin, quantile) for quantile in ("q05", "q25", "q75", "q95")),
         *run_lines(rows, colours),
-        *observed_marks(own, subjects=subjects, markers=markers, shades=shades, **small),
-        *observed_marks(others, RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades),
+        *observed_marks(
+            own, subjects=subjects, markers=markers, shades=shades, **small
+        ),
+        *observed_marks(
+            others, RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades
+        ),
     ]
     figure, _ = weeks_chart(titles, layers, rows["week"], panel_in=2.0, foot_in=0.6)
     if not others["subject"].isin(shades).all():
@@ -235,25 +326,45 @@ def norms_chart(
         extra.append(Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95"))
     elif len(curves):
         extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
-    run_legend(figure, colours, observed_name=observed_name, markers=markers, extra=extra)
+    run_legend(
+        figure, colours, observed_name=observed_name, markers=markers, extra=extra
+    )
     return figure
 
 
 @styled
-def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN) -> Figure:
-    """Draw a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
+def regions_chart(
+    regions: pd.DataFrame,
+    asymmetry: pd.DataFrame,
+    *,
+    observed_name: str = OBSERVED_BRAIN,
+) -> Figure:
+    """Draw a panel per metric over the weeks, a colour per region: both sides together,
+    and the asymmetry of area.
 
-    Observed brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
-    `regions` has the columns subject, run, week, hemisphere, region, metric, value, unit; `asymmetry` subject, run,
-    week, region, metric, asymmetry_index.
+    Observed brains are stars, the first three runs lines. Areas are sums of both sides,
+    other values their means. `regions` has the columns subject, run, week, hemisphere,
+    region, metric, value, unit; `asymmetry` subject, run, week, region, metric,
+    asymmetry_index.
     """
     rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
-    colours, lines = region_colours(rows["region"]), dict(zip(run_colours(rows["run"]), LINES, strict=False))
+    colours, lines = (
+        region_colours(rows["region"]),
+        dict(zip(run_colours(rows["run"]), LINES, strict=False)),
+    )
     # both sides together
-    rows = rows.groupby(["panel", "subject", "run", "week", "region"], sort=False)["value"].agg(["sum", "mean"])
-    rows = rows.reset_index().assign(value=lambda both: both["sum"].where(both["panel"] == "area", both["mean"]))
-    of_areas = runs_by_name(asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)])
-    rows = pd.concat([rows, of_areas.assign(panel="asymmetry", value=of_areas["asymmetry_index"])])
+    rows = rows.groupby(["panel", "subject", "run", "week", "region"], sort=False)[
+        "value"
+    ].agg(["sum", "mean"])
+    rows = rows.reset_index().assign(
+        value=lambda both: both["sum"].where(both["panel"] == "area", both["mean"])
+    )
+    of_areas = runs_by_name(
+        asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)]
+    )
+    rows = pd.concat(
+        [rows, of_areas.assign(panel="asymmetry", value=of_areas["asymmetry_index"])]
+    )
     titles |= {"area": f"{titles['area']}, both sides"} if "area" in titles else {}
     titles["asymmetry"] = "asymmetry of area, 2 (L − R)/(L + R)"
     layers = []
@@ -261,46 +372,108 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_na
         if run == MEASURED:
             layers += observed_marks(part, colours[str(region)], markersize=6)
         elif run in lines:
-            layers.append(Layer(part, {"color": colours[str(region)], "linestyle": lines[str(run)], "linewidth": 1.1}))
+            layers.append(
+                Layer(
+                    part,
+                    {
+                        "color": colours[str(region)],
+                        "linestyle": lines[str(run)],
+                        "linewidth": 1.1,
+                    },
+                )
+            )
     figure, panels = weeks_chart(titles, layers, rows["week"], foot_in=0.75)
     for name, axes in panels.items():
         # signed numbers and ratios are not compared with 0
-        if name != "asymmetry" and not METRICS[name].is_signed and METRICS[name].unit != "1":
+        if (
+            name != "asymmetry"
+            and not METRICS[name].is_signed
+            and METRICS[name].unit != "1"
+        ):
             from_zero(axes)
     panels["asymmetry"].axhline(0, color=MUTED_COLOUR, linewidth=0.8)
-    extra = [Line2D([], [], color=c, marker="s", linestyle="none", label=name) for name, c in colours.items()]
-    extra += [Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run) for run, line in lines.items()]
+    extra = [
+        Line2D([], [], color=c, marker="s", linestyle="none", label=name)
+        for name, c in colours.items()
+    ]
+    extra += [
+        Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run)
+        for run, line in lines.items()
+    ]
     run_legend(figure, {}, extra=[*extra, star(observed_name, MUTED_COLOUR)])
     return figure
 
 
 @styled
 def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw correlation with and distance from the observed brain by weeks after the start: a row of panels per start.
+    """Draw correlation with and distance from the observed brain by weeks after the
+    start: a row of panels per start.
 
-    Runs are solid lines, simpler predictions dashed. `prediction` has the columns run, start, horizon, model (`run` or
-    a simpler prediction), r_shape_index and distance_mm.
+    Runs are solid lines, simpler predictions dashed. `prediction` has the columns run,
+    start, horizon, model (`run` or a simpler prediction), r_shape_index and
+    distance_mm.
     """
-    columns = {"r_shape_index": "shape index, r with the observed brain", "distance_mm": "distance from it (mm)"}
+    columns = {
+        "r_shape_index": "shape index, r with the observed brain",
+        "distance_mm": "distance from it (mm)",
+    }
     colours = run_colours(prediction["run"], runs)
     # simpler predictions are the same for all runs
-    rows = prediction.assign(line=prediction["run"].where(prediction["model"] == "run", prediction["model"]))
-    rows = rows.drop_duplicates(["start", "line", "horizon"]).assign(week=lambda rows: rows["horizon"])
+    rows = prediction.assign(
+        line=prediction["run"].where(prediction["model"] == "run", prediction["model"])
+    )
+    rows = rows.drop_duplicates(["start", "line", "horizon"]).assign(
+        week=lambda rows: rows["horizon"]
+    )
     shades = run_colours([*colours, *rows["line"]])
-    simpler = dict(zip([name for name in shades if name not in colours], reversed(shades.values()), strict=False))
-    styles = {name: {"color": colour, "marker": ".", "linestyle": "--"} for name, colour in simpler.items()}
-    styles |= {name: {"color": colour, "marker": "o"} for name, colour in colours.items()}
-    titles = [f"{start}: {title}" for start in dict.fromkeys(rows["start"]) for title in columns.values()]
-    parts = [rows.assign(panel=rows["start"] + f": {title}", value=rows[name]) for name, title in columns.items()]
+    simpler = dict(
+        zip(
+            [name for name in shades if name not in colours],
+            reversed(shades.values()),
+            strict=False,
+        )
+    )
+    styles = {
+        name: {"color": colour, "marker": ".", "linestyle": "--"}
+        for name, colour in simpler.items()
+    }
+    styles |= {
+        name: {"color": colour, "marker": "o"} for name, colour in colours.items()
+    }
+    titles = [
+        f"{start}: {title}"
+        for start in dict.fromkeys(rows["start"])
+        for title in columns.values()
+    ]
+    parts = [
+        rows.assign(panel=rows["start"] + f": {title}", value=rows[name])
+        for name, title in columns.items()
+    ]
     rows = pd.concat(parts)
-    layers = [Layer(rows[rows["line"] == name], style) for name, style in styles.items()]
-    layout: dict[str, Any] = {"per_row": 2, "panel_in": 2.4, "foot_in": 0.9, "sharex": True, "sharey": "col"}
-    figure, panels = weeks_chart(dict(zip(titles, titles, strict=True)), layers, rows["week"], **layout)
+    layers = [
+        Layer(rows[rows["line"] == name], style) for name, style in styles.items()
+    ]
+    layout: dict[str, Any] = {
+        "per_row": 2,
+        "panel_in": 2.4,
+        "foot_in": 0.9,
+        "sharex": True,
+        "sharey": "col",
+    }
+    figure, panels = weeks_chart(
+        dict(zip(titles, titles, strict=True)), layers, rows["week"], **layout
+    )
     for axes in panels.values():
         axes.set_xlabel("weeks after the start")
     from_zero(list(panels.values())[1])
     extra = [
-        Line2D([], [], color=colour, linestyle="--", label=SIMPLER_PREDICTIONS.get(name, plain(name)))
+        Line2D(
+            [],
+            [],
+            color=colour,
+            linestyle="--",
+            label=SIMPLER_PREDICTIONS.get(name, plain(name)),
+        )
         for name, colour in simpler.items()
     ]
     run_legend(figure, colours, extra=extra)
@@ -309,59 +482,118 @@ def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
 
 @styled
 def displacement_chart(
-    displacement: pd.DataFrame, *, runs: Sequence[str] = (), published: Mapping[str, Any] | None = None
+    displacement: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+    published: Mapping[str, Any] | None = None,
 ) -> Figure:
     """Draw the maximal and the mean displacement norm of all nodes per week.
 
-    Norms are divided by the weeks between output weeks. Runs are lines, published values grey. `displacement` has the
-    columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm; that of `published` has
-    `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
+    Norms are divided by the weeks between output weeks. Runs are lines, published
+    values grey. `displacement` has the columns run, subject, from_week, to_week, nodes
+    ("all" or "pial"), max_mm, mean_mm; that of `published` has `from_weeks` (intervals
+    of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
     named, moved = (
         runs_by_name(displacement),
         published["displacement"] if published else {"from_weeks": [], "rows": []},
     )
-    colours, weeks = run_colours(named["run"], runs), np.array(moved["from_weeks"], dtype=float)
-    markers = dict(zip(dict.fromkeys(row["source"] for row in moved["rows"]), cycle(PUBLISHED_MARKERS), strict=False))
+    colours, weeks = (
+        run_colours(named["run"], runs),
+        np.array(moved["from_weeks"], dtype=float),
+    )
+    markers = dict(
+        zip(
+            dict.fromkeys(row["source"] for row in moved["rows"]),
+            cycle(PUBLISHED_MARKERS),
+            strict=False,
+        )
+    )
     tables = [
-        pd.DataFrame({**row, "run": row["source"], "from_week": weeks, "to_week": weeks + 1}) for row in moved["rows"]
+        pd.DataFrame(
+            {**row, "run": row["source"], "from_week": weeks, "to_week": weeks + 1}
+        )
+        for row in moved["rows"]
     ]
     rows = pd.concat([*tables, named[named["nodes"] == "all"]])
-    rows["week"], duration = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
-    titles = {"max_mm": "maximal displacement, all nodes", "mean_mm": "mean displacement, all nodes"}
-    rows = pd.concat(rows.assign(panel=column, value=rows[column] / duration) for column in titles)
-    styles = {run: {"color": MUTED_COLOUR, "marker": marker, "linestyle": "--"} for run, marker in markers.items()}
+    rows["week"], duration = (
+        (rows["from_week"] + rows["to_week"]) / 2,
+        rows["to_week"] - rows["from_week"],
+    )
+    titles = {
+        "max_mm": "maximal displacement, all nodes",
+        "mean_mm": "mean displacement, all nodes",
+    }
+    rows = pd.concat(
+        rows.assign(panel=column, value=rows[column] / duration) for column in titles
+    )
+    styles = {
+        run: {"color": MUTED_COLOUR, "marker": marker, "linestyle": "--"}
+        for run, marker in markers.items()
+    }
     styles |= {run: {"color": colour, "marker": "o"} for run, colour in colours.items()}
-    layers = [Layer(rows[rows["run"] == run], {"label": run, **style}) for run, style in styles.items()]
-    figure, panels = weeks_chart(titles, layers, [*rows["from_week"], *rows["to_week"]], per_row=2)
+    layers = [
+        Layer(rows[rows["run"] == run], {"label": run, **style})
+        for run, style in styles.items()
+    ]
+    figure, panels = weeks_chart(
+        titles, layers, [*rows["from_week"], *rows["to_week"]], per_row=2
+    )
     for axes in panels.values():
-        axes.set(ylabel="displacement (mm per week)", xlabel="gestational age (GW), middle of the interval")
+        axes.set(
+            ylabel="displacement (mm per week)",
+            xlabel="gestational age (GW), middle of the interval",
+        )
         from_zero(axes)
-    run_legend(figure, colours, extra=[Line2D([], [], label=run, **styles[run]) for run in markers])
+    run_legend(
+        figure,
+        colours,
+        extra=[Line2D([], [], label=run, **styles[run]) for run in markers],
+    )
     return figure
 
 
 def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
-    """Return the rows of some bands in the spectra of a proxy, with a column `trusted`."""
-    trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
-    return spectra.assign(trusted=trusted)[spectra["band"].isin(bands) & (spectra["proxy"] == proxy)]
+    """Return the rows of some bands in the spectra of a proxy, with a column
+    `trusted`."""
+    trusted = (
+        spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
+    )
+    return spectra.assign(trusted=trusted)[
+        spectra["band"].isin(bands) & (spectra["proxy"] == proxy)
+    ]
 
 
-def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0) -> None:
+def _beyond_the_modes(
+    axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0
+) -> None:
     words = "beyond the\nmodes computed"
-    axes.text(x, 0.5, words, transform=transform, ha="center", va="center", rotation=rotation)
+    axes.text(
+        x, 0.5, words, transform=transform, ha="center", va="center", rotation=rotation
+    )
 
 
 def _spectra_legend(
-    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], name: str, groups: list[Artist], *, bars: bool
+    figure: Figure,
+    rows: pd.DataFrame,
+    colours: Mapping[str, Any],
+    name: str,
+    groups: list[Artist],
+    *,
+    bars: bool,
 ) -> None:
-    """Draw the legend of a chart of bands, with groups and the marks of bands that are cut off or not resolved."""
+    """Draw the legend of a chart of bands, with groups and the marks of bands that are
+    cut off or not resolved."""
     untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
     label = "band cut off or not resolved"
     extra: list[Artist] = []
     if untrusted - {MEASURED}:
-        hatched = Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label)
-        hollow = star(label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white")
+        hatched = Patch(
+            facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label
+        )
+        hollow = star(
+            label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white"
+        )
         extra.append(hatched if bars else hollow)
     if MEASURED in untrusted:
         words = "the same, observed brain" if extra else label
@@ -384,24 +616,36 @@ def spectra_weeks_chart(
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
-    """Draw the relative power of the fold bands of mean curvature over weeks: a row per hemisphere, a column per band.
+    """Draw the relative power of the fold bands of mean curvature over weeks: a row per
+    hemisphere, a column per band.
 
-    Runs are lines, observed brains black stars; scans of a subject are joined and groups coloured. Markers are open if
-    the band, or one in the denominator of the relative power, is cut off, or if the surface does not resolve it.
-    `spectra` has the columns subject, run, week, hemisphere, proxy, band, relative_power, complete,
+    Runs are lines, observed brains black stars; scans of a subject are joined and
+    groups coloured. Markers are open if the band, or one in the denominator of the
+    relative power, is cut off, or if the surface does not resolve it. `spectra` has the
+    columns subject, run, week, hemisphere, proxy, band, relative_power, complete,
     denominator_complete, resolved.
     """
     with_power = set(spectra.loc[spectra["relative_power"].notna(), "band"])
     bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
     rows = _band_rows(runs_by_name(spectra), bands, PROXIES[0])
-    rows = rows.assign(panel=rows["hemisphere"] + rows["band"].astype(str), value=rows["relative_power"])
+    rows = rows.assign(
+        panel=rows["hemisphere"] + rows["band"].astype(str),
+        value=rows["relative_power"],
+    )
     sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
     shades, entries = group_shades(groups, colours)
-    layers = run_lines(rows, colours) + observed_marks(rows[rows["run"] == MEASURED], subjects=subjects, shades=shades)
+    layers = run_lines(rows, colours) + observed_marks(
+        rows[rows["run"] == MEASURED], subjects=subjects, shades=shades
+    )
     cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}
     heads = [f"B{band}, {_FOLDS[band]} folds" for band in bands]
     titles = dict(zip_longest(cells, heads, fillvalue=""))
-    layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
+    layout: dict[str, Any] = {
+        "per_row": len(bands),
+        "panel_in": 1.75,
+        "sharex": True,
+        "sharey": "col",
+    }
     figure, panels = weeks_chart(titles, layers, rows["week"], **layout)
     for cell, (side, band) in cells.items():
         axes = panels[cell]
@@ -427,44 +671,77 @@ def influence_spectra(
     week: float,
     observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
-    """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed brain at one week (in GW).
+    """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed
+    brain at one week (in GW).
 
-    A panel per proxy and hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. They
-    are hatched or open if the band, or one in the denominator of the relative power, is cut off, or if the surface does
-    not resolve it. A band without any power is labelled as beyond the modes.
+    A panel per proxy and hemisphere. Runs are bars, from pale to dark in their order;
+    observed brains are stars. They are hatched or open if the band, or one in the
+    denominator of the relative power, is cut off, or if the surface does not resolve
+    it. A band without any power is labelled as beyond the modes.
 
-    `members` are by run tables as for `spectra_weeks_chart`, None for a run that ended before the week; `observed`
-    those of observed brains, whose run is "real". `values` are by run the varied parameters with their values, in the
-    order of the sweep.
+    `members` are by run tables as for `spectra_weeks_chart`, None for a run that ended
+    before the week; `observed` those of observed brains, whose run is "real". `values`
+    are by run the varied parameters with their values, in the order of the sweep.
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
-    simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
+    simulated = [
+        table.assign(run=labels[run])
+        for run, table in members.items()
+        if table is not None
+    ]
     shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
     colours = dict(zip(labels.values(), shades, strict=False))
     spectra = pd.concat([*simulated, *observed])
-    by_proxy = {proxy: _band_rows(spectra[spectra["week"] == week], FOLD_BANDS, proxy) for proxy in PROXIES}
+    by_proxy = {
+        proxy: _band_rows(spectra[spectra["week"] == week], FOLD_BANDS, proxy)
+        for proxy in PROXIES
+    }
     rows = pd.concat(by_proxy.values())
     sides = _sides_in(rows)
-    figure, panels = panel_figure(len(sides) * len(PROXIES), per_row=len(sides), panel_in=2.3, sharey="row")
+    figure, panels = panel_figure(
+        len(sides) * len(PROXIES), per_row=len(sides), panel_in=2.3, sharey="row"
+    )
     width = 0.8 / len(colours)
     for axes, (proxy, hemisphere) in zip(panels, product(PROXIES, sides), strict=True):
         side = by_proxy[proxy][by_proxy[proxy]["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
             run_rows = side[side["run"] == run]
-            position = [FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width for band in run_rows["band"]]
-            bars = axes.bar(position, run_rows["relative_power"], width=0.92 * width, color=colour)
+            position = [
+                FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width
+                for band in run_rows["band"]
+            ]
+            bars = axes.bar(
+                position, run_rows["relative_power"], width=0.92 * width, color=colour
+            )
             for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
                 if not trusted:
                     bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
         for _, row in side[side["run"] == MEASURED].iterrows():
             centre, power = FOLD_BANDS.index(row["band"]), row["relative_power"]
-            axes.hlines(power, centre - 0.42, centre + 0.42, color=OBSERVED_COLOUR, linewidth=0.9)
+            axes.hlines(
+                power,
+                centre - 0.42,
+                centre + 0.42,
+                color=OBSERVED_COLOUR,
+                linewidth=0.9,
+            )
             face = OBSERVED_COLOUR if row["trusted"] else "white"
-            axes.plot(centre, power, "*", color=OBSERVED_COLOUR, markerfacecolor=face, markersize=8)
+            axes.plot(
+                centre,
+                power,
+                "*",
+                color=OBSERVED_COLOUR,
+                markerfacecolor=face,
+                markersize=8,
+            )
         for place, band in enumerate(FOLD_BANDS):
             if not side.loc[side["band"] == band, "relative_power"].notna().any():
-                _beyond_the_modes(axes, place, axes.get_xaxis_transform(), rotation=90.0)
-        axes.set_xticks(range(len(FOLD_BANDS)), [f"B{band}\n{_FOLDS[band]}" for band in FOLD_BANDS])
+                _beyond_the_modes(
+                    axes, place, axes.get_xaxis_transform(), rotation=90.0
+                )
+        axes.set_xticks(
+            range(len(FOLD_BANDS)), [f"B{band}\n{_FOLDS[band]}" for band in FOLD_BANDS]
+        )
         axes.set_xlabel("SpAnGy band, and the folds that go with it")
         axes.set_xlim(-0.5, len(FOLD_BANDS) - 0.5)
         axes.set_title(f"{hemisphere} hemisphere, {plain(proxy)}")

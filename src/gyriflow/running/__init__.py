@@ -1,1 +1,2 @@
-"""Starting Snakemake and following its jobs: launch, terminal, status, provenance, cost, logs, code hashes."""
+"""Starting Snakemake and following its jobs: launch, terminal, status, provenance,
+cost, logs, code hashes."""

@@ -1,4 +1,5 @@
-"""Predict the processor time of jobs, and memory and disk space of simulations, within a factor of two."""
+"""Predict the processor time of jobs, and memory and disk space of simulations, within
+a factor of two."""
 
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
@@ -20,32 +21,41 @@ from ..units import ML_PER_MM3, SECONDS_PER_GW
 FOLDINGS = ("simulate", "simulate_member")
 """Rules that fold."""
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
-"""Linear elements per cube of the requested edge length, fitted to meshes of 31 k to 464 k elements."""
+"""Linear elements per cube of the requested edge length, fitted to meshes of 31 k to
+464 k elements."""
 SECONDS_PER_ELEMENT_AND_STEP = {1: 4.3e-6, 2: 14e-6}
-"""By element order; fitted to runs of 130 k to 500 k linear and 27 k to 45 k quadratic elements and 28 to 126 steps,
-within a factor of 1.6. A quadratic element counts as the eight linear elements with the same nodes."""
+"""By element order; fitted to runs of 130 k to 500 k linear and 27 k to 45 k quadratic
+elements and 28 to 126 steps, within a factor of 1.6. A quadratic element counts as the
+eight linear elements with the same nodes."""
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 11e-6, 2: 18e-6}
-"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599 k, quadratic ones a guess."""
+"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599
+k, quadratic ones a guess."""
 SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.2e-4
-"""For a mesh to follow the brains of its series: targets, or an atlas' path; by 107 k to 130 k elements to 32 GW."""
+"""For a mesh to follow the brains of its series: targets, or an atlas' path; by 107 k
+to 130 k elements to 32 GW."""
 DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
-"""Week from which opened sulci are so deep that to follow a brain for a week takes so many times as long."""
+"""Week from which opened sulci are so deep that to follow a brain for a week takes so
+many times as long."""
 FUSED_SHARE = {"pial": 0.53, "series": 0.5}
-"""What surfaces, and bodies that follow them, take with `open_sulci: false`, over that with opened sulci."""
+"""What surfaces, and bodies that follow them, take with `open_sulci: false`, over that
+with opened sulci."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
 """By mesher; of elements of the mesh, linear or quadratic."""
 SECONDS_PER_ML = {"register": 0.13, "pial": 0.17}
-"""By stage, for each mL of the (later) brain, whose labels are registered or surfaced voxel by voxel; 22 to 38 GW."""
+"""By stage, for each mL of the (later) brain, whose labels are registered or surfaced
+voxel by voxel; 22 to 38 GW."""
 SECONDS_PER_VERTEX, SECONDS_PER_VERTEX_AND_MODE = 1.4e-4, 8.3e-7
-"""To measure a brain, by the vertices of its surface and the modes of its spectrum; 9 k to 18 k vertices."""
+"""To measure a brain, by the vertices of its surface and the modes of its spectrum; 9 k
+to 18 k vertices."""
 VERTEX_AREA = 0.87
 """Area of a vertex of an even triangulation over the square of the edge length."""
 BAND_MODES = {"B4": 270, "B5": 1100, "B6": 4500}
 """Modes up to the end of a band, of a hemisphere."""
 OPENED_FROM_GW, OPENED_PER_GW = 25.0, 0.11
-"""Week from which the banks of opened sulci, which lie close and so have short edges, add vertices, and how many."""
+"""Week from which the banks of opened sulci, which lie close and so have short edges,
+add vertices, and how many."""
 SECONDS_PER_STAGE = {
     "brain_figures": 6.5,
     "folding_figures": 13.0,
@@ -66,7 +76,8 @@ MIN_MIB, MIN_MINUTES, MIN_SURFACE_MIB = 2000, 60, 4000
 
 
 class Needs(NamedTuple):
-    """Predicted cost of a simulation: time on one core, memory of all ranks, disk space."""
+    """Predicted cost of a simulation: time on one core, memory of all ranks, disk
+    space."""
 
     seconds: float
     memory_mib: float
@@ -74,15 +85,20 @@ class Needs(NamedTuple):
 
 
 def surface_area_mm2(week: float) -> float:
-    """Predict the area of the pial surface of a brain of a week, with sulci as labels of 0.8 mm show them."""
+    """Predict the area of the pial surface of a brain of a week, with sulci as labels
+    of 0.8 mm show them."""
     return 9900 * (expected_volume_ml(week) / 51) ** 0.74
 
 
 def linear_elements(week: float, mesh: MeshSettings) -> float:
-    """Predict the number of linear elements of a brain of a week, from its surface area and volume."""
+    """Predict the number of linear elements of a brain of a week, from its surface area
+    and volume."""
     volume_ml, edge = expected_volume_ml(week), mesh.surface_edge_mm
     graded = 1 / edge**2 - 1 / mesh.core_edge_mm**2
-    cubes = surface_area_mm2(week) * (2.5 / edge**2 + max(graded, 0)) + volume_ml / ML_PER_MM3 / mesh.core_edge_mm**3
+    cubes = (
+        surface_area_mm2(week) * (2.5 / edge**2 + max(graded, 0))
+        + volume_ml / ML_PER_MM3 / mesh.core_edge_mm**3
+    )
     return ELEMENTS_PER_CUBE[mesh.mesher] * cubes
 
 
@@ -92,11 +108,24 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     elements = linear_elements(week, mesh)
     steps = max((run.end_week - week) * SECONDS_PER_GW / run.step_s, 1.0)
     memory = predicted_memory_mib(
-        round(elements / (8 if mesh.order == 2 else 1)), run.ranks, run.contact.kind, mesh.order
+        round(elements / (8 if mesh.order == 2 else 1)),
+        run.ranks,
+        run.contact.kind,
+        mesh.order,
     )
     # positions and fields of each output week, by a quarter as many nodes
-    disk = ((run.end_week - week) / run.output_every_gw + 1) * elements / 4 * (24 + 12 * len(run.fields)) / 2**20
-    rates = SHAPES_SECONDS_PER_ELEMENT_AND_STEP if simulation.shapes else SECONDS_PER_ELEMENT_AND_STEP
+    disk = (
+        ((run.end_week - week) / run.output_every_gw + 1)
+        * elements
+        / 4
+        * (24 + 12 * len(run.fields))
+        / 2**20
+    )
+    rates = (
+        SHAPES_SECONDS_PER_ELEMENT_AND_STEP
+        if simulation.shapes
+        else SECONDS_PER_ELEMENT_AND_STEP
+    )
     return Needs(rates[mesh.order] * elements * steps, memory, disk)
 
 
@@ -104,23 +133,35 @@ def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
     """Predict the processor time of a job, by its rule and wildcards."""
     mesh = study.config.mesh
     if rule in FOLDINGS:
-        return START_SECONDS + simulation_needs(study.simulations[wildcards["run"], wildcards["brain"]], mesh).seconds
+        return (
+            START_SECONDS
+            + simulation_needs(
+                study.simulations[wildcards["run"], wildcards["brain"]], mesh
+            ).seconds
+        )
     if rule in ("tetrahedralise", "path_mesh"):
         settings = study.config.growth.path_mesh if rule == "path_mesh" else mesh
         week = study.brains[wildcards["brain"]].week
         return START_SECONDS + _meshing_seconds(week, settings)
     if rule == "atlas_path":
         path = _path_from(study, wildcards["brain"])
-        return START_SECONDS + _series_seconds(study, path.weeks, study.config.growth.path_mesh)
+        return START_SECONDS + _series_seconds(
+            study, path.weeks, study.config.growth.path_mesh
+        )
     if rule == "targets":
-        return START_SECONDS + _series_seconds(study, study.chains[wildcards["brain"], wildcards["origin"]].weeks, mesh)
+        return START_SECONDS + _series_seconds(
+            study, study.chains[wildcards["brain"], wildcards["origin"]].weeks, mesh
+        )
     if rule == "predicted_targets":
-        return START_SECONDS + _prediction_seconds(study, wildcards["brain"], wildcards["origin"])
+        return START_SECONDS + _prediction_seconds(
+            study, wildcards["brain"], wildcards["origin"]
+        )
     return START_SECONDS + _brain_seconds(study, rule, wildcards)
 
 
 def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
-    """Predict the time of a stage that deals with one brain, measured or simulated, or registers it as the later."""
+    """Predict the time of a stage that deals with one brain, measured or simulated, or
+    registers it as the later."""
     if rule in SECONDS_PER_STAGE:
         return SECONDS_PER_STAGE[rule]
     brain = study.brains.get(wildcards.get("later") or wildcards.get("brain", ""))
@@ -128,16 +169,35 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
         return 0.0
     share = len(brain.sides) / len(SIDES)
     # rules of one hemisphere or with thickness are variants of a stage
-    volume_stage = next((stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None)
+    volume_stage = next(
+        (stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None
+    )
     if volume_stage and brain.config.has_labels:
-        opening = 1.0 if study.config.surface.open_sulci else FUSED_SHARE.get(volume_stage, 1.0)
-        return opening * SECONDS_PER_ML[volume_stage] * share * expected_volume_ml(brain.week)
+        opening = (
+            1.0
+            if study.config.surface.open_sulci
+            else FUSED_SHARE.get(volume_stage, 1.0)
+        )
+        return (
+            opening
+            * SECONDS_PER_ML[volume_stage]
+            * share
+            * expected_volume_ml(brain.week)
+        )
     if rule.startswith("measure"):
         # the surface of a simulated brain is that of its mesh, whatever its week
         is_simulated = rule.startswith("measure_simulated")
-        edge_mm = study.config.mesh.surface_edge_mm if is_simulated else study.config.surface.edge_length_mm
+        edge_mm = (
+            study.config.mesh.surface_edge_mm
+            if is_simulated
+            else study.config.surface.edge_length_mm
+        )
         vertices = share * surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
-        has_slits = brain.labels is not None and brain.labels.scheme.cortex and study.config.surface.open_sulci
+        has_slits = (
+            brain.labels is not None
+            and brain.labels.scheme.cortex
+            and study.config.surface.open_sulci
+        )
         if has_slits and not is_simulated:
             vertices *= 1 + OPENED_PER_GW * max(brain.week - OPENED_FROM_GW, 0.0)
         modes = study.config.metrics.spangy_modes
@@ -153,23 +213,37 @@ def _meshing_seconds(week: float, mesh: MeshSettings) -> float:
 
 def _path_from(study: Study, brain: str) -> Chain:
     """Return the path of an atlas from its first brain."""
-    return next(chain.path for chain in study.chains.values() if chain.path and chain.path.brains[0].id == brain)
+    return next(
+        chain.path
+        for chain in study.chains.values()
+        if chain.path and chain.path.brains[0].id == brain
+    )
 
 
 def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
     """Predict the time for the shapes that an atlas' growth gives a start brain."""
-    chain, file = study.chains[brain, origin], TARGETS.format(brain=brain, origin=origin)
-    end = max(simulation.weeks[-1] for simulation in study.simulations.values() if simulation.targets == file)
+    chain, file = (
+        study.chains[brain, origin],
+        TARGETS.format(brain=brain, origin=origin),
+    )
+    end = max(
+        simulation.weeks[-1]
+        for simulation in study.simulations.values()
+        if simulation.targets == file
+    )
     start = chain.weeks[0]
     later = [week for week in chain.path.weeks if week > start] if chain.path else []
     # it ends two weeks of the atlas after the end
     weeks = max(later[: bisect_left(later, end) + 2], default=start) - start
     elements = linear_elements(start, study.config.mesh)
-    return PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
+    return (
+        PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
+    )
 
 
 def _series_seconds(study: Study, weeks: Sequence[float], mesh: MeshSettings) -> float:
-    """Predict the time for a mesh to follow the brains of a series; with opened sulci, late weeks take most of it."""
+    """Predict the time for a mesh to follow the brains of a series; with opened sulci,
+    late weeks take most of it."""
     first, last = weeks[0], weeks[-1]
     per_week_s = SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(first, mesh)
     if not study.config.surface.open_sulci:
@@ -179,20 +253,27 @@ def _series_seconds(study: Study, weeks: Sequence[float], mesh: MeshSettings) ->
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:
-    """Return the limits of a simulation's job on a cluster: memory in MiB, and minutes."""
+    """Return the limits of a simulation's job on a cluster: memory in MiB, and
+    minutes."""
     needs = simulation_needs(simulation, mesh)
     minutes = ERROR_FACTOR * needs.seconds / simulation.settings.ranks / 60
-    return max(ceil(ERROR_FACTOR * needs.memory_mib), MIN_MIB), max(ceil(minutes), MIN_MINUTES)
+    return max(ceil(ERROR_FACTOR * needs.memory_mib), MIN_MIB), max(
+        ceil(minutes), MIN_MINUTES
+    )
 
 
 def targets_memory_mib(start: Brain, mesh: MeshSettings) -> int:
-    """Return the memory limit in MiB for the targets of a start brain, whose linear elements are fitted on one rank."""
-    needed = predicted_memory_mib(round(linear_elements(start.week, mesh)), 1, "global", 1)
+    """Return the memory limit in MiB for the targets of a start brain, whose linear
+    elements are fitted on one rank."""
+    needed = predicted_memory_mib(
+        round(linear_elements(start.week, mesh)), 1, "global", 1
+    )
     return max(MIN_SURFACE_MIB, ceil(ERROR_FACTOR * needed))
 
 
 def surface_memory_mib(labels: str, week: float) -> int:
-    """Return the memory limit in MiB for extracting a surface: 16 bytes a voxel, and 800 a voxel of the brain.
+    """Return the memory limit in MiB for extracting a surface: 16 bytes a voxel, and
+    800 a voxel of the brain.
 
     A file that does not exist yet is assumed to be of usual size.
     """

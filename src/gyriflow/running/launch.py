@@ -1,8 +1,11 @@
-"""Start Snakemake with this checkout's workflow (`./run snakemake ARG...`, `python -m gyriflow.running.launch ARG...`).
+"""Start Snakemake with this checkout's workflow (`./run snakemake ARG...`, `python -m
+gyriflow.running.launch ARG...`).
 
-The launcher removes the lock of an interrupted run (never that of a live one) and returns the exit code of the first
-failed step. The terminal shows a progress bar, warnings and failures; everything else goes to a log. `--verbose`,
-`--quiet`, `--printshellcmds` and `--logger` bring back Snakemake's own messages. All other options are Snakemake's.
+The launcher removes the lock of an interrupted run (never that of a live one) and
+returns the exit code of the first failed step. The terminal shows a progress bar,
+warnings and failures; everything else goes to a log. `--verbose`, `--quiet`,
+`--printshellcmds` and `--logger` bring back Snakemake's own messages. All other options
+are Snakemake's.
 """
 
 import logging
@@ -34,31 +37,65 @@ from ..step import EXIT_FILE, recorded_exit_code
 from .snakemake_internals import dates_before_copy, temporary_records
 
 ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
-"""The conda environment, whose variables of MPI and BLAS are defaults in any other one, too, as in `./run`."""
+"""The conda environment, whose variables of MPI and BLAS are defaults in any other one,
+too, as in `./run`."""
 INTERRUPT_S = 0.5
-"""Time for Snakemake to notice an interruption before its jobs are stopped, so that they do not count as failed."""
+"""Time for Snakemake to notice an interruption before its jobs are stopped, so that
+they do not count as failed."""
 GRACE_S = 4.0
-"""Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers allow 10 s or more in all."""
+"""Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers
+allow 10 s or more in all."""
 READ_ONLY_OPTIONS = (
-    *("dryrun", "nolock", "summary", "detailed_summary", "rulegraph", "dag", "filegraph", "list_rules", "lint"),
+    *(
+        "dryrun",
+        "nolock",
+        "summary",
+        "detailed_summary",
+        "rulegraph",
+        "dag",
+        "filegraph",
+        "list_rules",
+        "lint",
+    ),
 )
 """Options with which Snakemake runs nothing and takes no lock."""
 VERBOSE_OPTIONS = (
-    *("verbose", "quiet", "printshellcmds", "logger", "debug", "debug_dag", "unlock", "touch", "report", "archive"),
-    *("delete_all_output", "delete_temp_output", "cleanup_metadata", "list_changes", "list_input_changes"),
+    *(
+        "verbose",
+        "quiet",
+        "printshellcmds",
+        "logger",
+        "debug",
+        "debug_dag",
+        "unlock",
+        "touch",
+        "report",
+        "archive",
+    ),
+    *(
+        "delete_all_output",
+        "delete_temp_output",
+        "cleanup_metadata",
+        "list_changes",
+        "list_input_changes",
+    ),
     *("list_params_changes", "generate_unit_tests"),
 )
-"""Options that ask for Snakemake's own messages, or for something else than running steps."""
+"""Options that ask for Snakemake's own messages, or for something else than running
+steps."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
-"""Environment variable: continue after a failed step, or after a row of a table that cannot be used."""
+"""Environment variable: continue after a failed step, or after a row of a table that
+cannot be used."""
 DRY_RUN_VAR = "GYRIFLOW_DRY_RUN"
 """Environment variable: run nothing."""
 MEASURE_ONLY_VAR = "GYRIFLOW_MEASURE_ONLY"
 """Environment variable: fold nothing."""
 REFUSED_FILE_VAR = "GYRIFLOW_REFUSED_FILE"
-"""Environment variable with the path of a JSON file: refused brains and causes. The study is finished without them."""
+"""Environment variable with the path of a JSON file: refused brains and causes. The
+study is finished without them."""
 MIN_FREE_BYTES = 4 * 2**20
-"""If less disk space is left, a run that failed without an exit code of its own has filled the disk."""
+"""If less disk space is left, a run that failed without an exit code of its own has
+filled the disk."""
 MIN_FREE_FILES = 16
 """Likewise, for systems that can hold a fixed number of files."""
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
@@ -70,13 +107,18 @@ received_signals: list[int] = []
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
-    """Lock a working directory until the returned file is closed; None if another process has locked it."""
+    """Lock a working directory until the returned file is closed; None if another
+    process has locked it."""
     path = directory / ".snakemake" / "gyriflow.lock"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("a")
     except OSError as error:
-        raise StorageError("the working directory cannot be written", path=directory, found=error.strerror) from error
+        raise StorageError(
+            "the working directory cannot be written",
+            path=directory,
+            found=error.strerror,
+        ) from error
     if not lock_file(file):
         file.close()
         return None
@@ -85,7 +127,8 @@ def hold_lock(directory: Path) -> IO[str] | None:
 
 
 def clear_stale_lock(directory: Path) -> None:
-    """Remove Snakemake's locks from a working directory; StorageError if it is in use or cannot be written."""
+    """Remove Snakemake's locks from a working directory; StorageError if it is in use
+    or cannot be written."""
     # a run may be about to end
     deadline = time.monotonic() + 3.0
     while (file := hold_lock(directory)) is None:
@@ -96,62 +139,91 @@ def clear_stale_lock(directory: Path) -> None:
         time.sleep(0.2)
     with file:
         # if files cannot be locked, Snakemake's locks may be those of a live run
-        stale = [] if file.name in UNLOCKABLE else list((directory / ".snakemake" / "locks").glob("*.lock"))
+        stale = (
+            []
+            if file.name in UNLOCKABLE
+            else list((directory / ".snakemake" / "locks").glob("*.lock"))
+        )
         for lock in stale:
             lock.unlink()
     if stale:
-        print("gyriflow: removed the lock of an interrupted run; resuming it", file=sys.stderr)
+        print(
+            "gyriflow: removed the lock of an interrupted run; resuming it",
+            file=sys.stderr,
+        )
 
 
 def check_configfiles(files: Sequence[Path], directory: Path) -> None:
-    """Raise InputError if a file, or else the directory's config/config.yaml, is not a valid YAML configuration."""
+    """Raise InputError if a file, or else the directory's config/config.yaml, is not a
+    valid YAML configuration."""
     default = directory / "config" / "config.yaml"
     for file in files or ([default] if default.is_file() else []):
         try:
             read_keys(file)
         except InputError as error:
-            remedy = None if file.exists() else "Put targets before --configfile, or after another option"
+            remedy = (
+                None
+                if file.exists()
+                else "Put targets before --configfile, or after another option"
+            )
             raise InputError(f"configuration {error}", remedy=remedy) from error
 
 
 def what_runs(directory: Path) -> str:
-    """Return which configuration runs if a call names none, and which workflow in the current folder does not."""
+    """Return which configuration runs if a call names none, and which workflow in the
+    current folder does not."""
     demo, own = SHIPPED / "config" / "config.yaml", directory / "config" / "config.yaml"
     is_demo = not own.is_file() or own.samefile(demo)
-    text = f"without --configfile, this runs {f'the demo, {demo}' if is_demo else own.resolve()}"
+    text = (
+        "without --configfile, this runs"
+        f" {f'the demo, {demo}' if is_demo else own.resolve()}"
+    )
     for name in SNAKEFILES:
         if Path(name).is_file() and not Path(name).samefile(SHIPPED / "Snakefile"):
-            return f"{text}, and not {Path(name).absolute()}: that workflow needs its own snakemake"
+            return (
+                f"{text}, and not {Path(name).absolute()}: that workflow needs its own"
+                " snakemake"
+            )
     return text
 
 
 def check_options(unknown: Sequence[str], usage: str) -> None:
-    """Raise InputError if an `unknown` argument is an option; Snakemake's `usage` lists the valid ones."""
+    """Raise InputError if an `unknown` argument is an option; Snakemake's `usage` lists
+    the valid ones."""
     options = ["--stage", *dict.fromkeys(re.findall(r"--[a-z][a-z-]+", usage))]
-    for name in (argument.partition("=")[0] for argument in unknown if argument.startswith("-")):
+    for name in (
+        argument.partition("=")[0] for argument in unknown if argument.startswith("-")
+    ):
         raise InputError(f"unknown option {name}; {did_you_mean(name, options)}")
 
 
 def redirect_output(log: Path) -> None:
-    """Append to a file what libraries and child processes print. Python's own streams stay on the terminal."""
+    """Append to a file what libraries and child processes print. Python's own streams
+    stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
     # readable by its owner only, since it may contain names of subjects
     file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
     for number, stream in ((1, "stdout"), (2, "stderr")):
         getattr(sys, stream).flush()
-        setattr(sys, stream, os.fdopen(os.dup(number), "w", buffering=1, errors="replace"))
+        setattr(
+            sys, stream, os.fdopen(os.dup(number), "w", buffering=1, errors="replace")
+        )
         os.dup2(file, number)
 
 
 def refused_brains() -> dict[str, str]:
-    """Return the causes of the brains that an earlier pass of this call refused, by id."""
+    """Return the causes of the brains that an earlier pass of this call refused, by
+    id."""
     path = os.environ.get(REFUSED_FILE_VAR)
     return read_json(path) if path else {}
 
 
 def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
-    """Return the causes of the brains that had a failed step since a time (s since the epoch), by id."""
-    from .jobs import gather_messages  # takes a second to import, and only failed runs need it
+    """Return the causes of the brains that had a failed step since a time (s since the
+    epoch), by id."""
+    from .jobs import (
+        gather_messages,
+    )  # takes a second to import, and only failed runs need it
 
     brains = [folder.name for folder in directory.glob("results/brains/*")]
     messages = gather_messages(directory, brains, [], since_s=since_s)
@@ -160,7 +232,8 @@ def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
 
 
 def stop_jobs() -> None:
-    """Stop all processes below this one, MPI ranks included. Simulations keep their last checkpoint."""
+    """Stop all processes below this one, MPI ranks included. Simulations keep their
+    last checkpoint."""
     jobs: set[psutil.Process] = set()
     for stop in (psutil.Process.terminate, psutil.Process.kill):
         # the processes of a job that has ended may still run
@@ -180,12 +253,19 @@ def _is_running(process: psutil.Process) -> bool:
     return False
 
 
-def finish_without(refused: dict[str, str], arguments: Sequence[str], directory: Path) -> int:
-    """Run the same call again without the refused brains, unless it asks for their files.
+def finish_without(
+    refused: dict[str, str], arguments: Sequence[str], directory: Path
+) -> int:
+    """Run the same call again without the refused brains, unless it asks for their
+    files.
 
     Return the exit code of an interrupted run, or else 0.
     """
-    if any(argument.startswith(f"results/brains/{brain}/") for argument in arguments for brain in refused):
+    if any(
+        argument.startswith(f"results/brains/{brain}/")
+        for argument in arguments
+        for brain in refused
+    ):
         return 0
     path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
     write_json(path, refused)
@@ -194,7 +274,9 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
         _held_locks.pop().close()
     again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
     environment = os.environ | {REFUSED_FILE_VAR: str(path)}
-    process = subprocess.Popen(again, env=environment, stdout=sys.stdout, stderr=sys.stderr)
+    process = subprocess.Popen(
+        again, env=environment, stdout=sys.stdout, stderr=sys.stderr
+    )
     try:
         process.wait()
     except KeyboardInterrupt:
@@ -206,15 +288,20 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
 
 
 def exit_code(code: int, recorded: int | None, directory: Path) -> int:
-    """Return the exit code of a run, given Snakemake's `code` and the one `recorded`; report a full disk."""
+    """Return the exit code of a run, given Snakemake's `code` and the one `recorded`;
+    report a full disk."""
     if code and recorded in (None, 1) and (full := full_disk(directory)):
-        print(f"gyriflow: {directory.resolve()}: {full}, then run the same command again", file=sys.stderr)
+        print(
+            f"gyriflow: {directory.resolve()}: {full}, then run the same command again",
+            file=sys.stderr,
+        )
         return StorageError.exit_code
     return (recorded or code) if code else 0
 
 
 def full_disk(directory: Path) -> str:
-    """Return that the disk of a directory is full and what to do, or "" if it is not."""
+    """Return that the disk of a directory is full and what to do, or "" if it is
+    not."""
     if shutil.disk_usage(directory).free < MIN_FREE_BYTES:
         return "the disk is full. Free some space"
     if sys.platform == "win32":
@@ -227,7 +314,8 @@ def full_disk(directory: Path) -> str:
 
 
 def restore_dates(dates: Mapping[Path, float]) -> bool:
-    """Give files and links a date each (s since the epoch); return whether all of several have it now."""
+    """Give files and links a date each (s since the epoch); return whether all of
+    several have it now."""
     try:
         for path, date in dates.items():
             os.utime(path, (date, date))
@@ -240,30 +328,43 @@ def restore_dates(dates: Mapping[Path, float]) -> bool:
 
 
 def set_cache(directory: Path) -> None:
-    """Let libraries keep their caches with a study if the home folder cannot be written or is unknown."""
+    """Let libraries keep their caches with a study if the home folder cannot be written
+    or is unknown."""
     try:
-        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "snakemake")
+        cache = Path(
+            os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "snakemake"
+        )
         cache.mkdir(parents=True, exist_ok=True)
         usable = os.access(cache, os.W_OK)
     except (OSError, RuntimeError):
         usable = False
     if not usable:
-        os.environ["XDG_CACHE_HOME"] = str(directory.absolute() / ".snakemake" / "cache")
+        os.environ["XDG_CACHE_HOME"] = str(
+            directory.absolute() / ".snakemake" / "cache"
+        )
 
 
 def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
-    """Set the environment variables that the Snakefile and the steps of the workflow read."""
+    """Set the environment variables that the Snakefile and the steps of the workflow
+    read."""
     os.environ |= read_keys(ENVIRONMENT)["variables"] | os.environ
     # no module in a working directory is imported in place of another one
     os.environ["PYTHONSAFEPATH"] = "1"
     # steps call `python`; let it be this one
-    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
-    os.environ |= {name: "1" for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run)) if is_set}
+    os.environ["PATH"] = os.pathsep.join(
+        [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
+    )
+    os.environ |= {
+        name: "1"
+        for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run))
+        if is_set
+    }
     os.environ[EXIT_FILE] = str(exit_file)
 
 
 def call_snakemake(arguments: Sequence[str]) -> int:
-    """Run Snakemake in this process; return its exit code, or 128 plus the number of the signal that stopped it."""
+    """Run Snakemake in this process; return its exit code, or 128 plus the number of
+    the signal that stopped it."""
     from snakemake import cli
 
     unknown_targets: list[str] = []
@@ -303,17 +404,24 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     finally:
         logger.removeFilter(is_shown)
     for name in unknown_targets:
-        rules = [path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")]
+        rules = [
+            path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")
+        ]
         targets = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
-        raise InputError(f"no stage or result is named {name}; {did_you_mean(name, targets)}")
+        raise InputError(
+            f"no stage or result is named {name}; {did_you_mean(name, targets)}"
+        )
     return 128 + received_signals[0] if code and received_signals else code
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run Snakemake; return the exit code of the first failed step, or else Snakemake's own."""
+    """Run Snakemake; return the exit code of the first failed step, or else Snakemake's
+    own."""
     # the program name in Snakemake's usage messages
     sys.argv[0] = "snakemake"
-    from snakemake import cli  # takes a second to import; the Snakefile imports this module without needing it
+    from snakemake import (
+        cli,
+    )  # takes a second to import; the Snakefile imports this module without needing it
 
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)
@@ -323,11 +431,16 @@ def main(arguments: Sequence[str]) -> int:
     if not (options.configfile or options.snakefile or is_second_pass):
         print(f"gyriflow: {what_runs(directory)}", file=sys.stderr)
     check_configfiles(options.configfile or [], directory)
-    dry_run = any(getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS)
+    dry_run = any(
+        getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS
+    )
     if not dry_run:
         clear_stale_lock(directory)
         if restore_dates(dates_before_copy(directory)):
-            text = "the results were copied, or stored by git-annex: they get the dates at which they were made"
+            text = (
+                "the results were copied, or stored by git-annex: they get the dates at"
+                " which they were made"
+            )
             print(f"gyriflow: {text}", file=sys.stderr)
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
@@ -339,13 +452,32 @@ def main(arguments: Sequence[str]) -> int:
     with suppress(OSError):
         exit_file.unlink()
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
-    complete = ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
+    complete = (
+        ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
+    )
     # a folder of that name may be in the working directory
-    complete += [] if options.workflow_profile else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
+    complete += (
+        []
+        if options.workflow_profile
+        else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
+    )
     complete += arguments
-    if not dry_run and not any(getattr(options, name, None) for name in VERBOSE_OPTIONS):
-        details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
-        complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]
+    if not dry_run and not any(
+        getattr(options, name, None) for name in VERBOSE_OPTIONS
+    ):
+        details = (
+            directory.resolve()
+            / ".snakemake"
+            / "log"
+            / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
+        )
+        complete = [
+            "--logger",
+            "gyriflow",
+            "--logger-gyriflow-details",
+            str(details),
+            *complete,
+        ]
         redirect_output(details)
     began_s = time.time()
     try:
@@ -355,7 +487,10 @@ def main(arguments: Sequence[str]) -> int:
         recorded = recorded_exit_code(exit_file)
         exit_file.unlink(missing_ok=True)
     if code > 128:
-        print("gyriflow: interrupted; run the same command again to resume", file=sys.stderr)
+        print(
+            "gyriflow: interrupted; run the same command again to resume",
+            file=sys.stderr,
+        )
         return code
     can_finish = options.keep_going and not dry_run and not is_second_pass
     brains = failed_brains(directory, began_s) if code and can_finish else {}
@@ -365,7 +500,8 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    # the Snakefile imports this module by name; run that copy, so that both share the same locks
+    # the Snakefile imports this module by name; run that copy, so that both share the
+    # same locks
     from gyriflow.running.launch import main
 
     try:

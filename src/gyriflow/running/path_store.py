@@ -1,4 +1,5 @@
-"""Storage of atlases' paths for other studies: next to an atlas' files, named by all that a path is made from."""
+"""Storage of atlases' paths for other studies: next to an atlas' files, named by all
+that a path is made from."""
 
 import hashlib
 import re
@@ -20,10 +21,12 @@ SCRIPT = re.compile(r"scripts/(\w+\.py)")
 
 
 def path_origin(study: Study, path: Chain) -> dict[str, Any]:
-    """Return everything that a path is made from, with the paths of files (see `io.origins`).
+    """Return everything that a path is made from, with the paths of files (see
+    `io.origins`).
 
-    This is the description of each of its brains and of each brain whose thickness fills one of them, with all files
-    that they name; the settings of surfaces and of the mesh; and a hash of the rules and scripts.
+    This is the description of each of its brains and of each brain whose thickness
+    fills one of them, with all files that they name; the settings of surfaces and of
+    the mesh; and a hash of the rules and scripts.
     """
     brains = [*path.brains, *_thickness_sources(study, path)]
     return {
@@ -37,7 +40,8 @@ def path_origin(study: Study, path: Chain) -> dict[str, Any]:
 
 
 def _thickness_sources(study: Study, path: Chain) -> list[Brain]:
-    """Return the brains whose measured thickness fills the surfaces of a path's brains to labels."""
+    """Return the brains whose measured thickness fills the surfaces of a path's brains
+    to labels."""
     sources: dict[str, Brain] = {}
     for pair, posed in path.pairs:
         for brain, is_filled in zip(pair, posed, strict=True):
@@ -48,30 +52,44 @@ def _thickness_sources(study: Study, path: Chain) -> list[Brain]:
 
 
 def _description(brain: Brain) -> dict[str, Any]:
-    """Return everything that a study says of a brain, with the meaning of its labels."""
+    """Return everything that a study says of a brain, with the meaning of its
+    labels."""
     scheme = brain.labels.scheme.model_dump(mode="json") if brain.labels else None
     return {"brain": brain.config.model_dump(mode="json"), "scheme": scheme}
 
 
 def _code() -> str:
-    """Return a hash of the rules and scripts that make paths, and of the code behind the scripts."""
+    """Return a hash of the rules and scripts that make paths, and of the code behind
+    the scripts."""
     workflow = SHIPPED / "workflow"
     rules = [(workflow / "rules" / f"{name}.smk").read_text() for name in RULE_FILES]
-    scripts = [workflow / "scripts" / name for name in sorted(set(SCRIPT.findall("".join(rules))))]
-    texts = [*rules, *(script.read_text() for script in scripts), *map(code_hash, scripts)]
+    scripts = [
+        workflow / "scripts" / name
+        for name in sorted(set(SCRIPT.findall("".join(rules))))
+    ]
+    texts = [
+        *rules,
+        *(script.read_text() for script in scripts),
+        *map(code_hash, scripts),
+    ]
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()
 
 
 def store_folder(study: Study, path: Chain) -> Path | None:
-    """Return the folder for a path of an atlas, next to the files of the atlas; None for other brains."""
+    """Return the folder for a path of an atlas, next to the files of the atlas; None
+    for other brains."""
     if not all(brain.id in study.atlases for brain in path.brains):
         return None
     atlas = study.atlases[path.brains[0].id]
-    return next(used.folder for used in study.used_atlases if used.atlas is atlas) / "paths"
+    return (
+        next(used.folder for used in study.used_atlases if used.atlas is atlas)
+        / "paths"
+    )
 
 
 def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
-    """Return the file with the path that an earlier study kept; None if there is none, or if it is damaged."""
+    """Return the file with the path that an earlier study kept; None if there is none,
+    or if it is damaged."""
     folder = store_folder(study, path)
     if folder is None or key is None:
         return None
@@ -86,6 +104,7 @@ def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
 
 
 def has_path(path: Chain, key: str | None) -> bool:
-    """Return whether the study in the working directory has a path that was made from all that `key` stands for."""
+    """Return whether the study in the working directory has a path that was made from
+    all that `key` stands for."""
     file = Path(ATLAS_PATH.format(brain=path.brains[0].id))
     return key is not None and file.exists() and read_path_key(file) == key

@@ -1,4 +1,5 @@
-"""Record which study a folder's results belong to, the contents of its inputs, and the software versions."""
+"""Record which study a folder's results belong to, the contents of its inputs, and the
+software versions."""
 
 import platform
 import sys
@@ -16,10 +17,37 @@ from ..settings.root import Config
 from ..version import commit, version
 
 PACKAGES = (
-    *("fenics-dolfinx", "dolfinx-solver-real", "fenics-basix", "fenics-ffcx", "fenics-ufl", "petsc4py", "mpi4py"),
+    *(
+        "fenics-dolfinx",
+        "dolfinx-solver-real",
+        "fenics-basix",
+        "fenics-ffcx",
+        "fenics-ufl",
+        "petsc4py",
+        "mpi4py",
+    ),
     *("mpich", "numpy"),
-    *("scipy", "snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk"),
-    *("pandas", "picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
+    *(
+        "scipy",
+        "snakemake",
+        "nibabel",
+        "scikit-image",
+        "pymeshlab",
+        "pytetwild",
+        "trimesh",
+        "libigl",
+        "ipctk",
+    ),
+    *(
+        "pandas",
+        "picsl-greedy",
+        "SimpleITK",
+        "pyvista",
+        "vtk",
+        "matplotlib",
+        "h5py",
+        "pydantic",
+    ),
 )
 """Packages whose versions are recorded because results depend on them."""
 STUDY_RECORD = Path("results", "study", "study.json")
@@ -29,7 +57,8 @@ INPUTS_RECORD = Path("results", "study", "inputs.json")
 
 
 def software() -> dict[str, Any]:
-    """Return the versions of gyriflow, Python and the `PACKAGES`, the commit, and the present time (UTC)."""
+    """Return the versions of gyriflow, Python and the `PACKAGES`, the commit, and the
+    present time (UTC)."""
     packages: dict[str, str | None] = dict.fromkeys(PACKAGES)
     for name in PACKAGES:
         with suppress(metadata.PackageNotFoundError):
@@ -45,39 +74,67 @@ def software() -> dict[str, Any]:
 
 
 def recorded_version(directory: Path) -> str | None:
-    """Return the version of gyriflow that made the report in a working directory, or None if there is none."""
+    """Return the version of gyriflow that made the report in a working directory, or
+    None if there is none."""
     with suppress(InputError, KeyError):
-        return str(read_json(directory / "results" / "report" / "provenance.json")["gyriflow"])
+        return str(
+            read_json(directory / "results" / "report" / "provenance.json")["gyriflow"]
+        )
     return None
 
 
-def check_results_belong_to(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
+def check_results_belong_to(
+    directory: Path, files: Sequence[Path], config: Config, record: bool
+) -> None:
     """Raise InputError if the results in a working directory belong to another study.
 
-    Two studies differ if they share neither configuration files nor a brain, by its entry or the content of its files.
-    So a configuration may be edited, copied or moved, and data may be renamed. With `record`, this study is recorded
-    as the owner of the results.
+    Two studies differ if they share neither configuration files nor a brain, by its
+    entry or the content of its files. So a configuration may be edited, copied or
+    moved, and data may be renamed. With `record`, this study is recorded as the owner
+    of the results.
     """
     path = directory / STUDY_RECORD
     brains: list[list[Any]] = [
-        [brain.id, brain.week, brain.source, *(Path(file).name for file in brain.files)] for brain in config.brains
+        [brain.id, brain.week, brain.source, *(Path(file).name for file in brain.files)]
+        for brain in config.brains
     ]
-    study: dict[str, Any] = {"configuration": [str(file.resolve()) for file in files], "brains": brains}
+    study: dict[str, Any] = {
+        "configuration": [str(file.resolve()) for file in files],
+        "brains": brains,
+    }
     recorded = read_json(path) if path.is_file() else study
-    existing = [brain[0] for brain in recorded["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
-    is_same_study = recorded["configuration"] == study["configuration"] or any(b in recorded["brains"] for b in brains)
+    existing = [
+        brain[0]
+        for brain in recorded["brains"]
+        if (directory / "results" / "brains" / brain[0]).is_dir()
+    ]
+    is_same_study = recorded["configuration"] == study["configuration"] or any(
+        b in recorded["brains"] for b in brains
+    )
     if existing and not is_same_study and not _have_recorded_content(directory, config):
         results_of = f"{', '.join(existing)} of {', '.join(recorded['configuration'])}"
-        expected = f"{', '.join(brain[0] for brain in brains)} of {', '.join(study['configuration'])}"
-        remedy = f"Choose another --directory, or delete these results (or only study/{path.name}, to keep both here)."
-        problem, results = "the results here belong to another study", path.parents[1].resolve()
-        raise InputError(problem, path=results, found=results_of, expected=expected, remedy=remedy)
+        expected = (
+            f"{', '.join(brain[0] for brain in brains)} of"
+            f" {', '.join(study['configuration'])}"
+        )
+        remedy = (
+            "Choose another --directory, or delete these results (or only"
+            f" study/{path.name}, to keep both here)."
+        )
+        problem, results = (
+            "the results here belong to another study",
+            path.parents[1].resolve(),
+        )
+        raise InputError(
+            problem, path=results, found=results_of, expected=expected, remedy=remedy
+        )
     if record and (recorded != study or not path.is_file()):
         write_json(path, study)
 
 
 def _have_recorded_content(directory: Path, config: Config) -> bool:
-    """Return whether any file of a study's brains has the content of an input of the results in a directory."""
+    """Return whether any file of a study's brains has the content of an input of the
+    results in a directory."""
     recorded = _recorded_inputs(directory)
     known = {sha256 for sha256, *_ in recorded.values()}
     files = [file for brain in config.brains for file in brain.files]
@@ -91,22 +148,40 @@ def _recorded_inputs(directory: Path) -> dict[str, Any]:
 
 
 def texts_in(value: Any) -> list[str]:
-    """Return all strings in nested mappings and lists, such as the file names in a brain's entry."""
-    items = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else []
-    return [value] if isinstance(value, str) else [text for item in items for text in texts_in(item)]
+    """Return all strings in nested mappings and lists, such as the file names in a
+    brain's entry."""
+    items = (
+        value.values()
+        if isinstance(value, dict)
+        else value
+        if isinstance(value, list | tuple)
+        else []
+    )
+    return (
+        [value]
+        if isinstance(value, str)
+        else [text for item in items for text in texts_in(item)]
+    )
 
 
 def input_contents(
-    directory: Path, config: Config, checksums: Mapping[str, tuple[str, str]], record: bool
+    directory: Path,
+    config: Config,
+    checksums: Mapping[str, tuple[str, str]],
+    record: bool,
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the SHA-256 of each input file of a study and of its companions, by path; and those of the last run.
+    """Return the SHA-256 of each input file of a study and of its companions, by path;
+    and those of the last run.
 
-    For a file of an atlas that is not downloaded yet, it is the one in `checksums`. With `record`, hashes are stored in
-    the results with sizes and times, so that unchanged files are not read again.
+    For a file of an atlas that is not downloaded yet, it is the one in `checksums`.
+    With `record`, hashes are stored in the results with sizes and times, so that
+    unchanged files are not read again.
     """
     recorded = _recorded_inputs(directory)
     # a word of the configuration may be the name of a file, too
-    named = [text for text in texts_in(config.model_dump()) if "/" in text or "." in text]
+    named = [
+        text for text in texts_in(config.model_dump()) if "/" in text or "." in text
+    ]
     files = contents(dict.fromkeys(named), recorded)
     if record and files != recorded:
         write_json(directory / INPUTS_RECORD, files)
@@ -116,4 +191,8 @@ def input_contents(
 
 def folders_in(config: Config) -> list[str]:
     """Return the absolute paths of the folders that a configuration names."""
-    return [text for text in texts_in(config.model_dump()) if len(text) > 1 and text[0] == "/" and Path(text).is_dir()]
+    return [
+        text
+        for text in texts_in(config.model_dump())
+        if len(text) > 1 and text[0] == "/" and Path(text).is_dir()
+    ]

@@ -1,6 +1,8 @@
-"""Requirements of jobs besides the base packages: the extras, a C compiler, and libraries of the system.
+"""Requirements of jobs besides the base packages: the extras, a C compiler, and
+libraries of the system.
 
-`python -m gyriflow.running.requirements` prints the Debian packages that this machine lacks; `./run` installs them.
+`python -m gyriflow.running.requirements` prints the Debian packages that this machine
+lacks; `./run` installs them.
 """
 
 import ctypes
@@ -41,7 +43,8 @@ IMPORT = re.compile(r"^[ \t]*(?:import|from)[ \t]+(\w+)", re.MULTILINE)
 
 
 def require_for(programs: Mapping[str, Path]) -> None:
-    """Raise InputError if steps, given by their names and programs, lack a package, a library or a compiler."""
+    """Raise InputError if steps, given by their names and programs, lack a package, a
+    library or a compiler."""
     missing: dict[str, str] = {}
     compiles = False
     for name, program in programs.items():
@@ -56,23 +59,42 @@ def require_for(programs: Mapping[str, Path]) -> None:
         remedy = f'Install what is missing: pip install "gyriflow[{",".join(extras)}]"'
         if "dolfinx" in missing and not has_dolfinx_wheels():
             where = "in WSL, use" if sys.platform == "win32" else "use"
-            remedy = f"PyPI has no dolfinx with PETSc for this system: {where} conda, {CONDA}"
+            remedy = (
+                f"PyPI has no dolfinx with PETSc for this system: {where} conda,"
+                f" {CONDA}"
+            )
         names = ", ".join(missing)
-        problem = f"simulations, registrations and calibrations need packages that are not installed ({names})"
-        raise InputError(problem, found=f"step {rule}, which imports {package}", remedy=remedy)
+        problem = (
+            "simulations, registrations and calibrations need packages that are not"
+            f" installed ({names})"
+        )
+        raise InputError(
+            problem, found=f"step {rule}, which imports {package}", remedy=remedy
+        )
     lacking = missing_libraries()
     if lacking:
         names = ", ".join(lacking)
-        raise InputError(f"this system has no {names}", remedy=_install(LIBRARIES[name] for name in lacking))
+        raise InputError(
+            f"this system has no {names}",
+            remedy=_install(LIBRARIES[name] for name in lacking),
+        )
     if compiles and not has_compiler():
-        remedy = f"{_install(['gcc', 'libc6-dev'])}, or without root: pip install ziglang"
-        raise InputError("simulations need a C compiler, and there is none", remedy=remedy)
+        remedy = (
+            f"{_install(['gcc', 'libc6-dev'])}, or without root: pip install ziglang"
+        )
+        raise InputError(
+            "simulations need a C compiler, and there is none", remedy=remedy
+        )
     if compiles and not has_python_headers():
-        raise InputError("simulations need Python.h, and there is none", remedy=_install(["python3-dev"]))
+        raise InputError(
+            "simulations need Python.h, and there is none",
+            remedy=_install(["python3-dev"]),
+        )
 
 
 def packages_behind(program: Path) -> list[str]:
-    """Return the packages of the extras that a program or the modules behind it import."""
+    """Return the packages of the extras that a program or the modules behind it
+    import."""
     imported: set[str] = set()
     for source in {program, *modules_behind(program)}:
         if source.suffix == ".py":
@@ -81,13 +103,15 @@ def packages_behind(program: Path) -> list[str]:
 
 
 def is_installed(package: str) -> bool:
-    """Return whether a package is installed; `importlib.util.find_spec` would import MPI for dolfinx."""
+    """Return whether a package is installed; `importlib.util.find_spec` would import
+    MPI for dolfinx."""
     is_blocked = package in sys.modules and sys.modules[package] is None
     return not is_blocked and PathFinder.find_spec(package) is not None
 
 
 def has_dolfinx_wheels() -> bool:
-    """Return whether PyPI has dolfinx with PETSc for this system: Linux x86_64 with glibc 2.34 or later."""
+    """Return whether PyPI has dolfinx with PETSc for this system: Linux x86_64 with
+    glibc 2.34 or later."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return False
     library, version = platform.libc_ver()

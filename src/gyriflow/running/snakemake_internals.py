@@ -1,4 +1,5 @@
-"""Parts of Snakemake that gyriflow uses outside its public interface, tried with Snakemake 9.27.0 and 9.27.1."""
+"""Parts of Snakemake that gyriflow uses outside its public interface, tried with
+Snakemake 9.27.0 and 9.27.1."""
 
 import hashlib
 import json
@@ -25,10 +26,12 @@ DATE_TOL_S = 0.001
 
 
 def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
-    """Give rules a parameter that changes with their code; Snakemake reruns jobs whose parameters have changed.
+    """Give rules a parameter that changes with their code; Snakemake reruns jobs whose
+    parameters have changed.
 
-    Snakemake itself sees the date of a script, which a new checkout changes, and no package that a script imports. A
-    shell command has to name the code of its program itself. `scripts` is the folder of the rules' scripts.
+    Snakemake itself sees the date of a script, which a new checkout changes, and no
+    package that a script imports. A shell command has to name the code of its program
+    itself. `scripts` is the folder of the rules' scripts.
     """
     for rule in rules:
         script = scripts / Path(rule.script or "").name
@@ -36,13 +39,17 @@ def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
             rule.set_params(code=code_hash(script))
         if rule.script or rule.shellcmd:
             text = rule.shellcmd or script.read_text()
-            rule.set_params(command=f"code {hashlib.sha256(text.encode()).hexdigest()[:12]}")
+            rule.set_params(
+                command=f"code {hashlib.sha256(text.encode()).hexdigest()[:12]}"
+            )
 
 
 def complete_rules(rules: Iterable[Any], environment: str) -> None:
-    """Give rules a log (see `log_of`), and rules that name no environment the common one.
+    """Give rules a log (see `log_of`), and rules that name no environment the common
+    one.
 
-    For Snakemake's software deployment with conda, `environment` is the path of the environment's file.
+    For Snakemake's software deployment with conda, `environment` is the path of the
+    environment's file.
     """
     from snakemake.io import strip_wildcard_constraints
 
@@ -57,27 +64,41 @@ def complete_rules(rules: Iterable[Any], environment: str) -> None:
 
 
 def know_inputs_by_content(
-    contents: Mapping[str, str], earlier: Collection[str], folders: Collection[str], awaited: Collection[str] = ()
+    contents: Mapping[str, str],
+    earlier: Collection[str],
+    folders: Collection[str],
+    awaited: Collection[str] = (),
 ) -> None:
-    """Have Snakemake record the content of input files instead of their paths, so that they may be moved.
+    """Have Snakemake record the content of input files instead of their paths, so that
+    they may be moved.
 
-    Files of gyriflow and of a user count as changed if their content has, whatever their date. Dates of results mean
-    nothing in a copy of a study. `contents` are hashes of the study's input files by path, `earlier` those of the last
-    run; the place of `folders` is not recorded, like that of the working directory and of gyriflow. Of `awaited` files,
-    which jobs of this run fetch, the content is known once they are there.
+    Files of gyriflow and of a user count as changed if their content has, whatever
+    their date. Dates of results mean nothing in a copy of a study. `contents` are
+    hashes of the study's input files by path, `earlier` those of the last run; the
+    place of `folders` is not recorded, like that of the working directory and of
+    gyriflow. Of `awaited` files, which jobs of this run fetch, the content is known
+    once they are there.
     """
     from snakemake.io import _IOFile
     from snakemake.persistence import PersistenceBase
 
-    recorded_input, recorded_params, is_newer = PersistenceBase._input, PersistenceBase._params, _IOFile.is_newer
+    recorded_input, recorded_params, is_newer = (
+        PersistenceBase._input,
+        PersistenceBase._params,
+        _IOFile.is_newer,
+    )
     names = {path: f"input {content}" for path, content in contents.items()}
     names |= dict.fromkeys([*folders, str(Path.cwd()), str(SHIPPED)], "a folder")
     # as parameters are written
     names |= {repr(path)[1:-1]: name for path, name in names.items()}
-    awaited_by_text = {text: path for path in awaited for text in (path, repr(path)[1:-1])}
+    awaited_by_text = {
+        text: path for path in awaited for text in (path, repr(path)[1:-1])
+    }
     longest_first = sorted([*names, *awaited_by_text], key=len, reverse=True)
     has_dates = not dates_before_copy(Path())
-    places = re.compile(rf"(?<![\w./-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w.-])")
+    places = re.compile(
+        rf"(?<![\w./-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w.-])"
+    )
 
     @cache
     def present_content(path: str) -> str:
@@ -87,7 +108,11 @@ def know_inputs_by_content(
         if path in contents:
             return contents[path]
         # files of gyriflow itself, and files that were fetched
-        return present_content(path) if path.startswith("/") and Path(path).is_file() else None
+        return (
+            present_content(path)
+            if path.startswith("/") and Path(path).is_file()
+            else None
+        )
 
     def name_of(match: re.Match[str]) -> str:
         text = match[0]
@@ -98,7 +123,8 @@ def know_inputs_by_content(
 
     def by_content(self: PersistenceBase, job: Any) -> list[str]:
         return sorted(
-            f"input {content}" if (content := content_of(path)) else path for path in recorded_input(self, job)
+            f"input {content}" if (content := content_of(path)) else path
+            for path in recorded_input(self, job)
         )
 
     def without_places(self: PersistenceBase, job: Any) -> list[str]:
@@ -106,7 +132,11 @@ def know_inputs_by_content(
 
     async def is_newer_or_other(self: Any, time: float) -> bool:
         content, is_known = content_of(str(self)), str(self) in contents
-        may_be_newer = has_dates if content is None else earlier and is_known and content not in earlier
+        may_be_newer = (
+            has_dates
+            if content is None
+            else earlier and is_known and content not in earlier
+        )
         return bool(may_be_newer) and await is_newer(self, time)
 
     PersistenceBase._input, PersistenceBase._params = by_content, without_places
@@ -115,7 +145,8 @@ def know_inputs_by_content(
 
 @contextmanager
 def temporary_records(directory: Path) -> Iterator[None]:
-    """Let Snakemake plan in a directory that may be read-only: it writes records and caches to a temporary folder."""
+    """Let Snakemake plan in a directory that may be read-only: it writes records and
+    caches to a temporary folder."""
     from snakemake import workflow
     from snakemake.jobs import Job
     from snakemake.persistence.file import FilePersistence
@@ -132,14 +163,20 @@ def temporary_records(directory: Path) -> Iterator[None]:
         for name in ("metadata", "incomplete", "locks"):
             if (record := directory / ".snakemake" / name).is_dir():
                 Path(scratch, name).symlink_to(record.resolve())
-        with patch.object(workflow, "FilePersistence", lambda **kw: FilePersistence(**kw | {"path": Path(scratch)})):
+        with patch.object(
+            workflow,
+            "FilePersistence",
+            lambda **kw: FilePersistence(**kw | {"path": Path(scratch)}),
+        ):
             yield
 
 
 def dates_before_copy(directory: Path) -> dict[Path, float]:
-    """Return when the results of a copied working directory were made (s since the epoch), by path.
+    """Return when the results of a copied working directory were made (s since the
+    epoch), by path.
 
-    Empty if any of them still has its date, as after a move: then no copy has given all of them new ones.
+    Empty if any of them still has its date, as after a move: then no copy has given all
+    of them new ones.
     """
     dates = {}
     for made in _made_files(directory):
@@ -150,20 +187,24 @@ def dates_before_copy(directory: Path) -> dict[Path, float]:
 
 
 def remove_stale(rules: Collection[Any], *folders: str) -> None:
-    """Remove tables, figures and pages that an earlier run made and no rule makes, such as those of refused brains.
+    """Remove tables, figures and pages that an earlier run made and no rule makes, such
+    as those of refused brains.
 
     Files that a user has saved or changed in these `folders` are left.
     """
     for made in _made_files(Path()):
         is_in_folders = any(made.path.is_relative_to(folder) for folder in folders)
-        is_stale = is_in_folders and not any(rule.is_producer(str(made.path)) for rule in rules)
+        is_stale = is_in_folders and not any(
+            rule.is_producer(str(made.path)) for rule in rules
+        )
         if is_stale and made.path.suffix in REMOVED and made.has_its_date:
             made.path.unlink()
             made.record.unlink()
 
 
 class _MadeFile(NamedTuple):
-    """A result in a working directory that a job made, Snakemake's record of it, and its date then."""
+    """A result in a working directory that a job made, Snakemake's record of it, and
+    its date then."""
 
     path: Path
     record: Path
@@ -182,13 +223,17 @@ def _made_files(directory: Path) -> Iterator[_MadeFile]:
         # a record may be torn
         with suppress(OSError, ValueError, KeyError, TypeError):
             name = urlsafe_b64decode("".join(parts)).decode()
-            path, date_s = directory / name, float(json.loads(record.read_text())["endtime"])
+            path, date_s = (
+                directory / name,
+                float(json.loads(record.read_text())["endtime"]),
+            )
             if not Path(name).is_absolute() and path.is_file():
                 yield _MadeFile(path, record, date_s)
 
 
 def usage_patterns(rules: Iterable[Any]) -> dict[str, str]:
-    """Return the regular expression of the records of time and memory of each rule, with wildcards as groups.
+    """Return the regular expression of the records of time and memory of each rule,
+    with wildcards as groups.
 
     They are named like the rule's log (see `step.record_usage`).
     """
@@ -196,5 +241,7 @@ def usage_patterns(rules: Iterable[Any]) -> dict[str, str]:
     for rule in rules:
         if rule.log:
             log = rule.log[0].regex().pattern
-            patterns[rule.name] = log.replace("/logs/", "/benchmarks/").replace(r"\.log", r"\.tsv")
+            patterns[rule.name] = log.replace("/logs/", "/benchmarks/").replace(
+                r"\.log", r"\.tsv"
+            )
     return patterns

@@ -1,4 +1,5 @@
-"""Progress of a study, read from its working directory: the live or last run, and the results so far."""
+"""Progress of a study, read from its working directory: the live or last run, and the
+results so far."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import chdir, suppress
@@ -22,7 +23,11 @@ from .provenance import STUDY_RECORD
 STATE = Path(".snakemake", "gyriflow-run.json")
 """State of the live or last run, in the working directory."""
 REPORT = Path("results", "report", "report.html")
-BRAIN_RESULTS = {"surface": "surface/pial.surf.gii", "mesh": "mesh/brain.xdmf", "metrics": "metrics/metrics.csv"}
+BRAIN_RESULTS = {
+    "surface": "surface/pial.surf.gii",
+    "mesh": "mesh/brain.xdmf",
+    "metrics": "metrics/metrics.csv",
+}
 RUN_RESULTS = {
     "surfaces": "surfaces/week-*/pial.surf.gii",
     "metrics": "metrics/week-*/metrics.csv",
@@ -32,13 +37,18 @@ MISSING = "-"
 
 
 def status(directory: Path) -> Iterator[str]:
-    """Yield lines about the progress of the study in a working directory; InputError if there is none."""
+    """Yield lines about the progress of the study in a working directory; InputError if
+    there is none."""
     results, state = directory / "results", None
     with suppress(InputError):
         state = read_json(directory / STATE)
     configured = _configured(directory)
     if not results.is_dir() and state is None and not (directory / CONFIG).is_file():
-        raise InputError("contains no study", path=directory.resolve(), expected=f"results/ or {CONFIG} in it")
+        raise InputError(
+            "contains no study",
+            path=directory.resolve(),
+            expected=f"results/ or {CONFIG} in it",
+        )
     is_live = False
     # this user has no run in a directory that cannot be written
     with suppress(StorageError):
@@ -50,16 +60,26 @@ def status(directory: Path) -> Iterator[str]:
     yield from _lines(state, is_live)
     brains = [
         {"brain": folder.name}
-        | {name: "done" if (folder / file).is_file() else MISSING for name, file in BRAIN_RESULTS.items()}
+        | {
+            name: "done" if (folder / file).is_file() else MISSING
+            for name, file in BRAIN_RESULTS.items()
+        }
         for folder in _folders(results / "brains")
     ]
-    started = {(run.name, folder.name) for run in _folders(results / "runs") for folder in _folders(run)}
+    started = {
+        (run.name, folder.name)
+        for run in _folders(results / "runs")
+        for folder in _folders(run)
+    }
     runs = [
-        _row(run, results / "runs" / run / brain) for run, brain in [*configured, *sorted(started - set(configured))]
+        _row(run, results / "runs" / run / brain)
+        for run, brain in [*configured, *sorted(started - set(configured))]
     ]
     for rows in (brains, runs):
         if rows:
-            yield "\n" + tabulate(rows, headers="keys", tablefmt="plain", disable_numparse=True)
+            yield "\n" + tabulate(
+                rows, headers="keys", tablefmt="plain", disable_numparse=True
+            )
     if (directory / REPORT).is_file():
         yield f"\nreport: {(directory / REPORT).absolute()}"
 
@@ -70,7 +90,11 @@ def format_duration(seconds: float) -> str:
         return f"{max(5 * round(seconds / 5), 5)} s"
     if seconds < 90 * 60:
         return f"{round(seconds / 60)} min"
-    return f"{seconds / 3600:.1f} h" if seconds < 36 * 3600 else f"{seconds / 86400:.1f} days"
+    return (
+        f"{seconds / 3600:.1f} h"
+        if seconds < 36 * 3600
+        else f"{seconds / 86400:.1f} days"
+    )
 
 
 def format_progress(step: Mapping[str, Any]) -> str:
@@ -79,15 +103,19 @@ def format_progress(step: Mapping[str, Any]) -> str:
 
 
 def find_report(directory: Path) -> Path:
-    """Return the report of the study in a working directory or an export; InputError if there is none."""
+    """Return the report of the study in a working directory or an export; InputError if
+    there is none."""
     for report in (directory / REPORT, directory / "report" / REPORT.name):
         if report.is_file():
             return report.absolute()
-    raise InputError("has no report yet", path=directory.resolve(), expected=str(REPORT))
+    raise InputError(
+        "has no report yet", path=directory.resolve(), expected=str(REPORT)
+    )
 
 
 def _configured(directory: Path) -> list[tuple[str, str]]:
-    # problems of the configuration are reported when it is run; its paths may be relative to the working directory
+    # problems of the configuration are reported when it is run; its paths may be
+    # relative to the working directory
     with suppress(InputError), chdir(directory if directory.is_dir() else Path()):
         path = Path(CONFIG).absolute()
         if STUDY_RECORD.is_file():
@@ -103,13 +131,23 @@ def _lines(state: dict[str, Any] | None, live: bool) -> Iterator[str]:
         return
     steps = f"{state['done']} of {state['total']} steps done"
     if live:
-        left = f", about {format_duration(state['left_s'])} left" if state["left_s"] is not None else ""
+        left = (
+            f", about {format_duration(state['left_s'])} left"
+            if state["left_s"] is not None
+            else ""
+        )
         yield f"running since {state['began']}: {steps}{left}"
         yield from (f"  running: {job}" for job in state["running"])
     elif state["interrupted"]:
-        yield f"interrupted at {state['ended']}, {steps}; run the same command again to resume"
+        yield (
+            f"interrupted at {state['ended']}, {steps}; run the same command again to"
+            " resume"
+        )
     elif state["ended"] is None:
-        yield f"interrupted: the run of {state['began']} ended abruptly, {steps}; run the same command again to resume"
+        yield (
+            f"interrupted: the run of {state['began']} ended abruptly, {steps}; run the"
+            " same command again to resume"
+        )
     else:
         yield f"last run: {state['began']} to {state['ended']}, {steps}"
     for failure in state["failed"]:
@@ -119,16 +157,34 @@ def _lines(state: dict[str, Any] | None, live: bool) -> Iterator[str]:
 
 
 def _row(run: str, folder: Path) -> dict[str, str]:
-    counts = {name: str(len(list(folder.glob(pattern))) or MISSING) for name, pattern in RUN_RESULTS.items()}
-    return {"run": run, "brain": folder.name, "folding": _simulation_progress(folder)} | counts
+    counts = {
+        name: str(len(list(folder.glob(pattern))) or MISSING)
+        for name, pattern in RUN_RESULTS.items()
+    }
+    return {
+        "run": run,
+        "brain": folder.name,
+        "folding": _simulation_progress(folder),
+    } | counts
 
 
 def _simulation_progress(folder: Path) -> str:
     with suppress(InputError, KeyError, IndexError):
-        return f"done, GW {week_tag(read_json(folder / 'folding' / 'summary.json')['weeks'][-1])}"
-    steps = [event for event in events_in(read_log(folder / "logs" / "simulate.jsonl")) if event["event"] == "step"]
+        return (
+            "done, GW"
+            f" {week_tag(read_json(folder / 'folding' / 'summary.json')['weeks'][-1])}"
+        )
+    steps = [
+        event
+        for event in events_in(read_log(folder / "logs" / "simulate.jsonl"))
+        if event["event"] == "step"
+    ]
     return format_progress(steps[-1]) if steps else MISSING
 
 
 def _folders(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+    return (
+        sorted(path for path in folder.iterdir() if path.is_dir())
+        if folder.is_dir()
+        else []
+    )

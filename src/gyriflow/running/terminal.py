@@ -1,4 +1,5 @@
-"""Display a run on the terminal: progress bar, remaining time, warnings, failures, and how it ended."""
+"""Display a run on the terminal: progress bar, remaining time, warnings, failures, and
+how it ended."""
 
 import logging
 import re
@@ -21,26 +22,48 @@ from .jobs import OUT_OF_MEMORY, cause, events_in, messages_in, read_log
 from .launch import full_disk, received_signals
 from .status import REPORT, STATE, format_duration, format_progress
 
-WEIGHTS = {"simulate": 40.0, "simulate_member": 20.0, "tetrahedralise": 15.0, "register": 7.0, "validation": 7.0}
-"""Relative durations of the slow rules' jobs, for the bar and the remaining time; all others count 1."""
+WEIGHTS = {
+    "simulate": 40.0,
+    "simulate_member": 20.0,
+    "tetrahedralise": 15.0,
+    "register": 7.0,
+    "validation": 7.0,
+}
+"""Relative durations of the slow rules' jobs, for the bar and the remaining time; all
+others count 1."""
 SIGNAL_S = 0.2
 """Time to notice a signal."""
 PERCENT_PER_LINE = 5
-"""Without a terminal, a line is printed in place of the bar each time this much more is done."""
-SLURM = re.compile(r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL)
+"""Without a terminal, a line is printed in place of the bar each time this much more is
+done."""
+SLURM = re.compile(
+    r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL
+)
 SIGNAL = re.compile(r"died with <Signals\.(\w+)")
-SIGNAL_CAUSES = {"SIGKILL": OUT_OF_MEMORY, **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), "it was stopped")}
-INTERRUPTED_PREFIXES = ("Terminating processes on user request", "Cancelling snakemake on user request")
+SIGNAL_CAUSES = {
+    "SIGKILL": OUT_OF_MEMORY,
+    **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), "it was stopped"),
+}
+INTERRUPTED_PREFIXES = (
+    "Terminating processes on user request",
+    "Cancelling snakemake on user request",
+)
 FAILED_JOB_PREFIXES = (
-    *("Exiting because a job execution failed", "At least one job did not", "WorkflowError:\nAt least one job did not"),
+    *(
+        "Exiting because a job execution failed",
+        "At least one job did not",
+        "WorkflowError:\nAt least one job did not",
+    ),
     *("RuleException:", "CalledProcessError"),
 )
-"""Beginnings of Snakemake's messages about a failed job. The job's own log has the cause."""
+"""Beginnings of Snakemake's messages about a failed job. The job's own log has the
+cause."""
 
 
 @dataclass
 class Job:
-    """A running job and its log; a simulation writes its progress in the same folder."""
+    """A running job and its log; a simulation writes its progress in the same
+    folder."""
 
     rule: str
     name: str
@@ -50,14 +73,28 @@ class Job:
 
 
 class RunDisplay:
-    """Display of a run, driven by Snakemake's log records: lines, with a bar below them if the stream is a terminal."""
+    """Display of a run, driven by Snakemake's log records: lines, with a bar below them
+    if the stream is a terminal."""
 
-    def __init__(self, stream: TextIO, details: Path, clock: Callable[[], float] = time.monotonic) -> None:
-        self.console = Console(file=stream, markup=False, highlight=False, soft_wrap=True)
+    def __init__(
+        self, stream: TextIO, details: Path, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.console = Console(
+            file=stream, markup=False, highlight=False, soft_wrap=True
+        )
         self.live = self.console.is_terminal and not self.console.is_dumb_terminal
-        percent, running = TextColumn("{task.percentage:3.0f} %"), TextColumn("{task.description}", markup=False)
+        percent, running = (
+            TextColumn("{task.percentage:3.0f} %"),
+            TextColumn("{task.description}", markup=False),
+        )
         columns = percent, BarColumn(20), TimeRemainingColumn(), running
-        self.bar = Progress(*columns, console=self.console, transient=True, disable=not self.live, get_time=clock)
+        self.bar = Progress(
+            *columns,
+            console=self.console,
+            transient=True,
+            disable=not self.live,
+            get_time=clock,
+        )
         self.bar.speed_estimate_period = 1e6
         self.bar.add_task("", total=None)
         (self.task,) = self.bar.tasks
@@ -76,7 +113,8 @@ class RunDisplay:
         self.interrupted = self.has_errors = False
 
     def watch(self, lock: AbstractContextManager) -> None:
-        """Follow the jobs and record the state of the run for `gyriflow status`, until it ends."""
+        """Follow the jobs and record the state of the run for `gyriflow status`, until
+        it ends."""
         while self.ended is None:
             with lock:
                 self.tick()
@@ -88,21 +126,35 @@ class RunDisplay:
         self.has_errors |= record.levelno >= logging.ERROR
         match event.get("event"):
             case "run_info":
-                jobs = {rule: count for rule, count in (event["stats"] or {}).items() if rule != "total"}
+                jobs = {
+                    rule: count
+                    for rule, count in (event["stats"] or {}).items()
+                    if rule != "total"
+                }
                 self.total = sum(jobs.values())
-                self.bar.update(self.task.id, total=sum(count * WEIGHTS.get(rule, 1) for rule, count in jobs.items()))
-                self.console.print(f"gyriflow: {self.total} steps to run; log: {self.details}")
+                self.bar.update(
+                    self.task.id,
+                    total=sum(
+                        count * WEIGHTS.get(rule, 1) for rule, count in jobs.items()
+                    ),
+                )
+                self.console.print(
+                    f"gyriflow: {self.total} steps to run; log: {self.details}"
+                )
                 self.bar.start()
             case "job_info":
                 wildcards = " ".join((event["wildcards"] or {}).values())
                 log = Path(event["log"][0]).absolute() if event["log"] else None
                 name = f"{event['rule_name']} {wildcards}".strip()
-                self.running[event["jobid"]] = Job(event["rule_name"], name, self.clock(), log)
+                self.running[event["jobid"]] = Job(
+                    event["rule_name"], name, self.clock(), log
+                )
             case "job_finished" if job := self.running.pop(event["job_id"], None):
                 self._show_warnings(job)
                 self.work_done += WEIGHTS.get(job.rule, 1.0)
             case "job_error":
-                # a signal to all processes may have ended a job before it is noticed here
+                # a signal to all processes may have ended a job before it is noticed
+                # here
                 time.sleep(SIGNAL_S)
                 # an interrupted job has not failed
                 if not (self.interrupted or received_signals):
@@ -114,7 +166,9 @@ class RunDisplay:
                 self.interrupted |= text.startswith(INTERRUPTED_PREFIXES)
                 if text.startswith("Nothing to be done"):
                     self.console.print("gyriflow: everything is up to date")
-                elif record.levelno >= logging.WARNING and text.startswith(FAILED_JOB_PREFIXES):
+                elif record.levelno >= logging.WARNING and text.startswith(
+                    FAILED_JOB_PREFIXES
+                ):
                     self.failure_messages.append(text)
                 elif record.levelno >= logging.WARNING and text:
                     self.console.print(text)
@@ -131,37 +185,76 @@ class RunDisplay:
         if slurm:
             reason = f"Slurm ended job {slurm[1]}: {slurm[2]}"
         elif signal:
-            reason = SIGNAL_CAUSES.get(signal[1], f"it crashed ({signal[1]}): please report this with its log")
+            reason = SIGNAL_CAUSES.get(
+                signal[1], f"it crashed ({signal[1]}): please report this with its log"
+            )
         else:
-            reason = cause("".join(map(read_log, event["log"]))) or message or full_disk(Path())
-            reason = reason or f"it left no message in its log; see the end of {self.details}"
+            reason = (
+                cause("".join(map(read_log, event["log"])))
+                or message
+                or full_disk(Path())
+            )
+            reason = (
+                reason
+                or f"it left no message in its log; see the end of {self.details}"
+            )
         if reason == OUT_OF_MEMORY:
             record_exit_code(KILLED)
         name = job.name if job else event["rule_name"]
-        self.failed.append({"job": name, "cause": reason, "logs": [str(Path(log).absolute()) for log in event["log"]]})
+        self.failed.append(
+            {
+                "job": name,
+                "cause": reason,
+                "logs": [str(Path(log).absolute()) for log in event["log"]],
+            }
+        )
         line = f"failed  {name}: {reason}"
         if self.messages.add(name, line):
-            self.console.print("\n        ".join([line, *(f"log: {log}" for log in event["log"])]))
+            self.console.print(
+                "\n        ".join([line, *(f"log: {log}" for log in event["log"])])
+            )
 
     def tick(self) -> None:
         """Read the progress of running jobs; update the bar and the recorded state."""
         done, running = self.work_done, []
         for job in self.running.values():
             self._follow(job)
-            running.append(job.name + (f": {format_progress(job.step)}" if job.step else ""))
+            running.append(
+                job.name + (f": {format_progress(job.step)}" if job.step else "")
+            )
             if job.step:
                 since = self.clock() - job.began
-                done += WEIGHTS.get(job.rule, 1.0) * since / max(since + job.step["left_s"], 1e-9)
-        self.bar.update(self.task.id, completed=max(done, self.task.completed), description="; ".join(running))
+                done += (
+                    WEIGHTS.get(job.rule, 1.0)
+                    * since
+                    / max(since + job.step["left_s"], 1e-9)
+                )
+        self.bar.update(
+            self.task.id,
+            completed=max(done, self.task.completed),
+            description="; ".join(running),
+        )
         left = self.task.time_remaining
         if running and not self.live and self.task.percentage >= self.next_percent:
             self.next_percent = int(self.task.percentage) + PERCENT_PER_LINE
             remaining = f"{format_duration(left)} left  " if left else ""
-            self.console.print(f"{self.task.percentage:3.0f} %  {remaining}{'; '.join(running)}")
+            self.console.print(
+                f"{self.task.percentage:3.0f} %  {remaining}{'; '.join(running)}"
+            )
         if self.total:
             ended = f"{self.ended:%F %T}" if self.ended else None
-            state: dict[str, Any] = {"began": f"{self.began:%F %T}", "ended": ended, "left_s": left, "running": running}
-            state |= {"done": self.done, "total": self.total, "failed": self.failed, "interrupted": self.interrupted}
+            state: dict[str, Any] = {
+                "began": f"{self.began:%F %T}",
+                "ended": ended,
+                "left_s": left,
+                "running": running,
+            }
+            state |= {
+                "done": self.done,
+                "total": self.total,
+                "failed": self.failed,
+                "interrupted": self.interrupted,
+            }
             state["details"] = str(self.details)
             # the steps report a full disk
             with suppress(StorageError):
@@ -180,7 +273,9 @@ class RunDisplay:
             self.console.print(f"gyriflow: interrupted after {took}, {done}")
         elif self.failed:
             failed = f"finished after {took} with {len(self.failed)} failed"
-            self.console.print(f"gyriflow: {failed}, {done}; run the same command again to resume")
+            self.console.print(
+                f"gyriflow: {failed}, {done}; run the same command again to resume"
+            )
         elif self.failure_messages:
             self.console.print("\n".join(self.failure_messages))
         elif self.total and not self.has_errors:
@@ -190,13 +285,22 @@ class RunDisplay:
             self.console.print(f"gyriflow: done in {took}{steps}{report}")
 
     def _follow(self, job: Job) -> None:
-        for event in events_in(read_log(job.log.with_suffix(".jsonl"))) if job.log else ():
+        for event in (
+            events_in(read_log(job.log.with_suffix(".jsonl"))) if job.log else ()
+        ):
             match event:
                 case {"event": "warning", "message": str(text)}:
                     self._show_warning(job, text)
-                case {"event": "size", "elements": elements, "ranks": ranks, "memory_mib": mib}:
+                case {
+                    "event": "size",
+                    "elements": elements,
+                    "ranks": ranks,
+                    "memory_mib": mib,
+                }:
                     on = f"{ranks} rank{'s' if ranks > 1 else ''}"
-                    size = f"       {job.name}: {elements} elements, {on}, about {mib} MiB"
+                    size = (
+                        f"       {job.name}: {elements} elements, {on}, about {mib} MiB"
+                    )
                     if size not in self.sizes:
                         self.sizes.add(size)
                         self.console.print(size)

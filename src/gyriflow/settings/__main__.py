@@ -1,4 +1,5 @@
-"""`python -m gyriflow.settings > config/schema.json` writes the JSON schema of all keys, for editors."""
+"""`python -m gyriflow.settings > config/schema.json` writes the JSON schema of all
+keys, for editors."""
 
 import json
 

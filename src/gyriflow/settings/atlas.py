@@ -1,4 +1,5 @@
-"""Atlases: the keys of an `atlas.yaml`, and of the section by which a study uses one."""
+"""Atlases: the keys of an `atlas.yaml`, and of the section by which a study uses
+one."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -14,15 +15,19 @@ from .terms import AffineSource, Coordinates
 from .weeks import AnyWeek
 
 DOWNLOADS = Path("resources", "atlases")
-"""Folder in the working directory for the files of atlases whose section names no other."""
+"""Folder in the working directory for the files of atlases whose section names no
+other."""
 
-FileKey = Literal["labels", "image", "left", "right", "pial", "white_left", "white_right", "white"]
+FileKey = Literal[
+    "labels", "image", "left", "right", "pial", "white_left", "white_right", "white"
+]
 SOURCES_OF_SERIES: tuple[tuple[set[FileKey], set[FileKey]], ...] = (
     ({"labels"}, {"image"}),
     ({"left", "right"}, {"white_left", "white_right"}),
     ({"pial"}, {"white"}),
 )
-"""Sets of file keys that define a surface, each with those that may come with it. A series has one of them."""
+"""Sets of file keys that define a surface, each with those that may come with it. A
+series has one of them."""
 WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
 """How a week may be written in a file's name, as `05.2f`."""
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
@@ -30,11 +35,16 @@ NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 
 def _names_weeks(pattern: str) -> bool:
     try:
-        fields = [(name, kind, flag) for _, name, kind, flag in Formatter().parse(pattern) if name is not None]
+        fields = [
+            (name, kind, flag)
+            for _, name, kind, flag in Formatter().parse(pattern)
+            if name is not None
+        ]
     except ValueError:
         return False
     return bool(fields) and all(
-        name == "week" and flag is None and re.fullmatch(WEEK_FORMAT, kind or "") for name, kind, flag in fields
+        name == "week" and flag is None and re.fullmatch(WEEK_FORMAT, kind or "")
+        for name, kind, flag in fields
     )
 
 
@@ -90,13 +100,16 @@ class AtlasSeries(Settings):
     coordinates: Coordinates = "auto"
     """As for `brains`, with surfaces."""
     matched: bool = False
-    """Whether surfaces of all weeks have the same vertices; believed until the files are there."""
+    """Whether surfaces of all weeks have the same vertices; believed until the files
+    are there."""
     files: dict[FileKey, str]
-    """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week: `labels`
-    and perhaps `image` (T2-weighted), or pial surfaces `left` and `right` (perhaps `white_left` and `white_right`), or
-    the whole `pial` one (perhaps `white`)."""
+    """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`:
+    21.00) for the week: `labels` and perhaps `image` (T2-weighted), or pial surfaces
+    `left` and `right` (perhaps `white_left` and `white_right`), or the whole `pial` one
+    (perhaps `white`)."""
     weeks: dict[AnyWeek, dict[FileKey, AtlasFileRecord]]
-    """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files. [GW]"""
+    """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its
+    files. [GW]"""
 
     @field_validator("weeks", mode="before")
     @classmethod
@@ -105,26 +118,47 @@ class AtlasSeries(Settings):
             _require_weeks_once(value)
         if isinstance(value, list):
             return {week: {} for week in value}
-        return {week: records or {} for week, records in value.items()} if isinstance(value, dict) else value
+        return (
+            {week: records or {} for week, records in value.items()}
+            if isinstance(value, dict)
+            else value
+        )
 
     @field_validator("files")
     @classmethod
     def _paths_with_week(cls, files: dict[FileKey, str]) -> dict[FileKey, str]:
-        if not any(set(files) in (needed, needed | optional) for needed, optional in SOURCES_OF_SERIES):
-            with_white = "left and right (and perhaps white_left and white_right), or pial (and perhaps white)"
+        if not any(
+            set(files) in (needed, needed | optional)
+            for needed, optional in SOURCES_OF_SERIES
+        ):
+            with_white = (
+                "left and right (and perhaps white_left and white_right), or pial (and"
+                " perhaps white)"
+            )
             raise ValueError(f"should have labels (and perhaps image), or {with_white}")
         for pattern in files.values():
-            if Path(pattern).is_absolute() or ".." in Path(pattern).parts or "\\" in pattern:
+            if (
+                Path(pattern).is_absolute()
+                or ".." in Path(pattern).parts
+                or "\\" in pattern
+            ):
                 raise ValueError("should be paths below the folder of the atlas")
             if not _names_weeks(pattern):
-                raise ValueError("should have {week} in each path, for the gestational week")
+                raise ValueError(
+                    "should have {week} in each path, for the gestational week"
+                )
         return files
 
     def problems(self) -> Iterator[KeyProblem]:
         if ("labels" in self.files) != (self.scheme is not None):
-            yield KeyProblem("is needed with labels, whose meaning it is, and with nothing else", ("scheme",))
+            yield KeyProblem(
+                "is needed with labels, whose meaning it is, and with nothing else",
+                ("scheme",),
+            )
         if self.matched and "labels" in self.files:
-            yield KeyProblem("has no meaning with labels, which have no vertices", ("matched",))
+            yield KeyProblem(
+                "has no meaning with labels, which have no vertices", ("matched",)
+            )
 
     @property
     def needed(self) -> list[FileKey]:
@@ -151,42 +185,55 @@ class Atlas(Settings):
     """Populations by name, each a series over the weeks."""
 
     def brain_id(self, series: str, week: float) -> str:
-        """Return the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas has one series."""
-        return "-".join([self.name, *([series] if len(self.series) > 1 else []), f"{week:g}"])
+        """Return the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas
+        has one series."""
+        return "-".join(
+            [self.name, *([series] if len(self.series) > 1 else []), f"{week:g}"]
+        )
 
 
 # in a study
 
 
 class AtlasSettings(Settings):
-    """An atlas. Each of its weeks is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` if it has one series).
+    """An atlas. Each of its weeks is a brain with the id `NAME-SERIES-WEEK`
+    (`NAME-WEEK` if it has one series).
 
-    `atlas: NAME` is short for a section; several atlases are a list. Missing files are fetched when a stage needs
-    them, or by `./run snakemake --cores 1 retrieve`. An existing file is never replaced.
+    `atlas: NAME` is short for a section; several atlases are a list. Missing files are
+    fetched when a stage needs them, or by `./run snakemake --cores 1 retrieve`. An
+    existing file is never replaced.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
     short_key = ("name", str)
 
     name: str
-    """An atlas that comes with gyriflow, the name of a folder in `atlases`; or the `atlas.yaml` of your own."""
+    """An atlas that comes with gyriflow, the name of a folder in `atlases`; or the
+    `atlas.yaml` of your own."""
     series: str | tuple[str, ...] | None = None
     """Series to use; `null`: all."""
-    weeks: Annotated[tuple[AnyWeek, ...], AfterValidator(_require_weeks_once)] | None = None
+    weeks: (
+        Annotated[tuple[AnyWeek, ...], AfterValidator(_require_weeks_once)] | None
+    ) = None
     """Weeks to use, as in the file names; `null`: all. [GW]"""
     images: bool = False
     """Whether T2-weighted volumes are shown with the surfaces' outlines."""
     folder: str | None = None
-    """Folder where files are found by name, at any depth, and missing ones are put; `null`:
-    `resources/atlases/NAME` in the working directory."""
+    """Folder where files are found by name, at any depth, and missing ones are put;
+    `null`: `resources/atlases/NAME` in the working directory."""
     accept_licence: bool = False
     """Whether you accept the licence, where the `atlas.yaml` asks for it."""
 
     @field_validator("name")
     @classmethod
     def _known_name(cls, name: str) -> str:
-        if not name.endswith((".yaml", ".yml")) and name not in (shipped := shipped_atlases()):
-            raise refused(f"found {name!r}; {did_you_mean(name, shipped)} An atlas of your own is an atlas.yaml")
+        if not name.endswith((".yaml", ".yml")) and name not in (
+            shipped := shipped_atlases()
+        ):
+            raise refused(
+                f"found {name!r}; {did_you_mean(name, shipped)} An atlas of your own is"
+                " an atlas.yaml"
+            )
         return name
 
     @field_validator("folder")
@@ -200,11 +247,19 @@ class AtlasSettings(Settings):
 
     @property
     def description(self) -> Path:
-        return Path(self.name) if self.name.endswith((".yaml", ".yml")) else ATLASES / self.name / "atlas.yaml"
+        return (
+            Path(self.name)
+            if self.name.endswith((".yaml", ".yml"))
+            else ATLASES / self.name / "atlas.yaml"
+        )
 
     def located(self, base_dir: Path) -> "AtlasSettings":
         """Return the section with absolute paths."""
-        paths = {} if self.folder is None else {"folder": str(located(base_dir, self.folder))}
+        paths = (
+            {}
+            if self.folder is None
+            else {"folder": str(located(base_dir, self.folder))}
+        )
         if self.description == Path(self.name):
             paths["name"] = str(located(base_dir, self.name))
         return self.model_copy(update=paths)

@@ -1,6 +1,8 @@
-"""Base class of all settings. A key's docstring is its description; all problems are reported together.
+"""Base class of all settings. A key's docstring is its description; all problems are
+reported together.
 
-Pydantic checks single keys. `Settings.problems` checks keys against each other once each is valid.
+Pydantic checks single keys. `Settings.problems` checks keys against each other once
+each is valid.
 """
 
 import difflib
@@ -23,7 +25,12 @@ from pydantic import (
     field_validator,
     model_validator,
 )
-from pydantic_core import CoreSchema, ErrorDetails, InitErrorDetails, PydanticCustomError
+from pydantic_core import (
+    CoreSchema,
+    ErrorDetails,
+    InitErrorDetails,
+    PydanticCustomError,
+)
 from pydantic_core.core_schema import tagged_union_schema
 
 from ..errors import InputError
@@ -43,14 +50,17 @@ class KeyProblem:
 
 @dataclass(frozen=True)
 class FirstIf:
-    """Mark a union of two types, the first of which is meant by values of some kinds and the second by all others.
+    """Mark a union of two types, the first of which is meant by values of some kinds
+    and the second by all others.
 
     So a message is about one of them, not about both.
     """
 
     kinds: type | UnionType
 
-    def __get_pydantic_core_schema__(self, union: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(
+        self, union: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
         first, second = map(handler.generate_schema, get_args(union))
         return tagged_union_schema(
             {"(first)": first, "(second)": second},
@@ -59,12 +69,14 @@ class FirstIf:
 
 
 def refused(text: str) -> PydanticCustomError:
-    """Return an error for a validator of one key, with `text` as its complete message."""
+    """Return an error for a validator of one key, with `text` as its complete
+    message."""
     return PydanticCustomError(PROBLEM, text)
 
 
 class Settings(BaseModel):
-    """Frozen settings, validated as a whole. The value of the `short_key` alone, of its type, stands for a section."""
+    """Frozen settings, validated as a whole. The value of the `short_key` alone, of its
+    type, stands for a section."""
 
     short_key: ClassVar[tuple[str, type] | None] = None
     model_config = ConfigDict(
@@ -85,19 +97,30 @@ class Settings(BaseModel):
         if isinstance(value, bool) and bool not in (kind, *get_args(kind)):
             raise ValueError("should be a number or text, not true or false")
         # which ends a path or an argument for the system
-        inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+        inner = (
+            value.values()
+            if isinstance(value, dict)
+            else value
+            if isinstance(value, list)
+            else [value]
+        )
         if any(isinstance(text, str) and "\0" in text for text in inner):
             raise ValueError("should have no NUL characters")
         return value
 
     @model_validator(mode="wrap")
     @classmethod
-    def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+    def _report_all_problems(
+        cls, raw: Any, handler: ModelWrapValidatorHandler[Self]
+    ) -> Self:
         if cls.short_key and isinstance(raw, cls.short_key[1]):
             raw = {cls.short_key[0]: raw}
         settings = handler({} if raw is None else raw)
         if problems := dict.fromkeys(settings.problems()):
-            errors = [InitErrorDetails(type=refused(each.text), loc=each.key, input=None) for each in problems]
+            errors = [
+                InitErrorDetails(type=refused(each.text), loc=each.key, input=None)
+                for each in problems
+            ]
             raise ValidationError.from_exception_data(cls.__name__, errors)
         return settings
 
@@ -116,16 +139,20 @@ Key = tuple[str | int, ...]
 
 
 def messages(error: ValidationError, kind: type[BaseModel]) -> list[tuple[Key, str]]:
-    """Return the path and the text of each problem of settings of a kind, in the order of the keys."""
+    """Return the path and the text of each problem of settings of a kind, in the order
+    of the keys."""
     return [_message(details, kind) for details in error.errors()]
 
 
 def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
-    """Return settings of a kind from plain mappings; InputError naming `where` and all problems at once."""
+    """Return settings of a kind from plain mappings; InputError naming `where` and all
+    problems at once."""
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
-        raise InputError(f"{where}: {'; '.join(line(*problem) for problem in messages(error, kind))}") from None
+        raise InputError(
+            f"{where}: {'; '.join(line(*problem) for problem in messages(error, kind))}"
+        ) from None
 
 
 def line(path: Key, text: str) -> str:
@@ -135,16 +162,26 @@ def line(path: Key, text: str) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint for an unknown name: the valid names that end with it, the most similar one, or all of them."""
+    """Return a hint for an unknown name: the valid names that end with it, the most
+    similar one, or all of them."""
     names = list(names)
     longer = [candidate for candidate in names if candidate.endswith(f"_{name}")]
     near = longer or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else f"valid names are {', '.join(names)}"
+    return (
+        f"did you mean {' or '.join(near)}?"
+        if near
+        else f"valid names are {', '.join(names)}"
+    )
 
 
 def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
-    # pydantic puts tags into the path: of a union's member, here in parentheses, and `[key]` for a wrong key
-    path = tuple(part for part in details["loc"] if not str(part).startswith("(") and part != "[key]")
+    # pydantic puts tags into the path: of a union's member, here in parentheses, and
+    # `[key]` for a wrong key
+    path = tuple(
+        part
+        for part in details["loc"]
+        if not str(part).startswith("(") and part != "[key]"
+    )
     text = details["msg"].removeprefix("Value error, ")
     if details["type"] == "extra_forbidden":
         text = unknown_key(kind, path) or "unknown key"
@@ -157,7 +194,8 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
 
 
 def unknown_key(kind: Any, path: Key) -> str:
-    """Return the message for a key that settings of a kind do not have, with the nearest keys.
+    """Return the message for a key that settings of a kind do not have, with the
+    nearest keys.
 
     It is empty where there is such a key, or where no settings are.
     """
@@ -168,12 +206,21 @@ def unknown_key(kind: Any, path: Key) -> str:
 
 
 def settings_at(kind: Any, path: Key) -> type[Settings] | None:
-    """Return the class of the settings at `path` inside the type `kind`, or None if there are none."""
+    """Return the class of the settings at `path` inside the type `kind`, or None if
+    there are none."""
     if isinstance(kind, type) and issubclass(kind, Settings):
         field = kind.model_fields.get(str(path[0])) if path else None
-        return kind if not path else settings_at(field.annotation, path[1:]) if field else None
+        return (
+            kind
+            if not path
+            else settings_at(field.annotation, path[1:])
+            if field
+            else None
+        )
     inner = path[1:] if get_origin(kind) in (dict, tuple) else path
-    return next((found for part in get_args(kind) if (found := settings_at(part, inner))), None)
+    return next(
+        (found for part in get_args(kind) if (found := settings_at(part, inner))), None
+    )
 
 
 # paths of input files
@@ -183,7 +230,8 @@ WILDCARD = re.compile(r"\{.*\}", re.DOTALL)
 
 
 def path_in(folder: Path, path: str) -> Path:
-    """Return the path of a file that is given relative to a folder or to a home folder (`~/scans/a.nii.gz`)."""
+    """Return the path of a file that is given relative to a folder or to a home folder
+    (`~/scans/a.nii.gz`)."""
     try:
         return folder / Path(path).expanduser()
     except RuntimeError:  # no home folder of that name: `~` is part of the file name
@@ -191,37 +239,58 @@ def path_in(folder: Path, path: str) -> Path:
 
 
 def located(folder: Path | str, path: str) -> Path:
-    """Return the absolute path of a file in a folder or, if it only exists there, in the working directory."""
+    """Return the absolute path of a file in a folder or, if it only exists there, in
+    the working directory."""
     places = [path_in(Path(folder), path), Path.cwd() / path]
-    return own_name(next((place for place in places if place.exists() or absent_content(place)), places[0]))
+    return own_name(
+        next(
+            (place for place in places if place.exists() or absent_content(place)),
+            places[0],
+        )
+    )
 
 
 def own_name(path: Path) -> Path:
-    """Return an absolute path with folders resolved; a link to a file keeps its name, which has the format."""
+    """Return an absolute path with folders resolved; a link to a file keeps its name,
+    which has the format."""
     return path.resolve() if path.is_dir() else path.parent.resolve() / path.name
 
 
 def folder_of(path: Path) -> Path:
-    """Return the folder of a configuration: for a link, the folder of its target, unless git-annex stores that."""
+    """Return the folder of a configuration: for a link, the folder of its target,
+    unless git-annex stores that."""
     real = path.resolve()
     return (own_name(path) if "annex/objects" in real.as_posix() else real).parent
 
 
 def absent_content(path: Path, start: bytes = b"") -> str:
-    """Return how to get the content of a broken link of git-annex or of a pointer with this `start`, or ""."""
+    """Return how to get the content of a broken link of git-annex or of a pointer with
+    this `start`, or ""."""
     if start.startswith(b"version https://git-lfs.github.com"):
-        return f"its content is not here (Git LFS). Get it with `git lfs pull --include {path}`"
-    is_broken = path.is_symlink() and not path.exists() and "annex/objects" in path.readlink().as_posix()
+        return (
+            "its content is not here (Git LFS). Get it with `git lfs pull --include"
+            f" {path}`"
+        )
+    is_broken = (
+        path.is_symlink()
+        and not path.exists()
+        and "annex/objects" in path.readlink().as_posix()
+    )
     if is_broken or start.startswith(b"/annex/objects/"):
-        return f"its content is not here (git-annex). Get it with `datalad get {path}` or `git annex get {path}`"
+        return (
+            f"its content is not here (git-annex). Get it with `datalad get {path}` or"
+            f" `git annex get {path}`"
+        )
     return ""
 
 
 def _absolute(path: str, info: ValidationInfo) -> str:
-    """Return the absolute path of a file that must exist (a relative one if the working directory has braces).
+    """Return the absolute path of a file that must exist (a relative one if the working
+    directory has braces).
 
-    The validation context has the `folder` of the configuration, which is searched before the working directory, and
-    `awaited` files, which may not exist yet. Without a context the path is returned unchanged.
+    The validation context has the `folder` of the configuration, which is searched
+    before the working directory, and `awaited` files, which may not exist yet. Without
+    a context the path is returned unchanged.
     """
     if not info.context:
         return path
@@ -234,22 +303,35 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     if absent := absent_content(place):
         raise refused(absent)
     if not place.is_file() and path not in info.context.get("awaited", ()):
-        raise refused(f"no such file: {path_in(folder, path)}{hint_for_missing(path_in(folder, path))}")
+        raise refused(
+            "no such file:"
+            f" {path_in(folder, path)}{hint_for_missing(path_in(folder, path))}"
+        )
     if not WILDCARD.search(str(place)):
         return str(place)
     # a relative path avoids the braces of the working directory
     if WILDCARD.search(inside := os.path.relpath(place)) or not place.is_file():
-        raise refused(f"found {place}; Snakemake takes braces in a path for wildcards: rename the file or its folder")
+        raise refused(
+            f"found {place}; Snakemake takes braces in a path for wildcards: rename the"
+            " file or its folder"
+        )
     return inside
 
 
 InputFile = Annotated[str, AfterValidator(_absolute)]
-"""The path of an input file, relative to the configuration file or else to the working directory."""
+"""The path of an input file, relative to the configuration file or else to the working
+directory."""
 
 
 NO_PATH = (
-    (re.compile(r"\$\w|\$\{|%\w+%"), "variables such as $HOME are not replaced; write the whole path, or ~/…"),
-    (re.compile(r"(?:^|/)[A-Za-z][A-Za-z0-9+.-]+:/"), "expected a path without file:// or another address"),
+    (
+        re.compile(r"\$\w|\$\{|%\w+%"),
+        "variables such as $HOME are not replaced; write the whole path, or ~/…",
+    ),
+    (
+        re.compile(r"(?:^|/)[A-Za-z][A-Za-z0-9+.-]+:/"),
+        "expected a path without file:// or another address",
+    ),
     (re.compile(r"\\"), r"write / between folders, not \\"),
 )
 """What paths of files do not have, and the hints about it."""
@@ -263,14 +345,18 @@ def not_a_path(text: str) -> str:
 
 
 def hint_for_missing(path: Path) -> str:
-    """Return a hint why there is no such file, or "": what its path is instead, or names like its in the folder."""
+    """Return a hint why there is no such file, or "": what its path is instead, or
+    names like its in the folder."""
     if hint := not_a_path(str(path)):
         return f"; {hint}"
     try:
         if path.is_symlink() and not path.exists():
             return f"; it is a link to {path.readlink()}, which does not exist"
         if path.is_dir():
-            return f"; it is a folder{_listed(' with', sorted(path.iterdir()))}; expected a file"
+            return (
+                f"; it is a folder{_listed(' with', sorted(path.iterdir()))}; expected"
+                " a file"
+            )
         absent = [folder for folder in path.parents if not folder.exists()]
         if absent:
             return f"; there is no folder {absent[-1]}"
@@ -280,11 +366,16 @@ def hint_for_missing(path: Path) -> str:
 
 
 def _named_alike(path: Path) -> list[Path]:
-    """Return the files next to a missing one with its name, but for ending, case and spaces, or else for numbers."""
+    """Return the files next to a missing one with its name, but for ending, case and
+    spaces, or else for numbers."""
     files = sorted(path.parent.iterdir())
     stem = _stem(path.name)
     same = [file for file in files if _stem(file.name) == stem]
-    return same or [file for file in files if _without_numbers(_stem(file.name)) == _without_numbers(stem)]
+    return same or [
+        file
+        for file in files
+        if _without_numbers(_stem(file.name)) == _without_numbers(stem)
+    ]
 
 
 def _stem(name: str) -> str:
@@ -299,6 +390,9 @@ def _without_numbers(stem: str) -> str:
 
 
 def _listed(words: str, files: Sequence[Path]) -> str:
-    names = [repr(file.name) if file.name != file.name.strip() else file.name for file in files[:MAX_NAMES]]
+    names = [
+        repr(file.name) if file.name != file.name.strip() else file.name
+        for file in files[:MAX_NAMES]
+    ]
     names += ["…"] if len(files) > MAX_NAMES else []
     return f"{words} {', '.join(names)}" if names else ""

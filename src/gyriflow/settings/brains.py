@@ -1,4 +1,5 @@
-"""Settings of brains: the data that their pial surfaces are made from, regions given on them, and tables of brains."""
+"""Settings of brains: the data that their pial surfaces are made from, regions given on
+them, and tables of brains."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -15,7 +16,10 @@ from .weeks import Week, WeekNotation
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """A brain has exactly one of these keys."""
 
-HEMISPHERE_LABELS, HEMISPHERE_SURFACE = "labels of a hemisphere", "a hemisphere's surface"
+HEMISPHERE_LABELS, HEMISPHERE_SURFACE = (
+    "labels of a hemisphere",
+    "a hemisphere's surface",
+)
 LABEL_SOURCES = ("labels", HEMISPHERE_LABELS)
 SURFACE_SOURCES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
 KEY_SOURCES: dict[str, tuple[str, ...]] = {
@@ -28,20 +32,23 @@ KEY_SOURCES: dict[str, tuple[str, ...]] = {
 
 
 MAX_AXIS_RATIO = 2.0
-"""Limit of longest over shortest semi-axis; the ends of longer shapes are too sharp for even triangles."""
+"""Limit of longest over shortest semi-axis; the ends of longer shapes are too sharp for
+even triangles."""
 MAX_NOISE = 0.02
 """Largest height of the bumps relative to the shortest semi-axis."""
 Length = Annotated[float, Field(ge=5, le=150)]
 
 
 class ShapeSettings(Settings):
-    """An ellipsoid in place of a brain, for teaching and verification, centred on the origin; `{}` is one of 21 GW."""
+    """An ellipsoid in place of a brain, for teaching and verification, centred on the
+    origin; `{}` is one of 21 GW."""
 
     semi_axes_mm: tuple[Length, Length, Length] = (21.0, 28.0, 22.0)
-    """Semi-axes along X, Y, Z, all the same for a sphere; the longest is at most twice the shortest. [mm]"""
+    """Semi-axes along X, Y, Z, all the same for a sphere; the longest is at most twice
+    the shortest. [mm]"""
     noise_mm: float = Field(0.05, ge=0, le=0.5)
-    """Root mean square height of the smooth bumps that start the folding, at most a fiftieth of the shortest
-    semi-axis. [mm]"""
+    """Root mean square height of the smooth bumps that start the folding, at most a
+    fiftieth of the shortest semi-axis. [mm]"""
     seed: int = Field(0, ge=0)
     """Seed of the bumps' random pattern."""
 
@@ -52,11 +59,17 @@ class ShapeSettings(Settings):
     def problems(self) -> Iterator[KeyProblem]:
         shortest, longest = min(self.semi_axes_mm), max(self.semi_axes_mm)
         if longest > MAX_AXIS_RATIO * shortest:
-            text = f"found {longest:g} as the longest; expected at most {MAX_AXIS_RATIO:g} times the shortest"
+            text = (
+                f"found {longest:g} as the longest; expected at most {MAX_AXIS_RATIO:g}"
+                " times the shortest"
+            )
             yield KeyProblem(text, ("semi_axes_mm",))
         # the default suits the default sizes; only a given value can be wrong
         if self.is_set("noise_mm") and self.noise_mm > MAX_NOISE * shortest:
-            text = f"found {self.noise_mm:g}; expected at most {MAX_NOISE * shortest:g}, a fiftieth of the shortest"
+            text = (
+                f"found {self.noise_mm:g}; expected at most {MAX_NOISE * shortest:g}, a"
+                " fiftieth of the shortest"
+            )
             yield KeyProblem(f"{text} semi-axis", ("noise_mm",))
 
 
@@ -70,36 +83,40 @@ class HemisphereFiles(Settings):
 
 
 class OneHemisphere(Settings):
-    """The only hemisphere of a brain, after hemispherectomy or if the data has one side."""
+    """The only hemisphere of a brain, after hemispherectomy or if the data has one
+    side."""
 
     file: InputFile
-    """Closed pial surface or, with the brain's `scheme`, a label volume without cortex of the other hemisphere."""
+    """Closed pial surface or, with the brain's `scheme`, a label volume without cortex
+    of the other hemisphere."""
     side: Side
     """The hemisphere, `left` or `right`."""
 
 
 class BrainConfig(Settings):
-    """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial` and `shape`."""
+    """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial`
+    and `shape`."""
 
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=MAX_NAME_LENGTH)
     """Name in paths and tables: letters, digits, - _ ."""
     week: Week
     """Gestational age, such as `24.3` or `24+2`; rounded to two decimals. [GW]"""
     population: str | None = Field(None, min_length=1)
-    """Population in figures and tables, such as `spina bifida aperta`; `null`: real brain."""
+    """Population in figures and tables, such as `spina bifida aperta`; `null`: real
+    brain."""
     subject: str | None = Field(None, min_length=1)
-    """Subject, if several brains are scans of one. Changes between scans are tabulated, and simulations are compared
-    with scans of their own subject first."""
+    """Subject, if several brains are scans of one. Changes between scans are tabulated,
+    and simulations are compared with scans of their own subject first."""
     covariates: dict[str, str] = Field({})
-    """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv`, whose own columns have other names, and of
-    the export."""
+    """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv`, whose own
+    columns have other names, and of the export."""
     labels: InputFile | None = None
     """Tissue label volume, such as a NIfTI or MGZ file."""
     image: InputFile | None = None
     """T2-weighted volume (NIfTI) of the labels, shown in a figure."""
     scheme: str | None = None
-    """Label scheme: the name of a file in the folder `schemes`, such as `dhcp-19`, or of an entry of the key
-    `schemes`. Required with `labels`."""
+    """Label scheme: the name of a file in the folder `schemes`, such as `dhcp-19`, or
+    of an entry of the key `schemes`. Required with `labels`."""
     affine_from: AffineSource = "auto"
     """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
     hemispheres: HemisphereFiles | None = None
@@ -109,8 +126,8 @@ class BrainConfig(Settings):
     pial: InputFile | None = None
     """Closed surface of the whole brain."""
     white: FileOrPair | None = None
-    """White surface in the same coordinates, for the cortical thickness: a file; with `hemispheres`, a list of the
-    left and the right file."""
+    """White surface in the same coordinates, for the cortical thickness: a file; with
+    `hemispheres`, a list of the left and the right file."""
     coordinates: Coordinates = "auto"
     """Axes of surface files; `auto` determines any pose from the shape."""
     shape: ShapeSettings | None = None
@@ -140,9 +157,17 @@ class BrainConfig(Settings):
 
     @property
     def files(self) -> list[str]:
-        sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
+        sides = (
+            []
+            if self.hemispheres is None
+            else [self.hemispheres.left, self.hemispheres.right]
+        )
         single = None if self.hemisphere is None else self.hemisphere.file
-        return [path for path in (self.labels, self.pial, *sides, single) if path is not None]
+        return [
+            path
+            for path in (self.labels, self.pial, *sides, single)
+            if path is not None
+        ]
 
     @property
     def white_files(self) -> dict[str, str]:
@@ -153,26 +178,44 @@ class BrainConfig(Settings):
     def _kind(self) -> str:
         if self.hemisphere is None:
             return self.source
-        return HEMISPHERE_LABELS if is_volume(self.hemisphere.file) else HEMISPHERE_SURFACE
+        return (
+            HEMISPHERE_LABELS if is_volume(self.hemisphere.file) else HEMISPHERE_SURFACE
+        )
 
     def problems(self) -> Iterator[KeyProblem]:
         sources = [key for key in SOURCES if self.is_set(key)]
         if not sources and self.image is not None:
-            yield KeyProblem("gyriflow does not segment images; give a label volume under labels", ("image",))
+            yield KeyProblem(
+                "gyriflow does not segment images; give a label volume under labels",
+                ("image",),
+            )
         elif len(sources) != 1:
-            text = f"found {' and '.join(sources) or 'none'}; expected exactly one of {', '.join(SOURCES)}"
+            text = (
+                f"found {' and '.join(sources) or 'none'}; expected exactly one of"
+                f" {', '.join(SOURCES)}"
+            )
             yield KeyProblem(text)
         else:
             for key, kinds in KEY_SOURCES.items():
                 if key in self.model_fields_set and self._kind not in kinds:
                     yield KeyProblem(
-                        f"is not used with {self._kind}, only with {' or '.join(kinds)}; remove it", (key,)
+                        f"is not used with {self._kind}, only with"
+                        f" {' or '.join(kinds)}; remove it",
+                        (key,),
                     )
             pair = self._kind == "hemispheres"
-            if self.white is not None and self._kind in SURFACE_SOURCES and ("left" in self.white_files) != pair:
-                yield KeyProblem("should have one file for each pial surface", ("white",))
+            if (
+                self.white is not None
+                and self._kind in SURFACE_SOURCES
+                and ("left" in self.white_files) != pair
+            ):
+                yield KeyProblem(
+                    "should have one file for each pial surface", ("white",)
+                )
             if self._kind in LABEL_SOURCES and self.scheme is None:
-                yield KeyProblem("is missing; it defines the meaning of the labels", ("scheme",))
+                yield KeyProblem(
+                    "is missing; it defines the meaning of the labels", ("scheme",)
+                )
 
 
 # regions
@@ -188,30 +231,39 @@ class SurfaceRegions(Settings):
 
 
 class GivenRegions(Settings):
-    """Regions of a brain, from a label volume or from labels of both hemispheres' surfaces.
+    """Regions of a brain, from a label volume or from labels of both hemispheres'
+    surfaces.
 
-    Left and right regions with the same name are compared. Other brains get the regions of the brain closest in week.
+    Left and right regions with the same name are compared. Other brains get the regions
+    of the brain closest in week.
     """
 
     volume: InputFile | None = None
-    """Label volume (NIfTI) in the space of the brain's `labels`, with regions along the cortex."""
+    """Label volume (NIfTI) in the space of the brain's `labels`, with regions along the
+    cortex."""
     left: SurfaceRegions | None = None
     """Instead of a volume, labels of the left hemisphere."""
     right: SurfaceRegions | None = None
     """Labels of the right hemisphere."""
     names: dict[Label, str] = Field({})
-    """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`. Labels with the same name are one region;
-    labels without a name are ignored. Required with a volume; by default the label files' own names are used."""
+    """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`. Labels
+    with the same name are one region; labels without a name are ignored. Required with
+    a volume; by default the label files' own names are used."""
 
     def problems(self) -> Iterator[KeyProblem]:
         sides = [side for side in SIDES if self.is_set(side)]
         if (self.volume is not None) == bool(sides):
-            yield KeyProblem(f"found {'both' if sides else 'neither'}; expected volume, or left and right")
+            yield KeyProblem(
+                f"found {'both' if sides else 'neither'}; expected volume, or left and"
+                " right"
+            )
         elif len(sides) == 1:
             side = "right" if sides == ["left"] else "left"
             yield KeyProblem("is missing; both hemispheres need labels", (side,))
         if self.volume is not None and not self.names:
-            yield KeyProblem("is missing; it defines the regions of the volume", ("names",))
+            yield KeyProblem(
+                "is missing; it defines the regions of the volume", ("names",)
+            )
 
     @property
     def files(self) -> dict[str, str]:
@@ -232,23 +284,27 @@ class GivenRegions(Settings):
 class ParticipantsSettings(Settings):
     """A table with a brain in each row. `participants: FILE` is short for a section.
 
-    Columns are `participant_id` (or `id`); `session_id` (or `session`, `visit`) where a subject has several scans; the
-    age of the scan, `scan_age`, `pma`, `gestational_age` or `week`, as `24.3`, `24+2` or `24w2d` (in days with
-    `age_days`; `age` has its unit in the sidecar); and keys of brains, inner ones with a dot (`hemispheres.left`), two
-    `white` surfaces with a semicolon between. Instead of keys, `files` may name labels, a pial surface, or left and
-    right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is an empty value. Other columns are
-    covariates. Each participant is a subject. One with a `sub-01/sub-01_sessions.tsv` next to the table has a brain
-    for each session, with its age.
+    Columns are `participant_id` (or `id`); `session_id` (or `session`, `visit`) where a
+    subject has several scans; the age of the scan, `scan_age`, `pma`, `gestational_age`
+    or `week`, as `24.3`, `24+2` or `24w2d` (in days with `age_days`; `age` has its unit
+    in the sidecar); and keys of brains, inner ones with a dot (`hemispheres.left`), two
+    `white` surfaces with a semicolon between. Instead of keys, `files` may name labels,
+    a pial surface, or left and right surfaces with a semicolon between; with `side`,
+    one hemisphere. `n/a` is an empty value. Other columns are covariates. Each
+    participant is a subject. One with a `sub-01/sub-01_sessions.tsv` next to the table
+    has a brain for each session, with its age.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
     short_key = ("file", str)
 
     file: str
-    """File with tabs, semicolons or commas between columns; paths in it are relative to it."""
+    """File with tabs, semicolons or commas between columns; paths in it are relative to
+    it."""
     ages: WeekNotation | None = None
-    """Whether 24.3 is a `decimal` or 24 weeks and 3 `days`; needed if all decimals of a table could be days."""
+    """Whether 24.3 is a `decimal` or 24 weeks and 3 `days`; needed if all decimals of a
+    table could be days."""
     columns: dict[str, str] = Field({})
-    """Columns to add to the table, with one value for all rows. In it `{subject}`, `{session}` and `{id}`,
-    such as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme:
-    feta-7}`."""
+    """Columns to add to the table, with one value for all rows. In it `{subject}`,
+    `{session}` and `{id}`, such as `sub-01_ses-1`, are the row's: `{labels:
+    '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme: feta-7}`."""

@@ -1,4 +1,5 @@
-"""The mechanical model, its parameters and its numerics: settings of a study, parameters of a run."""
+"""The mechanical model, its parameters and its numerics: settings of a study,
+parameters of a run."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -6,14 +7,29 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    ValidationInfo,
+    field_validator,
+)
 
 from ..errors import InputError
 from .base import KeyProblem, Settings, line, validated
 from .ensemble import Ensemble
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
-from .varying import Maps, Varying, VaryingNumber, bounds_of, map_of, require_bounds, value_range, varying
+from .varying import (
+    Maps,
+    Varying,
+    VaryingNumber,
+    bounds_of,
+    map_of,
+    require_bounds,
+    value_range,
+    varying,
+)
 from .weeks import EndWeek, Week
 
 
@@ -33,8 +49,13 @@ def _memory(value: Any) -> float:
 Memory = Annotated[
     float,
     Field(allow_inf_nan=True),
-    BeforeValidator(_memory, json_schema_input_type=Annotated[float, Field(ge=0)] | Literal["infinite"]),
-    PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
+    BeforeValidator(
+        _memory,
+        json_schema_input_type=Annotated[float, Field(ge=0)] | Literal["infinite"],
+    ),
+    PlainSerializer(
+        lambda time: "infinite" if math.isinf(time) else time, when_used="json"
+    ),
 ]
 Share = Annotated[float, Field(ge=-1, le=1)]
 Fraction = Annotated[float, Field(gt=0, le=2)]
@@ -46,17 +67,21 @@ class Contact(Settings):
     """Contact between folds, and between the two hemispheres."""
 
     kind: Literal["global", "planes", "none"] = "global"
-    """`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's
-    plane, but folds may cross each other (the paper); `none`: no contact."""
+    """`global`: no part of the pial surface crosses another; `planes`: neither
+    hemisphere passes the fissure's plane, but folds may cross each other (the paper);
+    `none`: no contact."""
 
 
 class NoGrowth(Settings):
-    """The ellipsoid inside which nothing grows, and whose pial facets are clamped with `support: ellipsoid`."""
+    """The ellipsoid inside which nothing grows, and whose pial facets are clamped with
+    `support: ellipsoid`."""
 
     kind: Literal["ellipsoid", "none"] = "ellipsoid"
-    """`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`: all tissue grows."""
+    """`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`:
+    all tissue grows."""
     shift: tuple[Share, Share] = (0.05, -0.15)
-    """Shift of its centre from the middle, anterior and superior. [extents along Y, Z]"""
+    """Shift of its centre from the middle, anterior and superior. [extents along Y,
+    Z]"""
     semi_axes: tuple[Fraction, Fraction, Fraction] = (0.35, 0.40, 0.50)
     """Semi-axes along X, Y, Z. [extents]"""
 
@@ -73,14 +98,15 @@ class Solver(Settings):
 class FoldingSettings(Settings):
     """The mechanical model, its parameters and its numerics.
 
-    The defaults are the paper's, except `contact` (`planes` in the paper) and elements (linear in the paper: `mesh:
-    {order: 1}`).
+    The defaults are the paper's, except `contact` (`planes` in the paper) and elements
+    (linear in the paper: `mesh: {order: 1}`).
     """
 
     preset: Literal["fetalfoldsim", "measured", "expected"] | None = None
-    """Parameters to start from; other keys come on top, for the preset of a run the run's own. `fetalfoldsim`:
-    the paper's; `measured`: growth that takes the brain to the shapes that its series was measured to have;
-    `expected`: to those that the growth of another population, such as an atlas, would give it."""
+    """Parameters to start from; other keys come on top, for the preset of a run the
+    run's own. `fetalfoldsim`: the paper's; `measured`: growth that takes the brain to
+    the shapes that its series was measured to have; `expected`: to those that the
+    growth of another population, such as an atlas, would give it."""
     end_week: EndWeek
     """Gestational age at which the simulation ends. [GW]"""
     step_s: float = Field(43200.0, gt=0, le=604800)
@@ -104,21 +130,22 @@ class FoldingSettings(Settings):
     growth: Growth = Growth()
     """What the brain grows by."""
     stress_memory_gw: Memory = 0.0
-    """Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.
-    [GW]"""
+    """Relaxation time of elastic stress: after each step 0 forgets it (the paper),
+    `infinite` keeps all of it. [GW]"""
     relaxation: Literal["all", "shape"] = "all"
-    """What relaxes: `all` of the elastic strain (the paper), or its `shape` only, so that tissue keeps its change of
-    volume and the pressure that goes with it."""
+    """What relaxes: `all` of the elastic strain (the paper), or its `shape` only, so
+    that tissue keeps its change of volume and the pressure that goes with it."""
     support: Literal["ellipsoid", "free"] = "ellipsoid"
-    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `free` removes rigid
-    motions only."""
+    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no
+    growth; `free` removes rigid motions only."""
     contact: Contact = Contact()
     """Contact."""
     no_growth: NoGrowth = NoGrowth()
     """Tissue that does not grow."""
     output_every_gw: float = Field(1.0, ge=0.01, le=10)
-    """Interval between output weeks, besides the first and the last, and where some run predicts the start's growth
-    (`growth.of: atlas`) those of the brains to compare with. [GW]"""
+    """Interval between output weeks, besides the first and the last, and where some run
+    predicts the start's growth (`growth.of: atlas`) those of the brains to compare
+    with. [GW]"""
     fields: tuple[FieldName, ...] = ("displacement", "cortex_weight", "growth")
     """Fields for ParaView at each output week."""
     solver: Solver = Solver()
@@ -141,7 +168,10 @@ class FoldingSettings(Settings):
     def problems(self) -> Iterator[KeyProblem]:
         for key in GROWTH_RATES:
             if key not in self.growth.definition.rates and self.is_set(key):
-                yield KeyProblem(f"is not used by the growth model {self.growth.model}; remove it", (key,))
+                yield KeyProblem(
+                    f"is not used by the growth model {self.growth.model}; remove it",
+                    (key,),
+                )
 
     @field_validator("*")
     @classmethod
@@ -150,15 +180,20 @@ class FoldingSettings(Settings):
         return value
 
 
-VARYING = tuple(name for name, field in FoldingSettings.model_fields.items() if bounds_of(field))
+VARYING = tuple(
+    name for name, field in FoldingSettings.model_fields.items() if bounds_of(field)
+)
 """Parameters that may vary with week and place."""
 GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_s"))
 
 
 def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:
-    """Return the output weeks of a run, to two decimals: the start, then every `every_gw` weeks, and the end."""
+    """Return the output weeks of a run, to two decimals: the start, then every
+    `every_gw` weeks, and the end."""
     steps = int((end_week - start_week) / every_gw + 1e-9)
-    return sorted({*(round(start_week + n * every_gw, 2) for n in range(steps + 1)), end_week})
+    return sorted(
+        {*(round(start_week + n * every_gw, 2) for n in range(steps + 1)), end_week}
+    )
 
 
 class FoldingParameters(FoldingSettings):
@@ -176,36 +211,49 @@ class FoldingParameters(FoldingSettings):
     side: Side | None = None
     """The only hemisphere that the brain has; `null`: it has both."""
     targets: dict[Week, str] = Field({})
-    """With `growth.model: shapes`: by week what the names of the maps of the mesh's positions begin with.
-    [GW]"""
+    """With `growth.model: shapes`: by week what the names of the maps of the mesh's
+    positions begin with. [GW]"""
     stops: tuple[Week, ...] = ()
-    """Weeks of those targets that no brain was observed at: they lie on the way between two that were. [GW]"""
+    """Weeks of those targets that no brain was observed at: they lie on the way between
+    two that were. [GW]"""
 
     @property
     def varying_maps(self) -> set[str]:
         """The names of the maps of parameters that vary over the brain."""
-        return {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
+        return {
+            name for key in VARYING if (name := map_of(getattr(self, key))) is not None
+        }
 
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
-        return self.varying_maps | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
+        return self.varying_maps | {
+            f"{name}_{axis}" for name in self.targets.values() for axis in AXES
+        }
 
     def problems(self) -> Iterator[KeyProblem]:
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
-            yield KeyProblem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
+            yield KeyProblem(
+                f"found {weeks}; they should ascend from start_week to end_week",
+                ("output_weeks",),
+            )
         if (self.growth.definition.measured == "shapes") != bool(self.targets):
             text = "is not used by" if self.targets else "is missing; it is needed by"
-            yield KeyProblem(f"{text} the growth model {self.growth.model}", ("targets",))
+            yield KeyProblem(
+                f"{text} the growth model {self.growth.model}", ("targets",)
+            )
         yield from value_problems(self, self.start_week, {})
 
 
-def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[KeyProblem]:
-    """Yield the inconsistencies between the settings of a run, over all its weeks and vertices.
+def value_problems(
+    p: FoldingSettings, start_week: float, maps: Maps, start: str = ""
+) -> Iterator[KeyProblem]:
+    """Yield the inconsistencies between the settings of a run, over all its weeks and
+    vertices.
 
-    Parameters whose maps are not among `maps` are left out. `start` is the name of the start in messages, such as "the
-    week of the start brain a".
+    Parameters whose maps are not among `maps` are left out. `start` is the name of the
+    start in messages, such as "the week of the start brain a".
     """
     end = p.end_week
     if end <= start_week:
@@ -214,27 +262,46 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     values = {
         key: value
         for key in VARYING
-        if not (isinstance(value := getattr(p, key), Varying) and value.map not in (None, *maps))
+        if not (
+            isinstance(value := getattr(p, key), Varying)
+            and value.map not in (None, *maps)
+        )
     }
-    ranges = {key: value_range(value, maps, start_week, end) for key, value in values.items()}
-    for key, unit in (("thickness_mm", "mm"), ("shear_modulus_cortex_pa", "Pa"), ("shear_modulus_core_pa", "Pa")):
+    ranges = {
+        key: value_range(value, maps, start_week, end) for key, value in values.items()
+    }
+    for key, unit in (
+        ("thickness_mm", "mm"),
+        ("shear_modulus_cortex_pa", "Pa"),
+        ("shear_modulus_core_pa", "Pa"),
+    ):
         if key in ranges and (least := ranges[key][0]) <= 0:
-            yield KeyProblem(f"reaches {least:g} {unit}; it should stay above 0", (key,))
+            yield KeyProblem(
+                f"reaches {least:g} {unit}; it should stay above 0", (key,)
+            )
     rates = {key: ranges[key] for key in GROWTH_RATES if key in ranges}
     for key, (least, _) in rates.items():
         if least < 0:
             yield KeyProblem(f"found {least:g}; it should be 0 or more", (key,))
     if (growth := p.step_s * sum(most for _, most in rates.values())) >= 1:
-        yield KeyProblem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
+        yield KeyProblem(
+            f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step,"
+            " beyond 1",
+            ("step_s",),
+        )
 
 
 def target_map(week: float) -> str:
-    """Return what the names of the maps of positions that a mesh is to have at a week begin with."""
+    """Return what the names of the maps of positions that a mesh is to have at a week
+    begin with."""
     return f"target_{week:05.2f}"
 
 
-def target_maps(weeks: Iterable[float], positions: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Return the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at w weeks."""
+def target_maps(
+    weeks: Iterable[float], positions: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at
+    w weeks."""
     return {
         f"{target_map(week)}_{axis}": values
         for week, places in zip(weeks, positions, strict=True)
@@ -243,18 +310,33 @@ def target_maps(weeks: Iterable[float], positions: NDArray[np.float64]) -> dict[
 
 
 def parameters_from(values: Any) -> FoldingParameters:
-    """Return the parameters from nested mappings as read from YAML; InputError naming all problems at once."""
+    """Return the parameters from nested mappings as read from YAML; InputError naming
+    all problems at once."""
     return validated(FoldingParameters, values, "folding parameters")
 
 
 def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
-    """Raise InputError where a map is missing, does not fit the mesh, or holds impossible values."""
+    """Raise InputError where a map is missing, does not fit the mesh, or holds
+    impossible values."""
     for name in sorted(p.maps):
         if name not in maps:
-            raise InputError(f"the map {name} is missing", expected="a file with it, given with --maps")
+            raise InputError(
+                f"the map {name} is missing",
+                expected="a file with it, given with --maps",
+            )
         if (shape := maps[name].shape) != (vertices,):
-            raise InputError(f"the map {name} does not fit the mesh", found=shape, expected=f"{vertices} values")
+            raise InputError(
+                f"the map {name} does not fit the mesh",
+                found=shape,
+                expected=f"{vertices} values",
+            )
         if bad := np.count_nonzero(~np.isfinite(maps[name])):
-            raise InputError(f"the map {name} has NaN or infinity", found=f"{bad} of {vertices} values")
-    if problems := [line(problem.key, problem.text) for problem in value_problems(p, p.start_week, maps)]:
+            raise InputError(
+                f"the map {name} has NaN or infinity",
+                found=f"{bad} of {vertices} values",
+            )
+    if problems := [
+        line(problem.key, problem.text)
+        for problem in value_problems(p, p.start_week, maps)
+    ]:
         raise InputError("folding parameters: " + "; ".join(problems))

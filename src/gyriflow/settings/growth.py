@@ -1,4 +1,5 @@
-"""The section `folding.growth`, and the registry of growth models for all parts of gyriflow but the solver."""
+"""The section `folding.growth`, and the registry of growth models for all parts of
+gyriflow but the solver."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -9,7 +10,9 @@ from pydantic import ConfigDict, Field
 from .base import FirstIf, KeyProblem, Settings
 from .weeks import AnyWeek
 
-SizeCurve = Annotated[dict[AnyWeek, Annotated[float, Field(gt=0)]] | Literal["measured"], FirstIf(dict)]
+SizeCurve = Annotated[
+    dict[AnyWeek, Annotated[float, Field(gt=0)]] | Literal["measured"], FirstIf(dict)
+]
 """A size by gestational week, or the curve through the measured brains."""
 SIZES = ("area_cm2", "volume_ml")
 """Keys of the sizes that growth can follow."""
@@ -20,24 +23,27 @@ Origin = Literal["self", "atlas"]
 
 @dataclass(frozen=True)
 class GrowthModel:
-    """Properties of a growth model for configuration, planning, figures and methods text.
+    """Properties of a growth model for configuration, planning, figures and methods
+    text.
 
     Attributes
     ----------
     keys
         Keys of `folding.growth` that a configuration may give for it, besides `model`.
     resolved
-        Further keys of `folding.growth` that only the program gives, in a run's `params.yaml`.
+        Further keys of `folding.growth` that only the program gives, in a run's
+        `params.yaml`.
     rates
         Growth rates of `folding` that it uses.
     measured
-        What it follows of measured brains; a run that follows the observed brains themselves is `explained`, all others
-        are `predicted`.
+        What it follows of measured brains; a run that follows the observed brains
+        themselves is `explained`, all others are `predicted`.
     sentence
-        Returns its sentence of the methods text for a run (with `parameters` and `growth_of`), given how numbers are
-        written.
+        Returns its sentence of the methods text for a run (with `parameters` and
+        `growth_of`), given how numbers are written.
     has_layers
-        Whether cortex and core grow at rates of their own, so that folds depend on the elements through the cortex.
+        Whether cortex and core grow at rates of their own, so that folds depend on the
+        elements through the cortex.
     """
 
     keys: tuple[str, ...]
@@ -49,23 +55,38 @@ class GrowthModel:
 
 
 def _rates_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
-    cortex, core = (number(run["parameters"][f"{name}growth_rate_per_s"]) for name in ("", "core_"))
+    cortex, core = (
+        number(run["parameters"][f"{name}growth_rate_per_s"]) for name in ("", "core_")
+    )
     return f"The cortex grew tangentially at {cortex} per second, the core at {core}."
 
 
 def _sizes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
-    source = f" through brains of several subjects ({run['growth_of']}), {NOT_OWN}" if _of_population(run) else ""
-    return f"Growth rates of cortex and core were set in each step so that area and volume followed curves{source}."
+    source = (
+        f" through brains of several subjects ({run['growth_of']}), {NOT_OWN}"
+        if _of_population(run)
+        else ""
+    )
+    return (
+        "Growth rates of cortex and core were set in each step so that area and volume"
+        f" followed curves{source}."
+    )
 
 
 def _shapes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
     if _of_population(run):
-        target = f"that given by the growth of several subjects ({run['growth_of']}), {NOT_OWN}"
+        target = (
+            f"that given by the growth of several subjects ({run['growth_of']}),"
+            f" {NOT_OWN}"
+        )
     elif run["parameters"]["growth"]["of"] == "atlas":
         target = "that given by the growth of an atlas"
     else:
         target = "its own later shape"
-    return f"In each step the brain grew towards a target shape for the next known week: {target}."
+    return (
+        "In each step the brain grew towards a target shape for the next known week:"
+        f" {target}."
+    )
 
 
 NOT_OWN = "a population's growth and not the subject's own"
@@ -78,12 +99,19 @@ def _of_population(run: Mapping[str, Any]) -> bool:
 GROWTH_MODELS: dict[ModelName, GrowthModel] = {
     "rates": GrowthModel(
         keys=(),
-        rates=("growth_rate_per_s", "radial_growth_rate_per_s", "core_growth_rate_per_s"),
+        rates=(
+            "growth_rate_per_s",
+            "radial_growth_rate_per_s",
+            "core_growth_rate_per_s",
+        ),
         measured=None,
         sentence=_rates_sentence,
     ),
     "sizes": GrowthModel(
-        keys=("thickness_mm", *SIZES), rates=("radial_growth_rate_per_s",), measured="sizes", sentence=_sizes_sentence
+        keys=("thickness_mm", *SIZES),
+        rates=("radial_growth_rate_per_s",),
+        measured="sizes",
+        sentence=_sizes_sentence,
     ),
     "shapes": GrowthModel(
         keys=("of", "thickness_mm"),
@@ -95,29 +123,34 @@ GROWTH_MODELS: dict[ModelName, GrowthModel] = {
     ),
 }
 BEFORE_GW = 1.0
-"""How far before the first week of an atlas a brain may be that is to grow as the atlas does."""
+"""How far before the first week of an atlas a brain may be that is to grow as the atlas
+does."""
 
 
 class Growth(Settings):
-    """The model that the brain grows by; its name alone will do, as in `growth: shapes`."""
+    """The model that the brain grows by; its name alone will do, as in `growth:
+    shapes`."""
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string", "null"]})
     short_key = ("model", str)
 
     model: ModelName = "rates"
-    """`rates`: those of the keys that end with `growth_rate_per_s`; `sizes`: in each step the rates of cortex and
-    core that lead to curves of area and volume, which a brain off its curves joins within a week; `shapes`: in each
-    step what takes the brain to the shape that it is to have by the next known week."""
+    """`rates`: those of the keys that end with `growth_rate_per_s`; `sizes`: in each
+    step the rates of cortex and core that lead to curves of area and volume, which a
+    brain off its curves joins within a week; `shapes`: in each step what takes the
+    brain to the shape that it is to have by the next known week."""
     of: Origin = "self"
-    """With `shapes`, whose these are: of the start's own later brains (`self`), or what the growth of another
-    population, such as an `atlas`, would make of the start: a prediction."""
+    """With `shapes`, whose these are: of the start's own later brains (`self`), or what
+    the growth of another population, such as an `atlas`, would make of the start: a
+    prediction."""
     area_cm2: SizeCurve = "measured"
-    """With `sizes`, pial area of both hemispheres by week, as `{21: 99, 30: 252}`; `measured`: a smooth curve through
-    the brains of the start's growth series. [cm²]"""
+    """With `sizes`, pial area of both hemispheres by week, as `{21: 99, 30: 252}`;
+    `measured`: a smooth curve through the brains of the start's growth series. [cm²]"""
     volume_ml: SizeCurve = "measured"
     """With `sizes`, volume inside the pial surface, likewise. [mL]"""
     thickness_mm: SizeCurve | None = None
-    """With `sizes` and `shapes`, mean cortical thickness, likewise; `null`: the run's `thickness_mm`. [mm]"""
+    """With `sizes` and `shapes`, mean cortical thickness, likewise; `null`: the run's
+    `thickness_mm`. [mm]"""
 
     @property
     def definition(self) -> GrowthModel:
@@ -126,27 +159,41 @@ class Growth(Settings):
 
     @property
     def shapes(self) -> Origin | None:
-        """The source of the shapes that the brain grows towards; None for growth by rates or sizes."""
+        """The source of the shapes that the brain grows towards; None for growth by
+        rates or sizes."""
         return self.of if self.definition.measured == "shapes" else None
 
     @property
     def follows_sizes(self) -> bool:
         """Whether it follows curves of measured area or volume."""
-        return self.definition.measured == "sizes" and "measured" in (self.area_cm2, self.volume_ml)
+        return self.definition.measured == "sizes" and "measured" in (
+            self.area_cm2,
+            self.volume_ml,
+        )
 
     def own_keys(self) -> dict[str, Any]:
         """Return the model and the keys that it uses, in the form of a file."""
-        return self.model_dump(mode="json", include={"model", *self.definition.keys, *self.definition.resolved})
+        return self.model_dump(
+            mode="json",
+            include={"model", *self.definition.keys, *self.definition.resolved},
+        )
 
     def unused_keys(self, used: Collection[str]) -> Iterator[KeyProblem]:
         """Yield the problems of keys that are given but not among those used."""
         for key, field in type(self).model_fields.items():
             if key not in ("model", *used) and getattr(self, key) != field.default:
-                users = [name for name, model in GROWTH_MODELS.items() if key in model.keys]
+                users = [
+                    name for name, model in GROWTH_MODELS.items() if key in model.keys
+                ]
                 remedy = f"remove it, or use the model {' or '.join(users)}"
-                yield KeyProblem(f"is not used by the growth model {self.model}; {remedy}", (key,))
+                yield KeyProblem(
+                    f"is not used by the growth model {self.model}; {remedy}", (key,)
+                )
 
     def problems(self) -> Iterator[KeyProblem]:
         yield from self.unused_keys((*self.definition.keys, *self.definition.resolved))
         if self.of == "atlas" and self.thickness_mm == "measured":
-            yield KeyProblem("is measured on the start's own later brains, unknown to a prediction", ("thickness_mm",))
+            yield KeyProblem(
+                "is measured on the start's own later brains, unknown to a prediction",
+                ("thickness_mm",),
+            )

@@ -8,7 +8,16 @@ from .atlas import AtlasSettings
 from .base import Settings
 from .brains import BrainConfig, ParticipantsSettings
 from .folding import FoldingSettings
-from .runs import CalibrationSettings, GrowthSettings, Run, RunName, Start, StudyName, SweepSettings, complete_runs
+from .runs import (
+    CalibrationSettings,
+    GrowthSettings,
+    Run,
+    RunName,
+    Start,
+    StudyName,
+    SweepSettings,
+    complete_runs,
+)
 from .schemes import SchemeSettings
 from .stages import MeshSettings, MetricsSettings, SurfaceSettings
 
@@ -20,15 +29,18 @@ class Config(Settings):
     """All keys stand in these sections; `folding` is the base of every run."""
 
     brains: tuple[BrainConfig, ...] = ()
-    """The brains: those to fold, and others to compare with and to estimate growth from."""
+    """The brains: those to fold, and others to compare with and to estimate growth
+    from."""
     atlas: tuple[AtlasSettings, ...] = ()
-    """Atlases whose weeks are brains: a name, the `atlas.yaml` of your own, a section, or a list of these."""
+    """Atlases whose weeks are brains: a name, the `atlas.yaml` of your own, a section,
+    or a list of these."""
     participants: ParticipantsSettings | None = None
     """A table of brains, such as the `participants.tsv` of BIDS."""
     schemes: dict[str, SchemeSettings] = Field({})
     """Your own label schemes by name, for the brains' `scheme`."""
     start: Start | None = None
-    """Id of the brain to fold, a list of ids, `first` (of the list, of an atlas the earliest) or `all`."""
+    """Id of the brain to fold, a list of ids, `first` (of the list, of an atlas the
+    earliest) or `all`."""
     surface: SurfaceSettings = SurfaceSettings()
     """Pial surfaces."""
     mesh: MeshSettings = MeshSettings()
@@ -36,11 +48,14 @@ class Config(Settings):
     growth: GrowthSettings = GrowthSettings()
     """Growth rates."""
     folding: FoldingSettings | None = None
-    """Folding simulation; `null`, and no `start` or other key of folding: brains are measured only."""
+    """Folding simulation; `null`, and no `start` or other key of folding: brains are
+    measured only."""
     runs: dict[RunName, Run] = Field({})
-    """Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."""
+    """Runs by name, each with its `start` and what differs from `folding`; `{}`: one
+    run named `reference`."""
     studies: dict[StudyName, SweepSettings] = Field({})
-    """Studies by name: runs that differ in a few parameters, compared with real brains."""
+    """Studies by name: runs that differ in a few parameters, compared with real
+    brains."""
     calibrate: CalibrationSettings | None = None
     """A search for the parameters that meet a real brain best."""
     metrics: MetricsSettings = MetricsSettings()
@@ -51,10 +66,16 @@ class Config(Settings):
     @model_validator(mode="before")
     @classmethod
     def _fill_in_presets(cls, raw: Any) -> Any:
-        is_folded = isinstance(raw, dict) and any(raw.get(section) is not None for section in FOLDING_SECTIONS)
+        is_folded = isinstance(raw, dict) and any(
+            raw.get(section) is not None for section in FOLDING_SECTIONS
+        )
         return complete_runs(raw) if is_folded else raw
 
-    @field_validator("atlas", mode="before", json_schema_input_type=AtlasSettings | tuple[AtlasSettings, ...])
+    @field_validator(
+        "atlas",
+        mode="before",
+        json_schema_input_type=AtlasSettings | tuple[AtlasSettings, ...],
+    )
     @classmethod
     def _one_or_several(cls, value: Any) -> Any:
         return [value] if isinstance(value, str | dict) else value
@@ -68,7 +89,8 @@ class Config(Settings):
 
     @property
     def left_out(self) -> dict[str, dict[str, Any]]:
-        """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
+        """The rows of `participants` that can't be used, by id: their week, if it is
+        known, and the cause."""
         return self._left_out
 
     @property
@@ -79,4 +101,9 @@ class Config(Settings):
     @property
     def measured_only(self) -> "Config":
         """This configuration without simulations."""
-        return self.model_copy(update={name: type(self).model_fields[name].get_default() for name in FOLDING_SECTIONS})
+        return self.model_copy(
+            update={
+                name: type(self).model_fields[name].get_default()
+                for name in FOLDING_SECTIONS
+            }
+        )

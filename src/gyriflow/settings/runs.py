@@ -18,14 +18,16 @@ from .weeks import EndWeek
 ALL = "all"
 """Value of `start` for all brains."""
 FIRST = "first"
-"""Value of `start` for the first of `brains`. The first of an atlas is its earliest week."""
+"""Value of `start` for the first of `brains`. The first of an atlas is its earliest
+week."""
 
 Start = Annotated[tuple[str, ...] | str, FirstIf(list | tuple)]
 """The id of a brain, a list of ids, `first` or `all`."""
 
 RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=MAX_NAME_LENGTH)]
 StudyName = Annotated[str, Field(pattern=r"^[^\W_][\w-]*$", max_length=MAX_NAME_LENGTH)]
-"""Names that are used as folder names: letters, digits and these marks, beginning with a letter or digit."""
+"""Names that are used as folder names: letters, digits and these marks, beginning with
+a letter or digit."""
 
 FREE_GROWTH: dict[str, Any] = {
     "step_s": 86_400.0,
@@ -36,10 +38,12 @@ FREE_GROWTH: dict[str, Any] = {
     "contact": {"kind": "global"},
     "no_growth": {"kind": "none"},
 }
-"""Growth everywhere, a free body, a cortex as stiff as the core: growth makes the folds, not buckling."""
+"""Growth everywhere, a free body, a cortex as stiff as the core: growth makes the
+folds, not buckling."""
 
 PRESETS: dict[str, dict[str, Any]] = {
-    # the paper's model, independent of our defaults; its linear elements are `mesh.order: 1`
+    # the paper's model, independent of our defaults; its linear elements are
+    # `mesh.order: 1`
     "fetalfoldsim": {
         "step_s": 43_200.0,
         "growth": {"model": "rates"},
@@ -54,7 +58,11 @@ PRESETS: dict[str, dict[str, Any]] = {
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
         "contact": {"kind": "planes"},
-        "no_growth": {"kind": "ellipsoid", "shift": [0.05, -0.15], "semi_axes": [0.35, 0.40, 0.50]},
+        "no_growth": {
+            "kind": "ellipsoid",
+            "shift": [0.05, -0.15],
+            "semi_axes": [0.35, 0.40, 0.50],
+        },
     },
     # growth towards the shapes that were measured on the brain's own series
     "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},
@@ -67,24 +75,31 @@ PRESETS: dict[str, dict[str, Any]] = {
 class Run(FoldingSettings):
     """The complete settings of a run: those of `folding`, overridden by its own."""
 
-    model_config = ConfigDict(json_schema_extra={"type": ["object", "null"], "required": []})
+    model_config = ConfigDict(
+        json_schema_extra={"type": ["object", "null"], "required": []}
+    )
 
     start: Start | None = None
-    """Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the study's `start`."""
+    """Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the
+    study's `start`."""
 
     # unlike `folding`, a run may have rates that its growth model does not use
     def problems(self) -> Iterator[KeyProblem]:
         for problem in self.growth.unused_keys(self.growth.definition.keys):
             yield KeyProblem(problem.text, ("growth", *problem.key))
         if self.ensemble is not None and self.growth.definition.measured != "shapes":
-            yield KeyProblem(f"is not used by the growth model {self.growth.model}, only by shapes", ("ensemble",))
+            yield KeyProblem(
+                f"is not used by the growth model {self.growth.model}, only by shapes",
+                ("ensemble",),
+            )
 
 
 def complete_runs(raw: dict[str, Any]) -> dict[str, Any]:
     """Return a configuration, as plain dictionaries, with complete runs and `folding`.
 
-    A run has the keys of `folding`, overridden by its preset, overridden by its own. Keys of `folding` override the
-    preset of `folding`. Values that are not sections are left for validation. Without `runs` there is one, `reference`.
+    A run has the keys of `folding`, overridden by its preset, overridden by its own.
+    Keys of `folding` override the preset of `folding`. Values that are not sections are
+    left for validation. Without `runs` there is one, `reference`.
     """
     folding, runs = raw.get("folding", {}), raw.get("runs") or {"reference": {}}
     if not isinstance(folding, dict) or not isinstance(runs, dict):
@@ -94,27 +109,38 @@ def complete_runs(raw: dict[str, Any]) -> dict[str, Any]:
     for name, run in runs.items():
         own = run or {}
         is_preset = isinstance(own, dict) and "preset" in own
-        inherited = _merged(folding, PRESETS.get(str(own["preset"]), {})) if is_preset else base
+        inherited = (
+            _merged(folding, PRESETS.get(str(own["preset"]), {})) if is_preset else base
+        )
         complete[name] = _merged(inherited, own)
     return raw | {"folding": base, "runs": complete}
 
 
 def _merged(base: Any, over: Any, key: str = "") -> Any:
-    """Return a section with the keys of another on top; inner sections are merged, but not values that vary."""
+    """Return a section with the keys of another on top; inner sections are merged, but
+    not values that vary."""
     if key == "growth":
-        base, over = ({"model": growth} if isinstance(growth, str) else growth for growth in (base, over))
+        base, over = (
+            {"model": growth} if isinstance(growth, str) else growth
+            for growth in (base, over)
+        )
     if not isinstance(base, dict) or not isinstance(over, dict) or key in VARYING:
         return over
     # another growth model has other keys
     if key == "growth" and over.get("model", base.get("model")) != base.get("model"):
         return over
-    return base | {name: _merged(base.get(name), value, name) for name, value in over.items()}
+    return base | {
+        name: _merged(base.get(name), value, name) for name, value in over.items()
+    }
 
 
 def members_of(name: str, run: Run) -> dict[str, Variation]:
-    """Return the variations of a run's ensemble by the name of the member; empty if it has none."""
+    """Return the variations of a run's ensemble by the name of the member; empty if it
+    has none."""
     variations = run.ensemble.variations if run.ensemble else []
-    return {f"{name}-member-{variation.number + 1}": variation for variation in variations}
+    return {
+        f"{name}-member-{variation.number + 1}": variation for variation in variations
+    }
 
 
 def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:
@@ -136,18 +162,20 @@ class GrowthSettings(Settings):
     """The brains on which growth is measured."""
 
     brains: Series | None = None
-    """Ids of the brains whose areas and volumes are used, at two weeks or more; or several such lists by name,
-    `{surface: [...], volume: [...]}`. `null`: all brains. Each subject and each population is then a series, and
-    surfaces (`surface`) and label volumes (`volume`) are separate series if both have two weeks. Only a named series
-    may combine several subjects, such as all: `{cohort: [all]}`."""
+    """Ids of the brains whose areas and volumes are used, at two weeks or more; or
+    several such lists by name, `{surface: [...], volume: [...]}`. `null`: all brains.
+    Each subject and each population is then a series, and surfaces (`surface`) and
+    label volumes (`volume`) are separate series if both have two weeks. Only a named
+    series may combine several subjects, such as all: `{cohort: [all]}`."""
     series: str | None = None
-    """The series, if there are several, that gives measured curves or an atlas' growth. `null`: the start brain's."""
+    """The series, if there are several, that gives measured curves or an atlas' growth.
+    `null`: the start brain's."""
     matched_surfaces: bool = True
-    """Whether surfaces of a series with the same triangles correspond vertex by vertex, so that no registration is
-    needed."""
+    """Whether surfaces of a series with the same triangles correspond vertex by vertex,
+    so that no registration is needed."""
     path_edge_mm: float = Field(0.95, ge=0.5, le=5)
-    """Distance between neighbouring nodes in the cortex of the mesh that an atlas' first brain is carried by through
-    all its weeks, for growth of an atlas. [mm]"""
+    """Distance between neighbouring nodes in the cortex of the mesh that an atlas'
+    first brain is carried by through all its weeks, for growth of an atlas. [mm]"""
 
     @property
     def path_mesh(self) -> MeshSettings:
@@ -163,39 +191,57 @@ class GrowthSettings(Settings):
 
 
 def growth_series(
-    brains: Sequence[BrainConfig], given: Sequence[str] | Mapping[str, Sequence[str]] | None
+    brains: Sequence[BrainConfig],
+    given: Sequence[str] | Mapping[str, Sequence[str]] | None,
 ) -> dict[str, list[str]]:
-    """Return the ids of the brains of each growth series that has two weeks or more, by its name.
+    """Return the ids of the brains of each growth series that has two weeks or more, by
+    its name.
 
-    The names in a checked configuration are those of one series each (see `growing_groups`).
+    The names in a checked configuration are those of one series each (see
+    `growing_groups`).
     """
-    return {name: [brain.id for brain in members] for name, members in growing_groups(brains, given)}
+    return {
+        name: [brain.id for brain in members]
+        for name, members in growing_groups(brains, given)
+    }
 
 
 def growing_groups(
-    brains: Sequence[BrainConfig], given: Sequence[str] | Mapping[str, Sequence[str]] | None
+    brains: Sequence[BrainConfig],
+    given: Sequence[str] | Mapping[str, Sequence[str]] | None,
 ) -> list[tuple[str, Sequence[BrainConfig]]]:
     """Return the name and the brains of each growth series that has two weeks or more.
 
-    `given` is the setting `brains`; its ids must exist. Only a named series may combine several subjects or
-    populations; `all` stands for all brains. Single hemispheres and whole brains are never in one series.
+    `given` is the setting `brains`; its ids must exist. Only a named series may combine
+    several subjects or populations; `all` stands for all brains. Single hemispheres and
+    whole brains are never in one series.
     """
     series: list[tuple[str, Sequence[BrainConfig]]] = []
     if isinstance(given, Mapping):
         for name, ids in given.items():
-            series.append((name, [brain for brain in brains if brain.id in ids or ALL in ids]))
+            series.append(
+                (name, [brain for brain in brains if brain.id in ids or ALL in ids])
+            )
     else:
         groups: dict[tuple[str | None, str | None, str], list[BrainConfig]] = {}
         for brain in brains:
             if given is None or brain.id in given:
                 side = f"{brain.sides[0]} hemisphere" if len(brain.sides) == 1 else ""
-                groups.setdefault((brain.subject, brain.population, side), []).append(brain)
+                groups.setdefault((brain.subject, brain.population, side), []).append(
+                    brain
+                )
         for (subject, population, side), members in groups.items():
             by_kind = _series_by_kind(members)
             for kind, same_kind in by_kind.items():
                 parts = [subject or "", population or "", side]
-                parts += [kind] if len(by_kind) > 1 or not (subject or population) else []
-                name = ", ".join(part for part in parts if part) if len(groups) > 1 else kind
+                parts += (
+                    [kind] if len(by_kind) > 1 or not (subject or population) else []
+                )
+                name = (
+                    ", ".join(part for part in parts if part)
+                    if len(groups) > 1
+                    else kind
+                )
                 series.append((name, same_kind))
     return [(name, members) for name, members in series if _ages(members) > 1]
 
@@ -206,7 +252,11 @@ def _series_by_kind(brains: Sequence[BrainConfig]) -> dict[str, Sequence[BrainCo
     by_kind: dict[str, Sequence[BrainConfig]] = {"surface": surfaces, "volume": volumes}
     present = {kind: members for kind, members in by_kind.items() if members}
     # a kind with a single week can only be compared across kinds
-    return present if len(present) == 1 or all(_ages(members) > 1 for members in present.values()) else {"all": brains}
+    return (
+        present
+        if len(present) == 1 or all(_ages(members) > 1 for members in present.values())
+        else {"all": brains}
+    )
 
 
 def _ages(brains: Sequence[BrainConfig]) -> int:
@@ -217,7 +267,15 @@ def _ages(brains: Sequence[BrainConfig]) -> int:
 
 Value = Annotated[str | float, FirstIf(str)]
 """A value of a parameter that a sweep varies."""
-NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields", "ensemble")
+NOT_VARIED = (
+    "preset",
+    "start",
+    "end_week",
+    "ranks",
+    "output_every_gw",
+    "fields",
+    "ensemble",
+)
 """Keys that do not belong to the model of a run, or that the sweep sets."""
 CURVE_KEYS = tuple(f"growth.{size}" for size in SIZES)
 """Curves that may vary besides those of parameters."""
@@ -234,42 +292,49 @@ class ComparisonSettings(Settings):
     compare_week: EndWeek
     """Week of the comparison, at which the runs end. [GW]"""
     compare_with: tuple[str, ...] | None = None
-    """Ids of the observed brains of that week; `null`: all of the start brain's population, or of any population if
-    it has none."""
+    """Ids of the observed brains of that week; `null`: all of the start brain's
+    population, or of any population if it has none."""
 
 
 class SweepSettings(ComparisonSettings):
-    """A sweep: a run for each combination of the varied values, compared with observed brains of `compare_week`.
+    """A sweep: a run for each combination of the varied values, compared with observed
+    brains of `compare_week`.
 
-    Equal runs are solved once. A run that diverges is reported in the tables; the others continue.
+    Equal runs are solved once. A run that diverges is reported in the tables; the
+    others continue.
     """
 
     vary: dict[str, tuple[Value, ...]]
-    """Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; inner keys with dots
-    (`solver.newton_tolerance`)."""
+    """Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`;
+    inner keys with dots (`solver.newton_tolerance`)."""
     fixed: dict[str, Value] = Field({})
     """Keys of `folding` that are changed in all runs."""
     fixed_at: dict[float, dict[str, Value]] = Field({})
-    """Keys that are changed for one value of the first varied key, such as `{1.5: {step_s: 43200}}`."""
+    """Keys that are changed for one value of the first varied key, such as `{1.5:
+    {step_s: 43200}}`."""
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all keys by which the run with these varied values differs from the base."""
+        """Return all keys by which the run with these varied values differs from the
+        base."""
         at_first = next((self.fixed_at.get(first, {}) for first in values.values()), {})
         return {**self.fixed, **at_first, **values, "end_week": self.compare_week}
 
 
 class CalibrationSettings(ComparisonSettings):
-    """A search for the parameters whose brain is most similar to the observed one of a week.
+    """A search for the parameters whose brain is most similar to the observed one of a
+    week.
 
-    The first round is a scrambled Sobol sequence within the bounds. Later rounds are placed by optuna's tree-structured
-    Parzen estimator, where the best runs are dense. Runs that diverge count as worse than all others. The optimum is
-    the run with the least score.
+    The first round is a scrambled Sobol sequence within the bounds. Later rounds are
+    placed by optuna's tree-structured Parzen estimator, where the best runs are dense.
+    Runs that diverge count as worse than all others. The optimum is the run with the
+    least score.
     """
 
     parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
-    """One to three keys of `folding` with their lowest and highest values, such as `{thickness_mm: [1, 3]}`;
-    inner keys with dots. `stiffness_ratio` is the cortex's shear modulus over the core's; `KEY.amplitude`
-    scales the base run's curve of KEY."""
+    """One to three keys of `folding` with their lowest and highest values, such as
+    `{thickness_mm: [1, 3]}`; inner keys with dots. `stiffness_ratio` is the cortex's
+    shear modulus over the core's; `KEY.amplitude` scales the base run's curve of
+    KEY."""
     score: dict[Score, Annotated[float, Field(gt=0)]]
     """What is minimised: the weights of one or more measures (docs/metrics.md)."""
     rounds: tuple[Annotated[int, Field(ge=1, le=MAX_RUNS)], ...] = (12, 4, 4, 4)
@@ -279,23 +344,41 @@ class CalibrationSettings(ComparisonSettings):
 
     def problems(self) -> Iterator[KeyProblem]:
         if not 1 <= len(self.parameters) <= MAX_PARAMETERS:
-            yield KeyProblem(f"found {len(self.parameters)}; expected 1 to {MAX_PARAMETERS}", ("parameters",))
-        if not self.rounds or self.rounds[0] < MIN_FIRST_ROUND or sum(self.rounds) > MAX_RUNS:
-            text = f"found {list(self.rounds)}; expected at least {MIN_FIRST_ROUND} runs in the first round"
+            yield KeyProblem(
+                f"found {len(self.parameters)}; expected 1 to {MAX_PARAMETERS}",
+                ("parameters",),
+            )
+        if (
+            not self.rounds
+            or self.rounds[0] < MIN_FIRST_ROUND
+            or sum(self.rounds) > MAX_RUNS
+        ):
+            text = (
+                f"found {list(self.rounds)}; expected at least {MIN_FIRST_ROUND} runs"
+                " in the first round"
+            )
             yield KeyProblem(f"{text} and at most {MAX_RUNS} in all", ("rounds",))
         for key, bounds in self.parameters.items():
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 yield KeyProblem(
-                    f"found {list(bounds)}; expected the lowest and the highest value", ("parameters", key)
+                    f"found {list(bounds)}; expected the lowest and the highest value",
+                    ("parameters", key),
                 )
         if not self.score:
-            yield KeyProblem(f"found nothing; expected one or more of {', '.join(SCORES)}", ("score",))
+            yield KeyProblem(
+                f"found nothing; expected one or more of {', '.join(SCORES)}",
+                ("score",),
+            )
 
     @property
     def runs(self) -> dict[str, int]:
         # the round of each run, by name
-        rounds = [number for number, size in enumerate(self.rounds) for _ in range(size)]
-        return {f"calibration-{index:02d}": number for index, number in enumerate(rounds)}
+        rounds = [
+            number for number, size in enumerate(self.rounds) for _ in range(size)
+        ]
+        return {
+            f"calibration-{index:02d}": number for index, number in enumerate(rounds)
+        }
 
 
 def changed(run: Run, changes: Mapping[str, Any]) -> Run:
@@ -316,13 +399,17 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
 
 
 def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the name and the varied values of each run of a sweep, the last key varying fastest."""
+    """Yield the name and the varied values of each run of a sweep, the last key varying
+    fastest."""
     for values in product(*study.vary.values()):
-        texts = [_short(value) if isinstance(value, float) else value for value in values]
+        texts = [
+            _short(value) if isinstance(value, float) else value for value in values
+        ]
         yield "-".join([name, *texts]), dict(zip(study.vary, values, strict=True))
 
 
 def _short(number: float) -> str:
-    """Return a number in six digits, or in as many as it takes to tell it from all others."""
+    """Return a number in six digits, or in as many as it takes to tell it from all
+    others."""
     short = f"{number:g}"
     return short if float(short) == number else repr(number)

@@ -1,4 +1,5 @@
-"""Label schemes: the numbers of a tissue label volume that are cerebrum, cortex, left, right and other tissues.
+"""Label schemes: the numbers of a tissue label volume that are cerebrum, cortex, left,
+right and other tissues.
 
 The shipped schemes are the files of the folder `schemes`, read by `io.yaml_files`.
 """
@@ -11,20 +12,26 @@ from pydantic import Field
 from ..shipped import SHIPPED
 from .base import KeyProblem, Settings
 
-SCHEME_FILES = {path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))}
+SCHEME_FILES = {
+    path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))
+}
 """Files of the shipped schemes, by name."""
 Label = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
 class SchemeSettings(Settings):
-    """Meaning of the labels of a volume; 0 is background. A brain refers to it by `scheme: NAME`."""
+    """Meaning of the labels of a volume; 0 is background. A brain refers to it by
+    `scheme: NAME`."""
 
     cerebrum: tuple[Label, ...]
-    """Labels that together fill the cerebrum inside the pial surface. Not all of them need to occur."""
+    """Labels that together fill the cerebrum inside the pial surface. Not all of them
+    need to occur."""
     cortex: tuple[Label, ...] = ()
-    """Labels of the cortex; at least one must occur. Used to open the fissure and to measure cortical thickness."""
+    """Labels of the cortex; at least one must occur. Used to open the fissure and to
+    measure cortical thickness."""
     left: tuple[Label, ...] = ()
-    """Labels of the left hemisphere only. With `right` they separate the hemispheres."""
+    """Labels of the left hemisphere only. With `right` they separate the
+    hemispheres."""
     right: tuple[Label, ...] = ()
     """Labels of the right hemisphere only."""
     white_matter: tuple[Label, ...] = ()
@@ -32,7 +39,8 @@ class SchemeSettings(Settings):
     ventricles: tuple[Label, ...] = ()
     """Labels of fluid, which is left out where it is not enclosed by tissue."""
     cerebellum: tuple[Label, ...] = ()
-    """Labels of the cerebellum, outside the cerebrum. Used with `brainstem` to determine the pose."""
+    """Labels of the cerebellum, outside the cerebrum. Used with `brainstem` to
+    determine the pose."""
     brainstem: tuple[Label, ...] = ()
     """Labels of the brainstem, outside the cerebrum."""
     known: dict[Label, str] = Field({})
@@ -42,26 +50,53 @@ class SchemeSettings(Settings):
     def labels(self) -> dict[int, str]:
         # a label without a name gets the name of its list
         named = dict.fromkeys(self.cerebrum, "cerebrum")
-        for tissue in ("white_matter", "ventricles", "cortex", "cerebellum", "brainstem"):
+        for tissue in (
+            "white_matter",
+            "ventricles",
+            "cortex",
+            "cerebellum",
+            "brainstem",
+        ):
             named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
         return dict(sorted((named | self.known).items()))
 
     def problems(self) -> Iterator[KeyProblem]:
         if not self.cerebrum:
-            yield KeyProblem("found no labels; it should have one or more", ("cerebrum",))
-        for key in ("cerebrum", "cortex", "left", "right", "white_matter", "ventricles"):
+            yield KeyProblem(
+                "found no labels; it should have one or more", ("cerebrum",)
+            )
+        for key in (
+            "cerebrum",
+            "cortex",
+            "left",
+            "right",
+            "white_matter",
+            "ventricles",
+        ):
             labels = getattr(self, key)
             if twice := sorted({label for label in labels if labels.count(label) > 1}):
                 yield KeyProblem(f"found {_as_text(twice)} more than once", (key,))
             if outside := sorted(set(labels) - set(self.cerebrum)):
-                yield KeyProblem(f"found {_as_text(outside)}; it should have labels of the cerebrum only", (key,))
+                yield KeyProblem(
+                    f"found {_as_text(outside)}; it should have labels of the cerebrum"
+                    " only",
+                    (key,),
+                )
         if self.cortex and set(self.cerebrum) <= set(self.cortex):
-            yield KeyProblem("found all of the cerebrum; the tissue inside the cortex is missing", ("cortex",))
+            yield KeyProblem(
+                "found all of the cerebrum; the tissue inside the cortex is missing",
+                ("cortex",),
+            )
         if both := sorted(set(self.left) & set(self.right)):
-            yield KeyProblem(f"found {_as_text(both)}, which are also in left", ("right",))
+            yield KeyProblem(
+                f"found {_as_text(both)}, which are also in left", ("right",)
+            )
         if bool(self.left) != bool(self.right):
             side = "right" if self.left else "left"
-            yield KeyProblem("is missing; the hemispheres are separated by both left and right", (side,))
+            yield KeyProblem(
+                "is missing; the hemispheres are separated by both left and right",
+                (side,),
+            )
 
 
 class LabelScheme(SchemeSettings):

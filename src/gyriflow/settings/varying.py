@@ -1,4 +1,5 @@
-"""Parameters that may vary in time and space: a number, a curve over weeks, a map over the brain, or both."""
+"""Parameters that may vary in time and space: a number, a curve over weeks, a map over
+the brain, or both."""
 
 import operator
 from collections.abc import Iterator, Mapping
@@ -19,14 +20,16 @@ FileOrPair = Annotated[tuple[InputFile, InputFile] | InputFile, FirstIf(list | t
 
 
 class Varying(Settings):
-    """A parameter that varies: a curve over `weeks`, a `map` over the brain, or their product.
+    """A parameter that varies: a curve over `weeks`, a `map` over the brain, or their
+    product.
 
-    A map is a GIFTI file with a value per vertex of `surface` (or one for each hemisphere), or a NIfTI volume in world
-    coordinates. Maps move with the tissue.
+    A map is a GIFTI file with a value per vertex of `surface` (or one for each
+    hemisphere), or a NIfTI volume in world coordinates. Maps move with the tissue.
     """
 
     weeks: dict[AnyWeek, float] | None = None
-    """Values by week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside. [GW]"""
+    """Values by week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant
+    outside. [GW]"""
     map: FileOrPair | None = None
     """File with the values, or a list of the left and the right one."""
     surface: FileOrPair | None = None
@@ -56,9 +59,16 @@ class Varying(Settings):
         elif surfaces and len(maps) != len(surfaces):
             yield KeyProblem("should have as many files as `map`", ("surface",))
         elif surfaces and any(map(is_volume, maps)):
-            yield KeyProblem("is not used if the map is a volume; remove it", ("surface",))
-        elif not surfaces and (len(maps) > 1 or any(format_of(path, "surface") for path in maps)):
-            yield KeyProblem("is missing; it is the surface that the values of the map belong to", ("surface",))
+            yield KeyProblem(
+                "is not used if the map is a volume; remove it", ("surface",)
+            )
+        elif not surfaces and (
+            len(maps) > 1 or any(format_of(path, "surface") for path in maps)
+        ):
+            yield KeyProblem(
+                "is missing; it is the surface that the values of the map belong to",
+                ("surface",),
+            )
 
 
 def files_of(files: str | tuple[str, str] | None) -> list[str]:
@@ -75,22 +85,31 @@ BOUND_TEXTS = {
     "ge": ("minimum", "greater than or equal to", operator.ge),
     "le": ("maximum", "less than or equal to", operator.le),
 }
-"""Bounds of varying parameters: their names in JSON schemas, in messages, and their operators."""
+"""Bounds of varying parameters: their names in JSON schemas, in messages, and their
+operators."""
 
 
 def varying(default: float, **bounds: float) -> Any:
-    """Return a field for a parameter that may vary; `bounds` (gt, ge, le) apply to each number in it."""
-    return Field(default, json_schema_extra={BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()})
+    """Return a field for a parameter that may vary; `bounds` (gt, ge, le) apply to each
+    number in it."""
+    return Field(
+        default,
+        json_schema_extra={
+            BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()
+        },
+    )
 
 
 def bounds_of(field: FieldInfo) -> dict[str, float]:
-    """Return the bounds (gt, ge, le) of a parameter that may vary; empty for other keys."""
+    """Return the bounds (gt, ge, le) of a parameter that may vary; empty for other
+    keys."""
     extra: Any = field.json_schema_extra or {}
     return {name: extra[key] for name, (key, *_) in BOUND_TEXTS.items() if key in extra}
 
 
 def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
-    """Raise ValueError if a number, or one of a curve without a map, is out of bounds."""
+    """Raise ValueError if a number, or one of a curve without a map, is out of
+    bounds."""
     if isinstance(value, Varying):
         numbers = [] if value.map is not None else list((value.weeks or {}).values())
     else:
@@ -103,16 +122,20 @@ def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
 
 def map_of(value: float | Varying) -> str | None:
     """Return the name of the map of a parameter in a run's parameters, or None."""
-    return value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
+    return (
+        value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
+    )
 
 
 def weeks_of(value: float | Varying) -> dict[float, float]:
-    """Return the curve of a parameter, {week: value} in ascending order; empty if it has none."""
+    """Return the curve of a parameter, {week: value} in ascending order; empty if it
+    has none."""
     return (value.weeks or {}) if isinstance(value, Varying) else {}
 
 
 def curve_at(value: float | Varying, week: float) -> float:
-    """Return the number, or the curve's value at a week: linear in between, constant outside, 1 without a curve."""
+    """Return the number, or the curve's value at a week: linear in between, constant
+    outside, 1 without a curve."""
     if not isinstance(value, Varying):
         return value
     curve = weeks_of(value)
@@ -120,19 +143,26 @@ def curve_at(value: float | Varying, week: float) -> float:
 
 
 def mean_of_curve(value: float | Varying) -> float:
-    """Return the mean of a parameter's curve over its weeks, 1 without a curve: about what its map is multiplied by."""
+    """Return the mean of a parameter's curve over its weeks, 1 without a curve: about
+    what its map is multiplied by."""
     curve = weeks_of(value)
     return float(np.mean([*curve.values()])) if curve else 1.0
 
 
-def value_at(value: float | Varying, week: float, maps: Maps) -> float | NDArray[np.float64]:
-    """Return a parameter's value at a week: a number, or (n,) values if it has a map."""
+def value_at(
+    value: float | Varying, week: float, maps: Maps
+) -> float | NDArray[np.float64]:
+    """Return a parameter's value at a week: a number, or (n,) values if it has a
+    map."""
     name = map_of(value)
     return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
 
 
-def value_range(value: float | Varying, maps: Maps, start: float, end: float) -> tuple[float, float]:
-    """Return the smallest and the largest value of a parameter between two weeks, over all vertices."""
+def value_range(
+    value: float | Varying, maps: Maps, start: float, end: float
+) -> tuple[float, float]:
+    """Return the smallest and the largest value of a parameter between two weeks, over
+    all vertices."""
     name = map_of(value)
     places = np.ones(1) if name is None else maps[name]
     # the extremes of a curve lie at its weeks, or at the ends

@@ -1,4 +1,5 @@
-"""Gestational ages: numbers of weeks, and texts such as 24+3 in configurations, tables and names of files."""
+"""Gestational ages: numbers of weeks, and texts such as 24+3 in configurations, tables
+and names of files."""
 
 import re
 from typing import Annotated, Any, Literal
@@ -18,8 +19,11 @@ NUMBER = re.compile(r"(\d+(?:[.,]\d+)?)(?:gw|w(?:eeks?|ks?)?)?")
 TENTHS = re.compile(r"\d{2}[.,]([0-9])")
 
 
-def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = None) -> tuple[float | None, str]:
-    """Return a gestational age in weeks, rounded to two decimals as in file names, and the problem with it, or ''.
+def read_week(
+    text: str, unit: str = "weeks", notation: WeekNotation | None = None
+) -> tuple[float | None, str]:
+    """Return a gestational age in weeks, rounded to two decimals as in file names, and
+    the problem with it, or ''.
 
     By `notation`, 24.3 is a decimal (default), or 24 weeks and 3 days.
     """
@@ -36,12 +40,19 @@ def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = No
     else:
         return None, f"found {text or 'n/a'}; expected {EXPECTED_AGE}"
     if not WEEK_RANGE[0] <= week <= WEEK_RANGE[1]:
-        return None, f"found {text}; expected gestational weeks, {WEEK_RANGE[0]:g} to {WEEK_RANGE[1]:g}"
+        return (
+            None,
+            (
+                f"found {text}; expected gestational weeks, {WEEK_RANGE[0]:g} to"
+                f" {WEEK_RANGE[1]:g}"
+            ),
+        )
     return round(week, 2), ""
 
 
 def week_of(value: Any) -> Any:
-    """Return the number of weeks that a text gives, such as 22.14 for 22+1; other values unchanged."""
+    """Return the number of weeks that a text gives, such as 22.14 for 22+1; other
+    values unchanged."""
     if not isinstance(value, str):
         return value
     try:
@@ -56,9 +67,16 @@ def week_of(value: Any) -> Any:
 _two_decimals = AfterValidator(lambda week: round(week, 2))
 _InRange = Annotated[float, Field(ge=WEEK_RANGE[0], le=WEEK_RANGE[1])]
 _LaterInRange = Annotated[float, Field(gt=WEEK_RANGE[0], le=WEEK_RANGE[1])]
-AnyWeek = Annotated[_InRange, BeforeValidator(week_of, json_schema_input_type=_InRange | str)]
+AnyWeek = Annotated[
+    _InRange, BeforeValidator(week_of, json_schema_input_type=_InRange | str)
+]
 """A gestational week, such as one that a curve has a value at."""
 Week = Annotated[AnyWeek, _two_decimals]
-"""The week of a brain, rounded to the two decimals of file names and tables: equal weeks are equal numbers."""
-EndWeek = Annotated[_LaterInRange, BeforeValidator(week_of, json_schema_input_type=_LaterInRange | str), _two_decimals]
+"""The week of a brain, rounded to the two decimals of file names and tables: equal
+weeks are equal numbers."""
+EndWeek = Annotated[
+    _LaterInRange,
+    BeforeValidator(week_of, json_schema_input_type=_LaterInRange | str),
+    _two_decimals,
+]
 """The last week of a simulation, rounded likewise."""

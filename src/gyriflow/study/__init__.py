@@ -1,4 +1,5 @@
-"""Studies: load and check a configuration, and resolve it into brains, simulations, sweeps and figures."""
+"""Studies: load and check a configuration, and resolve it into brains, simulations,
+sweeps and figures."""
 
 from .resolve import resolve
 

@@ -1,4 +1,5 @@
-"""Checks of sections against each other: names, starts, runs, growth, metrics, studies, calibration."""
+"""Checks of sections against each other: names, starts, runs, growth, metrics, studies,
+calibration."""
 
 import re
 from collections import Counter
@@ -37,17 +38,32 @@ from ..version import RELEASE
 from .atlases import used_atlases
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
-"""Ids that brains may not have, since they have another meaning in results, tables or settings."""
+"""Ids that brains may not have, since they have another meaning in results, tables or
+settings."""
 RESULT_COLUMNS = re.compile(
     "subject|run|week|(participant_id|session_id|gestational_age|brain)_of_input|(whole|left|right)_(.+_)?("
-    + "|".join(f"{metric.name}_{metric.unit.replace('/', '_per_')}".removesuffix("_1") for metric in METRICS.values())
+    + "|".join(
+        f"{metric.name}_{metric.unit.replace('/', '_per_')}".removesuffix("_1")
+        for metric in METRICS.values()
+    )
     + ")"
 )
 """Columns of `metrics_wide.csv`, which covariates stand in as well."""
 RESERVED_STUDIES = (
-    *("benchmarks", "calibration", "figures", "growth", "logs", "matched", "registration", "tables", "validation"),
+    *(
+        "benchmarks",
+        "calibration",
+        "figures",
+        "growth",
+        "logs",
+        "matched",
+        "registration",
+        "tables",
+        "validation",
+    ),
 )
-"""Names that sweeps may not have, since other results of the study have folders of these names."""
+"""Names that sweeps may not have, since other results of the study have folders of
+these names."""
 NO_FOLDING_KEY = "is not a key of folding"
 
 
@@ -58,22 +74,32 @@ def problems_between(config: Config) -> list[KeyProblem]:
 
 
 def names(config: Config) -> Iterator[KeyProblem]:
-    """Yield problems with the names of brains, runs, studies and schemes. Folders have the names of brains and runs."""
+    """Yield problems with the names of brains, runs, studies and schemes. Folders have
+    the names of brains and runs."""
     if not config.brains and not config.atlas:
-        yield KeyProblem("found nothing; expected a list of brains, each with id, week and a source", ("brains",))
+        yield KeyProblem(
+            "found nothing; expected a list of brains, each with id, week and a source",
+            ("brains",),
+        )
     counts = Counter(brain.id for brain in config.brains)
     for name, count in counts.items():
         if count > 1:
-            yield KeyProblem(f"{count} brains have the id {name}; ids are unique", ("brains",))
+            yield KeyProblem(
+                f"{count} brains have the id {name}; ids are unique", ("brains",)
+            )
         if name in RESERVED_BRAINS:
             yield KeyProblem(f"the id {name} is reserved; choose another", ("brains",))
     for first, second in merged_names(counts, folder_name):
         yield KeyProblem(
-            f"the ids {first} and {second} differ only in case, so some disks mix up their folders; rename one",
+            f"the ids {first} and {second} differ only in case, so some disks mix up"
+            " their folders; rename one",
             ("brains",),
         )
     for first, second in merged_names(config.studies, folder_name):
-        text = f"differs from the study {first} only in case, so some disks mix up their folders; rename one"
+        text = (
+            f"differs from the study {first} only in case, so some disks mix up their"
+            " folders; rename one"
+        )
         yield KeyProblem(text, ("studies", second))
     reserved = {"runs": (MEASURED,), "schemes": tuple(SCHEMES)}
     for section, taken in reserved.items():
@@ -82,16 +108,25 @@ def names(config: Config) -> Iterator[KeyProblem]:
     for name in config.studies:
         if folder_name(name) in RESERVED_STUDIES:
             yield KeyProblem("the name is taken; choose another", ("studies", name))
-    covariates = {name: number for number, brain in reversed([*enumerate(config.brains)]) for name in brain.covariates}
+    covariates = {
+        name: number
+        for number, brain in reversed([*enumerate(config.brains)])
+        for name in brain.covariates
+    }
     for name, number in covariates.items():
         if RESULT_COLUMNS.fullmatch(name):
-            text = "is the name of a column of the results (metrics_wide.csv); rename the covariate"
+            text = (
+                "is the name of a column of the results (metrics_wide.csv); rename the"
+                " covariate"
+            )
             yield KeyProblem(text, ("brains", number, "covariates", name))
     schemes = dict.fromkeys([*SCHEMES, *config.schemes])
     for number, brain in enumerate(config.brains):
         if brain.scheme not in (None, *schemes):
             expected = f"expected one of {', '.join(schemes)}, or a name of schemes"
-            yield KeyProblem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
+            yield KeyProblem(
+                f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme")
+            )
 
 
 def starts(config: Config) -> Iterator[KeyProblem]:
@@ -100,10 +135,16 @@ def starts(config: Config) -> Iterator[KeyProblem]:
     for name, run in config.runs.items():
         yield from _start_problems(run.start, config, ("runs", name, "start"))
     if config.start is None and any(run.start is None for run in config.runs.values()):
-        yield KeyProblem("is missing; it is the id of the brain that is folded, a list of ids, or all", ("start",))
+        yield KeyProblem(
+            "is missing; it is the id of the brain that is folded, a list of ids,"
+            " or all",
+            ("start",),
+        )
 
 
-def _start_problems(start: Start | None, config: Config, key: Key) -> Iterator[KeyProblem]:
+def _start_problems(
+    start: Start | None, config: Config, key: Key
+) -> Iterator[KeyProblem]:
     if start is None or start in (ALL, FIRST) or not config.brains:
         return
     ids = [start] if isinstance(start, str) else list(start)
@@ -118,7 +159,10 @@ def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[KeyProble
     brains = [brain.id for brain in config.brains]
     for name in dict.fromkeys(ids):
         if name not in brains:
-            yield KeyProblem(f"found {name!r}, which is not a brain; {did_you_mean(name, brains)}", key)
+            yield KeyProblem(
+                f"found {name!r}, which is not a brain; {did_you_mean(name, brains)}",
+                key,
+            )
 
 
 def runs(config: Config) -> Iterator[KeyProblem]:
@@ -126,7 +170,9 @@ def runs(config: Config) -> Iterator[KeyProblem]:
     by_id = {brain.id: brain for brain in config.brains}
     for name, run in config.runs.items():
         brains = [by_id[brain] for brain in starts_of(config.start, run, list(by_id))]
-        weeks = [(brain.week, f"the week of the start brain {brain.id}") for brain in brains]
+        weeks = [
+            (brain.week, f"the week of the start brain {brain.id}") for brain in brains
+        ]
         # without a start brain, check the values at the end
         for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
             for problem in value_problems(run, week, {}, called):
@@ -135,22 +181,31 @@ def runs(config: Config) -> Iterator[KeyProblem]:
             value = getattr(run, key)
             if isinstance(value, Varying) and value.surface is not None:
                 ids = ", ".join(brain.id for brain in brains)
-                text = f"has a map on a surface, which belongs to one brain; the run starts from {ids}"
+                text = (
+                    "has a map on a surface, which belongs to one brain; the run"
+                    f" starts from {ids}"
+                )
                 yield KeyProblem(text, _place(name, (key,), config))
 
 
 def run_names(config: Config) -> Iterator[KeyProblem]:
-    """Yield runs with the name of another one. Runs of all sections have folders next to each other."""
+    """Yield runs with the name of another one. Runs of all sections have folders next
+    to each other."""
     earlier: dict[str, tuple[str, str]] = {}
     for name, owner, key in _named_runs(config):
         first, of = earlier.setdefault(folder_name(name), (name, owner))
         if (first, of) != (name, owner):
             pair = f"the run {name} of {owner} and the run {first} of {of}"
-            yield KeyProblem(f"{pair} would share a folder; choose names that differ, not only in case", key)
+            yield KeyProblem(
+                f"{pair} would share a folder; choose names that differ, not only in"
+                " case",
+                key,
+            )
 
 
 def _named_runs(config: Config) -> Iterator[tuple[str, str, Key]]:
-    """Yield each run's name, what it is of, and the key with which its name is changed."""
+    """Yield each run's name, what it is of, and the key with which its name is
+    changed."""
     for name in config.calibrate.runs if config.calibrate else ():
         yield name, "the calibration", ("calibrate",)
     for run, settings in config.runs.items():
@@ -165,37 +220,64 @@ def _named_runs(config: Config) -> Iterator[tuple[str, str, Key]]:
 
 def _place(run: str, key: Key, config: Config) -> Key:
     values = [getattr(settings, str(key[0])) for settings in config.runs.values()]
-    return ("folding", *key) if all(value == values[0] for value in values) else ("runs", run, *key)
+    return (
+        ("folding", *key)
+        if all(value == values[0] for value in values)
+        else ("runs", run, *key)
+    )
 
 
 def growth(config: Config) -> Iterator[KeyProblem]:
     """Yield problems between brains and growth series."""
     growth_brains = config.growth.brains
     named = dict(growth_brains) if isinstance(growth_brains, Mapping) else {}
-    lists: dict[Key, Sequence[str]] = {("growth", "brains", name): ids for name, ids in named.items()}
+    lists: dict[Key, Sequence[str]] = {
+        ("growth", "brains", name): ids for name, ids in named.items()
+    }
     if growth_brains is not None and not named:
         lists = {("growth", "brains"): list(growth_brains)}
     all_ids = [brain.id for brain in config.brains]
-    lists = {key: all_ids if named and ALL in ids else ids for key, ids in lists.items()}
-    unknown = [problem for key, ids in lists.items() for problem in _unknown(ids, config, key)]
+    lists = {
+        key: all_ids if named and ALL in ids else ids for key, ids in lists.items()
+    }
+    unknown = [
+        problem for key, ids in lists.items() for problem in _unknown(ids, config, key)
+    ]
     yield from unknown
     if unknown:
         return
     for key, ids in lists.items():
         brains = [config.brain(brain) for brain in ids]
         if (weeks := len({brain.week for brain in brains})) < 2:
-            yield KeyProblem(f"found brains of {weeks} week(s); growth needs two or more", key)
-        mixed = sorted({brain.population or "of no known population" for brain in brains})
+            yield KeyProblem(
+                f"found brains of {weeks} week(s); growth needs two or more", key
+            )
+        mixed = sorted(
+            {brain.population or "of no known population" for brain in brains}
+        )
         if named and len(mixed) > 1:
-            yield KeyProblem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", key)
+            yield KeyProblem(
+                f"found brains {' and '.join(mixed)}; a growth curve is of one"
+                " population",
+                key,
+            )
     names = [name for name, _ in growing_groups(config.brains, config.growth.brains)]
     for name, count in Counter(names).items():
         if count > 1:
-            text = f"{count} growth series would have the name {name}; rename a subject or a population"
+            text = (
+                f"{count} growth series would have the name {name}; rename a subject or"
+                " a population"
+            )
             yield KeyProblem(text, ("growth", "brains"))
-    series, preferred = growth_series(config.brains, config.growth.brains), config.growth.series
+    series, preferred = (
+        growth_series(config.brains, config.growth.brains),
+        config.growth.series,
+    )
     if preferred is not None and series and preferred not in series:
-        yield KeyProblem(f"found {preferred!r}; the series are {', '.join(series)}", ("growth", "series"))
+        yield KeyProblem(
+            f"found {preferred!r}; the series are {', '.join(series)}",
+            ("growth", "series"),
+        )
 
 
 def norm_settings(config: Config) -> dict[str, Any]:
@@ -206,31 +288,44 @@ def norm_settings(config: Config) -> dict[str, Any]:
         "norms": 2,
         "open_sulci": config.surface.open_sulci,
         "edge_length_mm": config.surface.edge_length_mm,
-        **config.metrics.model_dump(mode="json", include={"curvature_radius_mm", "spangy_modes", "spangy_mass"}),
+        **config.metrics.model_dump(
+            mode="json", include={"curvature_radius_mm", "spangy_modes", "spangy_mass"}
+        ),
         "spectra": "mean_curvature",
         "schemes": sorted({brain.scheme for brain in config.brains if brain.scheme}),
     }
 
 
 def _norms_problems(path: str, expected: Mapping[str, Any]) -> Iterator[str]:
-    """Yield in what the norms of a file cannot be used with the expected `norm_settings`."""
+    """Yield in what the norms of a file cannot be used with the expected
+    `norm_settings`."""
     try:
         content = read_json(path)
     except InputError as error:
         yield str(error)
         return
     found = content.get("made_with") if isinstance(content, dict) else None
-    if not isinstance(found, dict) or not isinstance(content.get("norms"), list) or not content["norms"]:
+    if (
+        not isinstance(found, dict)
+        or not isinstance(content.get("norms"), list)
+        or not content["norms"]
+    ):
         yield f"{path}: expected the results/study/norms.json of a study"
         return
     for name, value in expected.items():
         # a study may have fewer label schemes than the cohort
-        if found.get(name) != value and not (name == "schemes" and set(value) <= set(found.get(name, ()))):
-            yield f"{path}: made with other settings; found {name}: {found.get(name)}; expected {value}, as here"
+        if found.get(name) != value and not (
+            name == "schemes" and set(value) <= set(found.get(name, ()))
+        ):
+            yield (
+                f"{path}: made with other settings; found {name}: {found.get(name)};"
+                f" expected {value}, as here"
+            )
 
 
 def metrics(config: Config) -> Iterator[KeyProblem]:
-    """Yield unknown brains in the settings of metrics, and scans of a subject in the same week."""
+    """Yield unknown brains in the settings of metrics, and scans of a subject in the
+    same week."""
     settings = config.metrics
     atlases = {used.atlas.name for used in used_atlases(config)}
     norm = [name for name in settings.norm_reference or () if name not in atlases]
@@ -239,21 +334,41 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
         for problem in _norms_problems(settings.norms, norm_settings(config)):
             yield KeyProblem(problem, ("metrics", "norms"))
     yield from _unknown(settings.regions, config, ("metrics", "regions"))
-    names = [name for given in settings.regions.values() for name in given.names.values()]
+    names = [
+        name for given in settings.regions.values() for name in given.names.values()
+    ]
     for first, second in merged_names(names, column_part):
-        text = f"found {first!r} and {second!r}, which are one column of metrics_wide.csv; rename one"
-        yield KeyProblem(text, ("metrics", "regions"))
-    yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
-    # regions are carried, and their asymmetry measured, on both hemispheres together
-    if wrong := [brain.id for brain in config.brains if brain.id in settings.regions and brain.hemisphere is not None]:
-        yield KeyProblem(
-            f"found {', '.join(wrong)} with one hemisphere; expected brains with both", ("metrics", "regions")
+        text = (
+            f"found {first!r} and {second!r}, which are one column of metrics_wide.csv;"
+            " rename one"
         )
-    scans = Counter((brain.subject, brain.week) for brain in config.brains if brain.subject is not None)
+        yield KeyProblem(text, ("metrics", "regions"))
+    yield from _unknown(
+        [settings.template] if settings.template else (),
+        config,
+        ("metrics", "template"),
+    )
+    # regions are carried, and their asymmetry measured, on both hemispheres together
+    if wrong := [
+        brain.id
+        for brain in config.brains
+        if brain.id in settings.regions and brain.hemisphere is not None
+    ]:
+        yield KeyProblem(
+            f"found {', '.join(wrong)} with one hemisphere; expected brains with both",
+            ("metrics", "regions"),
+        )
+    scans = Counter(
+        (brain.subject, brain.week)
+        for brain in config.brains
+        if brain.subject is not None
+    )
     for (subject, week), count in scans.items():
         if count > 1:
             yield KeyProblem(
-                f"found {count} scans of the subject {subject} in week {week:g}; expected one", ("brains",)
+                f"found {count} scans of the subject {subject} in week {week:g};"
+                " expected one",
+                ("brains",),
             )
 
 
@@ -268,18 +383,41 @@ def studies(config: Config) -> Iterator[KeyProblem]:
 
 def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyProblem]:
     if not study.vary:
-        yield KeyProblem("found nothing; expected keys of folding with lists of values", (*key, "vary"))
+        yield KeyProblem(
+            "found nothing; expected keys of folding with lists of values",
+            (*key, "vary"),
+        )
     for value in study.fixed_at:
         if value not in next(iter(study.vary.values()), ()):
-            yield KeyProblem(f"found {value:g}; expected a value of the first varied key", (*key, "fixed_at"))
+            yield KeyProblem(
+                f"found {value:g}; expected a value of the first varied key",
+                (*key, "fixed_at"),
+            )
     for varied, values in study.vary.items():
         if not values or len(set(values)) < len(values):
-            yield KeyProblem(f"found {list(values)}; expected one or more values, each once", (*key, "vary", varied))
-    fixed_at = {name: value for settings in study.fixed_at.values() for name, value in settings.items()}
-    sections: dict[str, Mapping[str, object]] = {"vary": study.vary, "fixed": study.fixed, "fixed_at": fixed_at}
-    places = {name: (*key, section, name) for section, names in sections.items() for name in names}
+            yield KeyProblem(
+                f"found {list(values)}; expected one or more values, each once",
+                (*key, "vary", varied),
+            )
+    fixed_at = {
+        name: value
+        for settings in study.fixed_at.values()
+        for name, value in settings.items()
+    }
+    sections: dict[str, Mapping[str, object]] = {
+        "vary": study.vary,
+        "fixed": study.fixed,
+        "fixed_at": fixed_at,
+    }
+    places = {
+        name: (*key, section, name)
+        for section, names in sections.items()
+        for name in names
+    }
     if wrong := [name for name in places if name in NOT_VARIED]:
-        yield KeyProblem("cannot differ within a study; choose another base", places[wrong[0]])
+        yield KeyProblem(
+            "cannot differ within a study; choose another base", places[wrong[0]]
+        )
         return
     for _, combination in variants("", study):
         try:
@@ -296,17 +434,35 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
                 yield KeyProblem(problem.text, (*key, "vary", *problem.key))
 
 
-def _comparison_problems(settings: ComparisonSettings, config: Config, key: Key) -> Iterator[KeyProblem]:
-    weeks, week = {brain.id: brain.week for brain in config.brains}, settings.compare_week
+def _comparison_problems(
+    settings: ComparisonSettings, config: Config, key: Key
+) -> Iterator[KeyProblem]:
+    weeks, week = (
+        {brain.id: brain.week for brain in config.brains},
+        settings.compare_week,
+    )
     if settings.base not in config.runs:
-        yield KeyProblem(f"found {settings.base!r}; expected a run: {', '.join(config.runs)}", (*key, "base"))
+        yield KeyProblem(
+            f"found {settings.base!r}; expected a run: {', '.join(config.runs)}",
+            (*key, "base"),
+        )
     for brain in settings.compare_with or ():
         if weeks.get(brain) != week:
-            what = f"of {weeks[brain]:g} GW" if brain in weeks else "which is not a brain"
-            yield KeyProblem(f"found {brain}, {what}; expected brains of {week:g} GW", (*key, "compare_with"))
+            what = (
+                f"of {weeks[brain]:g} GW" if brain in weeks else "which is not a brain"
+            )
+            yield KeyProblem(
+                f"found {brain}, {what}; expected brains of {week:g} GW",
+                (*key, "compare_with"),
+            )
     if settings.compare_with is None and week not in weeks.values():
-        available = ", ".join(f"{other_week:g}" for other_week in sorted(set(weeks.values())))
-        yield KeyProblem(f"found {week:g}; there are brains of {available} GW to compare with", (*key, "compare_week"))
+        available = ", ".join(
+            f"{other_week:g}" for other_week in sorted(set(weeks.values()))
+        )
+        yield KeyProblem(
+            f"found {week:g}; there are brains of {available} GW to compare with",
+            (*key, "compare_week"),
+        )
 
 
 def calibration(config: Config) -> Iterator[KeyProblem]:

@@ -25,30 +25,50 @@ PREDICTION_TESTS = str(SHIPPED / "norms" / "predictions.yaml")
 
 def file_of(pattern: str, **names: str | float) -> str:
     """Return the file of a pattern; weeks have two decimals, such as "21.50"."""
-    return pattern.format(**{key: name if isinstance(name, str) else week_tag(name) for key, name in names.items()})
+    return pattern.format(
+        **{
+            key: name if isinstance(name, str) else week_tag(name)
+            for key, name in names.items()
+        }
+    )
 
 
 def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:
-    """Return the surface files of a brain in a folder, by part: the whole and its hemispheres."""
-    return {"whole": f"{folder}/pial.surf.gii", **{side: f"{folder}/{side}.pial.surf.gii" for side in sides}}
+    """Return the surface files of a brain in a folder, by part: the whole and its
+    hemispheres."""
+    return {
+        "whole": f"{folder}/pial.surf.gii",
+        **{side: f"{folder}/{side}.pial.surf.gii" for side in sides},
+    }
 
 
 def pial_of(*sides: Side) -> dict[str, str]:
     """Return the surface files of a brain with some hemispheres, for any source."""
     folder = f"{BRAIN}/surface"
-    return {**surfaces_in(folder, sides), "stl": f"{folder}/pial.stl", "report": f"{folder}/surface.json"}
+    return {
+        **surfaces_in(folder, sides),
+        "stl": f"{folder}/pial.stl",
+        "report": f"{folder}/surface.json",
+    }
 
 
 def folded_of(*sides: Side) -> dict[str, str]:
-    """Return the surfaces of a simulated brain at a week with some hemispheres, and its thickness."""
+    """Return the surfaces of a simulated brain at a week with some hemispheres, and its
+    thickness."""
     folder = f"{RUN}/surfaces/{WEEK}"
     return {**surfaces_in(folder, sides), "thickness": f"{folder}/thickness.shape.gii"}
 
 
 def measures_in(folder: str, *sides: Side) -> dict[str, str]:
-    """Return the tables of a measured or simulated brain in a folder, and the maps on its hemispheres."""
-    tables = {name: f"{folder}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
-    return {**tables, **{f"{side}_maps": f"{folder}/{side}.shape.gii" for side in sides}}
+    """Return the tables of a measured or simulated brain in a folder, and the maps on
+    its hemispheres."""
+    tables = {
+        name: f"{folder}/{name}.csv" for name in ("metrics", "spectra", "coefficients")
+    }
+    return {
+        **tables,
+        **{f"{side}_maps": f"{folder}/{side}.shape.gii" for side in sides},
+    }
 
 
 TEMPLATE_MAPS = f"{PLACE}/{{side}}.template.shape.gii"
@@ -56,8 +76,11 @@ TEMPLATE_MAPS = f"{PLACE}/{{side}}.template.shape.gii"
 
 
 def white_of(*sides: Side) -> dict[str, str]:
-    """Return the files of white surfaces of hemispheres, of the maps on them, and of their metrics."""
-    surfaces = {f"{side}_surface": f"{BRAIN}/surface/{side}.white.surf.gii" for side in sides}
+    """Return the files of white surfaces of hemispheres, of the maps on them, and of
+    their metrics."""
+    surfaces = {
+        f"{side}_surface": f"{BRAIN}/surface/{side}.white.surf.gii" for side in sides
+    }
     maps = {f"{side}_maps": f"{BRAIN}/metrics/{side}.white.shape.gii" for side in sides}
     return {**surfaces, **maps, "metrics": f"{BRAIN}/metrics/white.csv"}
 
@@ -77,9 +100,11 @@ THICKNESS = {
 }
 FILLED_LABELS = f"{BRAIN}/surface/filled.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
-REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
-VARIED_REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}/smoothing-{{smoothing}}.seed-{{seed}}.h5"
-"""A registration with a factor of its smoothing, and labels perturbed with a seed (0: unchanged)."""
+REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}"
+REGISTERED = f"{REGISTRATION}.h5"
+VARIED_REGISTRATION = f"{REGISTRATION}/smoothing-{{smoothing}}.seed-{{seed}}.h5"
+"""A registration with a factor of its smoothing, and labels perturbed with a seed (0:
+unchanged)."""
 MESH = {
     "mesh": f"{BRAIN}/mesh/brain.xdmf",
     "data": f"{BRAIN}/mesh/brain.h5",
@@ -89,10 +114,14 @@ MESH = {
 TARGETS = f"{BRAIN}/mesh/targets.{{origin}}.h5"
 PATH_MESH = {name: f"{BRAIN}/path/{PurePath(file).name}" for name, file in MESH.items()}
 ATLAS_PATH = f"{BRAIN}/path/shapes.h5"
-"""Shapes of the mesh of an atlas' first brain through all its weeks, on which other brains are carried."""
+"""Shapes of the mesh of an atlas' first brain through all its weeks, on which other
+brains are carried."""
 
 GROWTH = {name: f"{STUDY}/growth/{name}.csv" for name in ("areas", "rates")}
-CURVES = {"curves": f"{STUDY}/growth/curves.csv", "errors": f"{STUDY}/growth/curve_errors.csv"}
+CURVES = {
+    "curves": f"{STUDY}/growth/curves.csv",
+    "errors": f"{STUDY}/growth/curve_errors.csv",
+}
 
 PARAMETERS = f"{RUN}/params.yaml"
 MAPS = f"{RUN}/folding/maps.h5"
@@ -111,34 +140,45 @@ PREPARED = {
     for name in ("observed", "start", "adjacent")
     for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
 }
-"""Surfaces that all runs from a start brain are compared with in a week, prepared for comparison, with curvature."""
+"""Surfaces that all runs from a start brain are compared with in a week, prepared for
+comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
 ATLAS_BRAIN = f"{RUN}/surfaces/{WEEK}/atlas.pial.surf.gii"
-"""The atlas' own brain for comparison with a prediction: aligned with it, with its volume."""
+"""The atlas' own brain for comparison with a prediction: aligned with it, with its
+volume."""
 ENSEMBLE_MAPS = f"{RUN}/metrics/{WEEK}/{{side}}.ensemble.shape.gii"
 """Maps of the spread of an ensemble on a hemisphere."""
 GROWTH_SD = f"{RUN}/surfaces/growth_sd.shape.gii"
 """Standard deviation of the growth maps of an ensemble."""
 ENSEMBLE = f"{RUN}/metrics/ensemble.csv"
 """Intervals of a run with an ensemble."""
-DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}
+DEVIATION = {
+    "table": f"{RUN}/metrics/{WEEK}/deviation.csv",
+    "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii",
+}
 VALIDATION = f"{RUN}/metrics/validation.csv"
 COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}/comparison.csv"
 MEMBER_COEFFICIENTS = f"{SWEEP}/members/{{run}}/{{brain}}/coefficients.csv"
 
 
 def one_of(names: Iterable[str]) -> str:
-    """Return a pattern that matches exactly these names, or nothing if there are none."""
+    """Return a pattern that matches exactly these names, or nothing if there are
+    none."""
     return "|".join(map(re.escape, names)) or r"(?!)"
 
 
 def log_of(rule: str, pattern: str) -> str:
-    """Return the log of a rule that makes a file: named by the rule and the wildcards that are not in the folder.
+    """Return the log of a rule that makes a file: named by the rule and the wildcards
+    that are not in the folder.
 
     Commas part the values of the wildcards, since ids of brains may contain dots.
     """
     folders = (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT, PLACE)
     folder = next(place for place in folders if pattern.startswith(f"{place}/"))
-    wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)}", pattern) if f"{{{name}}}" not in folder]
+    wildcards = [
+        f"{{{name}}}"
+        for name in re.findall(r"{(\w+)}", pattern)
+        if f"{{{name}}}" not in folder
+    ]
     name = f"{rule}.{','.join(wildcards)}" if wildcards else rule
     return f"{folder}/logs/{name}.log"

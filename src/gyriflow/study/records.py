@@ -1,4 +1,5 @@
-"""Records of a study: brains, simulations and sweeps as the configuration defines them, with their files."""
+"""Records of a study: brains, simulations and sweeps as the configuration defines them,
+with their files."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,9 +21,10 @@ from . import paths
 class Measurement:
     """The files of one measured brain, observed or simulated.
 
-    `where` is the folder of its metrics under `results`, `surfaces` that of its surfaces. `subject` is the brain's id,
-    for a simulated brain that of the start; `run` is "real" for observed brains. Files of thickness, report (volumes of
-    tissues) and regions (by side) are empty if they are not made.
+    `where` is the folder of its metrics under `results`, `surfaces` that of its
+    surfaces. `subject` is the brain's id, for a simulated brain that of the start;
+    `run` is "real" for observed brains. Files of thickness, report (volumes of tissues)
+    and regions (by side) are empty if they are not made.
     """
 
     where: str
@@ -66,17 +68,21 @@ class Measurement:
     @property
     def halves_with_regions(self) -> list[list[str]]:
         """Its hemispheres, each with its regions."""
-        return [list(pair) for pair in zip(self.hemispheres, self.regions.values(), strict=True)]
+        return [
+            list(pair)
+            for pair in zip(self.hemispheres, self.regions.values(), strict=True)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
 class Brain:
     """A brain of the study; `config` is its entry in the configuration.
 
-    `labels` is None if it is defined by surfaces. `has_thickness`, `has_white`: there are results for its cortical
-    thickness and its white surfaces, from labels or from white surfaces of the configuration. `regions_from` is the
-    source of its regions: given for this brain, carried from another brain, or None without regions. `checksums` has
-    atlas and SHA-256 of its files that belong to an atlas, by path.
+    `labels` is None if it is defined by surfaces. `has_thickness`, `has_white`: there
+    are results for its cortical thickness and its white surfaces, from labels or from
+    white surfaces of the configuration. `regions_from` is the source of its regions:
+    given for this brain, carried from another brain, or None without regions.
+    `checksums` has atlas and SHA-256 of its files that belong to an atlas, by path.
     """
 
     config: BrainConfig
@@ -110,12 +116,15 @@ class Brain:
     @property
     def population(self) -> str:
         """Its population in tables; "synthetic" or "unknown" if none is named."""
-        return self.config.population or ("synthetic" if self.config.synthetic else "unknown")
+        return self.config.population or (
+            "synthetic" if self.config.synthetic else "unknown"
+        )
 
     def comparable(self, brains: Iterable["Brain"]) -> list["Brain"]:
         """Return the brains with the same hemispheres, population and subject.
 
-        A brain without a population or subject, as of an atlas, may be compared with any.
+        A brain without a population or subject, as of an atlas, may be compared with
+        any.
         """
         population, subject = self.config.population, self.config.subject
         return [
@@ -123,13 +132,19 @@ class Brain:
             for brain in brains
             if brain.sides == self.sides
             and population in (None, brain.config.population)
-            and (None in (subject, brain.config.subject) or brain.config.subject == subject)
+            and (
+                None in (subject, brain.config.subject)
+                or brain.config.subject == subject
+            )
         ]
 
     @property
     def registered(self) -> LabelSource:
-        """The volume for its registration: its labels, or those that its surfaces are filled with."""
-        return self.labels or LabelSource(paths.FILLED_LABELS.format(brain=self.id), "auto", FILLED)
+        """The volume for its registration: its labels, or those that its surfaces are
+        filled with."""
+        return self.labels or LabelSource(
+            paths.FILLED_LABELS.format(brain=self.id), "auto", FILLED
+        )
 
     @property
     def pial(self) -> str:
@@ -147,7 +162,11 @@ class Brain:
 
     @property
     def regions(self) -> Mapping[str, str]:
-        return paths.region_files(f"results/brains/{self.id}/metrics") if self.has_regions else {}
+        return (
+            paths.region_files(f"results/brains/{self.id}/metrics")
+            if self.has_regions
+            else {}
+        )
 
     @cached_property
     def measurement(self) -> Measurement:
@@ -158,7 +177,11 @@ class Brain:
             week=self.week,
             sides=self.sides,
             surfaces=f"results/brains/{self.id}/surface",
-            thickness=paths.THICKNESS["measured"].format(brain=self.id) if self.has_thickness else [],
+            thickness=(
+                paths.THICKNESS["measured"].format(brain=self.id)
+                if self.has_thickness
+                else []
+            ),
             report=self.report,
             regions=self.regions,
         )
@@ -168,13 +191,16 @@ class Brain:
 class Simulation:
     """A run from one start brain.
 
-    The first of the output `weeks` is that of the start brain. `series` is the growth series with curves of sizes for
-    the start. `base` is the run whose maps it uses: its own or the calibration's.
+    The first of the output `weeks` is that of the start brain. `series` is the growth
+    series with curves of sizes for the start. `base` is the run whose maps it uses: its
+    own or the calibration's.
 
-    `observed_brains` are the observed brains of its later weeks, by week, scans of the start's own subject first.
-    `observed`: the brain each week is compared with. `kind` is `explained` if that brain's growth was an input, else
-    `predicted`. `is_atlas_prediction`: growth came from another population only, without later brains of the start's.
-    A member of an ensemble is a simulation itself, with `member_of` the name of its run.
+    `observed_brains` are the observed brains of its later weeks, by week, scans of the
+    start's own subject first. `observed`: the brain each week is compared with. `kind`
+    is `explained` if that brain's growth was an input, else `predicted`.
+    `is_atlas_prediction`: growth came from another population only, without later
+    brains of the start's. A member of an ensemble is a simulation itself, with
+    `member_of` the name of its run.
     """
 
     run: str
@@ -192,14 +218,19 @@ class Simulation:
 
     @property
     def shapes(self) -> Origin | None:
-        """The source of the shapes that it grows towards; None for growth by rates or sizes."""
+        """The source of the shapes that it grows towards; None for growth by rates or
+        sizes."""
         return self.settings.growth.shapes
 
     @property
     def curves(self) -> str | list[str]:
         """The table of the curves of measured sizes, if it follows one."""
         growth = self.settings.growth
-        return paths.CURVES["curves"] if growth.follows_sizes or growth.thickness_mm == "measured" else []
+        return (
+            paths.CURVES["curves"]
+            if growth.follows_sizes or growth.thickness_mm == "measured"
+            else []
+        )
 
     @property
     def ensemble(self) -> tuple[str, ...]:
@@ -208,8 +239,13 @@ class Simulation:
 
     @property
     def chain(self) -> str | None:
-        """The name of the brains that its growth is measured on, or None (see `Study.chains`)."""
-        return f"{self.shapes}.{self.run}" if self.shapes and self.member_of else self.shapes
+        """The name of the brains that its growth is measured on, or None (see
+        `Study.chains`)."""
+        return (
+            f"{self.shapes}.{self.run}"
+            if self.shapes and self.member_of
+            else self.shapes
+        )
 
     @property
     def names(self) -> dict[str, str]:
@@ -222,8 +258,12 @@ class Simulation:
 
     @property
     def observed_with_start(self) -> dict[float, Brain]:
-        """The first observed brain of each week, with the start brain at its own week."""
-        return {self.weeks[0]: self.start, **{week: brains[0] for week, brains in self.observed_brains.items()}}
+        """The first observed brain of each week, with the start brain at its own
+        week."""
+        return {
+            self.weeks[0]: self.start,
+            **{week: brains[0] for week, brains in self.observed_brains.items()},
+        }
 
     @property
     def followed_series(self) -> str | None:
@@ -232,8 +272,13 @@ class Simulation:
 
     @property
     def targets(self) -> str | list[str]:
-        """The file with the shapes that the run grows towards; empty if there are none."""
-        return paths.TARGETS.format(brain=self.start.id, origin=self.chain) if self.chain else []
+        """The file with the shapes that the run grows towards; empty if there are
+        none."""
+        return (
+            paths.TARGETS.format(brain=self.start.id, origin=self.chain)
+            if self.chain
+            else []
+        )
 
     @property
     def atlas_surface(self) -> str:
@@ -249,12 +294,21 @@ class Simulation:
     def mapped(self) -> dict[str, Varying]:
         """Its parameters that have a map."""
         values = {name: getattr(self.settings, name) for name in VARYING}
-        return {name: value for name, value in values.items() if isinstance(value, Varying) and value.map is not None}
+        return {
+            name: value
+            for name, value in values.items()
+            if isinstance(value, Varying) and value.map is not None
+        }
 
     @property
     def maps(self) -> str | list[str]:
-        """The file with the maps of its parameters and its target shapes; empty if it has neither."""
-        return paths.MAPS.format(run=self.base, brain=self.start.id) if self.shapes or self.mapped else []
+        """The file with the maps of its parameters and its target shapes; empty if it
+        has neither."""
+        return (
+            paths.MAPS.format(run=self.base, brain=self.start.id)
+            if self.shapes or self.mapped
+            else []
+        )
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -262,17 +316,24 @@ class Simulation:
 
         The number of ranks is left out, since results do not depend on it.
         """
-        settings = self.settings.model_dump(mode="json", exclude={"ranks", "start", "ensemble"})
+        settings = self.settings.model_dump(
+            mode="json", exclude={"ranks", "start", "ensemble"}
+        )
         settings["growth"] = self.settings.growth.own_keys()
         for name in VARYING:
             if isinstance(value := getattr(self.settings, name), Varying):
                 curve = {"weeks": value.weeks} if value.weeks else {}
-                settings[name] = curve | ({"map": name} if value.map is not None else {})
+                settings[name] = curve | (
+                    {"map": name} if value.map is not None else {}
+                )
         return settings
 
     def at(self, week: float) -> Measurement:
         """Return the measurement of the simulated brain at a week."""
-        metrics, week_folder = f"runs/{self.run}/{self.start.id}/metrics", paths.file_of(paths.WEEK, week=week)
+        metrics, week_folder = (
+            f"runs/{self.run}/{self.start.id}/metrics",
+            paths.file_of(paths.WEEK, week=week),
+        )
         surfaces = f"{self.file(paths.RUN)}/surfaces/{week_folder}"
         return Measurement(
             where=f"{metrics}/{week_folder}",
@@ -284,7 +345,9 @@ class Simulation:
             thickness=f"{surfaces}/thickness.shape.gii",
             report=[],
             # the regions of a run are the same at all its weeks
-            regions=paths.region_files(f"results/{metrics}") if self.has_regions else {},
+            regions=(
+                paths.region_files(f"results/{metrics}") if self.has_regions else {}
+            ),
         )
 
     @property
@@ -299,10 +362,12 @@ class Simulation:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep (key `studies`): runs that differ in a few parameters, compared with observed brains of one week.
+    """A sweep (key `studies`): runs that differ in a few parameters, compared with
+    observed brains of one week.
 
-    `members` are its simulations with the varied values, in order. `observed` are the brains that simulations from a
-    start brain are compared with, by the id of the start brain.
+    `members` are its simulations with the varied values, in order. `observed` are the
+    brains that simulations from a start brain are compared with, by the id of the start
+    brain.
     """
 
     name: str
@@ -313,9 +378,11 @@ class Sweep:
 
 @dataclass(frozen=True)
 class CalibrationRuns:
-    """Rounds of runs that differ from `base`. The parameters of a round depend on the scores of earlier rounds.
+    """Rounds of runs that differ from `base`. The parameters of a round depend on the
+    scores of earlier rounds.
 
-    `rounds` has the round of each run, `observed` the target brains by the id of the start brain.
+    `rounds` has the round of each run, `observed` the target brains by the id of the
+    start brain.
     """
 
     base: tuple[Simulation, ...]
@@ -324,7 +391,11 @@ class CalibrationRuns:
 
     def scores_before(self, number: int) -> list[str]:
         """Return the score files of all runs in earlier rounds."""
-        return [f"{paths.CALIBRATION}/scores/{run}.csv" for run, run_round in self.rounds.items() if run_round < number]
+        return [
+            f"{paths.CALIBRATION}/scores/{run}.csv"
+            for run, run_round in self.rounds.items()
+            if run_round < number
+        ]
 
     def design(self, run: str) -> str:
         """Return the table with the parameters of all runs in the round of a run."""

@@ -1,4 +1,5 @@
-"""Growth series of a study, and the brains of them that growth for a start brain is measured on."""
+"""Growth series of a study, and the brains of them that growth for a start brain is
+measured on."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,15 +17,17 @@ from .paths import MATCHED, REGISTERED, VARIED_REGISTRATION
 from .records import Brain
 
 UNVARIED = (1.0, 0)
-"""Factor of the smoothing and seed of the perturbed labels of registrations, but for those of ensembles."""
+"""Factor of the smoothing and seed of the perturbed labels of registrations, but for
+those of ensembles."""
 
 
 @dataclass(frozen=True)
 class Series:
     """The brains of each growth series, by name in the order of the configuration.
 
-    `preferred` is the series to choose if several are possible. `matched` has the ids of brains with vertex-matched
-    surfaces, by series; `unmatched` has the reasons why other series of surfaces are not matched.
+    `preferred` is the series to choose if several are possible. `matched` has the ids
+    of brains with vertex-matched surfaces, by series; `unmatched` has the reasons why
+    other series of surfaces are not matched.
     """
 
     brains: Mapping[str, tuple[Brain, ...]]
@@ -33,26 +36,33 @@ class Series:
     unmatched: Mapping[str, str]
 
     def with_brain(self, brain: Brain) -> str:
-        """Return the series that contains a brain (the preferred one of several), or ""."""
+        """Return the series that contains a brain (the preferred one of several), or
+        ""."""
         names = [name for name, brains in self.brains.items() if brain in brains]
         return min(names, key=lambda name: name != self.preferred, default="")
 
     def for_sizes(self, brain: Brain) -> str | None:
-        """Return the series whose curves a start brain follows: the preferred one, its own, or the only other one.
+        """Return the series whose curves a start brain follows: the preferred one, its
+        own, or the only other one.
 
         A series of scans of another subject is used only if it is preferred.
         """
         if self.preferred is not None:
             return self.preferred if self.preferred in self.brains else None
         own = [name for name, brains in self.brains.items() if brain in brains]
-        populations = [name for name in self.brains if not self._is_single_subject(name)]
+        populations = [
+            name for name in self.brains if not self._is_single_subject(name)
+        ]
         return next(iter(own or (populations if len(populations) == 1 else [])), None)
 
-    def from_other_populations(self, start: Brain, *, all_atlases: bool = False) -> list[str]:
-        """Return the series of other populations with a brain's hemispheres; only the preferred one, if among them.
+    def from_other_populations(
+        self, start: Brain, *, all_atlases: bool = False
+    ) -> list[str]:
+        """Return the series of other populations with a brain's hemispheres; only the
+        preferred one, if among them.
 
-        A series of scans of another subject is returned only if it is preferred. With `all_atlases`, all others are
-        returned as well, the preferred one first.
+        A series of scans of another subject is returned only if it is preferred. With
+        `all_atlases`, all others are returned as well, the preferred one first.
         """
         population = start.config.population
         names = [
@@ -61,7 +71,10 @@ class Series:
             if start not in brains
             and (name == self.preferred or not self._is_single_subject(name))
             and all(brain.sides == start.sides for brain in brains)
-            and all(population is None or brain.config.population != population for brain in brains)
+            and all(
+                population is None or brain.config.population != population
+                for brain in brains
+            )
         ]
         names.sort(key=lambda name: name != self.preferred)
         return names[:1] if self.preferred in names and not all_atlases else names
@@ -72,44 +85,69 @@ class Series:
 
     def are_matched(self, *brains: Brain) -> bool:
         """Return whether brains have surfaces with the same vertices."""
-        return any({brain.id for brain in brains} <= ids for ids in self.matched.values())
+        return any(
+            {brain.id for brain in brains} <= ids for ids in self.matched.values()
+        )
 
-    def correspondence(self, earlier: Brain, later: Brain, variation: tuple[float, int] = UNVARIED) -> str:
-        """Return the file with the correspondence of two brains, by matched vertices or by registration.
+    def correspondence(
+        self, earlier: Brain, later: Brain, variation: tuple[float, int] = UNVARIED
+    ) -> str:
+        """Return the file with the correspondence of two brains, by matched vertices or
+        by registration.
 
-        `variation` is the factor of a registration's smoothing, and the seed of its perturbed labels.
+        `variation` is the factor of a registration's smoothing, and the seed of its
+        perturbed labels.
         """
         if self.are_matched(earlier, later):
             file = MATCHED
         else:
             file = REGISTERED if variation == UNVARIED else VARIED_REGISTRATION
         smoothing, seed = variation
-        return file.format(earlier=earlier.id, later=later.id, smoothing=smoothing, seed=seed)
+        return file.format(
+            earlier=earlier.id, later=later.id, smoothing=smoothing, seed=seed
+        )
 
     def posed(self, *pair: Brain) -> list[bool]:
-        """Return for each of two brains whether their correspondence refers to the pose of its surface.
+        """Return for each of two brains whether their correspondence refers to the pose
+        of its surface.
 
-        This is the case for masks made from surfaces. Otherwise it refers to the world coordinates of its files.
+        This is the case for masks made from surfaces. Otherwise it refers to the world
+        coordinates of its files.
         """
-        return [not brain.config.has_labels and not self.are_matched(*pair) for brain in pair]
+        return [
+            not brain.config.has_labels and not self.are_matched(*pair)
+            for brain in pair
+        ]
 
 
 def several_subjects(brains: Iterable[Brain]) -> bool:
-    """Return whether brains have different subjects. Brains without a subject, as of an atlas, count as one."""
+    """Return whether brains have different subjects. Brains without a subject, as of an
+    atlas, count as one."""
     return len({brain.config.subject for brain in brains}) > 1
 
 
-def series_of(config: Config, brains: Mapping[str, Brain], atlases: Iterable[UsedAtlas]) -> Series:
+def series_of(
+    config: Config, brains: Mapping[str, Brain], atlases: Iterable[UsedAtlas]
+) -> Series:
     """Return the growth series of a configuration, limited to the given brains.
 
-    Surfaces are read to find out whether their vertices are matched. For atlas files that have yet to be downloaded,
-    the description of the atlas decides.
+    Surfaces are read to find out whether their vertices are matched. For atlas files
+    that have yet to be downloaded, the description of the atlas decides.
     """
-    names = growth_series([brain.config for brain in brains.values()], config.growth.brains)
-    assumed = {str(file.path) for used in atlases for file in used.missing if used.atlas.series[file.series].matched}
+    names = growth_series(
+        [brain.config for brain in brains.values()], config.growth.brains
+    )
+    assumed = {
+        str(file.path)
+        for used in atlases
+        for file in used.missing
+        if used.atlas.series[file.series].matched
+    }
     matched, unmatched = {}, {}
     for name, ids in names.items():
-        members = sorted((brains[brain].config for brain in ids), key=lambda brain: brain.week)
+        members = sorted(
+            (brains[brain].config for brain in ids), key=lambda brain: brain.week
+        )
         if not any(brain.has_labels or brain.synthetic for brain in members):
             cause: str | None = "growth.matched_surfaces is false"
             if config.growth.matched_surfaces:
@@ -118,15 +156,20 @@ def series_of(config: Config, brains: Mapping[str, Brain], atlases: Iterable[Use
                 matched[name] = frozenset(ids)
             else:
                 unmatched[name] = cause
-    series = {name: tuple(brains[brain] for brain in ids) for name, ids in names.items()}
+    series = {
+        name: tuple(brains[brain] for brain in ids) for name, ids in names.items()
+    }
     return Series(series, config.growth.series, matched, unmatched)
 
 
-def unmatched_reason(brains: Sequence[BrainConfig], assumed: Collection[str] = ()) -> str | None:
+def unmatched_reason(
+    brains: Sequence[BrainConfig], assumed: Collection[str] = ()
+) -> str | None:
     """Return why the surfaces of brains are not vertex-matched, or None if they are.
 
-    They are matched if all brains have surface files of the same kind, with as many vertices and the same triangles for
-    each hemisphere. Files in `assumed` count as matched and may not exist yet.
+    They are matched if all brains have surface files of the same kind, with as many
+    vertices and the same triangles for each hemisphere. Files in `assumed` count as
+    matched and may not exist yet.
     """
     # imported here, since few configurations need it
     from ..io.surfaces import connectivity
@@ -134,8 +177,14 @@ def unmatched_reason(brains: Sequence[BrainConfig], assumed: Collection[str] = (
     first = brains[0]
     for brain in brains:
         if brain.source != first.source:
-            return f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
-    read = [brain for brain in brains if not assumed or not all(path in assumed for path in brain.files)]
+            return (
+                f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
+            )
+    read = [
+        brain
+        for brain in brains
+        if not assumed or not all(path in assumed for path in brain.files)
+    ]
     try:
         sides = [[connectivity(Path(path)) for path in brain.files] for brain in read]
     except InputError as error:
@@ -154,20 +203,22 @@ def unmatched_reason(brains: Sequence[BrainConfig], assumed: Collection[str] = (
 
 
 MAX_BEYOND_ATLAS_GW = 0.5
-"""How far the growth of an atlas is extrapolated for members of an ensemble that are older than stated."""
+"""How far the growth of an atlas is extrapolated for members of an ensemble that are
+older than stated."""
 
 
 @dataclass(frozen=True)
 class Chain:
-    """A start brain and the brains of a growth series through which its mesh is carried, one for each week.
+    """A start brain and the brains of a growth series through which its mesh is
+    carried, one for each week.
 
-    `correspondences` are the files that map each brain to the next; `posed` is for each of both whether the map
-    refers to its posed surface (True) or to the coordinates of its files. `variation` is that of a member of an
-    ensemble.
+    `correspondences` are the files that map each brain to the next; `posed` is for each
+    of both whether the map refers to its posed surface (True) or to the coordinates of
+    its files. `variation` is that of a member of an ensemble.
 
-    Growth of an atlas is that along its `path`, the chain of all its weeks from its own first brain; only the first
-    correspondence leads there, from the start to the atlas' brain of its week. Shapes are also computed for
-    `further_weeks`.
+    Growth of an atlas is that along its `path`, the chain of all its weeks from its own
+    first brain; only the first correspondence leads there, from the start to the atlas'
+    brain of its week. Shapes are also computed for `further_weeks`.
     """
 
     origin: Origin
@@ -188,24 +239,33 @@ class Chain:
 
     @property
     def pairs(self) -> list[tuple[tuple[Brain, Brain], list[bool]]]:
-        """The pairs of brains that correspond, those of its path included, and whether each map is posed."""
+        """The pairs of brains that correspond, those of its path included, and whether
+        each map is posed."""
         own = list(zip(pairwise(self.brains), self.posed, strict=False))
         return own + (self.path.pairs if self.path else [])
 
 
 def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
-    """Return the weeks of brains, not shapes, that simulations from a start brain are compared with."""
-    observed = [brain for brain in start.comparable(brains) if not brain.config.synthetic]
+    """Return the weeks of brains, not shapes, that simulations from a start brain are
+    compared with."""
+    observed = [
+        brain for brain in start.comparable(brains) if not brain.config.synthetic
+    ]
     return sorted({brain.week for brain in observed if brain.week > start.week})
 
 
-def chains_of(start: Brain, end: float, series: Series, brains: Sequence[Brain]) -> dict[tuple[str, str], Chain]:
-    """Return the brains on which growth for a start brain is measured up to a week, by its id and their origin."""
+def chains_of(
+    start: Brain, end: float, series: Series, brains: Sequence[Brain]
+) -> dict[tuple[str, str], Chain]:
+    """Return the brains on which growth for a start brain is measured up to a week, by
+    its id and their origin."""
     atlases = series.from_other_populations(start)
     name = atlases[0] if len(atlases) == 1 else None
     atlas = _along_path(start, start.week, end, name, series)
     observed = later_observed_weeks(start, brains)
-    further = tuple(week for week in observed if week <= end and week not in atlas.weeks[1:])
+    further = tuple(
+        week for week in observed if week <= end and week not in atlas.weeks[1:]
+    )
     return {
         (start.id, "self"): _chain("self", _own_chain(start, end, series), series),
         (start.id, "atlas"): replace(atlas, further_weeks=further),
@@ -213,16 +273,23 @@ def chains_of(start: Brain, end: float, series: Series, brains: Sequence[Brain])
 
 
 def member_chain(
-    run: str, start: Brain, settings: Run, variation: Variation, series: Series, brains: Sequence[Brain]
+    run: str,
+    start: Brain,
+    settings: Run,
+    variation: Variation,
+    series: Series,
+    brains: Sequence[Brain],
 ) -> Chain:
-    """Return the chain of a member of a run's ensemble. InputError if it is that of the run."""
+    """Return the chain of a member of a run's ensemble. InputError if it is that of the
+    run."""
     end, varied = settings.end_week, (variation.registration_smoothing, variation.seed)
     if settings.growth.shapes == "self":
         chain = _chain("self", _own_chain(start, end, series), series, varied)
         if chain.later and chain == _chain("self", chain.brains, series):
             raise InputError(
-                f"the members of the ensemble of run {run} would be equal: the surfaces of "
-                f"{start.id} and its later brains are matched by their vertices, so no registration can be varied",
+                f"the members of the ensemble of run {run} would be equal: the surfaces"
+                f" of {start.id} and its later brains are matched by their vertices, so"
+                " no registration can be varied",
                 remedy="Remove ensemble, or set growth.matched_surfaces to false.",
             )
         # ages of one series have the same error
@@ -235,9 +302,14 @@ def member_chain(
     name = names[variation.number % len(names)]
     atlas_weeks = [brain.week for brain in series.brains[name]]
     # the age of the whole run is shifted, as far as the atlas goes, or a little further
-    low, high = min(atlas_weeks) - BEFORE_GW - start.week, max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
+    low, high = (
+        min(atlas_weeks) - BEFORE_GW - start.week,
+        max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end,
+    )
     shift = round(min(max(variation.age_shift_gw, low), high), 2)
-    further = sorted({*(week for week in later_observed_weeks(start, brains) if week <= end), end})
+    further = sorted(
+        {*(week for week in later_observed_weeks(start, brains) if week <= end), end}
+    )
     return replace(
         _along_path(start, start.week + shift, end + shift, name, series, varied),
         further_weeks=tuple(further),
@@ -245,11 +317,21 @@ def member_chain(
     )
 
 
-def _chain(origin: Origin, brains: Sequence[Brain], series: Series, variation: tuple[float, int] = UNVARIED) -> Chain:
+def _chain(
+    origin: Origin,
+    brains: Sequence[Brain],
+    series: Series,
+    variation: tuple[float, int] = UNVARIED,
+) -> Chain:
     """Return a chain, with smoothing and seed of its registrations."""
     pairs = list(pairwise(brains))
     correspondences = tuple(series.correspondence(*pair, variation) for pair in pairs)
-    return Chain(origin, tuple(brains), correspondences, tuple(series.posed(*pair) for pair in pairs))
+    return Chain(
+        origin,
+        tuple(brains),
+        correspondences,
+        tuple(series.posed(*pair) for pair in pairs),
+    )
 
 
 def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
@@ -259,36 +341,56 @@ def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
 
 
 def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
-    """Return a start brain and later brains of its growth series, one a week, up to the first at or past an end week.
+    """Return a start brain and later brains of its growth series, one a week, up to the
+    first at or past an end week.
 
     All have label volumes, or surfaces with the same vertices.
     """
     # scans of the same subject come first in a population's series
-    members = sorted(series.brains.get(series.with_brain(start), ()), key=lambda brain: brain.subject != start.subject)
+    members = sorted(
+        series.brains.get(series.with_brain(start), ()),
+        key=lambda brain: brain.subject != start.subject,
+    )
     # growth up to the end week needs the first brain at or past it
     last = min((brain.week for brain in members if brain.week >= end), default=end)
     by_week = {start.week: start}
     for brain in members:
         have_labels = start.config.has_labels and brain.config.has_labels
-        if start.week < brain.week <= last and (have_labels or series.are_matched(start, brain)):
+        if start.week < brain.week <= last and (
+            have_labels or series.are_matched(start, brain)
+        ):
             by_week.setdefault(brain.week, brain)
     return sorted(by_week.values(), key=lambda brain: brain.week)
 
 
 def _along_path(
-    start: Brain, week: float, end: float, name: str | None, series: Series, variation: tuple[float, int] = UNVARIED
+    start: Brain,
+    week: float,
+    end: float,
+    name: str | None,
+    series: Series,
+    variation: tuple[float, int] = UNVARIED,
 ) -> Chain:
-    """Return the chain of a start brain of a week by the growth of a series of another population, if there is one.
+    """Return the chain of a start brain of a week by the growth of a series of another
+    population, if there is one.
 
-    Its brains, one for each week, begin with the last week up to that of the start (else with the first week), and end
-    with the first week at or past an end week. There are at least two weeks, if available.
+    Its brains, one for each week, begin with the last week up to that of the start
+    (else with the first week), and end with the first week at or past an end week.
+    There are at least two weeks, if available.
     """
     members = series.brains[name] if name else ()
-    weekly = sorted({brain.week: brain for brain in members}.values(), key=lambda brain: brain.week)
+    weekly = sorted(
+        {brain.week: brain for brain in members}.values(), key=lambda brain: brain.week
+    )
     if not weekly:
         return _chain("atlas", [start], series)
-    first = max((brain.week for brain in weekly if brain.week <= week), default=weekly[0].week)
-    last = min((brain.week for brain in weekly if brain.week >= end and brain.week > first), default=end)
+    first = max(
+        (brain.week for brain in weekly if brain.week <= week), default=weekly[0].week
+    )
+    last = min(
+        (brain.week for brain in weekly if brain.week >= end and brain.week > first),
+        default=end,
+    )
     brains = (start, *(brain for brain in weekly if first <= brain.week <= last))
     to_atlas = _chain("atlas", brains[:2], series, variation)
     return replace(to_atlas, brains=brains, path=_chain("self", weekly, series))

@@ -1,4 +1,5 @@
-"""Isosurfaces of masks: right size, outward, in world coordinates; handles are cut or filled with the least change."""
+"""Isosurfaces of masks: right size, outward, in world coordinates; handles are cut or
+filled with the least change."""
 
 from itertools import permutations
 
@@ -34,13 +35,17 @@ def ball():
 
 @pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, 1)])
 def test_ball_has_its_area_volume_and_place(ball, signs):
-    affine = rigid(10, 35, -20, shift=(5, -7, 11)) @ np.diag([*np.multiply(signs, 0.8), 1.0])
+    affine = rigid(10, 35, -20, shift=(5, -7, 11)) @ np.diag(
+        [*np.multiply(signs, 0.8), 1.0]
+    )
     surface = isosurface(smooth_mask(ball, 1.0), affine)
     radius = 0.8 * RADIUS
     assert is_closed(surface)
     assert signed_volume(surface) == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.03)
     assert area(surface) == pytest.approx(4 * np.pi * radius**2, rel=0.02)
-    assert surface.vertices.mean(axis=0) == pytest.approx(affine[:3, :3] @ np.full(3, 17.5) + affine[:3, 3], abs=0.05)
+    assert surface.vertices.mean(axis=0) == pytest.approx(
+        affine[:3, :3] @ np.full(3, 17.5) + affine[:3, 3], abs=0.05
+    )
 
 
 @pytest.mark.parametrize("factor", [2, 3])
@@ -49,8 +54,12 @@ def test_refined_field_stays_in_its_place(ball, factor):
     field, fine = refine(smooth_mask(ball, 1.0), affine, factor)
     assert field.shape == tuple(factor * n for n in ball.shape)
     surface = isosurface(field, fine)
-    assert surface.vertices.mean(axis=0) == pytest.approx(affine[:3, :3] @ np.full(3, 17.5), abs=0.01)
-    assert signed_volume(surface) == pytest.approx(signed_volume(isosurface(smooth_mask(ball, 1.0), affine)), rel=0.01)
+    assert surface.vertices.mean(axis=0) == pytest.approx(
+        affine[:3, :3] @ np.full(3, 17.5), abs=0.01
+    )
+    assert signed_volume(surface) == pytest.approx(
+        signed_volume(isosurface(smooth_mask(ball, 1.0), affine)), rel=0.01
+    )
 
 
 def test_crumbs_are_dropped_but_never_a_hemisphere():
@@ -147,17 +156,29 @@ def tunnel():
 
 
 # one layer of the tunnel's four voxels closes it
-@pytest.mark.parametrize(("mask", "cut", "filled"), [(bridge(two_blocks()), 1, 0), (tunnel(), 0, 4)])
-def test_a_thin_bridge_is_cut_and_a_narrow_tunnel_filled_with_the_least_change(mask, cut, filled):
+@pytest.mark.parametrize(
+    ("mask", "cut", "filled"), [(bridge(two_blocks()), 1, 0), (tunnel(), 0, 4)]
+)
+def test_a_thin_bridge_is_cut_and_a_narrow_tunnel_filled_with_the_least_change(
+    mask, cut, filled
+):
     assert handles(mask) == 1
     repaired, counts = without_handles(field(mask))
-    assert (counts["handles_left"], counts["bridges_cut"], counts["tunnels_filled"]) == (0, cut > 0, filled > 0)
-    assert (counts["voxels_cut_from_bridges"], counts["voxels_filled_in_tunnels"]) == (cut, filled)
+    assert (
+        counts["handles_left"],
+        counts["bridges_cut"],
+        counts["tunnels_filled"],
+    ) == (0, cut > 0, filled > 0)
+    assert (counts["voxels_cut_from_bridges"], counts["voxels_filled_in_tunnels"]) == (
+        cut,
+        filled,
+    )
     assert ((repaired > 0.5) != mask).sum() == cut + filled
 
 
 def test_storage_order_does_not_decide_which_of_two_bridges_is_cut():
-    # two plates joined by two equal posts are one handle; the post with values nearer to one half gives way
+    # two plates joined by two equal posts are one handle; the post with values nearer
+    # to one half gives way
     values = np.full((18, 36, 20), 0.3, dtype=np.float32)
     values[4:14, 4:32, 4:7] = values[4:14, 4:32, 13:16] = 0.7
     values[7, 8, 7:13], values[10, 26, 7:13] = 0.7, 0.6
@@ -165,7 +186,9 @@ def test_storage_order_does_not_decide_which_of_two_bridges_is_cut():
         for flipped in np.ndindex(2, 2, 2):
             turned = np.flip(values.transpose(axes), np.flatnonzero(flipped))
             repaired, counts = without_handles(turned)
-            found = np.flip(repaired, np.flatnonzero(flipped)).transpose(np.argsort(axes))
+            found = np.flip(repaired, np.flatnonzero(flipped)).transpose(
+                np.argsort(axes)
+            )
             assert (counts["bridges_cut"], counts["handles_left"]) == (1, 0)
             assert (found[7, 8, 7:13] > 0.5).all()
             assert (found[10, 26, 7:13] > 0.5).sum() == 5
@@ -191,8 +214,14 @@ def test_isosurface_has_the_topology_of_voxels_joined_by_faces(seed):
 
 @pytest.mark.parametrize("radius", [1.0, 1.5, 3.0, 4.5, 6.0])
 def test_dilation_reaches_as_far_as_the_radius(radius):
-    mask = np.pad(ndimage.gaussian_filter(np.random.default_rng(0).normal(size=(12, 16, 20)), 1.0) > 0.15, 5)
-    np.testing.assert_array_equal(dilated(mask, radius), ndimage.distance_transform_edt(~mask) <= radius)
+    mask = np.pad(
+        ndimage.gaussian_filter(np.random.default_rng(0).normal(size=(12, 16, 20)), 1.0)
+        > 0.15,
+        5,
+    )
+    np.testing.assert_array_equal(
+        dilated(mask, radius), ndimage.distance_transform_edt(~mask) <= radius
+    )
 
 
 def test_a_bridge_is_cut_though_what_it_joins_meets_far_away_only():
@@ -201,4 +230,8 @@ def test_a_bridge_is_cut_though_what_it_joins_meets_far_away_only():
     # a loop that is longer than the boxes in which its ends are looked for
     mask[8, 140, 8:12] = True
     _, counts = without_handles(field(mask))
-    assert (counts["handles_left"], counts["bridges_cut"], counts["voxels_cut_from_bridges"]) == (0, 1, 1)
+    assert (
+        counts["handles_left"],
+        counts["bridges_cut"],
+        counts["voxels_cut_from_bridges"],
+    ) == (0, 1, 1)

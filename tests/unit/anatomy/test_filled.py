@@ -1,11 +1,21 @@
-"""Labels filled from surfaces of known shape, and their registration with a brain of labels in another pose."""
+"""Labels filled from surfaces of known shape, and their registration with a brain of
+labels in another pose."""
 
 import numpy as np
 import pytest
 from atlas_brains import atlas_labels
 from facts import Facts
 from scipy.linalg import polar
-from shapes import cerebrum_surface, ellipsoid, inner, moved, octasphere, phantom, rigid, sphere
+from shapes import (
+    cerebrum_surface,
+    ellipsoid,
+    inner,
+    moved,
+    octasphere,
+    phantom,
+    rigid,
+    sphere,
+)
 
 from gyriflow.anatomy.fissure import split
 from gyriflow.anatomy.thickness import filled_labels
@@ -13,7 +23,13 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.deformations import carry, transform_points
 from gyriflow.geometry.matching import nearest_on
-from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, transformed, volume_ml
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    flipped,
+    merged,
+    transformed,
+    volume_ml,
+)
 from gyriflow.growth.registration import channels, register_and_measure, require_good
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.schemes import FILLED
@@ -28,38 +44,55 @@ def millilitres(labels, affine):
 
 
 @pytest.mark.parametrize("has_white", [True, False])
-def test_cortex_and_inside_have_the_volumes_between_and_within_known_surfaces(has_white):
+def test_cortex_and_inside_have_the_volumes_between_and_within_known_surfaces(
+    has_white,
+):
     whole = ellipsoid(HALF_AXES, 4)
     white = inner(whole, CORTEX_MM)
     # its triangles may be in either order
     whites = [flipped(white)] if has_white else []
     more = {} if has_white else {"thickness_mm": CORTEX_MM}
-    cortex, inside = millilitres(*filled_labels(whole, split(whole, 0.0), 0.0, whites=whites, voxel_mm=1.0, **more))
+    cortex, inside = millilitres(
+        *filled_labels(
+            whole, split(whole, 0.0), 0.0, whites=whites, voxel_mm=1.0, **more
+        )
+    )
     assert inside == pytest.approx(volume_ml(white), rel=0.02)
     assert cortex == pytest.approx(volume_ml(whole) - volume_ml(white), rel=0.04)
 
 
-def test_halves_are_joined_at_the_midline_where_they_nearly_touch_and_caps_have_no_cortex():
+def test_halves_that_nearly_touch_are_joined_at_the_midline_and_caps_have_no_cortex():
     whole = octasphere(20.0, 4)
     halves = [TriangleMesh(part.vertices, part.faces) for part in split(whole, 0.0)]
-    caps = [TriangleMesh(part.vertices * [0.0, 1.0, 1.0], part.faces[:, ::-1]) for part in halves]
+    caps = [
+        TriangleMesh(part.vertices * [0.0, 1.0, 1.0], part.faces[:, ::-1])
+        for part in halves
+    ]
 
     def filled(gap_mm):
         shifts = (-gap_mm / 2, gap_mm / 2)
         sides = [moved(half, shift) for half, shift in zip(halves, shifts, strict=True)]
         closed = [moved(cap, shift) for cap, shift in zip(caps, shifts, strict=True)]
-        return filled_labels(merged(*sides, *closed), sides, 0.0, thickness_mm=CORTEX_MM, voxel_mm=1.0)
+        return filled_labels(
+            merged(*sides, *closed), sides, 0.0, thickness_mm=CORTEX_MM, voxel_mm=1.0
+        )
 
     (labels, affine), near, far = filled(0.0), filled(1.0), filled(6.0)
     core = 4 / 3 * np.pi * (20.0 - CORTEX_MM) ** 3 / 1000
     assert millilitres(labels, affine)[1] == pytest.approx(core, rel=0.02)
     # the slit of a millimetre becomes tissue inside, with cortex at its rim only
     rim = 0.1 * np.pi * (2.0**2 - 1.75**2)
-    assert millilitres(*near)[1] == pytest.approx(core + 0.1 * np.pi * 1.75**2, rel=0.02)
-    assert millilitres(*near)[0] == pytest.approx(millilitres(labels, affine)[0] + rim, rel=0.03)
+    assert millilitres(*near)[1] == pytest.approx(
+        core + 0.1 * np.pi * 1.75**2, rel=0.02
+    )
+    assert millilitres(*near)[0] == pytest.approx(
+        millilitres(labels, affine)[0] + rim, rel=0.03
+    )
     # a wide gap stays, and the caps beside it are bare
     volume, grid = far
-    index = np.rint(transform_points(np.array([[0.0, 0, 0], [4.0, 0, 0]]), np.linalg.inv(grid))).astype(int)
+    index = np.rint(
+        transform_points(np.array([[0.0, 0, 0], [4.0, 0, 0]]), np.linalg.inv(grid))
+    ).astype(int)
     assert volume[tuple(index.T)].tolist() == [0, 1]
     assert sum(millilitres(*far)) == pytest.approx(volume_ml(whole), rel=0.02)
 
@@ -94,16 +127,26 @@ def test_a_filled_brain_registers_with_labels_in_an_oblique_pose_by_what_both_ha
     scheme = SCHEMES["spina-bifida-atlas"]
     brains = [
         channels(filled, affine, cerebrum=FILLED.cerebrum, cortex=FILLED.cortex),
-        channels(labels, pose @ grid, cerebrum=scheme.cerebrum, cortex=scheme.cortex if has_cortex else ()),
+        channels(
+            labels,
+            pose @ grid,
+            cerebrum=scheme.cerebrum,
+            cortex=scheme.cortex if has_cortex else (),
+        ),
     ]
     found, quality = register_and_measure(*brains, is_filled=True)
     require_good(quality, pair="24 to 25")
     assert found.channels == compared
-    assert caplog.messages == [Facts("0.60")] * (has_cortex and compared == ("cerebrum",))
+    assert caplog.messages == [Facts("0.60")] * (
+        has_cortex and compared == ("cerebrum",)
+    )
     turn, _ = polar(found.deformation.matrix[:3, :3])
     assert angle_deg(turn @ pose[:3, :3].T) < 6.0
     later = transformed(cerebrum_surface(labels, grid), pose)
-    assert nearest_on(carry(found.deformation, surface.vertices), later)[0].mean() < 0.6 * voxel
+    assert (
+        nearest_on(carry(found.deformation, surface.vertices), later)[0].mean()
+        < 0.6 * voxel
+    )
     if has_cortex and len(compared) == 1:
         # two brains of labels would be refused
         _, quality = register_and_measure(*brains, is_filled=False)

@@ -1,4 +1,5 @@
-"""The mid-plane and the fissure of shifted, turned and asymmetric brains, and left and right of closed surfaces."""
+"""The mid-plane and the fissure of shifted, turned and asymmetric brains, and left and
+right of closed surfaces."""
 
 from dataclasses import replace
 
@@ -28,7 +29,16 @@ from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import remesh
-from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, flipped, merged, submesh, transformed
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    corners,
+    face_areas,
+    flipped,
+    merged,
+    submesh,
+    transformed,
+)
 from gyriflow.io.yaml_files import SCHEMES
 
 
@@ -61,7 +71,9 @@ def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
     mesh = merged(brain, lump)
     left = left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
     to_file = rigid(shift=(100.0, 0.0, 0.0))
-    with pytest.raises(InputError, check=Facts("left", "2 pieces", "18.2 %", "(62, 0, 0)", "10 %")):
+    with pytest.raises(
+        InputError, check=Facts("left", "2 pieces", "18.2 %", "(62, 0, 0)", "10 %")
+    ):
         largest_pieces(mesh, {"left": left, "right": ~left}, to_file)
 
 
@@ -70,7 +82,9 @@ def test_a_small_piece_beside_a_hemisphere_is_left_out_and_told():
     left = left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
     kept, (warning,) = largest_pieces(mesh, {"left": left, "right": ~left}, np.eye(4))
     share = 201.0 / (201.0 + area(ellipsoid((24, 33, 22))) / 2)
-    assert warning == Facts("left", "2 pieces", f"{100 * share:.1f} %", "(-38, 0, 0)", "left out")
+    assert warning == Facts(
+        "left", "2 pieces", f"{100 * share:.1f} %", "(-38, 0, 0)", "left out"
+    )
     assert len(pieces(submesh(mesh, kept)[0])) == 1
 
 
@@ -79,7 +93,9 @@ def test_stray_patches_leave_each_hemisphere_in_one_piece():
     x, y, z = corners(mesh).mean(axis=1).T
     # rings of the right within the left, and of the left within those
     from_pole = np.hypot(x + 10.0, y)
-    heights = np.where(from_pole < 4.0, np.sin(from_pole * 3.0) + 0.2 * np.sin(9.0 * z), x)
+    heights = np.where(
+        from_pole < 4.0, np.sin(from_pole * 3.0) + 0.2 * np.sin(9.0 * z), x
+    )
     left = left_faces(mesh, heights)
     assert [len(pieces(side)) for side in cut_sides(mesh, left)] == [1, 1]
     assert left[x < -5.0].all()
@@ -88,15 +104,20 @@ def test_stray_patches_leave_each_hemisphere_in_one_piece():
 @pytest.mark.parametrize("mm", [3.0, 6.0])
 def test_hemispheres_apart_with_a_bent_midline_are_never_mixed(brain, mm):
     labels, affine = brain
-    mesh = cerebrum_surface(odd_brains.bent_midline(odd_brains.apart(labels, affine), affine, mm), affine)
+    mesh = cerebrum_surface(
+        odd_brains.bent_midline(odd_brains.apart(labels, affine), affine, mm), affine
+    )
     fissure = fissure_between(mesh, mid_plane(mesh))
-    sides = cut_sides(mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1))))
+    sides = cut_sides(
+        mesh, left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
+    )
     assert [len(pieces(side)) for side in sides] == [1, 1]
     assert area(sides[0]) == pytest.approx(area(sides[1]), rel=0.05)
 
 
 @pytest.mark.parametrize(
-    "pathology", [odd_brains.bent_midline, odd_brains.without_callosum, odd_brains.shifted_midline]
+    "pathology",
+    [odd_brains.bent_midline, odd_brains.without_callosum, odd_brains.shifted_midline],
 )
 def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
     labels, affine = brain
@@ -106,7 +127,10 @@ def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
     sides = cut_sides(mesh, left)
     assert [len(pieces(side)) for side in sides] == [1, 1]
     place = corners(mesh).mean(axis=1) - CENTRE_MM
-    middle = {"bent_midline": 3.0 * np.sin(place[:, 1] / 12.0), "shifted_midline": 8.0}.get(pathology.__name__, 0.0)
+    middle = {
+        "bent_midline": 3.0 * np.sin(place[:, 1] / 12.0),
+        "shifted_midline": 8.0,
+    }.get(pathology.__name__, 0.0)
     wrong = np.where(left, place[:, 0] - middle, middle - place[:, 0]) > 1.5
     assert face_areas(mesh)[wrong].sum() < 0.005 * area(mesh)
 
@@ -120,10 +144,17 @@ def test_a_cut_that_does_not_part_the_surface_is_refused():
 
 def test_a_bend_of_more_than_5_mm_is_followed():
     # two walls 2 mm apart whose middle bends away from the plane by 9 mm
-    y, z = np.meshgrid(np.arange(-40.0, 40.0, 1.0), np.arange(-20.0, 20.0, 1.0), indexing="ij")
+    y, z = np.meshgrid(
+        np.arange(-40.0, 40.0, 1.0), np.arange(-20.0, 20.0, 1.0), indexing="ij"
+    )
     middle = 9.0 * np.exp(-((y / 15.0) ** 2))
     left, right = (sheet(middle + x, y, z) for x in (-1.0, 1.0))
-    mesh = merged(left, flipped(right), flipped(sheet(0 * y - 35.0, y, z)), sheet(0 * y + 35.0, y, z))
+    mesh = merged(
+        left,
+        flipped(right),
+        flipped(sheet(0 * y - 35.0, y, z)),
+        sheet(0 * y + 35.0, y, z),
+    )
     plane = MidPlane(np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0)
     fissure = fissure_between(mesh, plane)
     for at in (-30.0, -12.0, 0.0, 12.0):
@@ -132,7 +163,8 @@ def test_a_bend_of_more_than_5_mm_is_followed():
 
 
 def block(gap_voxels):
-    """Return two blocks of core in cortex, joined by a bar, with a gap of CSF between their cortex, and the affine."""
+    """Return two blocks of core in cortex, joined by a bar, with a gap of CSF between
+    their cortex, and the affine."""
     brain, core = np.zeros((41, 40, 30), dtype=bool), np.zeros((41, 40, 30), dtype=bool)
     brain[4:37, 4:36, 4:26] = True
     core[6:18, 6:34, 6:24], core[23:35, 6:34, 6:24] = True, True
@@ -140,7 +172,9 @@ def block(gap_voxels):
     if gap_voxels:
         first = 20 - gap_voxels // 2
         brain[first : first + gap_voxels, :, 14:] = False
-        brain[first : first + gap_voxels, :10] = brain[first : first + gap_voxels, 30:] = False
+        brain[first : first + gap_voxels, :10] = brain[
+            first : first + gap_voxels, 30:
+        ] = False
     return brain, core, np.diag([0.9, 0.9, 0.9, 1.0])
 
 
@@ -148,10 +182,16 @@ def block(gap_voxels):
 def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     brain, core, affine = block(gap_voxels)
     walls = isosurface(smooth_mask(core, 1.0), affine)
-    side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)))
+    side_mm = side_distance(
+        brain, core, affine, fissure_between(walls, mid_plane(walls))
+    )
     hidden = hidden_fissure(side_mm, brain, core, affine)
     field = smooth_mask(brain, 0.5)
-    to_hidden = ndimage.distance_transform_edt(~hidden, sampling=0.9) if hidden.any() else np.full(brain.shape, np.inf)
+    to_hidden = (
+        ndimage.distance_transform_edt(~hidden, sampling=0.9)
+        if hidden.any()
+        else np.full(brain.shape, np.inf)
+    )
     wide = open_fissure(field, affine, side_mm, to_hidden)
     # cortex beside a fissure that CSF shows stays; a hidden one is opened
     taken = (field > 0.5) & (wide <= 0.5)
@@ -161,7 +201,9 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
 
 @pytest.mark.parametrize("gap_voxels", [0, 1])
 @pytest.mark.parametrize("shift_mm", [-0.05, 0.05])
-def test_noise_of_the_mid_plane_does_not_give_the_middle_to_one_side(gap_voxels, shift_mm):
+def test_noise_of_the_mid_plane_does_not_give_the_middle_to_one_side(
+    gap_voxels, shift_mm
+):
     # the layer of voxels in the middle is equally far from both cores
     brain, core, affine = block(gap_voxels)
     normal = np.array([1.0, 0.0, 0.0])
@@ -179,7 +221,9 @@ def test_tissue_that_crosses_a_fissure_is_opened():
     core[18:23, 12:28, 4:6] = True
     walls = isosurface(smooth_mask(core, 1.0), affine)
     brain[20, 18:21, 25] = True
-    side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)))
+    side_mm = side_distance(
+        brain, core, affine, fissure_between(walls, mid_plane(walls))
+    )
     hidden = hidden_fissure(side_mm, brain, core, affine, bridges=True)
     to_hidden = ndimage.distance_transform_edt(~hidden, sampling=0.9)
     opened = open_fissure(brain.astype(np.float32), affine, side_mm, to_hidden) > 0.5
@@ -189,22 +233,36 @@ def test_tissue_that_crosses_a_fissure_is_opened():
 
 @pytest.mark.parametrize("sided", [False, True])
 def test_gyri_that_reach_over_the_middle_are_on_their_own_side(sided):
-    # cores of two hemispheres, joined below; a gyrus of the left one reaches 4 mm over the middle, cortex all around
-    x, y, z = np.indices((61, 40, 40)) - np.array([30.0, 20.0, 0.0])[:, None, None, None]
+    # cores of two hemispheres, joined below; a gyrus of the left one reaches 4 mm over
+    # the middle, cortex all around
+    x, y, z = (
+        np.indices((61, 40, 40)) - np.array([30.0, 20.0, 0.0])[:, None, None, None]
+    )
     right = x > np.where((np.abs(y) < 6) & (np.abs(z - 25) < 6), 4, 0)
     brain = (np.abs(x) < 27) & (np.abs(y) < 17) & (z > 3) & (z < 37)
     inner = ndimage.binary_erosion(brain, iterations=2)
-    gap = ndimage.distance_transform_edt(right) + ndimage.distance_transform_edt(~right) - 1.0
+    gap = (
+        ndimage.distance_transform_edt(right)
+        + ndimage.distance_transform_edt(~right)
+        - 1.0
+    )
     core = inner & ((gap > 2.0) | (z < 12))
     affine = np.eye(4)
     affine[:3, 3] = [-30, -20, 0]
     walls = isosurface(smooth_mask(core, 1.0), affine)
     labels = [brain & ~right, brain & right] if sided else []
-    side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)), *labels)
+    side_mm = side_distance(
+        brain, core, affine, fissure_between(walls, mid_plane(walls)), *labels
+    )
     above = brain & (z > 14)
     assert ((side_mm > 0) == right)[above].mean() > 0.99
     hidden = hidden_fissure(side_mm, brain, core, affine)
-    opened = open_fissure(smooth_mask(brain), affine, side_mm, ndimage.distance_transform_edt(~hidden)) <= 0.5
+    opened = (
+        open_fissure(
+            smooth_mask(brain), affine, side_mm, ndimage.distance_transform_edt(~hidden)
+        )
+        <= 0.5
+    )
     number, _ = ndimage.label(~opened & brain & (z > 14))
     assert number[50, 20, 30] != number[10, 20, 30]
     assert not opened[core].any()
@@ -228,7 +286,9 @@ def test_a_narrow_fissure_shown_by_csf_keeps_its_width(brain):
     middle = np.abs(x) < 0.46
     filled = np.where((labels == 4) & (np.abs(x) < 3.0), 5, labels)
     shown = np.where((labels == 4) & middle & (filled == 5), 4, filled)
-    surface = from_labels(shown, affine, SCHEMES["spina-bifida-atlas"], week=24.0, edge_length_mm=1.2)
+    surface = from_labels(
+        shown, affine, SCHEMES["spina-bifida-atlas"], week=24.0, edge_length_mm=1.2
+    )
     assert cerebrum.sum() < np.isin(shown, odd_brains.CEREBRUM).sum()
     assert surface.report["fissure_opened_mL"] < 0.002 * surface.report["volume_mL"]
     assert surface.report["area_cm2"]["whole"] > 110.0
@@ -242,7 +302,9 @@ def centred():
 
 
 def angle_to(plane, normal):
-    return np.degrees(np.arccos(np.clip(plane.normal @ normal / np.linalg.norm(normal), -1, 1)))
+    return np.degrees(
+        np.arccos(np.clip(plane.normal @ normal / np.linalg.norm(normal), -1, 1))
+    )
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 45), (30, 20, -30), (90, 0, 0)])
@@ -291,15 +353,25 @@ def test_upright_turns_the_plane_to_constant_x_and_little_else(centred):
 
 
 def test_tiny_tilt_is_left_alone(centred):
-    matrix, angle = upright(mid_plane(transformed(centred, rigid(0, 0, 0.2))), np.zeros(3))
+    matrix, angle = upright(
+        mid_plane(transformed(centred, rigid(0, 0, 0.2))), np.zeros(3)
+    )
     assert angle == 0.0
     assert np.array_equal(matrix, np.eye(4))
 
 
 def test_named_coordinates_are_kept_by_a_body_with_many_mirror_planes(centred):
     # bodies of revolution about z and, of coarse and uneven triangles, about y
-    for body in (ellipsoid((24.0, 24.0, 33.0)), remesh(ellipsoid((30.0, 36.0, 30.0)), 2.5)):
-        assert angle_to(mid_plane(body, named=True), np.array([1.0, 0, 0])) == pytest.approx(0.0, abs=1e-6)
+    for body in (
+        ellipsoid((24.0, 24.0, 33.0)),
+        remesh(ellipsoid((30.0, 36.0, 30.0)), 2.5),
+    ):
+        assert angle_to(
+            mid_plane(body, named=True), np.array([1.0, 0, 0])
+        ) == pytest.approx(0.0, abs=1e-6)
     # a brain has one plane, in whatever coordinates
     rotation = rigid(0, 15, -25)
-    assert angle_to(mid_plane(transformed(centred, rotation), named=True), rotation[:3, 0]) < 1.0
+    assert (
+        angle_to(mid_plane(transformed(centred, rotation), named=True), rotation[:3, 0])
+        < 1.0
+    )

@@ -1,4 +1,5 @@
-"""Label schemes, whose faults are named; what hangs on a brain by a stalk, and ventricles that are no part of it."""
+"""Label schemes, whose faults are named; what hangs on a brain by a stalk, and
+ventricles that are no part of it."""
 
 import numpy as np
 import pytest
@@ -34,7 +35,13 @@ ATLAS = SCHEMES["spina-bifida-atlas"]
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 def test_schemes_name_only_labels_that_they_have(scheme):
-    inside = {*scheme.cortex, *scheme.left, *scheme.right, *scheme.white_matter, *scheme.ventricles}
+    inside = {
+        *scheme.cortex,
+        *scheme.left,
+        *scheme.right,
+        *scheme.white_matter,
+        *scheme.ventricles,
+    }
     outside = {*scheme.cerebellum, *scheme.brainstem}
     named = {*scheme.cerebrum, *inside, *outside}
     assert named <= set(scheme.labels)
@@ -69,7 +76,9 @@ def test_transient_zones_stand_for_white_matter():
 def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
     labels = np.full((9, 9, 9), 1)
     labels[2:7, 2:7, 2:7] = 5
-    with pytest.raises(InputError, check=Facts("spina-bifida-atlas", "cortex", "0 %", "50 %")):
+    with pytest.raises(
+        InputError, check=Facts("spina-bifida-atlas", "cortex", "0 %", "50 %")
+    ):
         require_cortex_outside(labels, ATLAS)
     assert require_cortex_outside(6 - labels, ATLAS) == 1.0
     # single voxels that are missing inside are no surface
@@ -91,7 +100,10 @@ def test_labels_of_the_left_on_the_right_are_refused():
 @pytest.fixture(scope="module")
 def atlas_brain():
     """The shipped atlas' brain of 25 GW."""
-    volume = read_label_volume(SHIPPED / "atlases/spina-bifida/fetal_SB_atlas_GA25_notoperated/parcellation.nii.gz")
+    volume = read_label_volume(
+        SHIPPED
+        / "atlases/spina-bifida/fetal_SB_atlas_GA25_notoperated/parcellation.nii.gz"
+    )
     return volume.labels, volume.affine
 
 
@@ -102,7 +114,9 @@ def feta(atlas_brain):
 
 
 def test_sides_that_are_no_hemispheres_are_another_schemes(feta):
-    with pytest.raises(InputError, check=Facts("dhcp-19", "left", "right", "49 %", "90 %")):
+    with pytest.raises(
+        InputError, check=Facts("dhcp-19", "left", "right", "49 %", "90 %")
+    ):
         require_sides(feta[0], SCHEMES["dhcp-19"], feta[1], np.array([1.0, 0, 0]))
 
 
@@ -116,8 +130,11 @@ AFFINE = np.diag([0.8, 0.8, 0.8, 1.0])
 
 
 def body(stalk_mm, ball_mm=4.0):
-    """Return a ball of 15 mm radius from which a smaller one hangs by a stalk of a radius."""
-    x, y, z = (0.8 * np.indices((60, 60, 80)).astype(float)) - np.array([24, 24, 40])[:, None, None, None]
+    """Return a ball of 15 mm radius from which a smaller one hangs by a stalk of a
+    radius."""
+    x, y, z = (0.8 * np.indices((60, 60, 80)).astype(float)) - np.array([24, 24, 40])[
+        :, None, None, None
+    ]
     large = np.sqrt(x**2 + y**2 + z**2) < 15.0
     stalk = (np.hypot(x, y) < stalk_mm) & (z < 0) & (z > -24.0)
     small = np.sqrt(x**2 + y**2 + (z + 24.0) ** 2) < ball_mm
@@ -139,7 +156,9 @@ def test_a_ball_on_a_thin_stalk_is_cut_off_with_the_stalk():
     (same,) = without_stalks(mask[:, :, ::2].transpose(order), affine)[1]
     assert same["volume_mm3"] == pytest.approx(found["volume_mm3"], rel=0.1)
     assert same["stalk_mm2"] == pytest.approx(found["stalk_mm2"], rel=0.6)
-    assert same["place_mm"] == pytest.approx(turn[:3, :3] @ found["place_mm"] + turn[:3, 3], abs=0.6)
+    assert same["place_mm"] == pytest.approx(
+        turn[:3, :3] @ found["place_mm"] + turn[:3, 3], abs=0.6
+    )
 
 
 @pytest.mark.parametrize("case", ["a thick stalk", "a blade"])
@@ -161,7 +180,9 @@ def test_a_polyp_of_a_surface_is_cut_and_the_cut_closed():
     assert len(stalks) == 1
     assert is_closed(mesh)
     assert euler_number(mesh) == 2
-    assert signed_volume(mesh) == pytest.approx(signed_volume(isosurface(smooth_mask(large, 0.7), AFFINE)), rel=0.01)
+    assert signed_volume(mesh) == pytest.approx(
+        signed_volume(isosurface(smooth_mask(large, 0.7), AFFINE)), rel=0.01
+    )
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +195,9 @@ def test_the_fourth_ventricle_is_outside_and_the_third_is_not(brain):
     made = with_fourth_ventricle(labels, affine)
     x, y, z = positions(made, affine)
     added = (made == VENTRICLES) & (labels != VENTRICLES)
-    below = z[np.isin(labels, CEREBRUM) & (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)].min()
+    below = z[
+        np.isin(labels, CEREBRUM) & (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)
+    ].min()
     out = outside_ventricles(made, SCHEMES["spina-bifida-atlas"])
     assert out[added & (z < below - 2.0)].all()
     assert not out[z > below + 5.0].any()
@@ -184,7 +207,12 @@ def test_a_ventricle_that_opens_to_the_outer_csf_stays_whole(brain):
     labels, affine = brain
     x, y, z = positions(labels, affine)
     # a cleft as wide as the ventricle is long, through the whole mantle on the left
-    cleft = (x < -8.0) & (np.abs(y) < 9.0) & (np.abs(z - 2.0) < 7.0) & np.isin(labels, CEREBRUM)
+    cleft = (
+        (x < -8.0)
+        & (np.abs(y) < 9.0)
+        & (np.abs(z - 2.0) < 7.0)
+        & np.isin(labels, CEREBRUM)
+    )
     split = np.where(cleft, VENTRICLES, labels)
     assert not outside_ventricles(split, SCHEMES["spina-bifida-atlas"]).any()
 
@@ -193,25 +221,42 @@ def test_without_labels_of_the_hindbrain_all_that_is_open_is_outside():
     labels = np.zeros((40, 40, 40), dtype=int)
     labels[5:35, 5:35, 20:36] = 1
     labels[15:25, 15:25, 4:30] = 2
-    out = outside_ventricles(labels, LabelScheme(name="mine", cerebrum=(1, 2), ventricles=(2,)))
+    out = outside_ventricles(
+        labels, LabelScheme(name="mine", cerebrum=(1, 2), ventricles=(2,))
+    )
     assert out[15:25, 15:25, 4:18].all()
     assert not out[:, :, 24:].any()
 
 
 UNNAMED = LabelScheme(
-    name="unnamed", cerebrum=(1, 5, 6, 8), known={2: "CSF", 3: "cerebellum", 4: "CSF", 7: "brainstem"}
+    name="unnamed",
+    cerebrum=(1, 5, 6, 8),
+    known={2: "CSF", 3: "cerebellum", 4: "CSF", 7: "brainstem"},
 )
-SOLID = LabelScheme(name="solid", cerebrum=(1, 2, 5, 6, 8), known={3: "cerebellum", 4: "CSF", 7: "brainstem"})
+SOLID = LabelScheme(
+    name="solid",
+    cerebrum=(1, 2, 5, 6, 8),
+    known={3: "cerebellum", 4: "CSF", 7: "brainstem"},
+)
 
 
 @pytest.mark.parametrize(
-    ("given", "scheme"), [(0, SCHEMES["spina-bifida-atlas"]), (4, SCHEMES["spina-bifida-atlas"]), (2, UNNAMED)]
+    ("given", "scheme"),
+    [
+        (0, SCHEMES["spina-bifida-atlas"]),
+        (4, SCHEMES["spina-bifida-atlas"]),
+        (2, UNNAMED),
+    ],
 )
-def test_ventricles_without_labels_are_filled_and_no_fissure_or_cistern(atlas_brain, given, scheme):
+def test_ventricles_without_labels_are_filled_and_no_fissure_or_cistern(
+    atlas_brain, given, scheme
+):
     labels, affine = atlas_brain
     known = SCHEMES["spina-bifida-atlas"]
     ventricles = (labels == VENTRICLES) & ~outside_ventricles(labels, known)
-    found = unlabelled_ventricles(np.where(labels == VENTRICLES, given, labels), scheme, affine)
+    found = unlabelled_ventricles(
+        np.where(labels == VENTRICLES, given, labels), scheme, affine
+    )
     assert (found & ventricles).sum() > 0.98 * ventricles.sum()
     assert (found & ~ventricles).sum() < 0.01 * ventricles.sum()
 
@@ -221,15 +266,22 @@ def test_nothing_is_filled_where_the_cerebrum_is_whole(atlas_brain, scheme):
     assert not unlabelled_ventricles(*(atlas_brain[0], scheme, atlas_brain[1])).any()
 
 
-def test_a_filled_ventricle_is_told_and_counts_as_ventricle_and_not_as_tissue(atlas_brain):
+def test_a_filled_ventricle_is_told_and_counts_as_ventricle_and_not_as_tissue(
+    atlas_brain,
+):
     labels, affine = atlas_brain
     with_labels, without = (
         read_cerebrum(given, affine, SCHEMES["spina-bifida-atlas"])
         for given in (labels, np.where(labels == VENTRICLES, 0, labels))
     )
-    assert [any("ventricles" in said for said in found.warnings) for found in (without, with_labels)] == [True, False]
+    assert [
+        any("ventricles" in said for said in found.warnings)
+        for found in (without, with_labels)
+    ] == [True, False]
     for name, volume in with_labels.report["label_volumes_mL"].items():
-        assert without.report["label_volumes_mL"][name] == pytest.approx(volume, rel=0.01)
+        assert without.report["label_volumes_mL"][name] == pytest.approx(
+            volume, rel=0.01
+        )
 
 
 def test_stray_voxels_and_voids_change_neither_the_cerebrum_nor_its_volume(brain):
@@ -239,17 +291,25 @@ def test_stray_voxels_and_voids_change_neither_the_cerebrum_nor_its_volume(brain
     inside = ndimage.binary_erosion(np.isin(labels, CEREBRUM), iterations=2)
     far = ~ndimage.binary_dilation(labels > 0, iterations=2)
     noise = random.random(labels.shape)
-    strewn = np.where(far & (noise < 0.02), 5, np.where(inside & (noise < 0.02), 0, labels))
+    strewn = np.where(
+        far & (noise < 0.02), 5, np.where(inside & (noise < 0.02), 0, labels)
+    )
     found = read_cerebrum(strewn, affine, scheme)
     assert (strewn != labels).sum() > 1000
     assert np.array_equal(found.mask, clean.mask)
     expected = clean.report["label_volumes_mL"]["cerebrum"]
-    assert found.report["label_volumes_mL"]["cerebrum"] == pytest.approx(expected, rel=1e-6)
+    assert found.report["label_volumes_mL"]["cerebrum"] == pytest.approx(
+        expected, rel=1e-6
+    )
     assert Facts(found.report["outside"]["parts"], "mL", "%") in found.warnings
 
 
-@pytest.mark.parametrize(("axis", "end"), [(axis, end) for axis in range(3) for end in (0, -1)])
-def test_a_brain_that_is_cut_at_any_border_of_its_volume_is_told_with_the_share(axis, end):
+@pytest.mark.parametrize(
+    ("axis", "end"), [(axis, end) for axis in range(3) for end in (0, -1)]
+)
+def test_a_brain_that_is_cut_at_any_border_of_its_volume_is_told_with_the_share(
+    axis, end
+):
     block = np.zeros((20, 18, 16), dtype=bool)
     block[5:13, 5:13, 5:13] = True
     assert border_share(block) == 0.0
@@ -268,31 +328,56 @@ def test_a_volume_that_ends_at_the_cerebrum_does_not_cut_it():
         missing = max(4, tight.shape[axis] // 8)
         for end in (slice(missing, None), slice(None, -missing)):
             cut = np.moveaxis(np.moveaxis(tight, axis, 0)[end], 0, axis)
-            assert read_cerebrum(cut, affine, ATLAS).report["border_share"] > REPORTED_LOSS
+            assert (
+                read_cerebrum(cut, affine, ATLAS).report["border_share"] > REPORTED_LOSS
+            )
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
 def test_volumes_of_labels_add_up_in_long_turned_voxels(order):
-    axes = np.arange(-21.0, 21.0, 0.7), np.arange(-21.0, 21.0, 0.7), np.arange(-21.0, 21.0, 2.1)
-    radius = np.sqrt(sum(axis**2 for axis in np.meshgrid(*axes, indexing="ij"))).transpose(order)
+    axes = (
+        np.arange(-21.0, 21.0, 0.7),
+        np.arange(-21.0, 21.0, 0.7),
+        np.arange(-21.0, 21.0, 2.1),
+    )
+    radius = np.sqrt(
+        sum(axis**2 for axis in np.meshgrid(*axes, indexing="ij"))
+    ).transpose(order)
     labels = np.digitize(radius, [5.0, 14.0, 18.0])
     labels = np.array([2, 1, 5, 0])[labels]
     affine = rigid(20, -30, 10) @ np.diag([0.7, 0.7, 2.1, 1.0])[:, [*order, 3]]
     volumes = read_cerebrum(labels, affine, ATLAS).report["label_volumes_mL"]
     balls = {radius: 4 / 3 * np.pi * radius**3 / 1e3 for radius in (5.0, 14.0, 18.0)}
-    expected = {"cerebrum": balls[18.0], "ventricles": balls[5.0], "tissue": balls[18.0] - balls[5.0]}
-    expected |= {"cortex": balls[18.0] - balls[14.0], "inside_cortex": balls[14.0] - balls[5.0]}
+    expected = {
+        "cerebrum": balls[18.0],
+        "ventricles": balls[5.0],
+        "tissue": balls[18.0] - balls[5.0],
+    }
+    expected |= {
+        "cortex": balls[18.0] - balls[14.0],
+        "inside_cortex": balls[14.0] - balls[5.0],
+    }
     assert volumes == pytest.approx(expected, rel=0.04)
-    assert volumes["cortex"] + volumes["inside_cortex"] + volumes["ventricles"] == pytest.approx(volumes["cerebrum"])
+    assert volumes["cortex"] + volumes["inside_cortex"] + volumes[
+        "ventricles"
+    ] == pytest.approx(volumes["cerebrum"])
 
 
 FETA = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])
 """The numbers of FeTA for those of the spina bifida atlas."""
 
 
-@pytest.mark.parametrize(("left", "right"), [(10, 0), (0, 10), (11, 0), (0, 11), (10, 10)])
+@pytest.mark.parametrize(
+    ("left", "right"), [(10, 0), (0, 10), (11, 0), (0, 11), (10, 10)]
+)
 def test_numbers_that_occur_in_a_scheme_of_sides_by_accident_contradict_it(left, right):
-    path = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA22_notoperated" / "parcellation.nii.gz"
+    path = (
+        SHIPPED
+        / "atlases"
+        / "spina-bifida"
+        / "fetal_SB_atlas_GA22_notoperated"
+        / "parcellation.nii.gz"
+    )
     labels = FETA[read_label_volume(path, cropped=True).labels]
     is_left = np.indices(labels.shape)[0] < np.argwhere(labels == 3)[:, 0].mean()
     volume = labels + (labels > 0) * np.where(is_left, left, right)

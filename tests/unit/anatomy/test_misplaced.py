@@ -1,4 +1,5 @@
-"""Cortex where none can be is warned of with its volume and place; cortex around white matter is not."""
+"""Cortex where none can be is warned of with its volume and place; cortex around white
+matter is not."""
 
 import numpy as np
 import pytest
@@ -28,11 +29,17 @@ BELOW = CENTRE + [0.0, 2.0, -26.0]
 
 @pytest.fixture
 def brain():
-    """A ball of cortex around white matter around a ventricle, on a brainstem and a cerebellum, in CSF."""
+    """A ball of cortex around white matter around a ventricle, on a brainstem and a
+    cerebellum, in CSF."""
     labels = np.where(ball(CENTRE, 23.0), CSF, 0)
     labels[ball(BELOW, 8.0)] = CEREBELLUM
     labels[ball(BELOW - [0.0, 12.0, 0.0], 6.0)] = BRAINSTEM
-    for radius_mm, tissue in ((20.0, CORTEX), (17.5, WHITE), (10.5, DEEP_GREY), (9.0, VENTRICLES)):
+    for radius_mm, tissue in (
+        (20.0, CORTEX),
+        (17.5, WHITE),
+        (10.5, DEEP_GREY),
+        (9.0, VENTRICLES),
+    ):
         labels[ball(CENTRE, radius_mm)] = tissue
     return labels
 
@@ -53,7 +60,9 @@ def test_a_brain_without_fault_has_no_warning(brain):
 
 def test_cerebellum_and_brainstem_labelled_as_cortex_are_named(brain):
     faulty = relabelled(brain, np.isin(brain, (CEREBELLUM, BRAINSTEM)))
-    assert list(misplaced_cortex(faulty, AFFINE, ATLAS)) == [Facts("6 mm", "cerebellum", "brainstem")]
+    assert list(misplaced_cortex(faulty, AFFINE, ATLAS)) == [
+        Facts("6 mm", "cerebellum", "brainstem")
+    ]
     assert hindbrain_note(faulty, ATLAS) == Facts("cerebellum", "brainstem")
     # check and the surface take their warnings from here
     cerebrum = read_cerebrum(faulty, AFFINE, ATLAS)
@@ -78,7 +87,9 @@ def test_a_blob_in_a_ventricle_has_its_place(brain):
 
 def test_a_layer_around_the_ventricle_is_found(brain):
     # joined to the outer cortex, so that it is no separate piece
-    layer = (brain == DEEP_GREY) | (ball(CENTRE, 18.0) & ball(CENTRE + [19.0, 0.0, 0.0], 10.0) & (brain == WHITE))
+    layer = (brain == DEEP_GREY) | (
+        ball(CENTRE, 18.0) & ball(CENTRE + [19.0, 0.0, 0.0], 10.0) & (brain == WHITE)
+    )
     found = list(misplaced_cortex(relabelled(brain, layer), AFFINE, ATLAS))
     assert found[-1] == Facts("ventricles", "100 %")
 
@@ -87,7 +98,9 @@ def test_a_sheet_that_touches_no_brain_is_found(brain):
     x, _, z = (np.indices(brain.shape).T * SIZE).T
     sheet = (np.abs(x - CENTRE[0]) < 1.0) & (z > CENTRE[2] + 21.5) & ball(CENTRE, 25.0)
     # nearer to the white matter than cortex may be
-    assert list(misplaced_cortex(relabelled(brain, sheet), AFFINE, ATLAS)) == [Facts("apart", *place(sheet))]
+    assert list(misplaced_cortex(relabelled(brain, sheet), AFFINE, ATLAS)) == [
+        Facts("apart", *place(sheet))
+    ]
 
 
 def test_strays_of_a_few_voxels_are_not_warned_of(brain):

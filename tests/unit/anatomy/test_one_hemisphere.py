@@ -1,4 +1,5 @@
-"""One hemisphere alone: posed by its file or its shape, of the side that it is said to be, or refused."""
+"""One hemisphere alone: posed by its file or its shape, of the side that it is said to
+be, or refused."""
 
 import numpy as np
 import odd_brains
@@ -26,21 +27,31 @@ def brain():
 
 @pytest.fixture(scope="module")
 def sides(brain):
-    return {side: cerebrum_surface(odd_brains.one_hemisphere(*brain, side), brain[1]) for side in ("left", "right")}
+    return {
+        side: cerebrum_surface(odd_brains.one_hemisphere(*brain, side), brain[1])
+        for side in ("left", "right")
+    }
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-@pytest.mark.parametrize(("degrees", "by"), [((0, 0, 0), "file"), ((0, 0, 180), "file"), ((100, 40, -70), "shape")])
+@pytest.mark.parametrize(
+    ("degrees", "by"),
+    [((0, 0, 0), "file"), ((0, 0, 180), "file"), ((100, 40, -70), "shape")],
+)
 def test_a_hemisphere_in_any_pose_is_posed(sides, side, degrees, by):
     turn = rigid(*degrees)
-    surface = from_surface(transformed(sides[side], turn), side, coordinates="auto", **QUICK)
+    surface = from_surface(
+        transformed(sides[side], turn), side, coordinates="auto", **QUICK
+    )
     assert surface.pose.by == by
     rest = surface.pose.of_file()[:3, :3] @ turn[:3, :3]
     assert angle_deg(rest) < 5.0
     there = getattr(surface, side)
     assert there is surface.whole
     assert getattr(surface, "left" if side == "right" else "right") is None
-    away = (there.vertices[:, 0] - surface.fissure_x_mm) * (1 if side == "right" else -1)
+    away = (there.vertices[:, 0] - surface.fissure_x_mm) * (
+        1 if side == "right" else -1
+    )
     assert away.min() == pytest.approx(0.5, abs=0.01)
 
 
@@ -56,7 +67,9 @@ def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain
     left = odd_brains.one_hemisphere(labels, affine, "left")
     surface = from_labels(left, affine, DHCP, "left", **QUICK)
     assert surface.whole.vertices[:, 0].max() < CENTRE_MM[0] + 0.5
-    assert surface.report["volume_mL"] == pytest.approx(surface.report["label_volumes_mL"]["cerebrum"], rel=0.01)
+    assert surface.report["volume_mL"] == pytest.approx(
+        surface.report["label_volumes_mL"]["cerebrum"], rel=0.01
+    )
     with pytest.raises(InputError, check=Facts("right")):
         from_labels(left, affine, DHCP, "right", **QUICK)
     with pytest.raises(InputError, check=Facts("left hemisphere")):
@@ -83,18 +96,25 @@ def test_volumes_of_a_hemisphere_whose_affine_is_lps_are_turned_as_its_labels(br
     world = surface.pose.world @ affine
     voxels = np.argwhere(np.isin(left, DHCP.cerebrum)) @ world[:3, :3].T + world[:3, 3]
     for end in (np.min, np.max):
-        assert end(surface.whole.vertices, axis=0) == pytest.approx(end(voxels, axis=0), abs=2.0)
+        assert end(surface.whole.vertices, axis=0) == pytest.approx(
+            end(voxels, axis=0), abs=2.0
+        )
 
 
 def test_white_surfaces_give_the_thickness_in_any_pose_and_may_not_cross(sides):
     moved = [transformed(sides[side], LPS) for side in ("left", "right")]
     surface = from_hemispheres(*moved, coordinates="lps", **QUICK)
     posed = surface.whole, surface.pose, surface.fissure_x_mm
-    whites = {side: inner(mesh, 1.5) for side, mesh in zip(("left", "right"), moved, strict=True)}
+    whites = {
+        side: inner(mesh, 1.5)
+        for side, mesh in zip(("left", "right"), moved, strict=True)
+    }
     thickness = thickness_from_white(*posed, whites)
     assert thickness.report["mean_mm"] == pytest.approx(1.5, abs=0.15)
     assert thickness.is_measured.mean() > 0.98
     with pytest.raises(InputError, check=Facts("left", "1 %", "0.5 mm")):
         thickness_from_white(*posed, whites | {"left": inner(moved[0], -1.5)})
-    with pytest.raises(InputError, check=Facts("right", f"{surface.fissure_x_mm:.1f} mm")):
+    with pytest.raises(
+        InputError, check=Facts("right", f"{surface.fissure_x_mm:.1f} mm")
+    ):
         thickness_from_white(*posed, whites | {"right": whites["left"]})

@@ -1,4 +1,5 @@
-"""Whole pial surfaces from each kind of input: closed spheres, posed, honest in size, split at the fissure."""
+"""Whole pial surfaces from each kind of input: closed spheres, posed, honest in size,
+split at the fissure."""
 
 import json
 import os
@@ -42,7 +43,9 @@ from gyriflow.mesh.maps import move_to_mesh
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.shipped import SHIPPED
 
-DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
+DATA = Path(
+    os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data")
+)
 ATLAS = SCHEMES["spina-bifida-atlas"]
 QUICK = {"edge_length_mm": 1.5}
 
@@ -59,8 +62,11 @@ def phantom(volume):
 
 @pytest.fixture(scope="module")
 def halves():
-    """The phantom's left and right hemispheres as closed surfaces a millimetre apart, where its volume has them."""
-    return [transformed(half, rigid(shift=CENTRE_MM)) for half in shapes.phantom_halves()]
+    """The phantom's left and right hemispheres as closed surfaces a millimetre apart,
+    where its volume has them."""
+    return [
+        transformed(half, rigid(shift=CENTRE_MM)) for half in shapes.phantom_halves()
+    ]
 
 
 def require_sound(surface, surfaces=1):
@@ -70,7 +76,11 @@ def require_sound(surface, surfaces=1):
     assert all(signed_volume(piece) > 0 for piece in pieces(whole))
     assert not self_intersecting_faces(whole).any()
     assert len(surface.left.faces) + len(surface.right.faces) == len(whole.faces)
-    assert surface.left.vertices[:, 0].mean() < surface.fissure_x_mm < surface.right.vertices[:, 0].mean()
+    assert (
+        surface.left.vertices[:, 0].mean()
+        < surface.fissure_x_mm
+        < surface.right.vertices[:, 0].mean()
+    )
     assert area(surface.left) + area(surface.right) == pytest.approx(area(whole))
     json.dumps(surface.report, allow_nan=False)
 
@@ -91,7 +101,9 @@ def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):
     turned = from_labels(labels, oblique @ affine, ATLAS, week=24.0, **QUICK)
     require_sound(turned)
     for part in ("whole", "left", "right"):
-        assert turned.report["area_cm2"][part] == pytest.approx(phantom.report["area_cm2"][part], rel=0.005)
+        assert turned.report["area_cm2"][part] == pytest.approx(
+            phantom.report["area_cm2"][part], rel=0.005
+        )
     assert Facts("cerebellum and brainstem") in turned.report["warnings"]
     normal = turned.pose.world[:3, :3] @ oblique[:3, 0]
     assert np.degrees(np.arccos(normal[0])) < 1.0
@@ -99,7 +111,8 @@ def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.4, 0.0), (0.0, 0.0, -0.4)])
 def test_the_fissure_is_where_the_brain_is_however_far_from_the_origin(tilt):
-    """A tilt too small to be undone: at the origin, 300 mm away, the plane's x is another one by 2 mm."""
+    """A tilt too small to be undone: at the origin, 300 mm away, the plane's x is
+    another one by 2 mm."""
     brain = merged(*shapes.phantom_halves(21.0, 2.0))
     far = transformed(brain, rigid(*tilt, shift=(20.0, -200.0, 220.0)))
     surface = from_surface(far, week=21.0, coordinates="ras", edge_length_mm=2.5)
@@ -111,9 +124,22 @@ def test_sulci_that_stay_fused_are_warned_of_at_ages_at_which_labels_close_them(
     labels, affine = volume
     mask = np.isin(labels, ATLAS.cerebrum).astype(np.int32)
     for week, number in ((24.0, 0), (27.0, 1)):
-        surface = from_labels(mask, affine, SCHEMES["binary"], week=week, open_sulci=True, **QUICK)
-        assert surface.report["sulci"] == {"stays_fused": "the labels have no white matter"}
-        assert len([warning for warning in surface.report["warnings"] if "not opened" in warning]) == number
+        surface = from_labels(
+            mask, affine, SCHEMES["binary"], week=week, open_sulci=True, **QUICK
+        )
+        assert surface.report["sulci"] == {
+            "stays_fused": "the labels have no white matter"
+        }
+        assert (
+            len(
+                [
+                    warning
+                    for warning in surface.report["warnings"]
+                    if "not opened" in warning
+                ]
+            )
+            == number
+        )
 
 
 def test_storage_order_makes_no_difference(volume, phantom):
@@ -121,15 +147,21 @@ def test_storage_order_makes_no_difference(volume, phantom):
     reversed_ = affine @ np.diag([1.0, -1.0, 1.0, 1.0])
     reversed_[:3, 3] += affine[:3, 1] * (labels.shape[1] - 1)
     same = from_labels(labels[:, ::-1], reversed_, ATLAS, week=24.0, **QUICK)
-    assert same.report["area_cm2"]["whole"] == pytest.approx(phantom.report["area_cm2"]["whole"], rel=0.003)
+    assert same.report["area_cm2"]["whole"] == pytest.approx(
+        phantom.report["area_cm2"]["whole"], rel=0.003
+    )
     assert same.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.1)
 
 
 @pytest.mark.parametrize(
     # with the wrong unit of a header that may give the same size, if any
-    ("factor", "units"), [(1e-3, ["metres", "header says micrometres"]), (1e3, ["micrometres", "header says metres"]),
-                          (0.1, ["centimetres"])]
-)  # fmt: skip
+    ("factor", "units"),
+    [
+        (1e-3, ["metres", "header says micrometres"]),
+        (1e3, ["micrometres", "header says metres"]),
+        (0.1, ["centimetres"]),
+    ],
+)
 def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, units):
     labels, affine = volume
     scale = np.diag([factor] * 3 + [1.0])
@@ -143,27 +175,49 @@ def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, units):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_two_brains_in_one_volume_or_surface_are_not_one_hemisphere(volume, phantom, axis):
+def test_two_brains_in_one_volume_or_surface_are_not_one_hemisphere(
+    volume, phantom, axis
+):
     labels, affine = volume
     facts = Facts("2 separate brains")
     with pytest.raises(InputError, check=facts):
-        from_labels(np.concatenate([labels, labels], axis=axis), affine, ATLAS, week=24.0, **QUICK)
+        from_labels(
+            np.concatenate([labels, labels], axis=axis),
+            affine,
+            ATLAS,
+            week=24.0,
+            **QUICK,
+        )
     # in contact or nearly so, as in one uterus
     size = np.ptp(phantom.whole.vertices, axis=0)
-    twins = merged(phantom.whole, transformed(phantom.whole, rigid(shift=1.02 * size * np.eye(3)[axis])))
+    twins = merged(
+        phantom.whole,
+        transformed(phantom.whole, rigid(shift=1.02 * size * np.eye(3)[axis])),
+    )
     with pytest.raises(InputError, check=facts):
         require_whole(twins, "surface")
 
 
 @pytest.mark.parametrize(
-    ("share", "doubted"), [(0.57, False), (1.27, False), (0.8**-3, True), (0.3, True), (0.5, True), (1.5, True)]
+    ("share", "doubted"),
+    [
+        (0.57, False),
+        (1.27, False),
+        (0.8**-3, True),
+        (0.3, True),
+        (0.5, True),
+        (1.5, True),
+    ],
 )
 def test_a_volume_far_from_that_of_the_week_is_doubted(share, doubted):
     doubts = require_plausible_size(share * expected_volume_ml(24.0) * 1e3, 24.0)
     assert doubts == [Facts(f"{100 * share:.0f} %", 24)] * doubted
 
 
-@pytest.mark.parametrize(("axis", "facts"), [(0, ["width", 1.06]), (1, ["width", 0.63]), (2, ["height", 0.93])])
+@pytest.mark.parametrize(
+    ("axis", "facts"),
+    [(0, ["width", 1.06]), (1, ["width", 0.63]), (2, ["height", 0.93])],
+)
 def test_a_wrong_edge_of_the_voxels_is_told_by_the_brains_proportions(axis, facts):
     # the spina bifida atlas at 31 GW
     extents = np.array([75.0, 92.0, 66.0])
@@ -185,20 +239,33 @@ def test_hemispheres_are_merged_apart_and_whole(halves):
     require_sound(surface, surfaces=2)
     assert surface.report["moved_apart_mm"] == 0.0
     assert is_closed(surface.left)
-    assert signed_volume(surface.whole) == pytest.approx(sum(map(signed_volume, halves)), rel=0.01)
+    assert signed_volume(surface.whole) == pytest.approx(
+        sum(map(signed_volume, halves)), rel=0.01
+    )
     assert surface.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
     assert smallest_gap(*pieces(surface.whole)) > 0.5
 
 
 @pytest.mark.parametrize("coordinates", ["ras", "auto"])
-def test_hemispheres_that_share_the_vertices_of_their_cut_are_joined_along_it(phantom, coordinates):
-    surface = from_hemispheres(phantom.left, phantom.right, week=24.0, coordinates=coordinates, **QUICK)
+def test_hemispheres_that_share_the_vertices_of_their_cut_are_joined_along_it(
+    phantom, coordinates
+):
+    surface = from_hemispheres(
+        phantom.left, phantom.right, week=24.0, coordinates=coordinates, **QUICK
+    )
     require_sound(surface)
-    assert (surface.report["source"], surface.report["joined_along_cut"]) == ("hemispheres", True)
-    assert signed_volume(surface.whole) == pytest.approx(signed_volume(phantom.whole), rel=0.01)
+    assert (surface.report["source"], surface.report["joined_along_cut"]) == (
+        "hemispheres",
+        True,
+    )
+    assert signed_volume(surface.whole) == pytest.approx(
+        signed_volume(phantom.whole), rel=0.01
+    )
     assert area(surface.left) == pytest.approx(area(phantom.left), rel=0.03)
     with pytest.raises(InputError, check=Facts("left", "right", "RAS+")):
-        from_hemispheres(phantom.right, phantom.left, week=24.0, coordinates=coordinates, **QUICK)
+        from_hemispheres(
+            phantom.right, phantom.left, week=24.0, coordinates=coordinates, **QUICK
+        )
 
 
 def test_overlapping_hemispheres_are_moved_apart(halves):
@@ -208,7 +275,10 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
     assert surface.report["gap_before_mm"] < 0
     assert 0.5 < surface.report["moved_apart_mm"] < 2.0
     assert smallest_gap(*pieces(surface.whole)) == pytest.approx(0.5, abs=0.1)
-    assert Facts(f"{surface.report['moved_apart_mm']:.2f} mm", "0.5 mm") in surface.report["warnings"]
+    assert (
+        Facts(f"{surface.report['moved_apart_mm']:.2f} mm", "0.5 mm")
+        in surface.report["warnings"]
+    )
     # white surfaces and maps of either file follow its hemisphere
     for side, given in (("left", left), ("right", halves[1])):
         followed = transformed(given, surface.pose.of_file(side)).vertices
@@ -217,13 +287,22 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
 
 @pytest.mark.slow
 def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain():
-    halves = [shapes.moved(half, shift) for half, shift in zip(atlas_halves(), (-0.6, 0.6), strict=True)]
+    halves = [
+        shapes.moved(half, shift)
+        for half, shift in zip(atlas_halves(), (-0.6, 0.6), strict=True)
+    ]
     world = merged(*halves)
     sides, whole = [transformed(half, LPS) for half in halves], transformed(world, LPS)
     surfaces = {
-        "pial, found": from_surface(whole, week=24.0, coordinates="auto", edge_length_mm=2.5),
-        "hemisphere, found": from_surface(sides[1], "right", week=24.0, coordinates="auto", edge_length_mm=2.5),
-        "hemispheres": from_hemispheres(*sides, week=24.0, coordinates="lps", edge_length_mm=2.5),
+        "pial, found": from_surface(
+            whole, week=24.0, coordinates="auto", edge_length_mm=2.5
+        ),
+        "hemisphere, found": from_surface(
+            sides[1], "right", week=24.0, coordinates="auto", edge_length_mm=2.5
+        ),
+        "hemispheres": from_hemispheres(
+            *sides, week=24.0, coordinates="lps", edge_length_mm=2.5
+        ),
     }
     for source, surface in surfaces.items():
         points, one = surface.whole.vertices, source.startswith("hemisphere,")
@@ -233,7 +312,10 @@ def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain():
         voxels = transformed(there, surface.pose.of_volume("a.nii"))
         for found in (moved, voxels):
             for end in (np.min, np.max):
-                assert np.abs(end(found.vertices, axis=0) - end(points, axis=0)).max() < 1.5, source
+                assert (
+                    np.abs(end(found.vertices, axis=0) - end(points, axis=0)).max()
+                    < 1.5
+                ), source
 
 
 def test_swapped_hemispheres_are_refused(halves):
@@ -243,18 +325,30 @@ def test_swapped_hemispheres_are_refused(halves):
         from_hemispheres(*halves, week=24.0, coordinates="lps")
 
 
-@pytest.mark.parametrize(("change", "bound"), [(scaling(1.06), "15 %"), (rigid(60, 0, 0), "1.3 mm")])
-def test_hemispheres_of_different_weeks_and_in_different_poses_are_refused(halves, change, bound):
+@pytest.mark.parametrize(
+    ("change", "bound"), [(scaling(1.06), "15 %"), (rigid(60, 0, 0), "1.3 mm")]
+)
+def test_hemispheres_of_different_weeks_and_in_different_poses_are_refused(
+    halves, change, bound
+):
     centre = halves[1].vertices.mean(axis=0)
-    changed = transformed(halves[1], rigid(shift=centre) @ change @ rigid(shift=-centre))
+    changed = transformed(
+        halves[1], rigid(shift=centre) @ change @ rigid(shift=-centre)
+    )
     with pytest.raises(InputError, check=Facts(bound, "surface.asymmetric")):
         from_hemispheres(halves[0], changed, week=24.0, **QUICK)
 
 
 def test_pial_surface_with_a_small_hole_is_closed(phantom):
-    near = np.linalg.norm(phantom.whole.vertices[phantom.whole.faces].mean(axis=1) - phantom.whole.vertices[0], axis=1)
+    near = np.linalg.norm(
+        phantom.whole.vertices[phantom.whole.faces].mean(axis=1)
+        - phantom.whole.vertices[0],
+        axis=1,
+    )
     holed, _ = submesh(phantom.whole, near > 1.5)
-    surface = from_surface(transformed(holed, LPS), week=24.0, coordinates="lps", max_hole_mm=6.0, **QUICK)
+    surface = from_surface(
+        transformed(holed, LPS), week=24.0, coordinates="lps", max_hole_mm=6.0, **QUICK
+    )
     require_sound(surface)
     assert surface.report["repair"]["holes_closed"] == 1
     assert area(surface.whole) == pytest.approx(area(phantom.whole), rel=0.02)
@@ -265,25 +359,42 @@ def test_pial_surface_with_a_small_hole_is_closed(phantom):
 def test_pial_surface_that_cuts_itself_is_made_anew(phantom):
     vertices = phantom.whole.vertices.copy()
     # the left hemisphere's medial wall pushed through the right one's
-    wall = (np.abs(vertices[:, 0] - phantom.fissure_x_mm) < 3.0) & (vertices[:, 0] < phantom.fissure_x_mm)
+    wall = (np.abs(vertices[:, 0] - phantom.fissure_x_mm) < 3.0) & (
+        vertices[:, 0] < phantom.fissure_x_mm
+    )
     wall &= vertices[:, 2] > CENTRE_MM[2] + 10.0
     vertices[wall, 0] += 4.0
     tangled = TriangleMesh(vertices, phantom.whole.faces)
     assert self_intersecting_faces(tangled).sum() > 20
     surface = from_surface(tangled, week=24.0, **QUICK)
     require_sound(surface)
-    assert signed_volume(surface.whole) == pytest.approx(signed_volume(tangled), rel=0.03)
+    assert signed_volume(surface.whole) == pytest.approx(
+        signed_volume(tangled), rel=0.03
+    )
 
 
 @pytest.mark.parametrize("has_common_vertices", [True, False])
-def test_hemispheres_that_share_their_medial_wall_in_one_file_are_moved_apart(has_common_vertices):
+def test_hemispheres_that_share_their_medial_wall_in_one_file_are_moved_apart(
+    has_common_vertices,
+):
     *open_halves, wall = shapes.cut_ellipsoid()
-    halves = [merged(half, side) for half, side in zip(open_halves, (wall, flipped(wall)), strict=True)]
-    vertices, places = np.unique(merged(*halves).vertices.round(6), axis=0, return_inverse=True)
-    both = TriangleMesh(vertices, places[merged(*halves).faces]) if has_common_vertices else merged(*halves)
+    halves = [
+        merged(half, side)
+        for half, side in zip(open_halves, (wall, flipped(wall)), strict=True)
+    ]
+    vertices, places = np.unique(
+        merged(*halves).vertices.round(6), axis=0, return_inverse=True
+    )
+    both = (
+        TriangleMesh(vertices, places[merged(*halves).faces])
+        if has_common_vertices
+        else merged(*halves)
+    )
     surface = from_surface(both, week=24.0, edge_length_mm=2.0)
     require_sound(surface, surfaces=2)
-    assert signed_volume(surface.whole) == pytest.approx(sum(map(signed_volume, halves)), rel=0.01)
+    assert signed_volume(surface.whole) == pytest.approx(
+        sum(map(signed_volume, halves)), rel=0.01
+    )
     assert area(surface.whole) == pytest.approx(sum(map(area, halves)), rel=0.02)
     assert smallest_gap(*pieces(surface.whole)) == pytest.approx(0.5, abs=0.05)
     assert Facts("0.5 mm") in surface.report["warnings"]
@@ -303,25 +414,47 @@ def test_an_open_medial_wall_is_capped_and_the_cap_left_out(source):
     assert is_closed(surface.whole)
     assert not self_intersecting_faces(surface.whole).any()
     assert [euler_number(piece) for piece in pieces(surface.whole)] == [2] * len(sides)
-    assert [area(side) for side in sides] == pytest.approx([area(left)] * len(sides), rel=0.02)
-    assert surface.report["area_cm2"]["whole"] == pytest.approx(sum(map(area, sides)) / 100)
-    assert area(surface.whole) == pytest.approx((area(left) + np.pi * 28.0 * 24.0) * len(sides), rel=0.02)
-    assert [warning for warning in surface.report["warnings"] if warning == Facts("56 mm")]
-    metrics = measure_brain(surface.whole, surface.left, surface.right).table.set_index(["hemisphere", "metric"])
-    assert metrics.loc[("whole", "area"), "value"] == pytest.approx(surface.report["area_cm2"]["whole"])
+    assert [area(side) for side in sides] == pytest.approx(
+        [area(left)] * len(sides), rel=0.02
+    )
+    assert surface.report["area_cm2"]["whole"] == pytest.approx(
+        sum(map(area, sides)) / 100
+    )
+    assert area(surface.whole) == pytest.approx(
+        (area(left) + np.pi * 28.0 * 24.0) * len(sides), rel=0.02
+    )
+    assert [
+        warning for warning in surface.report["warnings"] if warning == Facts("56 mm")
+    ]
+    metrics = measure_brain(surface.whole, surface.left, surface.right).table.set_index(
+        ["hemisphere", "metric"]
+    )
+    assert metrics.loc[("whole", "area"), "value"] == pytest.approx(
+        surface.report["area_cm2"]["whole"]
+    )
 
 
 def test_a_wide_hole_elsewhere_is_refused_with_its_size():
     left, right, wall = shapes.cut_ellipsoid()
     closed = merged(left, wall)
-    lateral, _ = submesh(closed, closed.vertices[closed.faces][:, :, 0].max(axis=1) > -19.0)
+    lateral, _ = submesh(
+        closed, closed.vertices[closed.faces][:, :, 0].max(axis=1) > -19.0
+    )
     whole, _ = submesh(
-        merged(left, right), np.r_[left.vertices[left.faces][:, :, 2].min(axis=1) < 20.0, right.faces[:, 0] >= 0]
+        merged(left, right),
+        np.r_[
+            left.vertices[left.faces][:, :, 2].min(axis=1) < 20.0,
+            right.faces[:, 0] >= 0,
+        ],
     )
     settings = {"week": 24.0, "edge_length_mm": 2.0}
-    with pytest.raises(MeshError, match=r"2\d\.\d mm across", check=Facts("medial wall")):
+    with pytest.raises(
+        MeshError, match=r"2\d\.\d mm across", check=Facts("medial wall")
+    ):
         from_surface(lateral, "left", **settings)
-    with pytest.raises(MeshError, match=r"2\d\.\d mm across", check=Facts("medial wall")):
+    with pytest.raises(
+        MeshError, match=r"2\d\.\d mm across", check=Facts("medial wall")
+    ):
         from_hemispheres(lateral, merged(right, flipped(wall)), **settings)
     with pytest.raises(MeshError, match=r"mm across", check=Facts("3 mm")):
         from_surface(whole, week=24.0)
@@ -331,7 +464,12 @@ def test_split_gives_bulges_back_to_their_hemisphere(phantom):
     vertices = phantom.whole.vertices.copy()
     fissure = phantom.fissure_x_mm
     # a patch of the left medial wall that bulges over the fissure
-    patch = np.linalg.norm(vertices - [fissure - 1.5, CENTRE_MM[1] + 20, CENTRE_MM[2] + 10], axis=1) < 4.0
+    patch = (
+        np.linalg.norm(
+            vertices - [fissure - 1.5, CENTRE_MM[1] + 20, CENTRE_MM[2] + 10], axis=1
+        )
+        < 4.0
+    )
     patch &= vertices[:, 0] < fissure
     assert patch.sum() > 5
     vertices[patch, 0] += 2.0
@@ -353,7 +491,9 @@ def test_gap_between_balls_is_known():
 def test_real_atlas_labels_give_sound_surfaces(week, series):
     folder = SHIPPED / "atlases" / "spina-bifida" / f"fetal_SB_atlas_GA{week}_{series}"
     volume = read_label_volume(folder / "parcellation.nii.gz")
-    surface = from_labels(volume.labels, volume.affine, ATLAS, week=float(week), edge_length_mm=1.2)
+    surface = from_labels(
+        volume.labels, volume.affine, ATLAS, week=float(week), edge_length_mm=1.2
+    )
     require_sound(surface)
     report = surface.report
     expected = report["label_volumes_mL"]["cerebrum"] - report["fissure_opened_mL"]
@@ -362,19 +502,29 @@ def test_real_atlas_labels_give_sound_surfaces(week, series):
     assert report["topology"]["voxels_filled_in_tunnels"] < 10
     # this atlas is mirror-symmetric about x = 0
     assert surface.fissure_x_mm == pytest.approx(0.0, abs=0.1)
-    assert report["area_cm2"]["left"] == pytest.approx(report["area_cm2"]["right"], rel=0.02)
+    assert report["area_cm2"]["left"] == pytest.approx(
+        report["area_cm2"]["right"], rel=0.02
+    )
     if week == 21:
-        # cortex hides the fissure: the hemispheres of this week, cut apart and closed, have 98.8 cm²; left shut, 75
+        # cortex hides the fissure: the hemispheres of this week, cut apart and closed,
+        # have 98.8 cm²; left shut, 75
         assert 85 < report["area_cm2"]["whole"] < 98
-        wall = surface.left.vertices[np.abs(surface.left.vertices[:, 0] - surface.fissure_x_mm) < 1.5]
+        wall = surface.left.vertices[
+            np.abs(surface.left.vertices[:, 0] - surface.fissure_x_mm) < 1.5
+        ]
         assert np.median(wall[:, 0]) == pytest.approx(-0.75, abs=0.1)
 
 
 def test_real_labels_and_hemispheres_of_a_week_agree():
     folder = DATA / "hemispheres"
     if not folder.exists():
-        pytest.skip(f"no example data: {folder} is missing (GYRIFLOW_DATA names its folder)")
-    left, right = (read_surface(folder / f"fetal.week21.{side}.pial.surf.gii") for side in ("left", "right"))
+        pytest.skip(
+            f"no example data: {folder} is missing (GYRIFLOW_DATA names its folder)"
+        )
+    left, right = (
+        read_surface(folder / f"fetal.week21.{side}.pial.surf.gii")
+        for side in ("left", "right")
+    )
     surface = from_hemispheres(left, right, week=21.0, coordinates="lps")
     require_sound(surface, surfaces=2)
     # truth.json of the example data: 49.40 and 49.44 cm², 23.01 and 23.04 mL
@@ -390,8 +540,17 @@ def test_a_mask_whose_fissure_is_shut_is_told(deep):
     mask = (x / 23) ** 2 + (y / 28) ** 2 + (z / 22) ** 2 < 1
     # a gap between the hemispheres, but for what joins them
     mask &= ~((abs(x) < 2) & (z > -14)) | (not deep)
-    surface = from_labels(mask.astype(np.int32), np.eye(4), SCHEMES["binary"], week=24.0, edge_length_mm=2.0)
+    surface = from_labels(
+        mask.astype(np.int32),
+        np.eye(4),
+        SCHEMES["binary"],
+        week=24.0,
+        edge_length_mm=2.0,
+    )
     share = surface.report["cut_share"]
     # all of the medial wall, or what lies below the gap
     assert share == pytest.approx(0.13 if deep else 1.0, abs=0.03)
-    assert (Facts("midline", f"{100 * share:.0f} %", "33 %", "week 24") in surface.report["warnings"]) != deep
+    assert (
+        Facts("midline", f"{100 * share:.0f} %", "33 %", "week 24")
+        in surface.report["warnings"]
+    ) != deep

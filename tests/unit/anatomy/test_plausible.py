@@ -1,4 +1,5 @@
-"""Brains of a series that do not fit each other, and shares of the medial wall by week."""
+"""Brains of a series that do not fit each other, and shares of the medial wall by
+week."""
 
 import pytest
 from facts import Facts
@@ -11,7 +12,10 @@ from gyriflow.anatomy.plausible import max_cut_share, thickness_jumps
     [
         ([(25, 1.22), (27, 2.32)], [("25", "1.22 mm", "27", "2.32 mm")]),
         # thinner, in the order of the weeks, over a brain whose thickness is not known
-        ([(29, 1.0), (24.5, 2.0), (26, float("nan"))], [("24.5", "2.00 mm", "29", "1.00 mm")]),
+        (
+            [(29, 1.0), (24.5, 2.0), (26, float("nan"))],
+            [("24.5", "2.00 mm", "29", "1.00 mm")],
+        ),
         ([(21, 1.6), (22, 1.95), (25, 2.6), (35, 3.0)], []),
         ([(24, 2.0), (24.2, 2.45)], []),
         ([(24, 2.0), (24.2, 2.6)], [("24.2", "2.60 mm")]),

@@ -1,4 +1,5 @@
-"""Hemispheres and whole brains in any pose: told by shape, hindbrain, labelled sides or file, or refused."""
+"""Hemispheres and whole brains in any pose: told by shape, hindbrain, labelled sides or
+file, or refused."""
 
 import json
 import os
@@ -32,12 +33,22 @@ from gyriflow.anatomy.repair import pieces
 from gyriflow.anatomy.template import medial_wall, shape_of
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import CUBE_ROTATIONS, angle_deg, motion
-from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    euler_number,
+    flipped,
+    is_closed,
+    signed_volume,
+    transformed,
+)
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.terms import SIDES
 
-DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data")) / "hemispheres"
+DATA = (
+    Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
+    / "hemispheres"
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +58,9 @@ def halves():
 
 def drawn(seed):
     random = np.random.default_rng(seed)
-    return motion(Rotation.random(random_state=random).as_matrix(), random.normal(0, 30, 3))
+    return motion(
+        Rotation.random(random_state=random).as_matrix(), random.normal(0, 30, 3)
+    )
 
 
 def linear(mesh, matrix):
@@ -55,23 +68,29 @@ def linear(mesh, matrix):
 
 
 def require_upright(pose, moved, pitch=10.0, tilt=2.0):
-    """Require that the pose takes the motions of both sides back, but for pitch and tilt in degrees."""
+    """Require that the pose takes the motions of both sides back, but for pitch and
+    tilt in degrees."""
     for side, there in zip(SIDES, moved, strict=True):
-        vector = Rotation.from_matrix((pose.of_file(side) @ there)[:3, :3]).as_rotvec(degrees=True)
+        vector = Rotation.from_matrix((pose.of_file(side) @ there)[:3, :3]).as_rotvec(
+            degrees=True
+        )
         assert abs(vector[0]) < pitch
         assert np.hypot(*vector[1:]) < tilt
 
 
 def test_separately_moved_hemispheres_are_posed(halves):
     moved = [drawn(1), drawn(101)]
-    pose = pose_of_pair(*(transformed(half, there) for half, there in zip(halves, moved, strict=True)))
+    pose = pose_of_pair(
+        *(transformed(half, there) for half, there in zip(halves, moved, strict=True))
+    )
     require_upright(pose, moved, pitch=5.0)
     assert not pose.together
     assert min(pose.evidence["confidence"].values()) > 1.5
     assert min(pose.evidence["side_ratio"].values()) > 1.1
     # side by side as they were, but for the gap
     left, right = (
-        transformed(half, pose.of_file(side) @ there).vertices.mean(axis=0) - half.vertices.mean(axis=0)
+        transformed(half, pose.of_file(side) @ there).vertices.mean(axis=0)
+        - half.vertices.mean(axis=0)
         for half, side, there in zip(halves, SIDES, moved, strict=True)
     )
     assert np.abs(right - left)[1:].max() < 1.0
@@ -98,7 +117,9 @@ def test_files_that_name_one_system_stay_together_however_they_lie(halves):
     assert not apart.together
     (warning,) = apart.warnings
     assert 8.0 < float(re.search(r"([\d.]+) mm", warning)[1]) < 10.0
-    assert facing_warnings(lower, halves[1], np.array([1.0, 0.0, 0.0])) == [Facts("9.0 mm")]
+    assert facing_warnings(lower, halves[1], np.array([1.0, 0.0, 0.0])) == [
+        Facts("9.0 mm")
+    ]
     assert facing_warnings(*halves, np.array([1.0, 0.0, 0.0])) == []
     pose = pose_of_pair(lower, halves[1], declared=True)
     assert pose.together
@@ -114,13 +135,22 @@ def test_other_sizes_and_asymmetric_brains_are_posed(halves, change):
     size = np.cbrt(np.linalg.det(change))
     changed = [linear(halves[0], size * np.eye(3)), linear(halves[1], np.array(change))]
     moved = [drawn(7), drawn(8)]
-    pose = pose_of_pair(*(transformed(half, there) for half, there in zip(changed, moved, strict=True)))
+    pose = pose_of_pair(
+        *(transformed(half, there) for half, there in zip(changed, moved, strict=True))
+    )
     require_upright(pose, moved, tilt=4.0)
 
 
 def test_swapped_hemispheres_are_refused(halves):
-    left, right = (transformed(half, drawn(seed)) for half, seed in zip(halves, (9, 10), strict=True))
-    with pytest.raises(InputError, match=r"0\.\d\d .*0\.\d\d ", check=Facts("coordinates: ras", "mirrored")):
+    left, right = (
+        transformed(half, drawn(seed))
+        for half, seed in zip(halves, (9, 10), strict=True)
+    )
+    with pytest.raises(
+        InputError,
+        match=r"0\.\d\d .*0\.\d\d ",
+        check=Facts("coordinates: ras", "mirrored"),
+    ):
         pose_of_pair(right, left)
     with pytest.raises(InputError, match=r"1\.\d\d .*0\.\d\d "):
         pose_of_pair(left, left)
@@ -134,7 +164,8 @@ AXES = {
     "SAR": np.eye(3)[[2, 1, 0]],
     "PIR": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
 }
-"""Coordinates of files as (3, 3) matrices from RAS+, by their axes; all but the first and the last mirror."""
+"""Coordinates of files as (3, 3) matrices from RAS+, by their axes; all but the first
+and the last mirror."""
 
 
 def test_the_axes_of_a_file_are_named():
@@ -157,28 +188,37 @@ def test_the_axes_of_a_file_are_named():
         ("SAR", False, ["mirrored", "SAR", "SAL", "Do not swap"]),
     ],
 )
-def test_mirrored_hemispheres_are_told_from_exchanged_ones_or_both_are_named(halves, axes, is_exchanged, facts):
+def test_mirrored_hemispheres_are_told_from_exchanged_ones_or_both_are_named(
+    halves, axes, is_exchanged, facts
+):
     files = [linear(half, AXES[axes]) for half in halves]
     with pytest.raises(InputError, check=Facts(*facts)) as caught:
         pose_of_pair(*(files[::-1] if is_exchanged else files))
     # nobody is told to swap where mirrored coordinates are more likely
-    assert ("If the files are exchanged, swap" in str(caught.value)) == ("swap" in facts)
+    assert ("If the files are exchanged, swap" in str(caught.value)) == (
+        "swap" in facts
+    )
 
 
 def test_of_unusual_axes_it_is_said_that_they_may_be_mirrored(halves):
     (doubt,) = pose_of_pair(*(linear(half, AXES["PIR"]) for half in halves)).warnings
     assert doubt == Facts("PIR", "left", "right")
-    # exchanged and mirrored hemispheres have the shapes of others: these are not to be told
+    # exchanged and mirrored hemispheres have the shapes of others: these are not to be
+    # told
     exchanged = [linear(half, AXES["LPI"]) for half in halves[::-1]]
     (doubt,) = pose_of_pair(*exchanged).warnings
     assert doubt == Facts("RPI", "left", "right")
 
 
 @pytest.mark.parametrize("coordinates", ["ras", "lps"])
-def test_nobody_is_told_to_swap_sides_in_coordinates_that_do_not_fit(halves, coordinates):
+def test_nobody_is_told_to_swap_sides_in_coordinates_that_do_not_fit(
+    halves, coordinates
+):
     # LPS named RAS, or the reverse
     left, right = (transformed(half, LPS) for half in halves)
-    with pytest.raises(InputError, check=Facts("coordinates: auto", "do not swap")) as caught:
+    with pytest.raises(
+        InputError, check=Facts("coordinates: auto", "do not swap")
+    ) as caught:
         require_left_and_right(left, right, coordinates)
     assert "Swap" not in str(caught.value)
 
@@ -188,7 +228,7 @@ def test_a_hemisphere_of_the_other_shape_is_mirrored_or_of_the_other_side(halves
     facts = Facts("right", "mirrored", "set side: right", "keep the side")
     with pytest.raises(InputError, check=facts):
         pose_of_hemisphere(mirrored, "left", "auto")
-    (doubt, *_) = pose_of_hemisphere(mirrored, "left", "ras").warnings
+    doubt, *_ = pose_of_hemisphere(mirrored, "left", "ras").warnings
     assert doubt == Facts("right", "left", "axis")
 
 
@@ -217,9 +257,12 @@ def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
 @pytest.mark.parametrize("half_lengths", [(9, 24, 16), (12, 24, 12)])
 def test_shapes_without_a_pose_are_refused(half_lengths):
     shape = transformed(
-        ellipsoid(half_lengths), motion(Rotation.from_euler("xyz", (50, 40, 30), degrees=True).as_matrix())
+        ellipsoid(half_lengths),
+        motion(Rotation.from_euler("xyz", (50, 40, 30), degrees=True).as_matrix()),
     )
-    with pytest.raises(InputError, check=Facts("left hemisphere", 0.13, 1.07, "ras", "lps")):
+    with pytest.raises(
+        InputError, check=Facts("left hemisphere", 0.13, 1.07, "ras", "lps")
+    ):
         pose_of_pair(shape, shape)
 
 
@@ -227,25 +270,41 @@ def test_a_wall_that_was_cut_is_found_to_half_a_degree():
     ball = ellipsoid((0.6, 1.0, 0.75), 5)
     half = TriangleMesh(np.maximum(ball.vertices, [0.0, -np.inf, -np.inf]), ball.faces)
     turn = Rotation.from_rotvec([0.0, 6.0, 8.0], degrees=True).as_matrix()
-    normal, offset = medial_wall(shape_of(linear(half, turn)), np.array([-1.0, 0.0, 0.0]))
+    normal, offset = medial_wall(
+        shape_of(linear(half, turn)), np.array([-1.0, 0.0, 0.0])
+    )
     assert -(normal @ turn)[0] > np.cos(np.radians(0.5))
     shape = shape_of(half)
     assert offset * shape.size_mm == pytest.approx(shape.centre[0], abs=0.01)
 
 
 def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
-    left, right = (flipped(transformed(half, drawn(seed))) for half, seed in zip(halves, (11, 12), strict=True))
-    surface = from_hemispheres(left, right, week=24.0, coordinates="auto", edge_length_mm=1.6)
+    left, right = (
+        flipped(transformed(half, drawn(seed)))
+        for half, seed in zip(halves, (11, 12), strict=True)
+    )
+    surface = from_hemispheres(
+        left, right, week=24.0, coordinates="auto", edge_length_mm=1.6
+    )
     assert is_closed(surface.whole)
     sides = pieces(surface.whole)
     assert [euler_number(side) for side in sides] == [2, 2]
     assert all(signed_volume(side) > 0 for side in sides)
     assert smallest_gap(*sides) > 0.4
-    assert surface.left.vertices[:, 0].mean() < surface.fissure_x_mm < surface.right.vertices[:, 0].mean()
+    assert (
+        surface.left.vertices[:, 0].mean()
+        < surface.fissure_x_mm
+        < surface.right.vertices[:, 0].mean()
+    )
     for name, file in (("left", left), ("right", right)):
-        there, ended = transformed(file, surface.pose.of_file(name)).vertices, getattr(surface, name).vertices
+        there, ended = (
+            transformed(file, surface.pose.of_file(name)).vertices,
+            getattr(surface, name).vertices,
+        )
         for edge in (np.min, np.max):
-            np.testing.assert_allclose(edge(there, axis=0), edge(ended, axis=0), atol=1.0)
+            np.testing.assert_allclose(
+                edge(there, axis=0), edge(ended, axis=0), atol=1.0
+            )
 
 
 @pytest.mark.slow
@@ -256,12 +315,18 @@ def test_real_hemispheres_are_upright(week):
     files = [f"fetal.week{week}.{side}.pial.surf.gii" for side in SIDES]
     meshes = [read_surface(DATA / file) for file in files]
     meshes = [flipped(mesh) if signed_volume(mesh) < 0 else mesh for mesh in meshes]
-    require_upright(pose_of_pair(*meshes), [np.linalg.inv(truth[file]["to_ras"]) for file in files])
+    require_upright(
+        pose_of_pair(*meshes), [np.linalg.inv(truth[file]["to_ras"]) for file in files]
+    )
 
 
 def test_doubtful_shapes_are_taken_as_ras_or_refused(halves, monkeypatch):
     # as if another pose of every hemisphere fitted the template nearly as well
-    monkeypatch.setattr(posing, "hemisphere_by_shape", lambda mesh: replace(hemisphere_by_shape(mesh), confidence=1.05))
+    monkeypatch.setattr(
+        posing,
+        "hemisphere_by_shape",
+        lambda mesh: replace(hemisphere_by_shape(mesh), confidence=1.05),
+    )
     turn = motion(Rotation.from_euler("xyz", (9, -14, 12), degrees=True).as_matrix())
     pose = pose_of_pair(*(transformed(half, turn) for half in halves))
     assert pose.by == "default"
@@ -280,15 +345,21 @@ def brain():
 
 
 def pose_when_turned(brain, degrees):
-    return pose_of_labels(brain[0], rigid(*degrees) @ brain[1], SCHEMES["spina-bifida-atlas"])
+    return pose_of_labels(
+        brain[0], rigid(*degrees) @ brain[1], SCHEMES["spina-bifida-atlas"]
+    )
 
 
 @pytest.mark.parametrize("degrees", TURNS)
 def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
     pose = pose_when_turned(brain, degrees)
     assert pose.by == "cerebellum and brainstem"
-    np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
-    assert pose.warnings[0] == Facts("cerebellum and brainstem", f"{max(map(abs, degrees))}°", "left", "right")
+    np.testing.assert_allclose(
+        pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9
+    )
+    assert pose.warnings[0] == Facts(
+        "cerebellum and brainstem", f"{max(map(abs, degrees))}°", "left", "right"
+    )
 
 
 @pytest.mark.parametrize("degrees", [(0, 0, 0), (5, 0, 0), (-15, 0, 0), (-6, 5, 7)])
@@ -299,7 +370,14 @@ def test_small_tilts_are_the_files_own(brain, degrees):
 
 
 @pytest.mark.parametrize(
-    ("degrees", "angle"), [((25, 0, 0), 25), ((30, 0, 0), 30), ((45, 0, 0), 45), ((0, 45, 0), 45), ((-20, 25, 30), 46)]
+    ("degrees", "angle"),
+    [
+        ((25, 0, 0), 25),
+        ((30, 0, 0), 30),
+        ((45, 0, 0), 45),
+        ((0, 45, 0), 45),
+        ((-20, 25, 30), 46),
+    ],
 )
 def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
     pose = pose_when_turned(brain, degrees)
@@ -310,27 +388,44 @@ def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
     assert abs(int(re.search(r"(\d+)°", warning)[1]) - angle) < 8
 
 
-@pytest.mark.parametrize("lost", [(), (10,), (11, 12)], ids=["nothing", "cerebellum", "brainstem"])
-def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(brain, lost):
+@pytest.mark.parametrize(
+    "lost", [(), (10,), (11, 12)], ids=["nothing", "cerebellum", "brainstem"]
+)
+def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(
+    brain, lost
+):
     labels, affine = odd_brains.add_sides(*brain), brain[1]
     labels = np.where(np.isin(labels, lost), 0, labels)
     for turn in TURNS:
         pose = pose_of_labels(labels, rigid(*turn) @ affine, SCHEMES["dhcp-19"])
-        np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*turn)[:3, :3], np.eye(3), atol=1e-9)
+        np.testing.assert_allclose(
+            pose.world[:3, :3] @ rigid(*turn)[:3, :3], np.eye(3), atol=1e-9
+        )
     tilts = ((0, 0, 0), (0, 10, 8), (0, -5, 12))
     for tilt in tilts:
-        assert pose_of_labels(labels, rigid(*tilt) @ affine, SCHEMES["dhcp-19"]).by == "file"
+        assert (
+            pose_of_labels(labels, rigid(*tilt) @ affine, SCHEMES["dhcp-19"]).by
+            == "file"
+        )
     for turn in (*tilts, *TURNS) if not lost else tilts:
         with pytest.raises(InputError, check=Facts("left", "right", "affine")):
-            pose_of_labels(labels, rigid(*turn) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
+            pose_of_labels(
+                labels,
+                rigid(*turn) @ np.diag([-1.0, 1, 1, 1]) @ affine,
+                SCHEMES["dhcp-19"],
+            )
 
 
 @pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 0, 180), (90, 0, 0), (0, 180, 0)])
 def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
     mesh = transformed(atlas_brain(), rigid(*degrees))
     pose = pose_of_volume_by_shape(mesh, has_sides=False)
-    np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
-    assert list(pose.warnings) == [Facts(f"{max(degrees)}°", "left", "right")] * any(degrees)
+    np.testing.assert_allclose(
+        pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9
+    )
+    assert list(pose.warnings) == [Facts(f"{max(degrees)}°", "left", "right")] * any(
+        degrees
+    )
 
 
 def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
@@ -346,7 +441,9 @@ def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
 def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
     labels, affine = brain
     scheme = SCHEMES["spina-bifida-atlas"]
-    assert pose_of_labels(labels[:, ::-1], affine, scheme).warnings[0] == Facts("180°", "left", "right")
+    assert pose_of_labels(labels[:, ::-1], affine, scheme).warnings[0] == Facts(
+        "180°", "left", "right"
+    )
     sided = odd_brains.add_sides(*brain)
     turned = pose_of_labels(sided, rigid(0, 0, 180) @ affine, SCHEMES["dhcp-19"])
     assert turned.warnings[0] == Facts("180°") != Facts("left")
@@ -354,7 +451,11 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
 
 @pytest.mark.parametrize(
     ("turn", "most_deg", "warnings"),
-    [(np.eye(4), 1e-6, []), (LPS, 1e-6, [Facts("LPS")]), (rigid(100, 40, -70), 5.0, [Facts("°")])],
+    [
+        (np.eye(4), 1e-6, []),
+        (LPS, 1e-6, [Facts("LPS")]),
+        (rigid(100, 40, -70), 5.0, [Facts("°")]),
+    ],
     ids=["RAS", "LPS", "any"],
 )
 def test_the_shape_of_a_surface_tells_its_pose(turn, most_deg, warnings):
@@ -370,7 +471,9 @@ def test_coordinates_that_are_named_are_kept_and_doubted():
     assert pose_of_surface(atlas_brain(), "ras").warnings == ()
 
 
-@pytest.mark.parametrize("pathology", ["without_callosum", "holoprosencephaly", "wide_hemisphere"])
+@pytest.mark.parametrize(
+    "pathology", ["without_callosum", "holoprosencephaly", "wide_hemisphere"]
+)
 def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, pathology):
     mesh = cerebrum_surface(getattr(odd_brains, pathology)(*brain), brain[1])
     pose = pose_of_surface(mesh, "auto")
@@ -385,5 +488,7 @@ def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted():
     about = [transformed(side, LPS) for side in (right, left)]
     (doubt,) = hemisphere_warnings(*about, "lps")
     assert doubt == Facts("left", "right", "LPS", "coordinates: auto")
-    (doubt,) = hemisphere_warnings(*(transformed(side, rigid(180, 0, 0)) for side in (left, right)), "ras")
+    (doubt,) = hemisphere_warnings(
+        *(transformed(side, rigid(180, 0, 0)) for side in (left, right)), "ras"
+    )
     assert re.search(r"1[78]\d° .*\bras\b", doubt)

@@ -7,10 +7,22 @@ import pytest
 from facts import Facts
 from shapes import box, moved, sphere, torus
 
-from gyriflow.anatomy.repair import clean, make_even, pieces, rebuild, sound_pieces, surface_of_mask
+from gyriflow.anatomy.repair import (
+    clean,
+    make_even,
+    pieces,
+    rebuild,
+    sound_pieces,
+    surface_of_mask,
+)
 from gyriflow.errors import MeshError
 from gyriflow.geometry.alignment import MIRROR
-from gyriflow.geometry.remeshing import in_meshlab, pymeshlab, remesh, self_intersecting_faces
+from gyriflow.geometry.remeshing import (
+    in_meshlab,
+    pymeshlab,
+    remesh,
+    self_intersecting_faces,
+)
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
@@ -33,7 +45,12 @@ def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
 
 def test_small_hole_is_closed_and_reported():
     whole = ball()
-    near = np.linalg.norm(whole.vertices[whole.faces].mean(axis=1) - [0, 0, RADIUS], axis=1) < 1.2
+    near = (
+        np.linalg.norm(
+            whole.vertices[whole.faces].mean(axis=1) - [0, 0, RADIUS], axis=1
+        )
+        < 1.2
+    )
     mesh, report, _ = clean(submesh(whole, ~near)[0], 3.0)
     assert is_closed(mesh)
     assert report["holes_closed"] == 1
@@ -44,10 +61,14 @@ def test_small_hole_is_closed_and_reported():
 def test_large_hole_is_refused_with_its_size():
     whole = ball()
     mesh, _ = submesh(whole, whole.vertices[whole.faces][:, :, 2].max(axis=1) < 8.0)
-    with pytest.raises(MeshError, match=r"1[12]\.\d mm", check=Facts(1, "3 mm", "surface.max_hole_mm")):
+    with pytest.raises(
+        MeshError, match=r"1[12]\.\d mm", check=Facts(1, "3 mm", "surface.max_hole_mm")
+    ):
         clean(mesh, 3.0)
     wide = TriangleMesh(3.0 * mesh.vertices, mesh.faces)
-    with pytest.raises(MeshError, match=r"3\d\.\d mm", check=Facts(1, "20 mm")) as caught:
+    with pytest.raises(
+        MeshError, match=r"3\d\.\d mm", check=Facts(1, "20 mm")
+    ) as caught:
         clean(wide, 20.0)
     assert str(caught.value) != Facts("surface.max_hole_mm")
 
@@ -57,7 +78,9 @@ def test_a_vertex_far_off_the_surface_is_told():
     assert sound_pieces(whole, 3.0).warnings == []
     vertices = whole.vertices.copy()
     vertices[7] *= 7.0
-    assert sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings[0] == Facts("60 mm")
+    assert sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings[0] == Facts(
+        "60 mm"
+    )
 
 
 def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():
@@ -76,21 +99,50 @@ WHOLE = ball()
 COUNT = len(WHOLE.faces)
 SOUP = WHOLE.vertices[WHOLE.faces].reshape(-1, 3), np.arange(3 * COUNT).reshape(-1, 3)
 FIN = [[*WHOLE.faces[0, :2], len(WHOLE.vertices)]]
-WITH_FIN = np.vstack([WHOLE.vertices, WHOLE.vertices[WHOLE.faces[0, 0]] * 1.02]), np.vstack([WHOLE.faces, FIN])
+WITH_FIN = (
+    np.vstack([WHOLE.vertices, WHOLE.vertices[WHOLE.faces[0, 0]] * 1.02]),
+    np.vstack([WHOLE.faces, FIN]),
+)
 TWICE = np.vstack([WHOLE.faces, WHOLE.faces[:5], [[7, 7, 8]]])
-SOME_TURNED = np.concatenate([WHOLE.faces[:100], WHOLE.faces[100:300, ::-1], WHOLE.faces[300:]])
+SOME_TURNED = np.concatenate(
+    [WHOLE.faces[:100], WHOLE.faces[100:300, ::-1], WHOLE.faces[300:]]
+)
 
 
 @pytest.mark.parametrize(
     ("vertices", "faces", "counts"),
     [
-        pytest.param(WHOLE.vertices, WHOLE.faces[:, ::-1], {"faces_turned_to_agree": 0, "pieces_turned_outward": 1}),
-        pytest.param(WHOLE.vertices, SOME_TURNED, {"faces_turned_to_agree": 200, "pieces_turned_outward": 0}),
-        pytest.param(*SOUP, {"duplicate_vertices_joined": 3 * COUNT - len(WHOLE.vertices), "faces_that_cut_others": 0}),
-        pytest.param(WHOLE.vertices, TWICE, {"double_faces_removed": 5, "degenerate_faces_removed": 1}),
+        pytest.param(
+            WHOLE.vertices,
+            WHOLE.faces[:, ::-1],
+            {"faces_turned_to_agree": 0, "pieces_turned_outward": 1},
+        ),
+        pytest.param(
+            WHOLE.vertices,
+            SOME_TURNED,
+            {"faces_turned_to_agree": 200, "pieces_turned_outward": 0},
+        ),
+        pytest.param(
+            *SOUP,
+            {
+                "duplicate_vertices_joined": 3 * COUNT - len(WHOLE.vertices),
+                "faces_that_cut_others": 0,
+            },
+        ),
+        pytest.param(
+            WHOLE.vertices,
+            TWICE,
+            {"double_faces_removed": 5, "degenerate_faces_removed": 1},
+        ),
         pytest.param(*WITH_FIN, {"non_manifold_edges_opened": 1}),
     ],
-    ids=["all inside out", "some inside out", "separate triangles", "degenerate and double faces", "a fin"],
+    ids=[
+        "all inside out",
+        "some inside out",
+        "separate triangles",
+        "degenerate and double faces",
+        "a fin",
+    ],
 )
 def test_what_is_wrong_with_triangles_is_repaired_and_counted(vertices, faces, counts):
     mesh, report, _ = clean(TriangleMesh(vertices, faces), 3.0)
@@ -102,7 +154,13 @@ def test_what_is_wrong_with_triangles_is_repaired_and_counted(vertices, faces, c
 
 def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
     mesh, report, _ = clean(
-        merged(ball((-11, 0, 0)), ball((11, 0, 0), 9.5), ball((0, 30, 0), 1.0), flipped(ball((-11, 0, 0), 7.0))), 3.0
+        merged(
+            ball((-11, 0, 0)),
+            ball((11, 0, 0), 9.5),
+            ball((0, 30, 0), 1.0),
+            flipped(ball((-11, 0, 0), 7.0)),
+        ),
+        3.0,
     )
     assert (report["pieces"], report["pieces_dropped"]) == (2, 2)
     assert signed_volume(mesh) == pytest.approx(VOLUME * (1 + 0.95**3), rel=0.01)
@@ -120,17 +178,27 @@ NEIGHBOURS = {
 
 
 @pytest.mark.parametrize("shared", NEIGHBOURS)
-@pytest.mark.parametrize("kind", ["vertices of their own", "vertices in common", "one inside out", "all inside out"])
+@pytest.mark.parametrize(
+    "kind",
+    ["vertices of their own", "vertices in common", "one inside out", "all inside out"],
+)
 def test_closed_pieces_that_share_a_wall_are_separated(shared, kind):
-    both = merged(BLOCK, flipped(NEIGHBOURS[shared]) if kind == "one inside out" else NEIGHBOURS[shared])
+    both = merged(
+        BLOCK,
+        flipped(NEIGHBOURS[shared]) if kind == "one inside out" else NEIGHBOURS[shared],
+    )
     if kind == "vertices in common":
         # as readers of STL join them
-        vertices, places = np.unique(both.vertices.round(9), axis=0, return_inverse=True)
+        vertices, places = np.unique(
+            both.vertices.round(9), axis=0, return_inverse=True
+        )
         both = TriangleMesh(vertices, places[both.faces])
     mesh, report, _ = clean(flipped(both) if kind == "all inside out" else both, 3.0)
     assert is_closed(mesh)
     assert [euler_number(piece) for piece in pieces(mesh)] == [2, 2]
-    assert [signed_volume(piece) for piece in pieces(mesh)] == pytest.approx([3200.0, 3200.0])
+    assert [signed_volume(piece) for piece in pieces(mesh)] == pytest.approx(
+        [3200.0, 3200.0]
+    )
     assert (report["double_faces_removed"], report["holes_closed"]) == (0, 0)
 
 
@@ -143,7 +211,9 @@ def test_a_surface_with_every_face_in_both_directions_is_one():
 def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
     # after a part of a surface was remeshed, as a cap is
     document = in_meshlab(ball())
-    document.meshing_isotropic_explicit_remeshing(targetlen=pymeshlab.PureValue(2.0), selectedonly=True)
+    document.meshing_isotropic_explicit_remeshing(
+        targetlen=pymeshlab.PureValue(2.0), selectedonly=True
+    )
     even, cutting = make_even(ball(), 1.0)
     assert is_closed(even)
     lengths = np.linalg.norm(np.diff(even.vertices[even.faces[:, :2]], axis=1), axis=-1)
@@ -169,9 +239,13 @@ def test_a_large_filled_gap_is_warned_of():
     # a hole of 5 × 60 mm² through a plate, which one layer of voxels closes
     mask = np.pad(np.ones((24, 70, 12), dtype=bool), 4)
     mask[14:19, 9:69] = False
-    surface = surface_of_mask(mask.astype(np.float32), np.eye(4), float(mask.sum()), 2.0)
+    surface = surface_of_mask(
+        mask.astype(np.float32), np.eye(4), float(mask.sum()), 2.0
+    )
     assert surface.report["topology"]["tunnels_filled"] == 1
-    assert [warning for warning in surface.warnings if "handles" in warning] == [Facts("300 mm³")]
+    assert [warning for warning in surface.warnings if "handles" in warning] == [
+        Facts("300 mm³")
+    ]
 
 
 def test_handle_of_a_torus_is_closed_when_remade():

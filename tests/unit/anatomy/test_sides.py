@@ -1,4 +1,5 @@
-"""Left and right from labels that have sides, and the volume that smoothing gives back."""
+"""Left and right from labels that have sides, and the volume that smoothing gives
+back."""
 
 import numpy as np
 import odd_brains
@@ -15,16 +16,21 @@ from gyriflow.geometry.triangles import area, corners, face_areas, merged, signe
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.schemes import LabelScheme
 
-SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
+SIDED = LabelScheme(
+    name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4)
+)
 
 
 def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet():
-    # at a surface bent by 4 mm, cortex on both sides of it and no gap between: the phantom's own fissure is filled
+    # at a surface bent by 4 mm, cortex on both sides of it and no gap between: the
+    # phantom's own fissure is filled
     labels, affine = phantom()
     x, y, _ = odd_brains.positions(labels, affine)
     gap = (np.abs(x) < 3.0) & (labels == 4)
     right, cortex = x > 4.0 * np.sin(y / 12.0), (labels == 5) | gap
-    sided = np.where(np.isin(labels, odd_brains.CEREBRUM) | gap, np.where(cortex, 3, 1) + right, 0)
+    sided = np.where(
+        np.isin(labels, odd_brains.CEREBRUM) | gap, np.where(cortex, 3, 1) + right, 0
+    )
     sided[labels == 2] = 5
     surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=1.5)
     inverse = surface.pose.world
@@ -49,13 +55,23 @@ def test_a_side_of_a_few_voxels_is_no_hemisphere():
 
 def test_smoothing_keeps_volume_and_area():
     labels, affine = phantom(22.0)
-    surface = from_labels(labels, affine, SCHEMES["spina-bifida-atlas"], week=22.0, edge_length_mm=1.5)
+    surface = from_labels(
+        labels, affine, SCHEMES["spina-bifida-atlas"], week=22.0, edge_length_mm=1.5
+    )
     smoothing = surface.report["smoothing"]
-    assert abs(smoothing["volume_change"]) < 1e-4 < abs(smoothing["volume_change_before_correction"])
+    assert (
+        abs(smoothing["volume_change"])
+        < 1e-4
+        < abs(smoothing["volume_change_before_correction"])
+    )
     assert abs(smoothing["area_change"]) < 0.025
-    assert signed_volume(surface.whole) / 1e3 == pytest.approx(smoothing["volume_expected_mL"], rel=1e-4)
+    assert signed_volume(surface.whole) / 1e3 == pytest.approx(
+        smoothing["volume_expected_mL"], rel=1e-4
+    )
     mask = np.isin(labels, (1, 2, 5, 6, 8)).sum() * 1.2**3 / 1e3
-    assert smoothing["volume_expected_mL"] == pytest.approx(mask - surface.report["fissure_opened_mL"], rel=2e-3)
+    assert smoothing["volume_expected_mL"] == pytest.approx(
+        mask - surface.report["fissure_opened_mL"], rel=2e-3
+    )
 
 
 def test_a_volume_that_is_far_off_is_told_and_not_hidden():
@@ -83,7 +99,9 @@ def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
 
 
 @pytest.mark.parametrize(("radius_mm", "refuses"), [(9.2, False), (11.0, True)])
-def test_a_piece_beside_a_hemisphere_is_left_out_or_refused_with_its_place(radius_mm, refuses):
+def test_a_piece_beside_a_hemisphere_is_left_out_or_refused_with_its_place(
+    radius_mm, refuses
+):
     labels, affine = phantom(28.0)
     labels = odd_brains.add_sides(odd_brains.apart(labels, affine), affine)
     place = np.array([-55.0, 0.0, 0.0])
@@ -91,14 +109,20 @@ def test_a_piece_beside_a_hemisphere_is_left_out_or_refused_with_its_place(radiu
     labels = np.pad(labels, room)
     affine = affine.copy()
     affine[:3, 3] -= affine[:3, :3] @ np.full(3, room)
-    from_centre = np.linalg.norm(odd_brains.positions(labels, affine) - place[:, None, None, None], axis=0)
+    from_centre = np.linalg.norm(
+        odd_brains.positions(labels, affine) - place[:, None, None, None], axis=0
+    )
     labels[from_centre < radius_mm] = 3
     labels[from_centre < radius_mm - 2.0] = 5
 
     def make():
-        return from_labels(labels, affine, SCHEMES["dhcp-19"], week=28.0, edge_length_mm=1.5)
+        return from_labels(
+            labels, affine, SCHEMES["dhcp-19"], week=28.0, edge_length_mm=1.5
+        )
 
-    facts = Facts("left", "2 pieces", f"({', '.join(str(round(x)) for x in place + CENTRE_MM)})")
+    facts = Facts(
+        "left", "2 pieces", f"({', '.join(str(round(x)) for x in place + CENTRE_MM)})"
+    )
     if refuses:
         with pytest.raises(InputError, check=facts):
             make()

@@ -1,4 +1,5 @@
-"""Simple shapes through the surface stage: nothing is moved, left and right meet at x = 0."""
+"""Simple shapes through the surface stage: nothing is moved, left and right meet at x =
+0."""
 
 import numpy as np
 import pytest
@@ -29,17 +30,28 @@ def ellipsoid_area(a, b, c):
     turn = np.linspace(0, 2 * np.pi, 1001)[:-1]
     ring = np.sqrt(1 - z**2)[:, None]
     x, y = ring * np.cos(turn), ring * np.sin(turn)
-    return float((a * b * c * np.sqrt((x / a) ** 2 + (y / b) ** 2 + (z[:, None] / c) ** 2)).mean() * 4 * np.pi)
+    return float(
+        (
+            a * b * c * np.sqrt((x / a) ** 2 + (y / b) ** 2 + (z[:, None] / c) ** 2)
+        ).mean()
+        * 4
+        * np.pi
+    )
 
 
-def test_an_ellipsoid_has_the_analytic_volume_and_area_and_even_triangles_that_look_outwards():
+def test_an_ellipsoid_has_the_analytic_size_and_even_triangles_that_look_outwards():
     volume = 4 / 3 * np.pi * np.prod(AXES)
-    coarse, mesh = (shape_surface(AXES, edge_length_mm=edge_mm, noise_mm=0.0) for edge_mm in (2.0, 1.0))
+    coarse, mesh = (
+        shape_surface(AXES, edge_length_mm=edge_mm, noise_mm=0.0)
+        for edge_mm in (2.0, 1.0)
+    )
     assert is_closed(mesh)
     assert euler_number(mesh) == 2
     assert signed_volume(mesh) == pytest.approx(volume, rel=0.01)
     assert area(mesh) == pytest.approx(ellipsoid_area(*AXES), rel=0.01)
-    assert (1 - signed_volume(coarse) / volume) / (1 - signed_volume(mesh) / volume) == pytest.approx(4.0, rel=0.25)
+    assert (1 - signed_volume(coarse) / volume) / (
+        1 - signed_volume(mesh) / volume
+    ) == pytest.approx(4.0, rel=0.25)
     lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=-1)
     assert lengths.mean() == pytest.approx(1.0, rel=0.1)
     assert 0.2 < lengths.min() < lengths.max() < 2.2
@@ -48,9 +60,11 @@ def test_an_ellipsoid_has_the_analytic_volume_and_area_and_even_triangles_that_l
     assert np.einsum("ij,ij->i", normals, face_normals(mesh)).min() > 0.9
 
 
-def test_bumps_have_the_height_asked_for_and_the_pattern_of_their_seed_at_any_edge_length():
+def test_bumps_have_the_given_height_and_the_pattern_of_their_seed_at_any_edge_length():
     def heights(edge_mm, seed):
-        mesh = shape_surface((40.0, 40.0, 40.0), edge_length_mm=edge_mm, noise_mm=0.2, seed=seed)
+        mesh = shape_surface(
+            (40.0, 40.0, 40.0), edge_length_mm=edge_mm, noise_mm=0.2, seed=seed
+        )
         return np.linalg.norm(mesh.vertices, axis=1) - 40.0, unit(mesh.vertices)
 
     fine, directions = heights(3.0, 1)
@@ -73,8 +87,16 @@ def test_a_shape_is_left_as_it_is_and_cut_at_x_0():
     assert np.array_equal(surface.whole.vertices, shape.vertices)
     assert surface.fissure_x_mm == surface.report["fissure_x_mm"] == 0.0
     assert surface.pose.world.tolist() == np.eye(4).tolist()
-    assert (surface.report["source"], surface.report["week"], surface.report["warnings"]) == ("shape", 21.0, [])
-    assert corners(surface.left)[:, :, 0].mean(axis=1).max() < 0 < corners(surface.right)[:, :, 0].mean(axis=1).min()
+    assert (
+        surface.report["source"],
+        surface.report["week"],
+        surface.report["warnings"],
+    ) == ("shape", 21.0, [])
+    assert (
+        corners(surface.left)[:, :, 0].mean(axis=1).max()
+        < 0
+        < corners(surface.right)[:, :, 0].mean(axis=1).min()
+    )
     assert area(surface.left) + area(surface.right) == pytest.approx(area(shape))
     assert area(surface.left) == pytest.approx(area(shape) / 2, rel=0.02)
 

@@ -1,4 +1,5 @@
-"""Surfaces from voxels: shut sulci are opened where two banks of cortex touch; terraces are taken out, folds stay."""
+"""Surfaces from voxels: shut sulci are opened where two banks of cortex touch; terraces
+are taken out, folds stay."""
 
 from unittest.mock import patch
 
@@ -35,7 +36,8 @@ VOXEL_MM, RADIUS_MM, THICKNESS_MM = 0.8, 12.0, 2.0
 
 
 def ball():
-    """Return a ball's mask, the (i, j, k, 3) places in mm, their depth below its surface, and the affine."""
+    """Return a ball's mask, the (i, j, k, 3) places in mm, their depth below its
+    surface, and the affine."""
     axis = np.arange(-22, 23) * VOXEL_MM + 0.13
     places = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     depth = RADIUS_MM - np.linalg.norm(places, axis=-1)
@@ -43,7 +45,8 @@ def ball():
 
 
 def with_sulcus(depth_mm):
-    """Return a ball with a shut sulcus all round it, in a plane that is oblique to the voxels."""
+    """Return a ball with a shut sulcus all round it, in a plane that is oblique to the
+    voxels."""
     body, places, depth, affine = ball()
     across = np.abs(places @ np.array([0.8, 0.36, 0.48]))
     to_end = np.hypot(across, np.maximum(depth - depth_mm, 0.0))
@@ -54,7 +57,9 @@ def with_sulcus(depth_mm):
 def test_a_shut_sulcus_is_opened_to_its_depth(depth_mm):
     body, core, affine = with_sulcus(depth_mm)
     field, volume = smooth_mask(body), body.sum() * VOXEL_MM**3
-    truth = 4 * np.pi * RADIUS_MM**2 + 2 * np.pi * (RADIUS_MM**2 - (RADIUS_MM - depth_mm) ** 2)
+    truth = 4 * np.pi * RADIUS_MM**2 + 2 * np.pi * (
+        RADIUS_MM**2 - (RADIUS_MM - depth_mm) ** 2
+    )
     shut = surface_of_mask(field, affine, volume, 1.0).mesh
     assert area(shut) < 0.83 * truth
     opened, fine, report = open_fused_sulci(field, affine, core)
@@ -66,7 +71,9 @@ def test_a_shut_sulcus_is_opened_to_its_depth(depth_mm):
     assert area(even.mesh) == pytest.approx(truth, rel=0.06)
     # half a millimetre wide
     assert taken < 0.6 * (truth - area(shut)) / 2
-    found = cortical_thickness(even.mesh, body, body & ~core, affine, fissure_x_mm=-100.0)
+    found = cortical_thickness(
+        even.mesh, body, body & ~core, affine, fissure_x_mm=-100.0
+    )
     assert found.is_measured.mean() > 0.95
     assert found.report["mean_mm"] == pytest.approx(THICKNESS_MM, abs=0.25)
 
@@ -74,7 +81,10 @@ def test_a_shut_sulcus_is_opened_to_its_depth(depth_mm):
 def test_hemispheres_are_no_banks_of_a_sulcus():
     body, core, affine = with_sulcus(6.0)
     side_mm = (ball()[1] @ np.array([0.8, 0.36, 0.48])).astype(np.float32)
-    assert open_fused_sulci(smooth_mask(body), affine, core, side_mm)[2]["slit_voxels"] == 0
+    assert (
+        open_fused_sulci(smooth_mask(body), affine, core, side_mm)[2]["slit_voxels"]
+        == 0
+    )
 
 
 @pytest.mark.parametrize("kind", ["thick crest", "groove"])
@@ -101,14 +111,19 @@ def test_holes_in_the_white_matter_open_nothing_more():
     deep = ndimage.binary_erosion(core, iterations=2)
     holes = deep & (np.random.default_rng(0).random(core.shape) < 0.02)
     assert holes.sum() > 20
-    fields = [open_fused_sulci(smooth_mask(body), affine, one)[0] for one in (core, core & ~holes)]
+    fields = [
+        open_fused_sulci(smooth_mask(body), affine, one)[0]
+        for one in (core, core & ~holes)
+    ]
     np.testing.assert_array_equal(*fields)
 
 
 def test_a_hemisphere_alone_has_its_sulcus_opened():
     labels, affine = phantom(voxel_mm=0.8)
     scheme = SCHEMES["dhcp-19"]
-    labels = odd_brains.one_hemisphere(odd_brains.add_sides(labels, affine), affine, "left")
+    labels = odd_brains.one_hemisphere(
+        odd_brains.add_sides(labels, affine), affine, "left"
+    )
     cerebrum = np.isin(labels, scheme.cerebrum)
     size = np.linalg.norm(affine[:3, :3], axis=0)
     depth = ndimage.distance_transform_edt(cerebrum, sampling=size)
@@ -123,7 +138,9 @@ def test_a_hemisphere_alone_has_its_sulcus_opened():
     labels[(np.abs(rows[0]) < 2) & (np.abs(rows[2] + 4) < 2)] = 0
     areas, expected_ml = {}, {}
     for opened in (False, True):
-        surface = from_labels(labels, affine, scheme, "left", week=24.0, open_sulci=opened)
+        surface = from_labels(
+            labels, affine, scheme, "left", week=24.0, open_sulci=opened
+        )
         areas[opened] = surface.report["area_cm2"]["left"]
         expected_ml[opened] = surface.report["smoothing"]["volume_expected_mL"]
         assert surface.report["euler_number"] == 2
@@ -133,7 +150,9 @@ def test_a_hemisphere_alone_has_its_sulcus_opened():
     filled_ml = expected_ml[False] - surface.report["label_volumes_mL"]["cerebrum"]
     assert filled_ml > 0.005
     opened_ml = surface.report["sulci"]["opened_mL"]
-    assert expected_ml[True] == pytest.approx(expected_ml[False] - opened_ml, abs=0.1 * filled_ml)
+    assert expected_ml[True] == pytest.approx(
+        expected_ml[False] - opened_ml, abs=0.1 * filled_ml
+    )
 
 
 def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
@@ -149,9 +168,13 @@ def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
 def test_cortex_of_a_voxel_stays_fused_and_has_one_number_of_voxels():
     labels, affine = phantom(24.0, 2.0)
     scheme = SCHEMES["spina-bifida-atlas"]
-    surface = from_labels(labels, affine, scheme, week=28.0, edge_length_mm=3.0, open_sulci=True)
+    surface = from_labels(
+        labels, affine, scheme, week=28.0, edge_length_mm=3.0, open_sulci=True
+    )
     placed = surface.whole, surface.pose, surface.fissure_x_mm
-    voxels = thickness_from_labels(labels, affine, scheme, *placed).report["voxels_through_cortex"]
+    voxels = thickness_from_labels(labels, affine, scheme, *placed).report[
+        "voxels_through_cortex"
+    ]
     assert voxels == pytest.approx(1.0, abs=0.2)
     reason = surface.report["sulci"]["stays_fused"]
     assert reason == Facts(f"{voxels:.1f} voxels")
@@ -160,7 +183,10 @@ def test_cortex_of_a_voxel_stays_fused_and_has_one_number_of_voxels():
 
 def test_uneven_cortex_is_opened_on_both_sides():
     body, places, depth, affine = ball()
-    across, along = np.abs(places @ np.array([0.8, 0.36, 0.48])), places @ np.array([0.0, 0.8, -0.6])
+    across, along = (
+        np.abs(places @ np.array([0.8, 0.36, 0.48])),
+        places @ np.array([0.0, 0.8, -0.6]),
+    )
     thickness = np.where(along < 0, 1.3, 2.6)
     to_end = np.hypot(across, np.maximum(depth - 6.0, 0.0))
     core = body & (depth > thickness) & (to_end > thickness)
@@ -175,25 +201,35 @@ def test_uneven_cortex_is_opened_on_both_sides():
 
 
 def voxels(half, size=VOXEL_MM):
-    """Return the centres (i, j, k, 3) of voxels around the origin and their affine; none lies at the origin."""
+    """Return the centres (i, j, k, 3) of voxels around the origin and their affine;
+    none lies at the origin."""
     count = int(np.ceil(half / size)) + 6
     affine = scaling(size, size * (np.array([0.1, 0.3, 0.2]) - count))
-    return np.moveaxis(np.indices((2 * count + 1,) * 3), 0, -1) * size + affine[:3, 3], affine
+    return (
+        np.moveaxis(np.indices((2 * count + 1,) * 3), 0, -1) * size + affine[:3, 3],
+        affine,
+    )
 
 
 def surface(mask, affine):
-    return surface_of_mask(smooth_mask(mask), affine, mask.sum() * np.linalg.det(affine), 1.0)
+    return surface_of_mask(
+        smooth_mask(mask), affine, mask.sum() * np.linalg.det(affine), 1.0
+    )
 
 
 @pytest.mark.parametrize("size", [VOXEL_MM, 0.5])
-def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxels(size):
+def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxels(
+    size,
+):
     centres, affine = voxels(18.0, size)
     mask = np.linalg.norm(centres, axis=-1) < 18.0
     with patch.object(repair, "without_terraces", lambda mesh, *_: mesh):
         before = surface(mask, affine).mesh
     found = surface(mask, affine)
     errors = [
-        np.sqrt(np.average((curvature(mesh).mean - 1 / 18) ** 2, weights=vertex_areas(mesh)))
+        np.sqrt(
+            np.average((curvature(mesh).mean - 1 / 18) ** 2, weights=vertex_areas(mesh))
+        )
         for mesh in (before, found.mesh)
     ]
     assert errors[1] < 0.5 * errors[0]
@@ -204,7 +240,9 @@ def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxe
 
 def test_folds_keep_their_height():
     centres, affine = voxels(20.0)
-    mask = np.linalg.norm(centres, axis=-1) < 16.0 + np.cos(2 * np.pi * centres[..., 2] / 10.0)
+    mask = np.linalg.norm(centres, axis=-1) < 16.0 + np.cos(
+        2 * np.pi * centres[..., 2] / 10.0
+    )
     points = surface(mask, affine).mesh.vertices
     height = np.linalg.norm(points, axis=1) - 16.0
     wave = np.cos(2 * np.pi * points[:, 2] / 10.0)
@@ -225,7 +263,8 @@ def test_narrow_gaps_stay_open():
 
 
 def test_faces_that_would_cut_others_stay_where_they_are():
-    # walls nearer to each other than a tenth of a voxel: there is no centre between them
+    # walls nearer to each other than a tenth of a voxel: there is no centre between
+    # them
     mesh = merged(moved(sphere(8.0), -8.02), moved(sphere(8.0), 8.02))
     assert faults(mesh) == ""
     assert faults(without_terraces(mesh, np.diag([3.0, 3.0, 3.0, 1.0]))) == ""
@@ -234,7 +273,9 @@ def test_faces_that_would_cut_others_stay_where_they_are():
 def test_it_does_not_depend_on_where_the_brain_lies():
     _, affine = voxels(9.0)
     mesh = sphere(8.0)
-    steps = TriangleMesh(np.round(mesh.vertices / 0.4) * 0.1 + 0.75 * mesh.vertices, mesh.faces)
+    steps = TriangleMesh(
+        np.round(mesh.vertices / 0.4) * 0.1 + 0.75 * mesh.vertices, mesh.faces
+    )
     plain = without_terraces(steps, affine)
     pose = rigid(20.0, -35.0, 50.0, shift=(7.0, 8.0, -9.0))
     turned = without_terraces(transformed(steps, pose), pose @ affine)
@@ -250,5 +291,6 @@ def test_branching_sulci_have_their_area_and_crowns_stay_whole(n_arcs, noise):
     assert found["opened"] == pytest.approx(0.0, abs=0.05)
     # without opening, what the sulci hide is missing
     assert (found["fused"] < -0.3) == (n_arcs > 0)
-    # of noise alone nothing opens; with sulci, less than a percent of their slits is in crowns
+    # of noise alone nothing opens; with sulci, less than a percent of their slits is in
+    # crowns
     assert found["cracks_mm3"] <= 0.01 * 1e3 * found["opened_mL"]

@@ -9,7 +9,12 @@ from skimage.measure import marching_cubes
 
 from gyriflow.anatomy.extraction import smooth_mask
 from gyriflow.anatomy.repair import surface_of_mask
-from gyriflow.anatomy.thickness import cortical_thickness, mean_curvature, summary, thickness_from_labels
+from gyriflow.anatomy.thickness import (
+    cortical_thickness,
+    mean_curvature,
+    summary,
+    thickness_from_labels,
+)
 from gyriflow.errors import InputError
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.poses import Pose
@@ -20,18 +25,29 @@ FOLDS_MM = 2.0
 
 
 def depth_below(points, folds_mm):
-    """Return the distance in mm of (..., 3) points from a folded ball's surface, and where they are inside it."""
+    """Return the distance in mm of (..., 3) points from a folded ball's surface, and
+    where they are inside it."""
 
     def level(x, y, z):
         r = np.sqrt(x**2 + y**2 + z**2) + 1e-9
-        return r - 20 - folds_mm * np.cos(9 * x / r) * np.cos(9 * y / r) * np.cos(9 * z / r + 1)
+        return (
+            r
+            - 20
+            - folds_mm * np.cos(9 * x / r) * np.cos(9 * y / r) * np.cos(9 * z / r + 1)
+        )
 
     axis = np.arange(-26, 26, 0.4)
-    vertices, faces, _, _ = marching_cubes(level(*np.meshgrid(axis, axis, axis, indexing="ij")), 0.0)
+    vertices, faces, _, _ = marching_cubes(
+        level(*np.meshgrid(axis, axis, axis, indexing="ij")), 0.0
+    )
     inside = level(*np.moveaxis(points, -1, 0)) < 0
     depth = np.zeros(inside.shape)
     vertices = vertices * 0.4 + axis[0]
-    depth[inside] = np.sqrt(igl.point_mesh_squared_distance(points[inside], vertices, faces.astype(np.int64))[0])
+    depth[inside] = np.sqrt(
+        igl.point_mesh_squared_distance(
+            points[inside], vertices, faces.astype(np.int64)
+        )[0]
+    )
     return depth, inside
 
 
@@ -40,7 +56,9 @@ def layered(folds_mm, voxel_mm):
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     depth, inside = depth_below(points, folds_mm)
     affine = scaling(voxel_mm, axis[0])
-    pial = surface_of_mask(smooth_mask(inside), affine, inside.sum() * voxel_mm**3, 1.0).mesh
+    pial = surface_of_mask(
+        smooth_mask(inside), affine, inside.sum() * voxel_mm**3, 1.0
+    ).mesh
     return pial, depth, inside, affine
 
 
@@ -62,16 +80,22 @@ def errors(brain, thickness_mm):
 
 
 @pytest.mark.parametrize("thickness_mm", [1.0, 1.7, 3.0])
-def test_a_layer_between_concentric_spheres_is_measured_to_a_hundredth_on_average(ball, thickness_mm):
+def test_a_layer_between_concentric_spheres_is_measured_to_a_hundredth_on_average(
+    ball, thickness_mm
+):
     found, error = errors(ball, thickness_mm)
     assert abs(error.mean()) < 0.02
     assert error.std() < 0.12
     assert found.report["mean_mm"] == pytest.approx(thickness_mm, abs=0.02)
-    assert found.report["voxels_through_cortex"] == pytest.approx(thickness_mm / 0.8, rel=0.02)
+    assert found.report["voxels_through_cortex"] == pytest.approx(
+        thickness_mm / 0.8, rel=0.02
+    )
 
 
 @pytest.mark.parametrize(("thickness_mm", "mean_mm"), [(1.0, 0.04), (2.0, 0.08)])
-def test_a_folded_layer_is_measured_to_a_tenth_of_a_voxel_on_average(folded, thickness_mm, mean_mm):
+def test_a_folded_layer_is_measured_to_a_tenth_of_a_voxel_on_average(
+    folded, thickness_mm, mean_mm
+):
     _, error = errors(folded, thickness_mm)
     assert abs(error.mean()) < mean_mm
     assert np.abs(np.quantile(error, [0.05, 0.95])).max() < 0.3
@@ -97,28 +121,45 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
     assert not found.is_measured[bare].any()
     assert (found.values_mm > 0.8 / 3).all()
     edge = found.is_measured & (pial.vertices[:, 0] > 7)
-    assert set(np.round(found.values_mm[bare], 6)) <= set(np.round(found.values_mm[edge], 6))
+    assert set(np.round(found.values_mm[bare], 6)) <= set(
+        np.round(found.values_mm[edge], 6)
+    )
 
 
 @pytest.mark.parametrize(
     ("thickness_mm", "messages"),
-    [(1.7, []), (8.0, [Facts("cortex", "8.0 mm")]), (0.9, [Facts("cortex", "1.1 voxels")])],
+    [
+        (1.7, []),
+        (8.0, [Facts("cortex", "8.0 mm")]),
+        (0.9, [Facts("cortex", "1.1 voxels")]),
+    ],
 )
-def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(ball, caplog, thickness_mm, messages):
+def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(
+    ball, caplog, thickness_mm, messages
+):
     pial, depth, inside, affine = ball
     labels = np.where(inside, np.where(depth < thickness_mm, 5, 1), 0)
-    thickness_from_labels(labels, affine, LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)), pial, Pose())
+    thickness_from_labels(
+        labels,
+        affine,
+        LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)),
+        pial,
+        Pose(),
+    )
     assert caplog.messages == messages
 
 
 @pytest.mark.parametrize("hidden", [0.0, 0.05, 0.1, 0.2])
 def test_area_that_fused_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, hidden):
-    """A fused sulcus through a ball of 20 mm: two banks of 2 mm that touch, as deep as hides a share of the area."""
+    """A fused sulcus through a ball of 20 mm: two banks of 2 mm that touch, as deep as
+    hides a share of the area."""
     pial, depth, inside, affine = ball
     walls_mm2 = hidden / (1.0 - hidden) * area(pial)
     # the area of a circle's segment, by its depth
     deep = np.linspace(0.0, 40.0, 2001)
-    segment = 400.0 * np.arccos(1.0 - deep / 20.0) - (20.0 - deep) * np.sqrt(np.maximum(deep * (40.0 - deep), 0.0))
+    segment = 400.0 * np.arccos(1.0 - deep / 20.0) - (20.0 - deep) * np.sqrt(
+        np.maximum(deep * (40.0 - deep), 0.0)
+    )
     shut_mm = np.interp(0.5 * walls_mm2, segment, deep)
     x, _, z = (affine[0, 3] + 0.8 * index for index in np.indices(inside.shape))
     # at its end, the sulcus has cortex around it
@@ -134,7 +175,10 @@ def test_area_that_fused_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, h
     assert bool(caplog.messages) == (hidden > 0.05)
 
 
-@pytest.mark.parametrize(("size", "tolerance"), [(LONG_MM, 0.01), ((1.2,) * 3, 0.01), ((1.0, 1.0, 3.0), 0.02)])
+@pytest.mark.parametrize(
+    ("size", "tolerance"),
+    [(LONG_MM, 0.01), ((1.2,) * 3, 0.01), ((1.0, 1.0, 3.0), 0.02)],
+)
 def test_both_borders_are_where_the_voxels_have_them(size, tolerance):
     semi_axes, turn = np.array([16.0, 20.0, 13.0]), rigid(20, 30, 10)
     shape = np.ceil(2 * (semi_axes.max() + 6) / np.array(size)).astype(int)
@@ -143,12 +187,16 @@ def test_both_borders_are_where_the_voxels_have_them(size, tolerance):
     inside = ((points / semi_axes) ** 2).sum(axis=-1) < 1.0
     whole, depth = ellipsoid(semi_axes, 5), np.zeros(shape)
     depth[inside] = nearest_on(points[inside], whole)[0]
-    pial = surface_of_mask(smooth_mask(inside), affine, inside.sum() * np.prod(size), 1.2).mesh
+    pial = surface_of_mask(
+        smooth_mask(inside), affine, inside.sum() * np.prod(size), 1.2
+    ).mesh
     found = cortical_thickness(pial, inside, inside & (depth < 2.0), affine)
     assert found.report["mean_mm"] == pytest.approx(2.0, rel=tolerance)
     assert found.report["voxel_mm"] == pytest.approx(max(size))
     if max(size) < 2.0:
-        assert found.report["voxels_through_cortex"] == pytest.approx(2.0 / max(size), rel=0.02)
+        assert found.report["voxels_through_cortex"] == pytest.approx(
+            2.0 / max(size), rel=0.02
+        )
 
 
 def test_mean_curvature_is_that_of_the_vertices_asked_for():
@@ -176,7 +224,10 @@ def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
 def test_long_voxels_have_their_length_along_their_own_axis(ball, order):
     pial, depth, inside, affine = ball
-    inside, depth = inside[:, :, ::3].transpose(order), depth[:, :, ::3].transpose(order)
+    inside, depth = (
+        inside[:, :, ::3].transpose(order),
+        depth[:, :, ::3].transpose(order),
+    )
     turn = rigid(20, -30, 10, shift=(5, -7, 2))
     affine = turn @ affine @ np.diag([1.0, 1.0, 3.0, 1.0])[:, [*order, 3]]
     # bare below, where the next cortex is a long voxel away
@@ -193,5 +244,12 @@ def test_long_voxels_have_their_length_along_their_own_axis(ball, order):
 def test_a_summary_is_weighted_by_area_and_leaves_out_what_was_not_measured():
     values, areas = np.array([1.0, 2.0, 4.0, 9.0]), np.array([1.0, 2.0, 1.0, 6.0])
     found = summary(values, np.array([True, True, True, False]), areas)
-    expected = {"mean_mm": 2.25, "median_mm": 2.0, "quantile05_mm": 1.0, "quantile95_mm": 4.0}
-    assert found == pytest.approx(expected | {"sd_mm": np.sqrt(4.75 / 4), "measured_area_share": 0.4})
+    expected = {
+        "mean_mm": 2.25,
+        "median_mm": 2.0,
+        "quantile05_mm": 1.0,
+        "quantile95_mm": 4.0,
+    }
+    assert found == pytest.approx(
+        expected | {"sd_mm": np.sqrt(4.75 / 4), "measured_area_share": 0.4}
+    )

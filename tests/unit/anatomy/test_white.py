@@ -1,4 +1,5 @@
-"""White surfaces: made of labels and of files, measured as pial ones are, on concentric spheres."""
+"""White surfaces: made of labels and of files, measured as pial ones are, on concentric
+spheres."""
 
 import numpy as np
 import pytest
@@ -20,7 +21,9 @@ POSE = np.array([[0.0, -1, 0, 5], [1, 0, 0, -3], [0, 0, 1, 2], [0, 0, 0, 1]])
 def spheres_labels():
     axis = np.arange(-24, 24, VOXEL_MM) + 0.13
     radius = np.sqrt(sum(np.square(np.meshgrid(axis, axis, axis, indexing="ij"))))
-    return np.where(radius < WHITE_MM, 1, np.where(radius < PIAL_MM, 2, 0)), scaling(VOXEL_MM, axis[0])
+    return np.where(radius < WHITE_MM, 1, np.where(radius < PIAL_MM, 2, 0)), scaling(
+        VOXEL_MM, axis[0]
+    )
 
 
 @pytest.mark.parametrize("source", ["labels", "whole", "sides"])
@@ -30,13 +33,23 @@ def test_the_white_surface_of_concentric_spheres_is_the_inner_one(source):
         labels, affine = spheres_labels()
         # the files lie elsewhere than the posed surface
         affine = np.linalg.inv(POSE) @ affine
-        found = white_from_labels(labels, affine, SCHEME, pial, Pose(POSE), edge_length_mm=1.5)
+        found = white_from_labels(
+            labels, affine, SCHEME, pial, Pose(POSE), edge_length_mm=1.5
+        )
     else:
         inner = sphere(WHITE_MM, 4)
-        given = {"whole": inner} if source == "whole" else {"left": inner, "right": inner}
-        given = {name: transformed(mesh, np.linalg.inv(POSE)) for name, mesh in given.items()}
-        found = white_from_surfaces(given, pial, Pose(files={"whole": POSE}), edge_length_mm=1.5)
-    radii = np.concatenate([np.linalg.norm(mesh.vertices, axis=1) for mesh in found.values()])
+        given = (
+            {"whole": inner} if source == "whole" else {"left": inner, "right": inner}
+        )
+        given = {
+            name: transformed(mesh, np.linalg.inv(POSE)) for name, mesh in given.items()
+        }
+        found = white_from_surfaces(
+            given, pial, Pose(files={"whole": POSE}), edge_length_mm=1.5
+        )
+    radii = np.concatenate(
+        [np.linalg.norm(mesh.vertices, axis=1) for mesh in found.values()]
+    )
     assert radii == pytest.approx(WHITE_MM, abs=VOXEL_MM / 4)
     assert radii.mean() == pytest.approx(WHITE_MM, abs=0.02)
     assert list(found) == ["left", "right"]
@@ -44,11 +57,21 @@ def test_the_white_surface_of_concentric_spheres_is_the_inner_one(source):
     value = table.set_index(["hemisphere", "metric"])["value"]
     # two whole spheres where the files have one for each side
     share = {"labels": 0.5, "whole": 0.5, "sides": 1.0}[source]
-    assert value["left", "white_area"] == pytest.approx(share * 4 * np.pi * WHITE_MM**2 / 100, rel=0.03)
-    assert value["whole", "white_area"] == pytest.approx(value["left", "white_area"] + value["right", "white_area"])
-    assert value["whole", "white_mean_curvedness"] == pytest.approx(1 / WHITE_MM, rel=0.03)
+    assert value["left", "white_area"] == pytest.approx(
+        share * 4 * np.pi * WHITE_MM**2 / 100, rel=0.03
+    )
+    assert value["whole", "white_area"] == pytest.approx(
+        value["left", "white_area"] + value["right", "white_area"]
+    )
+    assert value["whole", "white_mean_curvedness"] == pytest.approx(
+        1 / WHITE_MM, rel=0.03
+    )
     assert value["whole", "white_gyrification_index"] == pytest.approx(1, abs=0.01)
     assert value["right", "white_mean_sulcal_depth"] == pytest.approx(0, abs=0.02)
     assert len(maps["left"]["sulcal_depth_mm"]) == len(found["left"].vertices)
     if source != "sides":
-        assert found["left"].vertices[:, 0].max() < 1.5 < found["right"].vertices[:, 0].max()
+        assert (
+            found["left"].vertices[:, 0].max()
+            < 1.5
+            < found["right"].vertices[:, 0].max()
+        )

@@ -1,4 +1,5 @@
-"""What the commands hand on to Snakemake, what they tell to type next, and in which code they end."""
+"""What the commands hand on to Snakemake, what they tell to type next, and in which
+code they end."""
 
 import os
 import shutil
@@ -28,7 +29,8 @@ from gyriflow.study.loading import load
 
 @pytest.fixture
 def handed_on(monkeypatch, tmp_path):
-    """Return the arguments that Snakemake gets for those of `gyriflow run`, beside a configuration."""
+    """Return the arguments that Snakemake gets for those of `gyriflow run`, beside a
+    configuration."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "gyriflow.yaml").touch()
 
@@ -49,7 +51,9 @@ def test_a_run_on_this_machine_gets_its_cores(handed_on):
 
 
 @pytest.mark.parametrize("name", ["my.conf", "C.YAML", "study"])
-def test_any_file_may_be_the_configuration_but_results_are_targets(handed_on, tmp_path, name):
+def test_any_file_may_be_the_configuration_but_results_are_targets(
+    handed_on, tmp_path, name
+):
     result = tmp_path / "results" / "study" / "metrics.csv"
     result.parent.mkdir(parents=True)
     for path in (result, tmp_path / name):
@@ -62,17 +66,25 @@ def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
     assert "--cores" not in handed_on("--profile", "profiles/slurm")
     assert "--cores" not in handed_on("--executor=slurm")
     # but a limit that is asked for is one
-    assert handed_on("--cores", "200", "--profile", "profiles/slurm")[:2] == ["--cores", "200"]
+    assert handed_on("--cores", "200", "--profile", "profiles/slurm")[:2] == [
+        "--cores",
+        "200",
+    ]
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_a_missing_configuration_is_told_in_one_line_where_it_is_named(monkeypatch, tmp_path, command):
+def test_a_missing_configuration_is_told_in_one_line_where_it_is_named(
+    monkeypatch, tmp_path, command
+):
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(main, [command, "no.yaml"])
     assert (done.exit_code, done.output.count("\n")) == (2, 1)
     assert done.output == Facts(f"{tmp_path / 'no.yaml'}:", "gyriflow init")
     done = CliRunner().invoke(main, [command])
-    assert (done.exit_code, done.output) == (2, Facts(f"{tmp_path / 'gyriflow.yaml'}:", "gyriflow init"))
+    assert (done.exit_code, done.output) == (
+        2,
+        Facts(f"{tmp_path / 'gyriflow.yaml'}:", "gyriflow init"),
+    )
 
 
 def test_a_mistake_in_an_argument_is_one_line():
@@ -88,13 +100,17 @@ def test_an_unknown_option_is_refused_with_the_nearest_one(tmp_path):
 
 
 @pytest.mark.parametrize("folder", ["bids", "run", "data"])
-def test_a_data_set_may_lie_in_a_folder_that_is_called_as_a_command(monkeypatch, tmp_path, folder):
+def test_a_data_set_may_lie_in_a_folder_that_is_called_as_a_command(
+    monkeypatch, tmp_path, folder
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / folder).mkdir()
     done = CliRunner().invoke(main, [folder, "out", "participant"])
     assert (done.exit_code, done.output) == (2, Facts(f"{folder}:", 0, ".nii.gz"))
     # the command by its own name
-    assert CliRunner().invoke(main, ["bids", folder, "out", "group"]).output == done.output
+    assert (
+        CliRunner().invoke(main, ["bids", folder, "out", "group"]).output == done.output
+    )
 
 
 FOUND = "fetal_SB_atlas_GA22_notoperated"
@@ -104,48 +120,105 @@ LABELS = str(SHIPPED / "atlases" / "spina-bifida" / FOUND / "parcellation.nii.gz
 
 @pytest.fixture
 def predicted(monkeypatch, tmp_path):
-    """Return what `gyriflow predict` says, of the shipped brain of 22 GW by default, and note the run's arguments."""
-    monkeypatch.setattr(launch, "main", lambda asked: (tmp_path / "asked.txt").write_text(" ".join(asked)) and 0)
+    """Return what `gyriflow predict` says, of the shipped brain of 22 GW by default,
+    and note the run's arguments."""
+    monkeypatch.setattr(
+        launch,
+        "main",
+        lambda asked: (tmp_path / "asked.txt").write_text(" ".join(asked)) and 0,
+    )
 
     def said(*given, files=(LABELS,)):
-        arguments = ["predict", *files, "--directory", str(tmp_path), "--cores", "3", *given]
+        arguments = [
+            "predict",
+            *files,
+            "--directory",
+            str(tmp_path),
+            "--cores",
+            "3",
+            *given,
+        ]
         return CliRunner().invoke(main, arguments)
 
     return said
 
 
-def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted, tmp_path):
+def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(
+    predicted, tmp_path
+):
     done = predicted("--week", "22.4", "--until", "24.5")
     assert done.exit_code == 0
     assert done.output == Facts("spina bifida aperta")
     config = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
     assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
     study = resolve(config)
-    assert [(simulation.start.id, simulation.shapes) for simulation in study.run_simulations] == [(FOUND, "atlas")]
-    assert [brain.id for brain in study.chains[FOUND, "atlas"].later] == [brain.id for brain in config.brains[1:]]
+    assert [
+        (simulation.start.id, simulation.shapes) for simulation in study.run_simulations
+    ] == [(FOUND, "atlas")]
+    assert [brain.id for brain in study.chains[FOUND, "atlas"].later] == [
+        brain.id for brain in config.brains[1:]
+    ]
     asked = (tmp_path / "asked.txt").read_text()
-    assert asked == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path} all export"
+    assert (
+        asked
+        == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path}"
+        " all export"
+    )
     # the same call goes on, another one replaces nothing
     assert predicted("--week", "22.4", "--until", "24.5").exit_code == 0
     other = predicted("--week", "22.4", "--until", "24")
-    assert (other.exit_code, other.output) == (2, Facts(tmp_path / "gyriflow.yaml", "--force"))
+    assert (other.exit_code, other.output) == (
+        2,
+        Facts(tmp_path / "gyriflow.yaml", "--force"),
+    )
     assert predicted("--week", "22.4", "--until", "24", "--force").exit_code == 0
-    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs["predicted"].end_week == 24
-    assert predicted("--week", "22.4", "--until", "24", "--force", "--ensemble", "5").exit_code == 0
-    run = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs["predicted"]
+    assert (
+        load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
+        .runs["predicted"]
+        .end_week
+        == 24
+    )
+    assert (
+        predicted(
+            "--week", "22.4", "--until", "24", "--force", "--ensemble", "5"
+        ).exit_code
+        == 0
+    )
+    run = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs[
+        "predicted"
+    ]
     assert run.ensemble.members == 5
 
 
-def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(monkeypatch, predicted, tmp_path):
+def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(
+    monkeypatch, predicted, tmp_path
+):
     atlas = SHIPPED / "atlases" / "spina-bifida"
     monkeypatch.chdir(atlas.parent)
-    asked = ("--week", "22", "--until", "24", "--quick", "--atlas", f"{atlas.name}/atlas.yaml", "--folder", atlas.name)
+    asked = (
+        "--week",
+        "22",
+        "--until",
+        "24",
+        "--quick",
+        "--atlas",
+        f"{atlas.name}/atlas.yaml",
+        "--folder",
+        atlas.name,
+    )
     assert predicted(*asked).exit_code == 0
     monkeypatch.chdir(tmp_path)
     section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
-    assert (section["atlas"]["name"], section["atlas"]["folder"]) == (str(atlas / "atlas.yaml"), str(atlas))
+    assert (section["atlas"]["name"], section["atlas"]["folder"]) == (
+        str(atlas / "atlas.yaml"),
+        str(atlas),
+    )
     study = resolve(load(section))
-    assert all(Path(file).is_file() for brain in study.brains.values() for file in brain.config.files)
+    assert all(
+        Path(file).is_file()
+        for brain in study.brains.values()
+        for file in brain.config.files
+    )
     # growth towards shapes is not by layers
     assert list(coarse_cortices(study)) == []
     assert study.run_simulations[0].settings.step_s == 86400
@@ -154,25 +227,45 @@ def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(monk
     assert study.config.growth.path_edge_mm == 2 * GrowthSettings().path_edge_mm
 
 
-@pytest.mark.parametrize(("end", "weeks"), [("30", [25, 27, 29, 31]), ("34", [25, 27, 29, 31, 33, 34])])
-def test_a_quick_prediction_uses_every_other_week_up_to_its_end(predicted, tmp_path, end, weeks):
+@pytest.mark.parametrize(
+    ("end", "weeks"), [("30", [25, 27, 29, 31]), ("34", [25, 27, 29, 31, 33, 34])]
+)
+def test_a_quick_prediction_uses_every_other_week_up_to_its_end(
+    predicted, tmp_path, end, weeks
+):
     asked = ("--week", "25", "--until", end, "--atlas", "spina-bifida")
     assert predicted(*asked, "--quick").exit_code == 0
-    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[0].weeks == tuple(weeks)
+    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[
+        0
+    ].weeks == tuple(weeks)
     assert predicted(*asked, "--force").exit_code == 0
-    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[0].weeks == tuple(range(25, 35))
+    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[
+        0
+    ].weeks == tuple(range(25, 35))
 
 
 def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path):
     seen = []
-    monkeypatch.setattr(checking, "plan", lambda config, *_, **__: seen.append(config.is_file()) or [])
+    monkeypatch.setattr(
+        checking, "plan", lambda config, *_, **__: seen.append(config.is_file()) or []
+    )
     before = set(tmp_path.rglob("*"))
-    dry = ("--week", "22", "--until", "24", "--directory", str(tmp_path / "new"), "--dry-run")
+    dry = (
+        "--week",
+        "22",
+        "--until",
+        "24",
+        "--directory",
+        str(tmp_path / "new"),
+        "--dry-run",
+    )
     assert predicted(*dry).exit_code == 0
     assert (seen, set(tmp_path.rglob("*"))) == ([True], before)
     # what it would not replace, it says then
     (tmp_path / "gyriflow.yaml").write_text("start: mine")
-    assert predicted("--week", "22", "--until", "24", "-n").output == Facts(tmp_path / "gyriflow.yaml", "--force")
+    assert predicted("--week", "22", "--until", "24", "-n").output == Facts(
+        tmp_path / "gyriflow.yaml", "--force"
+    )
     assert (tmp_path / "gyriflow.yaml").read_text() == "start: mine"
 
 
@@ -188,14 +281,20 @@ def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path
         ("25", ["--folder", "nowhere"], ["--folder", "nowhere"]),
     ],
 )
-def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until, more, facts):
+def test_a_prediction_that_no_atlas_allows_is_refused(
+    predicted, tmp_path, until, more, facts
+):
     done = predicted("--week", "22.4", "--until", until, *more)
     assert (done.exit_code, done.output) == (2, Facts(*facts))
     assert not (tmp_path / "gyriflow.yaml").exists()
 
 
 def test_check_takes_a_folder_as_measure_does_and_writes_nothing(tmp_path, monkeypatch):
-    rows = ["participant_id gestational_age", "sub-01 24.1", *(f"sub-{number:02} n/a" for number in range(2, 8))]
+    rows = [
+        "participant_id gestational_age",
+        "sub-01 24.1",
+        *(f"sub-{number:02} n/a" for number in range(2, 8)),
+    ]
     names = [f"sub-{number:02}_dseg.nii.gz" for number in range(1, 8)]
     make_tree(tmp_path, labels=names, tables={"participants.tsv": rows})
     planned = []
@@ -228,12 +327,18 @@ def test_a_current_folder_that_was_deleted_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
     done = CliRunner().invoke(main, ["check"])
-    assert (done.exit_code, done.output) == (2, Facts("the current folder no longer exists"))
+    assert (done.exit_code, done.output) == (
+        2,
+        Facts("the current folder no longer exists"),
+    )
 
 
 def test_a_file_that_is_not_there_is_answered_with_what_is(predicted_from):
     done = predicted_from("brain.nii", "--week", "23.4")
-    assert (done.exit_code, done.output) == (2, Facts("brain.nii", "there is brain.stl"))
+    assert (done.exit_code, done.output) == (
+        2,
+        Facts("brain.nii", "there is brain.stl"),
+    )
     # of another kind than expected, and there
     done = predicted_from("brain.stl", "--week", "23.4", "--folder", "half.stl")
     assert (done.exit_code, "there is" in done.output) == (2, False)
@@ -243,8 +348,17 @@ def test_a_file_that_is_not_there_is_answered_with_what_is(predicted_from):
 def surfaces(tmp_path_factory):
     """Surface files of the shipped brain of 24 GW and of a ball, by name."""
     folder, (left, right) = tmp_path_factory.mktemp("surfaces"), atlas_halves()
-    meshes = {"brain": atlas_brain(), "half": left, "ball": sphere(5.0), "lh": left, "rh": right}
-    names = {name: f"{name}.pial.surf.gii" if name in ("lh", "rh") else f"{name}.stl" for name in meshes}
+    meshes = {
+        "brain": atlas_brain(),
+        "half": left,
+        "ball": sphere(5.0),
+        "lh": left,
+        "rh": right,
+    }
+    names = {
+        name: f"{name}.pial.surf.gii" if name in ("lh", "rh") else f"{name}.stl"
+        for name in meshes
+    }
     for name, mesh in meshes.items():
         write_surface(folder / names[name], mesh)
     write_surface(folder / "lh.white.surf.gii", left)
@@ -255,7 +369,8 @@ def surfaces(tmp_path_factory):
 
 @pytest.fixture
 def predicted_from(monkeypatch, predicted, surfaces):
-    """Return the outcome of `gyriflow predict` for files of that folder, in which it stands."""
+    """Return the outcome of `gyriflow predict` for files of that folder, in which it
+    stands."""
     monkeypatch.chdir(surfaces)
     return lambda *given: predicted("--until", "24.8", files=given)
 
@@ -269,25 +384,41 @@ def predicted_from(monkeypatch, predicted, surfaces):
             {"hemispheres": {"left": "lh.pial.surf.gii", "right": "rh.pial.surf.gii"}},
         ),
         (
-            ["lh.pial.surf.gii", "rh.pial.surf.gii", "--white", "lh.white.surf.gii", "--white", "rh.white.surf.gii"],
+            [
+                "lh.pial.surf.gii",
+                "rh.pial.surf.gii",
+                "--white",
+                "lh.white.surf.gii",
+                "--white",
+                "rh.white.surf.gii",
+            ],
             {
-                "hemispheres": {"left": "lh.pial.surf.gii", "right": "rh.pial.surf.gii"},
+                "hemispheres": {
+                    "left": "lh.pial.surf.gii",
+                    "right": "rh.pial.surf.gii",
+                },
                 "white": ["lh.white.surf.gii", "rh.white.surf.gii"],
             },
         ),
     ],
 )
-def test_a_brain_is_predicted_from_its_surfaces(predicted_from, surfaces, tmp_path, files, source):
+def test_a_brain_is_predicted_from_its_surfaces(
+    predicted_from, surfaces, tmp_path, files, source
+):
     done = predicted_from(*files, "--week", "23.4")
     assert (done.exit_code, done.output) == (0, Facts("23.4", "24.8 GW"))
     section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
     (entry,) = section["brains"]
-    found = {key: entry[key] for key in entry if key in ("pial", "hemispheres", "white")}
+    found = {
+        key: entry[key] for key in entry if key in ("pial", "hemispheres", "white")
+    }
     plain = yaml.safe_dump(found).replace(f"{surfaces}/", "")
     assert yaml.safe_load(plain) == source
     study = resolve(load(section))
     (simulation,) = study.run_simulations
-    assert [brain.week for brain in study.chains[simulation.start.id, "atlas"].later] == [23, 24, 25]
+    assert [
+        brain.week for brain in study.chains[simulation.start.id, "atlas"].later
+    ] == [23, 24, 25]
     assert [group["ids"] for group in study.filled] == [[entry["id"]]]
 
 
@@ -298,17 +429,42 @@ def test_a_brain_is_predicted_from_its_surfaces(predicted_from, surfaces, tmp_pa
         (["lh.pial.surf.gii", "--week", "23"], ["lh.pial.surf.gii", "LEFT", "RIGHT"]),
         (["half.stl", "--week", "23"], ["half.stl", "0.5", "LEFT", "RIGHT"]),
         (["ball.stl", "--week", "23"], ["ball.stl", "0.522 mL"]),
-        (["lh.pial.surf.gii", "lh.pial.surf.gii", "--week", "23"], ["lh.pial.surf.gii, lh.pial.surf.gii"]),
-        (["lh.pial.surf.gii", "rh.pial.surf.gii", "brain.stl", "--week", "23"], ["brain.stl"]),
-        (["lh.white.surf.gii", "rh.white.surf.gii", "--week", "23"], ["lh.white.surf.gii", "--white"]),
-        (["brain.stl", "--white", "brain.stl", "--white", "half.stl", "--week", "23"], ["--white", 2, 1]),
-        (["brain.stl", "--white", "lh.pial.surf.gii", "--week", "23"], ["lh.pial.surf.gii", "white"]),
+        (
+            ["lh.pial.surf.gii", "lh.pial.surf.gii", "--week", "23"],
+            ["lh.pial.surf.gii, lh.pial.surf.gii"],
+        ),
+        (
+            ["lh.pial.surf.gii", "rh.pial.surf.gii", "brain.stl", "--week", "23"],
+            ["brain.stl"],
+        ),
+        (
+            ["lh.white.surf.gii", "rh.white.surf.gii", "--week", "23"],
+            ["lh.white.surf.gii", "--white"],
+        ),
+        (
+            [
+                "brain.stl",
+                "--white",
+                "brain.stl",
+                "--white",
+                "half.stl",
+                "--week",
+                "23",
+            ],
+            ["--white", 2, 1],
+        ),
+        (
+            ["brain.stl", "--white", "lh.pial.surf.gii", "--week", "23"],
+            ["lh.pial.surf.gii", "white"],
+        ),
         (["notes.txt", "--week", "23"], ["notes.txt", ".nii.gz", ".stl"]),
         (["brain.stl", "--scheme", "feta-7", "--week", "23"], ["--scheme", "feta-7"]),
         (["brain.stl", "--image", "brain.stl", "--week", "23"], ["--image"]),
     ],
 )
-def test_files_that_are_not_one_brain_to_predict_are_refused(predicted_from, tmp_path, given, facts):
+def test_files_that_are_not_one_brain_to_predict_are_refused(
+    predicted_from, tmp_path, given, facts
+):
     done = predicted_from(*given)
     assert (done.exit_code, done.output) == (2, Facts(*facts))
     assert not (tmp_path / "gyriflow.yaml").exists()
@@ -317,13 +473,21 @@ def test_files_that_are_not_one_brain_to_predict_are_refused(predicted_from, tmp
 def test_labels_are_predicted_alone(predicted_from):
     for more in (["brain.stl"], ["--white", "brain.stl"]):
         done = predicted_from(LABELS, *more, "--week", "23")
-        assert (done.exit_code, done.output) == (2, Facts("parcellation.nii.gz", "brain.stl"))
+        assert (done.exit_code, done.output) == (
+            2,
+            Facts("parcellation.nii.gz", "brain.stl"),
+        )
 
 
 @pytest.mark.parametrize("home", ["", "/proc/nobody", "file"])
-def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(monkeypatch, tmp_path, home):
+def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(
+    monkeypatch, tmp_path, home
+):
     (tmp_path / "file").touch()
-    monkeypatch.setenv("HOME", str(tmp_path / home) if home == "file" else home or str(tmp_path / "home"))
+    monkeypatch.setenv(
+        "HOME",
+        str(tmp_path / home) if home == "file" else home or str(tmp_path / "home"),
+    )
     monkeypatch.setenv("XDG_CACHE_HOME", "")
     launch.set_cache(tmp_path)
     expected = str(tmp_path / ".snakemake" / "cache") if home else ""
@@ -332,11 +496,20 @@ def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(monke
 
 @pytest.mark.parametrize(
     ("code", "recorded", "free", "expected"),
-    [(0, None, 0, 0), (1, None, 2**20, 5), (1, 1, 2**20, 5), (1, 2, 2**20, 2), (1, None, 2**30, 1), (1, 3, 2**30, 3)],
+    [
+        (0, None, 0, 0),
+        (1, None, 2**20, 5),
+        (1, 1, 2**20, 5),
+        (1, 2, 2**20, 2),
+        (1, None, 2**30, 1),
+        (1, 3, 2**30, 3),
+    ],
 )
 def test_a_full_disk_is_the_cause_where_no_step_has_told_another(
     tmp_path, monkeypatch, capsys, code, recorded, free, expected
 ):
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(total=2**31, free=free))
+    monkeypatch.setattr(
+        shutil, "disk_usage", lambda path: SimpleNamespace(total=2**31, free=free)
+    )
     assert launch.exit_code(code, recorded, tmp_path) == expected
     assert bool(capsys.readouterr().err) == (expected == 5)

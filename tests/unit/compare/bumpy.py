@@ -10,15 +10,22 @@ from gyriflow.metrics.curvature import curvature
 RADIUS = 20.0
 
 
-def field(directions: Floats, seed: int, sharpness: float = 12.0, bumps: int = 40) -> Floats:
-    """Return the (n,) sum of bumps and dents at places that a seed gives, for unit vectors."""
+def field(
+    directions: Floats, seed: int, sharpness: float = 12.0, bumps: int = 40
+) -> Floats:
+    """Return the (n,) sum of bumps and dents at places that a seed gives, for unit
+    vectors."""
     generator = np.random.default_rng(seed)
     places = generator.normal(size=(bumps, 3))
     places /= np.linalg.norm(places, axis=1)[:, None]
-    return np.exp(sharpness * (directions @ places.T - 1)) @ generator.choice([-1.0, 1.0], bumps)
+    return np.exp(sharpness * (directions @ places.T - 1)) @ generator.choice(
+        [-1.0, 1.0], bumps
+    )
 
 
-def bumpy(seed: int, height: float = 1.0, sharpness: float = 12.0, subdivisions: int = 4) -> TriangleMesh:
+def bumpy(
+    seed: int, height: float = 1.0, sharpness: float = 12.0, subdivisions: int = 4
+) -> TriangleMesh:
     """Return a sphere with bumps and dents of a height in mm."""
     ball = sphere(1.0, subdivisions)
     radius = RADIUS + height * field(ball.vertices, seed, sharpness)

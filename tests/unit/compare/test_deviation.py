@@ -1,4 +1,5 @@
-"""Deviation of an observed brain from the expected one: distances, areas and thickness that are known."""
+"""Deviation of an observed brain from the expected one: distances, areas and thickness
+that are known."""
 
 import numpy as np
 import pandas as pd
@@ -6,7 +7,12 @@ import pytest
 from scripts import run_script
 from shapes import FAR, moved, sphere
 
-from gyriflow.compare.deviation import deviation_maps, deviation_scores, deviation_table, thickness_difference
+from gyriflow.compare.deviation import (
+    deviation_maps,
+    deviation_scores,
+    deviation_table,
+    thickness_difference,
+)
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 from gyriflow.io.files import read_table
 from gyriflow.io.surfaces import read_vertex_maps, write_surface, write_vertex_maps
@@ -54,10 +60,15 @@ def test_the_expected_thickness_is_the_start_s_grown_as_in_the_run():
     expected, start, observed = sphere(22.0), sphere(19.5, 3), sphere(23.0, 5)
     first, expected_mm = thickness(BALL, 1.0, 2.0), thickness(expected, 1.5, 5.0)[1]
     difference = thickness_difference(
-        sphere(23.0), thickness(observed, 2.5, 6.0), thickness(start, 2.0, 1.5), first, expected_mm
+        sphere(23.0),
+        thickness(observed, 2.5, 6.0),
+        thickness(start, 2.0, 1.5),
+        first,
+        expected_mm,
     )
     height = expected.vertices[:, 2]
-    # 2.0 mm became 2.0 · 1.5 mm / 1.0 mm above, and 1.5 mm became 1.5 · 5.0 mm / 2.0 mm below
+    # 2.0 mm became 2.0 · 1.5 mm / 1.0 mm above, and 1.5 mm became 1.5 · 5.0 mm / 2.0 mm
+    # below
     assert difference[height > 4] == pytest.approx(2.5 - 3.0)
     assert difference[height < -4] == pytest.approx(6.0 - 3.75)
 
@@ -66,38 +77,80 @@ def test_maps_are_averaged_over_the_brain_its_sides_and_their_regions():
     left, right = moved(BALL, -25), moved(sphere(10.0), 25)
     surface = merged(left, right)
     upper = [mesh.vertices[:, 2] > 1e-9 for mesh in (left, right)]
-    maps = {"distance_mm": np.concatenate([np.where(upper[0], 1.0, 0.0), np.where(upper[1], 3.0, -3.0)])}
+    maps = {
+        "distance_mm": np.concatenate(
+            [np.where(upper[0], 1.0, 0.0), np.where(upper[1], 3.0, -3.0)]
+        )
+    }
     regions = {
         "left": (upper[0].astype(np.int64), {1: "top"}),
         "right": (2 - upper[1].astype(np.int64), {1: "a", 2: "b"}),
     }
-    table = deviation_table({"run": "r", "week": 24.0}, surface, maps, {"left": left, "right": right}, regions)
-    assert list(table) == ["run", "week", "hemisphere", "region", "metric", "value", "unit"]
+    table = deviation_table(
+        {"run": "r", "week": 24.0},
+        surface,
+        maps,
+        {"left": left, "right": right},
+        regions,
+    )
+    assert list(table) == [
+        "run",
+        "week",
+        "hemisphere",
+        "region",
+        "metric",
+        "value",
+        "unit",
+    ]
     assert set(table["metric"]) == {"distance"}
     assert set(table["unit"]) == {"mm"}
     values = table.set_index(["hemisphere", "region"])["value"]
-    assert values.drop([("whole", ""), ("left", ""), ("right", "")]).to_dict() == pytest.approx(
+    assert values.drop(
+        [("whole", ""), ("left", ""), ("right", "")]
+    ).to_dict() == pytest.approx(
         {("left", "top"): 1.0, ("right", "a"): 3.0, ("right", "b"): -3.0}
     )
     share = values["left", ""]
     assert share == pytest.approx(0.5, abs=0.05)
     # the left side has four times the area of the right one
-    assert values["whole", ""] == pytest.approx((4 * share + values["right", ""]) / 5, rel=1e-3)
+    assert values["whole", ""] == pytest.approx(
+        (4 * share + values["right", ""]) / 5, rel=1e-3
+    )
 
 
 def test_a_deviation_is_scored_among_the_other_brains_of_its_run_and_place():
     subjects = [f"s{number}" for number in range(12)]
     weeks = 25.0 + 0.1 * np.arange(12.0)
-    common = {"start": subjects, "subject": subjects, "week": weeks, "metric": "distance", "unit": "mm"}
-    places = [("r", "whole", np.nan, 0.0), ("r", "left", "top", 9.0), ("q", "whole", np.nan, 50.0)]
+    common = {
+        "start": subjects,
+        "subject": subjects,
+        "week": weeks,
+        "metric": "distance",
+        "unit": "mm",
+    }
+    places = [
+        ("r", "whole", np.nan, 0.0),
+        ("r", "left", "top", 9.0),
+        ("q", "whole", np.nan, 50.0),
+    ]
     tables = [
-        pd.DataFrame({**common, "run": run, "hemisphere": side, "region": region, "value": usual + np.tile([1, -1], 6)})
+        pd.DataFrame(
+            {
+                **common,
+                "run": run,
+                "hemisphere": side,
+                "region": region,
+                "value": usual + np.tile([1, -1], 6),
+            }
+        )
         for run, side, region, usual in places
     ]
     scores = deviation_scores(pd.concat(tables, ignore_index=True), individuals=True)
     assert len(scores) == 36
     expected = scores.groupby(["run", "hemisphere"])["expected"].mean()
-    assert expected.to_dict() == pytest.approx({("r", "whole"): 0.0, ("r", "left"): 9.0, ("q", "whole"): 50.0}, abs=0.5)
+    assert expected.to_dict() == pytest.approx(
+        {("r", "whole"): 0.0, ("r", "left"): 9.0, ("q", "whole"): 50.0}, abs=0.5
+    )
     assert (np.sign(scores["z"]) == np.tile([1, -1], 18)).all()
     # without the brain itself
     assert (scores["brains"] == 11).all()
@@ -106,7 +159,8 @@ def test_a_deviation_is_scored_among_the_other_brains_of_its_run_and_place():
 
 
 def test_the_script_takes_each_surface_with_its_own_thickness(tmp_path):
-    """The observed brain is in another pose, and a millimetre larger than expected; no two thicknesses are equal."""
+    """The observed brain is in another pose, and a millimetre larger than expected; no
+    two thicknesses are equal."""
     brains = {
         "start": (sphere(19.5, 3), 2.0),
         "first": (BALL, 1.0),
@@ -121,9 +175,19 @@ def test_the_script_takes_each_surface_with_its_own_thickness(tmp_path):
         inputs[name] = f"{name}.gii"
     inputs["sides"] = ["expected.gii"]
     params = {"sides": ["left"], "labels": {"run": "r", "subject": "b", "week": 24.0}}
-    run_script("deviation.py", tmp_path, inputs, {"maps": "maps.gii", "table": "table.csv"}, params)
+    run_script(
+        "deviation.py",
+        tmp_path,
+        inputs,
+        {"maps": "maps.gii", "table": "table.csv"},
+        params,
+    )
     maps = read_vertex_maps(tmp_path / "maps.gii")
     assert maps["distance_mm"] == pytest.approx(1.0, abs=0.05)
-    assert maps["thickness_difference_mm"] == pytest.approx(2.7 - 2.0 * 1.5 / 1.0, abs=1e-3)
-    table = read_table(tmp_path / "table.csv").set_index(["hemisphere", "metric"])["value"]
+    assert maps["thickness_difference_mm"] == pytest.approx(
+        2.7 - 2.0 * 1.5 / 1.0, abs=1e-3
+    )
+    table = read_table(tmp_path / "table.csv").set_index(["hemisphere", "metric"])[
+        "value"
+    ]
     assert table["left", "distance"] == pytest.approx(1.0, abs=0.05)

@@ -13,10 +13,20 @@ from shapes import box_mesh
 
 from gyriflow.code_hash import modules_behind
 from gyriflow.folding import checkpoint
-from gyriflow.folding.checkpoint import State, read_checkpoint, run_key, write_checkpoint
+from gyriflow.folding.checkpoint import (
+    State,
+    read_checkpoint,
+    run_key,
+    write_checkpoint,
+)
 from gyriflow.settings.folding import parameters_from
 
-VALUES = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 22.0]}
+VALUES = {
+    "start_week": 21.0,
+    "end_week": 22.0,
+    "fissure_x_mm": 0.0,
+    "output_weeks": [21.0, 22.0],
+}
 
 
 def some_state(steps=3):
@@ -24,7 +34,9 @@ def some_state(steps=3):
     rng = np.random.default_rng(1)
     for i in range(steps):
         row = {"step": i + 1, "week": 21.0 + i, "rung": "cg"}
-        state = state.after(rng.normal(size=(4, 3)), 100.0, row, growth=np.full((4, 3, 3), 0.1))
+        state = state.after(
+            rng.normal(size=(4, 3)), 100.0, row, growth=np.full((4, 3, 3), 0.1)
+        )
     return state
 
 
@@ -37,7 +49,9 @@ def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
     state = State.at_start(at(0.0), 1.0)
     for before, after in pairwise(times[:3]):
         state = state.after(at(after) - at(before), after - before, {})
-    np.testing.assert_allclose(state.initial_guesses(1.5)[0], at(3.0) - at(1.5), rtol=1e-13)
+    np.testing.assert_allclose(
+        state.initial_guesses(1.5)[0], at(3.0) - at(1.5), rtol=1e-13
+    )
 
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path):
@@ -46,7 +60,9 @@ def test_a_checkpoint_comes_back_as_it_was(tmp_path):
     read, message = read_checkpoint(tmp_path / "state.h5", "key")
     assert message == Facts(3)
     for name, value in vars(state).items():
-        np.testing.assert_array_equal(getattr(read, name), value) if name != "rows" else None
+        np.testing.assert_array_equal(
+            getattr(read, name), value
+        ) if name != "rows" else None
     assert read.rows == state.rows
 
 
@@ -68,16 +84,24 @@ def test_a_checkpoint_with_any_damage_is_whole_or_not_used(tmp_path, data):
 def test_the_key_depends_on_mesh_and_parameters_but_not_on_ranks():
     mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
     base = parameters_from(VALUES)
-    assert run_key(mesh, base, {}) == run_key(mesh, parameters_from(VALUES | {"ranks": 7}), {})
-    assert run_key(mesh, base, {}) != run_key(mesh, parameters_from(VALUES | {"thickness_mm": 2.0}), {})
-    assert run_key(mesh, base, {}) != run_key(box_mesh((1, 1, 1), (1.0, 1.0, 1.1)), base, {})
+    assert run_key(mesh, base, {}) == run_key(
+        mesh, parameters_from(VALUES | {"ranks": 7}), {}
+    )
+    assert run_key(mesh, base, {}) != run_key(
+        mesh, parameters_from(VALUES | {"thickness_mm": 2.0}), {}
+    )
+    assert run_key(mesh, base, {}) != run_key(
+        box_mesh((1, 1, 1), (1.0, 1.0, 1.1)), base, {}
+    )
     mapped = parameters_from(VALUES | {"thickness_mm": {"map": "thickness_mm"}})
     thin, thick = ({"thickness_mm": np.full(8, h)} for h in (1.0, 2.0))
     assert run_key(mesh, mapped, thin) != run_key(mesh, mapped, thick)
 
 
 @pytest.mark.parametrize("name", ["newton.py", "products.c"])
-def test_a_checkpoint_is_not_used_after_the_source_has_changed(name, tmp_path, monkeypatch):
+def test_a_checkpoint_is_not_used_after_the_source_has_changed(
+    name, tmp_path, monkeypatch
+):
     mesh, parameters = box_mesh((1, 1, 1), (1.0, 1.0, 1.0)), parameters_from(VALUES)
     (tmp_path / "folding").mkdir()
     source, path = tmp_path / "folding" / name, tmp_path / "state.h5"
@@ -96,7 +120,10 @@ def test_a_checkpoint_is_not_used_after_the_source_has_changed(name, tmp_path, m
 
 
 def test_the_key_of_a_run_does_not_depend_on_how_labels_are_read():
-    behind = {path.name for path in modules_behind(Path(checkpoint.__file__).with_name("__main__.py"))}
+    behind = {
+        path.name
+        for path in modules_behind(Path(checkpoint.__file__).with_name("__main__.py"))
+    }
     assert {"run.py", "varying.py", "tetrahedra.py", "materials.py"} <= behind
     assert not {"labels.py", "extraction.py", "brains.py"} & behind
     c_files = {path.name for path in Path(checkpoint.__file__).parent.glob("*.c")}

@@ -11,14 +11,20 @@ from gyriflow.folding.compilation import form_compiler, pointer
 from gyriflow.folding.products import PartMotions, multiply_blocks
 
 
-def test_ranks_on_different_processors_share_code_that_all_can_execute(tmp_path, monkeypatch):
+def test_ranks_on_different_processors_share_code_that_all_can_execute(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folders = {}
     for processors in (("old", "old"), ("new",), ("old", "new"), ("new", "old")):
-        ranks = SimpleNamespace(rank=0, allgather=lambda _, found=processors: found, barrier=lambda: None)
+        ranks = SimpleNamespace(
+            rank=0, allgather=lambda _, found=processors: found, barrier=lambda: None
+        )
         with form_compiler(ranks) as options:
             folders[processors] = options["cache_dir"]
-            assert ("-march=native" in options["cffi_extra_compile_args"]) == (len(set(processors)) == 1)
+            assert ("-march=native" in options["cffi_extra_compile_args"]) == (
+                len(set(processors)) == 1
+            )
     assert folders["old", "new"] == folders["new", "old"]
     assert len(set(folders.values())) == 3
 
@@ -26,8 +32,14 @@ def test_ranks_on_different_processors_share_code_that_all_can_execute(tmp_path,
 def test_c_code_gets_arrays_of_its_type_and_size_only():
     interface = cffi.FFI()
     numbers = np.arange(6.0).reshape(2, 3)
-    assert interface.cast("double *", pointer(interface, numbers, np.float64, 6))[4] == 4.0
-    for wrong in (numbers.astype(np.float32), numbers.astype(np.int64), numbers.astype(">f8")):
+    assert (
+        interface.cast("double *", pointer(interface, numbers, np.float64, 6))[4] == 4.0
+    )
+    for wrong in (
+        numbers.astype(np.float32),
+        numbers.astype(np.int64),
+        numbers.astype(">f8"),
+    ):
         with pytest.raises(TypeError, check=Facts("float64", str(wrong.dtype))):
             pointer(interface, wrong, np.float64, 6)
     with pytest.raises(ValueError, check=Facts(7, "(2, 3)")):
@@ -45,7 +57,11 @@ def test_products_refuse_arrays_that_c_code_would_misread():
     blocks, x, y = np.ones((4, 3, 3), np.float32), np.ones(12), np.zeros(12)
     multiply_blocks(blocks, x, y)
     assert y == pytest.approx(3.0)
-    for wrong in ((blocks.astype(float), x, y), (blocks, x.astype(np.float32), y), (blocks, x, y.astype(int))):
+    for wrong in (
+        (blocks.astype(float), x, y),
+        (blocks, x.astype(np.float32), y),
+        (blocks, x, y.astype(int)),
+    ):
         with pytest.raises(TypeError):
             multiply_blocks(*wrong)
     for short in ((blocks, x[:9], y), (blocks, x, y[:9])):

@@ -1,4 +1,5 @@
-"""A body is drawn to shapes that it can have: without inverted elements, and without folds that cross."""
+"""A body is drawn to shapes that it can have: without inverted elements, and without
+folds that cross."""
 
 from dataclasses import replace
 
@@ -13,7 +14,12 @@ from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.matching import crossing_faces
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    linear_pieces,
+    volumes_between,
+)
 from gyriflow.geometry.triangles import TriangleMesh
 
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
@@ -28,9 +34,14 @@ def ratios(positions):
 def waves(height_mm, length_mm):
     x, y, z = BODY.vertices.T
     radius = np.sqrt((x / 20) ** 2 + (y / 24) ** 2 + (z / 18) ** 2)
-    outward = BODY.vertices / np.maximum(np.linalg.norm(BODY.vertices, axis=1), 1e-6)[:, None]
+    outward = (
+        BODY.vertices / np.maximum(np.linalg.norm(BODY.vertices, axis=1), 1e-6)[:, None]
+    )
     shell = np.exp(-(((1 - radius) / 0.25) ** 2))
-    return BODY.vertices * 1.05 + height_mm * (np.cos(2 * np.pi * y / length_mm) * shell)[:, None] * outward
+    return (
+        BODY.vertices * 1.05
+        + height_mm * (np.cos(2 * np.pi * y / length_mm) * shell)[:, None] * outward
+    )
 
 
 def test_a_shape_with_inverted_elements_is_followed_by_one_without():
@@ -44,7 +55,9 @@ def test_a_shape_with_inverted_elements_is_followed_by_one_without():
 
 
 def test_a_shape_that_a_body_can_have_is_reached_where_it_lies():
-    shape = transform_points(waves(0.5, 30.0), rigid(30, -20, 10, shift=(50.0, 0.0, -9.0)))
+    shape = transform_points(
+        waves(0.5, 30.0), rigid(30, -20, 10, shift=(50.0, 0.0, -9.0))
+    )
     body = ElasticFit(BODY)
     before = np.linalg.norm(body.follow(shape) - shape, axis=1)
     after = np.linalg.norm(body.draw(shape[USED]) - shape, axis=1)[USED]
@@ -92,7 +105,9 @@ def slit_block(low, high):
     return TetrahedralMesh(places[kept], numbers.reshape(-1, 4))
 
 
-UNSOLVABLE = replace(elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12, min_progress=1.0)
+UNSOLVABLE = replace(
+    elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12, min_progress=1.0
+)
 """Tolerances that no step meets."""
 
 
@@ -136,9 +151,12 @@ def test_what_cannot_be_drawn_is_held_and_the_rest_is_drawn():
 
 
 def flattened():
-    """Return places at which a vertex inside has gone most of the way to the opposite face of one of its elements."""
+    """Return places at which a vertex inside has gone most of the way to the opposite
+    face of one of its elements."""
     inside = np.setdiff1d(np.arange(len(BODY.vertices)), USED)
-    vertex = inside[np.argmin(np.linalg.norm(BODY.vertices[inside] - [8, 8, 5], axis=1))]
+    vertex = inside[
+        np.argmin(np.linalg.norm(BODY.vertices[inside] - [8, 8, 5], axis=1))
+    ]
     tet = BODY.tets[(BODY.tets == vertex).any(axis=1)][0]
     places = BODY.vertices.copy()
     places[vertex] += 0.9 * (places[tet[tet != vertex]].mean(axis=0) - places[vertex])
@@ -155,7 +173,9 @@ def test_flat_elements_are_elastic_and_open_in_the_next_steps():
     assert found[USED] == pytest.approx(BODY.vertices[USED], abs=0.05)
     # nothing moves where the elements are as those around them
     body.positions_mm = BODY.vertices * [1.2, 1.0, 0.9]
-    assert body.draw(body.positions_mm[USED]) == pytest.approx(BODY.vertices * [1.2, 1.0, 0.9], abs=1e-6)
+    assert body.draw(body.positions_mm[USED]) == pytest.approx(
+        BODY.vertices * [1.2, 1.0, 0.9], abs=1e-6
+    )
 
 
 def test_a_step_that_flat_elements_prevent_is_made_without_their_stress(monkeypatch):
@@ -175,7 +195,9 @@ def test_a_step_that_flat_elements_prevent_is_made_without_their_stress(monkeypa
 
     monkeypatch.setattr(body._problem, "set_step", set_and_note)
     monkeypatch.setattr(solver, "solve", fail_with_stress)
-    goals = waves(0.0, 20.0)[USED] + [0.0, 0.0, 0.5] * np.sin(BODY.vertices[USED, :1] / 5)
+    goals = waves(0.0, 20.0)[USED] + [0.0, 0.0, 0.5] * np.sin(
+        BODY.vertices[USED, :1] / 5
+    )
     before = np.linalg.norm(body.boundary.vertices - goals, axis=1).mean()
     assert np.linalg.norm(body.draw(goals)[USED] - goals, axis=1).mean() < 0.3 * before
 
@@ -184,7 +206,9 @@ def test_elements_that_a_step_leaves_flat_are_opened(monkeypatch):
     monkeypatch.setattr(ElasticFit, "_flattening", lambda self: None)
     body = ElasticFit(BODY)
     body.positions_mm = flattened()
-    assert ratios(body.draw(body.boundary.vertices)).min() == pytest.approx(0.2, abs=1e-6)
+    assert ratios(body.draw(body.boundary.vertices)).min() == pytest.approx(
+        0.2, abs=1e-6
+    )
 
 
 def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypatch):
@@ -192,7 +216,9 @@ def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypa
     body.positions_mm = BODY.vertices
     places = flattened()
     # as if the change had made these
-    monkeypatch.setattr(body, "_untangled", lambda before, after, lengths: (places, np.empty((0, 3))))
+    monkeypatch.setattr(
+        body, "_untangled", lambda before, after, lengths: (places, np.empty((0, 3)))
+    )
     assert ratios(body.move_to(BODY.vertices)).min() == pytest.approx(0.2, abs=1e-6)
     assert body.way_from(BODY.vertices) == []
     body.positions_mm, body._moved_straight = BODY.vertices, False
@@ -203,7 +229,8 @@ def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypa
 def test_springs_around_flat_elements_hardly_draw(monkeypatch):
     body = ElasticFit(BODY)
     goals = BODY.vertices[USED]
-    # a corner of an element with no vertex inside goes most of the way to the opposite face
+    # a corner of an element with no vertex inside goes most of the way to the opposite
+    # face
     tet = PIECES[np.isin(PIECES, USED).all(axis=1)][0]
     places = BODY.vertices.copy()
     places[tet[0]] += 0.85 * (places[tet[1:]].mean(axis=0) - places[tet[0]])

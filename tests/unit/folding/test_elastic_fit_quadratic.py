@@ -1,4 +1,5 @@
-"""A body of quadratic elements is drawn to shapes: none of its curved elements folds over, nor on the way."""
+"""A body of quadratic elements is drawn to shapes: none of its curved elements folds
+over, nor on the way."""
 
 import logging
 from itertools import pairwise
@@ -23,9 +24,14 @@ def waves(height_mm, body=BODY, length_mm=6.0):
     """Return the shape of a body with waves on its surface, which fade inside."""
     x, y, z = body.vertices.T
     radius = np.sqrt((x / 12) ** 2 + (y / 14) ** 2 + (z / 11) ** 2)
-    outward = body.vertices / np.maximum(np.linalg.norm(body.vertices, axis=1), 1e-6)[:, None]
+    outward = (
+        body.vertices / np.maximum(np.linalg.norm(body.vertices, axis=1), 1e-6)[:, None]
+    )
     shell = np.exp(-(((1 - radius) / 0.25) ** 2))
-    return 1.03 * body.vertices + height_mm * (np.cos(2 * np.pi * y / length_mm) * shell)[:, None] * outward
+    return (
+        1.03 * body.vertices
+        + height_mm * (np.cos(2 * np.pi * y / length_mm) * shell)[:, None] * outward
+    )
 
 
 def folded_over(positions, body=BODY):
@@ -45,7 +51,8 @@ def test_waves_leave_no_curved_element_that_folds_over(height_mm):
     found = body.draw(shape[USED])
     assert folded_over(found) == 0
     drawn = np.linalg.norm(found - shape, axis=1)[USED].mean()
-    # the higher waves bend elements too much: the body is only moved to the shape as a whole
+    # the higher waves bend elements too much: the body is only moved to the shape as a
+    # whole
     assert drawn < (0.6 if height_mm < 1 else 1.01) * followed
 
 
@@ -55,20 +62,29 @@ def bar(order):
 
 
 def twisted(mesh, turn):
-    """Return a bar whose ends are turned about its axis, by an angle in radians against each other."""
+    """Return a bar whose ends are turned about its axis, by an angle in radians against
+    each other."""
     x, y, z = mesh.vertices.T
     c, s = np.cos(turn * x / 36), np.sin(turn * x / 36)
     return np.stack([x, c * y - s * z, s * y + c * z], axis=1)
 
 
 def aligned(mesh, shape, onto):
-    return transform_points(shape, rigid_fit(shape, onto, vertex_sizes(onto, linear_pieces(mesh))))
+    return transform_points(
+        shape, rigid_fit(shape, onto, vertex_sizes(onto, linear_pieces(mesh)))
+    )
 
 
 def inverted_along(mesh, shapes):
-    """Return the number of elements inverted between each two shapes that follow each other, each aligned before."""
-    ways = [(before, aligned(mesh, after, before)) for before, after in pairwise(shapes)]
-    return [int(inverted_on_the_way(before, after, mesh.tets).sum()) for before, after in ways]
+    """Return the number of elements inverted between each two shapes that follow each
+    other, each aligned before."""
+    ways = [
+        (before, aligned(mesh, after, before)) for before, after in pairwise(shapes)
+    ]
+    return [
+        int(inverted_on_the_way(before, after, mesh.tets).sum())
+        for before, after in ways
+    ]
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -84,7 +100,9 @@ def test_stops_lie_where_the_straight_way_to_a_shape_inverts_elements(order):
     assert inverted_along(mesh, [mesh.vertices, wanted])[0] > 20
     way = body.way_from(mesh.vertices)
     assert [part for part, _ in way] == pytest.approx([0.5], abs=0.1)
-    assert inverted_along(mesh, [mesh.vertices, *(shape for _, shape in way), body.positions_mm]) == [0, 0]
+    assert inverted_along(
+        mesh, [mesh.vertices, *(shape for _, shape in way), body.positions_mm]
+    ) == [0, 0]
     # the shape itself has no fault, so it stays
     assert np.abs(body.positions_mm - wanted).max() < 1e-9
 
@@ -119,5 +137,7 @@ def test_a_path_reports_the_elements_that_it_inverts_between_two_shapes(order):
     assert at.max() < 6.0
     # in two steps with a shape between, nothing is inverted
     middle = twisted(mesh, 2.4 * np.pi)
-    whole = path_through([21.0, 22.0, 22.5, 23.0], [*shapes[:2], middle, shapes[2]], mesh, step_gw=0.25)
+    whole = path_through(
+        [21.0, 22.0, 22.5, 23.0], [*shapes[:2], middle, shapes[2]], mesh, step_gw=0.25
+    )
     assert [len(faults) for faults in whole.inverted] == [0, 0, 0]

@@ -1,4 +1,5 @@
-"""Hemispheres of a folded brain whose fissure is bent: those of the measured brain, carried along by the scripts."""
+"""Hemispheres of a folded brain whose fissure is bent: those of the measured brain,
+carried along by the scripts."""
 
 import numpy as np
 import pytest
@@ -19,18 +20,21 @@ from gyriflow.units import CM2_PER_MM2
 
 
 def beyond_fissure(points):
-    """Return how far (n, 3) points are to the right of a fissure that swings by 4 mm to both sides."""
+    """Return how far (n, 3) points are to the right of a fissure that swings by 4 mm to
+    both sides."""
     return points[:, 0] - 4.0 * np.sin(points[:, 1] / 8.0)
 
 
 def folded(points):
-    """Return points where a folded brain could have them: larger, and all to the right of the start's fissure."""
+    """Return points where a folded brain could have them: larger, and all to the right
+    of the start's fissure."""
     return 1.3 * points + [40.0, 0.0, 0.0] + [0.01, 0.0, 0.0] * points[:, 1:2] ** 2
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A folder with the regions of the brain's mesh, and with the surfaces of its second frame."""
+    """A folder with the regions of the brain's mesh, and with the surfaces of its
+    second frame."""
     folder = tmp_path_factory.mktemp("folded")
     brain = ellipsoid_mesh(16, SEMI_AXES)
     # the measured brain, in triangles of its own
@@ -41,15 +45,26 @@ def made(tmp_path_factory):
     def left_faces(mesh):
         return nearer_left(mesh, left, right)
 
-    write_regions(folder / "regions.xdmf", start_regions(brain, parameters_from(RUN), {}, left_faces))
+    write_regions(
+        folder / "regions.xdmf",
+        start_regions(brain, parameters_from(RUN), {}, left_faces),
+    )
     for week, positions in ((21.0, brain.vertices), (22.0, folded(brain.vertices))):
         write_frame(folder / f"{week}.h5", week, {"positions": positions})
-    join_frames(folder / "frames.h5", brain.tets, [folder / "21.0.h5", folder / "22.0.h5"])
-    parts = {part: f"{part}.gii" for part in ("whole", "left", "right", "thickness", "left_maps", "right_maps")}
+    join_frames(
+        folder / "frames.h5", brain.tets, [folder / "21.0.h5", folder / "22.0.h5"]
+    )
+    parts = {
+        part: f"{part}.gii"
+        for part in ("whole", "left", "right", "thickness", "left_maps", "right_maps")
+    }
     tables = {table: f"{table}.csv" for table in ("metrics", "spectra", "coefficients")}
     frames = {"frames": "frames.h5", "regions": "regions.xdmf"}
     labels = {"subject": "a", "run": "r", "week": 22.0}
-    params = {"labels": labels, "settings": {"curvature_radius_mm": 8.0, "spangy_modes": 30}}
+    params = {
+        "labels": labels,
+        "settings": {"curvature_radius_mm": 8.0, "spangy_modes": 30},
+    }
     run_script("measure.py", folder, frames, parts | tables, params)
     return folder
 
@@ -66,7 +81,9 @@ def test_facets_have_the_hemisphere_that_they_lie_on_though_the_fissure_is_bent(
 
 def test_the_folded_hemispheres_are_the_facets_that_were_theirs_at_the_start(made):
     regions = read_regions(made / "regions.xdmf")
-    whole, left, right = (read_surface(made / f"{part}.gii") for part in ("whole", "left", "right"))
+    whole, left, right = (
+        read_surface(made / f"{part}.gii") for part in ("whole", "left", "right")
+    )
     positions = folded(regions.mesh.vertices)
     for side, tag in ((left, LEFT), (right, RIGHT)):
         theirs = positions[regions.facets[regions.facet_tags["hemisphere"] == tag]]
@@ -80,8 +97,12 @@ def test_metrics_of_the_folded_brain_are_of_its_week_and_its_surfaces(made):
     assert set(metrics["week"]) == {22.0}
     for side in ("left", "right"):
         surface = read_surface(made / f"{side}.gii")
-        assert metrics.loc[(side, "area"), "value"] == pytest.approx(area(surface) * CM2_PER_MM2, rel=1e-6)
-        assert len(read_vertex_maps(made / f"{side}_maps.gii")["thickness_mm"]) == len(surface.vertices)
+        assert metrics.loc[(side, "area"), "value"] == pytest.approx(
+            area(surface) * CM2_PER_MM2, rel=1e-6
+        )
+        assert len(read_vertex_maps(made / f"{side}_maps.gii")["thickness_mm"]) == len(
+            surface.vertices
+        )
     # the cortex has grown with the rest
     thickness = read_vertex_maps(made / "thickness.gii")["thickness_mm"]
     assert np.nanmedian(thickness) == pytest.approx(1.3 * RUN["thickness_mm"], rel=0.1)

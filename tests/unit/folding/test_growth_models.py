@@ -1,4 +1,5 @@
-"""The registry of growth models: each has all that the rest of gyriflow asks for, and an unknown one is refused."""
+"""The registry of growth models: each has all that the rest of gyriflow asks for, and
+an unknown one is refused."""
 
 from typing import get_args
 
@@ -12,12 +13,20 @@ from gyriflow.report.page import methods_text
 from gyriflow.settings.folding import GROWTH_RATES, FoldingSettings, parameters_from
 from gyriflow.settings.growth import GROWTH_MODELS, Growth, ModelName
 
-VALUES = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 22.0]}
+VALUES = {
+    "start_week": 21.0,
+    "end_week": 22.0,
+    "fissure_x_mm": 0.0,
+    "output_weeks": [21.0, 22.0],
+}
 RATES = dict.fromkeys(GROWTH_RATES, 3e-7)
 
 
 def run_of(model, growth_of="own"):
-    return {"parameters": {"growth": {"model": model, "of": "self"}, **RATES}, "growth_of": growth_of}
+    return {
+        "parameters": {"growth": {"model": model, "of": "self"}, **RATES},
+        "growth_of": growth_of,
+    }
 
 
 def test_a_model_is_named_in_the_configuration_the_registry_and_the_solver():
@@ -33,7 +42,12 @@ def test_a_model_uses_keys_that_there_are_and_refuses_all_others(name):
     assert {*model.keys, *model.resolved} <= keys
     assert set(model.rates) <= set(GROWTH_RATES)
     assert set(Growth(model=name).own_keys()) == {"model", *model.keys, *model.resolved}
-    others = {"of": "atlas", "area_cm2": {21: 9.0}, "volume_ml": {21: 9.0}, "thickness_mm": {21: 2.0}}
+    others = {
+        "of": "atlas",
+        "area_cm2": {21: 9.0},
+        "volume_ml": {21: 9.0},
+        "thickness_mm": {21: 2.0},
+    }
     assert set(others) == keys
     for key in keys - {*model.keys, *model.resolved}:
         with pytest.raises(ValidationError, match=f"{key}\n.*{name}"):
@@ -49,13 +63,18 @@ def test_a_model_uses_keys_that_there_are_and_refuses_all_others(name):
 
 def test_each_model_has_a_sentence_of_its_own_in_the_methods():
     template = "{{ growth_sentence(run, number) }}"
-    found = {name: methods_text(template, run=run_of(name), number="{:g}".format) for name in GROWTH_MODELS}
+    found = {
+        name: methods_text(template, run=run_of(name), number="{:g}".format)
+        for name in GROWTH_MODELS
+    }
     assert len(set(found.values())) == len(found)
     assert all(text[0].isupper() and text.endswith(".") for text in found.values())
     # no sentence names rates that the model does not use
     assert [name for name, text in found.items() if "3e-07" in text] == ["rates"]
     for name, model in GROWTH_MODELS.items():
-        text = methods_text(template, run=run_of(name, "population cohort"), number="{:g}".format)
+        text = methods_text(
+            template, run=run_of(name, "population cohort"), number="{:g}".format
+        )
         assert ("cohort" in text) == (model.measured is not None)
 
 
@@ -72,9 +91,13 @@ def test_target_shapes_are_given_to_the_models_that_need_them_and_to_no_other():
 
 
 def test_an_unknown_model_is_refused():
-    with pytest.raises(InputError, check=Facts("growth.model", "springs", *GROWTH_MODELS)):
+    with pytest.raises(
+        InputError, check=Facts("growth.model", "springs", *GROWTH_MODELS)
+    ):
         parameters_from(VALUES | {"growth": {"model": "springs"}})
-    unknown = parameters_from(VALUES).model_copy(update={"growth": Growth().model_copy(update={"model": "springs"})})
+    unknown = parameters_from(VALUES).model_copy(
+        update={"growth": Growth().model_copy(update={"model": "springs"})}
+    )
     with pytest.raises(KeyError, match="springs"):
         growth_model(unknown, None)
     with pytest.raises(KeyError, match="springs"):

@@ -1,4 +1,5 @@
-"""Distances, cortical weight and normals; integration points of elements, and values at nodes brought there."""
+"""Distances, cortical weight and normals; integration points of elements, and values at
+nodes brought there."""
 
 import itertools
 import math
@@ -26,7 +27,12 @@ def search_of(mesh):
 
 def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
     weight = cortical_weight(np.array([0.0, 1.5, 3.0, 1e6]), 1.5)
-    np.testing.assert_allclose(weight, [1 / (1 + np.exp(-10)), 0.5, 1 / (1 + np.exp(10)), 0.0], rtol=1e-12, atol=1e-300)
+    np.testing.assert_allclose(
+        weight,
+        [1 / (1 + np.exp(-10)), 0.5, 1 / (1 + np.exp(10)), 0.0],
+        rtol=1e-12,
+        atol=1e-300,
+    )
 
 
 def test_the_cortex_has_its_own_thickness_at_the_start_and_grows_from_there():
@@ -34,9 +40,13 @@ def test_the_cortex_has_its_own_thickness_at_the_start_and_grows_from_there():
     p = parameters_from(RUN | {"thickness_mm": {"weeks": {21: 2.0, 23: 3.0}}})
     zones = zones_of_run(mesh, p, GAP_MM)
     for week, thickness in ((21.0, 2.0), (23.0, 3.0)):
-        fields = layer_fields(mesh.vertices, zones, p, {}, week, ["distance", "cortex_weight"])
+        fields = layer_fields(
+            mesh.vertices, zones, p, {}, week, ["distance", "cortex_weight"]
+        )
         np.testing.assert_allclose(
-            fields["cortex_weight"], cortical_weight(fields["distance_to_pial_mm"], thickness), rtol=1e-12
+            fields["cortex_weight"],
+            cortical_weight(fields["distance_to_pial_mm"], thickness),
+            rtol=1e-12,
         )
 
 
@@ -45,12 +55,19 @@ def test_rates_that_change_with_the_weeks_are_those_of_the_middle_of_a_step():
     p = parameters_from(RUN | {"growth_rate_per_s": {"weeks": {21.0: 0.0, 22.0: 1e-6}}})
     one = np.ones(1)
     tissue = SimpleNamespace(
-        weight=one, growing=one, maps={}, at_points=lambda values: values[None],
+        weight=one,
+        growing=one,
+        maps={},
+        at_points=lambda values: values[None],
         normals=lambda wanted: (wanted, np.array([[[0.0, 0.0, 1.0]]])),
-    )  # fmt: skip
-    inverse = GrowthByRates(p, StepStart(np.empty((0, 3)), 2 * day, day)).inverse(tissue)
+    )
+    inverse = GrowthByRates(p, StepStart(np.empty((0, 3)), 2 * day, day)).inverse(
+        tissue
+    )
     # two days and a half after the start
-    np.testing.assert_allclose(inverse[0, 0], np.diag([1 / (1 + 2.5 / 7 * 1e-6 * day)] * 2 + [1.0]), rtol=1e-12)
+    np.testing.assert_allclose(
+        inverse[0, 0], np.diag([1 / (1 + 2.5 / 7 * 1e-6 * day)] * 2 + [1.0]), rtol=1e-12
+    )
 
 
 def test_distance_is_to_the_triangles_not_to_the_vertices_within_reach():
@@ -72,20 +89,31 @@ def test_normals_on_a_ball_point_outwards_and_have_length_one():
 
 
 @pytest.mark.parametrize(("order", "degree"), [(1, 1), (2, 3)])
-def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights(order, degree):
+def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights(
+    order, degree
+):
     points = IntegrationPoints.for_order(order)
     assert (points.weights > 0).all()
     for powers in itertools.product(range(degree + 1), repeat=4):
         if sum(powers) <= degree:
             # the mean of a product of barycentric coordinates
-            exact = 6 * math.prod(map(math.factorial, powers)) / math.factorial(sum(powers) + 3)
-            assert points.weights @ (points.barycentric**powers).prod(axis=1) == pytest.approx(exact, rel=1e-12)
+            exact = (
+                6
+                * math.prod(map(math.factorial, powers))
+                / math.factorial(sum(powers) + 3)
+            )
+            assert points.weights @ (points.barycentric**powers).prod(
+                axis=1
+            ) == pytest.approx(exact, rel=1e-12)
 
 
 def test_the_rules_of_both_orders_prefer_no_corner():
     for order in (1, 2):
         points = IntegrationPoints.for_order(order)
-        known = {tuple(row) for row in np.column_stack([points.barycentric, points.weights]).round(9)}
+        known = {
+            tuple(row)
+            for row in np.column_stack([points.barycentric, points.weights]).round(9)
+        }
         for change in itertools.permutations(range(4)):
             assert {(*[key[i] for i in change], key[4]) for key in known} == known
 
@@ -93,10 +121,14 @@ def test_the_rules_of_both_orders_prefer_no_corner():
 def test_smooth_values_are_quadratic_and_bounded_ones_stay_between_the_nodes():
     points = IntegrationPoints.for_order(2)
     square = lambda places: places[:, 0] ** 2 - places[:, 1] * places[:, 2]  # noqa: E731
-    np.testing.assert_allclose(points.interpolation @ square(NODES), square(points.barycentric))
+    np.testing.assert_allclose(
+        points.interpolation @ square(NODES), square(points.barycentric)
+    )
     assert (points.piecewise_linear >= 0).all()
     np.testing.assert_allclose(points.piecewise_linear.sum(axis=1), 1.0)
-    np.testing.assert_allclose(points.piecewise_linear @ NODES, points.barycentric, atol=1e-12)
+    np.testing.assert_allclose(
+        points.piecewise_linear @ NODES, points.barycentric, atol=1e-12
+    )
 
 
 def test_normals_of_opposed_walls_do_not_cancel():
@@ -109,4 +141,6 @@ def test_normals_of_opposed_walls_do_not_cancel():
     angle = 0.3 * NODES[:, 1]
     turning = np.stack([np.sin(angle), np.zeros(10), np.cos(angle)], axis=1)
     found = interpolated_normals(turning[None], points)[0]
-    np.testing.assert_allclose(np.arctan2(found[:, 0], found[:, 2]), 0.3 * points.barycentric[:, 1], atol=2e-3)
+    np.testing.assert_allclose(
+        np.arctan2(found[:, 0], found[:, 2]), 0.3 * points.barycentric[:, 1], atol=2e-3
+    )

@@ -1,4 +1,5 @@
-"""A body without a sulcus follows surfaces in which one opens, although registration does not know of it."""
+"""A body without a sulcus follows surfaces in which one opens, although registration
+does not know of it."""
 
 from itertools import pairwise
 
@@ -9,7 +10,12 @@ from skimage.measure import marching_cubes
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import Deformation
 from gyriflow.geometry.matching import faces_that_cross, nearest_on
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    linear_pieces,
+    volumes_between,
+)
 from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas
 from gyriflow.growth.series_shapes import fit_onto_surface, follow_series
 
@@ -25,7 +31,9 @@ def grid(margin_mm):
     """Return the (3, i, j, k) places of a grid around the block, and its affine."""
     sides = [
         np.arange(low - margin_mm, low + size + margin_mm + 1e-9, VOXEL_MM)
-        for low, size in zip((-SIZE_MM[0] / 2, -SIZE_MM[1] / 2, -SIZE_MM[2]), SIZE_MM, strict=True)
+        for low, size in zip(
+            (-SIZE_MM[0] / 2, -SIZE_MM[1] / 2, -SIZE_MM[2]), SIZE_MM, strict=True
+        )
     ]
     affine = np.diag([VOXEL_MM] * 3 + [1.0])
     affine[:3, 3] = [side[0] for side in sides]
@@ -36,15 +44,20 @@ def block_with_slit(depth_mm):
     """Return the surface of the block with a slit; its bottom is half an ellipse."""
     (x, y, z), affine = grid(2 * VOXEL_MM)
     over = np.abs([x, y, z + SIZE_MM[2] / 2]) - SIZE_MM.reshape(3, 1, 1, 1) / 2
-    signed = np.linalg.norm(np.maximum(over, 0), axis=0) + np.minimum(over.max(axis=0), 0)
+    signed = np.linalg.norm(np.maximum(over, 0), axis=0) + np.minimum(
+        over.max(axis=0), 0
+    )
     depth = depth_mm * np.sqrt(np.clip(1 - (y / HALF_LENGTH_MM) ** 2, 0, 1))
     slit = np.where(depth > 0.2, np.maximum(np.abs(x) - WIDTH_MM / 2, -z - depth), 0.3)
-    places, faces, _, _ = marching_cubes(np.maximum(signed, -slit), 0.0, spacing=(VOXEL_MM,) * 3)
+    places, faces, _, _ = marching_cubes(
+        np.maximum(signed, -slit), 0.0, spacing=(VOXEL_MM,) * 3
+    )
     return TriangleMesh(places + affine[:3, 3], faces)
 
 
 def registration(before_mm, after_mm):
-    """Return the map of a week by labels: the tissue below the cortex sinks, and the top does not know of the slit."""
+    """Return the map of a week by labels: the tissue below the cortex sinks, and the
+    top does not know of the slit."""
     (x, y, z), affine = grid(3.0)
     place = np.exp(-((x / 2) ** 2) / 2) * np.sqrt(np.clip(1 - (y / 9) ** 2, 0, 1))
     below = before_mm + CORTEX_MM
@@ -56,7 +69,9 @@ def registration(before_mm, after_mm):
 
 def area_at_slit(surface):
     centres = corners(surface).mean(axis=1)
-    near = (np.abs(centres[:, 0]) < 8) & (np.abs(centres[:, 1]) < 9) & (centres[:, 2] > -8)
+    near = (
+        (np.abs(centres[:, 0]) < 8) & (np.abs(centres[:, 1]) < 9) & (centres[:, 2] > -8)
+    )
     return face_areas(surface)[near].sum()
 
 
@@ -65,7 +80,14 @@ def test_a_body_opens_a_slit_that_registration_does_not_know():
     mesh = TetrahedralMesh(box.vertices - [0, 0, SIZE_MM[2] / 2], box.tets)
     surfaces = [block_with_slit(depth) for depth in DEPTHS_MM]
     pairs = [registration(*depths) for depths in pairwise(DEPTHS_MM)]
-    shapes = follow_series(mesh, range(len(surfaces)), pairs, surfaces[1:], ElasticFit(mesh), open_sulci=True)
+    shapes = follow_series(
+        mesh,
+        range(len(surfaces)),
+        pairs,
+        surfaces[1:],
+        ElasticFit(mesh),
+        open_sulci=True,
+    )
     faces, used = boundary_surface(mesh)[0].faces, boundary_surface(mesh)[1]
     start = area_at_slit(surfaces[0])
     for week, surface in enumerate(surfaces[1:], start=1):

@@ -1,4 +1,5 @@
-"""Edges on one line that are parallel but for round-off neither repel each other nor stop a step."""
+"""Edges on one line that are parallel but for round-off neither repel each other nor
+stop a step."""
 
 import numpy as np
 import pytest
@@ -17,9 +18,11 @@ POSITIONS = np.array(
         [-3.0, 0.2, 0.35],
     ]
 )
-"""Two triangles in mm, each with an edge on the straight side of an element, as a folding slab had them.
+"""Two triangles in mm, each with an edge on the straight side of an element, as a
+folding slab had them.
 
-The ends are 0.149 mm apart, three times the contact distance; ipctk 1.6 takes the edges for crossing lines.
+The ends are 0.149 mm apart, three times the contact distance; ipctk 1.6 takes the edges
+for crossing lines.
 """
 DISPLACEMENT = np.array(
     [
@@ -34,7 +37,9 @@ DISPLACEMENT = np.array(
 
 
 def search_at(positions):
-    return ContactSearch(FACES, np.ones(len(positions), dtype=bool), positions, DISTANCE_MM)
+    return ContactSearch(
+        FACES, np.ones(len(positions), dtype=bool), positions, DISTANCE_MM
+    )
 
 
 def test_distant_edges_on_one_line_are_no_pair_and_do_not_stop_a_step():

@@ -1,4 +1,5 @@
-"""The steps of a simulation: their lengths, how stiff contact is from one to the next, and what is told of the mesh."""
+"""The steps of a simulation: their lengths, how stiff contact is from one to the next,
+and what is told of the mesh."""
 
 from types import SimpleNamespace
 
@@ -39,8 +40,12 @@ RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
         (500000.0, [21.0, 22.0], [21, 22]),
     ],
 )
-def test_a_step_that_does_not_divide_the_time_between_outputs_is_reported(step_s, weeks, shortened):
-    note = shortened_step_note(parameters_from(RUN | {"step_s": step_s, "output_weeks": weeks}))
+def test_a_step_that_does_not_divide_the_time_between_outputs_is_reported(
+    step_s, weeks, shortened
+):
+    note = shortened_step_note(
+        parameters_from(RUN | {"step_s": step_s, "output_weeks": weeks})
+    )
     assert note == (Facts("step_s", step_s, *shortened) if shortened else "")
 
 
@@ -48,14 +53,21 @@ class Stepper:
     """A folding whose steps fail where they are too long for the time."""
 
     def __init__(self, longest, through=2.5, **changes):
-        self.parameters = parameters_from(RUN | {"output_weeks": [21.0, 22.0]} | changes)
+        self.parameters = parameters_from(
+            RUN | {"output_weeks": [21.0, 22.0]} | changes
+        )
         self.domain = SimpleNamespace(comm=MPI.COMM_SELF, order=1)
         self.longest, self.solver, self.through = longest, None, through
 
     def step(self, state, step_s):
         if step_s > self.longest(state.time_s):
             raise NotConvergedError("too long")
-        row = {"dt_s": step_s, "converged": True, "elements_through_cortex": self.through, "week": 21.0}
+        row = {
+            "dt_s": step_s,
+            "converged": True,
+            "elements_through_cortex": self.through,
+            "week": 21.0,
+        }
         return state.after(np.zeros((1, 3)), step_s, row)
 
 
@@ -69,7 +81,9 @@ def steps_to(stepper, until_s):
 
 def test_a_failing_step_is_halved_and_grows_back():
     # nothing longer than 11 000 s works before 60 000 s
-    lengths = steps_to(Stepper(lambda time_s: 11_000.0 if time_s < 60_000 else 1e9), 604_800.0)
+    lengths = steps_to(
+        Stepper(lambda time_s: 11_000.0 if time_s < 60_000 else 1e9), 604_800.0
+    )
     assert lengths[0] == 10_800
     assert max(lengths) == 43_200
     first = lengths.index(21_600)
@@ -85,9 +99,14 @@ def test_where_the_smallest_step_fails_the_place_is_named():
 
 
 def test_a_short_remainder_is_halved_as_often_as_a_whole_step():
-    # 43 200 s and 800 s: what is left over is far below the smallest part of a whole step
-    stepper = Stepper(lambda time_s: 1e9 if time_s < 43_000 else 300.0, solver={"max_halvings": 3})
-    assert steps_to(stepper, 44_000.0) == pytest.approx([43_200.0, 200.0, 200.0, 200.0, 200.0])
+    # 43 200 s and 800 s: what is left over is far below the smallest part of a whole
+    # step
+    stepper = Stepper(
+        lambda time_s: 1e9 if time_s < 43_000 else 300.0, solver={"max_halvings": 3}
+    )
+    assert steps_to(stepper, 44_000.0) == pytest.approx(
+        [43_200.0, 200.0, 200.0, 200.0, 200.0]
+    )
 
 
 def test_elements_through_a_layer_are_its_thickness_over_the_edges_in_it():
@@ -95,7 +114,10 @@ def test_elements_through_a_layer_are_its_thickness_over_the_edges_in_it():
     # coarser below the layer, which is not to count
     z = mesh.vertices[:, 2] - 4.0
     stretched = np.where(z < -3, -3 + 4 * (z + 3), z)
-    domain = Domain(MPI.COMM_SELF, TetrahedralMesh(np.column_stack([mesh.vertices[:, :2], stretched]), mesh.tets))
+    domain = Domain(
+        MPI.COMM_SELF,
+        TetrahedralMesh(np.column_stack([mesh.vertices[:, :2], stretched]), mesh.tets),
+    )
     depth = -domain.local(domain.positions)[:, 2]
     # a cube in six tetrahedra, each with three edges, two diagonals and the long one
     edge = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
@@ -106,7 +128,10 @@ def test_elements_through_a_layer_are_its_thickness_over_the_edges_in_it():
 
 
 def rows(*through):
-    return [{"week": 21.0 + i, "elements_through_cortex": value} for i, value in enumerate(through)]
+    return [
+        {"week": 21.0 + i, "elements_through_cortex": value}
+        for i, value in enumerate(through)
+    ]
 
 
 def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
@@ -118,16 +143,34 @@ def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
     assert resolution_warning(rows(0.81), 2) == ""  # the default mesh at its start
     assert resolution_warning(rows(1.2, 0.79), 2) == Facts("GW 22.00", 0.8)
     # counts are judged as they are shown, with two digits
-    assert resolution_warning(rows(2.3, 1.96), 1) == resolution_warning(rows(0.796), 2) == ""
-    assert resolution_warning(rows(np.nan), 1) == Facts(2)  # no element lies in the cortex at all
+    assert (
+        resolution_warning(rows(2.3, 1.96), 1)
+        == resolution_warning(rows(0.796), 2)
+        == ""
+    )
+    assert resolution_warning(rows(np.nan), 1) == Facts(
+        2
+    )  # no element lies in the cortex at all
 
 
-@pytest.mark.parametrize(("growth", "warnings"), [("rates", 1), ("sizes", 1), ("shapes", 0)])
-def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(growth, warnings, capsys):
+@pytest.mark.parametrize(
+    ("growth", "warnings"), [("rates", 1), ("sizes", 1), ("shapes", 0)]
+)
+def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(
+    growth, warnings, capsys
+):
     sizes = {"area_cm2": {21: 90, 22: 99}, "volume_ml": {21: 40, 22: 46}}
     settings = {"rates": {}, "sizes": sizes, "shapes": sizes | {"of": "self"}}[growth]
     targets = {"targets": {22.0: "target_22"}} if growth == "shapes" else {}
-    steps_to(Stepper(lambda time_s: 1e9, through=1.0, growth={"model": growth} | settings, **targets), 604_800.0)
+    steps_to(
+        Stepper(
+            lambda time_s: 1e9,
+            through=1.0,
+            growth={"model": growth} | settings,
+            **targets,
+        ),
+        604_800.0,
+    )
     assert capsys.readouterr().out.count("elements lie through the cortex") == warnings
 
 
@@ -145,18 +188,35 @@ def test_a_step_above_its_tolerance_gives_a_warning():
 @pytest.mark.parametrize(
     ("order", "tets", "ranks", "contact", "measured"),
     [
-        *((1, 182_779, 1, "planes", 564), (1, 182_779, 1, "global", 649), (1, 448_597, 1, "planes", 877)),
-        *((1, 448_597, 1, "global", 1001), (1, 499_373, 1, "global", 914), (1, 499_373, 2, "global", 1580)),
-        *((2, 23_910, 1, "global", 600), (2, 23_910, 2, "global", 955), (2, 23_910, 2, "none", 838)),
+        *(
+            (1, 182_779, 1, "planes", 564),
+            (1, 182_779, 1, "global", 649),
+            (1, 448_597, 1, "planes", 877),
+        ),
+        *(
+            (1, 448_597, 1, "global", 1001),
+            (1, 499_373, 1, "global", 914),
+            (1, 499_373, 2, "global", 1580),
+        ),
+        *(
+            (2, 23_910, 1, "global", 600),
+            (2, 23_910, 2, "global", 955),
+            (2, 23_910, 2, "none", 838),
+        ),
         *((2, 34_684, 1, "global", 784), (2, 34_684, 2, "global", 1141)),
     ],
 )
-def test_predicted_memory_is_what_runs_have_taken(order, tets, ranks, contact, measured):
-    assert predicted_memory_mib(tets, ranks, contact, order) == pytest.approx(measured, rel=0.155)
+def test_predicted_memory_is_what_runs_have_taken(
+    order, tets, ranks, contact, measured
+):
+    assert predicted_memory_mib(tets, ranks, contact, order) == pytest.approx(
+        measured, rel=0.155
+    )
 
 
 @pytest.mark.parametrize(
-    ("gap", "stiffness"), [(np.inf, 1.0), (0.5, 1.0), (0.1, 1.0), (0.025, 2.0), (1e-9, MAX_STIFFENING)]
+    ("gap", "stiffness"),
+    [(np.inf, 1.0), (0.5, 1.0), (0.1, 1.0), (0.025, 2.0), (1e-9, MAX_STIFFENING)],
 )
 def test_the_barrier_is_stiffer_where_folds_are_close(gap, stiffness):
     assert stiffening(gap) == pytest.approx(stiffness)

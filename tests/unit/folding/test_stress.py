@@ -1,4 +1,5 @@
-"""Deformation, stress and strain of elements whose answers are known in closed form, or from the model's own energy."""
+"""Deformation, stress and strain of elements whose answers are known in closed form, or
+from the model's own energy."""
 
 from functools import cache
 from typing import get_args
@@ -40,31 +41,49 @@ def problem_of(law: type[Material], order: int) -> NonlinearProblem:
     mesh = box_mesh((1, 1, 1), (2.0, 3.0, 1.0))
     mesh = quadratic(mesh) if order == 2 else mesh
     facets, _ = boundary_faces(mesh)
-    zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
+    zones = Zones(
+        facets,
+        np.full(len(facets), FREE),
+        np.ones(len(mesh.vertices)),
+        0.0,
+        (-1.0, 1.0),
+    )
     return NonlinearProblem(Domain(MPI.COMM_SELF, mesh), zones, law(0.45))
 
 
 def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):
-    """Return the tensor that linear and quadratic elements have at all points after a homogeneous deformation."""
+    """Return the tensor that linear and quadratic elements have at all points after a
+    homogeneous deformation."""
     found = []
     for order in (1, 2):
         problem = problem_of(law, order)
-        x, cells = problem.domain.local(problem.domain.positions), len(problem.domain.cells)
+        x, cells = (
+            problem.domain.local(problem.domain.positions),
+            len(problem.domain.cells),
+        )
         ones, points = np.ones(len(x)), len(problem.points.weights)
         V = None if stretch is None else np.tile(stretch, (cells, points, 1, 1))
-        set_layers(problem, MU * ones, dg * ones, dr * ones, np.tile(normal, (cells, 1)), V)
+        set_layers(
+            problem, MU * ones, dg * ones, dr * ones, np.tile(normal, (cells, 1)), V
+        )
         found.append(problem.evaluate(name, x @ (F - np.eye(3)).T).reshape(-1, 3, 3))
     tensors = np.concatenate(found)
-    np.testing.assert_allclose(tensors, np.broadcast_to(tensors[0], tensors.shape), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        tensors, np.broadcast_to(tensors[0], tensors.shape), rtol=1e-9, atol=1e-9
+    )
     return tensors[:1]
 
 
 def stress_of(*gradients, law=NeoHookean):
-    return np.concatenate([outcomes(np.array(F, dtype=float), "stress", law) for F in gradients])
+    return np.concatenate(
+        [outcomes(np.array(F, dtype=float), "stress", law) for F in gradients]
+    )
 
 
 def turn(angle, *axis):
-    return Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis)).as_matrix()
+    return Rotation.from_rotvec(
+        angle * np.array(axis) / np.linalg.norm(axis)
+    ).as_matrix()
 
 
 def energy(Fe, law):
@@ -77,7 +96,9 @@ def test_every_element_of_an_affine_motion_has_its_gradient(order):
     mesh = box_mesh((2, 3, 2), (2.0, 3.0, 1.0))
     if order == 2:  # with curved sides
         mesh = quadratic(mesh)
-        mesh = TetrahedralMesh(mesh.vertices + RNG.uniform(-0.02, 0.02, mesh.vertices.shape), mesh.tets)
+        mesh = TetrahedralMesh(
+            mesh.vertices + RNG.uniform(-0.02, 0.02, mesh.vertices.shape), mesh.tets
+        )
     points = problem_of(NeoHookean, order).points
     moved = mesh.vertices @ SOME[0].T + [5.0, -1.0, 2.0]
     F = deformation_gradients(mesh.vertices, moved, mesh.tets, points.gradients)
@@ -91,7 +112,9 @@ def test_the_elastic_part_is_what_growth_and_old_stretch_leave():
     Fg = 1.3 * np.eye(3) - 0.2 * np.outer(normal, normal)
     Fe = outcomes(SOME[0], "elastic", stretch=V_old, dg=0.3, dr=0.1, normal=normal)
     np.testing.assert_allclose(Fe[0], SOME[0] @ V_old @ np.linalg.inv(Fg), atol=1e-12)
-    np.testing.assert_allclose(outcomes(SOME[0], "deformation", stretch=V_old, dg=0.3)[0], SOME[0], atol=1e-12)
+    np.testing.assert_allclose(
+        outcomes(SOME[0], "deformation", stretch=V_old, dg=0.3)[0], SOME[0], atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("dr", [0.2, 0.0])
@@ -103,7 +126,12 @@ def test_a_free_body_that_grows_as_it_likes_has_no_stress(law, dr):
     F = turn(0.7, 1, 2, 3) @ Fg
     growth = {"law": law, "dg": 0.2, "dr": dr, "normal": normal}
     Fe, stress = outcomes(F, "elastic", **growth), outcomes(F, "stress", **growth)
-    for found in (von_mises(stress), pressure(stress), hencky_equivalent(Fe), np.log(np.linalg.det(Fe))):
+    for found in (
+        von_mises(stress),
+        pressure(stress),
+        hencky_equivalent(Fe),
+        np.log(np.linalg.det(Fe)),
+    ):
         assert found == pytest.approx(0, abs=1e-12 * K)
     assert areal_stretch(F[None], normal[None]) == pytest.approx(1.44)
 
@@ -117,14 +145,20 @@ def test_stress_is_the_derivative_of_the_energy(law):
             change = np.zeros((3, 3))
             change[i, j] = step
             P[i, j] = (energy(Fe + change, law) - energy(Fe - change, law)) / (2 * step)
-        np.testing.assert_allclose(stress, P @ Fe.T / np.linalg.det(Fe), atol=1e-6 * np.abs(P).max())
+        np.testing.assert_allclose(
+            stress, P @ Fe.T / np.linalg.det(Fe), atol=1e-6 * np.abs(P).max()
+        )
 
 
 @pytest.mark.parametrize("law", MATERIALS.values())
 def test_all_laws_have_the_same_moduli_at_small_strain(law):
     strain = np.array([[2.0, 0.5, -1.0], [0.5, -1.0, 0.3], [-1.0, 0.3, 1.5]]) * 1e-6
     expected = 2 * MU * strain + (K - 2 * MU / 3) * np.trace(strain) * np.eye(3)
-    np.testing.assert_allclose(stress_of(np.eye(3) + strain, law=law)[0], expected, atol=2e-5 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        stress_of(np.eye(3) + strain, law=law)[0],
+        expected,
+        atol=2e-5 * np.abs(expected).max(),
+    )
 
 
 def test_stress_turns_with_the_body_and_does_not_see_turns_before():
@@ -137,11 +171,14 @@ def test_stress_turns_with_the_body_and_does_not_see_turns_before():
 
 
 def test_a_bar_drawn_out_at_constant_volume():
-    # stretches λ, λ^(−1/2), λ^(−1/2): dev(b) has 2/3 (λ² − 1/λ) along the bar, −1/3 of it across
+    # stretches λ, λ^(−1/2), λ^(−1/2): dev(b) has 2/3 (λ² − 1/λ) along the bar, −1/3 of
+    # it across
     stretch = 1.5
     stress = stress_of(np.diag([stretch**-0.5, stretch, stretch**-0.5]))
     difference = MU * (stretch**2 - 1 / stretch)
-    np.testing.assert_allclose(np.diag(stress[0]), difference * np.array([-1, 2, -1]) / 3)
+    np.testing.assert_allclose(
+        np.diag(stress[0]), difference * np.array([-1, 2, -1]) / 3
+    )
     assert von_mises(stress) == pytest.approx(difference)
     assert pressure(stress) == pytest.approx(0, abs=1e-12 * K)
 
@@ -157,7 +194,9 @@ def test_simple_shear():
     assert pressure(stress[None]) == pytest.approx(0, abs=1e-12 * K)
     assert von_mises(stress[None]) == pytest.approx(MU * gamma * np.sqrt(gamma**2 + 3))
     # the plane of the shear keeps its area, one across it does not
-    np.testing.assert_allclose(areal_stretch(np.array([F, F]), np.eye(3)[[1, 0]]), [1, np.sqrt(1 + gamma**2)])
+    np.testing.assert_allclose(
+        areal_stretch(np.array([F, F]), np.eye(3)[[1, 0]]), [1, np.sqrt(1 + gamma**2)]
+    )
 
 
 def test_strain_of_known_stretches():
@@ -176,14 +215,20 @@ def test_every_material_that_the_configuration_names_is_a_law_and_the_reverse():
     assert get_args(MaterialName) == tuple(MATERIALS)
 
 
-KEPT = np.eye(3) + 0.1 * (lambda a: a + a.T)(np.random.default_rng(5).standard_normal((3, 3)))
+KEPT = np.eye(3) + 0.1 * (lambda a: a + a.T)(
+    np.random.default_rng(5).standard_normal((3, 3))
+)
 
 
 def test_a_rotation_is_forgotten_and_the_stretch_kept():
-    np.testing.assert_allclose(left_stretch((KEPT @ turn(1.0, 3, -8, 5))[None])[0], KEPT, rtol=1e-12)
+    np.testing.assert_allclose(
+        left_stretch((KEPT @ turn(1.0, 3, -8, 5))[None])[0], KEPT, rtol=1e-12
+    )
 
 
 def test_logarithmic_strain_decays_exponentially():
     stretch = np.diag([1.2, 0.9, 1.0])[None]
     after = relaxed(relaxed(stretch, 0.5, 2.0), 1.5, 2.0)
-    np.testing.assert_allclose(np.log(np.diag(after[0])), np.exp(-1.0) * np.log([1.2, 0.9, 1.0]), atol=1e-14)
+    np.testing.assert_allclose(
+        np.log(np.diag(after[0])), np.exp(-1.0) * np.log([1.2, 0.9, 1.0]), atol=1e-14
+    )

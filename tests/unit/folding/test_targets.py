@@ -1,4 +1,5 @@
-"""Growth of a step towards shapes: what the path gives, and what feedback makes up for."""
+"""Growth of a step towards shapes: what the path gives, and what feedback makes up
+for."""
 
 from types import SimpleNamespace
 
@@ -32,17 +33,30 @@ from gyriflow.settings.folding import parameters_from
 DAY_S, DAY_GW = 86_400.0, 1 / 7
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
 RUN = {
-    "start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0, "step_s": DAY_S,
-    "support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0,
-    "growth": {"model": "shapes", "area_cm2": {21.0: 1.0, 23.0: 1.0}, "volume_ml": {21.0: 1.0, 23.0: 1.0}},
+    "start_week": 21.0,
+    "end_week": 23.0,
+    "output_weeks": [21.0, 23.0],
+    "fissure_x_mm": 0.0,
+    "step_s": DAY_S,
+    "support": "free",
+    "no_growth": {"kind": "none"},
+    "contact": {"kind": "none"},
+    "thickness_mm": 4.0,
+    "growth": {
+        "model": "shapes",
+        "area_cm2": {21.0: 1.0, 23.0: 1.0},
+        "volume_ml": {21.0: 1.0, 23.0: 1.0},
+    },
     "targets": {23.0: "target"},
-}  # fmt: skip
+}
 
 
 def misfits_after_steps(mesh, misfit, steps):
-    """Return the misfits (n, 3) before and after steps in which a body on a growing path takes all of its growth.
+    """Return the misfits (n, 3) before and after steps in which a body on a growing
+    path takes all of its growth.
 
-    The body grows by 4 % a week; `misfit` (n, 3) in mm is where it is off its path at the start.
+    The body grows by 4 % a week; `misfit` (n, 3) in mm is where it is off its path at
+    the start.
     """
     p = parameters_from(RUN)
     inputs = GrowthInputs(mesh, zones_of_run(mesh, p), {})
@@ -51,14 +65,19 @@ def misfits_after_steps(mesh, misfit, steps):
     positions = mesh.vertices + misfit
     misfits = [without_rigid_motion(positions, path(21.0), sizes)]
     for number in range(steps):
-        growth = growth_on_path(p, inputs, path, StepStart(positions, number * DAY_S, DAY_S))
+        growth = growth_on_path(
+            p, inputs, path, StepStart(positions, number * DAY_S, DAY_S)
+        )
         positions = growth.goal_mm
-        misfits.append(without_rigid_motion(positions, path(21.0 + (number + 1) * DAY_GW), sizes))
+        misfits.append(
+            without_rigid_motion(positions, path(21.0 + (number + 1) * DAY_GW), sizes)
+        )
     return misfits
 
 
 def remaining_share(before, after):
-    """Return the part of a misfit (n, 3) that remains: by projection, so that what else changed does not count."""
+    """Return the part of a misfit (n, 3) that remains: by projection, so that what else
+    changed does not count."""
     return float((before * after).sum() / (before**2).sum())
 
 
@@ -77,12 +96,19 @@ def test_feedback_is_of_the_smooth_part_of_a_misfit():
     inside = (np.abs(mesh.vertices - mesh.vertices.mean(axis=0)) < 4.5).all(axis=1)
     assert inside.sum() == 9**3
     # the shortest wave of a mesh with edges of 1 mm, 2 mm
-    rough = 0.1 * np.where(inside, (-1.0) ** np.rint(mesh.vertices).sum(axis=1), 0.0)[:, None] * [1.0, 0.0, 0.0]
+    rough = (
+        0.1
+        * np.where(inside, (-1.0) ** np.rint(mesh.vertices).sum(axis=1), 0.0)[:, None]
+        * [1.0, 0.0, 0.0]
+    )
     before, after = misfits_after_steps(mesh, rough, 1)
     fed_back = 1 - remaining_share(before, after)
-    # a step of diffusion keeps 1 / (1 + σ² k² / 2) of a wave, here of k² = 12/h² (the largest eigenvalue of the grid)
+    # a step of diffusion keeps 1 / (1 + σ² k² / 2) of a wave, here of k² = 12/h² (the
+    # largest eigenvalue of the grid)
     kept = 1 / (1 + FEEDBACK_SMOOTHING_MM**2 * 12 / 2)
-    assert fed_back == pytest.approx(kept * (1 - np.exp(-DAY_GW / FEEDBACK_GW)), rel=0.3)
+    assert fed_back == pytest.approx(
+        kept * (1 - np.exp(-DAY_GW / FEEDBACK_GW)), rel=0.3
+    )
 
 
 def test_misfits_of_the_solver_are_not_made_up_for():
@@ -99,7 +125,13 @@ def test_a_map_of_growth_has_the_error_of_its_elements():
     assert coarse["slope"] < fine["slope"] < 1.01
 
 
-UNEVEN = grid([np.array([-8, -7, -6, -5, 0, 5, 10.0]), np.linspace(-6, 6, 5), np.linspace(-5, 5, 5)])
+UNEVEN = grid(
+    [
+        np.array([-8, -7, -6, -5, 0, 5, 10.0]),
+        np.linspace(-6, 6, 5),
+        np.linspace(-5, 5, 5),
+    ]
+)
 """A box whose elements on the right are five times as long as those on the left."""
 
 
@@ -108,7 +140,9 @@ def test_a_misfit_and_the_motion_before_it_are_means_over_volume():
     p = parameters_from(RUN)
     inputs = GrowthInputs(UNEVEN, zones_of_run(UNEVEN, p), {})
     path = path_through([21.0, 23.0], [UNEVEN.vertices, UNEVEN.vertices], UNEVEN)
-    off = UNEVEN.vertices + np.where(UNEVEN.vertices[:, :1] < -4.5, [0.0, 0.0, 0.5], 0.0)
+    off = UNEVEN.vertices + np.where(
+        UNEVEN.vertices[:, :1] < -4.5, [0.0, 0.0, 0.5], 0.0
+    )
     found = growth_on_path(p, inputs, path, StepStart(off, 0.0, DAY_S)).misfit_mm
     sizes, even = vertex_sizes(off, UNEVEN.tets), np.ones(len(off))
 
@@ -126,21 +160,33 @@ def test_a_path_ends_with_its_last_shape_though_the_step_goes_on():
     inputs = GrowthInputs(BODY, zones_of_run(BODY, p), {})
     path = path_through([21.0, 23.0], [BODY.vertices, 1.1 * BODY.vertices], BODY)
     time_s = 13.5 * DAY_S
-    growth = growth_on_path(p, inputs, path, StepStart(path(21.0 + 13.5 * DAY_GW), time_s, DAY_S))
+    growth = growth_on_path(
+        p, inputs, path, StepStart(path(21.0 + 13.5 * DAY_GW), time_s, DAY_S)
+    )
     assert growth.goal_mm == pytest.approx(1.1 * BODY.vertices, abs=1e-3)
 
 
-def test_an_element_at_most_doubles_in_a_step_and_does_not_grow_where_its_goal_inverts_it():
+def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goal():
     p = parameters_from(RUN)
-    tets = np.array([[0, 1, 2, 3], [0, 1, 2, 3], [0, 1, 2, 3]]) + 4 * np.arange(3)[:, None]
+    tets = (
+        np.array([[0, 1, 2, 3], [0, 1, 2, 3], [0, 1, 2, 3]]) + 4 * np.arange(3)[:, None]
+    )
     single = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    goals = np.concatenate([single * [1.5, 1.0, 1.0], single * [3.0, 1.0, 1.0], single * [1.0, 1.0, -1.2]])
+    goals = np.concatenate(
+        [single * [1.5, 1.0, 1.0], single * [3.0, 1.0, 1.0], single * [1.0, 1.0, -1.2]]
+    )
     start = StepStart(np.concatenate([single] * 3), 0.0, DAY_S)
     counted = []
-    growth = TargetGrowth(p, start, goals, 0.0, 0, lambda count: counted.append(count) or count)
+    growth = TargetGrowth(
+        p, start, goals, 0.0, 0, lambda count: counted.append(count) or count
+    )
     points = SimpleNamespace(gradients=SLOPES[None])
     elements = SimpleNamespace(vertices=np.arange(12), cells=tets, points=points)
-    tissue = SimpleNamespace(elements=elements, growing=np.ones(12), at_points=lambda values: values[tets[:, :1]])
+    tissue = SimpleNamespace(
+        elements=elements,
+        growing=np.ones(12),
+        at_points=lambda values: values[tets[:, :1]],
+    )
     inverse = growth.inverse(tissue)[:, 0]
     for found, stretch in zip(inverse, (1.5, np.exp(0.7), 1.0), strict=True):
         assert found == pytest.approx(np.diag([1 / stretch, 1.0, 1.0]))
@@ -149,16 +195,26 @@ def test_an_element_at_most_doubles_in_a_step_and_does_not_grow_where_its_goal_i
 
 def test_a_run_off_its_path_tells_how_far_and_how_many_elements_were_held_in_any_step():
     row = {"week": 23.0, "to_path_mm": 0.15, "held_elements": 0}
-    assert missed_targets([row]) == missed_targets([]) == missed_targets([{"week": 22.0}]) == []
+    assert (
+        missed_targets([row])
+        == missed_targets([])
+        == missed_targets([{"week": 22.0}])
+        == []
+    )
     assert missed_targets([row | {"to_path_mm": 0.25}]) == [Facts("GW 23", "0.25 mm")]
     assert missed_targets([row | {"held_elements": 7}, row]) == [Facts("GW 23", 7)]
-    steps = [{"shrinking_elements": 3, "min_J": 0.4}, {"shrinking_elements": 0, "min_J": 0.9}]
+    steps = [
+        {"shrinking_elements": 3, "min_J": 0.4},
+        {"shrinking_elements": 0, "min_J": 0.9},
+    ]
     assert shrinkage_note(steps) == Facts(3, "10%", "0.40")
     assert shrinkage_note(steps[1:]) == ""
 
 
 def test_shapes_of_a_run_are_those_after_its_start_and_reach_to_its_end():
-    shape = dict(zip(("target_x", "target_y", "target_z"), (1.1 * BODY.vertices).T, strict=True))
+    shape = dict(
+        zip(("target_x", "target_y", "target_z"), (1.1 * BODY.vertices).T, strict=True)
+    )
     p = parameters_from(RUN | {"targets": {21.0: "earlier", 23.0: "target"}})
     weeks, shapes = shapes_of_run(p, shape, BODY.vertices)
     assert weeks == [21.0, 23.0]

@@ -1,4 +1,5 @@
-"""Contact, clamped and growing zones on an ellipsoid, whose answer is known by symmetry."""
+"""Contact, clamped and growing zones on an ellipsoid, whose answer is known by
+symmetry."""
 
 import numpy as np
 import pytest
@@ -12,7 +13,17 @@ from gyriflow.folding.checks import refuse_impossible, zone_report
 from gyriflow.folding.zones import brain_box, cell_tags, inside_ellipsoid, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from gyriflow.settings.folding import NoGrowth, parameters_from
-from gyriflow.settings.terms import BRIDGE, CLAMPED, CORE, CORTEX, LEFT, LEFT_CONTACT, MEDIAL_WALL, RIGHT, RIGHT_CONTACT
+from gyriflow.settings.terms import (
+    BRIDGE,
+    CLAMPED,
+    CORE,
+    CORTEX,
+    LEFT,
+    LEFT_CONTACT,
+    MEDIAL_WALL,
+    RIGHT,
+    RIGHT_CONTACT,
+)
 
 ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 
@@ -20,7 +31,9 @@ ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 def find_zones(mesh, gap_mm=2.5, contact="planes", no_growth=None, **given):
     """Return the zones of a run by the settings that decide them."""
     values = {"contact": {"kind": contact}, "no_growth": ELLIPSOID | (no_growth or {})}
-    return zones_of_run(mesh, parameters_from(RUN | {"fissure_x_mm": 0.0} | values | given), gap_mm)
+    return zones_of_run(
+        mesh, parameters_from(RUN | {"fissure_x_mm": 0.0} | values | given), gap_mm
+    )
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +45,9 @@ def test_the_ellipsoid_stands_where_the_model_puts_it():
     box = np.array([[-10.0, -20.0, -30.0], [10.0, 20.0, 30.0]])
     centre = np.array([0.0, 0.05 * 40, -0.15 * 60])
     tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])
-    points = np.concatenate([box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)])
+    points = np.concatenate(
+        [box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)]
+    )
     inside = inside_ellipsoid(points, NoGrowth(**ELLIPSOID), *brain_box(points))
     assert inside.tolist() == [False, False, True, True, True, False, False, False]
 
@@ -40,18 +55,25 @@ def test_the_ellipsoid_stands_where_the_model_puts_it():
 def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
     zones = find_zones(brain)
     x = brain.vertices[zones.facets, 0]
-    left, right = x[zones.facet_zone == LEFT_CONTACT], x[zones.facet_zone == RIGHT_CONTACT]
+    left, right = (
+        x[zones.facet_zone == LEFT_CONTACT],
+        x[zones.facet_zone == RIGHT_CONTACT],
+    )
     assert len(left)
     assert left.min() > -5.0
     assert left.max() <= -0.625
-    np.testing.assert_allclose(np.sort(left.ravel()), np.sort(-right.ravel()), atol=1e-9)
+    np.testing.assert_allclose(
+        np.sort(left.ravel()), np.sort(-right.ravel()), atol=1e-9
+    )
 
 
 def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
     zones = find_zones(brain)
     clamped = zones.vertices_of(CLAMPED)
     assert len(clamped)
-    assert inside_ellipsoid(brain.vertices, NoGrowth(**ELLIPSOID), *brain_box(brain.vertices))[clamped].all()
+    assert inside_ellipsoid(
+        brain.vertices, NoGrowth(**ELLIPSOID), *brain_box(brain.vertices)
+    )[clamped].all()
     assert (zones.growth[clamped] == 0).all()
 
 
@@ -66,9 +88,13 @@ def test_tissue_that_bridges_the_planes_does_not_grow():
 
 @pytest.mark.parametrize("gap", [0.5, 2.0, 4.0])
 def test_the_planes_follow_the_fissure(gap):
-    """Walls of separate hemispheres have contact and grow at any distance; the planes stay within the paper's."""
+    """Walls of separate hemispheres have contact and grow at any distance; the planes
+    stay within the paper's."""
     boxes = [box_mesh((4, 3, 3), (8.0, 6.0, 6.0)) for _ in range(2)]
-    x = [mesh.vertices + [shift, 0.0, 0.0] for mesh, shift in zip(boxes, (-4 - gap / 2, 4 + gap / 2), strict=True)]
+    x = [
+        mesh.vertices + [shift, 0.0, 0.0]
+        for mesh, shift in zip(boxes, (-4 - gap / 2, 4 + gap / 2), strict=True)
+    ]
     tets = [boxes[0].tets, boxes[1].tets + len(x[0])]
     pair = TetrahedralMesh(np.concatenate(x), np.concatenate(tets))
     zones = find_zones(pair, no_growth={"semi_axes": (0.01, 0.01, 0.01)})
@@ -80,7 +106,8 @@ def test_the_planes_follow_the_fissure(gap):
 
 
 def test_tissue_between_the_planes_does_not_grow_with_planes(brain):
-    """As in the prototype of the paper: elements whose most medial vertex lies between the planes."""
+    """As in the prototype of the paper: elements whose most medial vertex lies between
+    the planes."""
     between = np.abs(brain.vertices[:, 0]) < find_zones(brain).planes_mm[1]
     assert (find_zones(brain).growth[between] == 0).all()
 
@@ -90,17 +117,25 @@ def test_the_report_adds_up(brain):
     report = zone_report(brain, zones, 3.0)
     assert sum(zone["facets"] for zone in report["zones"].values()) == len(zones.facets)
     assert report["initial_penetration_mm"] == 0
-    assert report["clamped_share"]["left"] == pytest.approx(report["clamped_share"]["right"], rel=0.05)
+    assert report["clamped_share"]["left"] == pytest.approx(
+        report["clamped_share"]["right"], rel=0.05
+    )
 
 
 def test_few_walls_lie_between_the_planes(brain):
     zones = zone_report(brain, find_zones(brain, 20.0), 8.0)["zones"]
-    assert zones["between planes"]["area_mm2"] <= 0.01 * sum(zone["area_mm2"] for zone in zones.values())
+    assert zones["between planes"]["area_mm2"] <= 0.01 * sum(
+        zone["area_mm2"] for zone in zones.values()
+    )
 
 
 def test_the_sides_of_a_box_slide_in_their_planes():
     box = box_mesh((4, 3, 2), (8.0, 6.0, 4.0))
-    values = {"contact": {"kind": "none"}, "support": "free", "no_growth": {"kind": "none"}}
+    values = {
+        "contact": {"kind": "none"},
+        "support": "free",
+        "no_growth": {"kind": "none"},
+    }
     zones = box_zones(box, parameters_from(RUN | values))
     x, y, z = box.vertices.T
     low = z == -2.0
@@ -137,7 +172,8 @@ def half(side):
     """Return the half of an ellipsoid on one side of x = 0, flat there."""
     mesh = ellipsoid_mesh(12, (20.0, 26.0, 18.0))
     sign = -1.0 if side == "left" else 1.0
-    # pressed flat: the other half becomes a sheet, so only elements of one side are kept
+    # pressed flat: the other half becomes a sheet, so only elements of one side are
+    # kept
     kept = (sign * mesh.vertices[mesh.tets, 0]).min(axis=1) > -1e-9
     used, tets = np.unique(mesh.tets[kept], return_inverse=True)
     return TetrahedralMesh(mesh.vertices[used], tets.reshape(-1, 4))
@@ -157,7 +193,11 @@ def test_the_medial_wall_of_a_single_hemisphere_slides_in_its_plane(side):
     assert zones.penetration_mm(mesh.vertices) == 0.0
     assert not zones.vertices_of(RIGHT_CONTACT if side == "left" else LEFT_CONTACT).size
     # without cortex, but part of the area that is measured
-    assert not np.isin(zones.facets[zones.facet_zone == MEDIAL_WALL], zones.cortex_facets).all(axis=1).all()
+    assert (
+        not np.isin(zones.facets[zones.facet_zone == MEDIAL_WALL], zones.cortex_facets)
+        .all(axis=1)
+        .all()
+    )
     assert len(zones.measured_facets) == len(zones.facets)
     refuse_impossible(mesh, zones)
 
@@ -169,7 +209,9 @@ def test_a_sliding_wall_alone_leaves_no_rigid_motion():
     x, y, z = mesh.vertices.T
     zero, one = np.zeros_like(x), np.ones_like(x)
     turns = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
-    motions = np.concatenate([np.array([[one, zero, zero], [zero, one, zero], [zero, zero, one]]), turns])
+    motions = np.concatenate(
+        [np.array([[one, zero, zero], [zero, one, zero], [zero, zero, one]]), turns]
+    )
     fixed = motions.transpose(0, 2, 1)[:, zones.fixed]
     assert np.linalg.matrix_rank(fixed) == 6
     assert zones.fixed[:, 1:].sum() == 3
@@ -178,7 +220,11 @@ def test_a_sliding_wall_alone_leaves_no_rigid_motion():
 
 def test_elements_are_left_right_or_between_the_planes():
     mesh = ellipsoid_mesh(12, SEMI_AXES)
-    tags = cell_tags(mesh, zones_of_run(mesh, parameters_from(RUN), GAP_MM), (mesh.vertices[:, 1] > 0).astype(float))
+    tags = cell_tags(
+        mesh,
+        zones_of_run(mesh, parameters_from(RUN), GAP_MM),
+        (mesh.vertices[:, 1] > 0).astype(float),
+    )
     assert set(tags["layer"][mesh.vertices[mesh.tets, 1].min(axis=1) > 0]) == {CORTEX}
     assert set(tags["layer"][mesh.vertices[mesh.tets, 1].max(axis=1) <= 0]) == {CORE}
     x = mesh.vertices[mesh.tets, 0].mean(axis=1)

@@ -19,7 +19,8 @@ def ratios(places):
 
 
 def flattened(share):
-    """Return places at which one vertex inside has gone a share of the way to the opposite face, and the vertex."""
+    """Return places at which one vertex inside has gone a share of the way to the
+    opposite face, and the vertex."""
     vertex = INNER[np.argmin(np.linalg.norm(BODY.vertices[INNER] - [8, 8, 5], axis=1))]
     tet = BODY.tets[(BODY.tets == vertex).any(axis=1)][0]
     opposite = BODY.vertices[tet[tet != vertex]].mean(axis=0)
@@ -53,7 +54,10 @@ def test_vertices_move_no_further_than_they_may():
     assert 0.005 < moves.max() <= 0.01 + 1e-9
     assert ratios(places).min() < ratios(found).min() < 0.2
     fixed = np.where(np.arange(len(places)) == vertex, 0.0, longest_mm)
-    assert np.array_equal(open_flat_elements(places, BODY.tets, VOLUMES, fixed, 0.2)[vertex], places[vertex])
+    assert np.array_equal(
+        open_flat_elements(places, BODY.tets, VOLUMES, fixed, 0.2)[vertex],
+        places[vertex],
+    )
 
 
 def test_the_flattest_of_many_elements_never_becomes_flatter():

@@ -1,4 +1,5 @@
-"""Paths through shapes by week: noise of close weeks does not bend them, and elements stay valid on the way."""
+"""Paths through shapes by week: noise of close weeks does not bend them, and elements
+stay valid on the way."""
 
 import numpy as np
 import pytest
@@ -9,7 +10,12 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.jacobians import inverted_on_the_way
 from gyriflow.geometry.paths import limited_velocities, merged_shapes, path_through
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic, volumes_between
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    grid,
+    quadratic,
+    volumes_between,
+)
 
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
 
@@ -17,17 +23,29 @@ BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
 def grown(week):
     """Return the body's vertices at a week: they move linearly and unevenly."""
     x, y, _ = BODY.vertices.T
-    return BODY.vertices * (1 + 0.04 * (week - 21)) + (week - 21) * np.stack([np.sin(y / 12), 0 * x, np.cos(x / 9)], 1)
+    return BODY.vertices * (1 + 0.04 * (week - 21)) + (week - 21) * np.stack(
+        [np.sin(y / 12), 0 * x, np.cos(x / 9)], 1
+    )
 
 
 def without_motion(found, wanted):
-    return np.linalg.norm(without_rigid_motion(wanted, found, np.ones(len(found))), axis=1)
+    return np.linalg.norm(
+        without_rigid_motion(wanted, found, np.ones(len(found))), axis=1
+    )
 
 
 def test_linear_growth_is_linear_between_uneven_weeks_in_any_pose():
     weeks = [21.0, 21.5, 23.5, 24.0]
-    poses = [rigid(), rigid(10, 20, 30), rigid(0, -40, 5, shift=(9, 8, 7)), rigid(90, 0, 0)]
-    shapes = [transform_points(grown(week), pose) for week, pose in zip(weeks, poses, strict=True)]
+    poses = [
+        rigid(),
+        rigid(10, 20, 30),
+        rigid(0, -40, 5, shift=(9, 8, 7)),
+        rigid(90, 0, 0),
+    ]
+    shapes = [
+        transform_points(grown(week), pose)
+        for week, pose in zip(weeks, poses, strict=True)
+    ]
     path = path_through(weeks, shapes, BODY)
     for week in (21.25, 22.5, 23.0, 23.75):
         # but for the curvature that alignment of shapes that bend brings
@@ -38,7 +56,8 @@ def test_velocities_are_those_of_parabolas_and_do_not_overshoot():
     weeks = np.array([21.0, 22.0, 24.0, 24.5])
     at = np.array([0.0, 1.0, 5.0, 5.1])[:, None, None] * [[1.0, 0.0, 0.0]]
     found = limited_velocities(weeks, at)[:, 0, 0]
-    # mean speeds 1, 2, 0.2: at 24 the parabola has 0.56, at most three times the smaller
+    # mean speeds 1, 2, 0.2: at 24 the parabola has 0.56, at most three times the
+    # smaller
     assert found == pytest.approx([1.0, 4 / 3, 0.56, 0.2])
     jump = np.array([0.0, 0.1, 5.0, 5.5])[:, None, None] * [[1.0, 0.0, 0.0]]
     assert limited_velocities(weeks, jump)[1, 0, 0] == pytest.approx(0.3)
@@ -76,7 +95,8 @@ def test_close_weeks_lie_on_a_line_through_their_mean_and_the_start_stays():
 
 
 def turned(angle):
-    """Return a box of elements whose inner half is turned about its axis, as a whole."""
+    """Return a box of elements whose inner half is turned about its axis, as a
+    whole."""
     mesh = box_mesh((4, 4, 4), (8.0, 8.0, 8.0))
     x, y, z = (mesh.vertices - mesh.vertices.mean(axis=0)).T
     fade = np.clip(1.5 - np.hypot(x, y) / 3, 0, 1) * angle
@@ -91,29 +111,44 @@ def test_an_element_inverted_in_the_middle_of_a_straight_way_is_found():
     after = before * [-1, -1, 1]
     assert volumes_between(after, tet) > 0
     assert inverted_on_the_way(before, after, tet).tolist() == [True]
-    # less than half a turn stays valid: with positive Bernstein coefficients, and with a negative one
+    # less than half a turn stays valid: with positive Bernstein coefficients, and with
+    # a negative one
     for degrees in (60, 150):
         turned_part = transform_points(before, rigid(0, 0, degrees))
         assert inverted_on_the_way(before, turned_part, tet).tolist() == [False]
     assert inverted_on_the_way(before, before * [1, 1, -1], tet).tolist() == [True]
-    assert inverted_on_the_way(before, before * [0.1, 0.1, 0.1], tet).tolist() == [False]
+    assert inverted_on_the_way(before, before * [0.1, 0.1, 0.1], tet).tolist() == [
+        False
+    ]
 
 
 def test_each_shape_is_aligned_with_the_one_before_by_volume():
-    """A box that is bent to and fro: elements on the right are five times as long, and move on."""
-    mesh = grid([np.array([-8, -7, -6, -5, 0, 5, 10.0]), np.linspace(-6, 6, 5), np.linspace(-5, 5, 5)])
+    """A box that is bent to and fro: elements on the right are five times as long, and
+    move on."""
+    mesh = grid(
+        [
+            np.array([-8, -7, -6, -5, 0, 5, 10.0]),
+            np.linspace(-6, 6, 5),
+            np.linspace(-5, 5, 5),
+        ]
+    )
     sizes = vertex_sizes(mesh.vertices, mesh.tets)
     x = mesh.vertices[:, :1]
     bends = [np.zeros_like(x), np.where(x < -4.5, 1.0, 0.0), 0.01 * x**2]
     shapes = [
-        transform_points(mesh.vertices + bend * [0.0, 0.0, 1.0], rigid(0, 10 * number, 20, shift=(number, 0.0, 5.0)))
+        transform_points(
+            mesh.vertices + bend * [0.0, 0.0, 1.0],
+            rigid(0, 10 * number, 20, shift=(number, 0.0, 5.0)),
+        )
         for number, bend in enumerate(bends)
     ]
     path = path_through([21.0, 22.0, 23.0], shapes, mesh)
     for week in (21.0, 22.0):
         before, after = path(week), path(week + 1.0)
         # nothing is left of a motion from shape to shape
-        assert without_rigid_motion(before, after, sizes) == pytest.approx(after - before, abs=1e-6)
+        assert without_rigid_motion(before, after, sizes) == pytest.approx(
+            after - before, abs=1e-6
+        )
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -122,31 +157,52 @@ def test_the_check_agrees_with_many_points_on_the_way(order):
     before = mesh.vertices - mesh.vertices.mean(axis=0)
     if order == 2:
         mesh = quadratic(TetrahedralMesh(before, mesh.tets))
-        before, after = mesh.vertices, quadratic(TetrahedralMesh(after, mesh.corners)).vertices
+        before, after = (
+            mesh.vertices,
+            quadratic(TetrahedralMesh(after, mesh.corners)).vertices,
+        )
     found = inverted_on_the_way(before, after, mesh.tets)
-    volumes = np.stack([volumes_between(before + t * (after - before), mesh.tets) for t in np.linspace(0, 1, 101)])
+    volumes = np.stack(
+        [
+            volumes_between(before + t * (after - before), mesh.tets)
+            for t in np.linspace(0, 1, 101)
+        ]
+    )
     sampled = volumes.min(axis=0) <= 0
     assert 0 < sampled.sum() < len(sampled)
     assert found[sampled].all()
     # bounds of quadratic elements may be below 0 where their volume is not
-    assert (volumes.min(axis=0)[found] <= (1e-9 if order == 1 else 0.2) * volumes[0][found]).all()
-    assert inverted_on_the_way(before, after, mesh.corners, least=0.5).sum() > found.sum() if order == 1 else True
+    assert (
+        volumes.min(axis=0)[found] <= (1e-9 if order == 1 else 0.2) * volumes[0][found]
+    ).all()
+    assert (
+        inverted_on_the_way(before, after, mesh.corners, least=0.5).sum() > found.sum()
+        if order == 1
+        else True
+    )
 
 
-def test_near_an_element_that_would_be_inverted_the_path_is_straight_and_elsewhere_smooth():
-    # on the left a layer comes close to the next, fast, before that one moves on; the right end moves late
+def test_a_path_is_smooth_but_straight_near_an_element_that_would_be_inverted():
+    # on the left a layer comes close to the next, fast, before that one moves on; the
+    # right end moves late
     mesh = box_mesh((8, 8, 8), (32.0, 32.0, 32.0))
     shapes = np.repeat(mesh.vertices[None], 3, axis=0)
     left, right = (np.isclose(mesh.vertices[:, 0], place) for place in (-8.0, 12.0))
     assert left.sum() == right.sum() == 9 * 9
-    for place, moves in ((-8.0, [3.8, 5.3]), (-4.0, [0.0, 1.5]), (12.0, [0.0, 2.0]), (16.0, [0.0, 2.0])):
+    for place, moves in (
+        (-8.0, [3.8, 5.3]),
+        (-4.0, [0.0, 1.5]),
+        (12.0, [0.0, 2.0]),
+        (16.0, [0.0, 2.0]),
+    ):
         layer = np.isclose(mesh.vertices[:, 0], place)
         shapes[1:, layer, 0] += np.array(moves)[:, None]
     weeks = [21.0, 22.0, 23.0]
     path = path_through(weeks, shapes, mesh)
     assert [len(faults) for faults in path.inverted] == [0, 0]
 
-    # the path if no element were inverted, through the same shapes, each aligned with the one before
+    # the path if no element were inverted, through the same shapes, each aligned with
+    # the one before
     places = np.stack([path(week) for week in weeks])
     velocities = limited_velocities(np.array(weeks), places)
     straight = 0.5 * (places[1] + places[2])
@@ -157,4 +213,6 @@ def test_near_an_element_that_would_be_inverted_the_path_is_straight_and_elsewhe
     assert bends[right].min() > 0.05
     middle = path(22.5)
     assert (np.linalg.norm(middle - straight, axis=1) < 0.5 * bends)[left].all()
-    assert np.linalg.norm(middle - smooth, axis=1)[right].max() < 0.05 * bends[right].min()
+    assert (
+        np.linalg.norm(middle - smooth, axis=1)[right].max() < 0.05 * bends[right].min()
+    )

@@ -1,4 +1,5 @@
-"""The pose of a brain, which surfaces and volumes follow from their own axes, and how it is found."""
+"""The pose of a brain, which surfaces and volumes follow from their own axes, and how
+it is found."""
 
 import numpy as np
 import pytest
@@ -7,7 +8,13 @@ from scipy.spatial.transform import Rotation
 from shapes import LPS, rigid
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import RigidFit, angle_deg, fits_from_all_sides, residual_ratio, step_towards_planes
+from gyriflow.geometry.alignment import (
+    RigidFit,
+    angle_deg,
+    fits_from_all_sides,
+    residual_ratio,
+    step_towards_planes,
+)
 from gyriflow.geometry.poses import Pose, pose_from, turned
 
 TURN = rigid(10, 20, 30, shift=(4.0, -3.0, 2.0))
@@ -15,7 +22,9 @@ TURN = rigid(10, 20, 30, shift=(4.0, -3.0, 2.0))
 
 def test_without_motions_of_files_these_are_in_the_world_of_the_volumes():
     pose = Pose(TURN)
-    assert pose.of_file("left") is pose.of_file() is pose.of_volume("a.nii") is pose.world
+    assert (
+        pose.of_file("left") is pose.of_file() is pose.of_volume("a.nii") is pose.world
+    )
     np.testing.assert_allclose(pose.inverse @ TURN, np.eye(4), atol=1e-15)
 
 
@@ -56,7 +65,9 @@ def about(degrees, axis=(0.0, 0.0, 1.0)):
 def test_a_small_motion_is_taken_back_in_one_step():
     turn, move = about(0.01, (0.6, 0.0, 0.8)), np.array([0.002, -0.001, 0.003])
     targets = POINTS @ turn.T + move
-    found, shift = step_towards_planes(POINTS, NORMALS, np.einsum("ij,ij->i", targets - POINTS, NORMALS))
+    found, shift = step_towards_planes(
+        POINTS, NORMALS, np.einsum("ij,ij->i", targets - POINTS, NORMALS)
+    )
     np.testing.assert_allclose(POINTS @ found.T + shift, targets, atol=1e-5)
 
 
@@ -72,13 +83,25 @@ def test_the_best_poses_that_differ_are_compared_and_the_first_start_always():
     asked = []
 
     def roughly(start):
-        return RigidFit(start, np.zeros(3), rough[round(float(np.degrees(np.arctan2(start[1, 0], start[0, 0])) % 360))])
+        return RigidFit(
+            start,
+            np.zeros(3),
+            rough[round(float(np.degrees(np.arctan2(start[1, 0], start[0, 0])) % 360))],
+        )
 
     def better(fit):
         asked.append(fit.residual)
-        return RigidFit(fit.rotation, fit.shift, {3.0: 1.5, 1.0: 0.9, 2.0: 0.6}[fit.residual])
+        return RigidFit(
+            fit.rotation, fit.shift, {3.0: 1.5, 1.0: 0.9, 2.0: 0.6}[fit.residual]
+        )
 
-    fits = fits_from_all_sides([about(angle) for angle in rough], roughly, better, candidates=2, distinct_deg=30.0)
+    fits = fits_from_all_sides(
+        [about(angle) for angle in rough],
+        roughly,
+        better,
+        candidates=2,
+        distinct_deg=30.0,
+    )
     assert asked == [3.0, 1.0, 2.0]
     assert [fit.residual for fit in fits] == [1.5, 0.9, 0.6]
     assert residual_ratio(fits, fits[2], 30.0) == pytest.approx(1.5)

@@ -1,18 +1,25 @@
-"""Sides of curved elements become straighter until their Jacobian determinants are above a bound."""
+"""Sides of curved elements become straighter until their Jacobian determinants are
+above a bound."""
 
 import numpy as np
 import pytest
 from shapes import box_mesh
 
 from gyriflow.geometry.jacobians import EDGES
-from gyriflow.geometry.straightening import InnerSides, may_fold_over, straighten_sides, straightness
+from gyriflow.geometry.straightening import (
+    InnerSides,
+    may_fold_over,
+    straighten_sides,
+    straightness,
+)
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic
 
 MESH = quadratic(box_mesh((3, 3, 3), (6.0, 5.0, 4.0)))
 
 
 def inner_side():
-    """Return the node in the middle of a side inside the box, and the two ends of that side."""
+    """Return the node in the middle of a side inside the box, and the two ends of that
+    side."""
     on_surface = np.unique(boundary_faces(MESH)[0])
     sides = MESH.tets[:, EDGES].reshape(-1, 2)
     middles = MESH.tets[:, 4:].ravel()
@@ -41,10 +48,14 @@ def test_an_element_that_folds_over_becomes_valid():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_neither_elements_nor_their_pieces_stay_folded_over_where_all_sides_are_bowed(seed):
+def test_neither_elements_nor_their_pieces_stay_folded_over_where_all_sides_are_bowed(
+    seed,
+):
     middles = np.unique(MESH.tets[:, 4:])
     positions = MESH.vertices.copy()
-    positions[middles] += 0.4 * np.random.default_rng(seed).normal(size=(len(middles), 3))
+    positions[middles] += 0.4 * np.random.default_rng(seed).normal(
+        size=(len(middles), 3)
+    )
     assert may_fold_over(positions, MESH.tets).any()
     assert not may_fold_over(straighten_sides(positions, MESH.tets), MESH.tets).any()
 
@@ -66,7 +77,8 @@ def test_elements_above_the_bound_stay():
 
 
 def test_inner_sides_that_follow_a_bowed_surface_stay():
-    # one shear of all nodes: inner sides are bowed as the surface is, and straight ones would make elements fold over
+    # one shear of all nodes: inner sides are bowed as the surface is, and straight ones
+    # would make elements fold over
     x, y, z = MESH.vertices.T
     sheared = np.stack([x, y, z + 0.32 * x**2], axis=1)
     assert straightness(sheared, MESH.tets) == pytest.approx(1.0)

@@ -42,7 +42,9 @@ def test_edges_count_their_faces(box):
     pairs, faces = edges(box)
     assert len(pairs) == 18
     assert (faces == 2).all()
-    assert mean_edge_length(TriangleMesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])) == pytest.approx(4.0)
+    assert mean_edge_length(
+        TriangleMesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    ) == pytest.approx(4.0)
 
 
 def test_open_or_inconsistent_surfaces_are_not_closed(box):
@@ -67,4 +69,6 @@ def test_a_mirroring_motion_keeps_the_surface_outward(box):
     assert signed_volume(transformed(box, mirror)) == pytest.approx(24.0)
     assert signed_volume(flipped(box)) == pytest.approx(-24.0)
     shifted = transformed(box, [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]])
-    np.testing.assert_allclose(shifted.vertices.mean(axis=0) - box.vertices.mean(axis=0), [5, 6, 7])
+    np.testing.assert_allclose(
+        shifted.vertices.mean(axis=0) - box.vertices.mean(axis=0), [5, 6, 7]
+    )

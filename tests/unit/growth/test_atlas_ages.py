@@ -5,7 +5,11 @@ import pytest
 from facts import Facts
 from shapes import ellipsoid_mesh
 
-from gyriflow.growth.atlas_path import MIN_AGE_SPACING_GW, ages_by_size, resample_by_size
+from gyriflow.growth.atlas_path import (
+    MIN_AGE_SPACING_GW,
+    ages_by_size,
+    resample_by_size,
+)
 from gyriflow.growth.series_shapes import sizes_of
 
 WEEKS = np.arange(21.0, 33.0)
@@ -24,11 +28,15 @@ def test_a_week_that_jumps_in_size_is_taken_for_the_age_of_its_size():
     ages = ages_by_size(WEEKS, volumes)
     table = ages.table().set_index("stated_week")
     rate = 0.1 - 0.004 * 4
-    assert table.loc[25.0, "age_by_size"] == pytest.approx(25 + np.log(1.12) / rate, abs=0.25)
+    assert table.loc[25.0, "age_by_size"] == pytest.approx(
+        25 + np.log(1.12) / rate, abs=0.25
+    )
     assert table.loc[25.0, "curve_ml"] == pytest.approx(SMOOTH[4], rel=0.02)
     assert table.loc[25.0, "volume_ml"] == pytest.approx(volumes[4])
     others = table.drop(index=[25.0, 26.0])
-    assert others["age_by_size"].to_numpy() == pytest.approx(others.index.to_numpy(), abs=0.2)
+    assert others["age_by_size"].to_numpy() == pytest.approx(
+        others.index.to_numpy(), abs=0.2
+    )
     assert (np.diff(ages.ages) >= MIN_AGE_SPACING_GW - 1e-9).all()
 
 
@@ -40,7 +48,9 @@ def test_the_curve_also_follows_the_norm_where_it_has_volumes():
     assert found.volume(25) == pytest.approx(np.sqrt(1.2) * small[3], rel=0.02)
     # a brain that is smaller than the curve is younger
     assert found.ages[3] == pytest.approx(25 - np.log(1.2) / 2 / 0.12, abs=0.1)
-    assert ages_by_size(weeks, small, np.full(len(weeks), np.nan)).volume(25) == pytest.approx(small[3], rel=0.01)
+    assert ages_by_size(weeks, small, np.full(len(weeks), np.nan)).volume(
+        25
+    ) == pytest.approx(small[3], rel=0.01)
 
 
 def test_shape_follows_the_ages_and_size_the_curve():
@@ -49,7 +59,10 @@ def test_shape_follows_the_ages_and_size_the_curve():
     shapes = [mesh.vertices * [1.0, 1 + 0.02 * k, 1.0] for k in range(len(WEEKS))]
     volumes = [sizes_of(mesh, [shape])["volume_ml"][0] for shape in shapes]
     atlas = np.stack(
-        [shape * np.cbrt(volume / size) for shape, size, volume in zip(shapes, volumes, SMOOTH, strict=True)]
+        [
+            shape * np.cbrt(volume / size)
+            for shape, size, volume in zip(shapes, volumes, SMOOTH, strict=True)
+        ]
     )
     atlas[4] *= 1.04
     ages = ages_by_size(WEEKS, sizes_of(mesh, atlas)["volume_ml"])
@@ -65,10 +78,24 @@ def test_shape_follows_the_ages_and_size_the_curve():
     assert length(found[8]) == pytest.approx(length(atlas[8]), abs=0.01)
 
 
-def test_the_first_brain_keeps_its_weight_and_ages_far_from_the_stated_ones_are_said(caplog):
+def test_the_first_brain_keeps_its_weight_and_ages_far_from_the_stated_ones_are_said(
+    caplog,
+):
     # CRL's volumes from 24 GW on: the first brain is far below the others
     weeks = np.arange(24.0, 35.0)
-    volumes = [78.3, 109.1, 123.4, 129.9, 143.8, 158.8, 173.9, 193.9, 214.0, 226.2, 251.7]
+    volumes = [
+        78.3,
+        109.1,
+        123.4,
+        129.9,
+        143.8,
+        158.8,
+        173.9,
+        193.9,
+        214.0,
+        226.2,
+        251.7,
+    ]
     found = ages_by_size(weeks, volumes)
     assert found.ages[0] == pytest.approx(24.0, abs=1.0)
     assert found.volume(26) == pytest.approx(volumes[2], rel=0.12)

@@ -1,4 +1,5 @@
-"""Brains correspond by their matched surfaces or by registration, and what lies on them is carried along."""
+"""Brains correspond by their matched surfaces or by registration, and what lies on them
+is carried along."""
 
 from dataclasses import replace
 
@@ -9,7 +10,12 @@ from scipy.ndimage import binary_dilation, gaussian_filter, morphological_gradie
 from shapes import LPS, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, carry, transform_points
+from gyriflow.geometry.deformations import (
+    Deformation,
+    MatchedSurfaces,
+    carry,
+    transform_points,
+)
 from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
 from gyriflow.growth.carrying import (
     carry_over_weeks,
@@ -20,7 +26,14 @@ from gyriflow.growth.carrying import (
     match_surfaces,
     outward,
 )
-from gyriflow.growth.registration import Channels, channels, measure_quality, perturb_labels, register, require_good
+from gyriflow.growth.registration import (
+    Channels,
+    channels,
+    measure_quality,
+    perturb_labels,
+    register,
+    require_good,
+)
 from gyriflow.io.registrations import (
     WeeklyShapes,
     read_correspondence,
@@ -40,7 +53,10 @@ GRID = scaling(4.0, -30.0)
 def own_surface() -> TriangleMesh:
     """Return another mesh of the same brain."""
     ball = sphere(10.1, 3)
-    return TriangleMesh(ball.vertices @ np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1.0]]), ball.faces)
+    return TriangleMesh(
+        ball.vertices @ np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1.0]]),
+        ball.faces,
+    )
 
 
 def test_surfaces_are_matched_whatever_the_order_of_their_triangles():
@@ -55,7 +71,9 @@ def test_surfaces_are_matched_whatever_the_order_of_their_triangles():
 
 
 def test_other_triangles_and_other_places_are_refused():
-    with pytest.raises(InputError, check=Facts(642, 1280, 2562, 5120, "growth.matched_surfaces")):
+    with pytest.raises(
+        InputError, check=Facts(642, 1280, 2562, 5120, "growth.matched_surfaces")
+    ):
         match_surfaces(ATLAS, sphere(subdivisions=3))
     wrong = ATLAS.faces.copy()
     wrong[0] = wrong[0, 0], wrong[0, 1], wrong[400, 2]
@@ -74,7 +92,9 @@ def test_another_mesh_of_the_brain_goes_along_in_any_pose():
     back = MatchedSurfaces(TriangleMesh(turned.second, ATLAS.faces), GROWN.second)
     found = follow_surfaces(own, [turned, back])
     assert found[0] == pytest.approx(own.vertices)
-    assert found[1] == pytest.approx(own.vertices * STRETCH @ TURN.T + [5.0, 0, 0], abs=0.05)
+    assert found[1] == pytest.approx(
+        own.vertices * STRETCH @ TURN.T + [5.0, 0, 0], abs=0.05
+    )
     assert found[2] == pytest.approx(own.vertices * STRETCH, abs=0.05)
     assert np.array_equal(carry_surface(own, [turned, back]), found[2])
     assert carry_surface(own, []) is own.vertices
@@ -102,7 +122,9 @@ def test_matched_surfaces_are_read_as_written(tmp_path):
 
 def test_carried_meshes_are_read_as_written(tmp_path):
     solid = ellipsoid_mesh(4, (10.0, 10.0, 10.0))
-    carried = WeeklyShapes(np.array([21.0, 22.5]), np.stack([solid.vertices, 1.1 * solid.vertices]))
+    carried = WeeklyShapes(
+        np.array([21.0, 22.5]), np.stack([solid.vertices, 1.1 * solid.vertices])
+    )
     write_weekly_shapes(tmp_path / "carried.h5", carried)
     read = read_weekly_shapes(tmp_path / "carried.h5")
     assert read.weeks.tolist() == [21.0, 22.5]
@@ -132,8 +154,11 @@ def test_points_are_carried_in_turn():
 
 
 def test_maps_come_to_the_vertices_of_a_template():
-    """A brain that is the template bent and turned, with other triangles; its maps are functions of the place."""
-    points = np.stack(np.meshgrid(*[np.arange(16) * 4.0 - 30.0] * 3, indexing="ij"), axis=-1)
+    """A brain that is the template bent and turned, with other triangles; its maps are
+    functions of the place."""
+    points = np.stack(
+        np.meshgrid(*[np.arange(16) * 4.0 - 30.0] * 3, indexing="ij"), axis=-1
+    )
     bend = 1.5 * np.sin(points[..., [1, 2, 0]] / 8.0)
     between = Deformation(rigid(0, 0, 25, shift=(5, 0, -3)), bend, GRID)
     template, other = sphere(subdivisions=3), sphere(subdivisions=5)
@@ -142,7 +167,10 @@ def test_maps_come_to_the_vertices_of_a_template():
     def waves(places):
         return np.sin(places[:, 0] / 4.0) + places[:, 2] / 10.0
 
-    maps = {"waves": waves(brain.vertices), "half": (brain.vertices[:, 1] > 0).astype(float)}
+    maps = {
+        "waves": waves(brain.vertices),
+        "half": (brain.vertices[:, 1] > 0).astype(float),
+    }
     found = maps_on_template(maps, brain, template, [between])
     places = carry(between, template.vertices)
     assert found["waves"] == pytest.approx(waves(places), abs=0.01)
@@ -151,9 +179,13 @@ def test_maps_come_to_the_vertices_of_a_template():
     assert set(found["half"]) == {0, 1}
     assert found["template_distance_mm"].max() < 0.05
     # of the template itself, which needs no registration
-    assert maps_on_template({"x": brain.vertices[:, 0]}, brain, brain, [])["x"] == pytest.approx(brain.vertices[:, 0])
+    assert maps_on_template({"x": brain.vertices[:, 0]}, brain, brain, [])[
+        "x"
+    ] == pytest.approx(brain.vertices[:, 0])
     with pytest.raises(InputError, check=Facts(642, "40 mm")):
-        maps_on_template(maps, brain, transformed(template, scaling(1, (60, 0, 0))), [between])
+        maps_on_template(
+            maps, brain, transformed(template, scaling(1, (60, 0, 0))), [between]
+        )
 
 
 VOXEL = 1.0
@@ -161,7 +193,8 @@ CORTEX, WHITE, OTHER = 2, 1, 7
 
 
 def grown(points: np.ndarray) -> np.ndarray:
-    """Return where points of the earlier phantom are in the later one: larger, longer in front, bent, moved."""
+    """Return where points of the earlier phantom are in the later one: larger, longer
+    in front, bent, moved."""
     x, _, z = points.T
     out = points * [1.10, 1.14, 1.08]
     out[:, 0] += 2.0 * np.sin(z / 4)
@@ -177,11 +210,14 @@ def not_grown(points: np.ndarray) -> np.ndarray:
 
 
 def beyond_rim(points: np.ndarray) -> np.ndarray:
-    """Return how far points are outside an egg with a bump on the right and a dent on the left, in its radii."""
+    """Return how far points are outside an egg with a bump on the right and a dent on
+    the left, in its radii."""
     x, y, z = points.T
     angle = np.arctan2(y, x)
     radius = np.sqrt((x / 16) ** 2 + (y / 22) ** 2 + (z / 14) ** 2)
-    return radius - (1.0 + 0.12 * np.cos(angle) + 0.08 * np.sin(3 * angle) + 0.05 * z / 14)
+    return radius - (
+        1.0 + 0.12 * np.cos(angle) + 0.08 * np.sin(3 * angle) + 0.05 * z / 14
+    )
 
 
 def phantom(points: np.ndarray) -> np.ndarray:
@@ -195,7 +231,9 @@ def volume(affine: np.ndarray, *, later: bool, shape=(66, 78, 66)) -> np.ndarray
     return phantom(not_grown(points) if later else points).reshape(shape)
 
 
-def centred(shape=(66, 78, 66), turn: np.ndarray | None = None, at=(0.0, 0.0, 0.0)) -> np.ndarray:
+def centred(
+    shape=(66, 78, 66), turn: np.ndarray | None = None, at=(0.0, 0.0, 0.0)
+) -> np.ndarray:
     affine = np.eye(4)
     affine[:3, :3] = VOXEL * (np.eye(3) if turn is None else turn)
     affine[:3, 3] = at - affine[:3, :3] @ ((np.array(shape) - 1) / 2)
@@ -203,14 +241,18 @@ def centred(shape=(66, 78, 66), turn: np.ndarray | None = None, at=(0.0, 0.0, 0.
 
 
 def made(affine: np.ndarray, *, later: bool) -> Channels:
-    return channels(volume(affine, later=later), affine, cerebrum=(WHITE, CORTEX), cortex=(CORTEX,))
+    return channels(
+        volume(affine, later=later), affine, cerebrum=(WHITE, CORTEX), cortex=(CORTEX,)
+    )
 
 
 @pytest.fixture(scope="module")
 def pair() -> tuple[Channels, Channels]:
     # the later volume is stored with its axes in another order, one of them backwards
     turned = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    return made(centred(), later=False), made(centred(turn=turned, at=(4.0, -3.0, 2.0)), later=True)
+    return made(centred(), later=False), made(
+        centred(turn=turned, at=(4.0, -3.0, 2.0)), later=True
+    )
 
 
 @pytest.fixture(scope="module")
@@ -223,7 +265,8 @@ RIM_MM = 17.0
 
 
 def rim_errors(carried_points: np.ndarray) -> np.ndarray:
-    """Return how far points of the earlier brain's rim end from the later brain's rim, in mm.
+    """Return how far points of the earlier brain's rim end from the later brain's rim,
+    in mm.
 
     Along the rim, and inside, the phantom is all alike, and shows no one where it went.
     """
@@ -231,7 +274,9 @@ def rim_errors(carried_points: np.ndarray) -> np.ndarray:
 
 
 def rim_points(brain: Channels) -> np.ndarray:
-    grid = transform_points(np.indices(brain.tissue.shape).reshape(3, -1).T, brain.affine)
+    grid = transform_points(
+        np.indices(brain.tissue.shape).reshape(3, -1).T, brain.affine
+    )
     return grid[np.abs(beyond_rim(grid)) < 0.02]
 
 
@@ -271,7 +316,10 @@ def test_perturbed_labels_differ_at_boundaries_only_and_by_their_seed():
     assert np.array_equal(one, again)
     # errors of two brains, or of two members, are independent
     for other in (perturb_labels(labels, 2, "a"), perturb_labels(labels, 1, "b")):
-        assert abs(np.corrcoef((one != labels).ravel(), (other != labels).ravel())[0, 1]) < 0.5
+        assert (
+            abs(np.corrcoef((one != labels).ravel(), (other != labels).ravel())[0, 1])
+            < 0.5
+        )
     assert set(np.unique(one)) == {0, 2, 7}
     near = binary_dilation(morphological_gradient(labels, 3) > 0, iterations=2)
     assert np.array_equal(one[~near], labels[~near])
@@ -281,14 +329,18 @@ def test_perturbed_labels_differ_at_boundaries_only_and_by_their_seed():
 def test_a_failed_registration_is_refused_with_numbers(pair):
     none = Deformation(np.eye(4), np.zeros((*pair[0].tissue.shape, 3)), pair[0].affine)
     quality = measure_quality(*pair, none)
-    with pytest.raises(InputError, match=r"0\.7\d+ .*0\.2\d+ ", check=Facts("week 21 to 22", 0.95, 0.6)):
+    with pytest.raises(
+        InputError, match=r"0\.7\d+ .*0\.2\d+ ", check=Facts("week 21 to 22", 0.95, 0.6)
+    ):
         require_good(quality, pair="week 21 to 22")
 
 
 def test_a_map_that_folds_is_refused(pair, found):
     displacement = found.deformation.displacement.copy()
     displacement[22:25] += [8.0, 0.0, 0.0]
-    folded = Deformation(found.deformation.matrix, displacement, found.deformation.affine)
+    folded = Deformation(
+        found.deformation.matrix, displacement, found.deformation.affine
+    )
     quality = measure_quality(*pair, folded)
     assert quality["least_determinant"] < 0
     assert quality["folded_share"] > 0.005
@@ -308,10 +360,19 @@ def test_images_are_compared_where_both_brains_have_one(pair):
     image = 700.0 * gaussian_filter((labels > 0).astype(float), 1)
     shown = channels(labels, affine, cerebrum=(WHITE, CORTEX), image=(image, affine))
     assert shown.cortex is None
-    assert np.quantile(shown.intensity[shown.tissue > 0], 0.99) == pytest.approx(1.0, abs=0.01)
+    assert np.quantile(shown.intensity[shown.tissue > 0], 0.99) == pytest.approx(
+        1.0, abs=0.01
+    )
     with pytest.raises(InputError, check=Facts("0%", "99 %", 0)):
-        channels(labels, affine, cerebrum=(WHITE, CORTEX), image=(np.zeros_like(image), affine))
-    found = register(replace(shown, cortex=pair[0].cortex), replace(pair[1], intensity=None))
+        channels(
+            labels,
+            affine,
+            cerebrum=(WHITE, CORTEX),
+            image=(np.zeros_like(image), affine),
+        )
+    found = register(
+        replace(shown, cortex=pair[0].cortex), replace(pair[1], intensity=None)
+    )
     assert found.channels == ("cerebrum", "cortex")
 
 

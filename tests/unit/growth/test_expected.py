@@ -1,4 +1,5 @@
-"""What is to be expected of a brain: surfaces met sharply, and growth carried through a known map."""
+"""What is to be expected of a brain: surfaces met sharply, and growth carried through a
+known map."""
 
 import numpy as np
 import pytest
@@ -10,15 +11,33 @@ from gyriflow.errors import InputError
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.folding.stretches import deformation_gradients, log_stretch
 from gyriflow.geometry.alignment import without_rigid_motion
-from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, transform_points
+from gyriflow.geometry.deformations import (
+    Deformation,
+    MatchedSurfaces,
+    transform_points,
+)
 from gyriflow.geometry.diffusion import cell_sizes, diffuse, vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.matching import nearest_on
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    linear_pieces,
+)
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
 from gyriflow.growth.atlas_path import AtlasPath, resample_by_size
-from gyriflow.growth.expected import FADING_GW, expected_positions, place_in_atlas, predict_shapes
-from gyriflow.growth.series_shapes import SeriesShapes, fit_onto_surface, follow_series, sizes_of
+from gyriflow.growth.expected import (
+    FADING_GW,
+    expected_positions,
+    place_in_atlas,
+    predict_shapes,
+)
+from gyriflow.growth.series_shapes import (
+    SeriesShapes,
+    fit_onto_surface,
+    follow_series,
+    sizes_of,
+)
 from gyriflow.metrics.curvature import curvature
 
 BALL = ellipsoid_mesh(10, (20.0, 20.0, 20.0))
@@ -26,24 +45,39 @@ WEEKS = [22.0, 23.0, 24.0]
 
 
 def apart_mm(moving, surface):
-    """Return the mean distance of a surface's vertices from another one, weighted by area."""
-    return float(np.average(nearest_on(moving.vertices, surface)[0], weights=vertex_areas(moving)))
+    """Return the mean distance of a surface's vertices from another one, weighted by
+    area."""
+    return float(
+        np.average(
+            nearest_on(moving.vertices, surface)[0], weights=vertex_areas(moving)
+        )
+    )
 
 
 def bend(mesh):
-    return float(np.sqrt(np.average(curvature(mesh, radius_mm=2.5).mean ** 2, weights=vertex_areas(mesh))))
+    return float(
+        np.sqrt(
+            np.average(
+                curvature(mesh, radius_mm=2.5).mean ** 2, weights=vertex_areas(mesh)
+            )
+        )
+    )
 
 
 def wavy(height_mm):
     ball = sphere(20.0, 4)
     x, y, z = (ball.vertices / 20.0).T
     wave = np.sin(9 * x) * np.cos(8 * y + 1) + np.sin(8 * z + 2) * np.cos(7 * x)
-    return TriangleMesh(ball.vertices * (1 + height_mm * wave / 20)[:, None], ball.faces)
+    return TriangleMesh(
+        ball.vertices * (1 + height_mm * wave / 20)[:, None], ball.faces
+    )
 
 
 def test_a_smoothed_surface_is_fitted_onto_the_folded_one():
     folded = wavy(1.0)
-    smooth = TriangleMesh(diffuse(folded.vertices, folded.faces, folded.vertices, 3.0), folded.faces)
+    smooth = TriangleMesh(
+        diffuse(folded.vertices, folded.faces, folded.vertices, 3.0), folded.faces
+    )
     assert apart_mm(smooth, folded) > 0.3
     assert bend(smooth) < 0.7 * bend(folded)
     fitted = TriangleMesh(fit_onto_surface(smooth, folded), folded.faces)
@@ -54,10 +88,16 @@ def test_a_smoothed_surface_is_fitted_onto_the_folded_one():
 
 def test_needles_do_not_throw_vertices_off_the_surface():
     bands, around = 6, 60
-    heights, angles = np.cos(np.linspace(0, np.pi, bands)[1:-1]), np.linspace(0, 2 * np.pi, around, endpoint=False)
+    heights, angles = (
+        np.cos(np.linspace(0, np.pi, bands)[1:-1]),
+        np.linspace(0, 2 * np.pi, around, endpoint=False),
+    )
     # rings turned against each other: faces along them have angles of almost 180°
     rings = [(np.sqrt(1 - z * z), angles + 8 * z, z) for z in heights]
-    points = [np.column_stack([r * np.cos(a), r * np.sin(a), np.full(around, z)]) for r, a, z in rings]
+    points = [
+        np.column_stack([r * np.cos(a), r * np.sin(a), np.full(around, z)])
+        for r, a, z in rings
+    ]
     one = np.arange(around) + 1
     faces = [np.column_stack([0 * one, one, np.roll(one, -1)])]
     for ring in range(bands - 3):
@@ -68,25 +108,38 @@ def test_needles_do_not_throw_vertices_off_the_surface():
         ]
     last, end = one + around * (bands - 3), around * (bands - 2) + 1
     faces.append(np.column_stack([last, 0 * one + end, np.roll(last, -1)]))
-    ball = TriangleMesh(20.0 * np.vstack([[[0, 0, 1]], *points, [[0, 0, -1]]]), np.vstack(faces))
+    ball = TriangleMesh(
+        20.0 * np.vstack([[[0, 0, 1]], *points, [[0, 0, -1]]]), np.vstack(faces)
+    )
     half = sphere(21.0, 4)
-    half = TriangleMesh(half.vertices, half.faces[half.vertices[half.faces].mean(axis=1)[:, 2] > 0])
-    assert np.linalg.norm(fit_onto_surface(ball, half) - ball.vertices, axis=1).max() < 15
+    half = TriangleMesh(
+        half.vertices, half.faces[half.vertices[half.faces].mean(axis=1)[:, 2] > 0]
+    )
+    assert (
+        np.linalg.norm(fit_onto_surface(ball, half) - ball.vertices, axis=1).max() < 15
+    )
 
 
 def shift_map(factor, shift=(0.0, 0.0, 0.0)):
-    """Return a registration that knows how large a brain becomes and where it lies, and nothing of its folds."""
-    return Deformation(scaling(factor, shift), np.zeros((13, 13, 13, 3)), scaling(10.0, -60.0))
+    """Return a registration that knows how large a brain becomes and where it lies, and
+    nothing of its folds."""
+    return Deformation(
+        scaling(factor, shift), np.zeros((13, 13, 13, 3)), scaling(10.0, -60.0)
+    )
 
 
 def test_a_mesh_is_carried_onto_the_surface_of_the_next_brain_and_its_inside_along():
     later = wavy(1.0)
     moved = TriangleMesh(1.1 * later.vertices + [3.0, -2.0, 1.0], later.faces)
-    positions = follow_series(BALL, [22.0, 23.0], [shift_map(1.1, (3.0, -2.0, 1.0))], [moved]).positions
+    positions = follow_series(
+        BALL, [22.0, 23.0], [shift_map(1.1, (3.0, -2.0, 1.0))], [moved]
+    ).positions
     assert positions[0] == pytest.approx(BALL.vertices)
     boundary, used = boundary_surface(BALL)
     plain = 1.1 * BALL.vertices + [3.0, -2.0, 1.0]
-    before, after = (TriangleMesh(at[used], boundary.faces) for at in (plain, positions[1]))
+    before, after = (
+        TriangleMesh(at[used], boundary.faces) for at in (plain, positions[1])
+    )
     assert apart_mm(after, moved) < 0.4 * apart_mm(before, moved)
     # deep inside it goes as the registration says
     deep = np.linalg.norm(BALL.vertices, axis=1) < 5
@@ -96,7 +149,10 @@ def test_a_mesh_is_carried_onto_the_surface_of_the_next_brain_and_its_inside_alo
 def test_a_run_of_matched_surfaces_is_followed_from_its_first():
     inner = sphere(19.5)
     sheared = inner.vertices + inner.vertices[:, 2:] * [1.0, 0.0, 0.0]
-    pairs = [MatchedSurfaces(inner, sheared), MatchedSurfaces(TriangleMesh(sheared, inner.faces), inner.vertices)]
+    pairs = [
+        MatchedSurfaces(inner, sheared),
+        MatchedSurfaces(TriangleMesh(sheared, inner.faces), inner.vertices),
+    ]
     positions = follow_series(BALL, WEEKS, pairs, []).positions
     used = boundary_surface(BALL)[1]
     assert np.abs(positions[1] - BALL.vertices)[used].max() > 10.0
@@ -107,7 +163,14 @@ def test_a_run_of_matched_surfaces_is_followed_from_its_first():
 def test_an_interrupted_series_goes_on_from_its_last_week():
     surfaces = [wavy(height_mm) for height_mm in (0.3, 0.6)]
     states = []
-    whole = follow_series(BALL, WEEKS, [shift_map(1.0)] * 2, surfaces, ElasticFit(BALL), after_week=states.append)
+    whole = follow_series(
+        BALL,
+        WEEKS,
+        [shift_map(1.0)] * 2,
+        surfaces,
+        ElasticFit(BALL),
+        after_week=states.append,
+    )
     first = states[0]
     assert [state.weeks for state in states] == [[22.0, 23.0], WEEKS]
     # the first registration is not used again
@@ -121,7 +184,12 @@ def test_an_interrupted_series_goes_on_from_its_last_week():
 
 def test_matched_surfaces_go_on_from_the_last_week():
     pairs = [MatchedSurfaces(sphere(19.5), 1.1 * sphere(19.5).vertices)]
-    pairs.append(MatchedSurfaces(TriangleMesh(pairs[0].second, sphere(19.5).faces), 1.3 * sphere(19.5).vertices))
+    pairs.append(
+        MatchedSurfaces(
+            TriangleMesh(pairs[0].second, sphere(19.5).faces),
+            1.3 * sphere(19.5).vertices,
+        )
+    )
     states = []
     whole = follow_series(BALL, WEEKS, pairs, [], after_week=states.append)
     again = follow_series(BALL, WEEKS, pairs, [], earlier=states[0])
@@ -129,17 +197,23 @@ def test_matched_surfaces_go_on_from_the_last_week():
 
 
 def atlas_of(places, weeks=WEEKS):
-    """Return an atlas that grows unevenly, at (n, 3) places, in a pose of its own each week."""
+    """Return an atlas that grows unevenly, at (n, 3) places, in a pose of its own each
+    week."""
 
     def grown(week):
         t = week - weeks[0]
         x, y, z = places.T
-        wave = np.stack([0.6 * np.sin(y / 9), 0.5 * np.sin(z / 8), 0.4 * np.cos(x / 10)], axis=1)
+        wave = np.stack(
+            [0.6 * np.sin(y / 9), 0.5 * np.sin(z / 8), 0.4 * np.cos(x / 10)], axis=1
+        )
         return places * (1 + t * np.array([0.05, 0.08, 0.06])) + t * wave
 
     poses = [rigid(5 * week, -3 * week, 40, shift=(week, -20.0, 7.0)) for week in weeks]
     return [grown(week) for week in weeks], np.stack(
-        [transform_points(grown(week), pose) for week, pose in zip(weeks, poses, strict=True)]
+        [
+            transform_points(grown(week), pose)
+            for week, pose in zip(weeks, poses, strict=True)
+        ]
     )
 
 
@@ -172,14 +246,18 @@ def test_a_brain_between_two_weeks_has_gone_a_part_of_the_way():
 
 def test_small_bumps_of_a_brain_fade_wherever_the_atlas_begins_and_its_size_stays():
     mesh = box_mesh((10, 10, 10), (40.0, 40.0, 40.0))
-    start = TetrahedralMesh(mesh.vertices + 0.3 * np.sin(mesh.vertices * 2.0), mesh.tets)
+    start = TetrahedralMesh(
+        mesh.vertices + 0.3 * np.sin(mesh.vertices * 2.0), mesh.tets
+    )
     found = []
     for first in (20.0, 22.0):
         weeks = np.arange(first, 24.1)
         atlas = np.stack([mesh.vertices * (1 + 0.1 * (week - 22)) for week in weeks])
         found.append(expected_positions(start, 22.0, atlas, weeks, WEEKS[1:]))
     assert found[0] == pytest.approx(found[1], abs=1e-9)
-    left = [np.sqrt(((at - a) ** 2).mean()) for at, a in zip(found[1], atlas, strict=True)]
+    left = [
+        np.sqrt(((at - a) ** 2).mean()) for at, a in zip(found[1], atlas, strict=True)
+    ]
     # a fifth larger by then, as the brain is
     assert left[2] < 1.1 * 1.2 * np.exp(-2.0 / FADING_GW) * left[0]
     assert left[2] < 0.8 * left[0]
@@ -189,17 +267,20 @@ def test_small_bumps_of_a_brain_fade_wherever_the_atlas_begins_and_its_size_stay
 def test_a_brain_before_or_after_the_atlas_is_refused(week):
     with pytest.raises(InputError, check=Facts(f"{week:g} GW", "22 to 24 GW", "21 GW")):
         expected_positions(BALL, week, np.stack([BALL.vertices] * 3), WEEKS, [26.0])
-    assert expected_positions(BALL, 21.0, np.stack([BALL.vertices] * 3), WEEKS, WEEKS) == pytest.approx(
-        np.stack([BALL.vertices] * 4)
-    )
+    assert expected_positions(
+        BALL, 21.0, np.stack([BALL.vertices] * 3), WEEKS, WEEKS
+    ) == pytest.approx(np.stack([BALL.vertices] * 4))
 
 
 def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
-    """Growth of an atlas, carried by registrations to a brain that a known map makes from it, is correct to 5 %.
+    """Growth of an atlas, carried by registrations to a brain that a known map makes
+    from it, is correct to 5 %.
 
-    This holds if the whole individual difference is kept (`smoothing_mm` 0), for a map with any rotation, stretch,
-    bending by tenths of a millimetre and a rotation that varies by 4 degrees over 30 mm. Differences removed by the
-    default smoothing of 8 mm, among them a part of a difference in size, return to the atlas: an error of 5 to 10 %.
+    This holds if the whole individual difference is kept (`smoothing_mm` 0), for a map
+    with any rotation, stretch, bending by tenths of a millimetre and a rotation that
+    varies by 4 degrees over 30 mm. Differences removed by the default smoothing of 8
+    mm, among them a part of a difference in size, return to the atlas: an error of 5 to
+    10 %.
     """
     axes = np.array([30.0, 36.0, 27.0])
     mesh, fine = ellipsoid_mesh(12, tuple(axes)), ellipsoid(axes, 5)
@@ -223,21 +304,29 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     centres = x[pieces].mean(axis=1)
 
     def growth(before, after):
-        return log_stretch(deformation_gradients(before, after, pieces, SLOPES[None])[:, 0])
+        return log_stretch(
+            deformation_gradients(before, after, pieces, SLOPES[None])[:, 0]
+        )
 
     known = growth(psi(x), grows(psi(x)))
     h = 1e-4 * np.eye(3)
-    u, _, vt = np.linalg.svd(np.stack([(psi(centres + e) - psi(centres - e)) / 2e-4 for e in h], axis=2))
+    u, _, vt = np.linalg.svd(
+        np.stack([(psi(centres + e) - psi(centres - e)) / 2e-4 for e in h], axis=2)
+    )
     R = u @ vt
     wanted = np.swapaxes(R, 1, 2) @ known @ R
 
     def size(parts):
-        return np.average(np.linalg.norm(parts, axis=(1, 2)), weights=cell_sizes(x, pieces))
+        return np.average(
+            np.linalg.norm(parts, axis=(1, 2)), weights=cell_sizes(x, pieces)
+        )
 
     # without the rotation they would be wrong by far more than what is allowed
     assert size(known - wanted) > 0.5 * size(wanted)
     for smoothing_mm, least, most in ((0.0, 0.0, 0.05), (8.0, 0.05, 0.1)):
-        positions = expected_positions(mesh, 22.0, carried, [22.0, 23.0], [23.0], smoothing_mm=smoothing_mm)
+        positions = expected_positions(
+            mesh, 22.0, carried, [22.0, 23.0], [23.0], smoothing_mm=smoothing_mm
+        )
         found = growth(x, positions[1])
         assert least * size(wanted) <= size(found - wanted) < most * size(wanted)
 
@@ -247,24 +336,33 @@ def sampled(moved, points, spacing_mm=3.0):
     low = points.min(axis=0) - 6.0
     shape = np.ceil((np.ptp(points, axis=0) + 12.0) / spacing_mm).astype(int) + 1
     at = low + spacing_mm * np.indices(shape).reshape(3, -1).T
-    return Deformation(np.eye(4), (moved(at) - at).reshape(*shape, 3), scaling(spacing_mm, low))
+    return Deformation(
+        np.eye(4), (moved(at) - at).reshape(*shape, 3), scaling(spacing_mm, low)
+    )
 
 
 def path_of(weeks, growing, stops=()):
-    """Return the path of an atlas whose brain is the ball, at other vertices, that grows from week to week."""
+    """Return the path of an atlas whose brain is the ball, at other vertices, that
+    grows from week to week."""
     mesh = ellipsoid_mesh(12, (20.0, 20.0, 20.0))
     return AtlasPath(
-        mesh.tets, SeriesShapes(list(weeks), np.stack([growing(mesh.vertices, w) for w in weeks]), list(stops))
+        mesh.tets,
+        SeriesShapes(
+            list(weeks),
+            np.stack([growing(mesh.vertices, w) for w in weeks]),
+            list(stops),
+        ),
     )
 
 
 def uneven(places, week):
-    """Grow unevenly, by a tenth a week and more along y, and turn by 40 degrees a week."""
+    """Grow unevenly, by a tenth a week and more along y, and turn by 40 degrees a
+    week."""
     turn = rigid(0, 0, 40 * (week - 22))[:3, :3]
     return (places * (1 + np.array([0.08, 0.12, 0.1]) * (week - 22))) @ turn.T
 
 
-def test_points_keep_their_places_in_an_atlas_that_grows_and_turns_inside_and_outside_of_it():
+def test_points_inside_and_outside_an_atlas_that_grows_and_turns_keep_their_places():
     path = path_of(WEEKS, uneven)
     rng = np.random.default_rng(4)
     points = rng.normal(size=(500, 3))
@@ -276,7 +374,10 @@ def test_points_keep_their_places_in_an_atlas_that_grows_and_turns_inside_and_ou
     # those outside keep their distance from the surface
     outside = points * (21.0 / np.linalg.norm(points, axis=1))[:, None]
     surfaces = [boundary_surface(path.mesh(week))[0] for week in WEEKS]
-    distances = [nearest_on(at, surface)[0] for at, surface in zip(path.carry(outside, 22.0), surfaces, strict=True)]
+    distances = [
+        nearest_on(at, surface)[0]
+        for at, surface in zip(path.carry(outside, 22.0), surfaces, strict=True)
+    ]
     assert distances[0].min() > 0.9
     for found in distances[1:]:
         assert found == pytest.approx(distances[0], abs=0.15)
@@ -291,15 +392,20 @@ def test_ages_are_those_of_all_weeks_of_the_atlas_and_of_its_brains_alone():
     assert path.knots(ages) == pytest.approx(weeks, abs=0.02)
 
 
-def test_an_atlas_resampled_by_size_has_the_volumes_of_its_curve_as_multiples_of_the_mesh():
+def test_an_atlas_resampled_by_size_gives_a_mesh_the_relative_volumes_of_its_curve():
     weeks = np.array([21.0, 22.0, 23.0, 24.0, 25.0])
     # the brain called 23 is as large as one of 22.4
-    path = path_of(weeks, lambda places, week: places * 1.1 ** ((22.4 if week == 23 else week) - 22))
+    path = path_of(
+        weeks,
+        lambda places, week: places * 1.1 ** ((22.4 if week == 23 else week) - 22),
+    )
     ages = path.ages()
     inside = 0.9 * BALL.vertices
     carried = path.carry(inside, 22.0)
     mesh = TetrahedralMesh(inside, BALL.tets)
-    found = sizes_of(mesh, resample_by_size(mesh, carried, weeks, ages, path.knots(ages)))["volume_ml"]
+    found = sizes_of(
+        mesh, resample_by_size(mesh, carried, weeks, ages, path.knots(ages))
+    )["volume_ml"]
     curve = np.array([ages.volume(week) for week in weeks])
     assert found / found[0] == pytest.approx(curve / curve[0], rel=1e-3)
     assert found[1] == pytest.approx(0.9**3 * curve[1], rel=0.05)
@@ -307,7 +413,8 @@ def test_an_atlas_resampled_by_size_has_the_volumes_of_its_curve_as_multiples_of
 
 @pytest.fixture(scope="module")
 def prediction():
-    """Return a function that predicts a ball 5 % larger than the atlas at 22.3 GW, to an end week.
+    """Return a function that predicts a ball 5 % larger than the atlas at 22.3 GW, to
+    an end week.
 
     The ball may be called that of another week.
     """
@@ -318,17 +425,23 @@ def prediction():
     pair = Deformation(turn, np.zeros((13, 13, 13, 3)), scaling(10.0, -60.0))
 
     def predict(end_week, start_week=22.3, **options):
-        return start, predict_shapes(start, start_week, end_week, path, pair, 22.0, ElasticFit, **options)
+        return start, predict_shapes(
+            start, start_week, end_week, path, pair, 22.0, ElasticFit, **options
+        )
 
     return predict
 
 
-def test_a_prediction_at_a_week_does_not_depend_on_where_it_ends_or_on_what_else_is_predicted(prediction):
+def test_a_prediction_at_a_week_does_not_depend_on_the_end_week_or_further_weeks(
+    prediction,
+):
     _, whole = prediction(26.0)
     for end_week, further in ((23.5, []), (24.0, [22.9, 23.4]), (25.2, [25.0])):
         _, part = prediction(end_week, further_weeks=further)
         for week, shape in zip(part.shapes.weeks, part.shapes.positions, strict=True):
-            assert shape == pytest.approx(whole.shapes.positions[whole.shapes.weeks.index(week)], abs=1e-9)
+            assert shape == pytest.approx(
+                whole.shapes.positions[whole.shapes.weeks.index(week)], abs=1e-9
+            )
     _, first = prediction(24.0, further_weeks=[23.4])
     _, second = prediction(26.0, further_weeks=[23.4, 24.6])
     places = [found.positions[found.weeks.index(23.4)] for found in (first, second)]
@@ -348,7 +461,10 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
     assert found.shapes.weeks == [22.3, 23.0, 24.0, 25.0, 26.0]
     volumes = sizes_of(start, found.shapes.positions)["volume_ml"]
     wanted = np.array(
-        [np.linalg.det(np.diag(1 + np.array([0.08, 0.12, 0.1]) * (week - 22))) for week in found.shapes.weeks]
+        [
+            np.linalg.det(np.diag(1 + np.array([0.08, 0.12, 0.1]) * (week - 22)))
+            for week in found.shapes.weeks
+        ]
     )
     # a part of the difference in size is smoothed away
     assert volumes / volumes[0] == pytest.approx(wanted / wanted[0], rel=0.04)
@@ -356,16 +472,22 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
     assert found.weeks == [22.3, 23.0, 24.0, 24.5, 25.0, 26.0]
     boundary, _ = boundary_surface(start)
     own, deformed = (
-        np.array([abs(signed_volume(TriangleMesh(at, boundary.faces))) / 1e3 for at in found.baselines[name]])
+        np.array(
+            [
+                abs(signed_volume(TriangleMesh(at, boundary.faces))) / 1e3
+                for at in found.baselines[name]
+            ]
+        )
         for name in ("atlas", "atlas_deformed")
     )
-    # the atlas' own brain is smaller by 5 % in each direction, the one with the whole difference is not
+    # the atlas' own brain is smaller by 5 % in each direction, the one with the whole
+    # difference is not
     assert deformed[[0, 1, 2, 4, 5]] == pytest.approx(volumes, rel=0.04)
     assert own[1] / deformed[1] == pytest.approx(1.05**-3, rel=0.03)
     assert (cell_sizes(found.positions[3], start.tets) > 0).all()
 
 
-def test_a_brain_is_placed_inside_the_atlas_with_its_boundary_on_the_atlas_and_no_inverted_element():
+def test_a_brain_is_placed_with_its_boundary_on_the_atlas_and_no_inverted_element():
     atlas = ellipsoid_mesh(12, (20.0, 22.0, 20.0))
     places = place_in_atlas(BALL, shift_map(1.0), atlas, ElasticFit)
     boundary, used = boundary_surface(BALL)

@@ -55,12 +55,19 @@ SCATTERED = VOLUMES * np.exp(0.01 * np.random.default_rng(5).normal(size=10))
 def test_a_week_without_weight_counts_neither_for_the_curve_nor_for_its_error():
     leaping = SCATTERED.copy()
     leaping[4] *= 1.5
-    fit, without = fitted(WEEKS, leaping), fitted(np.delete(WEEKS, 4), np.delete(SCATTERED, 4))
+    fit, without = (
+        fitted(WEEKS, leaping),
+        fitted(np.delete(WEEKS, 4), np.delete(SCATTERED, 4)),
+    )
     assert fit.weights[4] == 0
-    for found, expected in zip(interval(fit.curve, WEEKS), interval(without.curve, WEEKS), strict=True):
+    for found, expected in zip(
+        interval(fit.curve, WEEKS), interval(without.curve, WEEKS), strict=True
+    ):
         assert found == pytest.approx(expected, rel=0.005)
     at = fit.curve.weeks
-    assert fit.curve.sd == pytest.approx(np.interp(at, without.curve.weeks, without.curve.sd), rel=0.05)
+    assert fit.curve.sd == pytest.approx(
+        np.interp(at, without.curve.weeks, without.curve.sd), rel=0.05
+    )
 
 
 def test_the_first_week_is_kept_where_all_growth_refers_to_it(caplog):
@@ -82,7 +89,10 @@ def test_a_small_scatter_is_no_outlier_and_few_weeks_show_none():
 
 def test_it_is_monotone_where_weeks_are_not():
     measured = [50.0, 60.0, 70.0, 64.0, 63.0, 75.0, 90.0]
-    fit, free = (fitted(WEEKS[:7], measured, degrees_of_freedom=6, may_shrink=shrinks) for shrinks in (False, True))
+    fit, free = (
+        fitted(WEEKS[:7], measured, degrees_of_freedom=6, may_shrink=shrinks)
+        for shrinks in (False, True)
+    )
     assert (np.diff(fit.curve.values) >= 0).all()
     assert (rate(fit.curve, np.linspace(21, 27, 200)) >= 0).all()
     assert rate(free.curve, 23.7) < -0.02
@@ -96,14 +106,19 @@ def test_noise_is_smoothed_and_covered_by_the_interval():
         fit = fitted(WEEKS, measured)
         low, high = interval(fit.curve, WEEKS)
         covered.append((low < VOLUMES) & (high > VOLUMES))
-        gain.append(np.log(value(fit.curve, WEEKS) / VOLUMES).std() / np.log(measured / VOLUMES).std())
+        gain.append(
+            np.log(value(fit.curve, WEEKS) / VOLUMES).std()
+            / np.log(measured / VOLUMES).std()
+        )
     assert 0.75 < np.mean(covered) <= 1.0
     assert np.mean(gain) < 0.8
 
 
 def test_several_brains_of_a_week_and_two_weeks_alone():
     fit = fitted([21, 21, 23, 23], [49.0, 51.0, 98.0, 102.0])
-    assert value(fit.curve, [21, 22, 23]) == pytest.approx([50, np.sqrt(50 * 100), 100], rel=2e-3)
+    assert value(fit.curve, [21, 22, 23]) == pytest.approx(
+        [50, np.sqrt(50 * 100), 100], rel=2e-3
+    )
     alone = fitted([21, 24], [50.0, 80.0])
     assert value(alone.curve, [21, 24]) == pytest.approx([50, 80], rel=1e-4)
     assert rate(alone.curve, 22) == pytest.approx(np.log(1.6) / 3, rel=1e-3)
@@ -120,7 +135,9 @@ def test_four_weeks_have_three_degrees_of_freedom_a_size_a_rate_and_its_change()
 def test_beyond_its_ends_growth_goes_on():
     fit = fitted(WEEKS, VOLUMES)
     end = rate(fit.curve, 30.0)
-    assert value(fit.curve, 32.0) == pytest.approx(value(fit.curve, 30.0) * np.exp(2 * end))
+    assert value(fit.curve, 32.0) == pytest.approx(
+        value(fit.curve, 30.0) * np.exp(2 * end)
+    )
 
 
 def test_shrinking_is_refused_unless_named():
@@ -135,7 +152,13 @@ def test_shrinking_is_refused_unless_named():
 
 
 @pytest.mark.parametrize(
-    ("weeks", "values"), [([21], [1.0]), ([21, 21], [1.0, 2.0]), ([21, 22], [1.0, -1.0]), ([21, 22], [1.0, np.nan])]
+    ("weeks", "values"),
+    [
+        ([21], [1.0]),
+        ([21, 21], [1.0, 2.0]),
+        ([21, 22], [1.0, -1.0]),
+        ([21, 22], [1.0, np.nan]),
+    ],
 )
 def test_what_is_no_curve_is_refused(weeks, values):
     with pytest.raises(InputError, check=Facts("volume")):
@@ -146,7 +169,14 @@ def test_tables_go_through_their_values_and_are_written_out():
     curve = tabulated([22, 21, 25], [60.0, 50.0, 90.0])
     assert value(curve, [21, 22, 25]) == pytest.approx([50, 60, 90])
     table = curve_table({"volume_ml": curve})
-    assert table.columns.tolist() == ["quantity", "week", "value", "low", "high", "rate_per_week"]
+    assert table.columns.tolist() == [
+        "quantity",
+        "week",
+        "value",
+        "low",
+        "high",
+        "rate_per_week",
+    ]
     assert table["value"].tolist() == pytest.approx([50, 60, 90])
     again = tabulated(table["week"], table["value"])
     assert value(again, 23.3) == pytest.approx(value(curve, 23.3))
@@ -155,10 +185,20 @@ def test_tables_go_through_their_values_and_are_written_out():
 # curves for runs that follow sizes
 
 TWICE = np.sort([*WEEKS, 23.0, 27.0])
-"""The weeks of brains of which two are of one week, and larger and smaller than the curve."""
-SIZE = np.select([np.diff(TWICE, append=99) == 0, np.diff(TWICE, prepend=0) == 0], [1 / 1.02, 1.02], 1.0)
+"""The weeks of brains of which two are of one week, and larger and smaller than the
+curve."""
+SIZE = np.select(
+    [np.diff(TWICE, append=99) == 0, np.diff(TWICE, prepend=0) == 0],
+    [1 / 1.02, 1.02],
+    1.0,
+)
 AREAS = pd.DataFrame(
-    {"series": "volume", "week": TWICE, "area_cm2": 90 * 1.1 ** (TWICE - 21), "volume_ml": 46 * 1.2 ** (TWICE - 21)}
+    {
+        "series": "volume",
+        "week": TWICE,
+        "area_cm2": 90 * 1.1 ** (TWICE - 21),
+        "volume_ml": 46 * 1.2 ** (TWICE - 21),
+    }
 ).assign(thickness_mm=np.nan)
 AREAS[["area_cm2", "volume_ml"]] *= SIZE[:, None]
 MEASURED = {"area_cm2": "measured", "volume_ml": "measured", "thickness_mm": None}
@@ -166,7 +206,9 @@ MEASURED = {"area_cm2": "measured", "volume_ml": "measured", "thickness_mm": Non
 
 def curves(areas=AREAS):
     (fits,) = fits_of_series(areas).values()
-    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(series="volume")
+    return curve_table({name: fit.curve for name, fit in fits.items()}).assign(
+        series="volume"
+    )
 
 
 def test_measured_sizes_are_followed_every_quarter_of_a_week():
@@ -187,44 +229,80 @@ def test_a_brain_without_a_series_has_no_measured_curve():
         with pytest.raises(InputError, check=Facts("area_cm2")):
             followed_sizes(MEASURED, table, series, [21.0, 22.0], False)
     with pytest.raises(InputError, check=Facts("thickness_mm")):
-        followed_sizes(MEASURED | {"thickness_mm": "measured"}, curves(), "volume", [21.0, 22.0], False)
+        followed_sizes(
+            MEASURED | {"thickness_mm": "measured"},
+            curves(),
+            "volume",
+            [21.0, 22.0],
+            False,
+        )
 
 
 def test_sizes_of_a_week_are_those_followed_or_else_the_measured_ones():
-    table = {"area_cm2": {21.0: 100.0, 25.0: 144.0}, "volume_ml": {21.0: 40.0, 25.0: 90.0}}
-    followed = sizes_on_curves({"model": "sizes", **table}, curves(), "volume", [21.0, 23.0])
+    table = {
+        "area_cm2": {21.0: 100.0, 25.0: 144.0},
+        "volume_ml": {21.0: 40.0, 25.0: 90.0},
+    }
+    followed = sizes_on_curves(
+        {"model": "sizes", **table}, curves(), "volume", [21.0, 23.0]
+    )
     assert followed[21.0] == pytest.approx({"area_cm2": 100, "volume_ml": 40})
     # logarithms are interpolated
     assert followed[23.0] == pytest.approx({"area_cm2": 120, "volume_ml": 60})
     measured = sizes_on_curves({"model": "rates"}, curves(), "volume", [23.0])
-    assert measured[23.0] == pytest.approx({"area_cm2": 90 * 1.21, "volume_ml": 46 * 1.44}, rel=5e-3)
+    assert measured[23.0] == pytest.approx(
+        {"area_cm2": 90 * 1.21, "volume_ml": 46 * 1.44}, rel=5e-3
+    )
     assert sizes_on_curves({"model": "rates"}, None, None, [23.0]) == {23.0: {}}
     with pytest.raises(InputError):
         sizes_on_curves({"model": "rates"}, curves(), "other", [23.0])
 
 
 def test_a_given_table_shrinks_only_where_that_is_allowed():
-    growth = MEASURED | {"area_cm2": {21: 90.0, 25: 80.0}, "volume_ml": {21: 40.0, 25: 80.0}}
+    growth = MEASURED | {
+        "area_cm2": {21: 90.0, 25: 80.0},
+        "volume_ml": {21: 40.0, 25: 80.0},
+    }
     with pytest.raises(InputError, check=Facts("area_cm2", 25)):
         followed_sizes(growth, None, None, [21.0, 22.0], False)
     assert followed_sizes(growth, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
 
 
-def test_parameters_of_a_run_have_the_sizes_that_it_follows_and_the_shapes_that_it_grows_towards():
+def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_towards():
     weeks, surface = [21.0, 22.0], {"fissure_x_mm": 0.5, "side": "left"}
-    settings = {"growth": MEASURED | {"thickness_mm": "measured"}, "thickness_mm": 1.5, "end_week": 22.0}
+    settings = {
+        "growth": MEASURED | {"thickness_mm": "measured"},
+        "thickness_mm": 1.5,
+        "end_week": 22.0,
+    }
     table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (TWICE - 21)))
     found = run_parameters(settings, weeks, surface, {}, [], table, "volume")
-    assert {name: found[name] for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")} == {
-        **{"start_week": 21.0, "output_weeks": weeks, "fissure_x_mm": 0.5, "side": "left", "end_week": 22.0}
+    assert {
+        name: found[name]
+        for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")
+    } == {
+        **{
+            "start_week": 21.0,
+            "output_weeks": weeks,
+            "fissure_x_mm": 0.5,
+            "side": "left",
+            "end_week": 22.0,
+        }
     }
     assert found["growth"]["area_cm2"][22.0] == pytest.approx(99, rel=5e-3)
     assert found["thickness_mm"]["weeks"][22.0] == pytest.approx(2.3, rel=5e-3)
     assert "targets" not in found
-    shapes = {"area_cm2": {21.0: 90.0, 23.0: 80.0}, "volume_ml": {21.0: 40.0, 23.0: 60.0}}
-    found = run_parameters({"growth": {"model": "shapes"}}, weeks, surface, shapes, [], None, None)
+    shapes = {
+        "area_cm2": {21.0: 90.0, 23.0: 80.0},
+        "volume_ml": {21.0: 40.0, 23.0: 60.0},
+    }
+    found = run_parameters(
+        {"growth": {"model": "shapes"}}, weeks, surface, shapes, [], None, None
+    )
     assert found["targets"] == {23.0: "target_23.00"}
-    assert found["growth"]["volume_ml"][22.0] == pytest.approx(np.sqrt(40 * 60), rel=1e-9)
+    assert found["growth"]["volume_ml"][22.0] == pytest.approx(
+        np.sqrt(40 * 60), rel=1e-9
+    )
 
 
 # growth rates
@@ -235,7 +313,9 @@ WEEK_S = 604_800.0
 @pytest.mark.parametrize("weeks", [1.0, 4.0])
 def test_compound_rates_multiply_up_to_the_ratios(weeks: float) -> None:
     step_s = 600.0
-    row = growth_rates([21, 21 + weeks], [9000.0, 14_000.0], [45_000.0, 80_000.0]).iloc[0]
+    row = growth_rates([21, 21 + weeks], [9000.0, 14_000.0], [45_000.0, 80_000.0]).iloc[
+        0
+    ]
     length = core_length = 1.0
     for _ in range(round(weeks * WEEK_S / step_s)):
         length *= 1 + row["compound_rate_per_s"] * step_s
@@ -248,34 +328,62 @@ def test_compound_rates_multiply_up_to_the_ratios(weeks: float) -> None:
 
 
 def brains(series: str, rows: list[tuple[float, float, float, float]]) -> pd.DataFrame:
-    """Return brains as the workflow's table has them: of each its week, area, volume and volume of tissue."""
+    """Return brains as the workflow's table has them: of each its week, area, volume
+    and volume of tissue."""
     table = pd.DataFrame(rows, columns=["week", "area_cm2", "volume_ml", "tissue_ml"])
     return table.assign(series=series, subject="brain")
 
 
-def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean() -> None:
+def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean() -> (
+    None
+):
     # in any order
-    surface = brains("surface", [(22, 121.0, 1331.0, 1200.0), (21, 100.0, 1000.0, 800.0)])
+    surface = brains(
+        "surface", [(22, 121.0, 1331.0, 1200.0), (21, 100.0, 1000.0, 800.0)]
+    )
     # two brains of one week, larger and smaller than their mean
-    volume = brains("volume", [(21, 90.0, 1100.0, 480.0), (23, 144.0, 1728.0, 550.0), (21, 110.0, 900.0, 400.0)])
+    volume = brains(
+        "volume",
+        [
+            (21, 90.0, 1100.0, 480.0),
+            (23, 144.0, 1728.0, 550.0),
+            (21, 110.0, 900.0, 400.0),
+        ],
+    )
     areas = pd.concat([surface, volume, surface.assign(series="cross-section")])
     table = rates_of_series(areas, ["surface", "volume"])
     assert table["series"].tolist() == ["surface", "volume"]
     np.testing.assert_allclose(table["rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
     np.testing.assert_allclose(table["core_rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
-    np.testing.assert_allclose(table[["area_ratio", "volume_ratio"]], [[1.1**2, 1.1**3], [1.2**2, 1.2**3]])
+    np.testing.assert_allclose(
+        table[["area_ratio", "volume_ratio"]], [[1.1**2, 1.1**3], [1.2**2, 1.2**3]]
+    )
     np.testing.assert_allclose(table["tissue_ratio"], [1.5, 1.25])
-    np.testing.assert_allclose(table["tissue_compound_rate_per_s"], np.log([1.5, 1.25]) / (3 * WEEK_S) / [1, 2])
+    np.testing.assert_allclose(
+        table["tissue_compound_rate_per_s"], np.log([1.5, 1.25]) / (3 * WEEK_S) / [1, 2]
+    )
     assert table["to_week"].tolist() == [22, 23]
 
 
 def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
-    for name, radius_mm, tissue_ml in zip("abcd", (20.0, 22.0, 20.0, 21.0), (30.0, 40.0, None, None), strict=True):
+    for name, radius_mm, tissue_ml in zip(
+        "abcd", (20.0, 22.0, 20.0, 21.0), (30.0, 40.0, None, None), strict=True
+    ):
         write_surface(tmp_path / f"{name}.gii", sphere(radius_mm, 2))
-        write_json(tmp_path / f"{name}.json", {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {})
+        write_json(
+            tmp_path / f"{name}.json",
+            {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {},
+        )
     write_json(tmp_path / "thickness.json", {"mean_mm": 1.8})
-    inputs = {"whole": [f"{name}.gii" for name in "abcd"], "reports": [f"{name}.json" for name in "abcd"]}
-    known = {"series": ["mine", "mine", "atlas", "atlas"], "brains": [*"abcd"], "weeks": [21, 22, 21, 22]}
+    inputs = {
+        "whole": [f"{name}.gii" for name in "abcd"],
+        "reports": [f"{name}.json" for name in "abcd"],
+    }
+    known = {
+        "series": ["mine", "mine", "atlas", "atlas"],
+        "brains": [*"abcd"],
+        "weeks": [21, 22, 21, 22],
+    }
     run_script(
         "growth_rates.py",
         tmp_path,
@@ -289,8 +397,12 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
     np.testing.assert_array_equal(areas["tissue_ml"], [30.0, 40.0, np.nan, np.nan])
     rates = pd.read_csv(tmp_path / "rates.csv").set_index("series")
     # radii grow as the square root of areas
-    assert rates["rate_per_s"].tolist() == pytest.approx([0.1 / WEEK_S, 0.05 / WEEK_S], rel=1e-5)
+    assert rates["rate_per_s"].tolist() == pytest.approx(
+        [0.1 / WEEK_S, 0.05 / WEEK_S], rel=1e-5
+    )
     assert rates.loc["mine", "tissue_ratio"] == pytest.approx(4 / 3)
-    assert rates.loc["mine", "tissue_compound_rate_per_s"] == pytest.approx(np.log(4 / 3) / (3 * WEEK_S))
+    assert rates.loc["mine", "tissue_compound_rate_per_s"] == pytest.approx(
+        np.log(4 / 3) / (3 * WEEK_S)
+    )
     assert np.isnan(rates.loc["atlas", "tissue_ratio"])
     assert rates["cortex_ratio"].isna().all()

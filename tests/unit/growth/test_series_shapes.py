@@ -1,4 +1,5 @@
-"""Limits of a fit to the surfaces of a series: the reach of a pull, the number of draws, and what is warned of."""
+"""Limits of a fit to the surfaces of a series: the reach of a pull, the number of
+draws, and what is warned of."""
 
 import logging
 from dataclasses import dataclass, field
@@ -57,9 +58,13 @@ def test_a_surface_that_faces_the_other_way_does_not_pull():
 
 
 def test_the_pull_of_a_surface_is_weighted_by_area():
-    """Coarse triangles end at z = 0, where the goal changes: the smoothed pull there is the mean of both sides."""
+    """Coarse triangles end at z = 0, where the goal changes: the smoothed pull there is
+    the mean of both sides."""
     ball = uneven(sphere(20.0, 5), ratio=3.0)
-    half = TriangleMesh(ball.vertices * np.where(ball.vertices[:, 2] > 0, 1.05, 1.0)[:, None], ball.faces)
+    half = TriangleMesh(
+        ball.vertices * np.where(ball.vertices[:, 2] > 0, 1.05, 1.0)[:, None],
+        ball.faces,
+    )
     found = radii(fit_onto_surface(ball, half, (4.0,))) - 20.0
     height = ball.vertices[:, 2]
     near = np.abs(height) < 1.0
@@ -68,7 +73,8 @@ def test_the_pull_of_a_surface_is_weighted_by_area():
 
 @dataclass
 class StubbornBody:
-    """A body that comes a share of the way to its goals, with the number of its draws and a way of its own."""
+    """A body that comes a share of the way to its goals, with the number of its draws
+    and a way of its own."""
 
     share: float
     positions_mm: Floats = field(default_factory=lambda: BALL.vertices)
@@ -104,18 +110,34 @@ class StubbornBody:
         (0.3, True, MAX_OPENING_DRAWS + 1),
     ],
 )
-def test_a_body_is_drawn_until_it_is_close_or_hardly_comes_closer(share, opens, n_draws):
+def test_a_body_is_drawn_until_it_is_close_or_hardly_comes_closer(
+    share, opens, n_draws
+):
     body = StubbornBody(share)
     below = BALL.vertices * (21.0 - INNER_MM) / 20.0
-    fit_body(body, BALL.vertices, (larger(1.0), below if opens else None), EVERY, open_sulci=opens)
+    fit_body(
+        body,
+        BALL.vertices,
+        (larger(1.0), below if opens else None),
+        EVERY,
+        open_sulci=opens,
+    )
     assert body.n_draws == n_draws
 
 
 @pytest.mark.parametrize(("mm", "is_warned"), [(0.15, False), (0.4, True)])
-def test_a_body_that_stays_from_its_shape_or_surface_is_warned_of(caplog, mm, is_warned):
-    fit_body(StubbornBody(0.0), (1 + mm / 20) * BALL.vertices, None, EVERY, open_sulci=False)
+def test_a_body_that_stays_from_its_shape_or_surface_is_warned_of(
+    caplog, mm, is_warned
+):
+    fit_body(
+        StubbornBody(0.0), (1 + mm / 20) * BALL.vertices, None, EVERY, open_sulci=False
+    )
     warn_of_misfit(BALL, larger(mm), 23.0)
-    warnings = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    warnings = [
+        record.getMessage()
+        for record in caplog.records
+        if record.levelno >= logging.WARNING
+    ]
     assert warnings == [Facts(f"{mm:.2f} mm"), Facts("GW 23", "mm")] * is_warned
 
 
@@ -128,26 +150,48 @@ def test_a_misfit_is_a_mean_over_area():
 
 
 def test_stops_that_round_to_a_week_are_no_stops():
-    body = StubbornBody(1.0, way=[(0.004, BALL.vertices), (0.5, 2 * BALL.vertices), (0.996, BALL.vertices)])
+    body = StubbornBody(
+        1.0,
+        way=[(0.004, BALL.vertices), (0.5, 2 * BALL.vertices), (0.996, BALL.vertices)],
+    )
     shapes = with_stops(WeekShape(22.0, BALL.vertices), 23.0, body)
-    assert [(shape.week, shape.is_stop) for shape in shapes] == [(22.5, True), (23.0, False)]
+    assert [(shape.week, shape.is_stop) for shape in shapes] == [
+        (22.5, True),
+        (23.0, False),
+    ]
     assert shapes[0].positions == pytest.approx(2 * BALL.vertices)
 
 
-def test_the_tissue_below_is_that_of_the_observed_surface_and_of_the_body_at_the_start():
+def test_tissue_below_is_that_of_the_observed_surface_and_of_the_body_at_the_start():
     """A body's own normals are rough: their errors would add up from week to week."""
-    shift = Deformation(rigid(shift=(5.0, 0.0, 0.0)), np.zeros((9, 9, 9, 3)), scaling(15.0, -60.0))
-    rough = BALL.vertices * (1 + 0.02 * np.random.default_rng(0).choice([-1.0, 1.0], len(EVERY)))[:, None]
+    shift = Deformation(
+        rigid(shift=(5.0, 0.0, 0.0)), np.zeros((9, 9, 9, 3)), scaling(15.0, -60.0)
+    )
+    rough = (
+        BALL.vertices
+        * (1 + 0.02 * np.random.default_rng(0).choice([-1.0, 1.0], len(EVERY)))[:, None]
+    )
     observed = [larger(0.5), larger(1.0)]
     for shapes, expected in (
         ([WeekShape(22.0, rough)], TriangleMesh(rough, BALL.faces)),
-        ([WeekShape(22.0, BALL.vertices), WeekShape(22.5, rough, is_stop=True), WeekShape(23.0, rough)], observed[0]),
+        (
+            [
+                WeekShape(22.0, BALL.vertices),
+                WeekShape(22.5, rough, is_stop=True),
+                WeekShape(23.0, rough),
+            ],
+            observed[0],
+        ),
     ):
-        places, _, target = next(_carried(BALL, EVERY, shapes, [shift] * 2, observed, True))
+        places, _, target = next(
+            _carried(BALL, EVERY, shapes, [shift] * 2, observed, True)
+        )
         assert places == pytest.approx(rough + [5.0, 0.0, 0.0])
         surface, below = target
         assert surface is observed[len(shapes) > 1]
-        assert below == pytest.approx(tissue_below(TriangleMesh(rough, BALL.faces), expected, shift))
+        assert below == pytest.approx(
+            tissue_below(TriangleMesh(rough, BALL.faces), expected, shift)
+        )
     smooth = inner(larger(0.5), INNER_MM).vertices
     assert points_below(larger(0.5)) == pytest.approx(smooth)
     assert np.abs(radii(below - [5.0, 0.0, 0.0]) - 18.5).max() < 0.1

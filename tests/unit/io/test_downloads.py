@@ -37,7 +37,9 @@ def fetched(folder, server, name, **known):
 
 @pytest.mark.parametrize(("name", "content"), [(LONG, LABELS), (SHORT, SURFACE)])
 def test_a_file_comes_whole_and_its_checksum_is_said(tmp_path, server, name, content):
-    said = fetched(tmp_path / "new", server, name, sha256=sha256(content), size=len(content))
+    said = fetched(
+        tmp_path / "new", server, name, sha256=sha256(content), size=len(content)
+    )
     assert files_in(tmp_path / "new") == {name: content}
     assert said == [Facts(tmp_path / "new" / name, sha256(content))]
     assert sha256_of(tmp_path / "new" / name) == sha256(content)
@@ -56,7 +58,9 @@ def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     own = gifti(seed=5)
     (tmp_path / SHORT).write_bytes(own)
     assert fetched(tmp_path, server, SHORT) == [Facts(tmp_path / SHORT)]
-    with pytest.raises(StorageError, check=Facts(tmp_path / SHORT, sha256(own), sha256(SURFACE))):
+    with pytest.raises(
+        StorageError, check=Facts(tmp_path / SHORT, sha256(own), sha256(SURFACE))
+    ):
         fetched(tmp_path, server, SHORT, sha256=sha256(SURFACE))
     assert files_in(tmp_path) == {SHORT: own}
     assert server.asked == []
@@ -70,15 +74,37 @@ BROKEN, OTHER = [150_000] * downloads.TRIES, "0" * 64
     [
         (LONG, LABELS, BROKEN, OTHER, [150_000]),
         (LONG, LABELS, [], OTHER, [sha256(LABELS), OTHER]),
-        (LONG, b"<!DOCTYPE html><title>Log in</title>", [], None, ["b'<!DOCTYPE html>"]),
-        (SHORT, b"<!DOCTYPE html><title>Log in</title>", [], None, ["b'<!DOCTYPE html>"]),
+        (
+            LONG,
+            b"<!DOCTYPE html><title>Log in</title>",
+            [],
+            None,
+            ["b'<!DOCTYPE html>"],
+        ),
+        (
+            SHORT,
+            b"<!DOCTYPE html><title>Log in</title>",
+            [],
+            None,
+            ["b'<!DOCTYPE html>"],
+        ),
         (SHORT, SURFACE[:-20], [], None, ["b'<?xml"]),
     ],
-    ids=["broken", "checksum", "page for an image", "page for a surface", "half a surface"],
+    ids=[
+        "broken",
+        "checksum",
+        "page for an image",
+        "page for a surface",
+        "half a surface",
+    ],
 )
-def test_what_is_not_the_file_is_refused_and_nothing_is_kept(tmp_path, server, name, content, broken, known, facts):
+def test_what_is_not_the_file_is_refused_and_nothing_is_kept(
+    tmp_path, server, name, content, broken, known, facts
+):
     server.files[name], server.broken_after[name] = content, list(broken)
-    with pytest.raises(StorageError, check=Facts(f"{server.url}/{name}:", *facts)) as caught:
+    with pytest.raises(
+        StorageError, check=Facts(f"{server.url}/{name}:", *facts)
+    ) as caught:
         fetched(tmp_path, server, name, sha256=known)
     assert caught.value.exit_code == 5
     assert files_in(tmp_path) == {}
@@ -88,7 +114,9 @@ def test_without_a_network_nothing_is_kept(tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         nowhere = Server({}, url=f"http://127.0.0.1:{free.getsockname()[1]}")
-        facts = Facts(f"{nowhere.url}/{SHORT}:", "Connection refused", tmp_path / "atlas")
+        facts = Facts(
+            f"{nowhere.url}/{SHORT}:", "Connection refused", tmp_path / "atlas"
+        )
         with pytest.raises(StorageError, check=facts) as caught:
             fetched(tmp_path, nowhere, SHORT)
     assert caught.value.exit_code == 5

@@ -61,15 +61,33 @@ def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
 
 def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
     path = tmp_path / "a.csv"
-    with pytest.raises(StorageError, check=Facts(path, "No space left on device")) as caught, atomic_write(path):
+    with (
+        pytest.raises(
+            StorageError, check=Facts(path, "No space left on device")
+        ) as caught,
+        atomic_write(path),
+    ):
         raise OSError(errno.ENOSPC, "No space left on device")
     assert caught.value.exit_code == 5
 
 
 def test_json_unwraps_numpy_and_has_no_nan(tmp_path):
     path = tmp_path / "a.json"
-    write_json(path, {"n": np.int64(3), "x": [np.float32(0.5), np.nan, np.inf], "m": np.eye(2), "ok": np.True_})
-    assert read_json(path) == {"n": 3, "x": [0.5, None, None], "m": [[1.0, 0.0], [0.0, 1.0]], "ok": True}
+    write_json(
+        path,
+        {
+            "n": np.int64(3),
+            "x": [np.float32(0.5), np.nan, np.inf],
+            "m": np.eye(2),
+            "ok": np.True_,
+        },
+    )
+    assert read_json(path) == {
+        "n": 3,
+        "x": [0.5, None, None],
+        "m": [[1.0, 0.0], [0.0, 1.0]],
+        "ok": True,
+    }
     assert "NaN" not in path.read_text()
 
 
@@ -88,7 +106,10 @@ def test_json_unwraps_numpy_and_has_no_nan(tmp_path):
 def test_cells_stay_below_their_heading(tmp_path, rows):
     path = tmp_path / "participants.tsv"
     path.write_text("\n".join(("id\tage\tfile", *rows)) + "\n")
-    assert read_text_table(path) == [{"id": "s1", "age": "24", "file": "a"}, {"id": "s2", "age": "25", "file": "b"}]
+    assert read_text_table(path) == [
+        {"id": "s1", "age": "24", "file": "a"},
+        {"id": "s2", "age": "25", "file": "b"},
+    ]
 
 
 ROWS = [{"id": "s1", "age": "24,5"}, {"id": "s2", "age": "25"}]
@@ -116,12 +137,36 @@ def test_a_workbook_of_excel_is_named_with_what_to_do(tmp_path, start):
         read_text_table(tmp_path / "participants.tsv")
 
 
-NAMES = ("021", "7", "1e5", "NA", "None", "true", "1.0", "2024-01-01", "-", "nan", "1_000", "a")
+NAMES = (
+    "021",
+    "7",
+    "1e5",
+    "NA",
+    "None",
+    "true",
+    "1.0",
+    "2024-01-01",
+    "-",
+    "nan",
+    "1_000",
+    "a",
+)
 
 
 def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
-    for column in ("subject", "run", "region", "real", "start", "series", "page", "population"):
-        table = pd.DataFrame({column: NAMES, "week": np.arange(12) / 4, "explained": [True, False] * 6})
+    for column in (
+        "subject",
+        "run",
+        "region",
+        "real",
+        "start",
+        "series",
+        "page",
+        "population",
+    ):
+        table = pd.DataFrame(
+            {column: NAMES, "week": np.arange(12) / 4, "explained": [True, False] * 6}
+        )
         write_table(tmp_path / "a.csv", table.assign(value=np.nan, unit=""))
         back = read_table(tmp_path / "a.csv")
         assert tuple(back[column]) == NAMES
@@ -130,7 +175,10 @@ def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
         assert back[["value", "unit"]].isna().all(axis=None)
         # all of one kind, too
         for name in NAMES:
-            write_table(tmp_path / "a.csv", pd.DataFrame({column: [name] * 2, "week": [21.0, 22.5]}))
+            write_table(
+                tmp_path / "a.csv",
+                pd.DataFrame({column: [name] * 2, "week": [21.0, 22.5]}),
+            )
             assert read_table(tmp_path / "a.csv")[column].tolist() == [name] * 2
 
 
@@ -155,11 +203,15 @@ def test_keys_that_yaml_reads_as_something_else_are_refused(tmp_path, key):
     (tmp_path / "a.yaml").write_text(f"runs:\n  {key}: {{}}\n")
     with pytest.raises(InputError, check=Facts(tmp_path / "a.yaml", "line 2", key)):
         read_keys(tmp_path / "a.yaml")
-    (tmp_path / "a.yaml").write_text(f'runs:\n  "{key}": {{}}\n  1: {{}}\n  21.50: {{}}\n')
+    (tmp_path / "a.yaml").write_text(
+        f'runs:\n  "{key}": {{}}\n  1: {{}}\n  21.50: {{}}\n'
+    )
     assert list(read_keys(tmp_path / "a.yaml")["runs"]) == [key, 1, 21.5]
 
 
-def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monkeypatch):
+def test_contents_are_read_again_only_where_size_or_times_changed(
+    tmp_path, monkeypatch
+):
     one, other, gone = tmp_path / "one", tmp_path / "other", tmp_path / "gone"
     one.write_text("a brain")
     other.write_text("another")
@@ -183,7 +235,11 @@ def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monk
     [
         ("a.hdr", "a.img", b""),
         ("a.img.gz", "a.hdr.gz", b""),
-        ("a.surf.gii", "points & more.dat", b'<DataArray ExternalFileName="points &amp; more.dat" Dim0="3">'),
+        (
+            "a.surf.gii",
+            "points & more.dat",
+            b'<DataArray ExternalFileName="points &amp; more.dat" Dim0="3">',
+        ),
     ],
 )
 def test_a_change_behind_an_input_is_one_of_its_contents(tmp_path, name, behind, text):
@@ -207,7 +263,9 @@ ABSENT = {
 }
 
 
-@pytest.mark.parametrize(("content", "command"), ABSENT.items(), ids=["link", "pointer", "LFS"])
+@pytest.mark.parametrize(
+    ("content", "command"), ABSENT.items(), ids=["link", "pointer", "LFS"]
+)
 @pytest.mark.parametrize(
     ("name", "read"),
     [
@@ -220,8 +278,12 @@ ABSENT = {
         ("a.yaml", read_yaml),
     ],
 )
-def test_content_that_is_not_here_is_named_with_the_command_that_gets_it(tmp_path, name, read, content, command):
-    nib.save(nib.Nifti1Pair(np.zeros((9, 9, 9), np.uint8), np.eye(4)), tmp_path / "a.img")
+def test_content_that_is_not_here_is_named_with_the_command_that_gets_it(
+    tmp_path, name, read, content, command
+):
+    nib.save(
+        nib.Nifti1Pair(np.zeros((9, 9, 9), np.uint8), np.eye(4)), tmp_path / "a.img"
+    )
     path = tmp_path / name
     path.unlink(missing_ok=True)
     path.symlink_to(content) if content is LINK else path.write_text(content)
@@ -229,11 +291,16 @@ def test_content_that_is_not_here_is_named_with_the_command_that_gets_it(tmp_pat
         read(path)
     if content is LINK:
         assert path in files_below(tmp_path)
-        assert refusal({"brains": [{"id": "a", "week": 21, "pial": str(path)}]}) == Facts(f"datalad get {path}")
+        assert refusal(
+            {"brains": [{"id": "a", "week": 21, "pial": str(path)}]}
+        ) == Facts(f"datalad get {path}")
 
 
 def test_a_link_to_a_key_is_read_as_its_own_name_says(tmp_path):
-    key, link = tmp_path / ".git" / "annex" / "objects" / "K" / "K", tmp_path / "a.surf.gii"
+    key, link = (
+        tmp_path / ".git" / "annex" / "objects" / "K" / "K",
+        tmp_path / "a.surf.gii",
+    )
     write_surface(tmp_path / "b.surf.gii", sphere(10, 1))
     key.parent.mkdir(parents=True)
     (tmp_path / "b.surf.gii").rename(key)

@@ -1,4 +1,5 @@
-"""Each format of surfaces and volumes is read, recognised by `gyriflow init`, and hidden where a report shows keys."""
+"""Each format of surfaces and volumes is read, recognised by `gyriflow init`, and
+hidden where a report shows keys."""
 
 import gzip
 
@@ -48,11 +49,14 @@ WRITERS = {
 
 
 def written(form, folder, stem, suffix):
-    """Write a file of a format and return its path; what is packed is packed afterwards."""
+    """Write a file of a format and return its path; what is packed is packed
+    afterwards."""
     WRITERS[form.name](folder / f"{stem}{suffix.removesuffix('.gz')}")
     if suffix.endswith(".gz"):
         for path in folder.glob(f"{stem}.*"):
-            path.with_name(f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes()))
+            path.with_name(f"{path.name}.gz").write_bytes(
+                gzip.compress(path.read_bytes())
+            )
             path.unlink()
     return folder / f"{stem}{suffix}"
 
@@ -65,7 +69,9 @@ def written(form, folder, stem, suffix):
 def test_a_format_is_read_recognised_and_hidden(tmp_path, form, suffix):
     # FreeSurfer's ending is the layer
     pial = "" if suffix in (".pial", ".white") else ".pial"
-    stems = ["case_week22_dseg"] if form.content == "volume" else [f"lh{pial}", f"rh{pial}"]
+    stems = (
+        ["case_week22_dseg"] if form.content == "volume" else [f"lh{pial}", f"rh{pial}"]
+    )
     paths = [written(form, tmp_path, stem, suffix) for stem in stems]
     if suffix == ".white":
         for side in ("lh", "rh"):
@@ -74,19 +80,26 @@ def test_a_format_is_read_recognised_and_hidden(tmp_path, form, suffix):
         if form.content == "surface":
             surface = read_surface(path)
             assert is_closed(surface)
-            assert signed_volume(surface) == pytest.approx(signed_volume(BALL), rel=1e-5)
-            assert np.sort(surface.vertices, axis=0) == pytest.approx(np.sort(BALL.vertices, axis=0), abs=1e-4)
+            assert signed_volume(surface) == pytest.approx(
+                signed_volume(BALL), rel=1e-5
+            )
+            assert np.sort(surface.vertices, axis=0) == pytest.approx(
+                np.sort(BALL.vertices, axis=0), abs=1e-4
+            )
         else:
             assert (read_label_volume(path).labels == LABELS).all()
         assert is_volume(path) == (form.content == "volume")
         assert hide_paths({"file": path.name}) == {"file": "(file)"}
     (found,) = recognise(tmp_path).brains
     # a pair is named by its header
-    assert all(repr(path.name.replace(".img", ".hdr")) in repr(found.entry) for path in paths)
+    assert all(
+        repr(path.name.replace(".img", ".hdr")) in repr(found.entry) for path in paths
+    )
 
 
 def write_mni(path, ball=BALL, coloured_by=2, corners=3):
-    """Write a surface as programs of the MNI do, coloured as a whole (0), by faces (1) or by vertices (2)."""
+    """Write a surface as programs of the MNI do, coloured as a whole (0), by faces (1)
+    or by vertices (2)."""
     colours = {0: 1, 1: len(ball.faces), 2: len(ball.vertices)}[coloured_by]
     ends = corners * np.arange(1, len(ball.faces) + 1)
     parts = [
@@ -118,7 +131,9 @@ def test_other_obj_files_of_the_mni_are_named(tmp_path):
     path.write_bytes(path.read_bytes()[:-500])
     with pytest.raises(InputError, check=Facts(path)):
         read_surface(path)
-    path.write_bytes(b"p" + np.array([0.3, 0.3, 0.4, 10.0], ">f4").tobytes() + b"\0" * 100)
+    path.write_bytes(
+        b"p" + np.array([0.3, 0.3, 0.4, 10.0], ">f4").tobytes() + b"\0" * 100
+    )
     with pytest.raises(InputError, check=Facts(path, "binary", "MNI")):
         read_surface(path)
     path.write_text("# nothing\n")
@@ -126,7 +141,9 @@ def test_other_obj_files_of_the_mni_are_named(tmp_path):
         read_surface(path)
 
 
-@pytest.mark.parametrize("ending", ["dlabel", "dscalar", "dtseries", "pconn", "dpconn", "plabel"])
+@pytest.mark.parametrize(
+    "ending", ["dlabel", "dscalar", "dtseries", "pconn", "dpconn", "plabel"]
+)
 def test_cifti_files_are_not_volumes(tmp_path, ending):
     assert not is_volume(f"a.{ending}.nii")
     assert is_volume(f"a.{ending}.nii.gz")
@@ -136,14 +153,18 @@ def test_cifti_files_are_not_volumes(tmp_path, ending):
     (brain,) = recognise(tmp_path).brains
     assert brain.entry["labels"] == "sub-1_week24_dseg.nii.gz"
     (tmp_path / "sub-1_week24_dseg.nii.gz").unlink()
-    with pytest.raises(InputError, check=Facts(f"sub-1_week24_seg.{ending}.nii", "CIFTI")):
+    with pytest.raises(
+        InputError, check=Facts(f"sub-1_week24_seg.{ending}.nii", "CIFTI")
+    ):
         recognise(tmp_path)
 
 
 def test_each_format_has_a_reader_and_each_reader_a_format():
     readers = {"surface": SURFACE_READERS, "volume": VOLUME_READERS}
     for content, by_name in readers.items():
-        assert list(by_name) == [form.name for form in FORMATS if form.content == content]
+        assert list(by_name) == [
+            form.name for form in FORMATS if form.content == content
+        ]
     suffixes = [suffix for form in FORMATS for suffix in form.all_suffixes]
     assert len(suffixes) == len(set(suffixes))
 

@@ -1,4 +1,5 @@
-"""Tetrahedral meshes, regions and frames on disk come back, and ParaView's reader and dolfinx find all in place."""
+"""Tetrahedral meshes, regions and frames on disk come back, and ParaView's reader and
+dolfinx find all in place."""
 
 import dolfinx
 import numpy as np
@@ -13,7 +14,12 @@ from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 from written_frames import element_field
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_faces,
+    quadratic,
+    signed_volumes,
+)
 from gyriflow.io.frames import (
     join_frames,
     read_field,
@@ -64,13 +70,18 @@ def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path, make):
 def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, found):
     points = np.vstack([np.zeros(3), np.eye(3)])
     points[3, 2] = point
-    write_tetrahedral_mesh(tmp_path / "bad.xdmf", TetrahedralMesh(points, np.array([tet])))
+    write_tetrahedral_mesh(
+        tmp_path / "bad.xdmf", TetrahedralMesh(points, np.array([tet]))
+    )
     with pytest.raises(InputError, check=Facts(tmp_path / "bad.h5", 1, found)):
         read_tetrahedral_mesh(tmp_path / "bad.xdmf")
 
 
 def test_maps_on_a_mesh_come_back_exactly(tmp_path):
-    maps = {"thickness_mm": np.random.default_rng(0).normal(size=50), "growth_rate_per_s": np.full(50, 2e-7)}
+    maps = {
+        "thickness_mm": np.random.default_rng(0).normal(size=50),
+        "growth_rate_per_s": np.full(50, 2e-7),
+    }
     write_maps(tmp_path / "maps.h5", maps)
     np.testing.assert_equal(read_maps(tmp_path / "maps.h5"), maps)
 
@@ -85,14 +96,29 @@ def test_missing_and_torn_files_are_refused(tmp_path, read, name):
 
 @pytest.fixture
 def frames(tmp_path):
-    """Three frames of a box that grows with the week, with fields at vertices and elements, as many as vertices."""
+    """Three frames of a box that grows with the week, with fields at vertices and
+    elements, as many as vertices."""
     box = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
-    # eight elements of eight vertices: only the place in the file tells the two kinds apart
+    # eight elements of eight vertices: only the place in the file tells the two kinds
+    # apart
     mesh = TetrahedralMesh(box.vertices, np.vstack([box.tets, box.tets[:2]]))
     for week in (21.0, 21.5, 22.0):
-        vertex_fields = {"positions": mesh.vertices * week, "w": np.full(8, week), "u": mesh.vertices * (week - 21)}
-        write_frame(tmp_path / f"{week}.h5", week, vertex_fields, {"stress": week + np.arange(8), "zone": np.arange(8)})
-    join_frames(tmp_path / "frames.h5", mesh.tets, [tmp_path / f"{week}.h5" for week in (21.0, 21.5, 22.0)])
+        vertex_fields = {
+            "positions": mesh.vertices * week,
+            "w": np.full(8, week),
+            "u": mesh.vertices * (week - 21),
+        }
+        write_frame(
+            tmp_path / f"{week}.h5",
+            week,
+            vertex_fields,
+            {"stress": week + np.arange(8), "zone": np.arange(8)},
+        )
+    join_frames(
+        tmp_path / "frames.h5",
+        mesh.tets,
+        [tmp_path / f"{week}.h5" for week in (21.0, 21.5, 22.0)],
+    )
     return tmp_path / "frames.h5", mesh
 
 
@@ -102,7 +128,9 @@ def test_frames_are_joined_into_one_time_series(frames):
     np.testing.assert_array_equal(read_positions(path, 21.5), mesh.vertices * 21.5)
     np.testing.assert_array_equal(read_tets(path), mesh.tets)
     np.testing.assert_array_equal(read_field(path, 22.0, "w"), np.full(8, 22.0))
-    np.testing.assert_array_equal(element_field(path, 21.5, "stress"), 21.5 + np.arange(8))
+    np.testing.assert_array_equal(
+        element_field(path, 21.5, "stress"), 21.5 + np.arange(8)
+    )
     with pytest.raises(InputError, check=Facts(path, "w", 23, 21, 21.5, 22)):
         read_field(path, 23.0, "w")
     with pytest.raises(InputError, check=Facts(path, "stress", 21)):
@@ -110,7 +138,12 @@ def test_frames_are_joined_into_one_time_series(frames):
     folder = path.parent
     (folder / "torn.h5").write_bytes(path.read_bytes()[:-1000])
     for name in ("torn.h5", "lost.h5"):
-        for read in (read_weeks, read_tets, read_pial_frames, lambda path: read_positions(path, 21.0)):
+        for read in (
+            read_weeks,
+            read_tets,
+            read_pial_frames,
+            lambda path: read_positions(path, 21.0),
+        ):
             with pytest.raises(InputError, check=Facts(folder / name)):
                 read(folder / name)
 
@@ -132,11 +165,15 @@ def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """A box tagged by place: elements by the side of x = 0 and by height, facets by the side and where they face up."""
+    """A box tagged by place: elements by the side of x = 0 and by height, facets by the
+    side and where they face up."""
     mesh = box_mesh((4, 3, 2), (4.0, 3.0, 2.0))
     facets, _ = boundary_faces(mesh)
     cells, faces = mesh.vertices[mesh.tets].mean(axis=1), mesh.vertices[facets]
-    cell_tags = {"hemisphere": np.where(cells[:, 0] < 0, 1, 2), "layer": np.where(cells[:, 2] < 0, 5, 7)}
+    cell_tags = {
+        "hemisphere": np.where(cells[:, 0] < 0, 1, 2),
+        "layer": np.where(cells[:, 2] < 0, 5, 7),
+    }
     facet_tags = {
         "zone": np.where((faces[:, :, 2] == 1.0).all(axis=1), 3, 0),
         "hemisphere": np.where(faces[:, :, 0].mean(axis=1) < 0, 1, 2),
@@ -150,8 +187,17 @@ def written(tmp_path_factory):
 def test_what_is_written_comes_back(written):
     path, mesh, facets, cell_tags, facet_tags = written
     back = read_regions(path)
-    found = back.mesh.vertices, back.mesh.tets, back.facets, back.cell_tags, back.facet_tags, back.fields["normal"]
-    np.testing.assert_equal(found, (mesh.vertices, mesh.tets, facets, cell_tags, facet_tags, mesh.vertices))
+    found = (
+        back.mesh.vertices,
+        back.mesh.tets,
+        back.facets,
+        back.cell_tags,
+        back.facet_tags,
+        back.fields["normal"],
+    )
+    np.testing.assert_equal(
+        found, (mesh.vertices, mesh.tets, facets, cell_tags, facet_tags, mesh.vertices)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -175,10 +221,15 @@ def domain(written):
         ("facet_hemisphere", 2, lambda x: np.where(x[:, 0] < 0, 1, 2)),
     ],
 )
-def test_dolfinx_reads_every_tag_where_it_belongs(written, domain, grid, dimension, expected):
+def test_dolfinx_reads_every_tag_where_it_belongs(
+    written, domain, grid, dimension, expected
+):
     path, mesh, facets, *_ = written
     with XDMFFile(MPI.COMM_SELF, path, "r") as file:
         tags = file.read_meshtags(domain, grid, xpath="/Xdmf/Domain[2]")
     assert tags.dim == dimension
     assert len(tags.values) == (len(facets) if dimension == 2 else len(mesh.tets))
-    np.testing.assert_array_equal(tags.values, expected(dolfinx.mesh.compute_midpoints(domain, tags.dim, tags.indices)))
+    np.testing.assert_array_equal(
+        tags.values,
+        expected(dolfinx.mesh.compute_midpoints(domain, tags.dim, tags.indices)),
+    )

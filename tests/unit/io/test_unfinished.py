@@ -1,4 +1,5 @@
-"""Shapes of an unfinished fit are read again if they are whole and everything they depend on is as before."""
+"""Shapes of an unfinished fit are read again if they are whole and everything they
+depend on is as before."""
 
 import h5py
 import numpy as np

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from shapes import box_mesh
 
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, radius_ratios, signed_volumes
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    radius_ratios,
+    signed_volumes,
+)
 from gyriflow.mesh.improvement import MIN_RADIUS_RATIO, improve_flat_elements
 
 MESH = box_mesh((5, 5, 5), (10.0, 10.0, 10.0))
@@ -12,7 +17,8 @@ MESH = box_mesh((5, 5, 5), (10.0, 10.0, 10.0))
 
 
 def flattened(vertex, towards):
-    """Return the mesh with a vertex close to the middle of a face of one of its elements, and that element."""
+    """Return the mesh with a vertex close to the middle of a face of one of its
+    elements, and that element."""
     element = MESH.tets[(MESH.tets == vertex).any(axis=1)][towards]
     middle = MESH.vertices[element[element != vertex]].mean(axis=0)
     vertices = MESH.vertices.copy()
@@ -22,7 +28,9 @@ def flattened(vertex, towards):
 
 @pytest.mark.parametrize("towards", [0, 5, 11])
 def test_a_flat_element_inside_is_improved_and_the_surface_stays(towards):
-    centre = int(np.argmin(np.linalg.norm(MESH.vertices - MESH.vertices.mean(axis=0), axis=1)))
+    centre = int(
+        np.argmin(np.linalg.norm(MESH.vertices - MESH.vertices.mean(axis=0), axis=1))
+    )
     # not the centre itself: a vertex beside it, with uneven surroundings
     flat = flattened(centre + 1, towards)
     assert 0 < radius_ratios(flat).min() < MIN_RADIUS_RATIO

@@ -1,4 +1,5 @@
-"""Sizing, quality and tetrahedralisation; what is told when a mesher dies; distances, crossings, widths of gaps."""
+"""Sizing, quality and tetrahedralisation; what is told when a mesher dies; distances,
+crossings, widths of gaps."""
 
 import os
 from functools import partial
@@ -19,7 +20,13 @@ from gyriflow.geometry.tetrahedra import (
     radius_ratios,
     signed_volumes,
 )
-from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, signed_volume
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    flipped,
+    mean_edge_length,
+    merged,
+    signed_volume,
+)
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
@@ -34,23 +41,49 @@ from gyriflow.mesh.quality import (
     quality_summary,
     refuse_bad_mesh,
 )
-from gyriflow.mesh.tetrahedralisation import edge_length_at, even_surface, tetrahedralise
+from gyriflow.mesh.tetrahedralisation import (
+    edge_length_at,
+    even_surface,
+    tetrahedralise,
+)
 
-REGULAR = TetrahedralMesh([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 1, 2, 3]])
-GATES = {"min_radius_ratio": 0.02, "max_volume_change": 0.02, "max_surface_distance_mm": 0.1}
-SIZES = {"surface_edge_mm": 1.5, "core_edge_mm": 3.0, "envelope_mm": 0.1, "time_limit_s": 120}
-OUTPUTS = {"mesh": "brain.xdmf", "data": "brain.h5", "surface": "pial.stl", "quality": "quality.json"}
+REGULAR = TetrahedralMesh(
+    [[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]], [[0, 1, 2, 3]]
+)
+GATES = {
+    "min_radius_ratio": 0.02,
+    "max_volume_change": 0.02,
+    "max_surface_distance_mm": 0.1,
+}
+SIZES = {
+    "surface_edge_mm": 1.5,
+    "core_edge_mm": 3.0,
+    "envelope_mm": 0.1,
+    "time_limit_s": 120,
+}
+OUTPUTS = {
+    "mesh": "brain.xdmf",
+    "data": "brain.h5",
+    "surface": "pial.stl",
+    "quality": "quality.json",
+}
 STAND_INS = {"pytetwild": "pytetwild.py", "tetgen": "igl/copyleft/tetgen.py"}
 MESHERS = list(STAND_INS)
 BALL = sphere(8.0, 3)
 
 
 def test_the_corner_element_has_its_known_quality():
-    corner = TetrahedralMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    corner = TetrahedralMesh(
+        [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]
+    )
     inscribed, circumscribed = 1 / (3 + np.sqrt(3)), np.sqrt(3) / 2
-    assert radius_ratios(corner)[0] == pytest.approx(3 * inscribed / circumscribed, rel=1e-12)
+    assert radius_ratios(corner)[0] == pytest.approx(
+        3 * inscribed / circumscribed, rel=1e-12
+    )
     angles = np.sort(dihedral_angles(corner)[0])
-    np.testing.assert_allclose(angles, [np.degrees(np.arccos(1 / np.sqrt(3)))] * 3 + [90] * 3, rtol=1e-12)
+    np.testing.assert_allclose(
+        angles, [np.degrees(np.arccos(1 / np.sqrt(3)))] * 3 + [90] * 3, rtol=1e-12
+    )
 
 
 def summary_of(mesh):
@@ -58,12 +91,20 @@ def summary_of(mesh):
 
 
 def test_a_good_mesh_passes_every_gate():
-    refuse_bad_mesh(REGULAR, summary_of(REGULAR), **(GATES | {"min_radius_ratio": 0.99}))
+    refuse_bad_mesh(
+        REGULAR, summary_of(REGULAR), **(GATES | {"min_radius_ratio": 0.99})
+    )
 
 
 def test_flat_elements_are_refused_with_their_place_and_all_gates_they_fail():
-    flat = TetrahedralMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1e-3]], [[0, 1, 2, 3]])
-    with pytest.raises(MeshError, match=r"7\.1\d*e-06", check=Facts("1 of 1", "[0.3, 0.3, 0.0] mm", 0.02)):
+    flat = TetrahedralMesh(
+        [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1e-3]], [[0, 1, 2, 3]]
+    )
+    with pytest.raises(
+        MeshError,
+        match=r"7\.1\d*e-06",
+        check=Facts("1 of 1", "[0.3, 0.3, 0.0] mm", 0.02),
+    ):
         refuse_bad_mesh(flat, summary_of(flat), **GATES)
 
 
@@ -72,16 +113,28 @@ def test_a_surface_that_left_the_given_one_is_refused():
     larger = box_mesh((2, 2, 2), (5.0, 5.0, 5.0))
     summary = quality_summary(box, boundary_surface(larger)[0])
     # the corner of the larger box is √3/2 from the smaller one, its faces 0.5
-    assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.5 * np.sqrt(3))
-    with pytest.raises(MeshError, match=r"0\.\d+ mm", check=Facts("0.1 mm", "mesh.max_surface_distance_mm")):
+    assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(
+        0.5 * np.sqrt(3)
+    )
+    with pytest.raises(
+        MeshError,
+        match=r"0\.\d+ mm",
+        check=Facts("0.1 mm", "mesh.max_surface_distance_mm"),
+    ):
         refuse_bad_mesh(box, summary, **GATES)
-    refuse_bad_mesh(box, summary, **(GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.9}))
+    refuse_bad_mesh(
+        box,
+        summary,
+        **(GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.9}),
+    )
 
 
 @pytest.mark.parametrize(("size", "change"), [(4.1, "-7.1 %"), (3.9, "+7.9 %")])
 def test_a_mesh_that_lost_or_won_volume_is_refused_with_the_share(size, change):
     box = box_mesh((2, 2, 2), (4.0, 4.0, 4.0))
-    summary = quality_summary(box, boundary_surface(box_mesh((2, 2, 2), (size,) * 3))[0])
+    summary = quality_summary(
+        box, boundary_surface(box_mesh((2, 2, 2), (size,) * 3))[0]
+    )
     with pytest.raises(MeshError, check=Facts("64 mm3", change, "2 %")):
         refuse_bad_mesh(box, summary, **GATES)
     refuse_bad_mesh(box, summary, **(GATES | {"max_volume_change": 0.08}))
@@ -93,7 +146,12 @@ def test_a_mesh_that_shuts_the_fissure_is_refused():
         shifts = ([-2 - gap / 2, 0, 0], [2 + gap / 2, 0, 0])
         first = len(parts[0].vertices)
         return TetrahedralMesh(
-            np.vstack([part.vertices + shift for part, shift in zip(parts, shifts, strict=True)]),
+            np.vstack(
+                [
+                    part.vertices + shift
+                    for part, shift in zip(parts, shifts, strict=True)
+                ]
+            ),
             np.vstack([parts[0].tets, parts[1].tets + first]),
         )
 
@@ -110,7 +168,9 @@ def test_edge_lengths_grow_with_depth_and_end_at_that_of_the_core():
     lengths = edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 0.8, 2.5)
     np.testing.assert_allclose(lengths, [0.8, 0.8, 1.8, 2.5])
     # nodes of quadratic elements are as far apart
-    np.testing.assert_allclose(edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 1.6, 5.0, 2), 2 * lengths)
+    np.testing.assert_allclose(
+        edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 1.6, 5.0, 2), 2 * lengths
+    )
 
 
 def test_a_ball_is_filled_within_the_envelope_by_elements_that_are_coarser_inside():
@@ -147,20 +207,31 @@ def stand_in(tmp_path, monkeypatch):
         for folder in path.relative_to(tmp_path).parents[:-1]:
             (tmp_path / folder / "__init__.py").touch()
         body = "\n".join(f"    {line}" for line in code)
-        path.write_text(f"import os, signal, time\ndef tetrahedralize(*arrays, **settings):\n{body}\n")
+        path.write_text(
+            "import os, signal, time\ndef tetrahedralize(*arrays,"
+            f" **settings):\n{body}\n"
+        )
         # the mesher's process is given this path
         monkeypatch.syspath_prepend(tmp_path)
 
     return put
 
 
-DYING = ("os.write(1, b'99 % of the elements are inverted')", "os.kill(os.getpid(), signal.SIGKILL)")
+DYING = (
+    "os.write(1, b'99 % of the elements are inverted')",
+    "os.kill(os.getpid(), signal.SIGKILL)",
+)
 HANGING = ("os.write(2, b'thinking')", "time.sleep(600)")
 
 
 @pytest.mark.parametrize("mesher", MESHERS)
 def test_the_folder_of_a_mesher_is_its_users_only(stand_in, mesher):
-    stand_in(mesher, "mode = os.stat('.').st_mode & 0o777", "os.write(1, f'mode {mode:o}'.encode())", DYING[1])
+    stand_in(
+        mesher,
+        "mode = os.stat('.').st_mode & 0o777",
+        "os.write(1, f'mode {mode:o}'.encode())",
+        DYING[1],
+    )
     before = os.umask(0)
     try:
         with pytest.raises(MeshError, match="mode 700"):
@@ -176,8 +247,12 @@ def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesh
     # on a busy machine its process has not begun when a short time is over
     for limit_s in (4, 20, 100):
         if "thinking" not in said:
-            with pytest.raises(MeshError, check=Facts(mesher, f"{limit_s} s")) as caught:
-                tetrahedralise(BALL, mesher=mesher, **(SIZES | {"time_limit_s": limit_s}))
+            with pytest.raises(
+                MeshError, check=Facts(mesher, f"{limit_s} s")
+            ) as caught:
+                tetrahedralise(
+                    BALL, mesher=mesher, **(SIZES | {"time_limit_s": limit_s})
+                )
             said = str(caught.value)
     assert "thinking" in said
 
@@ -185,15 +260,22 @@ def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesh
 def test_a_mesher_that_is_not_installed_is_said_so(stand_in):
     mesher = "tetgen"
     stand_in(mesher, "raise ImportError('cannot find its library')")
-    with pytest.raises(MeshError, check=Facts(mesher, "cannot find its library", "envs/requirements.txt")):
+    with pytest.raises(
+        MeshError,
+        check=Facts(mesher, "cannot find its library", "envs/requirements.txt"),
+    ):
         tetrahedralise(BALL, mesher=mesher, **SIZES)
 
 
 def mesh_in(folder, mesher, gates=GATES):
-    """Run the workflow's script on a ball; return the exit code and the files that it wrote for good."""
+    """Run the workflow's script on a ball; return the exit code and the files that it
+    wrote for good."""
     write_surface(folder / "pial.surf.gii", BALL)
     settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5}
-    params, code = {"settings": settings, "gates": gates, "refused": str(folder / "refused")}, 0
+    params, code = (
+        {"settings": settings, "gates": gates, "refused": str(folder / "refused")},
+        0,
+    )
     try:
         run_script("tetrahedralise.py", folder, {0: "pial.surf.gii"}, OUTPUTS, params)
     except SystemExit as end:
@@ -202,27 +284,44 @@ def mesh_in(folder, mesher, gates=GATES):
 
 
 @pytest.mark.parametrize("mesher", MESHERS)
-def test_the_step_of_a_mesher_that_dies_ends_in_three_with_all_that_it_printed_in_the_log(
+def test_the_step_of_a_mesher_that_dies_exits_with_three_and_logs_all_that_it_printed(
     stand_in, tmp_path, capsys, mesher
 ):
-    stand_in(mesher, "for i in range(300):", "    os.write(2, b'pass %d of the mesher\\n' % i)", *DYING)
+    stand_in(
+        mesher,
+        "for i in range(300):",
+        "    os.write(2, b'pass %d of the mesher\\n' % i)",
+        *DYING,
+    )
     assert mesh_in(tmp_path, mesher) == (3, [])
     said, log = capsys.readouterr().err, (tmp_path / "log").read_text()
     assert "inverted" in said
     # the message has the last words, the log all of them
     assert "pass 0 of the mesher" not in said
-    assert [f"{mesher}: pass {i} of the mesher\n" in log for i in range(300)] == [True] * 300
+    assert [f"{mesher}: pass {i} of the mesher\n" in log for i in range(300)] == [
+        True
+    ] * 300
     assert f"{mesher}: 99 % of the elements are inverted\n" in log
 
 
-def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_attempt(tmp_path, capsys):
-    refused, coarse = tmp_path / "refused", GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.1}
+def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_attempt(
+    tmp_path, capsys
+):
+    refused, coarse = (
+        tmp_path / "refused",
+        GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.1},
+    )
     strict = {"min_radius_ratio": 0.99, "max_surface_distance_mm": 1e-3}
     assert mesh_in(tmp_path, "tetgen", coarse | strict) == (3, [])
     said, log = capsys.readouterr().err, (tmp_path / "log").read_text()
-    assert said == Facts(refused / "brain.xdmf", 0.99, "0.001 mm", "mesh.max_surface_distance_mm")
+    assert said == Facts(
+        refused / "brain.xdmf", 0.99, "0.001 mm", "mesh.max_surface_distance_mm"
+    )
     assert said.removeprefix("gyriflow: ") in log
-    quality, mesh = read_json(refused / "quality.json"), read_tetrahedral_mesh(refused / "brain.xdmf")
+    quality, mesh = (
+        read_json(refused / "quality.json"),
+        read_tetrahedral_mesh(refused / "brain.xdmf"),
+    )
     assert quality["tets"] == len(mesh.tets)
     assert quality["min_radius_ratio"] == pytest.approx(radius_ratios(mesh).min())
     assert mesh_in(tmp_path, "tetgen", coarse) == (0, list(OUTPUTS))
@@ -237,7 +336,9 @@ def filled():
 def test_tetgen_keeps_the_remeshed_surface_exactly(filled):
     own, even = boundary_surface(filled)[0], even_surface(BALL, 1.2)
     assert len(own.faces) == len(even.faces)
-    np.testing.assert_array_equal(*(np.unique(surface.vertices, axis=0) for surface in (own, even)))
+    np.testing.assert_array_equal(
+        *(np.unique(surface.vertices, axis=0) for surface in (own, even))
+    )
     assert signed_volumes(filled).sum() == pytest.approx(signed_volume(even), rel=1e-12)
     assert (signed_volumes(filled) > 0).all()
 
@@ -246,17 +347,27 @@ def test_elements_of_tetgen_grow_inwards_up_to_the_core(filled):
     depth = 8 - np.linalg.norm(filled.vertices[filled.tets].mean(axis=1), axis=1)
     volumes = signed_volumes(filled)
     assert np.median(volumes[depth > 4]) > 1.5 * np.median(volumes[depth < 1])
-    # the regular element with edges of core_edge_mm; a few that touch the surface can't be divided
+    # the regular element with edges of core_edge_mm; a few that touch the surface can't
+    # be divided
     largest = 1.5**3 / (6 * np.sqrt(2))
-    fine = tetrahedralise(BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2, "core_edge_mm": 1.5}))
-    assert np.quantile(signed_volumes(fine), 0.99) <= largest < np.quantile(volumes, 0.7)
+    fine = tetrahedralise(
+        BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2, "core_edge_mm": 1.5})
+    )
+    assert (
+        np.quantile(signed_volumes(fine), 0.99) <= largest < np.quantile(volumes, 0.7)
+    )
 
 
 def test_a_narrow_gap_between_two_parts_stays_open():
     half = sphere(4.0, 3)
     apart = moved(half, 8.2)
-    mesh = tetrahedralise(merged(half, apart), mesher="tetgen", **(SIZES | {"surface_edge_mm": 0.6}))
-    left, right = (mesh.vertices[side] for side in (mesh.vertices[:, 0] < 4.1, mesh.vertices[:, 0] > 4.1))
+    mesh = tetrahedralise(
+        merged(half, apart), mesher="tetgen", **(SIZES | {"surface_edge_mm": 0.6})
+    )
+    left, right = (
+        mesh.vertices[side]
+        for side in (mesh.vertices[:, 0] < 4.1, mesh.vertices[:, 0] > 4.1)
+    )
     assert right[:, 0].min() - left[:, 0].max() == pytest.approx(0.2, abs=0.03)
     assert radius_ratios(mesh).min() > 0.02
 
@@ -272,20 +383,28 @@ def test_a_surface_that_cuts_itself_is_refused():
 def test_quadratic_elements_follow_the_surface_on_as_many_nodes(mesher):
     surface = sphere(8.0, 4)
     meshes = [
-        tetrahedralise(surface, mesher=mesher, order=order, **(SIZES | {"surface_edge_mm": 1.2})) for order in (1, 2)
+        tetrahedralise(
+            surface, mesher=mesher, order=order, **(SIZES | {"surface_edge_mm": 1.2})
+        )
+        for order in (1, 2)
     ]
     linear, bent = (quality_summary(mesh, surface) for mesh in meshes)
-    # pytetwild makes more where its surface is strongly curved, as this one is for elements of 2.4 mm
+    # pytetwild makes more where its surface is strongly curved, as this one is for
+    # elements of 2.4 mm
     assert 0.5 < bent["vertices"] / linear["vertices"] < 2.6
     assert bent["tets"] < linear["tets"] / 2
     assert bent["min_jacobian_ratio"] >= 0.3
     assert bent["crossing_faces"] == 0
-    assert bent["surface_distance_mm"]["hausdorff99"] < 1.2 * linear["surface_distance_mm"]["hausdorff99"]
+    assert (
+        bent["surface_distance_mm"]["hausdorff99"]
+        < 1.2 * linear["surface_distance_mm"]["hausdorff99"]
+    )
     assert abs(bent["volume_change"]) < 0.002
 
 
 def test_a_node_that_would_fold_its_element_over_stays_back():
-    # a flat corner of a box that is to become round: elements with two faces outside cannot follow
+    # a flat corner of a box that is to become round: elements with two faces outside
+    # cannot follow
     cube = box_mesh((3, 3, 3), (2.0, 2.0, 2.0))
     length = np.linalg.norm(cube.vertices, axis=1, keepdims=True)
     outer = np.unique(boundary_faces(cube)[0])
@@ -302,7 +421,10 @@ box = partial(shapes.box, subdivisions=3)
 
 
 def pair(gap):
-    return merged(box((4.0, 6.0, 6.0), (-2 - gap / 2, 0, 0)), box((4.0, 6.0, 6.0), (2 + gap / 2, 0, 0)))
+    return merged(
+        box((4.0, 6.0, 6.0), (-2 - gap / 2, 0, 0)),
+        box((4.0, 6.0, 6.0), (2 + gap / 2, 0, 0)),
+    )
 
 
 def test_concentric_spheres_are_as_far_apart_as_their_radii():
@@ -314,7 +436,8 @@ def test_concentric_spheres_are_as_far_apart_as_their_radii():
 def test_both_directions_count():
     small = box((4.0, 4.0, 4.0))
     both = merged(small, box((4.0, 4.0, 4.0), (7.0, 0.0, 0.0)))
-    # all of the small one lies on the other surface, whose second box is up to 7 mm from it
+    # all of the small one lies on the other surface, whose second box is up to 7 mm
+    # from it
     forth, back = fidelity(small, both), fidelity(both, small)
     assert forth == back
     assert forth["hausdorff"] == pytest.approx(7.0)
@@ -332,13 +455,16 @@ def test_a_small_bump_counts_in_the_largest_distance_only():
 
 def test_faces_that_cross_are_counted_once_each():
     tetrahedron = TriangleMesh(
-        [[0.0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+        [[0.0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]],
+        [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
     )
     assert crossing_faces(tetrahedron) == 0
     assert crossing_faces(merged(tetrahedron, moved(tetrahedron, 10.0))) == 0
-    # the tip of the second one, at (1, 1, 1.9), goes in through the slanted face of the first: that face and three more
+    # the tip of the second one, at (1, 1, 1.9), goes in through the slanted face of the
+    # first: that face and three more
     pointed = TriangleMesh(
-        [[1.0, 1, 1.9], [5, 5, 6], [6, 5, 5], [5, 6, 5]], [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        [[1.0, 1, 1.9], [5, 5, 6], [6, 5, 5], [5, 6, 5]],
+        [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
     )
     assert crossing_faces(merged(tetrahedron, pointed)) == 4
 
@@ -351,16 +477,25 @@ def test_the_gap_between_two_boxes_has_its_width_and_area():
 
 
 def test_walls_far_apart_or_thin_tissue_are_no_gap():
-    assert gap_summary(gap_walls(pair(4.0))) == {"percentile1": None, "median": None, "area_mm2": 0.0}
+    assert gap_summary(gap_walls(pair(4.0))) == {
+        "percentile1": None,
+        "median": None,
+        "area_mm2": 0.0,
+    }
     assert gap_kept(gap_walls(pair(4.0)), pair(0.1)) is None
     plate = box((0.5, 6.0, 6.0))
     assert gap_summary(gap_walls(plate))["area_mm2"] == 0.0
     # inside out, the same plate is a gap
-    assert gap_summary(gap_walls(flipped(plate)))["median"] == pytest.approx(0.5, abs=1e-3)
+    assert gap_summary(gap_walls(flipped(plate)))["median"] == pytest.approx(
+        0.5, abs=1e-3
+    )
 
 
-# half of the width is the limit: 0.3 of 0.5 mm is open, 0.2 is not, nor are walls that overlap
-@pytest.mark.parametrize(("left_open", "kept"), [(0.5, 1.0), (0.7, 1.0), (0.3, 1.0), (0.2, 0.0), (-0.1, 0.0)])
+# half of the width is the limit: 0.3 of 0.5 mm is open, 0.2 is not, nor are walls that
+# overlap
+@pytest.mark.parametrize(
+    ("left_open", "kept"), [(0.5, 1.0), (0.7, 1.0), (0.3, 1.0), (0.2, 0.0), (-0.1, 0.0)]
+)
 def test_a_gap_is_kept_where_half_of_its_width_is(left_open, kept):
     assert gap_kept(gap_walls(pair(0.5)), pair(left_open)) == kept
 

@@ -6,7 +6,15 @@ import pytest
 from shapes import hemisphere_with_cut, octasphere, sphere
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, area, convex_hull, is_closed, signed_volume, submesh, vertex_areas
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    convex_hull,
+    is_closed,
+    signed_volume,
+    submesh,
+    vertex_areas,
+)
 from gyriflow.metrics.gyrification import (
     cap,
     envelope,
@@ -28,17 +36,28 @@ def half_sphere() -> TriangleMesh:
 
 
 def dented(depth: float, width: float, subdivisions: int = 5) -> TriangleMesh:
-    """Return a sphere of 25 mm with a round dent of that depth and width (mm) at the top."""
+    """Return a sphere of 25 mm with a round dent of that depth and width (mm) at the
+    top."""
     shape = sphere(25.0, subdivisions)
     across = np.linalg.norm(shape.vertices[:, :2], axis=1)
-    dent = np.where(shape.vertices[:, 2] > 0, depth * np.exp(-((across / (0.5 * width)) ** 2) * 2), 0.0)
+    dent = np.where(
+        shape.vertices[:, 2] > 0,
+        depth * np.exp(-((across / (0.5 * width)) ** 2) * 2),
+        0.0,
+    )
     return TriangleMesh(shape.vertices * (1 - dent / 25.0)[:, None], shape.faces)
 
 
 def test_envelope_bridges_a_sulcus_and_follows_a_wide_dent() -> None:
     def depth(mesh: TriangleMesh, around: TriangleMesh) -> float:
         bottom = mesh.vertices[[np.linalg.norm(mesh.vertices, axis=1).argmin()]]
-        return float(np.sqrt(igl.point_mesh_squared_distance(bottom, around.vertices, around.faces)[0][0]))
+        return float(
+            np.sqrt(
+                igl.point_mesh_squared_distance(bottom, around.vertices, around.faces)[
+                    0
+                ][0]
+            )
+        )
 
     narrow, wide = dented(8.0, 5.0), dented(8.0, 30.0)
     assert depth(narrow, envelope(narrow)) > 7.0
@@ -67,7 +86,9 @@ def test_cap_of_half_a_sphere() -> None:
     closed = cap(half)
     assert not is_closed(half)
     assert is_closed(closed)
-    assert signed_volume(closed) == pytest.approx(0.5 * signed_volume(sphere(25.0)), rel=1e-3)
+    assert signed_volume(closed) == pytest.approx(
+        0.5 * signed_volume(sphere(25.0)), rel=1e-3
+    )
     assert area(closed) - area(half) == pytest.approx(np.pi * 25.0**2, rel=0.01)
     np.testing.assert_array_equal(closed.faces[: len(half.faces)], half.faces)
 
@@ -76,7 +97,8 @@ def test_cap_of_half_a_sphere() -> None:
 def test_what_spans_a_cut_in_a_pit_or_on_a_neck_is_left_out(pit: float) -> None:
     radius, cut = 25.0, 8.0
     mesh = hemisphere_with_cut(pit, radius, cut)
-    # areas over π: half the sphere, the plane round the cut and the walls; the hull goes from the plane's rim to a neck
+    # areas over π: half the sphere, the plane round the cut and the walls; the hull
+    # goes from the plane's rim to a neck
     pial = 2 * radius**2 + radius**2 - cut**2 + 2 * cut * abs(pit)
     hull = 2 * radius**2 + (radius + cut) * np.hypot(radius - cut, min(pit, 0.0))
     assert index(mesh, convex_hull(mesh)) == pytest.approx(pial / hull, rel=0.003)
@@ -89,7 +111,9 @@ def test_the_envelope_over_a_cut_is_left_out_and_nothing_else(pit: float) -> Non
     is_medial = np.abs(around.centres[:, 0]) < 4.0
     assert around.areas[is_medial & (across < 7.0)].sum() < 0.1 * np.pi * 8.0**2
     ring = is_medial & (across > 10.0) & (across < 20.0)
-    assert around.areas[ring].sum() == pytest.approx(np.pi * (20.0**2 - 10.0**2), rel=0.05)
+    assert around.areas[ring].sum() == pytest.approx(
+        np.pi * (20.0**2 - 10.0**2), rel=0.05
+    )
 
 
 def test_depth_beside_a_cut_is_that_below_the_hull() -> None:
@@ -116,6 +140,8 @@ def test_local_index_is_high_at_a_sulcus_and_one_far_from_it() -> None:
 
 
 def test_flat_surface_has_no_hull() -> None:
-    flat = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
+    flat = TriangleMesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]]
+    )
     with pytest.raises(MeshError):
         convex_hull(flat)

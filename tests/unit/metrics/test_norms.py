@@ -1,4 +1,5 @@
-"""Norms of brains that are drawn from known curves, and published ones; tables of a study, by brain, side and week."""
+"""Norms of brains that are drawn from known curves, and published ones; tables of a
+study, by brain, side and week."""
 
 import importlib.util
 from pathlib import Path
@@ -42,13 +43,19 @@ FILE = ROOT / "norms" / "svrtk-volumes.yaml"
 NORMS = published_norms(yaml.safe_load(FILE.read_text()))
 
 
-def table(weeks: np.ndarray, values: np.ndarray, *others: tuple[str, float, float]) -> tuple[pd.DataFrame, list[str]]:
-    """Return metrics of reference brains and of others (run, week, value), and the reference."""
+def table(
+    weeks: np.ndarray, values: np.ndarray, *others: tuple[str, float, float]
+) -> tuple[pd.DataFrame, list[str]]:
+    """Return metrics of reference brains and of others (run, week, value), and the
+    reference."""
     rows = [
         (f"s{i}", "real", week, "whole", "area", value, "cm2")
         for i, (week, value) in enumerate(zip(weeks, values, strict=True))
     ]
-    rows += [("other", run, week, "whole", "area", value, "cm2") for run, week, value in others]
+    rows += [
+        ("other", run, week, "whole", "area", value, "cm2")
+        for run, week, value in others
+    ]
     return pd.DataFrame(rows, columns=COLUMNS), [f"s{i}" for i in range(len(weeks))]
 
 
@@ -58,7 +65,9 @@ def labelled(week, volumes, scheme="dhcp-19", sides=SIDES):
 
 def test_published_volumes_of_cortex_and_white_matter() -> None:
     # at 29 weeks: 0.3052·841 − 11.828·29 + 123 and 0.0223·841 + 7.3471·29 − 145.28
-    found = published_scores(labelled(29.0, {3: 36.66 + 3.787, 5: 86.54, 99: 1.0}), NORMS).set_index("structure")
+    found = published_scores(
+        labelled(29.0, {3: 36.66 + 3.787, 5: 86.54, 99: 1.0}), NORMS
+    ).set_index("structure")
     assert found["expected"].tolist() == pytest.approx([36.66, 86.54], abs=0.01)
     assert list(found.index) == ["cortex", "white_matter"]
     # SD of the cortex: 0.01647·841 − 0.47701·29 + 3.76905
@@ -68,13 +77,25 @@ def test_published_volumes_of_cortex_and_white_matter() -> None:
     assert np.isnan(found["brains"]).all()
     first, last = NORMS["cortex"].weeks
     outside = "outside the norm's weeks"
-    for week, flag in ((first - 0.1, outside), (first, "ok"), (last, "ok"), (last + 0.1, outside)):
-        assert published_scores(labelled(week, {3: 30.0}), NORMS)["flag"].tolist() == [flag]
-    assert all(np.polyval(norm.sd, np.linspace(*norm.weeks, 201)).min() > 0 for norm in NORMS.values())
+    for week, flag in (
+        (first - 0.1, outside),
+        (first, "ok"),
+        (last, "ok"),
+        (last + 0.1, outside),
+    ):
+        assert published_scores(labelled(week, {3: 30.0}), NORMS)["flag"].tolist() == [
+            flag
+        ]
+    assert all(
+        np.polyval(norm.sd, np.linspace(*norm.weeks, 201)).min() > 0
+        for norm in NORMS.values()
+    )
 
 
 def scores(metrics, reference, **options):
-    return measured_scores(metrics, reference, cohort_norms(metrics, reference, **options))
+    return measured_scores(
+        metrics, reference, cohort_norms(metrics, reference, **options)
+    )
 
 
 def curves(metrics, reference, **options):
@@ -88,7 +109,9 @@ def growing(weeks):
 
 def centiles_benchmark():
     """Return the module `benchmarks/centiles.py`."""
-    spec = importlib.util.spec_from_file_location("centiles", ROOT / "benchmarks" / "centiles.py")
+    spec = importlib.util.spec_from_file_location(
+        "centiles", ROOT / "benchmarks" / "centiles.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -100,12 +123,16 @@ COHORTS, SEED = 30, 5
 
 @pytest.mark.parametrize("subjects", [12, 30, 100])
 @pytest.mark.parametrize("name", CENTILES.CASES)
-def test_of_new_normal_subjects_5_percent_are_below_the_5th_centile(name: str, subjects: int) -> None:
+def test_of_new_normal_subjects_5_percent_are_below_the_5th_centile(
+    name: str, subjects: int
+) -> None:
     case = CENTILES.CASES[name]
     if subjects < case.min_subjects:
         return
     found = CENTILES.new_subjects(case, subjects, COHORTS, seed=SEED)
-    below, above, first = (np.array(column) for column in zip(*found.values(), strict=True))
+    below, above, first = (
+        np.array(column) for column in zip(*found.values(), strict=True)
+    )
     # with the chance of so few cohorts
     for share in (below, above):
         assert np.abs(share - 5).max() < 4.2
@@ -115,8 +142,12 @@ def test_of_new_normal_subjects_5_percent_are_below_the_5th_centile(name: str, s
 
 
 @pytest.mark.parametrize("subjects", [30, 200])
-def test_half_a_week_beyond_the_norm_brains_are_expected_to_have_grown(subjects: int) -> None:
-    found = CENTILES.new_subjects(CENTILES.CASES["constant CV"], subjects, COHORTS, seed=2, beyond=0.5)
+def test_half_a_week_beyond_the_norm_brains_are_expected_to_have_grown(
+    subjects: int,
+) -> None:
+    found = CENTILES.new_subjects(
+        CENTILES.CASES["constant CV"], subjects, COHORTS, seed=2, beyond=0.5
+    )
     for name in ("first", "last"):
         below, above, first = found[name]
         assert max(below, above) < 9.5
@@ -135,11 +166,16 @@ def test_subjects_of_a_norm_are_scored_as_new_ones() -> None:
 @pytest.mark.parametrize("subjects", [30, 200])
 def test_a_90_percent_interval_of_z_holds(subjects: int) -> None:
     random, case = np.random.default_rng(1), CENTILES.CASES["constant CV"]
-    at, true = (axis.ravel() for axis in np.meshgrid([22.0, 29.0, 36.0], stats.norm.ppf([0.05, 0.5, 0.95])))
+    at, true = (
+        axis.ravel()
+        for axis in np.meshgrid([22.0, 29.0, 36.0], stats.norm.ppf([0.05, 0.5, 0.95]))
+    )
     holds = []
     for _ in range(60):
         weeks, values, people = CENTILES.drawn(case, subjects, random)
-        low, high = fit_norm(weeks, values, people, is_positive=True).scores(at, case.values(at, true))[1]
+        low, high = fit_norm(weeks, values, people, is_positive=True).scores(
+            at, case.values(at, true)
+        )[1]
         holds.append((low <= true) & (true <= high))
     assert 0.83 < np.mean(holds) < 0.97
 
@@ -153,15 +189,26 @@ def test_few_subjects_of_one_week_are_compared_by_students_distribution() -> Non
     student = stats.t.cdf(distance / np.sqrt(1 + 1 / 12), 11)
     assert z[0] == pytest.approx(stats.norm.ppf(student), rel=1e-3)
     error = 1.645 * np.sqrt(1 / 12 + distance**2 / 22)
-    assert [low[0], high[0]] == pytest.approx([distance - error, distance + error], rel=1e-3)
+    assert [low[0], high[0]] == pytest.approx(
+        [distance - error, distance + error], rel=1e-3
+    )
     assert norm.values([25.0], float(z[0])) == pytest.approx([7.0], rel=1e-6)
 
 
 def test_skewness_is_estimated_from_many_subjects() -> None:
     random = np.random.default_rng(0)
-    for share, subjects in ((0.0, 400), (1.0, 400), (1.0, MIN_SUBJECTS_FOR_SKEWNESS - 1)):
-        weeks, z = random.uniform(21, 37, subjects), random.standard_normal(subjects).clip(-3, 3)
-        values = CENTILES.volume(weeks) * np.where(share, 1 + 0.25 * z, np.exp(0.25 * z))
+    for share, subjects in (
+        (0.0, 400),
+        (1.0, 400),
+        (1.0, MIN_SUBJECTS_FOR_SKEWNESS - 1),
+    ):
+        weeks, z = (
+            random.uniform(21, 37, subjects),
+            random.standard_normal(subjects).clip(-3, 3),
+        )
+        values = CENTILES.volume(weeks) * np.where(
+            share, 1 + 0.25 * z, np.exp(0.25 * z)
+        )
         norm = fit_norm(weeks, values, np.arange(subjects), is_positive=True)
         if subjects == 400:
             assert norm.skewness == pytest.approx(share, abs=0.35)
@@ -170,13 +217,19 @@ def test_skewness_is_estimated_from_many_subjects() -> None:
 
 
 def test_a_subject_is_removed_by_one_step_as_by_another_fit() -> None:
-    weeks, values, people = CENTILES.drawn(CENTILES.CASES["constant CV"], 150, np.random.default_rng(5))
+    weeks, values, people = CENTILES.drawn(
+        CENTILES.CASES["constant CV"], 150, np.random.default_rng(5)
+    )
     norm = fit_norm(weeks, values, people, is_positive=True)
-    inner = np.flatnonzero((np.abs(weeks - 29) < 5) & (np.abs(norm.scores(weeks, values)[0]) > 1.0))[:5]
+    inner = np.flatnonzero(
+        (np.abs(weeks - 29) < 5) & (np.abs(norm.scores(weeks, values)[0]) > 1.0)
+    )[:5]
     for number in inner:
         scan = [weeks[number]], [values[number]]
         others = people != people[number]
-        alone = fit_norm(weeks[others], values[others], people[others], is_positive=True).scores(*scan)[0]
+        alone = fit_norm(
+            weeks[others], values[others], people[others], is_positive=True
+        ).scores(*scan)[0]
         change = alone - norm.scores(*scan)[0]
         one_step = norm.without(weeks[number], values[number]).scores(*scan)[0]
         assert np.abs(one_step - alone).max() < 0.35 * np.abs(change).max() + 0.01
@@ -186,7 +239,11 @@ def test_a_run_is_compared_with_all_subjects_and_a_scan_with_the_others() -> Non
     weeks = np.arange(21.0, 33.0)
     metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 6))
     run = metrics[metrics["subject"] == "s5"].assign(run="expected", value=263.0)
-    found = scores(pd.concat([metrics, run]), reference).query("subject == 's5'").set_index("run")
+    found = (
+        scores(pd.concat([metrics, run]), reference)
+        .query("subject == 's5'")
+        .set_index("run")
+    )
     assert found["brains"].to_dict() == {"real": 11, "expected": 12}
 
 
@@ -199,16 +256,24 @@ def test_the_interval_of_a_median_is_that_of_a_mean() -> None:
     assert curve["sd"] == pytest.approx(values.std(), rel=0.05)
 
 
-@pytest.mark.parametrize(("subjects", "weeks"), [(200, 160), (200, 7), (200, 1), (20, 16), (20, 3)])
+@pytest.mark.parametrize(
+    ("subjects", "weeks"), [(200, 160), (200, 7), (200, 1), (20, 16), (20, 3)]
+)
 @pytest.mark.parametrize("is_positive", [True, False])
-def test_values_and_scores_are_inverse(subjects: int, weeks: int, is_positive: bool) -> None:
+def test_values_and_scores_are_inverse(
+    subjects: int, weeks: int, is_positive: bool
+) -> None:
     random = np.random.default_rng(2)
     at = random.choice(np.linspace(21, 37, weeks), subjects)
-    values = growing(at) * np.exp(0.1 * random.standard_normal(subjects)) - (0 if is_positive else 150)
+    values = growing(at) * np.exp(0.1 * random.standard_normal(subjects)) - (
+        0 if is_positive else 150
+    )
     norm = fit_norm(at, values, np.arange(subjects), is_positive=is_positive)
     some = np.unique(at)[:3]
     for z in (-1.6, 0.0, 1.0):
-        assert norm.scores(some, norm.values(some, z))[0] == pytest.approx(np.full(len(some), z), abs=1e-6)
+        assert norm.scores(some, norm.values(some, z))[0] == pytest.approx(
+            np.full(len(some), z), abs=1e-6
+        )
     assert norm.is_spline == (weeks > 7)
 
 
@@ -217,7 +282,11 @@ def test_a_small_head_of_22_weeks_is_found() -> None:
     weeks = random.uniform(21, 37, 100)
     values = growing(weeks) * (1 + 0.08 * random.standard_normal(100))
     small = growing(22.0) * (1 + 0.08 * stats.norm.ppf(0.01))
-    found = scores(*table(weeks, values, ("small", 22.0, small))).query("run == 'small'").iloc[0]
+    found = (
+        scores(*table(weeks, values, ("small", 22.0, small)))
+        .query("run == 'small'")
+        .iloc[0]
+    )
     assert found["centile"] < 5
     assert found["centile_low"] < 1 < found["centile_high"] < 15
     assert 100 * stats.norm.cdf(found["z_low"]) == pytest.approx(found["centile_low"])
@@ -239,17 +308,27 @@ def test_whole_weeks_of_many_subjects_have_their_own_scatter() -> None:
 def test_thirty_subjects_are_compared_alike() -> None:
     random = np.random.default_rng(4)
     weeks = random.uniform(21, 36, 30)
-    found = scores(*table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(30))))
+    found = scores(
+        *table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(30)))
+    )
     assert set(found["flag"]) == {"ok"}
 
 
 def test_values_that_a_norm_cannot_have_are_not_scored() -> None:
     random = np.random.default_rng(4)
     weeks = random.uniform(21, 36, 40)
-    metrics, reference = table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(40)), ("flat", 25.0, 0.0))
+    metrics, reference = table(
+        weeks,
+        growing(weeks) * (1 + 0.08 * random.standard_normal(40)),
+        ("flat", 25.0, 0.0),
+    )
     flat = scores(metrics, reference).query("run == 'flat'").iloc[0]
     assert (flat["flag"], np.isnan(flat["centile"])) == ("not positive", True)
-    same = scores(*table(weeks, np.full(40, 5.0), ("other", 25.0, 6.0))).query("run == 'other'").iloc[0]
+    same = (
+        scores(*table(weeks, np.full(40, 5.0), ("other", 25.0, 6.0)))
+        .query("run == 'other'")
+        .iloc[0]
+    )
     assert (same["flag"], np.isnan(same["z"])) == ("no spread", True)
 
 
@@ -266,7 +345,9 @@ def test_a_brain_of_the_reference_is_compared_with_the_others() -> None:
     # as if it had never been there, for the odd one and a usual one
     for number in (0, 1):
         others = np.arange(60) != number
-        without = table(weeks[others], values[others], ("it", weeks[number], values[number]))
+        without = table(
+            weeks[others], values[others], ("it", weeks[number], values[number])
+        )
         alone = scores(*without).query("run == 'it'").iloc[0]
         assert found["z"][number] == pytest.approx(alone["z"], abs=0.03)
 
@@ -274,15 +355,27 @@ def test_a_brain_of_the_reference_is_compared_with_the_others() -> None:
 def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> None:
     random = np.random.default_rng(0)
     weeks = random.uniform(21, 36, 60)
-    metrics, reference = table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(60)), ("new", 25.0, 120.0))
+    metrics, reference = table(
+        weeks,
+        growing(weeks) * (1 + 0.08 * random.standard_normal(60)),
+        ("new", 25.0, 120.0),
+    )
     own = load(study())
-    cohort = cohort_norms(metrics, reference, made_with=norm_settings(own) | {"schemes": [LABELLED["scheme"], "more"]})
+    cohort = cohort_norms(
+        metrics,
+        reference,
+        made_with=norm_settings(own) | {"schemes": [LABELLED["scheme"], "more"]},
+    )
     path = tmp_path / "norms.json"
     write_json(path, cohort.plain)
     again = cohort_from_plain(read_json(path))
     pd.testing.assert_frame_equal(norm_curves(cohort), norm_curves(again))
-    (score,) = measured_scores(metrics[metrics["run"] == "new"], [], again).to_dict("records")
-    assert score["centile"] == pytest.approx(scores(metrics, reference).query("run == 'new'")["centile"].iloc[0])
+    (score,) = measured_scores(metrics[metrics["run"] == "new"], [], again).to_dict(
+        "records"
+    )
+    assert score["centile"] == pytest.approx(
+        scores(metrics, reference).query("run == 'new'")["centile"].iloc[0]
+    )
     # averages and hemispheres stay what they are
     averages = cohort_norms(metrics, reference, individuals=False)
     write_json(path, averages.plain)
@@ -290,12 +383,20 @@ def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> Non
     again = cohort_from_plain(read_json(path))
     assert measured_scores(new, [], again)["flag"].tolist() == [SPREAD_UNKNOWN]
     one_side = pd.concat([new, new.assign(hemisphere="left")])
-    assert measured_scores(one_side, [], again)["flag"].tolist() == ["other hemispheres"]
+    assert measured_scores(one_side, [], again)["flag"].tolist() == [
+        "other hemispheres"
+    ]
     write_json(path, cohort.plain)
     raw = study(metrics={"norms": str(path)})
     assert problems(raw) == []
-    other = {"surface": {"edge_length_mm": 0.7}, "metrics": {"norms": str(path), "curvature_radius_mm": 4.0}}
-    assert problems(raw | other) == [Facts(path, "edge_length_mm", 1.0, 0.7), Facts("curvature_radius_mm", 4.0)]
+    other = {
+        "surface": {"edge_length_mm": 0.7},
+        "metrics": {"norms": str(path), "curvature_radius_mm": 4.0},
+    }
+    assert problems(raw | other) == [
+        Facts(path, "edge_length_mm", 1.0, 0.7),
+        Facts("curvature_radius_mm", 4.0),
+    ]
     path.write_text("{}")
     assert problems(raw) == [Facts(path, "results/study/norms.json")]
 
@@ -303,17 +404,27 @@ def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> Non
 def test_a_norm_gives_median_volumes_within_its_weeks() -> None:
     weeks = np.repeat(np.arange(22.0, 31.0), 2)
     metrics, reference = table(weeks, 20 * weeks * np.tile([1.02, 0.98], 9))
-    whole = metrics.assign(metric="volume", hemisphere="whole", person=metrics["subject"])
+    whole = metrics.assign(
+        metric="volume", hemisphere="whole", person=metrics["subject"]
+    )
     found = cohort_norms(whole, reference).volumes_ml([21.0, 24.0, 30.0])
     assert found[1:] == pytest.approx([480, 600], rel=0.02)
     assert np.isnan(found[0])
-    assert np.isnan(cohort_norms(whole.assign(metric="area"), reference).volumes_ml([24.0])).all()
+    assert np.isnan(
+        cohort_norms(whole.assign(metric="area"), reference).volumes_ml([24.0])
+    ).all()
 
 
 def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
-    weeks, values = np.repeat([24.0, 25.0, 26.0, 27.0], 6), np.random.default_rng(1).normal(100, 5, 24)
+    weeks, values = (
+        np.repeat([24.0, 25.0, 26.0, 27.0], 6),
+        np.random.default_rng(1).normal(100, 5, 24),
+    )
     metrics, reference = table(weeks, values)
-    few, many = (metrics.assign(person=[f"s{number % count}" for number in range(24)]) for count in (9, 12))
+    few, many = (
+        metrics.assign(person=[f"s{number % count}" for number in range(24)])
+        for count in (9, 12)
+    )
     # many scans of nine subjects leave nothing to know a scatter by
     assert set(scores(few, reference)["flag"]) == {"too few brains"}
     assert curves(few, reference).empty
@@ -322,11 +433,20 @@ def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
     own = metrics.assign(person=metrics["subject"])
     twice = pd.concat([own, own.assign(subject=own["subject"] + "again")])
     both = [curves(metrics, reference), curves(twice, list(twice["subject"]))]
-    np.testing.assert_allclose(both[0][["q05", "q95"]], both[1][["q05", "q95"]], rtol=1e-3)
+    np.testing.assert_allclose(
+        both[0][["q05", "q95"]], both[1][["q05", "q95"]], rtol=1e-3
+    )
 
 
 @pytest.mark.parametrize(
-    "metric", ["crossing_faces", "curvature_radius", "weyl_number", "spangy_shape_index_B4_power", "area_ratio"]
+    "metric",
+    [
+        "crossing_faces",
+        "curvature_radius",
+        "weyl_number",
+        "spangy_shape_index_B4_power",
+        "area_ratio",
+    ],
 )
 def test_properties_of_the_mesh_and_of_the_analysis_have_no_norm(metric: str) -> None:
     weeks = np.arange(21.0, 33.0)
@@ -339,7 +459,9 @@ def test_properties_of_the_mesh_and_of_the_analysis_have_no_norm(metric: str) ->
 def test_few_brains_make_centiles_cautious() -> None:
     weeks = np.array([21.0, 23.0, 25.0, 27.0, 29.0, 31.0] * 2)
     values = 10 * weeks + np.tile([1.0, -1.0], 6)
-    metrics, reference = table(weeks, values, ("run", 26.0, 260.0 + 1.5), ("far", 26.0, 280.0))
+    metrics, reference = table(
+        weeks, values, ("run", 26.0, 260.0 + 1.5), ("far", 26.0, 280.0)
+    )
     found = scores(metrics, reference).set_index("run")
     assert (found.loc["run", "brains"], found.loc["run", "flag"]) == (12, "few brains")
     assert found.loc["run", "expected"] == pytest.approx(260.0, abs=0.3)
@@ -350,17 +472,26 @@ def test_few_brains_make_centiles_cautious() -> None:
 
 def test_what_cannot_be_scored_is_said() -> None:
     weeks = np.arange(21.0, 33.0)
-    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 6), ("a", 33.0, 1.0), ("b", 25.0, 250.0))
+    metrics, reference = table(
+        weeks,
+        10 * weeks + np.tile([1.0, -1.0], 6),
+        ("a", 33.0, 1.0),
+        ("b", 25.0, 250.0),
+    )
     found = scores(metrics, reference).set_index("run")["flag"]
     assert (found["a"], found["b"]) == ("outside the reference's weeks", "few brains")
-    few = scores(*table(weeks[:9], weeks[:9], ("a", 22.0, 1.0))).set_index("run").loc["a"]
+    few = (
+        scores(*table(weeks[:9], weeks[:9], ("a", 22.0, 1.0))).set_index("run").loc["a"]
+    )
     assert few["flag"] == "too few brains"
     assert np.isnan(few["centile"])
 
 
 def test_averages_give_a_curve_and_no_centiles() -> None:
     weeks = np.arange(21.0, 29.0)
-    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("b", 25.0, 260.0))
+    metrics, reference = table(
+        weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("b", 25.0, 260.0)
+    )
     found = scores(metrics, reference, individuals=False).set_index("run").loc["b"]
     assert found["expected"] == pytest.approx(250.0, abs=0.5)
     assert found[["sd", "z", "centile"]].isna().all()
@@ -372,7 +503,12 @@ def test_averages_give_a_curve_and_no_centiles() -> None:
 
 def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
     weeks = np.arange(21.0, 33.0)
-    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 6), ("half", 25.0, 125.0), ("all", 25.0, 250.0))
+    metrics, reference = table(
+        weeks,
+        10 * weeks + np.tile([1.0, -1.0], 6),
+        ("half", 25.0, 125.0),
+        ("all", 25.0, 250.0),
+    )
     sides = [
         metrics.assign(hemisphere=side, value=metrics["value"] / share)[rows]
         for side, share, rows in (
@@ -382,7 +518,9 @@ def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
             ("left", 1.0, metrics["run"] == "half"),
         )
     ]
-    found = scores(pd.concat(sides, ignore_index=True), reference).set_index(["run", "hemisphere"])
+    found = scores(pd.concat(sides, ignore_index=True), reference).set_index(
+        ["run", "hemisphere"]
+    )
     assert found.loc[("all", "whole"), "flag"] == "few brains"
     for side in ("whole", "left"):
         assert found.loc[("half", side), "flag"] == "other hemispheres"
@@ -392,7 +530,9 @@ def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
 
 def test_one_hemisphere_is_not_scored_by_volumes_of_both() -> None:
     volumes = {3: 20.0, 7: 2.3, 8: 2.3}
-    found = published_scores(labelled(29.0, volumes, sides=("left",)), NORMS).set_index("structure")
+    found = published_scores(labelled(29.0, volumes, sides=("left",)), NORMS).set_index(
+        "structure"
+    )
     assert found["flag"].tolist() == ["one hemisphere", "ok", "one hemisphere"]
     assert found.loc["cortex", ["expected", "sd", "z", "centile"]].isna().all()
     assert found.loc["left_lateral_ventricle", "z"] == pytest.approx(0.0, abs=0.1)
@@ -400,11 +540,20 @@ def test_one_hemisphere_is_not_scored_by_volumes_of_both() -> None:
 
 
 def test_structures_of_the_norms_scheme_and_of_others() -> None:
-    own = published_scores(labelled(21.0, {3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}), NORMS).set_index("structure")
-    assert own["value"].to_dict() == {"cortex": 9.0, "deep_grey": 3.0, "left_lateral_ventricle": 1.0}
+    own = published_scores(
+        labelled(21.0, {3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}), NORMS
+    ).set_index("structure")
+    assert own["value"].to_dict() == {
+        "cortex": 9.0,
+        "deep_grey": 3.0,
+        "left_lateral_ventricle": 1.0,
+    }
     assert set(own["flag"]) == {"ok"}
-    # 2 is the cortex of FeTA and outer CSF of BOUNTI; it has no sides for the ventricles
-    other = published_scores(labelled(21.0, {2: 8.0, 3: 40.0, 4: 3.0}, "feta-7"), NORMS).set_index("structure")
+    # 2 is the cortex of FeTA and outer CSF of BOUNTI; it has no sides for the
+    # ventricles
+    other = published_scores(
+        labelled(21.0, {2: 8.0, 3: 40.0, 4: 3.0}, "feta-7"), NORMS
+    ).set_index("structure")
     assert other["value"].to_dict() == {"cortex": 8.0, "white_matter": 40.0}
     assert set(other["flag"]) == {"other labels"}
 
@@ -421,7 +570,9 @@ def test_tables_of_volumes_have_the_labels_and_the_structures_of_each_brain():
         ["b", "real", 29.0, 7, SCHEMES["dhcp-19"].labels[7], 2.0],
         ["b", "real", 29.0, 3, SCHEMES["dhcp-19"].labels[3], 9.0],
     ]
-    assert scores[["subject", "structure", "value", "week", "flag"]].to_numpy().tolist() == [
+    assert scores[
+        ["subject", "structure", "value", "week", "flag"]
+    ].to_numpy().tolist() == [
         ["a", "cortex", 8.0, 21.0, "other labels"],
         ["b", "cortex", 9.0, 29.0, "one hemisphere"],
         ["b", "left_lateral_ventricle", 2.0, 29.0, "ok"],
@@ -452,15 +603,25 @@ SCANS = {"one": ["early", "late"]}
 
 
 def test_change_of_scans_and_of_the_simulation_from_the_first() -> None:
-    table = change_between_scans(long_table([METRICS, REGIONS]), SCANS).set_index(["run", "region"])
+    table = change_between_scans(long_table([METRICS, REGIONS]), SCANS).set_index(
+        ["run", "region"]
+    )
     scans = table.loc[("real", "")]
-    assert (scans["from_value"], scans["to_value"], scans["change"]) == (100.0, 150.0, 50.0)
+    assert (scans["from_value"], scans["to_value"], scans["change"]) == (
+        100.0,
+        150.0,
+        50.0,
+    )
     assert scans["change_per_week"] == pytest.approx(25.0)
     assert scans["relative_change"] == pytest.approx(0.5)
     assert scans["difference"] == 0.0
     run = table.loc[("follows", "")]
     # from the run's own start, beside what was measured
-    assert (run["change"], run["measured_change"], run["difference"]) == (42.0, 50.0, -10.0)
+    assert (run["change"], run["measured_change"], run["difference"]) == (
+        42.0,
+        50.0,
+        -10.0,
+    )
     assert table.loc[("real", "frontal"), "change"] == 6.0
     assert ("follows", "frontal") not in table.index
     assert set(table["subject"]) == {"one"}
@@ -473,11 +634,25 @@ def test_change_of_a_metric_below_zero_over_uneven_weeks() -> None:
         ("early", "run", 21.5, "right", "mean_shape_index", -0.4, "1"),
         ("early", "run", 24.0, "right", "mean_shape_index", -0.1, "1"),
     ]
-    found = change_between_scans(long_table([pd.DataFrame(rows, columns=COLUMNS)]), SCANS).set_index("run")
-    names = ["change", "change_per_week", "relative_change", "measured_change", "difference"]
-    assert found.loc["real", names].tolist() == pytest.approx([0.25, 0.1, 1.25, 0.25, 0.0])
-    assert found.loc["run", names].tolist() == pytest.approx([0.3, 0.12, 0.75, 0.25, -0.15])
-    assert found.loc["run", ["from_brain", "to_brain", "from_week", "to_week"]].tolist() == [
+    found = change_between_scans(
+        long_table([pd.DataFrame(rows, columns=COLUMNS)]), SCANS
+    ).set_index("run")
+    names = [
+        "change",
+        "change_per_week",
+        "relative_change",
+        "measured_change",
+        "difference",
+    ]
+    assert found.loc["real", names].tolist() == pytest.approx(
+        [0.25, 0.1, 1.25, 0.25, 0.0]
+    )
+    assert found.loc["run", names].tolist() == pytest.approx(
+        [0.3, 0.12, 0.75, 0.25, -0.15]
+    )
+    assert found.loc[
+        "run", ["from_brain", "to_brain", "from_week", "to_week"]
+    ].tolist() == [
         "early",
         "late",
         21.5,
@@ -492,7 +667,9 @@ def test_wide_has_a_row_per_brain_and_week() -> None:
     assert row["whole_area_cm2"] == 160.0
     assert row["left_mean_curvedness_1_per_mm"] == 0.1
     assert np.isnan(row["left_frontal_area_cm2"])
-    known = wide_table(long_table([METRICS, REGIONS]), {"other": {"sex": "F", "run": "3"}}).set_index("subject")
+    known = wide_table(
+        long_table([METRICS, REGIONS]), {"other": {"sex": "F", "run": "3"}}
+    ).set_index("subject")
     assert list(known.columns[:3]) == ["run", "week", "sex"]
     assert known.loc["other", "sex"] == "F"
     assert known["run"].isin(table["run"]).all()
@@ -509,7 +686,14 @@ def test_wide_has_a_row_per_brain_and_week() -> None:
 )
 def test_regions_of_one_column_are_refused_with_both_names(first, second) -> None:
     rows = [
-        {"subject": "a", "run": "real", "week": 21.0, "hemisphere": "left", "region": region, "metric": metric}
+        {
+            "subject": "a",
+            "run": "real",
+            "week": 21.0,
+            "hemisphere": "left",
+            "region": region,
+            "metric": metric,
+        }
         for region, metric in (first, second)
     ]
     table = pd.DataFrame(rows).assign(value=[1.0, 2.0], unit="1")
@@ -519,22 +703,34 @@ def test_regions_of_one_column_are_refused_with_both_names(first, second) -> Non
 
 def test_columns_are_described_by_side_region_and_unit() -> None:
     columns = described_columns(long_table([METRICS, REGIONS]))
-    assert columns["left_frontal_area_cm2"] == (Facts("region frontal", "left hemisphere"), "cm2")
+    assert columns["left_frontal_area_cm2"] == (
+        Facts("region frontal", "left hemisphere"),
+        "cm2",
+    )
     assert columns["whole_area_cm2"] == (Facts("both hemispheres"), "cm2")
     assert "region" not in columns["left_mean_curvedness_1_per_mm"][0]
     assert columns["left_mean_curvedness_1_per_mm"][1] == "1/mm"
 
 
 def test_asymmetry_of_sides() -> None:
-    sides, regions = ["right", "left", "left", "right"], ["frontal"] * 2 + ["insula"] * 2
+    sides, regions = (
+        ["right", "left", "left", "right"],
+        ["frontal"] * 2 + ["insula"] * 2,
+    )
     table = pd.DataFrame({"hemisphere": sides, "region": regions})
     table = table.assign(metric="area", unit="cm2", value=[30.0, 10.0, 0.0, 0.0])
     found = asymmetry(table).set_index("region")
     # the sign of the larger side
-    assert found.loc["frontal", ["difference", "unit", "asymmetry_index"]].tolist() == [-20.0, "cm2", -1.0]
+    assert found.loc["frontal", ["difference", "unit", "asymmetry_index"]].tolist() == [
+        -20.0,
+        "cm2",
+        -1.0,
+    ]
     assert np.isnan(found.loc["insula", "asymmetry_index"])
     # 0.01 and −0.01 are nearly equal, not as different as can be
-    signed = asymmetry(table.assign(metric="mean_shape_index", value=[-0.01, 0.01, 0.1, 0.2]))
+    signed = asymmetry(
+        table.assign(metric="mean_shape_index", value=[-0.01, 0.01, 0.1, 0.2])
+    )
     assert signed["difference"].tolist() == pytest.approx([0.02, -0.1])
     assert signed["asymmetry_index"].isna().all()
 
@@ -544,7 +740,13 @@ def test_norms_per_week_of_all_and_pial_nodes() -> None:
     first = np.array([[3.0, 4, 0], [0, 0, 1], [0, 0, 0], [0, 0, 2]])
     second = first + np.array([0, 0, 0.5])
     table = weekly_norms([21.0, 22.0, 23.5], [start, first, second], np.array([1, 3]))
-    assert table.columns.tolist() == ["from_week", "to_week", "nodes", "max_mm", "mean_mm"]
+    assert table.columns.tolist() == [
+        "from_week",
+        "to_week",
+        "nodes",
+        "max_mm",
+        "mean_mm",
+    ]
     assert table.to_numpy().tolist() == [
         [21.0, 22.0, "all", 5.0, 2.0],
         [21.0, 22.0, "pial", 2.0, 1.5],

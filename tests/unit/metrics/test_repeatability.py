@@ -1,11 +1,16 @@
-"""Noise beside changes and distances, from a record of one brain measured several times."""
+"""Noise beside changes and distances, from a record of one brain measured several
+times."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.metrics.repeatability import score_noise, with_change_noise, with_distance_noise
+from gyriflow.metrics.repeatability import (
+    score_noise,
+    with_change_noise,
+    with_distance_noise,
+)
 from gyriflow.quantities import METRICS
 from gyriflow.shipped import SHIPPED
 
@@ -21,11 +26,24 @@ RECORD = {
 MEAN = np.sqrt(2) * np.sqrt(2 / np.pi)
 
 
-def test_noise_of_a_change_is_relative_but_for_signed_metrics_and_not_known_for_regions() -> None:
-    rows = [("area", "", 150.0), ("mean_shape_index", "", -0.3), ("area", "frontal", 40.0), ("volume", "", 90.0)]
-    table = with_change_noise(pd.DataFrame(rows, columns=["metric", "region", "from_value"]), RECORD)
-    np.testing.assert_allclose(table["noise"], [2**0.5 * 1.5, 2**0.5 * 0.004, np.nan, np.nan])
-    assert with_change_noise(pd.DataFrame(columns=["metric", "region", "from_value"]), RECORD)["noise"].empty
+def test_noise_of_a_change_is_absolute_for_signed_metrics_and_none_for_regions() -> (
+    None
+):
+    rows = [
+        ("area", "", 150.0),
+        ("mean_shape_index", "", -0.3),
+        ("area", "frontal", 40.0),
+        ("volume", "", 90.0),
+    ]
+    table = with_change_noise(
+        pd.DataFrame(rows, columns=["metric", "region", "from_value"]), RECORD
+    )
+    np.testing.assert_allclose(
+        table["noise"], [2**0.5 * 1.5, 2**0.5 * 0.004, np.nan, np.nan]
+    )
+    assert with_change_noise(
+        pd.DataFrame(columns=["metric", "region", "from_value"]), RECORD
+    )["noise"].empty
 
 
 @pytest.mark.parametrize(
@@ -48,13 +66,22 @@ def test_noise_of_a_distance_is_that_of_a_brain_from_itself(measure, expected) -
 
 def test_noise_of_a_score_is_the_weighted_sum_of_its_parts() -> None:
     record = {"scores": {"size": 0.001, "shape_index": 0.04}}
-    assert score_noise({"size": 3.0, "shape_index": 0.5}, record) == pytest.approx(0.023)
+    assert score_noise({"size": 3.0, "shape_index": 0.5}, record) == pytest.approx(
+        0.023
+    )
     assert np.isnan(score_noise({"size": 3.0, "surface_distance": 0.5}, record))
 
 
 def test_the_shipped_record_has_the_metrics_of_brains() -> None:
     record = read_yaml(SHIPPED / "norms" / "repeatability.yaml")
     assert set(record["metrics"]) <= set(METRICS)
-    main = ["area", "volume", "gyrification_index", "mean_sulcal_depth", "mean_thickness", "spangy_B4_relative_power"]
+    main = [
+        "area",
+        "volume",
+        "gyrification_index",
+        "mean_sulcal_depth",
+        "mean_thickness",
+        "spangy_B4_relative_power",
+    ]
     assert all(0 < record["metrics"][name]["cv"] < 0.05 for name in main)
     assert {"distances", "scores"} <= set(record)

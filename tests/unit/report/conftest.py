@@ -12,12 +12,14 @@ from matplotlib.text import Text
 SMALLEST_PT = 6.0
 """Least size of print in a figure."""
 TOUCH = 3.0
-"""By how many dots texts may reach into each other or over the edge: boxes are a little larger than letters."""
+"""By how many dots texts may reach into each other or over the edge: boxes are a little
+larger than letters."""
 
 
 @pytest.fixture(autouse=True)
 def figures_can_be_printed(monkeypatch):
-    """Figures of several panels have letters, each once, and no text is small, cut off, or over another one."""
+    """Figures of several panels have letters, each once, and no text is small, cut off,
+    or over another one."""
     drawn, begin = [], Figure.__init__
 
     def noted(figure, *arguments, **settings):
@@ -28,11 +30,19 @@ def figures_can_be_printed(monkeypatch):
     yield
     for figure in drawn:
         drawn_on = [axes for axes in figure.axes if axes.axison or axes.has_data()]
-        panels = [axes for axes in drawn_on if axes.get_label() != "scale bar" and not hasattr(axes, "_colorbar")]
-        bold = [text for text in figure.findobj(Text) if text.get_fontweight() == "bold"]
+        panels = [
+            axes
+            for axes in drawn_on
+            if axes.get_label() != "scale bar" and not hasattr(axes, "_colorbar")
+        ]
+        bold = [
+            text for text in figure.findobj(Text) if text.get_fontweight() == "bold"
+        ]
         letters = sorted(text.get_text() for text in bold if len(text.get_text()) == 1)
         assert letters == list(ascii_lowercase[: len(letters)])
-        assert (len(letters) > 1) == (len(panels) > 1), [axes.get_title() for axes in panels]
+        assert (len(letters) > 1) == (len(panels) > 1), [
+            axes.get_title() for axes in panels
+        ]
     # the first of each test, as it takes time
     for figure in drawn[:1]:
         require_legible(figure)
@@ -44,8 +54,14 @@ def require_legible(figure: Figure) -> None:
     small = {text.get_text() for text in boxes if text.get_fontsize() < SMALLEST_PT}
     assert not small
     page = figure.bbox.padded(TOUCH)
-    assert not [text.get_text() for text, box in boxes.items() if not page.containsx(box.x0)
-                or not page.containsx(box.x1) or not page.containsy(box.y0) or not page.containsy(box.y1)]  # fmt: skip
+    assert not [
+        text.get_text()
+        for text, box in boxes.items()
+        if not page.containsx(box.x0)
+        or not page.containsx(box.x1)
+        or not page.containsy(box.y0)
+        or not page.containsy(box.y1)
+    ]
     for (text, box), (other, near) in combinations(boxes.items(), 2):
         common = mpl.transforms.Bbox.intersection(box, near)
         over = common is not None and min(common.width, common.height) > TOUCH
@@ -53,7 +69,8 @@ def require_legible(figure: Figure) -> None:
 
 
 def shown_texts(figure: Figure) -> set[Text]:
-    """Return the texts that are seen: not those of ticks beyond an axis, nor of an axis that is off."""
+    """Return the texts that are seen: not those of ticks beyond an axis, nor of an axis
+    that is off."""
     hidden = set()
     for axes in figure.findobj(Axes):
         for axis in (axes.xaxis, axes.yaxis):
@@ -63,4 +80,8 @@ def shown_texts(figure: Figure) -> set[Text]:
                     hidden |= {tick.label1, tick.label2}
             if not axes.axison:
                 hidden |= {axis.label, axis.offsetText}
-    return {text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()} - hidden
+    return {
+        text
+        for text in figure.findobj(Text)
+        if text.get_visible() and text.get_text().strip()
+    } - hidden

@@ -1,4 +1,5 @@
-"""The registry of figures: what each is drawn by takes what it gives, and the report has words on it."""
+"""The registry of figures: what each is drawn by takes what it gives, and the report
+has words on it."""
 
 import inspect
 from importlib import import_module
@@ -24,25 +25,59 @@ from gyriflow.units import SECONDS_PER_GW
 
 KINDS = list(kinds().values())
 SHAPE = {"semi_axes_mm": [20, 26, 18]}
-BRAINS = [{"id": name, "week": week, "shape": SHAPE} for name, week in (("a", 21), ("b", 22), ("c", 23))]
-STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}
-STUDY |= {"studies": {"rate": {"base": "thin", "vary": {"growth_rate_per_s": [1e-7, 2e-7]}, "compare_week": 22}}}
+BRAINS = [
+    {"id": name, "week": week, "shape": SHAPE}
+    for name, week in (("a", 21), ("b", 22), ("c", 23))
+]
+STUDY = {
+    "brains": BRAINS,
+    "start": "a",
+    "folding": {"end_week": 22},
+    "runs": {"thin": {}, "thick": {}},
+}
+STUDY |= {
+    "studies": {
+        "rate": {
+            "base": "thin",
+            "vary": {"growth_rate_per_s": [1e-7, 2e-7]},
+            "compare_week": 22,
+        }
+    }
+}
 
 
-LABELS = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
+LABELS = (
+    SHIPPED
+    / "atlases"
+    / "spina-bifida"
+    / "fetal_SB_atlas_GA21_notoperated"
+    / "parcellation.nii.gz"
+)
 OWN, OTHERS = (
     [
-        {"id": f"{name}{week}", "week": week, "population": name, "labels": str(LABELS), "scheme": "spina-bifida-atlas"}
+        {
+            "id": f"{name}{week}",
+            "week": week,
+            "population": name,
+            "labels": str(LABELS),
+            "scheme": "spina-bifida-atlas",
+        }
         for week in weeks
     ]
     for name, weeks in (("own", (22, 23)), ("atlas", (21, 22, 23, 24)))
 )
-ALONE = {"brains": [*OWN[:1], *OTHERS], "start": "own22", "folding": {"end_week": 23, "preset": "expected"}}
+ALONE = {
+    "brains": [*OWN[:1], *OTHERS],
+    "start": "own22",
+    "folding": {"end_week": 23, "preset": "expected"},
+}
 PREDICTION = ALONE | {
     "brains": [*OWN, *OTHERS],
     "runs": {"expected": {"ensemble": 3}, "plain": {"preset": "fetalfoldsim"}},
 }
-PREDICTION |= {"metrics": {"regions": {"own22": {"volume": str(LABELS), "names": {5: "cortex"}}}}}
+PREDICTION |= {
+    "metrics": {"regions": {"own22": {"volume": str(LABELS), "names": {5: "cortex"}}}}
+}
 EXAMPLES = SHIPPED / "config" / "examples"
 
 
@@ -52,8 +87,14 @@ def registry(study=STUDY):
 
 def examples():
     """Return the figures of studies that together have all kinds."""
-    shipped = (EXAMPLES / f"{name}.yaml" for name in ("spina-bifida-atlas", "calibration", "paper"))
-    studies = (resolve(load(yaml.safe_load(path.read_text()), EXAMPLES)) for path in (DEMO, *shipped))
+    shipped = (
+        EXAMPLES / f"{name}.yaml"
+        for name in ("spina-bifida-atlas", "calibration", "paper")
+    )
+    studies = (
+        resolve(load(yaml.safe_load(path.read_text()), EXAMPLES))
+        for path in (DEMO, *shipped)
+    )
     return [*map(figures_of, studies), *map(registry, (STUDY, ALONE, PREDICTION))]
 
 
@@ -67,7 +108,12 @@ def drawing_function(kind):
 
 
 def test_kinds_have_names_and_files_of_their_own():
-    assert len({kind.name for kind in KINDS}) == len({kind.file for kind in KINDS}) == len(KINDS) > 30
+    assert (
+        len({kind.name for kind in KINDS})
+        == len({kind.file for kind in KINDS})
+        == len(KINDS)
+        > 30
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -84,20 +130,27 @@ def test_every_function_of_figures_has_the_name_of_an_entry():
     functions = {
         name
         for name, function in vars(figures).items()
-        if callable(function) and list(inspect.signature(function).parameters)[:2] == ["kind", "study"]
+        if callable(function)
+        and list(inspect.signature(function).parameters)[:2] == ["kind", "study"]
     }
     assert functions < {kind.name for kind in KINDS}
     # a function says itself of what there is a figure
-    assert {(kind.each, kind.needs) for kind in KINDS if kind.name in functions} == {("study", "")}
+    assert {(kind.each, kind.needs) for kind in KINDS if kind.name in functions} == {
+        ("study", "")
+    }
 
 
-def test_figures_give_their_function_what_it_takes_and_have_names_for_their_words_and_files():
+def test_figures_give_their_function_its_arguments_and_fill_in_texts_and_file_names():
     found = [figure for study in examples() for figure in study]
     assert {figure.kind.name for figure in found} == {kind.name for kind in KINDS}
     for figure in found:
         if figure.kind.draw:
-            inspect.signature(drawing_function(figure.kind)).bind(**figure.inputs, **figure.options)
-        assert "{" not in "".join((figure.kind.title + figure.kind.caption).format(**figure.names))
+            inspect.signature(drawing_function(figure.kind)).bind(
+                **figure.inputs, **figure.options
+            )
+        assert "{" not in "".join(
+            (figure.kind.title + figure.kind.caption).format(**figure.names)
+        )
         assert "{" not in "".join(figure.files)
 
 
@@ -110,17 +163,37 @@ def test_all_files_are_drawn_once_and_jobs_of_a_rule_alike():
 
 
 def test_the_paper_stands_in_its_own_figures_alone():
-    published = {figure.path for figure in registry() if any("published" in file for file in files_in(figure.inputs))}
-    assert published == {"results/study/figures/displacement_paper.png", "results/study/rate/figures/nearest_paper.png"}
-    targets = ("figures", "growth", "validate", "influence_figures", "report", "brain", "quality")
+    published = {
+        figure.path
+        for figure in registry()
+        if any("published" in file for file in files_in(figure.inputs))
+    }
+    assert published == {
+        "results/study/figures/displacement_paper.png",
+        "results/study/rate/figures/nearest_paper.png",
+    }
+    targets = (
+        "figures",
+        "growth",
+        "validate",
+        "influence_figures",
+        "report",
+        "brain",
+        "quality",
+    )
     assert not published & set(target_files(registry(), *targets))
     assert published < set(target_files(registry(), "paper"))
 
 
-def test_runs_that_start_alike_have_one_figure_of_their_zones_which_the_paper_alone_asks_for():
+def test_runs_that_start_alike_have_one_figure_of_zones_which_only_the_paper_asks_for():
     figures = registry()
-    zones = ["results/runs/thin/a/figures/zones.png", "results/runs/thin/a/figures/zones.pdf"]
-    assert [file for file in target_files(figures, "paper") if "/zones." in file] == zones
+    zones = [
+        "results/runs/thin/a/figures/zones.png",
+        "results/runs/thin/a/figures/zones.pdf",
+    ]
+    assert [
+        file for file in target_files(figures, "paper") if "/zones." in file
+    ] == zones
     assert not any("/zones." in file for file in target_files(figures, "figures"))
 
 
@@ -131,13 +204,22 @@ def test_simulated_and_measured_brains_are_not_exchanged():
     }
     for row in rows:
         real = {21.0: "results/brains/a/surface", 22.0: "results/brains/b/surface"}
-        assert row.inputs["observed"] == {week: f"{folder}/pial.surf.gii" for week, folder in real.items()}
+        assert row.inputs["observed"] == {
+            week: f"{folder}/pial.surf.gii" for week, folder in real.items()
+        }
         for run, surfaces in row.inputs["runs"].items():
-            assert surfaces == {w: f"results/runs/{run}/a/surfaces/week-{w:.2f}/pial.surf.gii" for w in (21.0, 22.0)}
+            assert surfaces == {
+                w: f"results/runs/{run}/a/surfaces/week-{w:.2f}/pial.surf.gii"
+                for w in (21.0, 22.0)
+            }
     ((row,),) = jobs_of("shape_maps")
     for group, weeks in row.inputs["brains"].items():
-        folder = "results/brains/" if group == "ellipsoid" else f"results/runs/{group}/a/"
-        assert all(maps.startswith(folder) for halves in weeks.values() for _, maps in halves)
+        folder = (
+            "results/brains/" if group == "ellipsoid" else f"results/runs/{group}/a/"
+        )
+        assert all(
+            maps.startswith(folder) for halves in weeks.values() for _, maps in halves
+        )
 
 
 def test_members_of_a_study_that_ended_before_have_no_files():
@@ -173,7 +255,8 @@ INSIDE = np.array([[2.0, 2, 2]])
 
 @pytest.fixture
 def frames(tmp_path):
-    """A tetrahedron of four, with a node inside, that grows by a fifth from 21 to 22 GW."""
+    """A tetrahedron of four, with a node inside, that grows by a fifth from 21 to 22
+    GW."""
     path = tmp_path / "frames.h5"
     with h5py.File(path, "w") as file:
         file["tets"] = [[0, 1, 2, 4], [0, 1, 4, 3], [0, 4, 2, 3], [4, 1, 2, 3]]
@@ -188,29 +271,55 @@ def frames(tmp_path):
 
 
 def test_growth_is_that_of_a_week_up_to_the_later_frame(frames):
-    ((interval, maps),) = growth_per_week(read_pial_frames(frames), SECONDS_PER_GW / 4).items()
+    ((interval, maps),) = growth_per_week(
+        read_pial_frames(frames), SECONDS_PER_GW / 4
+    ).items()
     assert interval == (21.0, 22.0)
     # four steps a week, in both directions of the surface
-    assert maps["area_growth_percent_per_gw"] == pytest.approx(np.full(4, 100 * np.expm1(2 * 4 * 0.01)))
-    assert maps["thickness_growth_percent_per_gw"] == pytest.approx(np.full(4, 100 * np.expm1(4 * 0.02)))
+    assert maps["area_growth_percent_per_gw"] == pytest.approx(
+        np.full(4, 100 * np.expm1(2 * 4 * 0.01))
+    )
+    assert maps["thickness_growth_percent_per_gw"] == pytest.approx(
+        np.full(4, 100 * np.expm1(4 * 0.02))
+    )
     assert maps["growth_direction_y"] == pytest.approx([0, 4, 0, 0])
     repeats = [maps, {name: values + 2.0 for name, values in maps.items()}]
     found = growth_sd(maps, repeats)
-    assert set(found) == {"area_growth_percent_per_gw", "thickness_growth_percent_per_gw"}
+    assert set(found) == {
+        "area_growth_percent_per_gw",
+        "thickness_growth_percent_per_gw",
+    }
     assert found["area_growth_percent_per_gw"] == pytest.approx(np.full(4, np.sqrt(2)))
     assert np.isnan(growth_sd(maps, repeats[:1])["area_growth_percent_per_gw"]).all()
 
 
-def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_path, frames):
+def test_files_are_read_wherever_they_stand_among_the_inputs(
+    monkeypatch, tmp_path, frames
+):
     write_json(tmp_path / "quality.json", {"tets": 7})
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(RUN))
     (tmp_path / "published.yaml").write_text("nearest: []")
     write_table(tmp_path / "spectra.csv", pd.DataFrame({"week": [21.0]}))
-    at = {name: str(tmp_path / name) for name in ("quality.json", "params.yaml", "published.yaml", "spectra.csv")}
-    inputs = {"quality": {"a": at["quality.json"]}, "small": None, "tables": [at["spectra.csv"]]}
-    inputs |= {"frames": {"thin": frames}, "params": at["params.yaml"], "published": at["published.yaml"]}
+    at = {
+        name: str(tmp_path / name)
+        for name in ("quality.json", "params.yaml", "published.yaml", "spectra.csv")
+    }
+    inputs = {
+        "quality": {"a": at["quality.json"]},
+        "small": None,
+        "tables": [at["spectra.csv"]],
+    }
+    inputs |= {
+        "frames": {"thin": frames},
+        "params": at["params.yaml"],
+        "published": at["published.yaml"],
+    }
     given = drawn(monkeypatch, tmp_path, "tables.mesh_quality_table", inputs, gates={})
-    assert (given["quality"], given["small"], given["gates"]) == ({"a": {"tets": 7}}, None, {})
+    assert (given["quality"], given["small"], given["gates"]) == (
+        {"a": {"tets": 7}},
+        None,
+        {},
+    )
     assert given["params"].end_week == 22
     assert given["published"] == {"nearest": []}
     assert given["tables"][0]["week"].tolist() == [21.0]

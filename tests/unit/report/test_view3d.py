@@ -1,4 +1,5 @@
-"""The 3D view shows the surfaces that there are, small enough, with the values of their maps."""
+"""The 3D view shows the surfaces that there are, small enough, with the values of their
+maps."""
 
 from base64 import b64decode
 
@@ -21,13 +22,20 @@ def shorts(text: str) -> np.ndarray:
 
 def positions(data: dict, frame: dict) -> np.ndarray:
     """Return positions as the view makes them."""
-    return np.array(data["low"]) + shorts(frame["positions"]).reshape(-1, 3) / 65535 * data["size"]
+    return (
+        np.array(data["low"])
+        + shorts(frame["positions"]).reshape(-1, 3) / 65535 * data["size"]
+    )
 
 
 def growing(values: np.ndarray | None = None) -> list:
-    """Return a ball of 21 GW that is a fifth larger at 22 GW, each as one half with a map."""
+    """Return a ball of 21 GW that is a fifth larger at 22 GW, each as one half with a
+    map."""
     mesh, maps = BALL, {} if values is None else {"curvedness": values}
-    return [(21.0, [(mesh, maps)]), (22.0, [(TriangleMesh(1.2 * mesh.vertices, mesh.faces), maps)])]
+    return [
+        (21.0, [(mesh, maps)]),
+        (22.0, [(TriangleMesh(1.2 * mesh.vertices, mesh.faces), maps)]),
+    ]
 
 
 def test_thinning_keeps_vertices_and_the_shape():
@@ -36,7 +44,9 @@ def test_thinning_keeps_vertices_and_the_shape():
     assert len(kept) == pytest.approx(400, rel=0.1)
     assert faces.max() == len(kept) - 1
     coarse = pv.PolyData.from_regular_faces(mesh.vertices[kept], faces)
-    assert coarse.volume == pytest.approx(pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces).volume, rel=0.03)
+    assert coarse.volume == pytest.approx(
+        pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces).volume, rel=0.03
+    )
     assert len(thin_out(mesh, 10**6)[0]) == len(mesh.vertices)
 
 
@@ -55,9 +65,14 @@ def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
     values[0] = np.nan
     data = surfaces_view({"thin": growing(values)}, [], observed_name="observed brain")
     described, _ = data["maps"]
-    levels = np.frombuffer(b64decode(data["groups"][0]["frames"][0]["values"]["curvedness"]), dtype=np.uint8)
+    levels = np.frombuffer(
+        b64decode(data["groups"][0]["frames"][0]["values"]["curvedness"]),
+        dtype=np.uint8,
+    )
     assert levels[0] == 255
-    assert levels[1:] / 254 * described["high"] == pytest.approx(values[1:].clip(max=described["high"]), abs=1e-3)
+    assert levels[1:] / 254 * described["high"] == pytest.approx(
+        values[1:].clip(max=described["high"]), abs=1e-3
+    )
     assert len(b64decode(described["colours"])) == 3 * 255
 
 
@@ -65,9 +80,13 @@ def test_displacement_is_measured_from_the_first_week():
     data = surfaces_view({"thin": growing()}, growing(), observed_name="observed brain")
     assert [described["name"] for described in data["maps"]] == ["displacement_mm"]
     simulated, real = data["groups"]
-    start, later = (b64decode(frame["values"]["displacement_mm"]) for frame in simulated["frames"])
+    start, later = (
+        b64decode(frame["values"]["displacement_mm"]) for frame in simulated["frames"]
+    )
     assert set(start) == {0}
-    assert np.frombuffer(later, dtype=np.uint8) / 254 * data["maps"][0]["high"] == pytest.approx(4.0, abs=0.02)
+    assert np.frombuffer(later, dtype=np.uint8) / 254 * data["maps"][0][
+        "high"
+    ] == pytest.approx(4.0, abs=0.02)
     # what was measured has not moved
     assert real["name"] == "observed brain"
     assert not any(frame["values"] for frame in real["frames"])
@@ -75,4 +94,8 @@ def test_displacement_is_measured_from_the_first_week():
 
 def test_surfaces_of_a_run_with_other_vertices_are_refused():
     with pytest.raises(InputError, check=Facts("22 GW", 642, 2562)):
-        surfaces_view({"thin": [growing()[0], (22.0, [(sphere(20.0, 3), {})])]}, [], observed_name="observed brain")
+        surfaces_view(
+            {"thin": [growing()[0], (22.0, [(sphere(20.0, 3), {})])]},
+            [],
+            observed_name="observed brain",
+        )

@@ -1,4 +1,5 @@
-"""What jobs leave is read, messages, causes and time and memory, and on which modules their programs depend."""
+"""What jobs leave is read, messages, causes and time and memory, and on which modules
+their programs depend."""
 
 import os
 
@@ -8,12 +9,20 @@ from facts import Facts
 
 from gyriflow import code_hash as sources
 from gyriflow.code_hash import code_hash, modules_behind
-from gyriflow.running.jobs import OUT_OF_MEMORY, cause, gather_messages, read_messages, read_usage
+from gyriflow.running.jobs import (
+    OUT_OF_MEMORY,
+    cause,
+    gather_messages,
+    read_messages,
+    read_usage,
+)
 from gyriflow.step import USAGE_COLUMNS
 
 HEAD = "\t".join(USAGE_COLUMNS)
 PATTERNS = {
-    "pial_from_labels": r"results/brains/(?P<brain>a|b)/benchmarks/pial_from_labels\.tsv$",
+    "pial_from_labels": (
+        r"results/brains/(?P<brain>a|b)/benchmarks/pial_from_labels\.tsv$"
+    ),
     "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/benchmarks/simulate\.tsv$",
     "run_tables": r"results/study/benchmarks/run_tables\.tsv$",
 }
@@ -66,40 +75,63 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path):
         "study/logs/poses",
     }
     row = table[table["message"] == "runs/r/a/metrics/week-22.00/logs/measure"].iloc[0]
-    assert (row["subject"], row["run"], row["step"], row["level"]) == ("a", "r", "measure", "warning")
+    assert (row["subject"], row["run"], row["step"], row["level"]) == (
+        "a",
+        "r",
+        "measure",
+        "warning",
+    )
     os.utime(tmp_path / "results/brains/a/logs/pial_from_labels.log", (0, 0))
     later = gather_messages(tmp_path, ["a"], [], since_s=1.0)
-    assert set(later["message"]) == {"brains/a/metrics/logs/measure", "study/logs/poses"}
+    assert set(later["message"]) == {
+        "brains/a/metrics/logs/measure",
+        "study/logs/poses",
+    }
 
 
 @pytest.mark.parametrize(
     ("log", "expected"),
     [
         (
-            "2026-11-22 00:54:57,955 INFO gyriflow.io: read\n2026-11-22 00:54:58,001 ERROR root: a.nii: is no image;\n"
-            "  found text\n2026-11-22 00:54:59,000 INFO gyriflow.io: end\n",
+            (
+                "2026-11-22 00:54:57,955 INFO gyriflow.io: read\n2026-11-22"
+                " 00:54:58,001 ERROR root: a.nii: is no image;\n  found"
+                " text\n2026-11-22 00:54:59,000 INFO gyriflow.io: end\n"
+            ),
             "a.nii: is no image;\n  found text",
         ),
         (
-            "GW 21.071/23  step 1\n2026-11-22 00:54:58,001 INFO root: a\ngyriflow: no step left. Use smaller steps\n",
+            (
+                "GW 21.071/23  step 1\n2026-11-22 00:54:58,001 INFO root: a\ngyriflow:"
+                " no step left. Use smaller steps\n"
+            ),
             "no step left. Use smaller steps",
         ),
         (
-            "2026-11-22 00:54:58,001 ERROR root: unexpected error\nTraceback (most recent call last):\n"
-            '  File "a.py", line 1, in <module>\n    1 / 0\nZeroDivisionError: division by zero\n',
+            (
+                "2026-11-22 00:54:58,001 ERROR root: unexpected error\nTraceback (most"
+                ' recent call last):\n  File "a.py", line 1, in <module>\n    1 /'
+                " 0\nZeroDivisionError: division by zero\n"
+            ),
             Facts("ZeroDivisionError: division by zero"),
         ),
         (
-            "ValueError: no such week\nsnakemake_interface_common.exceptions.WorkflowError: At least one job did not "
-            "complete successfully.\nWorkflowError:\nAt least one job did not complete successfully.\n",
+            (
+                "ValueError: no such"
+                " week\nsnakemake_interface_common.exceptions.WorkflowError: At least"
+                " one job did not complete successfully.\nWorkflowError:\nAt least one"
+                " job did not complete successfully.\n"
+            ),
             Facts("ValueError: no such week"),
         ),
         ("mpiexec: one\n\ntwo\n", "mpiexec: one\ntwo"),
         ("2026-11-22 00:54:57,955 INFO gyriflow.io: read\n", OUT_OF_MEMORY),
         ("", ""),
     ],
-)  # fmt: skip
-def test_the_cause_is_gyriflows_own_message_or_else_the_exception_or_the_end(log, expected):
+)
+def test_the_cause_is_gyriflows_own_message_or_else_the_exception_or_the_end(
+    log, expected
+):
     assert cause(log) == expected
     assert not any(word in cause(log) for word in ("Traceback", "WorkflowError"))
 
@@ -113,9 +145,15 @@ def line(seconds, memory, cpu):
 
 
 def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
-    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(10.5, 200.25, 9.75))
+    write(
+        tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(10.5, 200.25, 9.75)
+    )
     write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line(11, 210, 10))
-    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", line("100.00", "1000.00", "190.00"))
+    write(
+        tmp_path,
+        "runs/two/a/benchmarks/simulate.tsv",
+        line("100.00", "1000.00", "190.00"),
+    )
     # of an earlier configuration
     write(tmp_path, "brains/c/benchmarks/pial_from_labels.tsv", line(1, 1, 1))
     write(tmp_path, "runs/three/a/benchmarks/simulate.tsv", line(1, 1, 1))
@@ -152,7 +190,10 @@ def package(tmp_path, monkeypatch):
         "surface/labels.py": "def read():\n    from .repair import ML",
         "mesh/__init__.py": "import numpy",
         "mesh/quality.py": "import gyriflow.units",
-        "mesh/fill.py": "from .. import (\n    surface,  # one\n    units as u,\n)\nimport gyriflow.unused as o",
+        "mesh/fill.py": (
+            "from .. import (\n    surface,  # one\n    units as u,\n)\nimport"
+            " gyriflow.unused as o"
+        ),
         "unused.py": "",
     }
     for name, text in contents.items():
@@ -168,7 +209,13 @@ def test_modules_behind_a_program_are_followed_through_others(package, tmp_path)
     program = tmp_path / "measure.py"
     program.write_text("from gyriflow.surface.labels import read")
     names = {path.relative_to(package).as_posix() for path in modules_behind(program)}
-    assert names == {"__init__.py", "surface/__init__.py", "surface/labels.py", "surface/repair.py", "units.py"}
+    assert names == {
+        "__init__.py",
+        "surface/__init__.py",
+        "surface/labels.py",
+        "surface/repair.py",
+        "units.py",
+    }
 
 
 def test_a_change_of_a_module_changes_the_hash(package, tmp_path):
@@ -178,7 +225,19 @@ def test_a_change_of_a_module_changes_the_hash(package, tmp_path):
     for name in ("unused.py", "mesh/quality.py", "unused.c", "mesh/quality.c"):
         with (package / name).open("a") as file:
             file.write("\n// another line")
-        for remembered in (sources._digest, sources._files_of, sources.imported_modules):
+        for remembered in (
+            sources._digest,
+            sources._files_of,
+            sources.imported_modules,
+        ):
             remembered.cache_clear()
         hashes.add(code_hash(program))
-        assert len(hashes) == {"unused.py": 1, "mesh/quality.py": 2, "unused.c": 2, "mesh/quality.c": 3}[name]
+        assert (
+            len(hashes)
+            == {
+                "unused.py": 1,
+                "mesh/quality.py": 2,
+                "unused.c": 2,
+                "mesh/quality.c": 3,
+            }[name]
+        )

@@ -1,4 +1,5 @@
-"""Cores and memory within the limits of a container, of a Slurm job and of the shell."""
+"""Cores and memory within the limits of a container, of a Slurm job and of the
+shell."""
 
 import os
 import resource
@@ -13,7 +14,9 @@ from gyriflow.running.machine import available_cores, available_memory_mib
 def in_job(monkeypatch):
     for name in [name for name in os.environ if name.startswith("SLURM_")]:
         monkeypatch.delenv(name)
-    return lambda job: [monkeypatch.setenv(f"SLURM_{name}", str(value)) for name, value in job.items()]
+    return lambda job: [
+        monkeypatch.setenv(f"SLURM_{name}", str(value)) for name, value in job.items()
+    ]
 
 
 @pytest.mark.parametrize(
@@ -37,13 +40,20 @@ def test_cores_are_those_of_the_job(monkeypatch, in_job, job, cores):
     ("own", "limits", "job", "mib"),
     [
         ("0::/", {"memory.max": 300 << 20}, {}, 300),
-        ("0::/job/step", {"job/memory.max": 200 << 20, "job/step/memory.max": "max"}, {}, 200),
+        (
+            "0::/job/step",
+            {"job/memory.max": 200 << 20, "job/step/memory.max": "max"},
+            {},
+            200,
+        ),
         ("4:memory:/docker/1", {"memory/memory.limit_in_bytes": 100 << 20}, {}, 100),
         ("0::/", {"memory.max": "max"}, {"MEM_PER_NODE": 70}, 70),
         ("0::/", {"memory.max": 300 << 20}, {"MEM_PER_CPU": 30, "CPUS_ON_NODE": 2}, 60),
     ],
 )
-def test_memory_is_the_smallest_limit(tmp_path, monkeypatch, in_job, own, limits, job, mib):
+def test_memory_is_the_smallest_limit(
+    tmp_path, monkeypatch, in_job, own, limits, job, mib
+):
     for name, text in {"own": own, **limits}.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(f"{text}\n")

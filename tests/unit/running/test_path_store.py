@@ -1,4 +1,5 @@
-"""The names of kept paths: another one for everything that a path is made from, the same for everything else."""
+"""The names of kept paths: another one for everything that a path is made from, the
+same for everything else."""
 
 from dataclasses import replace
 
@@ -15,23 +16,46 @@ from gyriflow.study.loading import load
 from gyriflow.study.paths import ATLAS_PATH
 
 WEEKS = (21, 22, 23)
-FILES = ("w{week}.nii.gz", "t2-{week}.nii.gz", "pial-{week}.surf.gii", "white-{week}.surf.gii")
-LABELS = {"files": {"labels": FILES[0], "image": FILES[1]}, "weeks": [*WEEKS], "scheme": "spina-bifida-atlas"}
-SURFACES = {"files": {"pial": FILES[2], "white": FILES[3]}, "weeks": [*WEEKS], "scheme": None}
+FILES = (
+    "w{week}.nii.gz",
+    "t2-{week}.nii.gz",
+    "pial-{week}.surf.gii",
+    "white-{week}.surf.gii",
+)
+LABELS = {
+    "files": {"labels": FILES[0], "image": FILES[1]},
+    "weeks": [*WEEKS],
+    "scheme": "spina-bifida-atlas",
+}
+SURFACES = {
+    "files": {"pial": FILES[2], "white": FILES[3]},
+    "weeks": [*WEEKS],
+    "scheme": None,
+}
 START = {"id": "start", "week": 21, "population": "b", "scheme": "spina-bifida-atlas"}
 SCHEME = {"cerebrum": [1, 2, 5], "cortex": [5], "white_matter": [1]}
 
 
 @pytest.fixture
 def paths(tmp_path):
-    """Return a function: a study and its atlas' path, after changes of the atlas' series, the study and its files."""
-    touched(tmp_path, "mine.nii.gz", *(name.format(week=week) for week in WEEKS for name in FILES))
+    """Return a function: a study and its atlas' path, after changes of the atlas'
+    series, the study and its files."""
+    touched(
+        tmp_path,
+        "mine.nii.gz",
+        *(name.format(week=week) for week in WEEKS for name in FILES),
+    )
 
     def path(series=LABELS, start=None, atlas=None, **settings):
         write_atlas(tmp_path, series, folder=".")
         config = {
-            "brains": [START | {"labels": str(tmp_path / "mine.nii.gz")} | (start or {})],
-            "atlas": {"name": str(tmp_path / "atlas.yaml"), "folder": str(tmp_path)} | (atlas or {}),
+            "brains": [
+                START | {"labels": str(tmp_path / "mine.nii.gz")} | (start or {})
+            ],
+            "atlas": (
+                {"name": str(tmp_path / "atlas.yaml"), "folder": str(tmp_path)}
+                | (atlas or {})
+            ),
             "start": "start",
             "folding": {"preset": "expected", "end_week": 22},
         }
@@ -43,18 +67,25 @@ def paths(tmp_path):
 
 @pytest.fixture
 def keys(paths, tmp_path):
-    """Return a function: the key of the path of an atlas, after changes; some files are changed or missing."""
+    """Return a function: the key of the path of an atlas, after changes; some files are
+    changed or missing."""
 
     def key(*series, changed=None, missing=(), **changes):
         study, path = paths(*series, **changes)
-        contents = {str(file): file.name for file in tmp_path.iterdir() if file.name not in missing}
+        contents = {
+            str(file): file.name
+            for file in tmp_path.iterdir()
+            if file.name not in missing
+        }
         contents |= {str(tmp_path / name): "other" for name in changed or ()}
         return origin_key(path_store.path_origin(study, path), contents)
 
     return key
 
 
-def test_a_path_is_kept_next_to_its_atlas_until_its_key_or_its_file_is_another(paths, tmp_path):
+def test_a_path_is_kept_next_to_its_atlas_until_its_key_or_its_file_is_another(
+    paths, tmp_path
+):
     study, path = paths()
     folder = path_store.store_folder(study, path)
     assert folder == tmp_path / "paths"
@@ -78,8 +109,14 @@ def test_a_study_has_the_path_that_was_made_from_the_same(paths, tmp_path, monke
     file = tmp_path / ATLAS_PATH.format(brain=path.brains[0].id)
     assert not path_store.has_path(path, "key")
     file.parent.mkdir(parents=True)
-    write_weekly_shapes(file, WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key"))
-    assert [path_store.has_path(path, key) for key in ("key", "other", None)] == [True, False, False]
+    write_weekly_shapes(
+        file, WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key")
+    )
+    assert [path_store.has_path(path, key) for key in ("key", "other", None)] == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_a_path_has_another_key_where_anything_differs_that_it_is_made_from(keys):
@@ -125,7 +162,10 @@ def test_a_path_has_the_same_key_where_nothing_differs_that_it_is_made_from(keys
         keys(),
         # another start brain and another end, as in another study
         keys(changed=["mine.nii.gz"]),
-        keys(start={"week": 22, "affine_from": "qform"}, folding={"preset": "expected", "end_week": 23}),
+        keys(
+            start={"week": 22, "affine_from": "qform"},
+            folding={"preset": "expected", "end_week": 23},
+        ),
         keys(start={"scheme": "feta-7"}),
         keys(metrics={"spangy_modes": 50}),
     ]
@@ -138,8 +178,13 @@ def test_a_path_has_no_key_until_all_files_of_its_brains_are_there(keys):
     assert keys(missing=["mine.nii.gz"]) == keys()
 
 
-@pytest.mark.parametrize("changed", ["rules/registration.smk", "scripts/filled_labels.py", "scripts/register.py"])
-def test_a_path_has_another_key_after_a_change_of_its_rules_and_scripts(keys, changed, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "changed",
+    ["rules/registration.smk", "scripts/filled_labels.py", "scripts/register.py"],
+)
+def test_a_path_has_another_key_after_a_change_of_its_rules_and_scripts(
+    keys, changed, tmp_path, monkeypatch
+):
     before = keys()
     copy = tmp_path / "copy" / "workflow"
     for name in ("rules", "scripts"):
@@ -152,9 +197,15 @@ def test_a_path_has_another_key_after_a_change_of_its_rules_and_scripts(keys, ch
     assert keys() != before
 
 
-def test_a_path_has_another_key_after_a_change_of_the_code_behind_its_scripts(keys, monkeypatch):
+def test_a_path_has_another_key_after_a_change_of_the_code_behind_its_scripts(
+    keys, monkeypatch
+):
     before = keys()
     # of one script
     changed = {"register.py": "code changed"}
-    monkeypatch.setattr(path_store, "code_hash", lambda script: changed.get(script.name) or code_hash(script))
+    monkeypatch.setattr(
+        path_store,
+        "code_hash",
+        lambda script: changed.get(script.name) or code_hash(script),
+    )
     assert keys() != before

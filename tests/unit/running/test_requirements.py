@@ -1,4 +1,5 @@
-"""What a job needs is found from what its program imports, and named before the first job."""
+"""What a job needs is found from what its program imports, and named before the first
+job."""
 
 import subprocess
 import sys
@@ -16,7 +17,13 @@ SCRIPTS = Path(__file__).parents[3] / "workflow" / "scripts"
 
 
 def test_measuring_needs_nothing_but_the_base_packages():
-    for script in ("pial.py", "measure.py", "brain_figures.py", "quality_table.py", "html_report.py"):
+    for script in (
+        "pial.py",
+        "measure.py",
+        "brain_figures.py",
+        "quality_table.py",
+        "html_report.py",
+    ):
         assert packages_behind(SCRIPTS / script) == []
 
 
@@ -35,16 +42,25 @@ def test_a_missing_package_is_named_with_its_step_and_extra(monkeypatch):
     monkeypatch.setattr(requirements, "has_dolfinx_wheels", lambda: True)
     with pytest.raises(InputError, check=Facts("ipctk", "simulate", "gyriflow[fold]")):
         require_for(measured | {"simulate": requirements.SOLVER})
-    monkeypatch.setattr(requirements, "is_installed", lambda name: name not in ("ipctk", "optuna"))
-    calibrated = {"simulate": requirements.SOLVER, "design": SCRIPTS / "calibration_design.py"}
-    with pytest.raises(InputError, check=Facts("ipctk", "optuna", "gyriflow[calibrate,fold]")):
+    monkeypatch.setattr(
+        requirements, "is_installed", lambda name: name not in ("ipctk", "optuna")
+    )
+    calibrated = {
+        "simulate": requirements.SOLVER,
+        "design": SCRIPTS / "calibration_design.py",
+    }
+    with pytest.raises(
+        InputError, check=Facts("ipctk", "optuna", "gyriflow[calibrate,fold]")
+    ):
         require_for(calibrated)
 
 
 def test_where_pypi_has_no_dolfinx_conda_is_named(monkeypatch):
     monkeypatch.setattr(requirements, "is_installed", lambda name: False)
     monkeypatch.setattr(requirements, "has_dolfinx_wheels", lambda: False)
-    with pytest.raises(InputError, check=Facts("dolfinx", "conda", "envs/gyriflow.yaml")):
+    with pytest.raises(
+        InputError, check=Facts("dolfinx", "conda", "envs/gyriflow.yaml")
+    ):
         require_for({"simulate": requirements.SOLVER})
 
 
@@ -57,7 +73,12 @@ def test_windows_is_sent_to_wsl(monkeypatch):
 
 @pytest.mark.parametrize(
     ("libc", "has_wheels"),
-    [(("glibc", "2.34"), True), (("glibc", "2.100"), True), (("glibc", "2.31"), False), (("", ""), False)],
+    [
+        (("glibc", "2.34"), True),
+        (("glibc", "2.100"), True),
+        (("glibc", "2.31"), False),
+        (("", ""), False),
+    ],
 )
 def test_the_wheels_of_dolfinx_need_glibc_2_34(monkeypatch, libc, has_wheels):
     monkeypatch.setattr(requirements.sys, "platform", "linux")
@@ -68,7 +89,9 @@ def test_the_wheels_of_dolfinx_need_glibc_2_34(monkeypatch, libc, has_wheels):
 
 def test_a_missing_library_is_named_with_its_package(monkeypatch):
     monkeypatch.setattr(requirements, "LIBRARIES", {"libnowhere.so.7": "libnowhere7"})
-    with pytest.raises(InputError, check=Facts("libnowhere.so.7", "apt-get install libnowhere7")):
+    with pytest.raises(
+        InputError, check=Facts("libnowhere.so.7", "apt-get install libnowhere7")
+    ):
         require_for({"measure": SCRIPTS / "measure.py"})
 
 
@@ -79,7 +102,9 @@ def test_without_a_compiler_only_simulations_are_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(requirements, "is_installed", lambda name: True)
     monkeypatch.setattr(requirements, "LIBRARIES", {})
     require_for({"measure": SCRIPTS / "measure.py"})
-    with pytest.raises(InputError, check=Facts("apt-get install gcc", "pip install ziglang")):
+    with pytest.raises(
+        InputError, check=Facts("apt-get install gcc", "pip install ziglang")
+    ):
         require_for({"simulate": requirements.SOLVER})
 
 
@@ -89,7 +114,9 @@ def test_without_pythons_headers_only_simulations_are_refused(monkeypatch, tmp_p
     monkeypatch.setattr(requirements, "is_installed", lambda name: True)
     monkeypatch.setattr(requirements, "LIBRARIES", {})
     require_for({"measure": SCRIPTS / "measure.py"})
-    with pytest.raises(InputError, check=Facts("Python.h", "apt-get install python3-dev")):
+    with pytest.raises(
+        InputError, check=Facts("Python.h", "apt-get install python3-dev")
+    ):
         require_for({"simulate": requirements.SOLVER})
     assert requirements.missing_debian_packages() == ["python3-dev"]
 
@@ -121,7 +148,9 @@ print(len(found.spectra))
 
 
 def test_a_brain_is_measured_where_the_solver_cannot_be_imported():
-    done = subprocess.run([sys.executable, "-c", MEASURING], capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURING], capture_output=True, text=True, timeout=300
+    )
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 0
 
@@ -135,5 +164,7 @@ assert not {"dolfinx", "dolfinx_solver", "mpi4py"} & set(sys.modules)
 
 
 def test_looking_for_the_solver_starts_no_mpi():
-    done = subprocess.run([sys.executable, "-c", SEARCH], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", SEARCH], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stderr

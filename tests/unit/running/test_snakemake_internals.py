@@ -1,4 +1,5 @@
-"""What gyriflow uses of Snakemake's internals, tried with the Snakemake that is installed."""
+"""What gyriflow uses of Snakemake's internals, tried with the Snakemake that is
+installed."""
 
 import ast
 import json
@@ -55,9 +56,14 @@ rule after:
 rerun_on_code_changes(workflow.rules, Path("scripts").absolute())
 know_inputs_by_content(contents, ["content-1"], [])
 remove_stale(workflow.rules, ".")
-print(usage_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
+codes = [getattr(rule.params, "code", None) for rule in workflow.rules]
+print(usage_patterns(workflow.rules), codes)
 """
-SCRIPT = "import shutil\nfrom gyriflow.units import ML_PER_MM3\nshutil.copy(snakemake.input[0], snakemake.output[0])\n"
+SCRIPT = """
+import shutil
+from gyriflow.units import ML_PER_MM3
+shutil.copy(snakemake.input[0], snakemake.output[0])
+"""
 
 
 @pytest.fixture
@@ -70,7 +76,17 @@ def study(tmp_path):
     known(tmp_path / "study", {tmp_path / "given": "content-1"})
     done = snakemake(tmp_path / "study", "--config", "names=a b")
     assert done.returncode == 0, done.stderr
-    assert done.stdout == Facts(str([None, code_hash(tmp_path / "study" / "scripts" / "copy.py"), "own", None, None]))
+    assert done.stdout == Facts(
+        str(
+            [
+                None,
+                code_hash(tmp_path / "study" / "scripts" / "copy.py"),
+                "own",
+                None,
+                None,
+            ]
+        )
+    )
     (pattern,) = ast.literal_eval(done.stdout.partition("}")[0] + "}").values()
     assert re.fullmatch(pattern, "in/benchmarks/a.tsv")["name"] == "a"
     assert not re.fullmatch(pattern, "in/logs/a.log")
@@ -78,12 +94,23 @@ def study(tmp_path):
 
 
 def known(folder, contents):
-    (folder / "contents.json").write_text(json.dumps({str(path): content for path, content in contents.items()}))
+    (folder / "contents.json").write_text(
+        json.dumps({str(path): content for path, content in contents.items()})
+    )
 
 
 def snakemake(folder, *arguments):
     triggers = ("--rerun-triggers", "mtime", "params", "input")
-    return ran(sys.executable, "-m", "snakemake", "--cores", "1", *arguments, *triggers, cwd=folder)
+    return ran(
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--cores",
+        "1",
+        *arguments,
+        *triggers,
+        cwd=folder,
+    )
 
 
 def reruns(folder):
@@ -92,7 +119,9 @@ def reruns(folder):
     return "rule copy" in dry.stdout + dry.stderr
 
 
-def test_inputs_are_known_by_their_content_wherever_they_and_the_study_are(study, tmp_path):
+def test_inputs_are_known_by_their_content_wherever_they_and_the_study_are(
+    study, tmp_path
+):
     os.utime(tmp_path / "given", (2e9, 2e9))
     (tmp_path / "given").rename(tmp_path / "an other")
     study.rename(tmp_path / "moved")
@@ -113,7 +142,9 @@ def test_jobs_run_again_after_a_change_of_their_code_not_of_its_date(study):
     assert reruns(study)
 
 
-def test_only_files_that_a_run_made_are_removed_where_no_rule_makes_them_any_more(study):
+def test_only_files_that_a_run_made_are_removed_where_no_rule_makes_them_any_more(
+    study,
+):
     touched(study, "mine.csv", "tables/mine.png")
     # of two that are not made any more, a user has changed one
     (study / "made-a.csv").write_text("mine")
@@ -126,7 +157,9 @@ def test_results_that_are_kept_as_links_count_as_copied_once(study):
     # as by git-annex
     store = study.parent / "annex" / "objects"
     store.mkdir(parents=True)
-    for number, name in enumerate(("after.csv", "tables/coded.csv", "made-a.csv", "made-b.csv", "large.bin")):
+    for number, name in enumerate(
+        ("after.csv", "tables/coded.csv", "made-a.csv", "made-b.csv", "large.bin")
+    ):
         kept = (study / name).rename(store / f"key-{number}")
         (study / name).symlink_to(kept)
         os.utime(study / name, (2e9 + number, 2e9 + number), follow_symlinks=False)
@@ -139,9 +172,14 @@ def test_results_that_are_kept_as_links_count_as_copied_once(study):
 
 
 def test_the_dates_of_a_copy_are_those_at_which_its_results_were_made(study):
-    made = {path: path.stat().st_mtime for path in (study / "made-a.csv", study / "made-b.csv")}
+    made = {
+        path: path.stat().st_mtime
+        for path in (study / "made-a.csv", study / "made-b.csv")
+    }
     assert dates_before_copy(study) == {}
-    for number, name in enumerate(("after.csv", "tables/coded.csv", "made-a.csv", "made-b.csv", "large.bin")):
+    for number, name in enumerate(
+        ("after.csv", "tables/coded.csv", "made-a.csv", "made-b.csv", "large.bin")
+    ):
         os.utime(study / name, (2e9 + number, 2e9 + number))
     dates = dates_before_copy(study)
     assert {path: dates[path] for path in made} == pytest.approx(made, abs=1e-6)

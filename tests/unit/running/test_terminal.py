@@ -1,4 +1,5 @@
-"""What a run tells by Snakemake's records, on a terminal and in a file; how far a study is, and whose results."""
+"""What a run tells by Snakemake's records, on a terminal and in a file; how far a study
+is, and whose results."""
 
 import io
 import logging
@@ -26,7 +27,9 @@ class Run:
     def __init__(self, folder, stream):
         self.now = 0.0
         self.folder = folder
-        self.display = RunDisplay(stream, folder / ".snakemake" / "log" / "x.log", lambda: self.now)
+        self.display = RunDisplay(
+            stream, folder / ".snakemake" / "log" / "x.log", lambda: self.now
+        )
 
     def tell(self, event=None, text="", level=logging.INFO, **said):
         record = logging.LogRecord("snakemake", level, "", 0, text, (), None)
@@ -35,7 +38,14 @@ class Run:
 
     def begin(self, rule, number=1, **wildcards):
         log = self.folder / f"{rule}.log"
-        self.tell("job_info", jobid=number, rule_name=rule, wildcards=wildcards, output=["x"], log=[str(log)])
+        self.tell(
+            "job_info",
+            jobid=number,
+            rule_name=rule,
+            wildcards=wildcards,
+            output=["x"],
+            log=[str(log)],
+        )
         return log
 
     def end(self, number=1, done=1, total=1):
@@ -76,16 +86,27 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
     assert run.lines[-1] == Facts("gyriflow:", "5 s")
     assert len(run.lines) == 23
     assert "\x1b" not in "".join(run.lines)
-    assert (run.state["done"], run.state["total"], run.state["running"]) == (100, 100, [])
+    assert (run.state["done"], run.state["total"], run.state["running"]) == (
+        100,
+        100,
+        [],
+    )
 
 
 def test_a_folding_tells_its_size_weeks_and_warnings(run):
     run.tell("run_info", stats={"simulate": 1})
     log = run.begin("simulate", run="r", brain="a")
-    size = '{"event": "size", "elements": 12, "unknowns": 9, "ranks": 1, "memory_mib": 70}\n'
+    size = (
+        '{"event": "size", "elements": 12, "unknowns": 9, "ranks": 1, "memory_mib":'
+        " 70}\n"
+    )
     coarse = '{"event": "warning", "message": "coarse"}\n'
-    log.with_suffix(".jsonl").write_text(size + coarse + STEP.format(week=21.5, left=75.0))
-    log.write_text("warning: coarse\n2026-11-22 00:54:57,955 WARNING trimesh: not ours\n")
+    log.with_suffix(".jsonl").write_text(
+        size + coarse + STEP.format(week=21.5, left=75.0)
+    )
+    log.write_text(
+        "warning: coarse\n2026-11-22 00:54:57,955 WARNING trimesh: not ours\n"
+    )
     run.now = 25.0
     run.display.tick()
     run.end()
@@ -104,7 +125,9 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
     warned = "2026-11-22 00:54:57,001 WARNING gyriflow.io: thin cortex\n"
     log.write_text(warned + "2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
     run.fail("pial_from_labels", log=[str(log)])
-    run.tell(text="Exiting because a job execution failed. Look below", level=logging.ERROR)
+    run.tell(
+        text="Exiting because a job execution failed. Look below", level=logging.ERROR
+    )
     run.display.end()
     assert run.lines[1:] == [
         Facts("pial_from_labels a: thin cortex"),
@@ -112,7 +135,9 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         Facts(log),
         Facts("gyriflow:", "5 s", 1, 0, 2),
     ]
-    assert run.state["failed"] == [{"job": "pial_from_labels a", "cause": "a.nii: is no image", "logs": [str(log)]}]
+    assert run.state["failed"] == [
+        {"job": "pial_from_labels a", "cause": "a.nii: is no image", "logs": [str(log)]}
+    ]
 
 
 @pytest.mark.parametrize(
@@ -122,30 +147,53 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         ("died with <Signals.SIGSEGV: 11>.", ["SIGSEGV"], None),
         ("died with <Signals.SIGTERM: 15>.", [], None),
         # as snakemake-executor-plugin-slurm 2.8 puts it
-        ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", [12, "CANCELLED"], None),
-        ("SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x", ["a.nii: is no image"], None),
+        (
+            "SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x",
+            [12, "CANCELLED"],
+            None,
+        ),
+        (
+            "SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x",
+            ["a.nii: is no image"],
+            None,
+        ),
     ],
 )
-def test_what_has_ended_a_program_from_outside_is_told(run, monkeypatch, message, facts, code):
+def test_what_has_ended_a_program_from_outside_is_told(
+    run, monkeypatch, message, facts, code
+):
     monkeypatch.setenv(EXIT_FILE, str(run.folder / "code"))
     log = run.begin("measure", brain="a")
     log.write_text("2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
-    run.fail("measure", f"CalledProcessError in file x:\n'python x.py' {message}", [str(log)])
+    run.fail(
+        "measure", f"CalledProcessError in file x:\n'python x.py' {message}", [str(log)]
+    )
     assert run.lines[0] == Facts("measure a:", *facts)
     assert ("a.nii" in run.lines[0]) == ("'FAILED'" in message)
     assert recorded_exit_code(run.folder / "code") == code
 
 
-def test_a_step_without_a_message_is_told_with_where_its_own_is_not_by_the_shell_command(run):
-    run.fail("measure", "CalledProcessError in file x:\nCommand 'set -e; python x.py' returned 1", [])
+def test_a_failed_step_without_a_message_names_its_log_and_not_the_shell_command(
+    run,
+):
+    run.fail(
+        "measure",
+        "CalledProcessError in file x:\nCommand 'set -e; python x.py' returned 1",
+        [],
+    )
     assert run.lines[0] == Facts("measure", run.display.details)
     assert "python" not in run.lines[0]
 
 
-def test_a_hundred_jobs_with_one_warning_and_one_cause_are_three_lines_each_and_a_number(run):
+def test_a_hundred_equal_warnings_and_failures_are_three_lines_each_and_a_number(
+    run,
+):
     for number in range(100):
         log = run.begin("pial", number, brain=f"sub-{number:03}")
-        log.write_text(f"2026-01-01 10:00:00 WARNING gyriflow.io.volumes: /a/{number}.nii: voxels of {number} mm\n")
+        log.write_text(
+            f"2026-01-01 10:00:00 WARNING gyriflow.io.volumes: /a/{number}.nii: voxels"
+            f" of {number} mm\n"
+        )
         if number % 2:
             run.end(number)
         else:
@@ -170,7 +218,10 @@ def test_a_run_until_a_stage_says_when_it_is_done(run):
 def test_what_was_stopped_is_no_failure(run):
     run.tell("run_info", stats={"simulate": 2})
     run.begin("simulate", run="r", brain="a")
-    run.tell(text="Terminating processes on user request, this might take some time.", level=logging.WARNING)
+    run.tell(
+        text="Terminating processes on user request, this might take some time.",
+        level=logging.WARNING,
+    )
     run.fail("simulate")
     run.display.end()
     assert run.lines[-1] == Facts("gyriflow:", "5 s", 0, 2)
@@ -200,7 +251,11 @@ RUNNING = {
 
 @pytest.fixture
 def study(tmp_path):
-    for name in ("brains/a/surface/pial.surf.gii", "brains/b/logs/x", "runs/r/a/logs/simulate.log"):
+    for name in (
+        "brains/a/surface/pial.surf.gii",
+        "brains/b/logs/x",
+        "runs/r/a/logs/simulate.log",
+    ):
         (tmp_path / "results" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "results" / name).touch()
     write_json(tmp_path / STATE, RUNNING)
@@ -218,17 +273,30 @@ def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
 
 
 def test_a_run_that_was_killed_is_called_interrupted(study):
-    assert text(study) == Facts("2026-01-01 10:00:00", 3, 12) != Facts(*RUNNING["running"])
-    write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True})
-    assert text(study) == Facts("2026-01-01 10:05:00", 3, 12) != Facts("2026-01-01 10:00:00")
+    assert (
+        text(study) == Facts("2026-01-01 10:00:00", 3, 12) != Facts(*RUNNING["running"])
+    )
+    write_json(
+        study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True}
+    )
+    assert (
+        text(study)
+        == Facts("2026-01-01 10:05:00", 3, 12)
+        != Facts("2026-01-01 10:00:00")
+    )
 
 
 def test_stages_of_brains_and_runs_are_told_from_their_files(study):
     assert ["b", "-", "-", "-"] in [line.split() for line in text(study).splitlines()]
     progress = study / "results/runs/r/a/logs/simulate.jsonl"
-    progress.write_text('{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s": 142.0}\n')
+    progress.write_text(
+        '{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s":'
+        " 142.0}\n"
+    )
     assert Facts("r", "a", "GW 21.50", 23) in text(study).splitlines()
-    write_json(study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]})
+    write_json(
+        study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]}
+    )
     assert Facts("r", "a", "GW 23.00") in text(study).splitlines()
     assert "report.html" not in text(study)
 
@@ -238,15 +306,30 @@ def test_what_is_done_of_each_brain_and_run_is_counted(tmp_path):
         tmp_path / "results" / "brains" / "a",
         *("surface/pial.surf.gii", "metrics/metrics.csv"),
     )
-    touched(tmp_path / "results" / "brains" / "b", "surface/pial.surf.gii", "mesh/brain.xdmf")
+    touched(
+        tmp_path / "results" / "brains" / "b",
+        "surface/pial.surf.gii",
+        "mesh/brain.xdmf",
+    )
     run = tmp_path / "results" / "runs" / "r" / "a"
-    touched(run, *(f"surfaces/week-{week}/pial.surf.gii" for week in (21, 22, 23)), "figures/x.png")
+    touched(
+        run,
+        *(f"surfaces/week-{week}/pial.surf.gii" for week in (21, 22, 23)),
+        "figures/x.png",
+    )
     touched(run, *(f"metrics/week-{week}/metrics.csv" for week in (21, 22)))
     rows = [line.split() for line in text(tmp_path).splitlines() if line]
     assert rows == [
         ["nothing", "is", "running"],
-        *(["brain", "surface", "mesh", "metrics"], ["a", "done", "-", "done"], ["b", "done", "done", "-"]),
-        *(["run", "brain", "folding", "surfaces", "metrics", "figures"], ["r", "a", "-", "3", "2", "1"]),
+        *(
+            ["brain", "surface", "mesh", "metrics"],
+            ["a", "done", "-", "done"],
+            ["b", "done", "done", "-"],
+        ),
+        *(
+            ["run", "brain", "folding", "surfaces", "metrics", "figures"],
+            ["r", "a", "-", "3", "2", "1"],
+        ),
     ]
 
 
@@ -256,7 +339,9 @@ def test_the_status_of_a_configuration_with_mistakes_is_told(tmp_path, content):
     assert text(tmp_path) == "nothing is running"
 
 
-def test_the_runs_of_a_configuration_are_told_before_they_start_wherever_its_files_are(tmp_path):
+def test_the_runs_of_a_configuration_are_told_before_they_start_wherever_its_files_are(
+    tmp_path,
+):
     shape = "{id: a, week: 21, shape: {semi_axes_mm: [20, 20, 20]}}"
     (tmp_path / "gyriflow.yaml").write_text(
         f"brains: [{shape}]\nstart: a\nfolding: {{end_week: 22}}\nruns: {{x: {{}}}}"
@@ -277,19 +362,31 @@ def configured(*ids, week=21):
 @pytest.fixture
 def made(tmp_path):
     """A folder with results of a study of brains a and b."""
-    check_results_belong_to(tmp_path, [tmp_path / "one.yaml"], configured("a", "b"), record=True)
+    check_results_belong_to(
+        tmp_path, [tmp_path / "one.yaml"], configured("a", "b"), record=True
+    )
     (tmp_path / "results" / "brains" / "a").mkdir(parents=True)
     return tmp_path
 
 
 def test_another_study_is_refused_with_what_to_do(made):
     with pytest.raises(
-        InputError, check=Facts(made / "results", "a", made / "one.yaml", "c", made / "two.yaml", "--directory")
+        InputError,
+        check=Facts(
+            made / "results",
+            "a",
+            made / "one.yaml",
+            "c",
+            made / "two.yaml",
+            "--directory",
+        ),
     ):
         check_results_belong_to(made, [made / "two.yaml"], configured("c"), record=True)
     # a brain of the same name may be another one
     with pytest.raises(InputError, check=Facts(made / "one.yaml", made / "two.yaml")):
-        check_results_belong_to(made, [made / "two.yaml"], configured("a", week=25), record=False)
+        check_results_belong_to(
+            made, [made / "two.yaml"], configured("a", week=25), record=False
+        )
 
 
 @pytest.mark.parametrize(
@@ -306,7 +403,9 @@ def test_a_study_that_was_changed_goes_on(made, file, ids):
 def test_renamed_data_with_a_renamed_configuration_are_the_same_study(tmp_path):
     def renamed(name):
         brain = {"id": name, "week": 21, "labels": f"{name}.nii.gz", "scheme": "binary"}
-        return load({"brains": [brain], "start": name, "folding": {"end_week": 30}}, tmp_path)
+        return load(
+            {"brains": [brain], "start": name, "folding": {"end_week": 30}}, tmp_path
+        )
 
     (tmp_path / "old.nii.gz").write_text("one")
     config = renamed("old")

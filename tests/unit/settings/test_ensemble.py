@@ -1,16 +1,30 @@
-"""Members of an ensemble: which inputs differ, by how much, and that none goes with another."""
+"""Members of an ensemble: which inputs differ, by how much, and that none goes with
+another."""
 
 import numpy as np
 import pytest
 
-from gyriflow.settings.ensemble import AGE_SD_GW, DIFFERENCE_RANGE_MM, FADING_RANGE_GW, SMOOTHING_RANGE, Ensemble
+from gyriflow.settings.ensemble import (
+    AGE_SD_GW,
+    DIFFERENCE_RANGE_MM,
+    FADING_RANGE_GW,
+    SMOOTHING_RANGE,
+    Ensemble,
+)
 
-INPUTS = ("age_shift_gw", "registration_smoothing", "difference_smoothing_mm", "fading_gw")
+INPUTS = (
+    "age_shift_gw",
+    "registration_smoothing",
+    "difference_smoothing_mm",
+    "fading_gw",
+)
 
 
 def values_of(ensemble: Ensemble) -> np.ndarray:
     """Return the (members, inputs) values of the members of an ensemble."""
-    return np.array([[getattr(member, name) for name in INPUTS] for member in ensemble.variations])
+    return np.array(
+        [[getattr(member, name) for name in INPUTS] for member in ensemble.variations]
+    )
 
 
 def test_members_differ_in_each_input_by_itself():
@@ -28,7 +42,9 @@ def test_each_input_fills_its_range():
     # quantiles of a normal distribution, to two decimals
     assert shifts.mean() == pytest.approx(0.0, abs=0.02)
     assert shifts.std() == pytest.approx(AGE_SD_GW, rel=0.06)
-    for values, (low, high) in zip(factors, (SMOOTHING_RANGE, DIFFERENCE_RANGE_MM, FADING_RANGE_GW), strict=True):
+    for values, (low, high) in zip(
+        factors, (SMOOTHING_RANGE, DIFFERENCE_RANGE_MM, FADING_RANGE_GW), strict=True
+    ):
         # a quarter of the members in each quarter of the range, by its logarithm
         place = np.log(values / low) / np.log(high / low)
         counts, _ = np.histogram(place, np.linspace(0.0, 1.0, 5))
@@ -36,8 +52,13 @@ def test_each_input_fills_its_range():
 
 
 def test_ensembles_are_the_same_again_and_others_by_their_seed():
-    first, again, other = (values_of(Ensemble(members=8, seed=seed)) for seed in (0, 0, 1))
+    first, again, other = (
+        values_of(Ensemble(members=8, seed=seed)) for seed in (0, 0, 1)
+    )
     assert np.array_equal(first, again)
     assert not (first == other).all(axis=1).any()
-    seeds = [{member.seed for member in Ensemble(members=8, seed=seed).variations} for seed in (0, 1)]
+    seeds = [
+        {member.seed for member in Ensemble(members=8, seed=seed).variations}
+        for seed in (0, 1)
+    ]
     assert seeds[0].isdisjoint(seeds[1])

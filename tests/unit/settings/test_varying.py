@@ -8,7 +8,12 @@ from gyriflow.errors import InputError
 from gyriflow.settings.folding import parameters_from, require_maps
 from gyriflow.settings.varying import value_at, value_range
 
-RUN = {"start_week": 21.0, "end_week": 31.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 31.0]}
+RUN = {
+    "start_week": 21.0,
+    "end_week": 31.0,
+    "fissure_x_mm": 0.0,
+    "output_weeks": [21.0, 31.0],
+}
 MAP = {"thickness_mm": np.array([1.0, 2.0, 4.0])}
 
 
@@ -20,7 +25,13 @@ def value(given):
 def test_a_curve_is_linear_between_its_weeks_and_constant_beyond():
     assert value_at(value("2e-3"), 33.0, {}) == 2e-3
     curve = value({"weeks": {25: 3.0, "21": 1.0}})
-    assert [value_at(curve, week, {}) for week in (20.0, 21.0, 22.0, 25.0, 40.0)] == [1.0, 1.0, 1.5, 3.0, 3.0]
+    assert [value_at(curve, week, {}) for week in (20.0, 21.0, 22.0, 25.0, 40.0)] == [
+        1.0,
+        1.0,
+        1.5,
+        3.0,
+        3.0,
+    ]
 
 
 def test_a_map_is_multiplied_with_the_curve():
@@ -28,11 +39,23 @@ def test_a_map_is_multiplied_with_the_curve():
     np.testing.assert_allclose(value_at(both, 26.0, MAP), [1.5, 3.0, 6.0])
     assert value_range(both, MAP, 21.0, 40.0) == (1.0, 8.0)
     assert value_range(both, MAP, 21.0, 26.0) == (1.0, 6.0)
-    np.testing.assert_allclose(value_at(value({"map": "thickness_mm"}), 26.0, MAP), MAP["thickness_mm"])
+    np.testing.assert_allclose(
+        value_at(value({"map": "thickness_mm"}), 26.0, MAP), MAP["thickness_mm"]
+    )
 
 
 @pytest.mark.parametrize(
-    "given", ["thick", True, {}, {"weeks": {}}, {"weeks": [1, 2]}, {"week": {21: 1}}, None, "estimated"]
+    "given",
+    [
+        "thick",
+        True,
+        {},
+        {"weeks": {}},
+        {"weeks": [1, 2]},
+        {"week": {21: 1}},
+        None,
+        "estimated",
+    ],
 )
 def test_what_is_no_number_curve_or_map_is_refused(given):
     with pytest.raises(InputError, match="thickness_mm"):

@@ -1,9 +1,17 @@
-"""Atlases: what an atlas.yaml may say, the brains that a section stands for, and what is said of files and weeks."""
+"""Atlases: what an atlas.yaml may say, the brains that a section stands for, and what
+is said of files and weeks."""
 
 from pathlib import Path
 
 import pytest
-from configurations import LABELLED, problems, series_for, series_of, touched, write_atlas
+from configurations import (
+    LABELLED,
+    problems,
+    series_for,
+    series_of,
+    touched,
+    write_atlas,
+)
 from facts import Facts
 
 from gyriflow.errors import InputError
@@ -16,13 +24,20 @@ from gyriflow.study.atlases import known_checksums, retrieval_note, used_atlases
 from gyriflow.study.loading import load
 from gyriflow.study.registry import observed_name
 
-UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, operated"
+UNOPERATED, OPERATED = (
+    "spina bifida aperta, unoperated",
+    "spina bifida aperta, operated",
+)
 HERE = {"folder": "."}
 SURFACES = "atlas/fetal.week{}.{}.pial.surf.gii"
 
 
 def surfaces(*weeks, inside=""):
-    return [inside + SURFACES.format(week, side) for week in weeks for side in ("left", "right")]
+    return [
+        inside + SURFACES.format(week, side)
+        for week in weeks
+        for side in ("left", "right")
+    ]
 
 
 def study(atlas, start, **changes):
@@ -55,7 +70,10 @@ def test_labels_of_spina_bifida_lie_in_the_checkout_as_published(tmp_path):
     assert used.missing == []
     assert all(sha256_of(file.path) == file.record.sha256 for file in used.files)
     assert all(file.path.stat().st_size == file.record.bytes for file in used.files)
-    assert all(brain.image is None and Path(brain.labels).is_relative_to(ATLASES) for brain in config.brains)
+    assert all(
+        brain.image is None and Path(brain.labels).is_relative_to(ATLASES)
+        for brain in config.brains
+    )
     assert (ATLASES / "spina-bifida" / "LICENSE.txt").is_file()
 
 
@@ -77,16 +95,23 @@ def test_populations_are_named_and_never_share_a_curve(tmp_path):
 
 def test_a_growth_curve_across_populations_is_refused(tmp_path):
     mixed = ["spina-bifida-unoperated-21", "spina-bifida-operated-34"]
-    found = problems(study("spina-bifida", mixed[0], growth={"brains": {"mixed": mixed}}), tmp_path)
+    found = problems(
+        study("spina-bifida", mixed[0], growth={"brains": {"mixed": mixed}}), tmp_path
+    )
     assert found == [Facts("growth.brains.mixed:", OPERATED, UNOPERATED)]
     # without a name the two are series of one week each, which is none
-    found = resolve(load(study("spina-bifida", mixed[0], growth={"brains": mixed}), tmp_path))
+    found = resolve(
+        load(study("spina-bifida", mixed[0], growth={"brains": mixed}), tmp_path)
+    )
     assert series_of(found) == {}
 
 
 def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_path):
     own = [{"id": "own", "week": 21, **LABELLED}]
-    atlas = [{"name": "spina-bifida", "series": "unoperated", "weeks": [22, 21]}, "dhcp-surface"]
+    atlas = [
+        {"name": "spina-bifida", "series": "unoperated", "weeks": [22, 21]},
+        "dhcp-surface",
+    ]
     config = load(study(atlas, "own", brains=own), tmp_path)
     dhcp = [f"dhcp-surface-{week}" for week in range(21, 37)]
     assert [brain.id for brain in config.brains] == [
@@ -96,18 +121,31 @@ def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_
         *dhcp,
     ]
     twice = problems(study([*atlas, "dhcp-surface"], "own", brains=own), tmp_path)
-    assert twice == [*(Facts("brains:", 2, name) for name in dhcp[:3]), Facts(len(dhcp) - 3)]
+    assert twice == [
+        *(Facts("brains:", 2, name) for name in dhcp[:3]),
+        Facts(len(dhcp) - 3),
+    ]
 
 
 # files in a folder
 
 
 def test_files_are_found_by_name_wherever_they_lie_and_others_are_put_beside(tmp_path):
-    touched(tmp_path / "mine", *surfaces(21, inside="some/where/"), "clone/atlas/fetal.week22.left.pial.surf.gii")
+    touched(
+        tmp_path / "mine",
+        *surfaces(21, inside="some/where/"),
+        "clone/atlas/fetal.week22.left.pial.surf.gii",
+    )
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 22]}
     config = load(study(section, "dhcp-surface-21"), tmp_path)
-    assert config.brains[0].hemispheres.left == f"{tmp_path}/mine/some/where/{SURFACES.format(21, 'left')}"
-    assert config.brains[1].hemispheres.left == f"{tmp_path}/mine/clone/atlas/fetal.week22.left.pial.surf.gii"
+    assert (
+        config.brains[0].hemispheres.left
+        == f"{tmp_path}/mine/some/where/{SURFACES.format(21, 'left')}"
+    )
+    assert (
+        config.brains[1].hemispheres.left
+        == f"{tmp_path}/mine/clone/atlas/fetal.week22.left.pial.surf.gii"
+    )
     (missing,) = used_atlases(config)[0].missing
     assert missing.path == tmp_path / "mine" / SURFACES.format(22, "right")
     assert missing.url.endswith("/" + SURFACES.format(22, "right"))
@@ -130,23 +168,41 @@ def test_an_atlas_folder_and_what_is_in_it_may_be_links(tmp_path):
 
 def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
     known = read_yaml(ATLASES / "crl" / "atlas.yaml")["series"]["normative"]["weeks"]
-    section = {"name": "crl", "folder": "mine", "weeks": [21, 22], "accept_licence": True}
-    touched(tmp_path / "mine", "Other21_Study1/parcellation.nii.gz", "x/HarvardSTA22_Study1/parcellation.nii.gz")
+    section = {
+        "name": "crl",
+        "folder": "mine",
+        "weeks": [21, 22],
+        "accept_licence": True,
+    }
+    touched(
+        tmp_path / "mine",
+        "Other21_Study1/parcellation.nii.gz",
+        "x/HarvardSTA22_Study1/parcellation.nii.gz",
+    )
     config = load(study(section, "crl-21"), tmp_path)
     file = f"{tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz"
     assert [brain.labels for brain in config.brains][1] == file
     # which is looked at by the stage that reads it
     found = {file: known_checksums(used_atlases(config))[file]}
     assert found == {file: ("crl", known[22]["labels"]["sha256"])}
-    with pytest.raises(InputError, check=Facts(f"{file}:", "crl", known[22]["labels"]["sha256"])):
+    with pytest.raises(
+        InputError, check=Facts(f"{file}:", "crl", known[22]["labels"]["sha256"])
+    ):
         require_checksums(found)
 
 
-def test_two_files_of_one_name_and_a_file_in_the_place_of_the_folder_are_refused(tmp_path):
+def test_two_files_of_one_name_and_a_file_in_the_place_of_the_folder_are_refused(
+    tmp_path,
+):
     touched(tmp_path / "mine", *surfaces(21), surfaces(21, inside="copy/")[0])
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21]}
-    both = [tmp_path / "mine" / inside / SURFACES.format(21, "left") for inside in ("", "copy")]
-    assert problems(study(section, "dhcp-surface-21"), tmp_path) == [Facts("atlas.folder:", *both)]
+    both = [
+        tmp_path / "mine" / inside / SURFACES.format(21, "left")
+        for inside in ("", "copy")
+    ]
+    assert problems(study(section, "dhcp-surface-21"), tmp_path) == [
+        Facts("atlas.folder:", *both)
+    ]
     touched(tmp_path, "file")
     found = problems(study(section | {"folder": "file"}, "dhcp-surface-21"), tmp_path)
     assert found == [Facts("atlas.folder:", tmp_path / "file")]
@@ -156,12 +212,19 @@ def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
     touched(tmp_path / "mine", *surfaces("21.5"))
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 21.5]}
     config = load(study(section, "dhcp-surface-21.5"), tmp_path)
-    assert [(brain.id, brain.week) for brain in config.brains] == [("dhcp-surface-21", 21), ("dhcp-surface-21.5", 21.5)]
-    assert config.brains[1].hemispheres.left.endswith("fetal.week21.5.left.pial.surf.gii")
+    assert [(brain.id, brain.week) for brain in config.brains] == [
+        ("dhcp-surface-21", 21),
+        ("dhcp-surface-21.5", 21.5),
+    ]
+    assert config.brains[1].hemispheres.left.endswith(
+        "fetal.week21.5.left.pial.surf.gii"
+    )
     later = ", ".join(map(str, range(22, 37)))
     for week in (21.004, 37):
         found = problems(study(section | {"weeks": [week]}, "a"), tmp_path)
-        assert found == [Facts("atlas.weeks:", "dhcp-surface", week, f"21, 21.5, {later}")]
+        assert found == [
+            Facts("atlas.weeks:", "dhcp-surface", week, f"21, 21.5, {later}")
+        ]
 
 
 # an atlas of one's own
@@ -170,16 +233,26 @@ def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
 def test_an_atlas_of_ones_own_is_one_file(tmp_path):
     touched(tmp_path / "mine", "w21.nii.gz", "w22.nii.gz")
     file = write_atlas(tmp_path / "mine", **HERE)
-    for given in ("mine/atlas.yaml", str(file), {"name": "mine/atlas.yaml", "series": ["all"]}):
+    for given in (
+        "mine/atlas.yaml",
+        str(file),
+        {"name": "mine/atlas.yaml", "series": ["all"]},
+    ):
         config = load(study(given, "mine-21", folding={"end_week": 22}), tmp_path)
-        assert [(brain.id, brain.population) for brain in config.brains] == [("mine-21", "sheep"), ("mine-22", "sheep")]
+        assert [(brain.id, brain.population) for brain in config.brains] == [
+            ("mine-21", "sheep"),
+            ("mine-22", "sheep"),
+        ]
         assert config.brains[1].labels == str(tmp_path / "mine" / "w22.nii.gz")
 
 
 @pytest.mark.parametrize(
     ("names", "white"),
     [
-        (["left", "right", "white_left", "white_right"], {"left": "21.white_left.gii", "right": "21.white_right.gii"}),
+        (
+            ["left", "right", "white_left", "white_right"],
+            {"left": "21.white_left.gii", "right": "21.white_right.gii"},
+        ),
         (["pial", "white"], {"whole": "21.white.gii"}),
     ],
 )
@@ -187,7 +260,9 @@ def test_an_atlas_may_have_white_surfaces(tmp_path, names, white):
     touched(tmp_path, *(f"{week}.{name}.gii" for week in (21, 22) for name in names))
     files = {name: f"{{week}}.{name}.gii" for name in names}
     write_atlas(tmp_path, **HERE, series={"scheme": None, "files": files})
-    brain, _ = load(study("atlas.yaml", "mine-21", folding={"end_week": 22}), tmp_path).brains
+    brain, _ = load(
+        study("atlas.yaml", "mine-21", folding={"end_week": 22}), tmp_path
+    ).brains
     assert {side: Path(path).name for side, path in brain.white_files.items()} == white
 
 
@@ -199,16 +274,36 @@ def test_an_atlas_may_have_white_surfaces(tmp_path, names, white):
         ({"series": {"scheme": None}}, "series.all.scheme", ["labels"]),
         ({"series": {"weeks": []}}, "series.all.weeks", [[]]),
         ({"series": {"weeks": [21, 21]}}, "series.all.weeks", [[21, 21]]),
-        ({"series": {"files": {"labels": "a.nii.gz"}}}, "series.all.files", ["{week}", "a.nii.gz"]),
-        ({"series": {"files": {"left": "{week}.gii"}}}, "series.all.files", ["left", "right", "pial", "{week}.gii"]),
-        ({"series": {"files": {"pial": "{week}.gii", "white_left": "{week}.w"}}}, "series.all.files", ["white_left"]),
-        ({"series": {"weeks": {21: {"labels": {"sha256": "abc"}}}}}, "series.all.weeks[21].labels.sha256", ["abc", 64]),
+        (
+            {"series": {"files": {"labels": "a.nii.gz"}}},
+            "series.all.files",
+            ["{week}", "a.nii.gz"],
+        ),
+        (
+            {"series": {"files": {"left": "{week}.gii"}}},
+            "series.all.files",
+            ["left", "right", "pial", "{week}.gii"],
+        ),
+        (
+            {"series": {"files": {"pial": "{week}.gii", "white_left": "{week}.w"}}},
+            "series.all.files",
+            ["white_left"],
+        ),
+        (
+            {"series": {"weeks": {21: {"labels": {"sha256": "abc"}}}}},
+            "series.all.weeks[21].labels.sha256",
+            ["abc", 64],
+        ),
     ],
 )
-def test_mistakes_in_a_description_are_named_with_its_file(tmp_path, changes, key, facts):
+def test_mistakes_in_a_description_are_named_with_its_file(
+    tmp_path, changes, key, facts
+):
     touched(tmp_path, "w21.nii.gz", "w22.nii.gz")
     file = write_atlas(tmp_path, **HERE | changes)
-    assert problems(study("atlas.yaml", "mine-21"), tmp_path) == [Facts(f"{file}: {key}:", *facts)]
+    assert problems(study("atlas.yaml", "mine-21"), tmp_path) == [
+        Facts(f"{file}: {key}:", *facts)
+    ]
 
 
 # licences and mistakes
@@ -217,14 +312,24 @@ def test_mistakes_in_a_description_are_named_with_its_file(tmp_path, changes, ke
 def test_a_narrow_licence_has_to_be_accepted_and_is_told(tmp_path):
     (found,) = problems(study({"name": "crl", "weeks": [21]}, "crl-21"), tmp_path)
     licence = Atlas(**read_yaml(ATLASES / "crl" / "atlas.yaml")).licence
-    assert found == Facts("atlas.accept_licence:", "true", "crl", licence.name, licence.url, licence.terms)
-    config = load(study({"name": "crl", "weeks": [21, 22], "accept_licence": True}, "crl-21"), tmp_path)
+    assert found == Facts(
+        "atlas.accept_licence:", "true", "crl", licence.name, licence.url, licence.terms
+    )
+    config = load(
+        study({"name": "crl", "weeks": [21, 22], "accept_licence": True}, "crl-21"),
+        tmp_path,
+    )
     note = retrieval_note(used_atlases(config)[0])
     folder = tmp_path / "resources" / "atlases" / "crl"
     assert note == Facts("crl", 2, "0.1 MB", folder, "Gholipour", licence.terms)
     write_atlas(tmp_path, url="https://example.org/atlas")
-    (unchecked,) = used_atlases(load(study("atlas.yaml", "mine-21", folding={"end_week": 22}), tmp_path))
-    assert ("checksum" in note, "checksum" in retrieval_note(unchecked)) == (False, True)
+    (unchecked,) = used_atlases(
+        load(study("atlas.yaml", "mine-21", folding={"end_week": 22}), tmp_path)
+    )
+    assert ("checksum" in note, "checksum" in retrieval_note(unchecked)) == (
+        False,
+        True,
+    )
 
 
 @pytest.mark.parametrize(
@@ -239,12 +344,25 @@ def test_a_narrow_licence_has_to_be_accepted_and_is_told(tmp_path):
             ["spina-bifda", {"name": "spina-bifida", "series": "operatd"}],
             [
                 Facts("atlas[0].name:", "spina-bifda", "spina-bifida"),
-                Facts("atlas[1].series:", "operatd", "spina-bifida", "unoperated, operated"),
+                Facts(
+                    "atlas[1].series:",
+                    "operatd",
+                    "spina-bifida",
+                    "unoperated, operated",
+                ),
             ],
         ),
         (
             {"name": "spina-bifida", "series": "operated", "weeks": [24]},
-            [Facts("atlas.weeks:", 24, "spina-bifida", "operated", "25, 26, 27, 28, 29, 30, 31, 32, 33, 34")],
+            [
+                Facts(
+                    "atlas.weeks:",
+                    24,
+                    "spina-bifida",
+                    "operated",
+                    "25, 26, 27, 28, 29, 30, 31, 32, 33, 34",
+                )
+            ],
         ),
         ({"weeks": [21]}, [Facts("atlas.name:")]),
         ("none.yaml", [Facts("atlas.name:", "none.yaml")]),
@@ -253,4 +371,8 @@ def test_a_narrow_licence_has_to_be_accepted_and_is_told(tmp_path):
 )
 def test_mistakes_in_a_section_are_named_at_once(tmp_path, atlas, found):
     named = problems(study(atlas, "x", folding={"end_weak": 23}), tmp_path)
-    assert named == [*found, Facts("folding.end_week:"), Facts("folding.end_weak:", "end_week")]
+    assert named == [
+        *found,
+        Facts("folding.end_week:"),
+        Facts("folding.end_weak:", "end_week"),
+    ]

@@ -1,4 +1,5 @@
-"""Brains in a configuration: their sources, files, label schemes and regions, and what is refused of them."""
+"""Brains in a configuration: their sources, files, label schemes and regions, and what
+is refused of them."""
 
 import pytest
 from configurations import LABELLED, keys, problems, study, touched
@@ -17,23 +18,47 @@ def one(**brain):
 
 @pytest.fixture
 def folder(tmp_path):
-    return touched(tmp_path, "a.nii.gz", "t2w.nii.gz", "l.gii", "r.gii", "lw.gii", "rw.gii", "all.stl", "white.stl")
+    return touched(
+        tmp_path,
+        "a.nii.gz",
+        "t2w.nii.gz",
+        "l.gii",
+        "r.gii",
+        "lw.gii",
+        "rw.gii",
+        "all.stl",
+        "white.stl",
+    )
 
 
 def test_files_are_found_beside_the_configuration(folder):
     pair = {"left": "l.gii", "right": "r.gii"}
     brains = [
-        {"id": "a", "week": 21, "labels": "a.nii.gz", "scheme": "binary", "image": "t2w.nii.gz"},
+        {
+            "id": "a",
+            "week": 21,
+            "labels": "a.nii.gz",
+            "scheme": "binary",
+            "image": "t2w.nii.gz",
+        },
         {"id": "b", "week": 21, "hemispheres": pair, "white": ["lw.gii", "rw.gii"]},
         {"id": "c", "week": 22, "pial": "all.stl", "white": "white.stl"},
         {"id": "d", "week": 22, "hemisphere": {"file": "l.gii", "side": "left"}},
-        {"id": "e", "week": 22, "hemisphere": {"file": "a.nii.gz", "side": "right"}, "scheme": "binary"},
+        {
+            "id": "e",
+            "week": 22,
+            "hemisphere": {"file": "a.nii.gz", "side": "right"},
+            "scheme": "binary",
+        },
         {"id": "f", "week": 22, "shape": {}},
     ]
     labels, both, whole, left, right, shape = load(study(brains), folder).brains
     assert labels.files == [labels.label_volume] == [str(folder / "a.nii.gz")]
     assert both.files == [str(folder / "l.gii"), str(folder / "r.gii")]
-    assert both.white_files == {"left": str(folder / "lw.gii"), "right": str(folder / "rw.gii")}
+    assert both.white_files == {
+        "left": str(folder / "lw.gii"),
+        "right": str(folder / "rw.gii"),
+    }
     assert whole.white_files == {"whole": str(folder / "white.stl")}
     assert (left.sides, left.label_volume) == (("left",), None)
     assert (right.sides, right.label_volume) == (("right",), str(folder / "a.nii.gz"))
@@ -47,21 +72,45 @@ REGIONS = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
 @pytest.mark.parametrize(
     ("brain", "key", "facts"),
     [
-        ({"labels": "a.nii.gz", "scheme": "binary", "pial": "all.stl"}, "", ["labels", "pial", "shape"]),
+        (
+            {"labels": "a.nii.gz", "scheme": "binary", "pial": "all.stl"},
+            "",
+            ["labels", "pial", "shape"],
+        ),
         ({}, "", ["labels", "hemispheres", "hemisphere", "pial", "shape"]),
         ({"labels": "a.nii.gz"}, ".scheme", []),
         ({"labels": "a.nii.gz", "scheme": "d"}, ".scheme", ["d", "binary, crl"]),
         ({"image": "t2w.nii.gz"}, ".image", ["labels"]),
         ({"pial": "lost.stl"}, ".pial", ["lost.stl"]),
         ({"hemispheres": {"left": "l.gii"}}, ".hemispheres.right", []),
-        ({"hemispheres": {"left": "l.gii", "right": "r.gii"}, "white": "white.stl"}, ".white", []),
+        (
+            {"hemispheres": {"left": "l.gii", "right": "r.gii"}, "white": "white.stl"},
+            ".white",
+            [],
+        ),
         ({"hemisphere": HEMISPHERE}, ".scheme", []),
-        ({"hemisphere": HEMISPHERE, "scheme": "binary", "coordinates": "ras"}, ".coordinates", ["pial"]),
-        ({"hemisphere": HEMISPHERE | {"file": "l.gii"}, "scheme": "binary"}, ".scheme", ["labels"]),
-        ({"hemisphere": HEMISPHERE | {"side": "middle"}, "scheme": "binary"}, ".hemisphere.side", ["left", "right"]),
+        (
+            {"hemisphere": HEMISPHERE, "scheme": "binary", "coordinates": "ras"},
+            ".coordinates",
+            ["pial"],
+        ),
+        (
+            {"hemisphere": HEMISPHERE | {"file": "l.gii"}, "scheme": "binary"},
+            ".scheme",
+            ["labels"],
+        ),
+        (
+            {"hemisphere": HEMISPHERE | {"side": "middle"}, "scheme": "binary"},
+            ".hemisphere.side",
+            ["left", "right"],
+        ),
         ({"shape": {}, "coordinates": "lps"}, ".coordinates", ["shape", "pial"]),
         ({"shape": {}, "population": "sheep"}, ".population", ["shape", "pial"]),
-        ({"shape": {"semi_axes_mm": [40, 40, 200]}}, ".shape.semi_axes_mm[2]", [200, 150]),
+        (
+            {"shape": {"semi_axes_mm": [40, 40, 200]}},
+            ".shape.semi_axes_mm[2]",
+            [200, 150],
+        ),
         ({"shape": {"semi_axes_mm": [10, 21, 12]}}, ".shape.semi_axes_mm", [21, 2]),
         ({"shape": {"noise_mm": 0.45}}, ".shape.noise_mm", [0.45, 0.42]),
         ({"week": 50, "pial": "all.stl"}, ".week", [50, 45]),
@@ -83,21 +132,37 @@ def test_ids_are_unique_and_no_folder_of_the_results():
 
 @pytest.mark.parametrize("pair", [("s", "S"), ("w8", "W8")])
 def test_studies_that_differ_only_in_case_are_refused(pair):
-    sweep = {"base": "reference", "compare_week": 22.5, "vary": {"thickness_mm": [1, 2]}}
+    sweep = {
+        "base": "reference",
+        "compare_week": 22.5,
+        "vary": {"thickness_mm": [1, 2]},
+    }
     first, second = pair
-    text = problems(study(studies={first: sweep, second: sweep | {"vary": {"thickness_mm": [3, 4]}}}))
+    text = problems(
+        study(
+            studies={first: sweep, second: sweep | {"vary": {"thickness_mm": [3, 4]}}}
+        )
+    )
     assert text == [Facts(f"studies.{second}:", first)]
 
 
 def test_one_scan_of_a_subject_is_of_each_week():
     scans = [{"id": name, "week": 24, "subject": "one", **LABELLED} for name in "ab"]
-    assert problems(study(scans, folding={"end_week": 25})) == [Facts("brains:", 2, "one", 24)]
+    assert problems(study(scans, folding={"end_week": 25})) == [
+        Facts("brains:", 2, "one", 24)
+    ]
 
 
 def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
-    touched(tmp_path, "week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz")
+    touched(
+        tmp_path, "week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz"
+    )
     assert problems(one(labels="week30_labels.nii.gz", scheme="binary"), tmp_path) == [
-        Facts("brains[0].labels:", tmp_path / "week30_labels.nii.gz", "week21_labels.nii.gz, week22.5_labels.nii.gz")
+        Facts(
+            "brains[0].labels:",
+            tmp_path / "week30_labels.nii.gz",
+            "week21_labels.nii.gz, week22.5_labels.nii.gz",
+        )
     ]
 
 
@@ -105,9 +170,16 @@ def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
 
 
 def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
-    config = load(one(labels="a.nii.gz", scheme="mine") | {"schemes": {"mine": MINE}}, folder)
+    config = load(
+        one(labels="a.nii.gz", scheme="mine") | {"schemes": {"mine": MINE}}, folder
+    )
     scheme = label_scheme(config, config.brains[0])
-    assert (scheme.name, scheme.cerebrum, scheme.cortex, scheme.known) == ("mine", (1, 2), (2,), {9: "outer CSF"})
+    assert (scheme.name, scheme.cerebrum, scheme.cortex, scheme.known) == (
+        "mine",
+        (1, 2),
+        (2,),
+        {9: "outer CSF"},
+    )
     plain = load(one(**LABELLED))
     assert label_scheme(plain, plain.brains[0]) == SCHEMES["spina-bifida-atlas"]
 
@@ -141,7 +213,10 @@ def test_all_mistakes_in_schemes_are_named_at_once():
     [
         ({"regions": {"a": {}}}, Facts("regions.a:", "volume", "left", "right")),
         ({"regions": {"a": {"volume": "a.nii.gz"}}}, Facts("regions.a.names:")),
-        ({"regions": {"a": {"left": {"labels": "l.gii", "surface": "l.gii"}}}}, Facts("regions.a.right:")),
+        (
+            {"regions": {"a": {"left": {"labels": "l.gii", "surface": "l.gii"}}}},
+            Facts("regions.a.right:"),
+        ),
         ({"regions": {"q": REGIONS["a"]}}, Facts("regions:", "q", "a")),
         ({"norm_reference": ["x"]}, Facts("norm_reference:", "x", "a")),
     ],
@@ -152,7 +227,9 @@ def test_what_is_wrong_with_regions_and_references_is_said(folder, metrics, fact
 
 
 def test_regions_need_both_hemispheres(folder):
-    raw = one(hemisphere=HEMISPHERE, scheme="binary") | {"metrics": {"regions": REGIONS}}
+    raw = one(hemisphere=HEMISPHERE, scheme="binary") | {
+        "metrics": {"regions": REGIONS}
+    }
     assert problems(raw, folder) == [Facts("metrics.regions:", "a")]
 
 
@@ -161,7 +238,13 @@ def test_regions_need_both_hemispheres(folder):
 
 @pytest.mark.parametrize(
     ("text", "week"),
-    [("22+3", 22.43), ("22 wks 1 day", 22.14), ("22 weeks and 6 days", 22.86), ("22w2d", 22.29), ("22.4", 22.4)],
+    [
+        ("22+3", 22.43),
+        ("22 wks 1 day", 22.14),
+        ("22 weeks and 6 days", 22.86),
+        ("22w2d", 22.29),
+        ("22.4", 22.4),
+    ],
 )
 def test_ages_may_be_written_in_weeks_and_days(text, week):
     curve = {"weeks": {text: 1.5, "30+0": 2.0}}
@@ -175,18 +258,34 @@ def test_ages_may_be_written_in_weeks_and_days(text, week):
 
 
 @pytest.mark.parametrize(
-    ("text", "facts"), [("22+7", ["24+2"]), ("2+3", ["24+2"]), ("50+1", [15, 45]), ("young", ["24+2"])]
+    ("text", "facts"),
+    [("22+7", ["24+2"]), ("2+3", ["24+2"]), ("50+1", [15, 45]), ("young", ["24+2"])],
 )
 def test_what_is_no_age_is_refused(text, facts):
-    assert problems(one(**LABELLED, week=text)) == [Facts("brains[0].week:", text, *facts)]
+    assert problems(one(**LABELLED, week=text)) == [
+        Facts("brains[0].week:", text, *facts)
+    ]
 
 
 @pytest.mark.parametrize(
-    "name", ["run", "week", "subject", "brain_of_input", "whole_area_cm2", "left_frontal_gyrification_index"]
+    "name",
+    [
+        "run",
+        "week",
+        "subject",
+        "brain_of_input",
+        "whole_area_cm2",
+        "left_frontal_gyrification_index",
+    ],
 )
 def test_covariates_named_like_columns_of_results_are_refused_once(name):
-    brains = [{"id": text, "week": 21, "covariates": {"site": "run", name: "x"}, **LABELLED} for text in "ab"]
-    assert problems(study(brains)) == [Facts(f"brains[0].covariates.{name}:", "metrics_wide.csv")]
+    brains = [
+        {"id": text, "week": 21, "covariates": {"site": "run", name: "x"}, **LABELLED}
+        for text in "ab"
+    ]
+    assert problems(study(brains)) == [
+        Facts(f"brains[0].covariates.{name}:", "metrics_wide.csv")
+    ]
 
 
 def test_other_covariates_may_have_names_that_begin_like_those_columns():

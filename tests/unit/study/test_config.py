@@ -1,4 +1,5 @@
-"""A configuration is used as a whole or refused as a whole, with every problem named."""
+"""A configuration is used as a whole or refused as a whole, with every problem
+named."""
 
 import json
 import math
@@ -20,19 +21,30 @@ from gyriflow.study.loading import load
 
 
 def test_all_mistakes_are_named_at_once():
-    wrong = study(folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}, metric={}, start="a")
+    wrong = study(
+        folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2},
+        metric={},
+        start="a",
+    )
     assert problems(wrong) == [
         Facts("folding.poisson_ratio:", 0.5),
         Facts("folding.thicknes_mm:", "thickness_mm"),
         Facts("metric:", "metrics"),
     ]
-    across = study(folding={"end_week": 20, "step_s": 6e5, "growth_rate_per_s": 2e-6}, start=["b", "b"])
+    across = study(
+        folding={"end_week": 20, "step_s": 6e5, "growth_rate_per_s": 2e-6},
+        start=["b", "b"],
+    )
     assert problems(across) == [
         Facts("start:", "b"),
         Facts("folding.end_week:", 20, 22.5, "b"),
         Facts("folding.step_s:", 600000, 1.2, 1),
     ]
-    assert refusal(wrong).splitlines()[-1] != refusal(across).splitlines()[-1] == Facts("config/README.md")
+    assert (
+        refusal(wrong).splitlines()[-1]
+        != refusal(across).splitlines()[-1]
+        == Facts("config/README.md")
+    )
 
 
 @pytest.mark.parametrize(
@@ -52,7 +64,7 @@ def test_all_mistakes_are_named_at_once():
         ("scans/week26.mgz", ["there is week24.nii.gz, week25.nii"]),
         ("lost.nii.gz", ["a link to {}/nowhere.nii.gz"]),
     ],
-)  # fmt: skip
+)
 def test_a_path_without_a_file_says_what_is_there_instead(tmp_path, path, facts):
     (tmp_path / "scans").mkdir()
     for name in ("week24.nii.gz", "week25.nii"):
@@ -60,7 +72,9 @@ def test_a_path_without_a_file_says_what_is_there_instead(tmp_path, path, facts)
     (tmp_path / "lost.nii.gz").symlink_to(tmp_path / "nowhere.nii.gz")
     brain = {"id": "a", "week": 24, "labels": path, "scheme": "binary"}
     expected = [fact.format(tmp_path) for fact in facts]
-    assert refusal({"brains": [brain]}, folder=tmp_path) == Facts("brains[0].labels:", *expected)
+    assert refusal({"brains": [brain]}, folder=tmp_path) == Facts(
+        "brains[0].labels:", *expected
+    )
 
 
 def test_a_folder_of_an_atlas_is_not_made_of_a_variable_or_an_address():
@@ -77,10 +91,18 @@ def test_a_folder_of_an_atlas_is_not_made_of_a_variable_or_an_address():
         ({"thickness_mm": {"map": "x.shape.gii"}}, "thickness_mm.map", ["x.shape.gii"]),
         ({"step_s": "fast"}, "step_s", ["fast"]),
         ({"step_s": True}, "step_s", [True]),
-        ({"stress_memory_gw": "forever"}, "stress_memory_gw", [0, "infinite", "forever"]),
+        (
+            {"stress_memory_gw": "forever"},
+            "stress_memory_gw",
+            [0, "infinite", "forever"],
+        ),
         ({"growth_rate_per_s": float("nan")}, "growth_rate_per_s", ["nan"]),
         ({"fields": ["tension"]}, "fields[0]", ["displacement", "tension"]),
-        ({"contact": {"kind": "walls"}}, "contact.kind", ["global", "planes", "none", "walls"]),
+        (
+            {"contact": {"kind": "walls"}},
+            "contact.kind",
+            ["global", "planes", "none", "walls"],
+        ),
         ({"end_week": 21}, "end_week", [21, "a"]),
         ({"growth_rate_per_s": -1e-8}, "growth_rate_per_s", [0, -1e-8]),
         # what would fail later in the run
@@ -88,7 +110,9 @@ def test_a_folder_of_an_atlas_is_not_made_of_a_variable_or_an_address():
     ],
 )
 def test_an_impossible_value_is_refused_with_its_key_and_the_bound(folding, key, facts):
-    assert problems(study(folding={"end_week": 24} | folding)) == [Facts(f"folding.{key}:", *facts)]
+    assert problems(study(folding={"end_week": 24} | folding)) == [
+        Facts(f"folding.{key}:", *facts)
+    ]
 
 
 def test_what_is_allowed_by_name_or_missing():
@@ -99,7 +123,12 @@ def test_what_is_allowed_by_name_or_missing():
 
 
 def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
-    found = problems(study(folding={"end_week": 24, "step_s": 0}, runs={"x": {"poison_ratio": 0.4}, "y": {}}))
+    found = problems(
+        study(
+            folding={"end_week": 24, "step_s": 0},
+            runs={"x": {"poison_ratio": 0.4}, "y": {}},
+        )
+    )
     assert found == [
         Facts("folding.step_s:", 0),
         Facts("runs.x.poison_ratio:", "poisson_ratio"),
@@ -107,9 +136,21 @@ def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
 
 
 def test_a_run_folds_the_brains_that_it_names():
-    runs = {"one": {"start": "b"}, "some": {"start": ["b", "a"]}, "every": {"start": "all"}, "default": None}
+    runs = {
+        "one": {"start": "b"},
+        "some": {"start": ["b", "a"]},
+        "every": {"start": "all"},
+        "default": None,
+    }
     found = resolved(runs=runs)
-    pairs = [("one", "b"), ("some", "a"), ("some", "b"), ("every", "a"), ("every", "b"), ("default", "a")]
+    pairs = [
+        ("one", "b"),
+        ("some", "a"),
+        ("some", "b"),
+        ("every", "a"),
+        ("every", "b"),
+        ("default", "a"),
+    ]
     assert found.pairs == pairs
     assert found.simulations["some", "b"].weeks == (22.5, 23.5, 24)
     assert resolved(start="all").pairs == [("reference", "a"), ("reference", "b")]
@@ -126,7 +167,11 @@ def test_starts_that_cannot_be_are_all_named():
         "w": {"thickness_mm": {"map": __file__, "surface": __file__}},
         "X": {},
     }
-    assert problems(study(start=["a", "B"], brains=[*labelled(21, 22.5), *labelled(23, names=["all"])])) == [
+    assert problems(
+        study(
+            start=["a", "B"], brains=[*labelled(21, 22.5), *labelled(23, names=["all"])]
+        )
+    ) == [
         Facts("brains:", "all"),
         Facts("start:", "B", "a, b, all"),
     ]
@@ -137,20 +182,29 @@ def test_starts_that_cannot_be_are_all_named():
         Facts("runs.z.start:", "b"),
         Facts("runs.w.thickness_mm:", "a, b"),
     ]
-    far = study(start="all", folding={"end_week": 22}, runs={"x": {}, "y": {"start": "a"}})
+    far = study(
+        start="all", folding={"end_week": 22}, runs={"x": {}, "y": {"start": "a"}}
+    )
     assert problems(far) == [Facts("folding.end_week:", 22, 22.5, "b")]
 
 
 @pytest.mark.parametrize(
     ("end", "every", "weeks"),
-    [(24, 1, [21, 22, 23, 24]), (23.5, 1, [21, 22, 23, 23.5]), (21.3, 0.1, [21, 21.1, 21.2, 21.3]), (22, 5, [21, 22])],
+    [
+        (24, 1, [21, 22, 23, 24]),
+        (23.5, 1, [21, 22, 23, 23.5]),
+        (21.3, 0.1, [21, 21.1, 21.2, 21.3]),
+        (22, 5, [21, 22]),
+    ],
 )
 def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
     assert output_weeks(21, end, every) == pytest.approx(weeks)
 
 
 def test_parameters_of_a_run_are_what_the_folding_program_reads():
-    (one,) = resolved(folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}).run_simulations
+    (one,) = resolved(
+        folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}
+    ).run_simulations
     known = {"start_week": one.weeks[0], "output_weeks": one.weeks, "fissure_x_mm": 0.0}
     read = parameters_from(known | one.parameters)
     assert read.stress_memory_gw == math.inf
@@ -158,7 +212,9 @@ def test_parameters_of_a_run_are_what_the_folding_program_reads():
     assert read.output_weeks == (21.0, 22.0, 23.0, 24.0)
     assert not {"ranks", "start"} & set(one.parameters)
     given = one.settings.model_dump(exclude={"ranks", "start"})
-    assert read.model_dump(exclude={"ranks", "side", "targets", "stops", *known}) == given
+    assert (
+        read.model_dump(exclude={"ranks", "side", "targets", "stops", *known}) == given
+    )
 
 
 CONFIG = Path(__file__).parents[3] / "config"
@@ -173,15 +229,28 @@ def test_the_schema_of_all_keys_is_current():
 
 
 def test_the_page_of_keys_has_every_section():
-    listed = re.findall(r"^::: gyriflow\.\S+\.(\w+)$", (CONFIG.parent / "docs" / "keys.md").read_text(), re.MULTILINE)
-    sections = {*SCHEMA["$defs"], *Atlas.model_json_schema()["$defs"], "Atlas", "ComparisonSettings"}
+    listed = re.findall(
+        r"^::: gyriflow\.\S+\.(\w+)$",
+        (CONFIG.parent / "docs" / "keys.md").read_text(),
+        re.MULTILINE,
+    )
+    sections = {
+        *SCHEMA["$defs"],
+        *Atlas.model_json_schema()["$defs"],
+        "Atlas",
+        "ComparisonSettings",
+    }
     # runs have the keys of folding
     assert sorted(listed) == sorted(sections - {"Run"})
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_editors_find_the_schema_of_each_example_and_it_holds(path):
-    named = path.read_text().split("\n", 1)[0].removeprefix("# yaml-language-server: $schema=")
+    named = (
+        path.read_text()
+        .split("\n", 1)[0]
+        .removeprefix("# yaml-language-server: $schema=")
+    )
     assert (path.parent / named).resolve() == CONFIG / "schema.json"
     content = json.loads(json.dumps(read_yaml(path)))  # keys of JSON are texts
     jsonschema.validate(content, SCHEMA)

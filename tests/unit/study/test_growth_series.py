@@ -1,7 +1,18 @@
-"""Which brains growth is measured on, whose surfaces match by their vertices, and which are individuals."""
+"""Which brains growth is measured on, whose surfaces match by their vertices, and which
+are individuals."""
 
 import pytest
-from configurations import LABELLED, both_kinds, labelled, problems, resolved, series_for, series_of, study, touched
+from configurations import (
+    LABELLED,
+    both_kinds,
+    labelled,
+    problems,
+    resolved,
+    series_for,
+    series_of,
+    study,
+    touched,
+)
 from facts import Facts
 from shapes import sphere
 
@@ -26,7 +37,9 @@ def folder(tmp_path):
     write("b.gii", flipped(TriangleMesh(1.1 * SURFACE.vertices, SURFACE.faces[::-1])))
     write("fine.gii", sphere(30.0, 3))
     turned = SURFACE.faces.copy()
-    turned[0, 0] = next(corner for corner in range(len(SURFACE.vertices)) if corner not in turned[0])
+    turned[0, 0] = next(
+        corner for corner in range(len(SURFACE.vertices)) if corner not in turned[0]
+    )
     write("other.gii", TriangleMesh(SURFACE.vertices, turned))
     (tmp_path / "torn.gii").write_text("")
     return tmp_path
@@ -34,7 +47,11 @@ def folder(tmp_path):
 
 def series(folder, *files, **changes):
     brains = [
-        {"id": name, "week": 21 + number, **({"pial": file} if isinstance(file, str) else file)}
+        {
+            "id": name,
+            "week": 21 + number,
+            **({"pial": file} if isinstance(file, str) else file),
+        }
         for number, (name, file) in enumerate(zip("abcdef", files, strict=False))
     ]
     return resolve(load(RUN | {"brains": brains} | changes, folder)).series
@@ -52,7 +69,10 @@ def test_equal_triangles_in_any_order_are_matched(folder):
         ("fine.gii", ["b", 642, 1280, "a", 162, 320]),
         ("other.gii", ["b", "a"]),
         ("torn.gii", ["torn.gii:"]),
-        ({"hemispheres": {"left": "a.gii", "right": "b.gii"}}, ["b", "hemispheres", "a", "pial"]),
+        (
+            {"hemispheres": {"left": "a.gii", "right": "b.gii"}},
+            ["b", "hemispheres", "a", "pial"],
+        ),
     ],
 )
 def test_others_are_not_and_say_why(folder, file, facts):
@@ -70,25 +90,39 @@ def test_hemispheres_match_side_by_side(folder):
 
 def test_an_atlas_is_believed_until_its_files_are_there(folder):
     named = {"name": "dhcp-surface", "weeks": [21, 22], "folder": str(folder)}
-    found = resolve(load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)).series
+    found = resolve(
+        load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)
+    ).series
     assert list(found.matched.values()) == [{"dhcp-surface-21", "dhcp-surface-22"}]
     for week, file in ((21, "a.gii"), (22, "fine.gii")):
         for side in ("left", "right"):
-            (folder / f"fetal.week{week}.{side}.pial.surf.gii").write_bytes((folder / file).read_bytes())
-    found = resolve(load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)).series
+            (folder / f"fetal.week{week}.{side}.pial.surf.gii").write_bytes(
+                (folder / file).read_bytes()
+            )
+    found = resolve(
+        load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)
+    ).series
     assert found.matched == {}
     assert list(found.unmatched.values()) == [Facts("dhcp-surface-22", 642, 162)]
 
 
 @pytest.mark.parametrize(
     ("growth", "brains"),
-    [({}, ["a", "b", "c"]), ({"brains": ["c", "a"]}, ["a", "c"]), ({"brains": None}, ["a", "b", "c"])],
+    [
+        ({}, ["a", "b", "c"]),
+        ({"brains": ["c", "a"]}, ["a", "c"]),
+        ({"brains": None}, ["a", "b", "c"]),
+    ],
 )
 def test_growth_is_of_all_brains_or_those_named(growth, brains):
-    assert series_of(resolved(labelled(21, 22, 22), growth=growth)) == {"volume": brains}
+    assert series_of(resolved(labelled(21, 22, 22), growth=growth)) == {
+        "volume": brains
+    }
 
 
-def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_followed(tmp_path):
+def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_followed(
+    tmp_path,
+):
     raw = both_kinds(tmp_path, (21, 22))
     found = resolve(load(raw, tmp_path))
     assert series_of(found) == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
@@ -99,14 +133,25 @@ def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_followe
     assert series_of(chosen) == {"volume": ["v21", "v22"]}
 
 
-def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(tmp_path):
+def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(
+    tmp_path,
+):
     brains = [
-        {"id": f"{side}{week}", "week": week, "hemisphere": {"file": "lh.surf.gii", "side": side}}
+        {
+            "id": f"{side}{week}",
+            "week": week,
+            "hemisphere": {"file": "lh.surf.gii", "side": side},
+        }
         for side in ("left", "right")
         for week in (24, 25)
     ]
     brains += [{"id": f"p{week}", "week": week, **LABELLED} for week in (24, 25)]
-    found = resolve(load(study(brains, start="left24", folding={"end_week": 26}), touched(tmp_path, "lh.surf.gii")))
+    found = resolve(
+        load(
+            study(brains, start="left24", folding={"end_week": 26}),
+            touched(tmp_path, "lh.surf.gii"),
+        )
+    )
     assert series_of(found) == {
         "left hemisphere, surface": ["left24", "left25"],
         "right hemisphere, surface": ["right24", "right25"],
@@ -117,10 +162,24 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
 
 def test_averages_are_no_individuals():
     atlas = {"name": "spina-bifida", "series": "operated", "weeks": [25, 26]}
-    brains = [{"id": f"s{week}", "week": week, "subject": f"s{week}", **LABELLED} for week in (21, 23)]
+    brains = [
+        {"id": f"s{week}", "week": week, "subject": f"s{week}", **LABELLED}
+        for week in (21, 23)
+    ]
     brains += [{"id": f"n{week}", "week": week, **LABELLED} for week in (21, 21.4, 23)]
-    found = resolve(load({"brains": brains, "atlas": atlas, "metrics": {"norm_reference": ["spina-bifida"]}}))
-    assert found.norm_reference == ["spina-bifida-operated-25", "spina-bifida-operated-26"]
+    found = resolve(
+        load(
+            {
+                "brains": brains,
+                "atlas": atlas,
+                "metrics": {"norm_reference": ["spina-bifida"]},
+            }
+        )
+    )
+    assert found.norm_reference == [
+        "spina-bifida-operated-25",
+        "spina-bifida-operated-26",
+    ]
     assert not found.are_individuals(found.norm_reference)
     assert found.are_individuals(["s21", "s23"])
     assert not found.are_individuals(["n21", "n23"])
@@ -145,10 +204,20 @@ def test_two_series_of_one_name_are_refused(first, second):
 
 
 def test_charts_are_coloured_by_a_covariate_that_groups_subjects():
-    covariates = [{"site": "x", "mother": str(number), "sex": "FM"[number % 2]} for number in range(3)]
-    brains = [{"id": f"b{n}", "week": 21, "covariates": values, **LABELLED} for n, values in enumerate(covariates)]
+    covariates = [
+        {"site": "x", "mother": str(number), "sex": "FM"[number % 2]}
+        for number in range(3)
+    ]
+    brains = [
+        {"id": f"b{n}", "week": 21, "covariates": values, **LABELLED}
+        for n, values in enumerate(covariates)
+    ]
     figures = figures_of(resolve(load({"brains": brains})))
-    (groups,) = [figure.options["groups"] for figure in figures if figure.kind.name == "metrics_figure"]
+    (groups,) = [
+        figure.options["groups"]
+        for figure in figures
+        if figure.kind.name == "metrics_figure"
+    ]
     # all are of one site, and each has its own mother
     assert groups == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
 
@@ -166,11 +235,17 @@ COHORT = {"growth": {"brains": {"cohort": ["all"]}}}
         (ONE_SUBJECT, MEASURED, ["volume"]),
         ([{"subject": name} for name in "xyz"], MEASURED | COHORT, []),
         ([{"subject": name} for name in "xyz"], {"runs": {"r": {}}, **COHORT}, []),
-        ([{"subject": name} for name in "xyz"], {"runs": {"r": {"growth": "sizes"}}, **COHORT}, ["cohort"]),
+        (
+            [{"subject": name} for name in "xyz"],
+            {"runs": {"r": {"growth": "sizes"}}, **COHORT},
+            ["cohort"],
+        ),
     ],
 )
 def test_only_brains_whose_differences_are_growth_have_rates(keys, changes, names):
-    brains = [{**brain, **key} for brain, key in zip(labelled(21, 22, 23), keys, strict=True)]
+    brains = [
+        {**brain, **key} for brain, key in zip(labelled(21, 22, 23), keys, strict=True)
+    ]
     found = resolved(brains, **changes)
     assert len(found.growth_brains) == 3
     assert found.series_with_rates == names

@@ -1,4 +1,5 @@
-"""Studies and calibrations in a configuration: the runs that they make, and what is refused."""
+"""Studies and calibrations in a configuration: the runs that they make, and what is
+refused."""
 
 import re
 from pathlib import Path
@@ -24,12 +25,29 @@ THICKNESS = {
     "fixed": {"shear_modulus_cortex_pa": 3000},
     "compare_week": 25,
 }
-STIFFNESS = {"base": "reference", "vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]}, "compare_week": 25}
-CALIBRATION = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 25}
+STIFFNESS = {
+    "base": "reference",
+    "vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]},
+    "compare_week": 25,
+}
+CALIBRATION = {
+    "base": "reference",
+    "parameters": {"thickness_mm": [1, 3]},
+    "score": {"size": 1},
+    "compare_week": 25,
+}
 
 
 def config(**sections):
-    return load({"brains": BRAINS, "start": "first", "folding": {"end_week": 26}, "runs": RUNS, **sections})
+    return load(
+        {
+            "brains": BRAINS,
+            "start": "first",
+            "folding": {"end_week": 26},
+            "runs": RUNS,
+            **sections,
+        }
+    )
 
 
 def resolved(**sections):
@@ -60,9 +78,15 @@ def test_a_study_makes_a_run_of_each_combination():
 
 
 def test_equal_runs_are_solved_once():
-    found = resolved(studies={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS})
+    found = resolved(
+        studies={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS}
+    )
     # 1500 Pa is the reference, 3000 Pa stands in the other study too
-    assert members(found, "stiffness") == ["stiffness-300", "reference", "thickness-1.5"]
+    assert members(found, "stiffness") == [
+        "stiffness-300",
+        "reference",
+        "thickness-1.5",
+    ]
     assert found.may_diverge == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
 
 
@@ -76,7 +100,14 @@ VALUES = {
     "growth_rate_per_s": [1e-7, 2e-7],
     "radial_growth_rate_per_s": [0.0, 1e-8],
     "core_growth_rate_per_s": [0.0, 1e-8],
-    "growth": ["rates", {"model": "sizes", "area_cm2": {21: 90, 30: 200}, "volume_ml": {21: 40, 30: 150}}],
+    "growth": [
+        "rates",
+        {
+            "model": "sizes",
+            "area_cm2": {21: 90, 30: 200},
+            "volume_ml": {21: 40, 30: 150},
+        },
+    ],
     "stress_memory_gw": [0.0, 1.0],
     "relaxation": ["all", "shape"],
     "support": ["ellipsoid", "free"],
@@ -109,16 +140,33 @@ def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
     assert simulations["thickness-1.5", "a"].weeks == (21, 22, 23, 24, 24.5, 25)
     assert simulations["thickness-0.8", "a"].weeks[-1] == 24.5
     # the reference itself has no surface of that week, so that it cannot stand in
-    other = resolved(brains=brains, studies={"stiffness": STIFFNESS | {"compare_week": 24.5}})
+    other = resolved(
+        brains=brains, studies={"stiffness": STIFFNESS | {"compare_week": 24.5}}
+    )
     assert members(other, "stiffness")[1] == "stiffness-1500"
 
 
 def test_comparison_prefers_the_starts_population(tmp_path):
     brains = []
-    for name, week, population in (("a", 21, "one"), ("b", 25, "two"), ("c", 25, "one")):
+    for name, week, population in (
+        ("a", 21, "one"),
+        ("b", 25, "two"),
+        ("c", 25, "one"),
+    ):
         (tmp_path / f"{name}.stl").touch()
-        brains.append({"id": name, "week": week, "pial": str(tmp_path / f"{name}.stl"), "population": population})
-    for known, asked, real in ((brains, {}, "c"), (brains[:2], {}, "b"), (brains, {"compare_with": ["b"]}, "b")):
+        brains.append(
+            {
+                "id": name,
+                "week": week,
+                "pial": str(tmp_path / f"{name}.stl"),
+                "population": population,
+            }
+        )
+    for known, asked, real in (
+        (brains, {}, "c"),
+        (brains[:2], {}, "b"),
+        (brains, {"compare_with": ["b"]}, "b"),
+    ):
         found = resolved(brains=known, studies={"thickness": THICKNESS | asked})
         assert [brain.id for brain in found.sweeps["thickness"].observed["a"]] == [real]
 
@@ -129,9 +177,13 @@ def test_the_run_of_a_single_value_may_differ_further():
         "fixed_at": {1.5: {"step_s": 43200}},
     }
     found = [
-        (one.run, one.settings.step_s, values) for one, values in resolved(studies={"s": study}).sweeps["s"].members
+        (one.run, one.settings.step_s, values)
+        for one, values in resolved(studies={"s": study}).sweeps["s"].members
     ]
-    assert found == [("s-0.8", 86400, {"thickness_mm": 0.8}), ("s-1.5", 43200, {"thickness_mm": 1.5})]
+    assert found == [
+        ("s-0.8", 86400, {"thickness_mm": 0.8}),
+        ("s-1.5", 43200, {"thickness_mm": 1.5}),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -151,7 +203,9 @@ def test_the_run_of_a_single_value_may_differ_further():
     ],
 )
 def test_what_is_wrong_with_a_study_is_said(change, key, facts):
-    assert refusal(studies={"s": THICKNESS | change}) == Facts(1, f"studies.s.{key}:", *facts)
+    assert refusal(studies={"s": THICKNESS | change}) == Facts(
+        1, f"studies.s.{key}:", *facts
+    )
 
 
 def test_values_that_agree_in_six_digits_are_runs_of_their_own():
@@ -167,18 +221,29 @@ def test_values_that_agree_in_six_digits_are_runs_of_their_own():
 @pytest.mark.parametrize(
     ("changes", "key", "facts"),
     [
-        ({"studies": {"s": THICKNESS}, "runs": RUNS | {"S-0.8": {}}}, "studies.s", ["s-0.8", "S-0.8", "runs"]),
+        (
+            {"studies": {"s": THICKNESS}, "runs": RUNS | {"S-0.8": {}}},
+            "studies.s",
+            ["s-0.8", "S-0.8", "runs"],
+        ),
         (
             {
                 "studies": {
-                    "s": THICKNESS | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}},
+                    "s": (
+                        THICKNESS
+                        | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}}
+                    ),
                     "s-1": THICKNESS | {"vary": {"poisson_ratio": [0.3, 0.4]}},
                 }
             },
             "studies.s-1",
             ["s-1-0.3", "study s", "study s-1"],
         ),
-        ({"calibrate": CALIBRATION, "runs": RUNS | {"Calibration-01": {}}}, "runs.Calibration-01", ["calibration-01"]),
+        (
+            {"calibrate": CALIBRATION, "runs": RUNS | {"Calibration-01": {}}},
+            "runs.Calibration-01",
+            ["calibration-01"],
+        ),
     ],
 )
 def test_runs_of_all_sections_have_folders_of_their_own(changes, key, facts):
@@ -191,46 +256,90 @@ def test_folders_of_results_are_no_names_of_studies():
         *ROOT.glob("workflow/rules/*.smk"),
         *ROOT.glob("src/gyriflow/study/*.py"),
     ]
-    paths = [*(path.read_text() for path in sources), log_of("rule", f"{STUDY}/metrics.png")]
-    folders = {name for text in paths for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)}
+    paths = [
+        *(path.read_text() for path in sources),
+        log_of("rule", f"{STUDY}/metrics.png"),
+    ]
+    folders = {
+        name
+        for text in paths
+        for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)
+    }
     assert folders > {"logs", "figures", "calibration", "registration"}
     # records of time and memory are named like logs
     for folder in folders | {"benchmarks"}:
         assert refusal(studies={folder: THICKNESS}) == Facts(f"studies.{folder}:")
-        assert refusal(studies={folder.upper(): THICKNESS}) == Facts(f"studies.{folder.upper()}:")
-    assert refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts("studies.s:", "s-0.8")
+        assert refusal(studies={folder.upper(): THICKNESS}) == Facts(
+            f"studies.{folder.upper()}:"
+        )
+    assert refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts(
+        "studies.s:", "s-0.8"
+    )
 
 
 @pytest.mark.parametrize(
     ("change", "key", "facts"),
     [
-        ({"parameters": {"thickness_mm": [3, 1]}}, "parameters.thickness_mm", [[3.0, 1.0]]),
+        (
+            {"parameters": {"thickness_mm": [3, 1]}},
+            "parameters.thickness_mm",
+            [[3.0, 1.0]],
+        ),
         ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm", [0, -1]),
         ({"parameters": {"poisson": [0, 0.4]}}, "parameters.poisson", []),
-        ({"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}}, "parameters.growth_rate_per_s.amplitude", []),
-        ({"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}, "parameters.growth.area_cm2.amplitude", []),
-        ({"parameters": {"stiffness_ratio": [0, 2]}}, "parameters.stiffness_ratio", [0]),
+        (
+            {"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}},
+            "parameters.growth_rate_per_s.amplitude",
+            [],
+        ),
+        (
+            {"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}},
+            "parameters.growth.area_cm2.amplitude",
+            [],
+        ),
+        (
+            {"parameters": {"stiffness_ratio": [0, 2]}},
+            "parameters.stiffness_ratio",
+            [0],
+        ),
         ({"rounds": [30, 11]}, "rounds", [[30, 11], 3, 40]),
         ({"score": {}}, "score", ["shape_index", "surface_distance"]),
-        ({"score": {"beauty": 1}}, "score.beauty", ["beauty", "shape_index", "surface_distance"]),
+        (
+            {"score": {"beauty": 1}},
+            "score.beauty",
+            ["beauty", "shape_index", "surface_distance"],
+        ),
         ({"compare_week": 24}, "compare_week", [24, 21, 25]),
         ({"base": "ref"}, "base", ["ref", "reference, short"]),
     ],
 )
 def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
-    assert refusal(calibrate=CALIBRATION | change) == Facts(1, f"calibrate.{key}:", *facts)
+    assert refusal(calibrate=CALIBRATION | change) == Facts(
+        1, f"calibrate.{key}:", *facts
+    )
 
 
 @pytest.mark.parametrize(
     ("pattern", "log"),
     [
-        ("results/brains/{brain}/mesh/targets.{origin}.h5", "results/brains/{brain}/logs/rule.{origin}.log"),
-        ("results/study/{study}/members/{run}.csv", "results/study/{study}/logs/rule.{run}.log"),
-        ("results/study/matched/{earlier}/{later}.h5", "results/study/logs/rule.{earlier},{later}.log"),
+        (
+            "results/brains/{brain}/mesh/targets.{origin}.h5",
+            "results/brains/{brain}/logs/rule.{origin}.log",
+        ),
+        (
+            "results/study/{study}/members/{run}.csv",
+            "results/study/{study}/logs/rule.{run}.log",
+        ),
+        (
+            "results/study/matched/{earlier}/{later}.h5",
+            "results/study/logs/rule.{earlier},{later}.log",
+        ),
         ("results/{where}/regions.csv", "results/{where}/logs/rule.log"),
     ],
 )
-def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(pattern, log):
+def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(
+    pattern, log
+):
     assert log_of("rule", pattern) == log
 
 
@@ -247,6 +356,15 @@ def test_ids_with_the_marks_of_file_names_have_files_of_their_own(patterns):
     files = []
     for first in names:
         for second in names:
-            values = {"study": "s", "run": first, "brain": second, "earlier": first, "later": second}
-            files += [pattern.format(**values, smoothing="1", seed="2") for pattern in patterns]
+            values = {
+                "study": "s",
+                "run": first,
+                "brain": second,
+                "earlier": first,
+                "later": second,
+            }
+            files += [
+                pattern.format(**values, smoothing="1", seed="2")
+                for pattern in patterns
+            ]
     assert len(set(files)) == len(files)

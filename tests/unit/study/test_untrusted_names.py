@@ -1,4 +1,5 @@
-"""What comes from others: names stay names and lead into no other folder; random damage is refused with the cause."""
+"""What comes from others: names stay names and lead into no other folder; random damage
+is refused with the cause."""
 
 import copy
 import os
@@ -19,10 +20,34 @@ from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
 NAMES = [
-    "a b", "a'b", 'a"b', "a;b", "$(touch x)", "`x`", "a\nb", "a\n", "a\0b", "-rf", "--all", ".hidden", "..", "../x",
-    "a/b", "/etc/passwd", "a\\b", "a|b", "a&b", "a*", "a?", "~root", "{brain}", "a\u202eb", "", " ",
+    "a b",
+    "a'b",
+    'a"b',
+    "a;b",
+    "$(touch x)",
+    "`x`",
+    "a\nb",
+    "a\n",
+    "a\0b",
+    "-rf",
+    "--all",
+    ".hidden",
+    "..",
+    "../x",
+    "a/b",
+    "/etc/passwd",
+    "a\\b",
+    "a|b",
+    "a&b",
+    "a*",
+    "a?",
+    "~root",
+    "{brain}",
+    "a\u202eb",
+    "",
+    " ",
     "a" * 5000,
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -39,9 +64,16 @@ def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
 def test_rows_of_a_table_have_such_names_neither(tmp_path, name):
     (tmp_path / "a.gii").touch()
     lines = [["participant_id", "week", "pial"], [name, "24", "a.gii"]]
-    table = "\n".join("\t".join(f'"{cell.replace(chr(34), chr(34) * 2)}"' for cell in row) for row in lines)
+    table = "\n".join(
+        "\t".join(f'"{cell.replace(chr(34), chr(34) * 2)}"' for cell in row)
+        for row in lines
+    )
     (tmp_path / "participants.tsv").write_text(table + "\n")
-    raw = {"participants": "participants.tsv", "folding": {"end_week": 25}, "start": "first"}
+    raw = {
+        "participants": "participants.tsv",
+        "folding": {"end_week": 25},
+        "start": "first",
+    }
     assert refusal(raw, tmp_path) == Facts("id")
 
 
@@ -50,7 +82,9 @@ def test_a_file_between_braces_is_refused_instead_of_another_one(tmp_path):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "l.nii.gz").touch()
     brain = {"id": "a", "week": 21, "labels": "{brain}/l.nii.gz", "scheme": "binary"}
-    assert refusal(study(brains=[brain]), tmp_path) == Facts("brains[0].labels:", tmp_path / brain["labels"])
+    assert refusal(study(brains=[brain]), tmp_path) == Facts(
+        "brains[0].labels:", tmp_path / brain["labels"]
+    )
 
 
 def with_atlas(folder, **changes):
@@ -75,13 +109,21 @@ def with_atlas(folder, **changes):
     ],
 )
 def test_files_of_an_atlas_stay_in_its_folder(tmp_path, pattern):
-    refused = refusal(with_atlas(tmp_path, series={"files": {"labels": pattern}}), tmp_path)
+    refused = refusal(
+        with_atlas(tmp_path, series={"files": {"labels": pattern}}), tmp_path
+    )
     assert refused == Facts(f"{tmp_path}/atlas.yaml: series.all.files:", repr(pattern))
 
 
 def test_an_atlas_with_plain_names_is_fetched_into_its_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    config = load(with_atlas(tmp_path, series={"files": {"labels": "sub folder/$(x) {week:05.2f}.nii.gz"}}), tmp_path)
+    config = load(
+        with_atlas(
+            tmp_path,
+            series={"files": {"labels": "sub folder/$(x) {week:05.2f}.nii.gz"}},
+        ),
+        tmp_path,
+    )
     folder = tmp_path / "resources" / "atlases" / "mine"
     assert [brain.labels for brain in config.brains] == [
         str(folder / "sub folder" / f"$(x) {week}.00.nii.gz") for week in (21, 22)
@@ -91,10 +133,14 @@ def test_an_atlas_with_plain_names_is_fetched_into_its_folder(tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("key", "value"),
     [("name", name) for name in ("../x", "/tmp/x", ".", "a/b", "-x")]
-    + [("url", url) for url in ("file:///etc", "ftp://x", "javascript:x", "--output=x")],
+    + [
+        ("url", url) for url in ("file:///etc", "ftp://x", "javascript:x", "--output=x")
+    ],
 )
 def test_an_atlas_has_a_plain_name_and_is_on_the_web(tmp_path, key, value):
-    assert f"atlas.yaml: {key}: " in refusal(with_atlas(tmp_path, **{key: value}), tmp_path)
+    assert f"atlas.yaml: {key}: " in refusal(
+        with_atlas(tmp_path, **{key: value}), tmp_path
+    )
 
 
 @pytest.mark.parametrize(
@@ -109,9 +155,22 @@ def test_an_atlas_has_a_plain_name_and_is_on_the_web(tmp_path, key, value):
         "a: &x {b: *x}",
         "[" * 5000,
         "a: &a [x, x]\n"
-        + "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}' if n else '*a'] * 9)}]\n" for n in range(12)),
+        + "".join(
+            f"a{n}: &a{n} [{', '.join([f'*a{n - 1}' if n else '*a'] * 9)}]\n"
+            for n in range(12)
+        ),
     ],
-    ids=["apply", "new", "name", "module", "tag", "cycle", "cycle-of-keys", "deep", "laughs"],
+    ids=[
+        "apply",
+        "new",
+        "name",
+        "module",
+        "tag",
+        "cycle",
+        "cycle-of-keys",
+        "deep",
+        "laughs",
+    ],
 )
 def test_yaml_makes_no_objects_cycles_or_masses(tmp_path, monkeypatch, text):
     monkeypatch.chdir(tmp_path)
@@ -122,14 +181,23 @@ def test_yaml_makes_no_objects_cycles_or_masses(tmp_path, monkeypatch, text):
 
 
 STUDY = {
-    "brains": [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22.5, "shape": {"semi_axes_mm": [23, 23, 23]}}],
+    "brains": [
+        {"id": "a", "week": 21, **LABELLED},
+        {"id": "b", "week": 22.5, "shape": {"semi_axes_mm": [23, 23, 23]}},
+    ],
     "start": "a",
     "surface": {"edge_length_mm": 2.0},
     "mesh": {"order": 2},
-    "folding": {"end_week": 23, "growth_rate_per_s": 2e-7, "thickness_mm": {"weeks": {21: 1.5, 23: 2.0}}},
+    "folding": {
+        "end_week": 23,
+        "growth_rate_per_s": 2e-7,
+        "thickness_mm": {"weeks": {21: 1.5, 23: 2.0}},
+    },
     "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
     "metrics": {"norm_reference": ["a"]},
-    "studies": {"s": {"base": "thick", "compare_week": 22.5, "vary": {"step_s": [3600, 7200]}}},
+    "studies": {
+        "s": {"base": "thick", "compare_week": 22.5, "vary": {"step_s": [3600, 7200]}}
+    },
 }
 VALUES = st.recursive(
     st.one_of(
@@ -139,11 +207,27 @@ VALUES = st.recursive(
         st.floats(),
         st.text(max_size=6),
         st.sampled_from(
-            ["", "a", "estimated", "auto", "ras", "../x", "nan", "1e5", "$(touch x)", "\n", "{week}", "-1"]
+            [
+                "",
+                "a",
+                "estimated",
+                "auto",
+                "ras",
+                "../x",
+                "nan",
+                "1e5",
+                "$(touch x)",
+                "\n",
+                "{week}",
+                "-1",
+            ]
         ),
         st.sampled_from(sorted(Config.model_fields)),
     ),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4) | st.integers(), inner, max_size=3),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.text(max_size=4) | st.integers(), inner, max_size=3)
+    ),
     max_leaves=6,
 )
 
@@ -151,7 +235,13 @@ VALUES = st.recursive(
 def places(value, path=()):
     """Yield the paths of all values in nested dictionaries and lists."""
     yield path
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    items = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     for key, item in items:
         yield from places(item, (*path, key))
 
@@ -172,9 +262,13 @@ def changed(draw):
             if kind == "drop":
                 del holder[path[-1]]
             elif kind == "add" and isinstance(holder, dict):
-                holder[draw(st.sampled_from([*Config.model_fields, "endweek", "folder", "labels", "-x"]))] = draw(
-                    VALUES
-                )
+                holder[
+                    draw(
+                        st.sampled_from(
+                            [*Config.model_fields, "endweek", "folder", "labels", "-x"]
+                        )
+                    )
+                ] = draw(VALUES)
             else:
                 holder[path[-1]] = draw(VALUES)
         except (LookupError, TypeError):
@@ -197,7 +291,8 @@ def test_the_study_is_valid_as_it_is(tmp_path):
 def test_changed_values(tmp_path, raw):
     config = loaded(raw, tmp_path)
     if config is not None:
-        # what is valid serves, but for brains that shapes to grow towards are missing for
+        # what is valid serves, but for brains that shapes to grow towards are missing
+        # for
         with suppress(InputError):
             assert all(one.weeks for one in resolve(config).run_simulations)
     assert not list(tmp_path.iterdir())
@@ -219,8 +314,12 @@ def test_damaged_text(tmp_path, content):
 @BOUNDED
 @given(
     content=st.one_of(
-        damaged(b"participant_id\tgestational_age\tfiles\tscheme\nsub-01\t24.5\ta.nii.gz\tfeta-7\nsub-02\tn/a\tb\tx\n"),
-        st.text("\t\n\r\"' ;abid.0159/-$()éü\u2028", max_size=60).map(lambda text: f"id\tweek\tpial\n{text}".encode()),
+        damaged(
+            b"participant_id\tgestational_age\tfiles\tscheme\nsub-01\t24.5\ta.nii.gz\tfeta-7\nsub-02\tn/a\tb\tx\n"
+        ),
+        st.text("\t\n\r\"' ;abid.0159/-$()éü\u2028", max_size=60).map(
+            lambda text: f"id\tweek\tpial\n{text}".encode()
+        ),
     )
 )
 def test_damaged_tables_of_participants(tmp_path, content):
