@@ -317,12 +317,10 @@ def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():
 
 
 def test_conda_environment_sets_what_run_sets():
-    (settings,) = re.findall(
-        r"^settings\(\) \{\n(.*?)^\}",
-        (ROOT / "run").read_text(),
-        flags=re.MULTILINE | re.DOTALL,
-    )
-    exports = dict(re.findall(r"\b([A-Z]\w+)=(?:\$\{\w+:-)?([\w:,]+)\}?", settings))
+    lines = (ROOT / "run").read_text().splitlines()
+    settings = [line for line in lines if line.startswith("export") and ":-" in line]
+    pairs = re.findall(r"\b([A-Z]\w+)=(?:\$\{\w+:-)?([\w:,]+)\}?", "\n".join(settings))
+    exports = dict(pairs)
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
     # what concerns the checkout and the user's Python is the launcher's own
     assert environment["variables"] == {
