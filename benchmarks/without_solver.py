@@ -3,14 +3,15 @@
 
     python3 -m venv plain && plain/bin/pip install .
     ./run python benchmarks/without_solver.py plain/bin/gyriflow \\
-        --data ../shared/data --out FOLDER
+        --data ../shared/data --out FOLDER [--only BRAIN ...]
 
 `--checkout` is the checkout whose ./run has the solver (default: this one). In
 622a1dfd, the last commit with the tree of Debian's dolfinx 0.9, modes are computed by
 SLEPc.
 
 DATA holds `spina_bifida_atlas/week{21,34}_labels.nii.gz` and
-`hemispheres/fetal.week21.{left,right}.pial.surf.gii`. Each brain is a study of its own,
+`hemispheres/fetal.week21.{left,right}.pial.surf.gii`; the surfaces of 34 GW are those
+that gyriflow extracts from the labels of 34 GW. Each brain is a study of its own,
 measured on one core to the report. The last line is one JSON object: for each brain the
 CPU seconds of all processes, the memory of the largest one, and the largest relative
 difference of the results, as `same_results.py` compares them; `coefficients.csv` is
@@ -36,7 +37,7 @@ OWN_VARIABLES = ("PYTHONPATH", "VIRTUAL_ENV", "OMP_NUM_THREADS", "OPENBLAS_NUM_T
 """Variables of ./run that a shell does not have."""
 
 
-def studies(data: Path) -> dict[str, dict[str, Any]]:
+def studies(data: Path, out: Path) -> dict[str, dict[str, Any]]:
     """Return the entry of the configuration for each brain."""
     brains: dict[str, dict[str, Any]] = {}
     for week in (21, 34):
@@ -46,12 +47,22 @@ def studies(data: Path) -> dict[str, dict[str, Any]]:
             "labels": labels,
             "scheme": "spina-bifida-atlas",
         }
-    hemispheres = {}
-    for side in ("left", "right"):
-        hemispheres[side] = str(
-            data / "hemispheres" / f"fetal.week21.{side}.pial.surf.gii"
-        )
-    brains["surfaces-21"] = {"week": 21, "hemispheres": hemispheres}
+    given = data / "hemispheres"
+    brains["surfaces-21"] = {
+        "week": 21,
+        "hemispheres": {
+            "left": str(given / "fetal.week21.left.pial.surf.gii"),
+            "right": str(given / "fetal.week21.right.pial.surf.gii"),
+        },
+    }
+    extracted = out / "labels-34/without/study/results/brains/brain/surface"
+    brains["surfaces-34"] = {
+        "week": 34,
+        "hemispheres": {
+            "left": str(extracted / "left.pial.surf.gii"),
+            "right": str(extracted / "right.pial.surf.gii"),
+        },
+    }
     return brains
 
 
@@ -83,15 +94,19 @@ def main() -> None:
     )
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--only", nargs="+", metavar="BRAIN")
     parser.add_argument("--checkout", type=Path, default=ROOT)
     arguments = parser.parse_args()
     plain = [str(arguments.program.absolute())]
     checkout = [str(arguments.checkout.resolve() / "run"), "gyriflow"]
     rows = []
     is_equal = True
-    for name, brain in studies(arguments.data.resolve()).items():
-        without = arguments.out.resolve() / name / "without"
-        with_solver = arguments.out.resolve() / name / "with"
+    out = arguments.out.resolve()
+    brains = studies(arguments.data.resolve(), out)
+    for name in arguments.only or brains:
+        brain = brains[name]
+        without = out / name / "without"
+        with_solver = out / name / "with"
         cpu_without, memory_without = measure(plain, without / "study", brain)
         cpu_with, memory_with = measure(checkout, with_solver / "study", brain)
         differences, summary = compare(
