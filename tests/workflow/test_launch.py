@@ -2,6 +2,9 @@
 of gyriflow."""
 
 import errno
+import getpass
+import os
+import pwd
 import re
 import subprocess
 import sys
@@ -14,7 +17,7 @@ from processes import ran
 from gyriflow.folding.__main__ import locked
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
-from gyriflow.running.launch import clear_stale_lock, what_runs
+from gyriflow.running.launch import clear_stale_lock, set_user_name, what_runs
 from gyriflow.shipped import SHIPPED
 
 from .conftest import SMALL_STUDY
@@ -49,6 +52,20 @@ def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(wo
     )
     assert "of-my-study" in outcome.stdout + outcome.stderr
     assert "of-elsewhere" not in outcome.stdout + outcome.stderr
+
+
+def test_a_user_whom_the_system_does_not_know_has_a_name(monkeypatch):
+    for variable in ("LOGNAME", "USER", "LNAME", "USERNAME"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
+    set_user_name()
+    assert getpass.getuser() == f"user-{os.getuid()}"
+
+
+def test_a_user_whom_the_system_knows_keeps_the_name(monkeypatch):
+    monkeypatch.setenv("LOGNAME", "ana")
+    set_user_name()
+    assert getpass.getuser() == "ana"
 
 
 def stale(directory):

@@ -8,6 +8,7 @@ warnings and failures; everything else goes to a log. `--verbose`, `--quiet`,
 are Snakemake's.
 """
 
+import getpass
 import logging
 import os
 import re
@@ -360,6 +361,16 @@ def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None
         if is_set
     }
     os.environ[EXIT_FILE] = str(exit_file)
+    set_user_name()
+
+
+def set_user_name() -> None:
+    """Name a user whom the system does not know, such as one of `docker run -u`, as
+    Snakemake asks for a name."""
+    try:
+        getpass.getuser()
+    except (KeyError, OSError):
+        os.environ["LOGNAME"] = f"user-{os.getuid()}"
 
 
 def call_snakemake(arguments: Sequence[str]) -> int:
