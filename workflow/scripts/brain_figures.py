@@ -62,7 +62,9 @@ with step(snakemake.log[0]):
     maps = shape_maps(
         {"": {report["week"]: halves}}, quantity="shape_index", views=ROUND_VIEWS
     )
-    write_figure(output.quality, output.quality_pdf, quality_page(brain, row, warnings))
+    notes = [report["hindbrain"]] if "hindbrain" in report else []
+    page = quality_page(brain, row, warnings, notes)
+    write_figure(output.quality, output.quality_pdf, page)
     write_figure(output.maps, output.maps_pdf, maps)
     write_figure(
         output.small, output.small_pdf, small_pictures(halves, side=params.side)

@@ -95,19 +95,22 @@ def tissue_groups(
 
 @styled
 def quality_page(
-    brain: QualityBrain, row: Mapping[str, Any], warnings: Sequence[str]
+    brain: QualityBrain,
+    row: Mapping[str, Any],
+    warnings: Sequence[str],
+    notes: Sequence[str] = (),
 ) -> Figure:
     """Draw the page of a brain: three planes, the surface in four views, thickness in
-    four views, and its warnings.
+    four views, its warnings and notes, which need no review.
 
     The outlines are drawn on the image, or on the labels if there is no image. The page
-    ends below its last warning. `row` is the output of `quality_row`.
+    ends below its last line. `row` is the output of `quality_row`.
     """
-    lines = [
-        line
-        for text in warnings
-        for line in wrap(f"• {text}", LINE_LETTERS).split("\n")
-    ]
+    lines = []
+    for text in warnings:
+        lines += wrap(f"• {text}", LINE_LETTERS).split("\n")
+    for text in notes:
+        lines += wrap(f"Note: {text}", LINE_LETTERS).split("\n")
     height_in = HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines)
     figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     heading, colour = VERDICT_HEADINGS[row["verdict"]]

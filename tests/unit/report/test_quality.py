@@ -59,12 +59,13 @@ def test_the_page_shows_planes_views_and_warnings():
         QualityBrain(sphere(20.0, 3), 0.0, tissues=(groups, scaling(1.0, -30))),
         row,
         warnings,
+        notes=["it is small"],
     )
     shown = words(figure)
     parts = {
         "a, 24 GW",
         "NEEDS REVIEW",
-        "Warnings:\n• it is crooked",
+        "Warnings:\n• it is crooked\nNote: it is small",
         "coronal, y = 0 mm",
     }
     assert parts | {"left", "right medial", "front"} <= shown
