@@ -8,6 +8,7 @@ import pwd
 import re
 import subprocess
 import sys
+import threading
 
 import pytest
 from facts import Facts
@@ -17,7 +18,13 @@ from processes import ran
 from gyriflow.folding.__main__ import locked
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
-from gyriflow.running.launch import clear_stale_lock, set_user_name, what_runs
+from gyriflow.running.launch import (
+    clear_stale_lock,
+    end_scheduler_timers,
+    set_user_name,
+    stop_jobs,
+    what_runs,
+)
 from gyriflow.shipped import SHIPPED
 
 from .conftest import SMALL_STUDY
@@ -66,6 +73,20 @@ def test_a_user_whom_the_system_knows_keeps_the_name(monkeypatch):
     monkeypatch.setenv("LOGNAME", "ana")
     set_user_name()
     assert getpass.getuser() == "ana"
+
+
+def test_timers_of_the_scheduler_end_and_that_which_stops_jobs_stays():
+    scheduler = threading.Timer(60, print)
+    stopping = threading.Timer(60, stop_jobs)
+    for timer in (scheduler, stopping):
+        timer.start()
+    try:
+        end_scheduler_timers()
+        scheduler.join(20)
+        assert not scheduler.is_alive()
+        assert stopping.is_alive()
+    finally:
+        stopping.cancel()
 
 
 def stale(directory):

@@ -414,6 +414,7 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         code = 1
     finally:
         logger.removeFilter(is_shown)
+        end_scheduler_timers()
     for name in unknown_targets:
         rules = [
             path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")
@@ -423,6 +424,14 @@ def call_snakemake(arguments: Sequence[str]) -> int:
             f"no stage or result is named {name}; {did_you_mean(name, targets)}"
         )
     return 128 + received_signals[0] if code and received_signals else code
+
+
+def end_scheduler_timers() -> None:
+    """End the timers of Snakemake's scheduler, for which Python would wait at its
+    end."""
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer) and thread.function is not stop_jobs:
+            thread.cancel()
 
 
 def main(arguments: Sequence[str]) -> int:
