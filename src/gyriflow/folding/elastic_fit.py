@@ -111,6 +111,10 @@ elements flatter."""
 MAX_LEFT_MM = 3.0
 """Largest distance, as a root mean square, at which a body may stay from a shape: the
 way to the next shape begins there."""
+FOLDS_OVER = (
+    "curved elements fold over. Mesh with smaller elements (mesh.surface_edge_mm) or"
+    " linear ones (mesh.order: 1)"
+)
 SETTINGS = NewtonSettings(
     newton_tolerance=2e-2,
     krylov_tolerance=1e-2,
@@ -179,14 +183,17 @@ class ElasticFit:
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
         self._surface, self._used = boundary_surface(mesh)
-        self._pieces, self._start_volumes = (
-            pieces,
-            volumes_between(mesh.vertices, pieces),
-        )
+        self._pieces = pieces
+        # with the corners of curved elements: straight sides need these to have volume
+        is_curved = self._tets is not pieces
+        corners = self._tets[:, :4]
+        self._kept_open = np.concatenate([pieces, corners]) if is_curved else pieces
+        self._start_volumes = volumes_between(mesh.vertices, self._kept_open)
         is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
+        all_outer = self._kept_open[is_outer[self._kept_open].all(axis=1)]
         self._inner_moves_mm = np.where(is_outer, 0.0, np.inf)
         self._outer_moves_mm = np.zeros(len(mesh.vertices))
-        self._outer_moves_mm[pieces[is_outer[pieces].all(axis=1)]] = MAX_OUTER_MOVE_MM
+        self._outer_moves_mm[all_outer] = MAX_OUTER_MOVE_MM
         facets = self._used[self._surface.faces]
         whole = np.ones(len(mesh.vertices))
         zones = Zones(
@@ -237,7 +244,7 @@ class ElasticFit:
         if its boundary is still more than `MAX_LEFT_MM` from that of the shape (root
         mean square).
         """
-        boundary = self.boundary
+        boundary, start, n_passed = self.boundary, self.positions_mm, len(self._passed)
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
         ratio = signed_volume(
@@ -268,6 +275,9 @@ class ElasticFit:
             problem = self._step(
                 (self.positions_mm + displacement)[self._used], lengths, strain
             )
+        if not self._straighten():
+            problem = FOLDS_OVER
+            self._return_to_valid(start, n_passed)
         misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
         if problem and misfit_mm > MAX_LEFT_MM:
             raise SolverError(
@@ -280,7 +290,6 @@ class ElasticFit:
                     " that place."
                 ),
             )
-        self._straighten()
         return self._move(np.linalg.inv(motion))
 
     def draw(self, goals: Floats) -> Floats:
@@ -302,13 +311,11 @@ class ElasticFit:
             lengths = np.full(len(goals), length_mm)
             lengths[self._near_flat_elements()] = FREED_SPRING_LENGTH_MM
             self._step(boundary.vertices + pull, lengths, None)
-            try:
-                self._straighten()
+            if self._straighten():
                 return self._move(np.linalg.inv(motion))
-            except SolverError as error:
-                self.positions_mm, problem = start, str(error)
-                del self._passed[n_passed:]
-        log.warning("the body is not drawn to a surface: %s", problem)
+            self.positions_mm = start
+            del self._passed[n_passed:]
+        log.warning("the body is not drawn to a surface: %s", FOLDS_OVER)
         return start
 
     def move_to(self, shape: Floats) -> Floats:
@@ -421,17 +428,15 @@ class ElasticFit:
     def _near_flat_elements(self) -> Mask:
         """Return (b,) whether a vertex of the boundary is a corner of a flat element or
         of one that touches it."""
-        is_flat = (
-            volumes_between(self.positions_mm, self._pieces)
-            < MIN_VOLUME_LEFT * self._start_volumes
-        )
+        volumes = volumes_between(self.positions_mm, self._kept_open)
+        is_flat = volumes < MIN_VOLUME_LEFT * self._start_volumes
         is_near = np.zeros(len(self.positions_mm), dtype=bool)
-        is_near[self._pieces[is_flat]] = True
+        is_near[self._kept_open[is_flat]] = True
         is_near[self._pieces[is_near[self._pieces].any(axis=1)]] = True
         return is_near[self._used]
 
     def _flat_count(self, places: Floats) -> int:
-        volumes = volumes_between(places, self._pieces)
+        volumes = volumes_between(places, self._kept_open)
         return int((volumes < MIN_VOLUME_LEFT / 2 * self._start_volumes).sum())
 
     def _halfway(
@@ -481,23 +486,27 @@ class ElasticFit:
             self.positions_mm, goal, self._pieces, SLOPES[None]
         )[:, 0]
 
-    def _straighten(self) -> None:
-        """Straighten the edges of curved elements that fold over; SolverError where
-        that does not make them valid."""
+    def _straighten(self) -> bool:
+        """Straighten the sides of curved elements that fold over; return whether all
+        are valid then, and leave the body as it is if not."""
         if self._tets is self._pieces:
-            return
+            return True
         places = straighten_sides(self.positions_mm, self._tets)
-        bad = may_fold_over(places, self._tets)
-        if bad.any():
-            raise SolverError(
-                "a shape cannot be reached with curved elements that are valid",
-                found=f"{int(bad.sum())} elements fold over",
-                remedy=(
-                    "Mesh with smaller elements (mesh.surface_edge_mm) or linear ones"
-                    " (mesh.order: 1)."
-                ),
-            )
-        self.positions_mm = places
+        is_valid = not may_fold_over(places, self._tets).any()
+        if is_valid:
+            self.positions_mm = places
+        return is_valid
+
+    def _return_to_valid(self, start: Floats, n_passed: int) -> None:
+        """Move the body to the last state that its curved elements can have, of those
+        that it has passed through from a valid `start`."""
+        log.info("the body follows a shape as far as it can: %s", FOLDS_OVER)
+        while len(self._passed) > n_passed:
+            self.positions_mm = self._passed.pop()
+            if self._straighten():
+                self._passed.append(self.positions_mm)
+                return
+        self.positions_mm = start
 
     def _move(self, motion: NDArray) -> Floats:
         self.positions_mm = transform_points(self.positions_mm, motion)
@@ -552,7 +561,7 @@ class ElasticFit:
 
         No state is lost, since none is in the elements.
         """
-        arguments = self._pieces, self._start_volumes
+        arguments = self._kept_open, self._start_volumes
         opened = open_flat_elements(
             places, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT
         )

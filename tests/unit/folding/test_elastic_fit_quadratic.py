@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from shapes import box_mesh, ellipsoid_mesh
 
+from gyriflow.folding import elastic_fit
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.alignment import rigid_fit
 from gyriflow.geometry.deformations import transform_points
@@ -38,7 +39,9 @@ def folded_over(positions, body=BODY):
     return int((lower_bounds(positions, body.tets) <= 0).sum())
 
 
-@pytest.mark.parametrize("height_mm", [0.5, 1.0])
+# the highest ones turn the corners of curved elements inside out, though the linear
+# pieces of these stay valid
+@pytest.mark.parametrize("height_mm", [0.5, 1.0, 2.5])
 def test_waves_leave_no_curved_element_that_folds_over(height_mm):
     shape = waves(height_mm)
     assert folded_over(shape) > 20
@@ -54,6 +57,34 @@ def test_waves_leave_no_curved_element_that_folds_over(height_mm):
     # the higher waves bend elements too much: the body is only moved to the shape as a
     # whole
     assert drawn < (0.6 if height_mm < 1 else 1.01) * followed
+
+
+@pytest.mark.parametrize("n_invalid", [1, 3, 1000])
+def test_a_body_follows_a_shape_as_far_as_its_curved_elements_can(
+    monkeypatch, n_invalid
+):
+    real, states = elastic_fit.may_fold_over, []
+
+    def fold_over_at_first(positions, tets):
+        states.append(positions)
+        if len(states) <= n_invalid:
+            return np.ones(len(tets), dtype=bool)
+        return real(positions, tets)
+
+    monkeypatch.setattr(elastic_fit, "may_fold_over", fold_over_at_first)
+    shape = waves(0.5)
+    body = ElasticFit(BODY)
+    found = body.follow(shape)
+    left = [np.linalg.norm(state - shape, axis=1)[USED].mean() for state in states]
+    if n_invalid == 1000:
+        assert len(states) > 2
+        np.testing.assert_allclose(found, BODY.vertices, atol=1e-9)
+    else:
+        # the last state is asked for twice: at the end, and as a state passed
+        assert len(states) == n_invalid + 1
+        assert left[-1] > left[0] - 1e-3
+        assert folded_over(found) == 0
+        assert np.linalg.norm(found - BODY.vertices, axis=1)[USED].mean() > 0.05
 
 
 def bar(order):
