@@ -41,7 +41,7 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     on_surface[boundary_surface(mesh)[1]] = True
     for element in flat.tolist():
         for _ in range(ROUNDS):
-            if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
+            if signed_ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break
             moves = [
                 _best_move(vertices, mesh.tets, element, vertex, on_surface)
@@ -73,7 +73,7 @@ def _best_move(
     across = vertices[vertex] - others.mean(axis=0)
     edge = float(np.linalg.norm(others - vertices[vertex], axis=1).max())
     directions = [normal, across, *(vertices[vertex] - other for other in others)]
-    least = _ratios(vertices, star).min()
+    least = signed_ratios(vertices, star).min()
     best = None
     for direction in directions:
         length = np.linalg.norm(direction)
@@ -83,7 +83,7 @@ def _best_move(
                 trial = vertices[star].copy()
                 place = vertices[vertex] + sign * size * edge / length * direction
                 trial[star == vertex] = place
-                ratio = _ratios(
+                ratio = signed_ratios(
                     trial.reshape(-1, 3), np.arange(star.size).reshape(-1, 4)
                 ).min()
                 if ratio > least and (best is None or ratio - least > best[0]):
@@ -91,8 +91,8 @@ def _best_move(
     return best
 
 
-def _ratios(vertices: Floats, tets: Ints) -> Floats:
-    """Return the radius ratios of elements, negative for inverted ones."""
+def signed_ratios(vertices: Floats, tets: Ints) -> Floats:
+    """Return the (m,) radius ratios of linear elements, negative for inverted ones."""
     corners = vertices[tets]
     signs = np.sign(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     return signs * radius_ratios(

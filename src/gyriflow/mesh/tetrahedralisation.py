@@ -30,6 +30,7 @@ from ..settings.terms import Mesher
 from .improvement import improve_flat_elements
 from .meshers import run_mesher
 from .nodes import curve_edges
+from .splitting import split_inner_edges
 
 log = logging.getLogger(__name__)
 TIME_LIMIT_S = 3600.0
@@ -135,7 +136,10 @@ def tetrahedralise(
                 envelope_mm / float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
             ),
         }
-    mesh = improve_flat_elements(run_mesher(mesher, arrays, time_limit_s))
+    mesh = run_mesher(mesher, arrays, time_limit_s)
+    if order == 2:
+        mesh = split_inner_edges(mesh)
+    mesh = improve_flat_elements(mesh)
     _refuse_other_shape(mesh, surface)
     return curve_edges(mesh, surface) if order == 2 else mesh
 
