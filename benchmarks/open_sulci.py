@@ -46,11 +46,9 @@ Turn = tuple[float, float, float]
 # a ball with sulci around it, at x = ±X + A sin(y/L), all in mm
 RADIUS_MM, DEPTH_MM, THICKNESS_MM = 20.0, 6.0, 2.0
 PLACES_MM, WAVE_MM, LENGTH_MM = (-6.0, 6.0), 1.5, 4.0
-WIDTHS_MM, VOXELS_MM, TURNS_DEG = (
-    (0.0, 0.2, 0.5, 1.0),
-    (0.5, 0.8, 1.0),
-    ((0, 0, 0), (20, 30, 10), (45, 35, 0)),
-)
+WIDTHS_MM = (0.0, 0.2, 0.5, 1.0)
+VOXELS_MM = (0.5, 0.8, 1.0)
+TURNS_DEG = ((0, 0, 0), (20, 30, 10), (45, 35, 0))
 # cells of a voxel along each axis; the label is that of most cells
 CELLS = 3
 EDGE_MM = 1.0
@@ -214,10 +212,8 @@ def branching_phantom(
     turn = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1) @ turn
     corners, arcs = network()
-    share, height = (
-        np.linspace(0.0, 1.0, 200),
-        np.arange(radius_mm - depth_mm, radius_mm, 0.1),
-    )
+    share = np.linspace(0.0, 1.0, 200)
+    height = np.arange(radius_mm - depth_mm, radius_mm, 0.1)
     ends = corners[arcs[:n_arcs]][:, :, None]
     lines = (ends[:, 0] * (1.0 - share[:, None]) + ends[:, 1] * share[:, None]).reshape(
         -1, 3
@@ -280,10 +276,8 @@ def try_branching(
 def try_surface(pial_file: Path) -> dict[str, Any]:
     """Return area errors of a hemisphere's surfaces with fused and opened sulci, from
     labels between its surfaces."""
-    pial, white = (
-        read_surface(pial_file),
-        read_surface(Path(str(pial_file).replace(".pial.", ".white."))),
-    )
+    pial = read_surface(pial_file)
+    white = read_surface(Path(str(pial_file).replace(".pial.", ".white.")))
     # both may have been moved, and have the same vertices
     shift = np.average(
         pial.vertices - white.vertices, axis=0, weights=vertex_areas(white)

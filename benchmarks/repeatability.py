@@ -121,10 +121,8 @@ def measure_turned(
     arguments: argparse.Namespace, number: int
 ) -> tuple[TriangleMesh, BrainMetrics]:
     """Return the surface and the metrics of the brain, turned for the nth time."""
-    volume, scheme = (
-        read_label_volume(arguments.labels, cropped=True),
-        SCHEMES[arguments.scheme],
-    )
+    volume = read_label_volume(arguments.labels, cropped=True)
+    scheme = SCHEMES[arguments.scheme]
     labels, affine = turned(volume.labels, volume.affine, number)
     surface = from_labels(labels, affine, scheme, week=arguments.week)
     pose, fissure = pose_from(surface.report["pose"]), surface.report["fissure_x_mm"]

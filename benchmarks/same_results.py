@@ -195,13 +195,11 @@ def compare(
     earlier, later = {new_name(name): name for name in files(before)}, set(files(after))
     lines, largest, place = [], 0.0, ""
     for file in sorted({*earlier} & later):
-        old, new = (
-            {
-                new_name(name): array
-                for name, array in read(before / earlier[file]).items()
-            },
-            read(after / file),
-        )
+        old = {
+            new_name(name): array
+            for name, array in read(before / earlier[file]).items()
+        }
+        new = read(after / file)
         lines += [
             f"{file}: {name}: only {'before' if name in old else 'after'}"
             for name in sorted({*old} ^ {*new})

@@ -176,10 +176,8 @@ def read_cerebrum(
     }
     report["border_share"] = border_share(main)
     box, first = extraction.crop(main)
-    cropped, labelled = (
-        np.pad(main[box], extraction.PAD_VOXELS),
-        np.pad(tissue[box], extraction.PAD_VOXELS),
-    )
+    cropped = np.pad(main[box], extraction.PAD_VOXELS)
+    labelled = np.pad(tissue[box], extraction.PAD_VOXELS)
     return Cerebrum(
         cropped,
         labelled,
@@ -299,10 +297,8 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
     if not hindbrain.any():
         return out
-    elsewhere, touching = (
-        ~hindbrain & ~np.isin(labels, scheme.cerebrum),
-        np.zeros_like(out),
-    )
+    elsewhere = ~hindbrain & ~np.isin(labels, scheme.cerebrum)
+    touching = np.zeros_like(out)
     for box, part in extraction.parts_in_boxes(out):
         around = ndimage.binary_dilation(part, extraction.OUTSIDE)
         if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():

@@ -409,10 +409,8 @@ def _fill_holes(
         (float(np.ptp(mesh.vertices[loop], axis=0).max()), list(loop))
         for loop in igl.boundary_loop_all(mesh.faces)
     )
-    sizes, loops = (
-        [size for size, _ in by_size],
-        [np.asarray(loop) for _, loop in by_size],
-    )
+    sizes = [size for size, _ in by_size]
+    loops = [np.asarray(loop) for _, loop in by_size]
     small = sum(size <= max_hole_mm for size in sizes)
     wide, component = sizes[small:], triangles.face_components(mesh)
     pieces_with_wide = {

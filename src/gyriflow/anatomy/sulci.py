@@ -77,10 +77,8 @@ def open_fused_sulci(
     solid, _ = refine(
         main_parts(core)[0][part].astype(np.float32), affine, every * factor
     )
-    near, grid = (
-        field[brain],
-        shifted_affine(affine, np.array([side.start for side in brain])),
-    )
+    near = field[brain]
+    grid = shifted_affine(affine, np.array([side.start for side in brain]))
     whole, fine = refine(near, grid, factor)
     size = np.linalg.norm(fine[:3, :3], axis=0)
     inside, solid = whole > LEVEL, solid > LEVEL

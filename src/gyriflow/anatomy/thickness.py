@@ -111,10 +111,8 @@ def cortical_thickness(
         sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points)
         for mask in (~cortex, cerebrum)
     )
-    at_labels, over_cortex = (
-        to_outside < MAX_OUTSIDE_VOXELS * voxel,
-        to_cortex < NEAR_VOXELS * voxel,
-    )
+    at_labels = to_outside < MAX_OUTSIDE_VOXELS * voxel
+    over_cortex = to_cortex < NEAR_VOXELS * voxel
     if fissure_x_mm is not None:
         at_labels |= np.abs(points[:, 0] - fissure_x_mm) > FISSURE_REACH_MM
     is_measured = at_labels & over_cortex & (values >= MIN_LAYER_VOXELS * voxel)

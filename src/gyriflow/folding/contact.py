@@ -93,11 +93,9 @@ class SelfContact:
         ipctk.set_num_threads(1)  # more threads would compete with other ranks
         self.domain, self.surface = domain, ContactSurface(domain, facets)
         self._stiffens = stiffens
-        self._initial_pa, self._given_mm, self._max_mm = (
-            stiffness_pa,
-            distance_mm,
-            np.inf,
-        )
+        self._initial_pa = stiffness_pa
+        self._given_mm = distance_mm
+        self._max_mm = np.inf
         start = self.surface.reference_mm()
         self._edges = edges(TriangleMesh(start, self.surface.faces))[0]
         # from rank 0, since other processors may round differently

@@ -251,10 +251,8 @@ class Domain:
         The four triangles of a quadratic element's face have one tag. ValueError where
         the facets are not the boundary.
         """
-        faces, tags = (
-            whole_faces(facets, self.order),
-            tags[:: PIECES_OF_ORDER[self.order]],
-        )
+        faces = whole_faces(facets, self.order)
+        tags = tags[:: PIECES_OF_ORDER[self.order]]
         topology = self.mesh.topology
         topology.create_entities(2)
         topology.create_connectivity(2, 3)

@@ -179,10 +179,8 @@ class ElasticFit:
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
         self._surface, self._used = boundary_surface(mesh)
-        self._pieces, self._start_volumes = (
-            pieces,
-            volumes_between(mesh.vertices, pieces),
-        )
+        self._pieces = pieces
+        self._start_volumes = volumes_between(mesh.vertices, pieces)
         is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
         self._inner_moves_mm = np.where(is_outer, 0.0, np.inf)
         self._outer_moves_mm = np.zeros(len(mesh.vertices))
@@ -215,10 +213,8 @@ class ElasticFit:
         self._inverse_edges = np.linalg.inv(
             np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
         )
-        size, columns = (
-            (len(mesh.vertices), len(cells)),
-            np.repeat(np.arange(len(cells)), 4),
-        )
+        size = (len(mesh.vertices), len(cells))
+        columns = np.repeat(np.arange(len(cells)), 4)
         self._incidence = sparse.csr_array(
             (np.ones(4 * len(cells)), (cells.ravel(), columns)), shape=size
         )
@@ -324,10 +320,8 @@ class ElasticFit:
             self.positions_mm, transform_points(shape, motion), UNTANGLING_MM
         )
         if not len(faults):
-            self.positions_mm, self._moved_straight = (
-                self._opened_after(self.positions_mm, untangled),
-                True,
-            )
+            self.positions_mm = self._opened_after(self.positions_mm, untangled)
+            self._moved_straight = True
             return self._move(np.linalg.inv(motion))
         log.info(
             "%d faults remain on the way to a shape: the body follows it", len(faults)
@@ -343,11 +337,9 @@ class ElasticFit:
 
         Elements that lose most of their volume count as faults in the first round only.
         """
-        sizes, displacement, least = (
-            vertex_sizes(before, self._pieces),
-            after - before,
-            MIN_VOLUME_ON_WAY,
-        )
+        sizes = vertex_sizes(before, self._pieces)
+        displacement = after - before
+        least = MIN_VOLUME_ON_WAY
         for length in lengths_mm:
             faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
@@ -455,10 +447,8 @@ class ElasticFit:
         """Return the (k, 3) places before, of elements that are inverted and faces that
         cross on the straight way."""
         inverted = inverted_on_the_way(before, after, self._tets, least)
-        places, faces = (
-            [before[self._tets[inverted]].mean(axis=1)],
-            self._used[self._surface.faces],
-        )
+        places = [before[self._tets[inverted]].mean(axis=1)]
+        faces = self._used[self._surface.faces]
         for part in PARTS_OF_WAY:
             surface = TriangleMesh(
                 ((1 - part) * before + part * after)[self._used], self._surface.faces
@@ -587,10 +577,8 @@ class ElasticFit:
         cells = self._elements.vertices[self._elements.cells]
         corners = self.positions_mm[cells]
         edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-        logs, volumes = (
-            log_stretch(edges @ self._inverse_edges, left=True),
-            determinants(edges),
-        )
+        logs = log_stretch(edges @ self._inverse_edges, left=True)
+        volumes = determinants(edges)
         around = packed(logs)
         for _ in range(FLATTENING_ROUNDS):
             at_vertices = (

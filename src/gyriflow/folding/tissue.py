@@ -68,10 +68,8 @@ class Tissue:
         Maps are (n,) at all vertices.
         """
         points, cells = elements.points, elements.cells
-        pial, nodes = (
-            PialSearch(positions, zones.cortex_facets),
-            positions[elements.vertices],
-        )
+        pial = PialSearch(positions, zones.cortex_facets)
+        nodes = positions[elements.vertices]
         # the maximum over the whole mesh, so that all ranks search equally far
         reach = (
             WEIGHT_REACH

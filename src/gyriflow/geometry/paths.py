@@ -135,10 +135,8 @@ def merged_shapes(
     kept = np.ones(len(weeks), dtype=bool)
     for number, group in enumerate(groups):
         if len(group) > 1:
-            (early, first), (late, last) = (
-                means[max(number - 1, 0)],
-                means[min(number + 1, len(groups) - 1)],
-            )
+            early, first = means[max(number - 1, 0)]
+            late, last = means[min(number + 1, len(groups) - 1)]
             week, mean = means[number]
             merged[group] = mean + ((weeks[group] - week) / (late - early))[
                 :, None, None

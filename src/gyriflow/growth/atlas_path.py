@@ -76,10 +76,8 @@ def ages_by_size(
     which the curve has its volume; ages that do not ascend are replaced by their
     nearest ascending ones (isotonic regression). InputError if the atlas shrinks.
     """
-    stated, volumes = (
-        np.asarray(weeks, dtype=float),
-        np.asarray(volumes_ml, dtype=float),
-    )
+    stated = np.asarray(weeks, dtype=float)
+    volumes = np.asarray(volumes_ml, dtype=float)
     points = pd.DataFrame({"week": stated, "volume": volumes})
     if len(norm_ml):
         points = pd.concat(

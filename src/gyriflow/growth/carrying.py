@@ -140,10 +140,8 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
             expected=f"at most {MAX_DISTANCE_MM:g} mm on average",
             remedy="Both must have the same pose and week.",
         )
-    offsets, weights = (
-        mesh.vertices - values_at(match, start.vertices),
-        vertex_areas(start),
-    )
+    offsets = mesh.vertices - values_at(match, start.vertices)
+    weights = vertex_areas(start)
     turns = [
         rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces
     ]

@@ -63,10 +63,8 @@ def picture_addresses(
 
 def _coded(path: AnyPath, width: int) -> tuple[str, float]:
     with Image.open(path) as picture:
-        image, inches = (
-            picture.convert("RGB"),
-            float(picture.width / picture.info["dpi"][0]),
-        )
+        image = picture.convert("RGB")
+        inches = float(picture.width / picture.info["dpi"][0])
     if image.width > width:
         image = image.resize(
             (width, round(image.height * width / image.width)), Image.Resampling.LANCZOS

@@ -287,10 +287,8 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
     rows = []
     for number, cells in enumerate((cells[has_names:] for cells in body), start=2):
         if any(cells[len(head) :]):
-            found, expected = (
-                f"{len(cells)} cells in row {number}",
-                f"{len(head)}, as in the heading",
-            )
+            found = f"{len(cells)} cells in row {number}"
+            expected = f"{len(head)}, as in the heading"
             raise InputError(
                 "has a row that is longer than its heading",
                 path=path,

@@ -87,10 +87,8 @@ def write_tetrahedral_mesh(
         file["tets"], file["vertices"] = mesh.tets, mesh.vertices
         for name, (values, _) in fields.items():
             file[f"Cell/{name}"] = values
-    cells, points = (
-        (mesh.tets, f"{data.name}:/tets"),
-        (mesh.vertices, f"{data.name}:/vertices"),
-    )
+    cells = (mesh.tets, f"{data.name}:/tets")
+    points = (mesh.vertices, f"{data.name}:/vertices")
     write_text(path, document(grid("mesh", cells, points, {}, fields)))
 
 

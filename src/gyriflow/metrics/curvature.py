@@ -241,15 +241,11 @@ def _balls(
     for start in range(0, len(vertices), CHUNK):
         centres = np.arange(start, min(start + CHUNK, len(vertices)))
         reached = np.zeros((len(centres), len(vertices)), dtype=bool)
-        found, ring = (
-            [],
-            sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr"),
-        )
+        found = []
+        ring = sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr")
         while ring.nnz:
-            row, column = (
-                np.repeat(np.arange(len(centres)), np.diff(ring.indptr)),
-                ring.indices,
-            )
+            row = np.repeat(np.arange(len(centres)), np.diff(ring.indptr))
+            column = ring.indices
             offset = vertices[column] - vertices[centres[row]]
             is_new = ~reached[row, column] & (
                 np.einsum("ij,ij->i", offset, offset) < radii_mm[centres[row]] ** 2

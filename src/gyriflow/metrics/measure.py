@@ -176,14 +176,10 @@ def size_metrics(
 
     The area of the whole is that of its `hemispheres`, without caps of medial walls.
     """
-    volume, cm2 = (
-        volume_ml(cap(mesh)),
-        sum(map(area_cm2, hemispheres)) or area_cm2(mesh),
-    )
-    relative, crossing = (
-        cm2 / volume ** (2 / 3) if volume > 0 else np.nan,
-        float(crossing_faces(mesh)),
-    )
+    volume = volume_ml(cap(mesh))
+    cm2 = sum(map(area_cm2, hemispheres)) or area_cm2(mesh)
+    relative = cm2 / volume ** (2 / 3) if volume > 0 else np.nan
+    crossing = float(crossing_faces(mesh))
     return {
         "volume": volume,
         "area": cm2,

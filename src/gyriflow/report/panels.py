@@ -150,11 +150,9 @@ def panel_grid(
         0.15 * -(-len(legend) // legend_columns) + 0.16,
     )
     total = _TOP_IN + _dots(foot_in) + sum(heights.sum() for heights in heights_in)
-    figure, top, letters = (
-        Figure(figsize=(width, total)),
-        total - _TOP_IN,
-        iter(ascii_lowercase),
-    )
+    figure = Figure(figsize=(width, total))
+    top = total - _TOP_IN
+    letters = iter(ascii_lowercase)
     for block, block_rows, heights in zip(blocks, drawn, heights_in, strict=True):
         ends = {
             "left": left / width,

@@ -417,10 +417,8 @@ def influence_picture(
         for name, halves in brains.items()
         if halves
     }
-    scale, colours = (
-        scale_of("shape_index", np.empty(0)),
-        {observed_name: OBSERVED_SURFACE_COLOUR},
-    )
+    scale = scale_of("shape_index", np.empty(0))
+    colours = {observed_name: OBSERVED_SURFACE_COLOUR}
     groups = {
         "": {
             name: plain_panel(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR))

@@ -27,11 +27,9 @@ _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
 _DRAWN = [name for name, record in VERTEX_MAPS.items() if record.colours]
 # base64 writes three bytes as four letters; a vertex has about two triangles, of three
 # indices of two bytes
-_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = (
-    4 / 3,
-    6 + len(_DRAWN),
-    12,
-)
+_LETTERS_PER_BYTE = 4 / 3
+_BYTES_PER_FRAME = 6 + len(_DRAWN)
+_BYTES_PER_TRIANGULATION = 12
 
 Timed = tuple[float, TriangleMesh, dict[str, Floats]]
 """A week, a surface in RAS+ mm and its maps by name; NaN for unknown values."""

@@ -141,10 +141,8 @@ def gather_messages(
     Subject and run are empty if not applicable. Only logs written after `since_s` (s
     since the epoch) are read.
     """
-    folder, known = (
-        Path(folder),
-        {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)},
-    )
+    folder = Path(folder)
+    known = {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)}
     rows = []
     for path in sorted(folder.glob("results/*/**/logs/*.log")):
         kind, *names = path.relative_to(folder / "results").parts[:-2]

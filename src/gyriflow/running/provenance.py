@@ -121,10 +121,8 @@ def check_results_belong_to(
             "Choose another --directory, or delete these results (or only"
             f" study/{path.name}, to keep both here)."
         )
-        problem, results = (
-            "the results here belong to another study",
-            path.parents[1].resolve(),
-        )
+        problem = "the results here belong to another study"
+        results = path.parents[1].resolve()
         raise InputError(
             problem, path=results, found=results_of, expected=expected, remedy=remedy
         )

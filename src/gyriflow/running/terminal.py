@@ -83,10 +83,8 @@ class RunDisplay:
             file=stream, markup=False, highlight=False, soft_wrap=True
         )
         self.live = self.console.is_terminal and not self.console.is_dumb_terminal
-        percent, running = (
-            TextColumn("{task.percentage:3.0f} %"),
-            TextColumn("{task.description}", markup=False),
-        )
+        percent = TextColumn("{task.percentage:3.0f} %")
+        running = TextColumn("{task.description}", markup=False)
         columns = percent, BarColumn(20), TimeRemainingColumn(), running
         self.bar = Progress(
             *columns,

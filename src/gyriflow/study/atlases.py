@@ -140,10 +140,8 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
     have yet to be fetched."""
     entries: dict[str, dict[str, Any]] = {}
     for file in used.files:
-        series, name = (
-            used.atlas.series[file.series],
-            used.atlas.brain_id(file.series, file.week),
-        )
+        series = used.atlas.series[file.series]
+        name = used.atlas.brain_id(file.series, file.week)
         entry = entries.setdefault(
             name, {"id": name, "week": file.week, "population": series.population}
         )

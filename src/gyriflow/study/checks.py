@@ -269,10 +269,8 @@ def growth(config: Config) -> Iterator[KeyProblem]:
                 " a population"
             )
             yield KeyProblem(text, ("growth", "brains"))
-    series, preferred = (
-        growth_series(config.brains, config.growth.brains),
-        config.growth.series,
-    )
+    series = growth_series(config.brains, config.growth.brains)
+    preferred = config.growth.series
     if preferred is not None and series and preferred not in series:
         yield KeyProblem(
             f"found {preferred!r}; the series are {', '.join(series)}",
@@ -437,10 +435,8 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
 def _comparison_problems(
     settings: ComparisonSettings, config: Config, key: Key
 ) -> Iterator[KeyProblem]:
-    weeks, week = (
-        {brain.id: brain.week for brain in config.brains},
-        settings.compare_week,
-    )
+    weeks = {brain.id: brain.week for brain in config.brains}
+    week = settings.compare_week
     if settings.base not in config.runs:
         yield KeyProblem(
             f"found {settings.base!r}; expected a run: {', '.join(config.runs)}",

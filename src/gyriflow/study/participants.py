@@ -616,10 +616,8 @@ def _entry(
         **covariates(values),
     }
     if FILES in values:
-        files, side = (
-            [part.strip() for part in values[FILES].split(";")],
-            values.get(SIDE),
-        )
+        files = [part.strip() for part in values[FILES].split(";")]
+        side = values.get(SIDE)
         limit, expected = (
             (2, "at most a left and a right hemisphere")
             if side is None

@@ -55,10 +55,8 @@ SCATTERED = VOLUMES * np.exp(0.01 * np.random.default_rng(5).normal(size=10))
 def test_a_week_without_weight_counts_neither_for_the_curve_nor_for_its_error():
     leaping = SCATTERED.copy()
     leaping[4] *= 1.5
-    fit, without = (
-        fitted(WEEKS, leaping),
-        fitted(np.delete(WEEKS, 4), np.delete(SCATTERED, 4)),
-    )
+    fit = fitted(WEEKS, leaping)
+    without = fitted(np.delete(WEEKS, 4), np.delete(SCATTERED, 4))
     assert fit.weights[4] == 0
     for found, expected in zip(
         interval(fit.curve, WEEKS), interval(without.curve, WEEKS), strict=True

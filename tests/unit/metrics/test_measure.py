@@ -195,10 +195,8 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
             mesh.faces,
         )
 
-    left, right = (
-        bumpy((18.0, 26.0, 20.0), 4, -40.0),
-        bumpy((24.0, 34.0, 22.0), 3, 40.0),
-    )
+    left = bumpy((18.0, 26.0, 20.0), 4, -40.0)
+    right = bumpy((24.0, 34.0, 22.0), 3, 40.0)
     thickness = np.concatenate(
         [
             np.linspace(1.0, 2.0, len(left.vertices)),

@@ -438,15 +438,11 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
         labels(week, population="third", id=f"third{week}")
         for week in (21, 22, 23, 24, 25)
     ]
-    brains, run = (
-        [*of_two(22, 24), *third],
-        {"preset": "expected", "ensemble": {"members": 4, "seed": 1}},
-    )
+    brains = [*of_two(22, 24), *third]
+    run = {"preset": "expected", "ensemble": {"members": 4, "seed": 1}}
     found = study(brains, runs={"a": run}, growth={"series": "atlas"})
-    simulation, members = (
-        found.simulations["a", "own22"],
-        found.members(found.simulations["a", "own22"]),
-    )
+    simulation = found.simulations["a", "own22"]
+    members = found.members(found.simulations["a", "own22"])
     assert [member.run for member in members] == [
         f"a-member-{number}" for number in (1, 2, 3, 4)
     ]
