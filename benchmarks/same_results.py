@@ -41,23 +41,19 @@ COMMANDS = {
 }
 """The command for each configuration in `benchmarks/regression`."""
 IGNORED = {
-    *(
-        "seconds",
-        "cpu_seconds",
-        "seconds_per_step",
-        "cpu_s",
-        "peak_memory_MiB",
-        "commit",
-        "gyriflow",
-    ),
-    *(
-        "logs",
-        "benchmarks",
-        "report",
-        "provenance.json",
-        "resources.csv",
-        "inputs.json",
-    ),
+    "seconds",
+    "cpu_seconds",
+    "seconds_per_step",
+    "cpu_s",
+    "peak_memory_MiB",
+    "commit",
+    "gyriflow",
+    "logs",
+    "benchmarks",
+    "report",
+    "provenance.json",
+    "resources.csv",
+    "inputs.json",
 }
 """Columns, keys, files and folders that differ between two runs of the same code."""
 FOLDERS_OF_PATH = re.compile(r"/\S*/")

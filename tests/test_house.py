@@ -78,25 +78,21 @@ RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.
 OPENING_ROOMS = {"code_hash", "io", "folding", "running", "cli", "step"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
-    *(
-        "open",
-        "read_text",
-        "read_bytes",
-        "write_text",
-        "write_bytes",
-        "tofile",
-        "to_filename",
-        "savefig",
-    ),
-    *(
-        "to_csv",
-        "to_json",
-        "to_hdf",
-        "to_parquet",
-        "to_pickle",
-        "load_new_mesh",
-        "save_current_mesh",
-    ),
+    "open",
+    "read_text",
+    "read_bytes",
+    "write_text",
+    "write_bytes",
+    "tofile",
+    "to_filename",
+    "savefig",
+    "to_csv",
+    "to_json",
+    "to_hdf",
+    "to_parquet",
+    "to_pickle",
+    "load_new_mesh",
+    "save_current_mesh",
 }
 OPENING_FUNCTIONS = {
     "numpy": {

@@ -26,13 +26,11 @@ MAPS = (
 )
 PIAL_MAPS = (*MAPS, "spangyDominantBand", "spangyShapeIndexDominantBand", "thickness")
 EXPECTED = {
-    *(
-        ".bidsignore",
-        "README.md",
-        "dataset_description.json",
-        "descriptions.tsv",
-        "sessions.json",
-    ),
+    ".bidsignore",
+    "README.md",
+    "dataset_description.json",
+    "descriptions.tsv",
+    "sessions.json",
     *(f"{name}.json" for name in ("pial", "white", *PIAL_MAPS)),
     *("sub-01/sub-01_sessions.tsv", "sub-01/figures/sub-01_ses-1_quality.png"),
     *(

@@ -10,15 +10,13 @@ from gyriflow.metrics.spangy import PART_POWERS
 from gyriflow.shipped import SHIPPED
 
 TABLES = (
-    *(
-        "metrics",
-        "spectra",
-        "regions",
-        "metrics_long",
-        "metrics_wide",
-        "change",
-        "asymmetry",
-    ),
+    "metrics",
+    "spectra",
+    "regions",
+    "metrics_long",
+    "metrics_wide",
+    "change",
+    "asymmetry",
     *("norm_curves", "centiles", "spectral_distance"),
 )
 ODD = ("1e5", "NA", "None", "true", "1.0", "2024-01-01")

@@ -55,18 +55,14 @@ DIRECTION_QUANTILE = 0.9
 ABSENT = "ended\nbefore\nthis week"
 """Text in place of a run that ended before the week."""
 ZONE_COLOURS = {
-    **{
-        "free": "#D55E00",
-        "clamped": "#009E73",
-        "left contact": "#0072B2",
-        "right contact": RIGHT_COLOUR,
-    },
-    **{
-        "between planes": "#CC79A7",
-        "base": "#999999",
-        "side x": "#56B4E9",
-        "side y": "#E69F00",
-    },
+    "free": "#D55E00",
+    "clamped": "#009E73",
+    "left contact": "#0072B2",
+    "right contact": RIGHT_COLOUR,
+    "between planes": "#CC79A7",
+    "base": "#999999",
+    "side x": "#56B4E9",
+    "side y": "#E69F00",
     "medial wall": "#8C6D31",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and

@@ -38,29 +38,23 @@ _TABLE = Environment(autoescape=True).from_string(
 )
 
 COMMON_PARAMETERS = (
-    *(
-        "thickness_mm",
-        "shear_modulus_cortex_pa",
-        "shear_modulus_core_pa",
-        "material",
-        "poisson_ratio",
-    ),
-    *(
-        "growth_of",
-        "growth_rate_per_s",
-        "core_growth_rate_per_s",
-        "stress_memory_gw",
-        "support",
-    ),
-    *(
-        "contact.kind",
-        "no_growth.kind",
-        "step_s",
-        "tets",
-        "order",
-        "elements_through_cortex",
-        "element_error_percent",
-    ),
+    "thickness_mm",
+    "shear_modulus_cortex_pa",
+    "shear_modulus_core_pa",
+    "material",
+    "poisson_ratio",
+    "growth_of",
+    "growth_rate_per_s",
+    "core_growth_rate_per_s",
+    "stress_memory_gw",
+    "support",
+    "contact.kind",
+    "no_growth.kind",
+    "step_s",
+    "tets",
+    "order",
+    "elements_through_cortex",
+    "element_error_percent",
     *("steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are listed even if all runs share them."""

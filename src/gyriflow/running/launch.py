@@ -46,39 +46,33 @@ GRACE_S = 4.0
 """Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers
 allow 10 s or more in all."""
 READ_ONLY_OPTIONS = (
-    *(
-        "dryrun",
-        "nolock",
-        "summary",
-        "detailed_summary",
-        "rulegraph",
-        "dag",
-        "filegraph",
-        "list_rules",
-        "lint",
-    ),
+    "dryrun",
+    "nolock",
+    "summary",
+    "detailed_summary",
+    "rulegraph",
+    "dag",
+    "filegraph",
+    "list_rules",
+    "lint",
 )
 """Options with which Snakemake runs nothing and takes no lock."""
 VERBOSE_OPTIONS = (
-    *(
-        "verbose",
-        "quiet",
-        "printshellcmds",
-        "logger",
-        "debug",
-        "debug_dag",
-        "unlock",
-        "touch",
-        "report",
-        "archive",
-    ),
-    *(
-        "delete_all_output",
-        "delete_temp_output",
-        "cleanup_metadata",
-        "list_changes",
-        "list_input_changes",
-    ),
+    "verbose",
+    "quiet",
+    "printshellcmds",
+    "logger",
+    "debug",
+    "debug_dag",
+    "unlock",
+    "touch",
+    "report",
+    "archive",
+    "delete_all_output",
+    "delete_temp_output",
+    "cleanup_metadata",
+    "list_changes",
+    "list_input_changes",
     *("list_params_changes", "generate_unit_tests"),
 )
 """Options that ask for Snakemake's own messages, or for something else than running

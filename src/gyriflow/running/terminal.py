@@ -49,11 +49,9 @@ INTERRUPTED_PREFIXES = (
     "Cancelling snakemake on user request",
 )
 FAILED_JOB_PREFIXES = (
-    *(
-        "Exiting because a job execution failed",
-        "At least one job did not",
-        "WorkflowError:\nAt least one job did not",
-    ),
+    "Exiting because a job execution failed",
+    "At least one job did not",
+    "WorkflowError:\nAt least one job did not",
     *("RuleException:", "CalledProcessError"),
 )
 """Beginnings of Snakemake's messages about a failed job. The job's own log has the

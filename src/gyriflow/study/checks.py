@@ -50,17 +50,15 @@ RESULT_COLUMNS = re.compile(
 )
 """Columns of `metrics_wide.csv`, which covariates stand in as well."""
 RESERVED_STUDIES = (
-    *(
-        "benchmarks",
-        "calibration",
-        "figures",
-        "growth",
-        "logs",
-        "matched",
-        "registration",
-        "tables",
-        "validation",
-    ),
+    "benchmarks",
+    "calibration",
+    "figures",
+    "growth",
+    "logs",
+    "matched",
+    "registration",
+    "tables",
+    "validation",
 )
 """Names that sweeps may not have, since other results of the study have folders of
 these names."""

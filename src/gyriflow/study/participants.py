@@ -34,16 +34,14 @@ from .ages import (
 IDS = ("participant_id", "id")
 """Possible names of the column of participants."""
 SESSIONS = (
-    *(
-        "session_id",
-        "session",
-        "ses",
-        "ses_id",
-        "session_label",
-        "session_number",
-        "visit",
-        "visit_id",
-    ),
+    "session_id",
+    "session",
+    "ses",
+    "ses_id",
+    "session_label",
+    "session_number",
+    "visit",
+    "visit_id",
     *("visit_number", "timepoint", "time_point", "tp", "wave"),
 )
 """Possible names of the column of sessions; the first one of a table counts."""

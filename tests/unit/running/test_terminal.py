@@ -321,15 +321,11 @@ def test_what_is_done_of_each_brain_and_run_is_counted(tmp_path):
     rows = [line.split() for line in text(tmp_path).splitlines() if line]
     assert rows == [
         ["nothing", "is", "running"],
-        *(
-            ["brain", "surface", "mesh", "metrics"],
-            ["a", "done", "-", "done"],
-            ["b", "done", "done", "-"],
-        ),
-        *(
-            ["run", "brain", "folding", "surfaces", "metrics", "figures"],
-            ["r", "a", "-", "3", "2", "1"],
-        ),
+        ["brain", "surface", "mesh", "metrics"],
+        ["a", "done", "-", "done"],
+        ["b", "done", "done", "-"],
+        ["run", "brain", "folding", "surfaces", "metrics", "figures"],
+        ["r", "a", "-", "3", "2", "1"],
     ]
 
 

@@ -672,14 +672,12 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
     described = found.prediction_facts
     at = "results/runs/a/own22.4/surfaces/week-23.90"
     assert described | {"surfaces": described["surfaces"][:1]} == {
-        **{
-            "run": "a",
-            "brain": "own22.4",
-            "start_week": 22.4,
-            "week": 23.9,
-            "atlas_brain": "b24",
-            "atlas_week": 24,
-        },
+        "run": "a",
+        "brain": "own22.4",
+        "start_week": 22.4,
+        "week": 23.9,
+        "atlas_brain": "b24",
+        "atlas_week": 24,
         # a series of one's own is no atlas with a licence
         **{"population": "atlas", "atlas": None, "surfaces": [f"{at}/pial.surf.gii"]},
         "atlas_surface": f"{at}/atlas.pial.surf.gii",
