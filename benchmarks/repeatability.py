@@ -104,8 +104,8 @@ def main() -> None:
         .sum()
     )
     print(
-        "| metric | coefficient of variation | standard deviation |\n| --- | ---: |"
-        " ---: |"
+        "| metric | coefficient of variation | standard deviation |\n"
+        "| --- | ---: | ---: |"
     )
     for name, row in record["metrics"].items():
         print(f"| `{name}` | {100 * row['cv']:.2f} % | {row['sd']:.3g} |")
@@ -130,7 +130,9 @@ def measure_turned(
         labels, affine, scheme, surface.whole, pose, fissure
     )
     found = measure_brain(
-        *(surface.whole, surface.left, surface.right),
+        surface.whole,
+        surface.left,
+        surface.right,
         thickness_mm=thickness.measured_mm,
         label_volumes_ml=surface.report.get("label_volumes_mL", {}),
         spangy_modes=arguments.last,

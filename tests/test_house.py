@@ -401,7 +401,7 @@ def test_opened_files_are_seen(tmp_path, code):
 def test_buffers_in_memory_are_no_files(tmp_path):
     source = tmp_path / "a.py"
     source.write_text(
-        "import io\nimport numpy as np\nsent = io.BytesIO()\nnp.savez(sent,"
-        " a=1)\nnp.load(io.BytesIO(b''))"
+        "import io\nimport numpy as np\n"
+        "sent = io.BytesIO()\nnp.savez(sent, a=1)\nnp.load(io.BytesIO(b''))"
     )
     assert opened_files(source) == []

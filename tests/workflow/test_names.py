@@ -17,7 +17,9 @@ TABLES = (
     "metrics_wide",
     "change",
     "asymmetry",
-    *("norm_curves", "centiles", "spectral_distance"),
+    "norm_curves",
+    "centiles",
+    "spectral_distance",
 )
 ODD = ("1e5", "NA", "None", "true", "1.0", "2024-01-01")
 COHORTS = {

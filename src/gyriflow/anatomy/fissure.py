@@ -575,13 +575,11 @@ def largest_pieces(
             triangles.corners(part)[component == 1].mean(axis=(0, 1))[None], to_file
         )[0]
         share = areas[component > 0].sum() / areas.sum()
+        where = ", ".join(str(round(x)) for x in place)
         found = (
             f"the {side} hemisphere is in {component.max() + 1} pieces,"
-            f" {100 * share:.1f} % of its area is outside "
-        )
-        found += (
-            f"the largest, around ({', '.join(str(round(x)) for x in place)}) mm in the"
-            " file's coordinates"
+            f" {100 * share:.1f} % of its area is outside the largest, around"
+            f" ({where}) mm in the file's coordinates"
         )
         if share > MAX_LEFT_OUT:
             raise InputError(

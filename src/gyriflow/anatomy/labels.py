@@ -446,10 +446,9 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
 
     def with_numbers(tissue: NDArray[np.bool], name: str) -> str:
         numbers = [str(number) for number in layout.labels[tissue]]
-        return (
-            f"{name}"
-            f" ({', '.join([*numbers[:4], *(['…'] if len(numbers) > 4 else [])])})"
-        )
+        if len(numbers) > 4:
+            numbers[4:] = ["…"]
+        return f"{name} ({', '.join(numbers)})"
 
     surface = layout.contact[np.ix_(cerebrum, outside)].sum(axis=1)
     cortex_share = float(surface[cortex[cerebrum]].sum() / max(surface.sum(), 1))

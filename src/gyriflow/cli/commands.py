@@ -135,11 +135,8 @@ class Commands(click.Group):
             sys.exit(error.exit_code)
         except click.UsageError as error:
             command = error.ctx.command_path if error.ctx else command_name()
-            click.echo(
-                f"gyriflow: {' '.join(error.format_message().split())} See `{command}"
-                " --help`.",
-                err=True,
-            )
+            message = " ".join(error.format_message().split())
+            click.echo(f"gyriflow: {message} See `{command} --help`.", err=True)
             sys.exit(error.exit_code)
 
 
@@ -651,10 +648,8 @@ def bids(
     work_to_do = (
         "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
     )
-    click.echo(
-        f"{len(brains)} scan{'s' if len(brains) > 1 else ''} to {work_to_do}:"
-        f" {', '.join(brains)}"
-    )
+    scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
+    click.echo(f"{scans} to {work_to_do}: {', '.join(brains)}")
     click.echo(f"configuration: {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     code = _run(

@@ -353,10 +353,10 @@ def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -
     )
     if mean > MAX_MISFIT_MM:
         text = (
-            "the shape at GW %g stays %.2f mm from the observed surface on average (95"
-            " %% below %.2f mm): the body "
+            "the shape at GW %g stays %.2f mm from the observed surface on average"
+            " (95 %% below %.2f mm): the body cannot reach all of it without inverted"
+            " elements or crossing folds"
         )
-        text += "cannot reach all of it without inverted elements or crossing folds"
         log.warning(text, week, mean, far)
 
 

@@ -43,8 +43,8 @@ def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
 def write_html(path: AnyPath, body: str) -> None:
     """Write a page with the given content, tables first of all."""
     head = (
-        '<!DOCTYPE html>\n<html lang="en">\n<meta'
-        f' charset="utf-8">\n<style>{TABLE_LOOK}</style>'
+        '<!DOCTYPE html>\n<html lang="en">\n<meta charset="utf-8">\n'
+        f"<style>{TABLE_LOOK}</style>"
     )
     write_text(path, f"{head}\n{body}\n</html>\n")
 

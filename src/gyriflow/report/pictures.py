@@ -221,8 +221,9 @@ def displacement_maps(frames: Mapping[str, Mapping[float, SurfaceMaps]]) -> Figu
         place = mesh.vertices[int(np.nanargmax(norms))]
         where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
         words = (
-            f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean"
-            f" {np.nanmean(norms):.2f} mm"
+            f"max {np.nanmax(norms):.2f} mm\n"
+            f"at {where}\n"
+            f"mean {np.nanmean(norms):.2f} mm"
         )
         return replace(_mapped((mesh, norms), scale), caption=words, mark=place)
 

@@ -32,9 +32,12 @@ _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+| %| \([+−][\d.]+\))?|–")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TABLE = Environment(autoescape=True).from_string(
-    "<table><thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor"
-    " %}</tr></thead>\n<tbody>{% for row in rows %}<tr>{% for kind, text in row %}<td"
-    ' class="{{ kind }}">{{ text }}</td>{% endfor %}</tr>\n{% endfor %}</tbody></table>'
+    "<table><thead><tr>"
+    "{% for head in heads %}<th>{{ head }}</th>{% endfor %}"
+    "</tr></thead>\n"
+    "<tbody>{% for row in rows %}<tr>"
+    '{% for kind, text in row %}<td class="{{ kind }}">{{ text }}</td>{% endfor %}'
+    "</tr>\n{% endfor %}</tbody></table>"
 )
 
 COMMON_PARAMETERS = (
@@ -55,7 +58,10 @@ COMMON_PARAMETERS = (
     "order",
     "elements_through_cortex",
     "element_error_percent",
-    *("steps", "newton", "seconds", "peak_memory_MiB"),
+    "steps",
+    "newton",
+    "seconds",
+    "peak_memory_MiB",
 )
 """Parameters and summaries that are listed even if all runs share them."""
 MESH_MEASURES = {

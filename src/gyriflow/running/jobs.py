@@ -17,10 +17,11 @@ from ..step import USAGE_COLUMNS
 NEXT = r"(?!\d{4}-\d\d-\d\d |warning: |gyriflow: )"
 """Lookahead: the line does not begin another message."""
 MESSAGE = re.compile(
-    r"^\d{4}-\d\d-\d\d \S+ (?P<level>WARNING|ERROR) (?P<logger>\S+):"
-    rf" (?P<logged>.*(?:\n{NEXT}.*)*)"
+    r"^\d{4}-\d\d-\d\d \S+ (?P<level>WARNING|ERROR) (?P<logger>\S+): "
+    rf"(?P<logged>.*(?:\n{NEXT}.*)*)"
     # a simulation is a program whose output is its log
-    r"|^(?:gyriflow: )?warning: (?P<warning>.+)|^gyriflow: (?P<error>.+(?:\n {2,}.+)*)",
+    r"|^(?:gyriflow: )?warning: (?P<warning>.+)"
+    r"|^gyriflow: (?P<error>.+(?:\n {2,}.+)*)",
     re.MULTILINE,
 )
 OWN_LOGGERS = ("", "root", "__main__")

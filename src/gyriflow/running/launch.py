@@ -73,7 +73,8 @@ VERBOSE_OPTIONS = (
     "cleanup_metadata",
     "list_changes",
     "list_input_changes",
-    *("list_params_changes", "generate_unit_tests"),
+    "list_params_changes",
+    "generate_unit_tests",
 )
 """Options that ask for Snakemake's own messages, or for something else than running
 steps."""

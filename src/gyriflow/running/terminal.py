@@ -52,7 +52,8 @@ FAILED_JOB_PREFIXES = (
     "Exiting because a job execution failed",
     "At least one job did not",
     "WorkflowError:\nAt least one job did not",
-    *("RuleException:", "CalledProcessError"),
+    "RuleException:",
+    "CalledProcessError",
 )
 """Beginnings of Snakemake's messages about a failed job. The job's own log has the
 cause."""

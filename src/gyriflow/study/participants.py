@@ -42,7 +42,11 @@ SESSIONS = (
     "session_number",
     "visit",
     "visit_id",
-    *("visit_number", "timepoint", "time_point", "tp", "wave"),
+    "visit_number",
+    "timepoint",
+    "time_point",
+    "tp",
+    "wave",
 )
 """Possible names of the column of sessions; the first one of a table counts."""
 SUBJECT_FOLDER = re.compile(r"sub-[^_/.]+")

@@ -448,7 +448,8 @@ class Study:
             **simulation.names,
             "start_week": simulation.start.week,
             "week": last.week,
-            **{"atlas_brain": atlas_brain.id, "atlas_week": atlas_brain.week},
+            "atlas_brain": atlas_brain.id,
+            "atlas_week": atlas_brain.week,
             # the population whose growth was used
             "population": atlas_brain.population,
             "atlas": (

@@ -197,7 +197,8 @@ def test_a_step_above_its_tolerance_gives_a_warning():
         (2, 23_910, 1, "global", 600),
         (2, 23_910, 2, "global", 955),
         (2, 23_910, 2, "none", 838),
-        *((2, 34_684, 1, "global", 784), (2, 34_684, 2, "global", 1141)),
+        (2, 34_684, 1, "global", 784),
+        (2, 34_684, 2, "global", 1141),
     ],
 )
 def test_predicted_memory_is_what_runs_have_taken(

@@ -282,8 +282,8 @@ def legacy(path, ball, order, kind="f4"):
     )
     name = {"f4": "float", "f8": "double"}[kind]
     head = (
-        "# vtk DataFile Version 1.0\nmesh\nBINARY\nDATASET POLYDATA\nPOINTS"
-        f" {len(ball.vertices)} {name}\n"
+        "# vtk DataFile Version 1.0\nmesh\nBINARY\nDATASET POLYDATA\n"
+        f"POINTS {len(ball.vertices)} {name}\n"
     )
     points = ball.vertices.astype(order + kind).tobytes()
     path.write_bytes(

@@ -208,8 +208,8 @@ def stand_in(tmp_path, monkeypatch):
             (tmp_path / folder / "__init__.py").touch()
         body = "\n".join(f"    {line}" for line in code)
         path.write_text(
-            "import os, signal, time\ndef tetrahedralize(*arrays,"
-            f" **settings):\n{body}\n"
+            "import os, signal, time\n"
+            f"def tetrahedralize(*arrays, **settings):\n{body}\n"
         )
         # the mesher's process is given this path
         monkeypatch.syspath_prepend(tmp_path)

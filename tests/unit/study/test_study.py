@@ -679,7 +679,9 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         "atlas_brain": "b24",
         "atlas_week": 24,
         # a series of one's own is no atlas with a licence
-        **{"population": "atlas", "atlas": None, "surfaces": [f"{at}/pial.surf.gii"]},
+        "population": "atlas",
+        "atlas": None,
+        "surfaces": [f"{at}/pial.surf.gii"],
         "atlas_surface": f"{at}/atlas.pial.surf.gii",
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
