@@ -215,15 +215,13 @@ def branching_phantom(
     share = np.linspace(0.0, 1.0, 200)
     height = np.arange(radius_mm - depth_mm, radius_mm, 0.1)
     ends = corners[arcs[:n_arcs]][:, :, None]
-    lines = (ends[:, 0] * (1.0 - share[:, None]) + ends[:, 1] * share[:, None]).reshape(
-        -1, 3
-    )
+    lines = ends[:, 0] * (1.0 - share[:, None]) + ends[:, 1] * share[:, None]
+    lines = lines.reshape(-1, 3)
     lines /= np.linalg.norm(lines, axis=1, keepdims=True)
     sheets = (height[:, None, None] * lines).reshape(-1, 3)
     reach = 3.0 * thickness_mm
-    to_sulci = cKDTree(sheets).query(points.reshape(-1, 3), distance_upper_bound=reach)[
-        0
-    ]
+    tree = cKDTree(sheets)
+    to_sulci, _ = tree.query(points.reshape(-1, 3), distance_upper_bound=reach)
     to_sulci = np.minimum(to_sulci, reach).reshape(points.shape[:3])
     below = radius_mm - np.linalg.norm(points, axis=-1)
     affine = np.diag([voxel_mm] * 3 + [1.0])

@@ -143,9 +143,8 @@ def difference(before: np.ndarray, after: np.ndarray) -> tuple[float, str]:
     an example."""
     if before.shape != after.shape:
         return np.inf, f"shapes {before.shape}, {after.shape}"
-    changed = (before != after) & (
-        (before == before) | (after == after)
-    )  # two NaN are equal
+    # two NaN are equal
+    changed = (before != after) & ((before == before) | (after == after))
     if not changed.any():
         return 0.0, ""
     try:

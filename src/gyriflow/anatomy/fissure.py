@@ -571,9 +571,8 @@ def largest_pieces(
         is_kept[faces[component == 0]] = True
         if not component.any():
             continue
-        place = transform_points(
-            triangles.corners(part)[component == 1].mean(axis=(0, 1))[None], to_file
-        )[0]
+        centre = triangles.corners(part)[component == 1].mean(axis=(0, 1))
+        place = transform_points(centre[None], to_file)[0]
         share = areas[component > 0].sum() / areas.sum()
         where = ", ".join(str(round(x)) for x in place)
         found = (

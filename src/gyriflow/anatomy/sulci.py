@@ -145,9 +145,8 @@ def _around_brain(
         )
         for side in ndimage.find_objects((field > LEVEL).astype(np.uint8))[0]
     ]
-    return tuple(slice(every * side.start, every * side.stop) for side in large), tuple(
-        large
-    )
+    fine = [slice(every * side.start, every * side.stop) for side in large]
+    return tuple(fine), tuple(large)
 
 
 def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:

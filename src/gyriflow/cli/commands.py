@@ -58,9 +58,8 @@ class InputPath(click.Path):
         except click.BadParameter as error:
             if Path(value).exists():
                 raise
-            from ..settings.base import (
-                hint_for_missing,
-            )  # settings take a while to import
+            # settings take a while to import
+            from ..settings.base import hint_for_missing
 
             message = f"{error.message}{hint_for_missing(Path(value))}"
             raise click.BadParameter(message, ctx=ctx, param=param) from None

@@ -282,9 +282,9 @@ def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
         "tissue label volumes (.nii.gz), or surfaces with left and right or pial in"
         " their names"
     )
-    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]] + [
-        "\n  …"
-    ] * (len(reasons) > 10)
+    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]]
+    if len(reasons) > 10:
+        names.append("\n  …")
     found = f"{len(reasons)} files{''.join(names)}\n"
     return InputError(
         "no brain was recognised", path=folder, found=found, expected=expected

@@ -262,9 +262,8 @@ class SelfContact:
         areas[near.part.vertices[owned]] = (
             np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2
         )
-        pressure = np.linalg.norm(
-            self.domain.sum_over_ranks(forces), axis=1
-        ) / self.domain.sum_over_ranks(areas)
+        norms = np.linalg.norm(self.domain.sum_over_ranks(forces), axis=1)
+        pressure = norms / self.domain.sum_over_ranks(areas)
         values = np.zeros(len(self.domain.positions))
         values[self.surface.nodes] = pressure[: len(self.surface.nodes)]
         return values

@@ -139,9 +139,8 @@ class Springs:
         areas and lengths of springs."""
         weights = MODULUS_PA / (lengths_mm * M_PER_MM) * areas_mm2 * M_PER_MM**2
         self._weights = weights[self._rows, None]
-        self._gaps = (self._domain.positions[self._vertices] - goals_mm * M_PER_MM)[
-            self._rows
-        ]
+        gaps = self._domain.positions[self._vertices] - goals_mm * M_PER_MM
+        self._gaps = gaps[self._rows]
 
     def energy(self, u: Floats) -> float:
         local = 0.5 * float((self._weights * (u[self._local] + self._gaps) ** 2).sum())
@@ -236,9 +235,8 @@ class ElasticFit:
         boundary = self.boundary
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
-        ratio = signed_volume(
-            TriangleMesh(goal[self._used], boundary.faces)
-        ) / signed_volume(boundary)
+        goal_surface = TriangleMesh(goal[self._used], boundary.faces)
+        ratio = signed_volume(goal_surface) / signed_volume(boundary)
         logs = log_stretch(self._gradients(goal), limit=MAX_LOG_STRETCH)
         # of the whole, and of nine elements in ten
         mean_strain = (
@@ -391,9 +389,8 @@ class ElasticFit:
         before it."""
         untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
         # a change that flattens elements is the last resort
-        needs_stop = len(faults) > 0 or self._flat_count(untangled) > self._flat_count(
-            after
-        )
+        n_flat = self._flat_count(after)
+        needs_stop = len(faults) > 0 or self._flat_count(untangled) > n_flat
         i = self._halfway(before, after, passed) if needs_stop and halvings else None
         if i is not None:
             # each shape is fitted to the one before, as on the path
@@ -467,9 +464,10 @@ class ElasticFit:
         return float(np.quantile(np.linalg.norm(moves[self._used], axis=1), 0.99))
 
     def _gradients(self, goal: Floats) -> Floats:
-        return deformation_gradients(
+        gradients = deformation_gradients(
             self.positions_mm, goal, self._pieces, SLOPES[None]
-        )[:, 0]
+        )
+        return gradients[:, 0]
 
     def _straighten(self) -> None:
         """Straighten the edges of curved elements that fold over; SolverError where

@@ -138,9 +138,8 @@ def merged_shapes(
             early, first = means[max(number - 1, 0)]
             late, last = means[min(number + 1, len(groups) - 1)]
             week, mean = means[number]
-            merged[group] = mean + ((weeks[group] - week) / (late - early))[
-                :, None, None
-            ] * (last - first)
+            fractions = (weeks[group] - week) / (late - early)
+            merged[group] = mean + fractions[:, None, None] * (last - first)
             before, after = np.searchsorted(observed, [group[0], group[-1]]) + [-1, 1]
             end = observed[after] if after < len(observed) else group[-1] + 1
             around = slice(observed[max(before, 0)], end)

@@ -180,11 +180,8 @@ def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floa
     matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
     if matched:
         return np.asarray(follow_surfaces(mesh, matched)[-1])
-    return np.asarray(
-        carry_over_weeks(
-            mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)]
-        )[-1]
-    )
+    deformations = [pair for pair in between if isinstance(pair, Deformation)]
+    return np.asarray(carry_over_weeks(mesh.vertices, deformations)[-1])
 
 
 def carry_regions(

@@ -78,10 +78,9 @@ def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
                 volumes_ml = (
                     brains.groupby("week")[f"{tissue}_ml"].mean().to_numpy(dtype=float)
                 )
-                rates[f"{tissue}_ratio"] = volumes_ml[1:] / volumes_ml[:-1]
-                rates[f"{tissue}_compound_rate_per_s"] = np.log(
-                    rates[f"{tissue}_ratio"]
-                ) / (3 * seconds)
+                ratio = volumes_ml[1:] / volumes_ml[:-1]
+                rates[f"{tissue}_ratio"] = ratio
+                rates[f"{tissue}_compound_rate_per_s"] = np.log(ratio) / (3 * seconds)
         tables.append(rates)
     return (
         pd.concat(tables, ignore_index=True)

@@ -367,9 +367,8 @@ def _nifti_affine(
     if len(present) == 2:
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
         difference = matrices["sform"] - matrices["qform"]
-        ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]])).reshape(
-            3, -1
-        )
+        ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]]))
+        ends = ends.reshape(3, -1)
         distance = float(
             np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max()
         )

@@ -307,9 +307,8 @@ def _fit(
     values = np.linalg.eigvalsh(matrices)
     fitted = values[:, 0] > 1e-9 * np.abs(values[:, -1])
     coefficients = np.zeros((len(centres), 6))
-    coefficients[fitted] = np.linalg.solve(matrices[fitted], right[fitted, :, None])[
-        ..., 0
-    ]
+    solved = np.linalg.solve(matrices[fitted], right[fitted, :, None])
+    coefficients[fitted] = solved[..., 0]
     # back from units of the radius
     coefficients *= radii_mm[centres, None] ** np.array([-1, -1, -1, 0, 0, 1])
     return coefficients, fitted

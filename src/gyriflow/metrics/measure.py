@@ -103,12 +103,11 @@ def hemisphere_spectra(
     basis = spectral_basis(mesh, spangy_modes, mass)
     # values near a cut are not reliable and are replaced by a harmonic continuation
     reliable = np.flatnonzero(curvature_maps.reliable)
-    values = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])[
-        reliable
-    ]
-    maps = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(
-        values
-    ).T
+    values = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])
+    continued = harmonic_continuation(
+        mesh.vertices, mesh.faces, reliable, tolerance=1e-12
+    )
+    maps = continued(values[reliable]).T
     radius = float(curvature_maps.radius_mm.mean())
     return {
         proxy: spectrum(proxy_map, basis, radius_mm=radius)

@@ -332,9 +332,8 @@ def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Float
     Vectors of length 1 or more give lines as long as a cube.
     """
     normals = vertex_normals(mesh)
-    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[
-        1
-    ]
+    cubes = np.floor(mesh.vertices / LINES_MM)
+    _, vertices = np.unique(cubes, axis=0, return_index=True)
     vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
     half = (
         directions[vertices]

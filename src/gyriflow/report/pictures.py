@@ -255,9 +255,8 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
         return colour_scale(record.colours, *record.limits)
     finite = values[np.isfinite(values)]
     # below zero by more than rounding
-    signed = record.is_signed or finite.min(initial=0.0) < -ROUNDING * np.abs(
-        finite
-    ).max(initial=0.0)
+    rounding = ROUNDING * np.abs(finite).max(initial=0.0)
+    signed = record.is_signed or finite.min(initial=0.0) < -rounding
     sizes = np.abs(finite) if signed else finite
     high = float(np.quantile(sizes, record.quantile)) if len(sizes) else 1.0
     end = round_up(high) if high > 0 else 1.0

@@ -2,6 +2,7 @@
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -57,9 +58,7 @@ def surfaces_view(
         for name, frames in runs.items()
     }
     observed_frames = [_timed(*frame) for frame in observed]
-    everything = [
-        frame for frames in simulated.values() for frame in frames
-    ] + observed_frames
+    everything = [*chain.from_iterable(simulated.values()), *observed_frames]
     if not everything:
         return {"groups": [], "maps": []}
     bytes_per_vertex = (
@@ -117,9 +116,8 @@ def surfaces_view(
     maps = []
     for name, scale in scales.items():
         bottom, top = scale.get_clim()
-        colours = scale.to_rgba(
-            np.linspace(bottom, top, _VALUE_LEVELS + 1), bytes=True
-        )[:, :3]
+        levels = np.linspace(bottom, top, _VALUE_LEVELS + 1)
+        colours = scale.to_rgba(levels, bytes=True)[:, :3]
         maps.append(
             {
                 "name": name,

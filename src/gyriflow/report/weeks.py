@@ -347,9 +347,8 @@ def regions_chart(
     colours = region_colours(rows["region"])
     lines = dict(zip(run_colours(rows["run"]), LINES, strict=False))
     # both sides together
-    rows = rows.groupby(["panel", "subject", "run", "week", "region"], sort=False)[
-        "value"
-    ].agg(["sum", "mean"])
+    keys = ["panel", "subject", "run", "week", "region"]
+    rows = rows.groupby(keys, sort=False)["value"].agg(["sum", "mean"])
     rows = rows.reset_index().assign(
         value=lambda both: both["sum"].where(both["panel"] == "area", both["mean"])
     )
@@ -547,9 +546,8 @@ def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.Da
     trusted = (
         spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
     )
-    return spectra.assign(trusted=trusted)[
-        spectra["band"].isin(bands) & (spectra["proxy"] == proxy)
-    ]
+    is_shown = spectra["band"].isin(bands) & (spectra["proxy"] == proxy)
+    return spectra.assign(trusted=trusted)[is_shown]
 
 
 def _beyond_the_modes(

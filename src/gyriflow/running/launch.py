@@ -216,9 +216,8 @@ def refused_brains() -> dict[str, str]:
 def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
     """Return the causes of the brains that had a failed step since a time (s since the
     epoch), by id."""
-    from .jobs import (
-        gather_messages,
-    )  # takes a second to import, and only failed runs need it
+    # takes a second to import, and only failed runs need it
+    from .jobs import gather_messages
 
     brains = [folder.name for folder in directory.glob("results/brains/*")]
     messages = gather_messages(directory, brains, [], since_s=since_s)
@@ -414,9 +413,8 @@ def main(arguments: Sequence[str]) -> int:
     own."""
     # the program name in Snakemake's usage messages
     sys.argv[0] = "snakemake"
-    from snakemake import (
-        cli,
-    )  # takes a second to import; the Snakefile imports this module without needing it
+    # takes a second to import; the Snakefile imports this module without needing it
+    from snakemake import cli
 
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)

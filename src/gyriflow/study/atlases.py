@@ -85,9 +85,8 @@ class UsedAtlas:
                 path = series.files[key].format(
                     week=int(week) if week == int(week) else week
                 )
-                copies = self._in_folder[series.files[key]].get(week) or self._shipped(
-                    path
-                )
+                in_folder = self._in_folder[series.files[key]].get(week)
+                copies = in_folder or self._shipped(path)
                 # unpublished files have no address
                 url = f"{root}/{path}" if root and week in series.weeks else None
                 record = series.weeks.get(week, {}).get(key, AtlasFileRecord())

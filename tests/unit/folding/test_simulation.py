@@ -148,9 +148,8 @@ def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
         == resolution_warning(rows(0.796), 2)
         == ""
     )
-    assert resolution_warning(rows(np.nan), 1) == Facts(
-        2
-    )  # no element lies in the cortex at all
+    # no element lies in the cortex at all
+    assert resolution_warning(rows(np.nan), 1) == Facts(2)
 
 
 @pytest.mark.parametrize(

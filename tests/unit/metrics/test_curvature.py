@@ -200,9 +200,8 @@ def expected() -> dict[str, float]:
     """Return the measures of the torus: c = R/r; the outer half of a torus has ∫K dA =
     4π, as a sphere."""
     c = LARGE / SMALL
-    ring = np.cos(ANGLES) / (
-        c + np.cos(ANGLES)
-    )  # r times the smaller principal curvature
+    # r times the smaller principal curvature
+    ring = np.cos(ANGLES) / (c + np.cos(ANGLES))
     weight = c + np.cos(ANGLES)
     return {
         "intrinsic_curvature_index": 1.0,
