@@ -102,10 +102,8 @@ def drawn(
     """Return the weeks, the values and the subjects' numbers of the scans of a
     cohort."""
     weeks = np.concatenate([case.weeks(random, subjects) for _ in range(case.scans)])
-    own, scan = (
-        random.standard_normal((2, subjects)),
-        random.standard_normal(len(weeks)),
-    )
+    own = random.standard_normal((2, subjects))
+    scan = random.standard_normal(len(weeks))
     z = (
         np.sqrt(0.8) * np.tile(own[0], case.scans) + np.sqrt(0.2) * scan
         if case.scans > 1
@@ -131,10 +129,8 @@ def new_subjects(
     With `beyond`, they are so many weeks before the first and after the last week of
     the norm.
     """
-    random, found = (
-        np.random.default_rng((seed, subjects)),
-        {name: [] for name in PLACES},
-    )
+    random = np.random.default_rng((seed, subjects))
+    found = {name: [] for name in PLACES}
     for _ in range(cohorts):
         weeks, values, numbers = drawn(case, subjects, random)
         norm = fit_norm(weeks, values, numbers, is_positive=case.is_positive)

@@ -197,11 +197,9 @@ def carry_surface(frames: Path, week: float) -> CarriedSurface:
     """Return the measured surface as a run moved it until a week, with its metrics."""
     start = TetrahedralMesh(read_positions(frames, START_WEEK), read_tets(frames))
     boundary, nodes = boundary_surface(start)
-    before, after, faces = (
-        boundary.vertices,
-        read_positions(frames, week)[nodes],
-        boundary.faces.astype(np.int64),
-    )
+    before = boundary.vertices
+    after = read_positions(frames, week)[nodes]
+    faces = boundary.faces.astype(np.int64)
     if start.order == 2:
         matrix, faces = finer_surface(faces)
         before, after = matrix @ before, matrix @ after

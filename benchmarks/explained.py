@@ -172,10 +172,8 @@ def companion_rows(
     body, pieces = ElasticFit(start.mesh), linear_pieces(start.mesh)
     carried = carry_alone(start, arguments.observed)
     for week in arguments.weeks or start.weeks:
-        observed, target = (
-            start.pial(arguments.observed.format(week=week)),
-            start.targets[week],
-        )
+        observed = start.pial(arguments.observed.format(week=week))
+        target = start.targets[week]
         models = {
             f"smooth {length:g} mm": move_smoothly(boundary, target, length)
             for length in arguments.smoothing

@@ -109,10 +109,8 @@ def deformed(
     """Return the labels of an individual KIND-SIZE-SEED with a share of its individual
     difference at the start."""
     kind, size, seed = name.split("-")
-    (centre, lengths, _), (_, start_lengths, cerebrum) = (
-        cerebrum_of(volume, scheme),
-        cerebrum_of(start, scheme),
-    )
+    (centre, lengths, _) = cerebrum_of(volume, scheme)
+    (_, start_lengths, cerebrum) = cerebrum_of(start, scheme)
     parts = []
     for part, number in ((share, int(seed)), (np.sqrt(1 - share**2), int(seed) + 1000)):
         rms = np.sqrt((velocity(kind, number, cerebrum[::20]) ** 2).sum(axis=1).mean())
@@ -265,15 +263,11 @@ def run_study(
 ) -> None:
     """Deform an atlas' labels into individuals, and run the workflow for the files that
     are compared."""
-    weeks, series = (
-        sorted(arguments.weeks),
-        read_keys(ATLASES / atlas / "atlas.yaml")["series"]["normative"],
-    )
-    start, scheme, growing = (
-        weeks[0],
-        series["scheme"],
-        list(range(weeks[0], weeks[-1] + 1)),
-    )
+    weeks = sorted(arguments.weeks)
+    series = read_keys(ATLASES / atlas / "atlas.yaml")["series"]["normative"]
+    start = weeks[0]
+    scheme = series["scheme"]
+    growing = list(range(weeks[0], weeks[-1] + 1))
     folder.mkdir(parents=True, exist_ok=True)
     paths = {
         week: files / series["files"]["labels"].format(week=week) for week in weeks

@@ -46,11 +46,9 @@ Turn = tuple[float, float, float]
 # a ball with sulci around it, at x = ±X + A sin(y/L), all in mm
 RADIUS_MM, DEPTH_MM, THICKNESS_MM = 20.0, 6.0, 2.0
 PLACES_MM, WAVE_MM, LENGTH_MM = (-6.0, 6.0), 1.5, 4.0
-WIDTHS_MM, VOXELS_MM, TURNS_DEG = (
-    (0.0, 0.2, 0.5, 1.0),
-    (0.5, 0.8, 1.0),
-    ((0, 0, 0), (20, 30, 10), (45, 35, 0)),
-)
+WIDTHS_MM = (0.0, 0.2, 0.5, 1.0)
+VOXELS_MM = (0.5, 0.8, 1.0)
+TURNS_DEG = ((0, 0, 0), (20, 30, 10), (45, 35, 0))
 # cells of a voxel along each axis; the label is that of most cells
 CELLS = 3
 EDGE_MM = 1.0
@@ -214,20 +212,16 @@ def branching_phantom(
     turn = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1) @ turn
     corners, arcs = network()
-    share, height = (
-        np.linspace(0.0, 1.0, 200),
-        np.arange(radius_mm - depth_mm, radius_mm, 0.1),
-    )
+    share = np.linspace(0.0, 1.0, 200)
+    height = np.arange(radius_mm - depth_mm, radius_mm, 0.1)
     ends = corners[arcs[:n_arcs]][:, :, None]
-    lines = (ends[:, 0] * (1.0 - share[:, None]) + ends[:, 1] * share[:, None]).reshape(
-        -1, 3
-    )
+    lines = ends[:, 0] * (1.0 - share[:, None]) + ends[:, 1] * share[:, None]
+    lines = lines.reshape(-1, 3)
     lines /= np.linalg.norm(lines, axis=1, keepdims=True)
     sheets = (height[:, None, None] * lines).reshape(-1, 3)
     reach = 3.0 * thickness_mm
-    to_sulci = cKDTree(sheets).query(points.reshape(-1, 3), distance_upper_bound=reach)[
-        0
-    ]
+    tree = cKDTree(sheets)
+    to_sulci, _ = tree.query(points.reshape(-1, 3), distance_upper_bound=reach)
     to_sulci = np.minimum(to_sulci, reach).reshape(points.shape[:3])
     below = radius_mm - np.linalg.norm(points, axis=-1)
     affine = np.diag([voxel_mm] * 3 + [1.0])
@@ -280,10 +274,8 @@ def try_branching(
 def try_surface(pial_file: Path) -> dict[str, Any]:
     """Return area errors of a hemisphere's surfaces with fused and opened sulci, from
     labels between its surfaces."""
-    pial, white = (
-        read_surface(pial_file),
-        read_surface(Path(str(pial_file).replace(".pial.", ".white."))),
-    )
+    pial = read_surface(pial_file)
+    white = read_surface(Path(str(pial_file).replace(".pial.", ".white.")))
     # both may have been moved, and have the same vertices
     shift = np.average(
         pial.vertices - white.vertices, axis=0, weights=vertex_areas(white)

@@ -118,19 +118,15 @@ def main() -> None:
             summary,
             key=lambda summary: summary["cpu_seconds"],
         )
-    rows, reference = (
-        [],
-        read_positions(arguments.out / next(iter(runs)) / "frames.h5", end),
-    )
+    rows = []
+    reference = read_positions(arguments.out / next(iter(runs)) / "frames.h5", end)
     for name, summary in fastest.items():
         start, last = (
             read_positions(arguments.out / name / "frames.h5", at)
             for at in (values["start_week"], end)
         )
-        gaps, moved = (
-            np.linalg.norm(last - reference, axis=1),
-            np.linalg.norm(last - start, axis=1),
-        )
+        gaps = np.linalg.norm(last - reference, axis=1)
+        moved = np.linalg.norm(last - start, axis=1)
         row = {"run": name} | {key: summary[key] for key in REPORTED}
         row |= {
             "rms_mm": np.sqrt((gaps**2).mean()),

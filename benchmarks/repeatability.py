@@ -104,8 +104,8 @@ def main() -> None:
         .sum()
     )
     print(
-        "| metric | coefficient of variation | standard deviation |\n| --- | ---: |"
-        " ---: |"
+        "| metric | coefficient of variation | standard deviation |\n"
+        "| --- | ---: | ---: |"
     )
     for name, row in record["metrics"].items():
         print(f"| `{name}` | {100 * row['cv']:.2f} % | {row['sd']:.3g} |")
@@ -121,10 +121,8 @@ def measure_turned(
     arguments: argparse.Namespace, number: int
 ) -> tuple[TriangleMesh, BrainMetrics]:
     """Return the surface and the metrics of the brain, turned for the nth time."""
-    volume, scheme = (
-        read_label_volume(arguments.labels, cropped=True),
-        SCHEMES[arguments.scheme],
-    )
+    volume = read_label_volume(arguments.labels, cropped=True)
+    scheme = SCHEMES[arguments.scheme]
     labels, affine = turned(volume.labels, volume.affine, number)
     surface = from_labels(labels, affine, scheme, week=arguments.week)
     pose, fissure = pose_from(surface.report["pose"]), surface.report["fissure_x_mm"]
@@ -132,7 +130,9 @@ def measure_turned(
         labels, affine, scheme, surface.whole, pose, fissure
     )
     found = measure_brain(
-        *(surface.whole, surface.left, surface.right),
+        surface.whole,
+        surface.left,
+        surface.right,
         thickness_mm=thickness.measured_mm,
         label_volumes_ml=surface.report.get("label_volumes_mL", {}),
         spangy_modes=arguments.last,

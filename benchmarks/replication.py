@@ -63,12 +63,10 @@ GROWTH_WEEKS, MIN_RATE_PER_S = (21, 29), 1e-7
 MODES = {"right": 1970, "left": 1833}
 """The paper's numbers of modes, the largest Weyl number of all surfaces (section
 4.1.3)."""
-AGREES, IN_PART, DIFFERS, NOT_TESTABLE = (
-    "as in the paper",
-    "in part",
-    "not as in the paper",
-    "not testable",
-)
+AGREES = "as in the paper"
+IN_PART = "in part"
+DIFFERS = "not as in the paper"
+NOT_TESTABLE = "not testable"
 
 
 @dataclass(frozen=True)
@@ -109,10 +107,8 @@ def displacement_rows(folder: Path, brain: str) -> list[Row]:
         for week, number in zip(published["from_weeks"], paper[column], strict=True):
             if ("all", week) not in by_nodes.index:
                 continue
-            every, pial = (
-                by_nodes.loc[("all", week), column],
-                by_nodes.loc[("pial", week), column],
-            )
+            every = by_nodes.loc[("all", week), column]
+            pial = by_nodes.loc[("pial", week), column]
             result = f"{name} displacement, {week}-{week + 1} GW (mm)"
             here = f"all nodes {every:.2f} (surface {pial:.2f})"
             rows.append(Row(result, f"{number:.2f}", here, agreement(every, number)))
@@ -274,10 +270,8 @@ def share_rows(shares: pd.DataFrame, mirror_mm: float | None) -> list[Row]:
     }
     has_both = {"left", "right"} <= set(shares.index.get_level_values("hemisphere"))
     if has_both and mirror_mm is not None and mirror_mm > MAX_MIRROR_MM:
-        right, left = (
-            shares.xs("right", level="hemisphere"),
-            shares.xs("left", level="hemisphere"),
-        )
+        right = shares.xs("right", level="hemisphere")
+        left = shares.xs("left", level="hemisphere")
         fine = pd.concat([left["B5"] - right["B5"], left["B6"] - right["B6"]])
         margins["B4 is higher on the right, in real and simulated brains"] = (
             right["B4"] - left["B4"] - SHARE_TOL

@@ -41,23 +41,19 @@ COMMANDS = {
 }
 """The command for each configuration in `benchmarks/regression`."""
 IGNORED = {
-    *(
-        "seconds",
-        "cpu_seconds",
-        "seconds_per_step",
-        "cpu_s",
-        "peak_memory_MiB",
-        "commit",
-        "gyriflow",
-    ),
-    *(
-        "logs",
-        "benchmarks",
-        "report",
-        "provenance.json",
-        "resources.csv",
-        "inputs.json",
-    ),
+    "seconds",
+    "cpu_seconds",
+    "seconds_per_step",
+    "cpu_s",
+    "peak_memory_MiB",
+    "commit",
+    "gyriflow",
+    "logs",
+    "benchmarks",
+    "report",
+    "provenance.json",
+    "resources.csv",
+    "inputs.json",
 }
 """Columns, keys, files and folders that differ between two runs of the same code."""
 FOLDERS_OF_PATH = re.compile(r"/\S*/")
@@ -147,9 +143,8 @@ def difference(before: np.ndarray, after: np.ndarray) -> tuple[float, str]:
     an example."""
     if before.shape != after.shape:
         return np.inf, f"shapes {before.shape}, {after.shape}"
-    changed = (before != after) & (
-        (before == before) | (after == after)
-    )  # two NaN are equal
+    # two NaN are equal
+    changed = (before != after) & ((before == before) | (after == after))
     if not changed.any():
         return 0.0, ""
     try:
@@ -195,13 +190,11 @@ def compare(
     earlier, later = {new_name(name): name for name in files(before)}, set(files(after))
     lines, largest, place = [], 0.0, ""
     for file in sorted({*earlier} & later):
-        old, new = (
-            {
-                new_name(name): array
-                for name, array in read(before / earlier[file]).items()
-            },
-            read(after / file),
-        )
+        old = {
+            new_name(name): array
+            for name, array in read(before / earlier[file]).items()
+        }
+        new = read(after / file)
         lines += [
             f"{file}: {name}: only {'before' if name in old else 'after'}"
             for name in sorted({*old} ^ {*new})

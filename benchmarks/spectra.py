@@ -112,8 +112,9 @@ def compare_copies(path: Path, per_wavelength: list[float], last: str) -> None:
         )
 
     print(
-        f"\n{path}\n\n| edges per wave | vertices | CPU s | modes | H, % | same | shape"
-        " index, % | same |"
+        f"\n{path}\n\n"
+        "| edges per wave | vertices | CPU s | modes |"
+        " H, % | same | shape index, % | same |"
     )
     print("| --- | ---: | ---: | --- | --- | ---: | --- | ---: |")
     row("as it is")
@@ -125,8 +126,8 @@ def compare_copies(path: Path, per_wavelength: list[float], last: str) -> None:
 def print_waves() -> None:
     """Print the tables of waves of known length."""
     print(
-        "| folds | rms, mm | proxy | B2 | B3 | B4 |\n| --- | --- | --- | --- | --- |"
-        " --- |"
+        "| folds | rms, mm | proxy | B2 | B3 | B4 |\n"
+        "| --- | --- | --- | --- | --- | --- |"
     )
     for kind in ("isotropic", "parallel"):
         for rms_mm in (0.4, 1.0):
@@ -140,8 +141,8 @@ def print_waves() -> None:
                 )
                 print(f"| {kind} | {rms_mm:g} | {proxy} | {shares} |", flush=True)
     print(
-        "\n| wavelength / radius | edges / radius | kept | closed form |\n| --- | --- |"
-        " --- | --- |"
+        "\n| wavelength / radius | edges / radius | kept | closed form |\n"
+        "| --- | --- | --- | --- |"
     )
     for wavelength in (2.0, 3.0, 4.0, 6.0):
         for edges_per_radius in (2.0, 3.0, 4.0):

@@ -197,13 +197,9 @@ def theory() -> dict:
 
     def log_height(steps: int) -> float:
         waves = np.array([2 * np.pi / 7.07])
-        return float(
-            np.log(
-                amplifications(Slab(CONTRASTS[0]), waves, TWO_WEEKS / steps, steps)[
-                    -1, 0
-                ]
-            )
-        )
+        slab = Slab(CONTRASTS[0])
+        heights = amplifications(slab, waves, TWO_WEEKS / steps, steps)
+        return float(np.log(heights[-1, 0]))
 
     exact = 2 * log_height(448) - log_height(224)
     found["steps"] = {

@@ -32,8 +32,6 @@ def pattern(fact: object) -> str:
     ends = r"(?!\w)(?!\.\w)(?!\[)" if re.search(r"\w$", text) else ""
     if isinstance(fact, int | float) and not isinstance(fact, bool):
         # a minus is of the number; 21-24 is a range
-        starts, ends = (
-            rf"{starts}(?<!\W-)",
-            ("0*" if "." in text else r"(?:\.0+)?") + ends,
-        )
+        starts = rf"{starts}(?<!\W-)"
+        ends = ("0*" if "." in text else r"(?:\.0+)?") + ends
     return starts + re.escape(text) + ends

@@ -148,11 +148,9 @@ def _cerebrum(points: list[Floats], shape: Shape, seed: int) -> tuple[Mask, Floa
     x, y, z = points
     half = (shape.half_length * PROPORTIONS).astype(np.float32)
     # wider on the right in front and on the left behind (the torque of real brains)
-    p, q, r = (
-        x / (half[0] * (1 + 0.02 * np.tanh(x / 5) * y / half[1])),
-        y / half[1],
-        z / half[2],
-    )
+    p = x / (half[0] * (1 + 0.02 * np.tanh(x / 5) * y / half[1]))
+    q = y / half[1]
+    r = z / half[2]
     rho = np.sqrt(p**2 + q**2 + r**2) + np.float32(1e-6)
     u, v, w = p / rho, q / rho, r / rho
     # temporal lobes, narrower frontal lobes, a flat base that is higher under the

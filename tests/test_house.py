@@ -79,25 +79,21 @@ RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.
 OPENING_ROOMS = {"code_hash", "io", "folding", "running", "cli", "step"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
-    *(
-        "open",
-        "read_text",
-        "read_bytes",
-        "write_text",
-        "write_bytes",
-        "tofile",
-        "to_filename",
-        "savefig",
-    ),
-    *(
-        "to_csv",
-        "to_json",
-        "to_hdf",
-        "to_parquet",
-        "to_pickle",
-        "load_new_mesh",
-        "save_current_mesh",
-    ),
+    "open",
+    "read_text",
+    "read_bytes",
+    "write_text",
+    "write_bytes",
+    "tofile",
+    "to_filename",
+    "savefig",
+    "to_csv",
+    "to_json",
+    "to_hdf",
+    "to_parquet",
+    "to_pickle",
+    "load_new_mesh",
+    "save_current_mesh",
 }
 OPENING_FUNCTIONS = {
     "numpy": {
@@ -409,7 +405,7 @@ def test_opened_files_are_seen(tmp_path, code):
 def test_buffers_in_memory_are_no_files(tmp_path):
     source = tmp_path / "a.py"
     source.write_text(
-        "import io\nimport numpy as np\nsent = io.BytesIO()\nnp.savez(sent,"
-        " a=1)\nnp.load(io.BytesIO(b''))"
+        "import io\nimport numpy as np\n"
+        "sent = io.BytesIO()\nnp.savez(sent, a=1)\nnp.load(io.BytesIO(b''))"
     )
     assert opened_files(source) == []

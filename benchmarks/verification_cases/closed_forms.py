@@ -49,11 +49,9 @@ def thin_film(slab: Slab) -> ThinFilm:
     """
     s = slab.steepness
     # ∫w², ∫w·d and ∫w·d² of w = 1/(1 + exp(s (d − 1))) over the depth d
-    area, first, second = (
-        1 - 1 / s,
-        (1 + np.pi**2 / (3 * s**2)) / 2,
-        (1 + np.pi**2 / s**2) / 3,
-    )
+    area = 1 - 1 / s
+    first = (1 + np.pi**2 / (3 * s**2)) / 2
+    second = (1 + np.pi**2 / s**2) / 3
     inertia = second - first**2
     k = (4 * slab.contrast * inertia) ** (-1 / 3)
     rate = (1 + slab.poisson_ratio) * area / (3 * inertia * k**2)

@@ -98,11 +98,9 @@ def slopes_of_remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Flo
     )
     v = np.ascontiguousarray(u[:, [2, 0, 1]]) / 2
     v[x[:, 2] < -0.499 * SIDE_MM] = 0.0
-    energy, residual, owned = (
-        problem.energy(u),
-        problem.residual(u),
-        v[: domain.n_owned].ravel(),
-    )
+    energy = problem.energy(u)
+    residual = problem.residual(u)
+    owned = v[: domain.n_owned].ravel()
     tangent = problem.tangent(residual).matrix
     direction, change = tangent.createVecs()
     direction.array[:] = owned

@@ -152,10 +152,8 @@ def solved(
     problem = NonlinearProblem(domain, zones, NeoHookean(POISSON_RATIO))
 
     side = SIDE_MM * 1e-3
-    nodes, to_points = (
-        domain.local(domain.positions) / side,
-        problem.points.interpolation.T,
-    )
+    nodes = domain.local(domain.positions) / side
+    to_points = problem.points.interpolation.T
     points = np.matmul(problem.points.interpolation, nodes[domain.cells])
     mu, dg, dr = (
         np.broadcast_to(values, len(nodes))

@@ -180,10 +180,8 @@ def elastic_parts(after: NDArray, fields: Fields) -> tuple[NDArray, NDArray]:
 
 def stress(slab: Slab, after: NDArray, fields: Fields) -> NDArray:
     """Return ∂/∂A of the energy ψ(Fe)·det G/det V per volume of the flat slab."""
-    mu, ratio = (
-        fields.mu,
-        2 * (1 + slab.poisson_ratio) / (3 * (1 - 2 * slab.poisson_ratio)),
-    )
+    mu = fields.mu
+    ratio = 2 * (1 + slab.poisson_ratio) / (3 * (1 - 2 * slab.poisson_ratio))
     before, Fe = elastic_parts(after, fields)
     J = np.linalg.det(Fe)[..., None, None]
     cofactor = np.swapaxes(np.linalg.inv(Fe), -1, -2)
@@ -300,11 +298,9 @@ def critical_growth(
     With stress kept, the tangent of a step without growth is then no longer positive
     definite.
     """
-    waves, found, grown = (
-        at_start(slab, wavenumber),
-        np.full(len(wavenumber), np.nan),
-        0.0,
-    )
+    waves = at_start(slab, wavenumber)
+    found = np.full(len(wavenumber), np.nan)
+    grown = 0.0
     while np.isnan(found).any() and grown <= max_growth:
         _, tangents = flat_step(slab, fields_of(slab, waves, 0.0))
         for index in np.flatnonzero(np.isnan(found)):

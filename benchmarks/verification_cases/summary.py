@@ -64,10 +64,8 @@ def rates_of(contrast: float, found: dict) -> dict:
 def memory_of(found: dict) -> dict:
     """Summarise the largest amplification: expected, on each mesh, and the errors of
     its logarithm."""
-    expected, simulated = (
-        np.array(found["expected"])[-1],
-        np.array(found["measured"])[:, -1],
-    )
+    expected = np.array(found["expected"])[-1]
+    simulated = np.array(found["measured"])[:, -1]
     wave = int(expected.argmax())
     errors = np.log(simulated[:, wave]) / np.log(expected[wave]) - 1
     return {

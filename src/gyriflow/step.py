@@ -77,10 +77,8 @@ def usage() -> Usage:
         return Usage(wall_s, time.process_time(), memory / 2**20)
     import resource
 
-    own, children = (
-        resource.getrusage(resource.RUSAGE_SELF),
-        resource.getrusage(resource.RUSAGE_CHILDREN),
-    )
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu_s = own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
     # macOS counts bytes, Linux KiB
     per_mib = 2**20 if sys.platform == "darwin" else 2**10
@@ -128,11 +126,11 @@ def step(log: str, *inputs: str) -> Iterator[None]:
         if isinstance(error, GyriflowError):
             message, code, named = str(error), error.exit_code, error.names_file
         else:
-            message, code, named = (
-                f"memory ran out ({error}). Free memory, or run fewer jobs at once",
-                KILLED,
-                False,
+            message = (
+                f"memory ran out ({error}). Free memory, or run fewer jobs at once"
             )
+            code = KILLED
+            named = False
         if inputs and not named:
             message = f"{', '.join(inputs)}: {message}"
         logging.error("%s", message)

@@ -33,11 +33,9 @@ def test_forces_fit_the_energy_and_stiffness_the_forces():
     problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
     domain, u = problem.domain, approach(problem.domain)
     v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
-    energy, stiffness, owned = (
-        contact.energy(u),
-        contact.stiffness(u),
-        v[: domain.n_owned].ravel(),
-    )
+    energy = contact.energy(u)
+    stiffness = contact.stiffness(u)
+    owned = v[: domain.n_owned].ravel()
     direction, change = stiffness.createVecs()
     direction.array[:] = owned
     stiffness.mult(direction, change)

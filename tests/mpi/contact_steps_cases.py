@@ -282,10 +282,8 @@ def vertices_pulled_near(gap, count, growth_rate_per_s=0.0):
     )
     positions = mesh.vertices.copy()
     positions[np.flatnonzero(facing)[[1, 11][:count]], 2] = 0.01 - gap / 2
-    mesh, p = (
-        TetrahedralMesh(positions, mesh.tets),
-        free_blocks(gap, growth_rate_per_s=growth_rate_per_s)[0].parameters,
-    )
+    mesh = TetrahedralMesh(positions, mesh.tets)
+    p = free_blocks(gap, growth_rate_per_s=growth_rate_per_s)[0].parameters
     return Folding(COMM, mesh, in_a_tube(mesh), p), State.at_start(
         mesh.vertices * M_PER_MM, p.step_s
     )

@@ -40,10 +40,8 @@ def clamped_box(**layers):
 def test_the_preconditioner_is_that_of_the_present_tangent():
     problem = clamped_box()
     domain = problem.domain
-    nothing, up = (
-        np.zeros(len(problem.rest())),
-        np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1)),
-    )
+    nothing = np.zeros(len(problem.rest()))
+    up = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
     r, z = tangent_at_rest(problem).matrix.createVecs()
     r.array[:] = smooth_displacement(domain, 1.0)[: domain.n_owned].ravel()
     problem.clear_fixed(r.array_w)

@@ -180,10 +180,8 @@ def test_a_run_along_a_compatible_path_arrives_without_stress_on_any_mesh(order)
     for cells in (6, 10):
         mesh = sound(cells, order)
         folding, state, target = wavy_run(mesh, 7)
-        places, sizes = (
-            state.positions * MM_PER_M,
-            vertex_sizes(mesh.vertices, linear_pieces(mesh)),
-        )
+        places = state.positions * MM_PER_M
+        sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
         # in quadratic elements the sums of growth and nodes differ by what the elements
         # do not resolve
         assert np.abs(without_rigid_motion(places, target, sizes)).max() < 1e-3

@@ -11,8 +11,8 @@ from scan_trees import make_tree
 pytestmark = pytest.mark.slow
 
 SETTINGS = (
-    "surface: {edge_length_mm: 3.0}\nmetrics: {curvature_radius_mm: 7.0, spangy_modes:"
-    " 50}\n"
+    "surface: {edge_length_mm: 3.0}\n"
+    "metrics: {curvature_radius_mm: 7.0, spangy_modes: 50}\n"
 )
 SCAN = "sub-01/ses-1/anat/sub-01_ses-1"
 MAPS = (
@@ -26,15 +26,14 @@ MAPS = (
 )
 PIAL_MAPS = (*MAPS, "spangyDominantBand", "spangyShapeIndexDominantBand", "thickness")
 EXPECTED = {
-    *(
-        ".bidsignore",
-        "README.md",
-        "dataset_description.json",
-        "descriptions.tsv",
-        "sessions.json",
-    ),
+    ".bidsignore",
+    "README.md",
+    "dataset_description.json",
+    "descriptions.tsv",
+    "sessions.json",
     *(f"{name}.json" for name in ("pial", "white", *PIAL_MAPS)),
-    *("sub-01/sub-01_sessions.tsv", "sub-01/figures/sub-01_ses-1_quality.png"),
+    "sub-01/sub-01_sessions.tsv",
+    "sub-01/figures/sub-01_ses-1_quality.png",
     *(
         f"{SCAN}_hemi-{side}_{layer}.surf.gii"
         for side in "LR"

@@ -51,10 +51,8 @@ def wait_until(condition, process):
 
 def started(workflow, until):
     """Start the folding and return its process when the log has a line with `until`."""
-    process, log = (
-        launched(workflow, SUMMARY, "--configfile", "study.yaml"),
-        workflow.directory / LOG,
-    )
+    process = launched(workflow, SUMMARY, "--configfile", "study.yaml")
+    log = workflow.directory / LOG
     wait_until(lambda: log.exists() and until in log.read_text(), process)
     return process
 
@@ -135,10 +133,8 @@ rule slow:
 )
 def test_a_signal_to_the_launcher_stops_its_jobs(workflow, name, send):
     (workflow.directory / "stubborn.smk").write_text(STUBBORN)
-    process, number = (
-        launched(workflow, "slow.txt", "--snakefile", "stubborn.smk"),
-        signal.Signals[name],
-    )
+    process = launched(workflow, "slow.txt", "--snakefile", "stubborn.smk")
+    number = signal.Signals[name]
     wait_until(
         lambda: (
             (workflow.directory / "begun").exists() and len(below(process.pid)) >= 5

@@ -67,10 +67,8 @@ def write_study(workflow, hemispheres, kind="hemispheres") -> str:
     for week in WEEKS:
         files = {}
         for side, mesh in hemispheres.items():
-            vertices, faces = (
-                transform_points(grown(mesh.vertices, week), POSES[week]),
-                mesh.faces,
-            )
+            vertices = transform_points(grown(mesh.vertices, week), POSES[week])
+            faces = mesh.faces
             # the order of corners is the other one in one of the weeks
             faces = faces[::-1, ::-1] if week == 22 else faces
             files[side] = f"week{week}.{side}.surf.gii"

@@ -87,10 +87,8 @@ def test_a_moved_data_set_is_up_to_date_for_measuring_and_for_the_bids_app(
         labels=["sub-01/ses-1/anat/sub-01_ses-1_dseg.nii.gz"],
         tables={"participants.tsv": ["participant_id scan_age", "sub-01 24.0"]},
     )
-    bids, measure = (
-        ("data", "out", "group", "-n"),
-        ("measure", "data", "-d", "measured", "-n"),
-    )
+    bids = ("data", "out", "group", "-n")
+    measure = ("measure", "data", "-d", "measured", "-n")
     commands(workflow, *bids)
     commands(workflow, "init", "data")
     for directory, config, targets in (

@@ -10,16 +10,16 @@ from gyriflow.metrics.spangy import PART_POWERS
 from gyriflow.shipped import SHIPPED
 
 TABLES = (
-    *(
-        "metrics",
-        "spectra",
-        "regions",
-        "metrics_long",
-        "metrics_wide",
-        "change",
-        "asymmetry",
-    ),
-    *("norm_curves", "centiles", "spectral_distance"),
+    "metrics",
+    "spectra",
+    "regions",
+    "metrics_long",
+    "metrics_wide",
+    "change",
+    "asymmetry",
+    "norm_curves",
+    "centiles",
+    "spectral_distance",
 )
 ODD = ("1e5", "NA", "None", "true", "1.0", "2024-01-01")
 COHORTS = {
@@ -143,10 +143,8 @@ def test_a_cohort_with_names_like_numbers_has_the_tables_of_one_with_letters(
     )
     names = dict(zip(ids, LETTERS, strict=True)) | {"1": "runs"}
     for name in TABLES:
-        found, expected = (
-            read_table(tmp_path / f"odd/out/{name}.csv"),
-            read_table(tmp_path / f"plain/out/{name}.csv"),
-        )
+        found = read_table(tmp_path / f"odd/out/{name}.csv")
+        expected = read_table(tmp_path / f"plain/out/{name}.csv")
         assert len(found) == len(expected) > 0, name
         regions = {"NA": "front", "7": "back"}
         for column in ("subject", "run", "real", "from_brain", "to_brain", "region"):

@@ -15,10 +15,8 @@ from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0]):
-    targets, predicted = (
-        read_weekly_shapes(files.targets),
-        read_surface(files.predicted),
-    )
+    targets = read_weekly_shapes(files.targets)
+    predicted = read_surface(files.predicted)
     start, _ = boundary_surface(read_tetrahedral_mesh(files.mesh))
     shapes = np.stack(targets.surfaces["atlas"])
     atlas = TriangleMesh(

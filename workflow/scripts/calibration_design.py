@@ -5,11 +5,9 @@ from gyriflow.compare.calibration import first_round, next_round, require_bands
 from gyriflow.io.files import read_table, read_tables, write_table
 from gyriflow.step import step
 
-params, earlier, spectra = (
-    snakemake.params,
-    snakemake.input.scores,
-    snakemake.input.spectra,
-)
+params = snakemake.params
+earlier = snakemake.input.scores
+spectra = snakemake.input.spectra
 with step(snakemake.log[0], *spectra):
     for path in spectra:
         require_bands(read_table(path), params.score, path)

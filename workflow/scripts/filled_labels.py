@@ -14,10 +14,8 @@ from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0], *files.white):
-    report, similar = (
-        read_json(files.report),
-        read_json(files.similar) if files.similar else {},
-    )
+    report = read_json(files.report)
+    similar = read_json(files.similar) if files.similar else {}
     whites = {side: read_surface(path) for side, path in snakemake.params.white.items()}
     labels, affine = filled_labels(
         read_surface(files.whole),

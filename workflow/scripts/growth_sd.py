@@ -6,8 +6,6 @@ from gyriflow.step import step
 
 files = snakemake.input
 with step(snakemake.log[0]):
-    run, members = (
-        read_vertex_maps(files.run),
-        [read_vertex_maps(path) for path in files.members],
-    )
+    run = read_vertex_maps(files.run)
+    members = [read_vertex_maps(path) for path in files.members]
     write_vertex_maps(snakemake.output[0], growth_sd(run, members))

@@ -51,10 +51,8 @@ def read_weeks(weeks):
 
 
 with step(snakemake.log[0]):
-    template, parts = (
-        read_text(files.page),
-        {name: read_text(files[name]) for name in PARTS},
-    )
+    template = read_text(files.page)
+    parts = {name: read_text(files[name]) for name in PARTS}
     tables = Tables(**{name: read_table(files[name]) for name in TABLES if files[name]})
     origin = {
         "provenance": read_json(files.provenance),

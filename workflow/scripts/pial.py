@@ -46,11 +46,9 @@ with step(snakemake.log[0], *files, *snakemake.input.white):
     write_brain(output, surface.whole, surface.left, surface.right)
     write_json(output.report, surface.report | volumes)
     if output.get("thickness"):
-        pial, pose, fissure = (
-            read_surface(output.whole),
-            read_pose(output.report),
-            surface.report["fissure_x_mm"],
-        )
+        pial = read_surface(output.whole)
+        pose = read_pose(output.report)
+        fissure = surface.report["fissure_x_mm"]
         if labels:
             thickness = thickness_from_labels(
                 volume.labels, volume.affine, labels.scheme, pial, pose, fissure

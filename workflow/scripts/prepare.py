@@ -32,10 +32,8 @@ with step(snakemake.log[0]):
                 mesh.vertices, facets, surface, values, path
             )
         else:
-            (values, affine), motion = (
-                read_volume_map(path, params.affine_from),
-                pose.of_volume(path),
-            )
+            values, affine = read_volume_map(path, params.affine_from)
+            motion = pose.of_volume(path)
             maps[name] = on_mesh.volume_map_on_mesh(
                 mesh.vertices, values, motion @ affine, path
             )

@@ -19,10 +19,8 @@ with step(snakemake.log[0]):
         read_yaml(files.base), values, snakemake.params.week
     )
     write_yaml(output.params, parameters)
-    mesh, maps = (
-        read_tetrahedral_mesh(files.mesh),
-        read_maps(files.maps) if files.maps else {},
-    )
+    mesh = read_tetrahedral_mesh(files.mesh)
+    maps = read_maps(files.maps) if files.maps else {}
     regions = start_regions(
         mesh,
         parameters_from(parameters),

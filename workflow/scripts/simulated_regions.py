@@ -11,10 +11,8 @@ from gyriflow.step import step
 files = snakemake.input
 with step(snakemake.log[0]):
     start = read_regions(files.mesh)
-    surface, on_left = (
-        TriangleMesh(start.mesh.vertices, start.facets),
-        start.facet_tags["hemisphere"] == LEFT,
-    )
+    surface = TriangleMesh(start.mesh.vertices, start.facets)
+    on_left = start.facet_tags["hemisphere"] == LEFT
     for side, part in zip(SIDES, (on_left, ~on_left), strict=True):
         labels, names = read_vertex_labels(files[f"{side}_regions"])
         found = regions_from_surface(

@@ -66,10 +66,8 @@ with step(snakemake.log[0]):
         files.summaries,
         strict=True,
     ):
-        folder, settings = (
-            Path(path).parent,
-            {"run": run, "start": brain, "parameters": read_yaml(parameters)},
-        )
+        folder = Path(path).parent
+        settings = {"run": run, "start": brain, "parameters": read_yaml(parameters)}
         start = fingerprints(
             [f"results/brains/{brain}/mesh/brain.h5", folder / "folding" / "maps.h5"]
         )

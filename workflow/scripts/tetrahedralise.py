@@ -18,10 +18,8 @@ with step(snakemake.log[0]):
     refused = Path(params.refused)
     surface = read_surface(snakemake.input[0])
     mesh = tetrahedralise(surface, **params.settings)
-    summary, fields = (
-        quality_summary(mesh, surface),
-        {"radius_ratio": radius_ratios(mesh)},
-    )
+    summary = quality_summary(mesh, surface)
+    fields = {"radius_ratio": radius_ratios(mesh)}
     with making_files(refused, refused.with_name(".refused-files.json")):
         try:
             refuse_bad_mesh(mesh, summary, refused / "brain.xdmf", **params.gates)

@@ -69,10 +69,8 @@ with step(snakemake.log[0]):
         labels, models, observed, radius_mm=params.curvature_radius_mm
     )
     if files.get("params"):
-        growth, curves = (
-            read_yaml(files.params)["growth"],
-            read_table(files.curves) if files.curves else None,
-        )
+        growth = read_yaml(files.params)["growth"]
+        curves = read_table(files.curves) if files.curves else None
         table = add_curves(
             table, sizes_on_curves(growth, curves, params.series, params.weeks)
         )

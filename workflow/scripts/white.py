@@ -17,10 +17,8 @@ from gyriflow.step import step
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 labels, settings = params.labels, dict(params.surface)
 with step(snakemake.log[0], *files.given):
-    pial, pose = (
-        {side: read_surface(files[side]) for side in SIDES if files.get(side)},
-        read_pose(files.report),
-    )
+    pial = {side: read_surface(files[side]) for side in SIDES if files.get(side)}
+    pose = read_pose(files.report)
     max_hole_mm = settings.pop("max_hole_mm")
     if labels:
         volume = labels.read(cropped=True)

@@ -273,10 +273,8 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     ends = (slice(None, -1), slice(1, None))
     count = sum(mask[i, j, k].astype(np.int8) for i in ends for j in ends for k in ends)
     for j, k in np.ndindex(2, 2):
-        low, high = (
-            mask[ends[0], ends[j], ends[k]],
-            mask[ends[1], ends[1 - j], ends[1 - k]],
-        )
+        low = mask[ends[0], ends[j], ends[k]]
+        high = mask[ends[1], ends[1 - j], ends[1 - k]]
         opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
         for corner in np.ndindex(2, 2, 2):
             ambiguous[tuple(ends[side] for side in corner)] |= opposite

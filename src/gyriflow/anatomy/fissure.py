@@ -115,10 +115,8 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
     sample, tree = mesh.vertices[selection], cKDTree(mesh.vertices)
     planes = _symmetry_planes(sample, tree)
     if named:
-        x, middle = (
-            np.array([1.0, 0.0, 0.0]),
-            float(weights @ mesh.vertices[:, 0] / weights.sum()),
-        )
+        x = np.array([1.0, 0.0, 0.0])
+        middle = float(weights @ mesh.vertices[:, 0] / weights.sum())
         distance = _mirror_distance(x, middle, sample, tree)
         least = min(asymmetry for _, _, asymmetry in planes)
         if (
@@ -157,10 +155,8 @@ def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
     width = np.ptp(height)
     facing = triangles.vertex_normals(mesh) @ normal
     near = np.abs(height) < FISSURE_BAND * width
-    left, right = (
-        np.flatnonzero(near & (facing > 0.5)),
-        np.flatnonzero(near & (facing < -0.5)),
-    )
+    left = np.flatnonzero(near & (facing > 0.5))
+    right = np.flatnonzero(near & (facing < -0.5))
     if len(left) < 8 or len(right) < 8:
         return np.empty((0, 3))
     return np.concatenate(
@@ -332,10 +328,8 @@ def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
     )
     fissure = Fissure(plane, axes, corner, np.zeros(shape))
     middle = fissure_points(walls, plane.normal, plane.offset)
-    height, cells = (
-        middle @ plane.normal - plane.offset,
-        np.rint(fissure.cells(middle)).astype(int),
-    )
+    height = middle @ plane.normal - plane.offset
+    cells = np.rint(fissure.cells(middle)).astype(int)
     for _ in range(N_UPDATES):
         near = np.abs(fissure.height_above(middle)) < MAX_SHIFT_MM
         weight, total = np.zeros(shape), np.zeros(shape)
@@ -421,10 +415,8 @@ def hidden_fissure(
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     # not whole voxels, which rounding would include or not
-    sheet, reach = (
-        np.abs(side_mm) < 1.25 * size.max(),
-        max(0.5 * FISSURE_MM, 1.25 * size.min()),
-    )
+    sheet = np.abs(side_mm) < 1.25 * size.max()
+    reach = max(0.5 * FISSURE_MM, 1.25 * size.min())
 
     def distance(voxels: Mask) -> NDArray[np.float32]:
         """Return each voxel's distance in mm from the nearest of some voxels, infinite
@@ -497,10 +489,8 @@ def plane_between_labels(
     to_left, to_right = (
         ndimage.distance_transform_edt(~side, sampling=size) for side in (left, right)
     )
-    side, near = (
-        to_left - to_right,
-        ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM,
-    )
+    side = to_left - to_right
+    near = ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
     places = transform_points(np.argwhere(near & (np.abs(side) < size.max())), affine)
     centre = places.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov(places.T))
@@ -581,17 +571,14 @@ def largest_pieces(
         is_kept[faces[component == 0]] = True
         if not component.any():
             continue
-        place = transform_points(
-            triangles.corners(part)[component == 1].mean(axis=(0, 1))[None], to_file
-        )[0]
+        centre = triangles.corners(part)[component == 1].mean(axis=(0, 1))
+        place = transform_points(centre[None], to_file)[0]
         share = areas[component > 0].sum() / areas.sum()
+        where = ", ".join(str(round(x)) for x in place)
         found = (
             f"the {side} hemisphere is in {component.max() + 1} pieces,"
-            f" {100 * share:.1f} % of its area is outside "
-        )
-        found += (
-            f"the largest, around ({', '.join(str(round(x)) for x in place)}) mm in the"
-            " file's coordinates"
+            f" {100 * share:.1f} % of its area is outside the largest, around"
+            f" ({where}) mm in the file's coordinates"
         )
         if share > MAX_LEFT_OUT:
             raise InputError(

@@ -176,10 +176,8 @@ def read_cerebrum(
     }
     report["border_share"] = border_share(main)
     box, first = extraction.crop(main)
-    cropped, labelled = (
-        np.pad(main[box], extraction.PAD_VOXELS),
-        np.pad(tissue[box], extraction.PAD_VOXELS),
-    )
+    cropped = np.pad(main[box], extraction.PAD_VOXELS)
+    labelled = np.pad(tissue[box], extraction.PAD_VOXELS)
     return Cerebrum(
         cropped,
         labelled,
@@ -299,10 +297,8 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
     if not hindbrain.any():
         return out
-    elsewhere, touching = (
-        ~hindbrain & ~np.isin(labels, scheme.cerebrum),
-        np.zeros_like(out),
-    )
+    elsewhere = ~hindbrain & ~np.isin(labels, scheme.cerebrum)
+    touching = np.zeros_like(out)
     for box, part in extraction.parts_in_boxes(out):
         around = ndimage.binary_dilation(part, extraction.OUTSIDE)
         if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
@@ -450,10 +446,9 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
 
     def with_numbers(tissue: NDArray[np.bool], name: str) -> str:
         numbers = [str(number) for number in layout.labels[tissue]]
-        return (
-            f"{name}"
-            f" ({', '.join([*numbers[:4], *(['…'] if len(numbers) > 4 else [])])})"
-        )
+        if len(numbers) > 4:
+            numbers[4:] = ["…"]
+        return f"{name} ({', '.join(numbers)})"
 
     surface = layout.contact[np.ix_(cerebrum, outside)].sum(axis=1)
     cortex_share = float(surface[cortex[cerebrum]].sum() / max(surface.sum(), 1))

@@ -69,8 +69,8 @@ def misplaced_cortex(
     share = (at_ventricles & cortex & ~enclosed).sum() / max(at_ventricles.sum(), 1)
     if share > MAX_AT_VENTRICLES:
         found = (
-            f"cortex lies at {100 * share:.0f} % of the ventricles' surface, at most 3"
-            " % in atlases"
+            f"cortex lies at {100 * share:.0f} % of the ventricles' surface,"
+            " at most 3 % in atlases"
         )
         yield f"{found}: is tissue around or in the ventricles labelled as cortex?"
 

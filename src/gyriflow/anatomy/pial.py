@@ -398,10 +398,8 @@ def from_hemispheres(
                 "joined_along_cut": True,
             },
         )
-    brain, named = (
-        _Brain(week, {"source": "hemispheres", "coordinates": coordinates}),
-        coordinates != "auto",
-    )
+    brain = _Brain(week, {"source": "hemispheres", "coordinates": coordinates})
+    named = coordinates != "auto"
     to_ras = CONVENTIONS[coordinates] if named else np.eye(4)
     parts = [
         repair.sound_pieces(
@@ -424,10 +422,8 @@ def from_hemispheres(
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
     else:
         pose = posing.pose_of_pair(left, right, declared=declared)
-        left, right = (
-            triangles.transformed(left, pose.of_file("left")),
-            triangles.transformed(right, pose.of_file("right")),
-        )
+        left = triangles.transformed(left, pose.of_file("left"))
+        right = triangles.transformed(right, pose.of_file("right"))
         brain.warn(pose.warnings)
     length = float(np.ptp(triangles.merged(left, right).vertices, axis=0).max())
     brain.warn(plausible.require_pair(left, right, max_hemisphere_ratio, coordinates))
@@ -555,10 +551,8 @@ def from_surface(
     if side:
         return _one_side(even, side, pose, brain)
     brain.warn(pose.warnings)
-    even, named = (
-        replace(even, mesh=triangles.transformed(even.mesh, pose.of_file())),
-        coordinates != "auto",
-    )
+    even = replace(even, mesh=triangles.transformed(even.mesh, pose.of_file()))
+    named = coordinates != "auto"
     plane = fissure.mid_plane(even.mesh, named=named)
     heights = fissure.fissure_between(even.mesh, plane).height_above(
         triangles.corners(even.mesh).mean(axis=1)

@@ -135,10 +135,8 @@ def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) ->
     """Raise InputError, with probable units, if the median of the positive values is
     not a cortical thickness."""
     known = values[np.isfinite(values) & (values > 0)]
-    median, (low, high) = (
-        factor_mm * float(np.median(known)) if len(known) else 0.0,
-        THICKNESSES_MM,
-    )
+    median = factor_mm * float(np.median(known)) if len(known) else 0.0
+    low, high = THICKNESSES_MM
     if low <= median <= high:
         return
     units = " or ".join(

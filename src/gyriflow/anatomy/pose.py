@@ -185,8 +185,8 @@ def pose_of_pair(
         angle, shift = _difference(*motions, mirrored_left)
         doubts.append(
             "the medial walls do not face each other in the files' coordinates:"
-            f" {np.linalg.norm(shift):.1f} mm and {angle:.0f}° off: each was posed by"
-            " its own shape. Are both files in one space?"
+            f" {np.linalg.norm(shift):.1f} mm and {angle:.0f}° off:"
+            " each was posed by its own shape. Are both files in one space?"
         )
     if together and not frame and (axes := axes_of_file(motions[0][:3, :3])):
         doubts.append(

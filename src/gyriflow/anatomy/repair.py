@@ -162,9 +162,8 @@ def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> Repaired
             f"{key}_{number + 1}" if number else key: value
             for key, value in even.report.items()
         }
-        is_cap = clean.is_cap[component == number][
-            nearest_on(triangles.corners(even.mesh).mean(axis=1), piece)[1]
-        ]
+        nearest = nearest_on(triangles.corners(even.mesh).mean(axis=1), piece)[1]
+        is_cap = clean.is_cap[component == number][nearest]
         # the pial surface around a cap is in one piece
         is_cap[~is_cap] = (
             triangles.face_components(triangles.submesh(even.mesh, ~is_cap)[0]) > 0
@@ -409,10 +408,8 @@ def _fill_holes(
         (float(np.ptp(mesh.vertices[loop], axis=0).max()), list(loop))
         for loop in igl.boundary_loop_all(mesh.faces)
     )
-    sizes, loops = (
-        [size for size, _ in by_size],
-        [np.asarray(loop) for _, loop in by_size],
-    )
+    sizes = [size for size, _ in by_size]
+    loops = [np.asarray(loop) for _, loop in by_size]
     small = sum(size <= max_hole_mm for size in sizes)
     wide, component = sizes[small:], triangles.face_components(mesh)
     pieces_with_wide = {
@@ -500,9 +497,8 @@ def surface_without_stalks(
     nearest = ndimage.distance_transform_edt(
         labels == 0, return_distances=False, return_indices=True
     )
-    voxel = np.rint(voxel_index(triangles.corners(mesh).mean(axis=1), affine)).astype(
-        int
-    )
+    centres = triangles.corners(mesh).mean(axis=1)
+    voxel = np.rint(voxel_index(centres, affine)).astype(int)
     is_kept = remaining[tuple(nearest[(slice(None), *voxel)])]
     cut_open, _ = triangles.submesh(mesh, is_kept)
     return clean(cut_open, MAX_CUT_MM)[0], report

@@ -77,10 +77,8 @@ def open_fused_sulci(
     solid, _ = refine(
         main_parts(core)[0][part].astype(np.float32), affine, every * factor
     )
-    near, grid = (
-        field[brain],
-        shifted_affine(affine, np.array([side.start for side in brain])),
-    )
+    near = field[brain]
+    grid = shifted_affine(affine, np.array([side.start for side in brain]))
     whole, fine = refine(near, grid, factor)
     size = np.linalg.norm(fine[:3, :3], axis=0)
     inside, solid = whole > LEVEL, solid > LEVEL
@@ -147,9 +145,8 @@ def _around_brain(
         )
         for side in ndimage.find_objects((field > LEVEL).astype(np.uint8))[0]
     ]
-    return tuple(slice(every * side.start, every * side.stop) for side in large), tuple(
-        large
-    )
+    fine = [slice(every * side.start, every * side.stop) for side in large]
+    return tuple(fine), tuple(large)
 
 
 def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:

@@ -133,9 +133,8 @@ def _room(
     centres = transform_points(np.argwhere(around) + first, voxels)
     distance, face, place = nearest_on(centres, mesh)
     near = distance < max_move_mm
-    height = np.einsum("ij,ij->i", centres - place, face_normals(mesh)[face])[
-        near
-    ].repeat(3)
+    heights = np.einsum("ij,ij->i", centres - place, face_normals(mesh)[face])
+    height = heights[near].repeat(3)
     vertex = mesh.faces[face[near]].ravel()
     lowest, highest = (
         np.full(len(mesh.vertices), sign * max_move_mm) for sign in (-1.0, 1.0)

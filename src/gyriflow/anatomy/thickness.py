@@ -111,10 +111,8 @@ def cortical_thickness(
         sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points)
         for mask in (~cortex, cerebrum)
     )
-    at_labels, over_cortex = (
-        to_outside < MAX_OUTSIDE_VOXELS * voxel,
-        to_cortex < NEAR_VOXELS * voxel,
-    )
+    at_labels = to_outside < MAX_OUTSIDE_VOXELS * voxel
+    over_cortex = to_cortex < NEAR_VOXELS * voxel
     if fissure_x_mm is not None:
         at_labels |= np.abs(points[:, 0] - fissure_x_mm) > FISSURE_REACH_MM
     is_measured = at_labels & over_cortex & (values >= MIN_LAYER_VOXELS * voxel)
@@ -155,9 +153,8 @@ def border(mask: Mask, affine: Floats) -> TriangleMesh:
         kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)
     )
     mesh = isosurface(field.astype(np.float32), affine)
-    missing_mm3 = main_parts(mask)[0].sum() * abs(
-        np.linalg.det(affine[:3, :3])
-    ) - signed_volume(mesh)
+    mask_mm3 = main_parts(mask)[0].sum() * abs(np.linalg.det(affine[:3, :3]))
+    missing_mm3 = mask_mm3 - signed_volume(mesh)
     return TriangleMesh(
         mesh.vertices + missing_mm3 / area(mesh) * vertex_normals(mesh), mesh.faces
     )
@@ -181,14 +178,10 @@ def mean_curvature(mesh: TriangleMesh, at: Mask) -> float:
     """Return the mean curvature (1/mm) of a surface over some vertices, an (n,) mask:
     half of what its area grows."""
     step = OFFSET_MM * vertex_normals(mesh)
-    areas = [
-        float(
-            vertex_areas(TriangleMesh(mesh.vertices + sign * step, mesh.faces))[
-                at
-            ].sum()
-        )
-        for sign in (-1, 0, 1)
-    ]
+    areas = []
+    for sign in (-1, 0, 1):
+        offset = TriangleMesh(mesh.vertices + sign * step, mesh.faces)
+        areas.append(float(vertex_areas(offset)[at].sum()))
     return (areas[2] - areas[0]) / (4.0 * OFFSET_MM * areas[1])
 
 

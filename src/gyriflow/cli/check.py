@@ -70,8 +70,8 @@ THROUGH_CORTEX = {
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as
 found on the shipped brains."""
 CODE_ONLY = re.compile(
-    r"before: ('code \w+',?|<nothing exclusive>)* now: ('code \w+',?|<nothing"
-    r" exclusive>)* $"
+    r"before: ('code \w+',?|<nothing exclusive>)*"
+    r" now: ('code \w+',?|<nothing exclusive>)* $"
 )
 """End of Snakemake's reason to run a job again whose code has changed and nothing else
 of its parameters."""
@@ -471,12 +471,10 @@ def _needs(
         ),
         False,
     )
-    share = (
-        f", {sum(each.seconds for each in needs) / sum(seconds):.0%} of them for"
-        " folding"
-        if foldings
-        else ""
-    )
+    share = ""
+    if foldings:
+        folding_s = sum(each.seconds for each in needs)
+        share = f", {folding_s / sum(seconds):.0%} of them for folding"
     yield f"work    about {hours:.2g} core hours{share}", False
     at_once = max(cores // max((job.threads for job in foldings), default=1), 1)
     memory = sum(sorted((each.memory_mib for each in needs), reverse=True)[:at_once])

@@ -58,9 +58,8 @@ class InputPath(click.Path):
         except click.BadParameter as error:
             if Path(value).exists():
                 raise
-            from ..settings.base import (
-                hint_for_missing,
-            )  # settings take a while to import
+            # settings take a while to import
+            from ..settings.base import hint_for_missing
 
             message = f"{error.message}{hint_for_missing(Path(value))}"
             raise click.BadParameter(message, ctx=ctx, param=param) from None
@@ -135,11 +134,8 @@ class Commands(click.Group):
             sys.exit(error.exit_code)
         except click.UsageError as error:
             command = error.ctx.command_path if error.ctx else command_name()
-            click.echo(
-                f"gyriflow: {' '.join(error.format_message().split())} See `{command}"
-                " --help`.",
-                err=True,
-            )
+            message = " ".join(error.format_message().split())
+            click.echo(f"gyriflow: {message} See `{command} --help`.", err=True)
             sys.exit(error.exit_code)
 
 
@@ -651,10 +647,8 @@ def bids(
     work_to_do = (
         "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
     )
-    click.echo(
-        f"{len(brains)} scan{'s' if len(brains) > 1 else ''} to {work_to_do}:"
-        f" {', '.join(brains)}"
-    )
+    scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
+    click.echo(f"{scans} to {work_to_do}: {', '.join(brains)}")
     click.echo(f"configuration: {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     code = _run(

@@ -256,15 +256,11 @@ def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:
         read_label_volume(regions.volume, brain.affine_from if brain else "auto")
     for side in SIDES:
         if (given := getattr(regions, side)) is not None:
-            labels, surface = (
-                read_vertex_labels(given.labels, side)[0],
-                read_surface(given.surface, side),
-            )
+            labels = read_vertex_labels(given.labels, side)[0]
+            surface = read_surface(given.surface, side)
             if len(labels) != len(surface.vertices):
-                problem, found = (
-                    "does not belong to its surface",
-                    f"{len(labels)} labels",
-                )
+                problem = "does not belong to its surface"
+                found = f"{len(labels)} labels"
                 expected = (
                     f"{len(surface.vertices)}, the number of vertices of"
                     f" {given.surface}"

@@ -282,9 +282,9 @@ def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
         "tissue label volumes (.nii.gz), or surfaces with left and right or pial in"
         " their names"
     )
-    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]] + [
-        "\n  …"
-    ] * (len(reasons) > 10)
+    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]]
+    if len(reasons) > 10:
+        names.append("\n  …")
     found = f"{len(reasons)} files{''.join(names)}\n"
     return InputError(
         "no brain was recognised", path=folder, found=found, expected=expected
@@ -564,11 +564,9 @@ def _complete(
 ) -> None:
     """Add the age, the subject and its other values to a scan, read its files, and add
     why it cannot be used."""
-    scan, subject, session = (
-        _scan_of(brain.file),
-        _label(brain.file, "sub"),
-        _label(brain.file, "ses"),
-    )
+    scan = _scan_of(brain.file)
+    subject = _label(brain.file, "sub")
+    session = _label(brain.file, "ses")
     owners = _owners(brain.file, tables) if subject is None else [subject]
     facts, cause = None, ""
     if len(owners) > 1:
@@ -582,10 +580,8 @@ def _complete(
         cause = "" if facts or subject is None else _similar_ids(subject, tables)
     else:
         cause = _similar_ids(scan, tables, only_similar=True)
-    age, named = (
-        facts or ScanAge(None, cause=cause),
-        week_in_name(brain.file.parts, tables.notation),
-    )
+    age = facts or ScanAge(None, cause=cause)
+    named = week_in_name(brain.file.parts, tables.notation)
     if (
         age.week is not None
         and named.week is not None
@@ -679,10 +675,8 @@ def _require_brain(path: Path, *, whole: bool = False) -> None:
     require_one_brain(mesh, "surface", path)
     if (shape := narrowness(mesh)) < MIN_NARROWNESS:
         problem = "seems to be one hemisphere only, and atlases have whole brains"
-        found, expected = (
-            f"a shortest extent of {shape:.2f} of the longest",
-            f"{MIN_NARROWNESS} or more",
-        )
+        found = f"a shortest extent of {shape:.2f} of the longest"
+        expected = f"{MIN_NARROWNESS} or more"
         raise InputError(
             problem,
             path=path,

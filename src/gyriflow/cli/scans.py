@@ -98,10 +98,8 @@ def found_rows(
             )
             reasons += [cause] if cause else []
         data = ", ".join(file.rpartition("/")[2] for file in brain.files.split(", "))
-        age, scheme = (
-            "–" if week == UNSET else f"{week:g}",
-            "–" if scheme == UNSET else scheme,
-        )
+        age = "–" if week == UNSET else f"{week:g}"
+        scheme = "–" if scheme == UNSET else scheme
         yield ScanRow(
             brain.entry["id"],
             age,

@@ -79,10 +79,8 @@ def log_errors(tests: Sequence[Mapping[str, Any]], metric: str) -> pd.DataFrame:
     rows = rows[
         (rows["model"] == "run") & (rows["protocol"] == DEFAULT_PROTOCOL)
     ].dropna(subset=difference)
-    week, error = (
-        rows["start_week"] + rows["horizon"],
-        np.log1p(rows[difference].astype(float)),
-    )
+    week = rows["start_week"] + rows["horizon"]
+    error = np.log1p(rows[difference].astype(float))
     return pd.DataFrame(
         {
             "start": rows["start"],

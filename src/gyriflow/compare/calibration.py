@@ -213,10 +213,8 @@ def require_bands(
             row = rows[rows["band"] == band]
             if row["complete"].all() and row["resolved"].all():
                 continue
-            problem, remedy = (
-                "not resolved",
-                "Use shorter edges and a smaller metrics.curvature_radius_mm",
-            )
+            problem = "not resolved"
+            remedy = "Use shorter edges and a smaller metrics.curvature_radius_mm"
             if not row["complete"].all():
                 problem, remedy = "cut off", f"Set metrics.spangy_modes: B{band}"
             raise InputError(

@@ -94,9 +94,8 @@ class ObservedBrain:
         if self.resampling.is_symmetric:
             left, right = (values_at(side, points) for side in self.resampling.sides)
             on_left = number_patches(left, self.resampling.side_areas, PATCH_EDGE_MM)
-            numbers = np.tile(on_left, 2)[
-                cKDTree(np.concatenate([left, right])).query(points)[1]
-            ]
+            nearest = cKDTree(np.concatenate([left, right])).query(points)[1]
+            numbers = np.tile(on_left, 2)[nearest]
         else:
             numbers = number_patches(points, self.prepared.areas, PATCH_EDGE_MM)
         return numbers, draw_units([int(numbers.max()) + 1])
@@ -105,15 +104,13 @@ class ObservedBrain:
     def baseline_correlations(self) -> dict[tuple[str, str], Floats]:
         """The correlation of each baseline and map, and that in each bootstrap
         sample."""
-        return {
-            (name, measure): self.resampling.correlations(
-                getattr(self.prepared, measure), values
-            )
-            for name, surface in self.baselines.items()
-            for measure, values in interpolate_measures(surface, self.prepared)[
-                0
-            ].items()
-        }
+        found = {}
+        for name, surface in self.baselines.items():
+            measures, _ = interpolate_measures(surface, self.prepared)
+            for measure, values in measures.items():
+                own = getattr(self.prepared, measure)
+                found[name, measure] = self.resampling.correlations(own, values)
+        return found
 
 
 def observed_brain(name: str, surface: TriangleMesh, radius_mm: float) -> ObservedBrain:

@@ -125,10 +125,8 @@ def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataF
         # scores are computed by hemisphere, so each region is passed as a hemisphere of
         # its own
         parts = table["hemisphere"] + " " + table["region"].fillna("")
-        rows, subjects = (
-            table.assign(run=MEASURED, hemisphere=parts),
-            list(table["subject"]),
-        )
+        rows = table.assign(run=MEASURED, hemisphere=parts)
+        subjects = list(table["subject"])
         scores = measured_scores(
             rows, subjects, cohort_norms(rows, subjects, individuals=individuals)
         )

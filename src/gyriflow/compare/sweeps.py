@@ -43,19 +43,15 @@ WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
 _VALUES = ("value", "observed_value")
 PARAMETERS = (
-    *(
-        "thickness_mm",
-        "shear_modulus_cortex_pa",
-        "shear_modulus_core_pa",
-        "poisson_ratio",
-    ),
-    *(
-        "growth_rate_per_s",
-        "radial_growth_rate_per_s",
-        "step_s",
-        "start_week",
-        "end_week",
-    ),
+    "thickness_mm",
+    "shear_modulus_cortex_pa",
+    "shear_modulus_core_pa",
+    "poisson_ratio",
+    "growth_rate_per_s",
+    "radial_growth_rate_per_s",
+    "step_s",
+    "start_week",
+    "end_week",
 )
 """Parameters of each run in `members.csv`, as in the tables of the FetalFoldSim
 paper."""

@@ -93,11 +93,9 @@ class SelfContact:
         ipctk.set_num_threads(1)  # more threads would compete with other ranks
         self.domain, self.surface = domain, ContactSurface(domain, facets)
         self._stiffens = stiffens
-        self._initial_pa, self._given_mm, self._max_mm = (
-            stiffness_pa,
-            distance_mm,
-            np.inf,
-        )
+        self._initial_pa = stiffness_pa
+        self._given_mm = distance_mm
+        self._max_mm = np.inf
         start = self.surface.reference_mm()
         self._edges = edges(TriangleMesh(start, self.surface.faces))[0]
         # from rank 0, since other processors may round differently
@@ -264,9 +262,8 @@ class SelfContact:
         areas[near.part.vertices[owned]] = (
             np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2
         )
-        pressure = np.linalg.norm(
-            self.domain.sum_over_ranks(forces), axis=1
-        ) / self.domain.sum_over_ranks(areas)
+        norms = np.linalg.norm(self.domain.sum_over_ranks(forces), axis=1)
+        pressure = norms / self.domain.sum_over_ranks(areas)
         values = np.zeros(len(self.domain.positions))
         values[self.surface.nodes] = pressure[: len(self.surface.nodes)]
         return values

@@ -54,10 +54,8 @@ class SearchRange:
         margin = self.reach - distance_mm / 2
         if np.isinf(margin):
             return True
-        low, high = (
-            np.minimum(self.first, self.last) - margin,
-            np.maximum(self.first, self.last) + margin,
-        )
+        low = np.minimum(self.first, self.last) - margin
+        high = np.maximum(self.first, self.last) + margin
         return all(bool((at >= low).all() and (at <= high).all()) for at in positions)
 
 
@@ -121,12 +119,10 @@ class ContactSearch:
         distance_mm: float,
         previous: "ContactSearch | None" = None,
     ) -> None:
-        self._faces, self._owned, self._rest, self._distance = (
-            faces,
-            owned,
-            rest_mm,
-            distance_mm,
-        )
+        self._faces = faces
+        self._owned = owned
+        self._rest = rest_mm
+        self._distance = distance_mm
         self._part: tuple[SurfacePart, SearchRange] | None = (
             previous._part if previous else None
         )

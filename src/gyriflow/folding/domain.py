@@ -251,18 +251,15 @@ class Domain:
         The four triangles of a quadratic element's face have one tag. ValueError where
         the facets are not the boundary.
         """
-        faces, tags = (
-            whole_faces(facets, self.order),
-            tags[:: PIECES_OF_ORDER[self.order]],
-        )
+        faces = whole_faces(facets, self.order)
+        tags = tags[:: PIECES_OF_ORDER[self.order]]
         topology = self.mesh.topology
         topology.create_entities(2)
         topology.create_connectivity(2, 3)
         local = dolfinx.mesh.exterior_facet_indices(topology)
         # the corners are the first three nodes
-        nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local).reshape(
-            len(local), -1
-        )[:, :3]
+        nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local)
+        nodes = nodes.reshape(len(local), -1)[:, :3]
         local_faces = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
         count = len(self.positions)
         weights = np.array([count * count, count, 1], dtype=np.int64)

@@ -143,9 +143,8 @@ class Springs:
         areas and lengths of springs."""
         weights = MODULUS_PA / (lengths_mm * M_PER_MM) * areas_mm2 * M_PER_MM**2
         self._weights = weights[self._rows, None]
-        self._gaps = (self._domain.positions[self._vertices] - goals_mm * M_PER_MM)[
-            self._rows
-        ]
+        gaps = self._domain.positions[self._vertices] - goals_mm * M_PER_MM
+        self._gaps = gaps[self._rows]
 
     def energy(self, u: Floats) -> float:
         local = 0.5 * float((self._weights * (u[self._local] + self._gaps) ** 2).sum())
@@ -222,10 +221,8 @@ class ElasticFit:
         self._inverse_edges = np.linalg.inv(
             np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
         )
-        size, columns = (
-            (len(mesh.vertices), len(cells)),
-            np.repeat(np.arange(len(cells)), 4),
-        )
+        size = (len(mesh.vertices), len(cells))
+        columns = np.repeat(np.arange(len(cells)), 4)
         self._incidence = sparse.csr_array(
             (np.ones(4 * len(cells)), (cells.ravel(), columns)), shape=size
         )
@@ -247,9 +244,8 @@ class ElasticFit:
         boundary, start, n_passed = self.boundary, self.positions_mm, len(self._passed)
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
-        ratio = signed_volume(
-            TriangleMesh(goal[self._used], boundary.faces)
-        ) / signed_volume(boundary)
+        goal_surface = TriangleMesh(goal[self._used], boundary.faces)
+        ratio = signed_volume(goal_surface) / signed_volume(boundary)
         logs = log_stretch(self._gradients(goal), limit=MAX_LOG_STRETCH)
         # of the whole, and of nine elements in ten
         mean_strain = (
@@ -331,10 +327,8 @@ class ElasticFit:
             self.positions_mm, transform_points(shape, motion), UNTANGLING_MM
         )
         if not len(faults):
-            self.positions_mm, self._moved_straight = (
-                self._opened_after(self.positions_mm, untangled),
-                True,
-            )
+            self.positions_mm = self._opened_after(self.positions_mm, untangled)
+            self._moved_straight = True
             return self._move(np.linalg.inv(motion))
         log.info(
             "%d faults remain on the way to a shape: the body follows it", len(faults)
@@ -350,11 +344,9 @@ class ElasticFit:
 
         Elements that lose most of their volume count as faults in the first round only.
         """
-        sizes, displacement, least = (
-            vertex_sizes(before, self._pieces),
-            after - before,
-            MIN_VOLUME_ON_WAY,
-        )
+        sizes = vertex_sizes(before, self._pieces)
+        displacement = after - before
+        least = MIN_VOLUME_ON_WAY
         for length in lengths_mm:
             faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
@@ -406,9 +398,8 @@ class ElasticFit:
         before it."""
         untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
         # a change that flattens elements is the last resort
-        needs_stop = len(faults) > 0 or self._flat_count(untangled) > self._flat_count(
-            after
-        )
+        n_flat = self._flat_count(after)
+        needs_stop = len(faults) > 0 or self._flat_count(untangled) > n_flat
         i = self._halfway(before, after, passed) if needs_stop and halvings else None
         if i is not None:
             # each shape is fitted to the one before, as on the path
@@ -460,10 +451,8 @@ class ElasticFit:
         """Return the (k, 3) places before, of elements that are inverted and faces that
         cross on the straight way."""
         inverted = inverted_on_the_way(before, after, self._tets, least)
-        places, faces = (
-            [before[self._tets[inverted]].mean(axis=1)],
-            self._used[self._surface.faces],
-        )
+        places = [before[self._tets[inverted]].mean(axis=1)]
+        faces = self._used[self._surface.faces]
         for part in PARTS_OF_WAY:
             surface = TriangleMesh(
                 ((1 - part) * before + part * after)[self._used], self._surface.faces
@@ -482,9 +471,10 @@ class ElasticFit:
         return float(np.quantile(np.linalg.norm(moves[self._used], axis=1), 0.99))
 
     def _gradients(self, goal: Floats) -> Floats:
-        return deformation_gradients(
+        gradients = deformation_gradients(
             self.positions_mm, goal, self._pieces, SLOPES[None]
-        )[:, 0]
+        )
+        return gradients[:, 0]
 
     def _straighten(self) -> bool:
         """Straighten the sides of curved elements that fold over; return whether all
@@ -596,10 +586,8 @@ class ElasticFit:
         cells = self._elements.vertices[self._elements.cells]
         corners = self.positions_mm[cells]
         edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-        logs, volumes = (
-            log_stretch(edges @ self._inverse_edges, left=True),
-            determinants(edges),
-        )
+        logs = log_stretch(edges @ self._inverse_edges, left=True)
+        volumes = determinants(edges)
         around = packed(logs)
         for _ in range(FLATTENING_ROUNDS):
             at_vertices = (

@@ -172,9 +172,9 @@ def increments(
     core (α_CORE).
     """
     isotropic = core * (1 - w)
-    return (tangential * w + isotropic) * (g * step_s), (
-        radial * (1 - w) + isotropic
-    ) * (g * step_s)
+    tangential_growth = (tangential * w + isotropic) * (g * step_s)
+    radial_growth = (radial * (1 - w) + isotropic) * (g * step_s)
+    return tangential_growth, radial_growth
 
 
 def increments_at(

@@ -52,10 +52,8 @@ class LinearElements:
                     matrix.indptr,
                 )
             )
-            rows, columns = (
-                np.repeat(cells, 4, axis=1).ravel(),
-                np.tile(cells, 4).ravel(),
-            )
+            rows = np.repeat(cells, 4, axis=1).ravel()
+            columns = np.tile(cells, 4).ravel()
             # blocks below the diagonal are needed only if one of their nodes is a ghost
             needed = (
                 (columns >= rows)

@@ -249,9 +249,8 @@ class LinearSolver:
         self._right.array_w[:] = residual.owned
         self._cg.solve(self._right, self._solution)
         owned = -self._solution.array_r
-        self._problem.clear_fixed(
-            owned
-        )  # fixed components are zero only to within the tolerance
+        # fixed components are zero only to within the tolerance
+        self._problem.clear_fixed(owned)
         slope = self._problem.domain.dot(owned, residual.owned)
         reason = self._cg.getConvergedReason() if slope < 0 else 0  # False for NaN
         return reason, Direction(

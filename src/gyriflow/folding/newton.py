@@ -234,11 +234,9 @@ class NewtonSolver:
     def _line_search(self, iterate: Iterate, direction: Direction) -> Iterate:
         """Halve the step along a direction until it lowers the energy and inverts no
         element; return that iterate."""
-        problem, start, norm = (
-            self.problem,
-            iterate.residual.displacement,
-            iterate.residual.norm,
-        )
+        problem = self.problem
+        start = iterate.residual.displacement
+        norm = iterate.residual.norm
         slope, convex, before = direction.slope, direction.convex, iterate.energy
         owned = direction.values[: problem.domain.n_owned].ravel()
         if not problem.convex:

@@ -191,10 +191,8 @@ class NonlinearProblem:
         set_at_points(self._weight, weight)
         set_at_points(self._H, H)
         if self._linear:
-            self._linear.weight, self._linear.H = (
-                np.ascontiguousarray(weight),
-                np.ascontiguousarray(H),
-            )
+            self._linear.weight = np.ascontiguousarray(weight)
+            self._linear.H = np.ascontiguousarray(H)
         self._tangent.elastic.forget()
         if self.free:
             self._tangent.motions = RigidMotions(

@@ -209,10 +209,10 @@ def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
     left_s = seconds_per_step * (end_week - row["week"]) * SECONDS_PER_GW / state.step_s
     minutes, seconds = divmod(round(left_s), 60)
     line = (
-        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton"
-        f" {row['newton']}  krylov {row['krylov']:3d}  max|u| {row['max_u_mm']:.3f} mm "
-        f" min J {row['min_J']:.3f}  {row['seconds']:.2f} s  left"
-        f" {minutes}:{seconds:02d}"
+        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}"
+        f"  newton {row['newton']}  krylov {row['krylov']:3d}"
+        f"  max|u| {row['max_u_mm']:.3f} mm  min J {row['min_J']:.3f}"
+        f"  {row['seconds']:.2f} s  left {minutes}:{seconds:02d}"
     )
     print_line(
         line,

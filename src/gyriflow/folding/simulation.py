@@ -192,10 +192,8 @@ class Folding:
                 part = self.contact.join_touching(part)
         stretch = None
         if state.stretch is not None:
-            before, step_gw = (
-                unpacked(state.stretch[domain.tet_of_cell]),
-                step_s / SECONDS_PER_GW,
-            )
+            before = unpacked(state.stretch[domain.tet_of_cell])
+            step_gw = step_s / SECONDS_PER_GW
             stretch = relaxed(
                 before,
                 step_gw,
@@ -227,10 +225,8 @@ class Folding:
     def _solution_row(
         self, solution: Solution, displacement: Floats
     ) -> dict[str, float]:
-        u, length = (
-            solution.displacement,
-            np.linalg.norm(displacement, axis=1) * MM_PER_M,
-        )
+        u = solution.displacement
+        length = np.linalg.norm(displacement, axis=1) * MM_PER_M
         ratios = self.problem.volume_ratios(u)
         return {
             "newton": solution.newton,

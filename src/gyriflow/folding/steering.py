@@ -110,10 +110,8 @@ def steered_rates(
             found="tissue that does not grow",
             expected="a growing core",
         )
-    mean, ideal = (
-        required[1] / (cortex_volume + core_volume),
-        required[0] / max(gain[0, 0], 1e-9),
-    )
+    mean = required[1] / (cortex_volume + core_volume)
+    ideal = required[0] / max(gain[0, 0], 1e-9)
     # on a ball tangential growth adds no area: feedback raises it until the core no
     # longer grows
     cortex = np.clip(ideal, *bounds)
@@ -140,10 +138,8 @@ def free_growth(
     distance = PialSearch(positions_mm, zones.cortex_facets).distance(
         positions_mm, WEIGHT_REACH * np.max(thickness)
     )
-    weight, volumes = (
-        cortical_weight(distance, thickness),
-        volumes_between(positions_mm, inputs.pieces),
-    )
+    weight = cortical_weight(distance, thickness)
+    volumes = volumes_between(positions_mm, inputs.pieces)
 
     def volume_rate(tangential: float, radial: float | Floats, core: float) -> float:
         dg, dr = increments(weight, zones.growth, tangential, radial, core, 1.0)

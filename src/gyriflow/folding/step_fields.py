@@ -30,12 +30,10 @@ def step_fields(
     they are. Growth towards shapes leaves no stress and elastic strain but next to
     contact, where they depend on the mesh: there are none.
     """
-    p, problem, domain, u = (
-        folding.parameters,
-        folding.problem,
-        folding.domain,
-        folding.solved.displacement,
-    )
+    p = folding.parameters
+    problem = folding.problem
+    domain = folding.domain
+    u = folding.solved.displacement
     kept = {"pressure_pa", "elastic_volume_strain"} if p.keeps_volume_only else set()
 
     def as_rates(fields: dict[str, Floats]) -> dict[str, Floats]:

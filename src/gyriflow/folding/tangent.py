@@ -119,9 +119,8 @@ class ElasticMatrix:
             column_map, self.nodes[self._stored], local_columns[self._stored]
         )
         # so that these blocks and their transposes add up to the matrix
-        self._half_weights = np.where(
-            (rows == self.columns) | (local_columns >= owned), 0.5, 1.0
-        )[self._stored]
+        is_half = (rows == self.columns) | (local_columns >= owned)
+        self._half_weights = np.where(is_half, 0.5, 1.0)[self._stored]
 
     def assemble(self, u: Floats) -> None:
         """Assemble the tangent at a displacement (k, 3) of the local nodes in m."""
@@ -203,9 +202,8 @@ class LaggedTangent:
         to a relative error `within`."""
         if self._last is None:
             return False
-        change = (at.displacement - self._last.displacement)[
-            : self._domain.n_owned
-        ].ravel()
+        change = at.displacement - self._last.displacement
+        change = change[: self._domain.n_owned].ravel()
         predicted = np.empty_like(change)
         self.matrix.products.multiply(change, predicted)
         error = predicted + self._last.elastic - at.elastic

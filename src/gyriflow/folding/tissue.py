@@ -68,10 +68,8 @@ class Tissue:
         Maps are (n,) at all vertices.
         """
         points, cells = elements.points, elements.cells
-        pial, nodes = (
-            PialSearch(positions, zones.cortex_facets),
-            positions[elements.vertices],
-        )
+        pial = PialSearch(positions, zones.cortex_facets)
+        nodes = positions[elements.vertices]
         # the maximum over the whole mesh, so that all ranks search equally far
         reach = (
             WEIGHT_REACH
@@ -133,12 +131,8 @@ def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
     ones: all are turned to the side of the first before they are interpolated. If the
     result nearly vanishes, the nearest node's normal is taken.
     """
-    turned = (
-        normals
-        * np.where(np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0, -1.0, 1.0)[
-            :, :, None
-        ]
-    )
+    is_opposite = np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0
+    turned = normals * np.where(is_opposite, -1.0, 1.0)[:, :, None]
     mean = np.matmul(points.interpolation, turned)
     length = np.linalg.norm(mean, axis=2, keepdims=True)
     nearest = turned[:, points.piecewise_linear.argmax(axis=1)]

@@ -190,15 +190,12 @@ def zones_of_run(
     if support == "ellipsoid":
         zone[all_of_face(static[facets])] = terms.CLAMPED
     if p.contact.kind != "none":
-        zone[all_of_face((facet_x > left_plane) & (facet_x < right_plane))] = (
-            terms.BETWEEN_PLANES
-        )
-        zone[
-            all_of_face((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))
-        ] = terms.LEFT_CONTACT
-        zone[
-            all_of_face((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))
-        ] = terms.RIGHT_CONTACT
+        between = (facet_x > left_plane) & (facet_x < right_plane)
+        left = (facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)
+        right = (facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)
+        zone[all_of_face(between)] = terms.BETWEEN_PLANES
+        zone[all_of_face(left)] = terms.LEFT_CONTACT
+        zone[all_of_face(right)] = terms.RIGHT_CONTACT
     anchors = None
     if side is not None:
         zone[medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
@@ -210,15 +207,13 @@ def zones_of_run(
     if ellipsoid.kind != "none":
         growth[static] = 0.0
         if side is None:
-            growth[
-                bridge_vertices(
-                    mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
-                )
-            ] = 0.0
+            in_bridge = bridge_vertices(
+                mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
+            )
+            growth[in_bridge] = 0.0
             if p.contact.kind == "planes":
-                growth[medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)] = (
-                    0.0
-                )
+                medial = medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
+                growth[medial] = 0.0
     free = support == "free" and side is None
     return Zones(
         facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, anchors
@@ -233,11 +228,8 @@ def planes_distance(
     farthest = np.abs(vertices[facets, 0] - fissure_x_mm).max(axis=1)
     nearest_first = np.argsort(farthest)
     within = np.cumsum(face_areas(TriangleMesh(vertices, facets))[nearest_first])
-    return float(
-        farthest[nearest_first][
-            np.searchsorted(within, MAX_BETWEEN_PLANES * within[-1])
-        ]
-    )
+    last = np.searchsorted(within, MAX_BETWEEN_PLANES * within[-1])
+    return float(farthest[nearest_first][last])
 
 
 def bridge_vertices(

@@ -140,10 +140,8 @@ def _inside(
     for corner in range(3):
         ends = faces[face][:, [corner - 2, corner - 1]]
         forwards = ends[:, 0] < ends[:, 1]
-        along, offset = (
-            np.diff(flat[np.sort(ends)], axis=1)[:, 0],
-            lines - flat[ends.min(axis=1)],
-        )
+        along = np.diff(flat[np.sort(ends)], axis=1)[:, 0]
+        offset = lines - flat[ends.min(axis=1)]
         side = along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]
         shifted = (along[:, 1] < 0) | ((along[:, 1] == 0) & (along[:, 0] > 0))
         sides[corner] = np.abs(side)
@@ -191,10 +189,8 @@ def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
         distances, vertices = tree.query(
             points[unmatched], k=min(count, len(mesh.vertices))
         )
-        distances, vertices = (
-            distances.reshape(len(unmatched), -1),
-            vertices.reshape(len(unmatched), -1),
-        )
+        distances = distances.reshape(len(unmatched), -1)
+        vertices = vertices.reshape(len(unmatched), -1)
         agreeing = (
             np.einsum("ik,ijk->ij", normals[unmatched], directions[vertices])
             >= MIN_NORMAL_COSINE
@@ -239,10 +235,8 @@ def match_layers(
     distance, nearest = cKDTree(places).query(np.hstack([points, inner]))
     better = distance < np.linalg.norm(np.hstack(misfit), axis=1)
     rows, nearest = np.flatnonzero(better), nearest[better]
-    match.corners[rows], match.weights[rows] = (
-        ends[nearest][:, [0, 1, 1]],
-        [0.5, 0.5, 0.0],
-    )
+    match.corners[rows] = ends[nearest][:, [0, 1, 1]]
+    match.weights[rows] = [0.5, 0.5, 0.0]
     match.distance_mm[rows] = np.linalg.norm(places[nearest, :3] - points[rows], axis=1)
     return Match(
         match.corners,

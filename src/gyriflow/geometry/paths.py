@@ -135,14 +135,11 @@ def merged_shapes(
     kept = np.ones(len(weeks), dtype=bool)
     for number, group in enumerate(groups):
         if len(group) > 1:
-            (early, first), (late, last) = (
-                means[max(number - 1, 0)],
-                means[min(number + 1, len(groups) - 1)],
-            )
+            early, first = means[max(number - 1, 0)]
+            late, last = means[min(number + 1, len(groups) - 1)]
             week, mean = means[number]
-            merged[group] = mean + ((weeks[group] - week) / (late - early))[
-                :, None, None
-            ] * (last - first)
+            fractions = (weeks[group] - week) / (late - early)
+            merged[group] = mean + fractions[:, None, None] * (last - first)
             before, after = np.searchsorted(observed, [group[0], group[-1]]) + [-1, 1]
             end = observed[after] if after < len(observed) else group[-1] + 1
             around = slice(observed[max(before, 0)], end)

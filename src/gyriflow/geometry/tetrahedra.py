@@ -217,9 +217,8 @@ def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     )
     outer = np.sort(first[counts == 1])
     pieces = PIECES_OF_ORDER[mesh.order]
-    triangles = mesh.tets[:, FACES if mesh.order == 1 else FINE_FACES].reshape(
-        -1, pieces, 3
-    )[outer]
+    triangles = mesh.tets[:, FACES if mesh.order == 1 else FINE_FACES]
+    triangles = triangles.reshape(-1, pieces, 3)[outer]
     return triangles.reshape(-1, 3), np.repeat(outer // 4, pieces)
 
 
@@ -256,9 +255,8 @@ def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     split = triangles.reshape(-1, 4, 3)
     nodes = np.concatenate([split[:, [0, 1, 2], [0, 1, 2]], split[:, 3]], axis=1)
     # shape functions on a tetrahedron's face with the nodes 0, 1, 2 and 4, 5, 6
-    on_lattice = shape_values(np.pad(LATTICE / FINER, ((0, 0), (0, 1))))[
-        :, [0, 1, 2, 4, 5, 6]
-    ]
+    on_lattice = shape_values(np.pad(LATTICE / FINER, ((0, 0), (0, 1))))
+    on_lattice = on_lattice[:, [0, 1, 2, 4, 5, 6]]
     weights = np.broadcast_to(on_lattice, (len(nodes), len(LATTICE), 6)).reshape(-1, 6)
     names = np.repeat(nodes, len(LATTICE), axis=0)
     # faces share a vertex if it has the same nodes with the same weights

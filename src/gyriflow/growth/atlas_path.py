@@ -76,10 +76,8 @@ def ages_by_size(
     which the curve has its volume; ages that do not ascend are replaced by their
     nearest ascending ones (isotonic regression). InputError if the atlas shrinks.
     """
-    stated, volumes = (
-        np.asarray(weeks, dtype=float),
-        np.asarray(volumes_ml, dtype=float),
-    )
+    stated = np.asarray(weeks, dtype=float)
+    volumes = np.asarray(volumes_ml, dtype=float)
     points = pd.DataFrame({"week": stated, "volume": volumes})
     if len(norm_ml):
         points = pd.concat(
@@ -142,12 +140,10 @@ class AtlasPath:
         """Return the ages by size of the atlas' brains in all its weeks; `norm_ml` as
         for `ages_by_size`."""
         positions = self.shapes.positions[self.observed]
-        volumes = sizes_of(TetrahedralMesh(positions[0], self.tets), positions)[
-            "volume_ml"
-        ]
+        sizes = sizes_of(TetrahedralMesh(positions[0], self.tets), positions)
         return ages_by_size(
             [self.shapes.weeks[number] for number in self.observed],
-            list(volumes),
+            list(sizes["volume_ml"]),
             norm_ml,
         )
 
@@ -174,9 +170,8 @@ class AtlasPath:
         inside = element >= 0
         at_corners = mesh.vertices[pieces[element[inside]]]
         edges = np.moveaxis(at_corners[:, 1:] - at_corners[:, :1], 1, 2)
-        weights = np.linalg.solve(
-            edges, (points[inside] - at_corners[:, 0])[..., None]
-        )[..., 0]
+        offsets = points[inside] - at_corners[:, 0]
+        weights = np.linalg.solve(edges, offsets[..., None])[..., 0]
         weights = np.column_stack([1 - weights.sum(axis=1), weights])
         _, face, on = nearest_on(points[~inside], boundary)
         on_face = barycentric(on, corners(boundary)[face])

@@ -140,10 +140,8 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
             expected=f"at most {MAX_DISTANCE_MM:g} mm on average",
             remedy="Both must have the same pose and week.",
         )
-    offsets, weights = (
-        mesh.vertices - values_at(match, start.vertices),
-        vertex_areas(start),
-    )
+    offsets = mesh.vertices - values_at(match, start.vertices)
+    weights = vertex_areas(start)
     turns = [
         rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces
     ]
@@ -182,11 +180,8 @@ def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floa
     matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
     if matched:
         return np.asarray(follow_surfaces(mesh, matched)[-1])
-    return np.asarray(
-        carry_over_weeks(
-            mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)]
-        )[-1]
-    )
+    deformations = [pair for pair in between if isinstance(pair, Deformation)]
+    return np.asarray(carry_over_weeks(mesh.vertices, deformations)[-1])
 
 
 def carry_regions(

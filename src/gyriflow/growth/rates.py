@@ -66,10 +66,8 @@ def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
         "series", sort=False
     ):
         weekly = brains.groupby("week")[["area_cm2", "volume_ml"]].mean()
-        areas_mm2, volumes_mm3 = (
-            weekly["area_cm2"] / CM2_PER_MM2,
-            weekly["volume_ml"] / ML_PER_MM3,
-        )
+        areas_mm2 = weekly["area_cm2"] / CM2_PER_MM2
+        volumes_mm3 = weekly["volume_ml"] / ML_PER_MM3
         rates = growth_rates(
             weekly.index.tolist(), areas_mm2.tolist(), volumes_mm3.tolist()
         )
@@ -80,10 +78,9 @@ def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
                 volumes_ml = (
                     brains.groupby("week")[f"{tissue}_ml"].mean().to_numpy(dtype=float)
                 )
-                rates[f"{tissue}_ratio"] = volumes_ml[1:] / volumes_ml[:-1]
-                rates[f"{tissue}_compound_rate_per_s"] = np.log(
-                    rates[f"{tissue}_ratio"]
-                ) / (3 * seconds)
+                ratio = volumes_ml[1:] / volumes_ml[:-1]
+                rates[f"{tissue}_ratio"] = ratio
+                rates[f"{tissue}_compound_rate_per_s"] = np.log(ratio) / (3 * seconds)
         tables.append(rates)
     return (
         pd.concat(tables, ignore_index=True)

@@ -78,11 +78,9 @@ def fit_onto_surface(
     without a slit opens to both banks of a sulcus.
     """
     vertices, faces = moving.vertices, moving.faces
-    normals, areas, below = (
-        vertex_normals(surface),
-        vertex_areas(surface),
-        points_below(surface),
-    )
+    normals = vertex_normals(surface)
+    areas = vertex_areas(surface)
+    below = points_below(surface)
     reach_mm = REACH_MM if inner is None else REACH_BY_TISSUE_MM
     for spread in pull_mm:
         moved = TriangleMesh(vertices, faces)
@@ -212,10 +210,8 @@ def fit_body(
     gap_mm = np.inf
     for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
-        last_mm, gap_mm = (
-            gap_mm,
-            float(np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2))),
-        )
+        last_mm = gap_mm
+        gap_mm = float(np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2)))
         if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
@@ -357,10 +353,10 @@ def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -
     )
     if mean > MAX_MISFIT_MM:
         text = (
-            "the shape at GW %g stays %.2f mm from the observed surface on average (95"
-            " %% below %.2f mm): the body "
+            "the shape at GW %g stays %.2f mm from the observed surface on average"
+            " (95 %% below %.2f mm): the body cannot reach all of it without inverted"
+            " elements or crossing folds"
         )
-        text += "cannot reach all of it without inverted elements or crossing folds"
         log.warning(text, week, mean, far)
 
 

@@ -240,13 +240,13 @@ def _places(
 def _descriptions(
     brains: Sequence[ExportedBrain], places: Sequence[Place]
 ) -> dict[str, str]:
-    descriptions = {
-        desc[
-            1:
-        ]: f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
-        for brain, (_, desc) in zip(brains, places, strict=True)
-        if desc
-    }
+    descriptions = {}
+    for brain, (_, desc) in zip(brains, places, strict=True):
+        if desc:
+            descriptions[desc[1:]] = (
+                f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of"
+                " gestation"
+            )
     if any(brain.white for brain in brains):
         descriptions["desc-white"] = (
             "Map on the white surface; those without it are on the pial one"

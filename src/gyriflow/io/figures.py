@@ -43,8 +43,8 @@ def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
 def write_html(path: AnyPath, body: str) -> None:
     """Write a page with the given content, tables first of all."""
     head = (
-        '<!DOCTYPE html>\n<html lang="en">\n<meta'
-        f' charset="utf-8">\n<style>{TABLE_LOOK}</style>'
+        '<!DOCTYPE html>\n<html lang="en">\n<meta charset="utf-8">\n'
+        f"<style>{TABLE_LOOK}</style>"
     )
     write_text(path, f"{head}\n{body}\n</html>\n")
 
@@ -63,10 +63,8 @@ def picture_addresses(
 
 def _coded(path: AnyPath, width: int) -> tuple[str, float]:
     with Image.open(path) as picture:
-        image, inches = (
-            picture.convert("RGB"),
-            float(picture.width / picture.info["dpi"][0]),
-        )
+        image = picture.convert("RGB")
+        inches = float(picture.width / picture.info["dpi"][0])
     if image.width > width:
         image = image.resize(
             (width, round(image.height * width / image.width)), Image.Resampling.LANCZOS

@@ -81,10 +81,8 @@ def _time_series(data_name: str, file: h5py.File) -> str:
             field: (values, f"{where}/{CELL_FIELDS}/{field}")
             for field, values in cell_fields.items()
         }
-        cells, points = (
-            (tets, f"{data_name}:/tets"),
-            (frame[POSITIONS], f"{where}/{POSITIONS}"),
-        )
+        cells = (tets, f"{data_name}:/tets")
+        points = (frame[POSITIONS], f"{where}/{POSITIONS}")
         grids.append(
             grid(
                 name,

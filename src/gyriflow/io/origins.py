@@ -21,9 +21,8 @@ def origin_key(origin: Any, contents_by_path: Mapping[str, str]) -> str | None:
         described = _with_contents(origin, contents_by_path)
     except KeyError:
         return None
-    return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[
-        :12
-    ]
+    text = json.dumps(described, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def present_key(origin: Any) -> str | None:

@@ -288,10 +288,8 @@ def read_surface_map(
             f"{intent_codes.niistring[array.intent]} {array.data.shape}"
             for array in arrays
         ]
-        problem, expected = (
-            "is not a map of one value per vertex",
-            "one array of numbers (.shape.gii, .func.gii)",
-        )
+        problem = "is not a map of one value per vertex"
+        expected = "one array of numbers (.shape.gii, .func.gii)"
         raise InputError(
             problem, path=path, found=", ".join(kinds) or "none", expected=expected
         )
@@ -397,10 +395,8 @@ def _read_obj(path: Path) -> RawSurface:
     with path.open("rb") as file:
         start = file.read(START_BYTES)
     if start.startswith(b"p") and b"\0" in start:
-        problem, expected = (
-            "is a binary .obj file of the MNI",
-            "its form as text, or another format such as GIFTI",
-        )
+        problem = "is a binary .obj file of the MNI"
+        expected = "its form as text, or another format such as GIFTI"
         raise InputError(problem, path=path, expected=expected)
     return _read_mni_obj(path) if MNI_OBJ.match(start) else _read_with_trimesh(path)
 

@@ -41,8 +41,8 @@ def grid(
     kind, count = XDMF_TOPOLOGY[cells[0].shape[1]], len(cells[0])
     parts = [] if time is None else [f'<Time Value="{time}"/>']
     parts.append(
-        f'<Topology TopologyType="{kind}"'
-        f' NumberOfElements="{count}">{_data_item(*cells)}</Topology>'
+        f'<Topology TopologyType="{kind}" NumberOfElements="{count}">'
+        f"{_data_item(*cells)}</Topology>"
     )
     parts.append(f'<Geometry GeometryType="XYZ">{_data_item(*points)}</Geometry>')
     for centre, fields in (("Node", vertex_fields), ("Cell", cell_fields)):
@@ -50,8 +50,8 @@ def grid(
             kind = XDMF_ATTRIBUTE[1 if values.ndim == 1 else values.shape[1]]
             item = _data_item(values, where)
             parts.append(
-                f'<Attribute Name="{field}" AttributeType="{kind}"'
-                f' Center="{centre}">{item}</Attribute>'
+                f'<Attribute Name="{field}" AttributeType="{kind}" Center="{centre}">'
+                f"{item}</Attribute>"
             )
     return f'<Grid Name="{name}" GridType="Uniform">{"".join(parts)}</Grid>'
 
@@ -87,10 +87,8 @@ def write_tetrahedral_mesh(
         file["tets"], file["vertices"] = mesh.tets, mesh.vertices
         for name, (values, _) in fields.items():
             file[f"Cell/{name}"] = values
-    cells, points = (
-        (mesh.tets, f"{data.name}:/tets"),
-        (mesh.vertices, f"{data.name}:/vertices"),
-    )
+    cells = (mesh.tets, f"{data.name}:/tets")
+    points = (mesh.vertices, f"{data.name}:/vertices")
     write_text(path, document(grid("mesh", cells, points, {}, fields)))
 
 

@@ -38,10 +38,8 @@ class UnfinishedSeries:
         """Write the (w, n, 3) positions in mm at the weeks so far; `stops` are those
         without an observed brain."""
         with new_hdf5(self.folder / FILE) as file:
-            file["weeks"], file["stops"] = (
-                np.array(list(weeks)),
-                np.array(list(stops), dtype=np.float64),
-            )
+            file["weeks"] = np.array(list(weeks))
+            file["stops"] = np.array(list(stops), dtype=np.float64)
             # in full precision: folds may lie closer to each other than that of a
             # result
             file["positions"] = positions

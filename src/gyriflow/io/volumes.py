@@ -158,10 +158,8 @@ def read_values(
         values = _stored_values(image, path)
     shape = tuple(n for axis, n in enumerate(values.shape) if axis < 3 or n != 1)
     if len(shape) != 3 or values.dtype.kind not in "biuf":
-        form, problem = (
-            f"shape {values.shape}, type {values.dtype}",
-            f"is not a volume of {content}",
-        )
+        form = f"shape {values.shape}, type {values.dtype}"
+        problem = f"is not a volume of {content}"
         expected = "three axes (further ones of length 1) of numbers"
         raise InputError(problem, path=path, found=form, expected=expected)
     affine = np.array(_affine(image, affine_from, path), dtype=float)
@@ -369,9 +367,8 @@ def _nifti_affine(
     if len(present) == 2:
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
         difference = matrices["sform"] - matrices["qform"]
-        ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]])).reshape(
-            3, -1
-        )
+        ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]]))
+        ends = ends.reshape(3, -1)
         distance = float(
             np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max()
         )
@@ -392,10 +389,8 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
     except KeyError:
         unit = ""
     if unit not in MM_PER_NIFTI_UNIT:
-        problem, expected = (
-            "has a unit of length that is not in NIfTI",
-            "2 (mm), 1 (metres), 3 (micrometres) or 0",
-        )
+        problem = "has a unit of length that is not in NIfTI"
+        expected = "2 (mm), 1 (metres), 3 (micrometres) or 0"
         raise InputError(
             problem, path=path, found=f"xyzt_units {code}", expected=expected
         )
@@ -431,16 +426,12 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
                 error,
             )
         values = np.rint(values)
-    least, largest, bounds = (
-        values.min(initial=0),
-        values.max(initial=0),
-        np.iinfo(np.int32),
-    )
+    least = values.min(initial=0)
+    largest = values.max(initial=0)
+    bounds = np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:
-        span, expected = (
-            f"{least:.6g} to {largest:.6g}",
-            f"whole numbers up to {bounds.max}",
-        )
+        span = f"{least:.6g} to {largest:.6g}"
+        expected = f"whole numbers up to {bounds.max}"
         raise InputError(
             "contains values that are not tissue labels",
             path=path,

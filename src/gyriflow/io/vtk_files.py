@@ -57,9 +57,8 @@ def _little_endian_surface(content: bytes) -> tuple[NDArray, NDArray] | None:
     polygons = LEGACY_POLYGONS.match(content, end)
     if polygons is None or int(polygons[2]) != 4 * int(polygons[1]):
         return None
-    cells = np.frombuffer(content, "<i4", int(polygons[2]), polygons.end()).reshape(
-        -1, 4
-    )
+    numbers = np.frombuffer(content, "<i4", int(polygons[2]), polygons.end())
+    cells = numbers.reshape(-1, 4)
     if (cells[:, 0] != 3).any():
         return None
     return np.frombuffer(content[head.end() : end], kind).reshape(-1, 3), cells[:, 1:]

@@ -198,11 +198,9 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     relative to it (see `fidelity`). Quadratic elements are measured on the triangles
     between nodes. `gap_kept` is None without gaps.
     """
-    ratios, angles, volumes = (
-        tetrahedra.radius_ratios(mesh),
-        dihedral_angles(mesh),
-        tetrahedra.signed_volumes(mesh),
-    )
+    ratios = tetrahedra.radius_ratios(mesh)
+    angles = dihedral_angles(mesh)
+    volumes = tetrahedra.signed_volumes(mesh)
     boundary, _ = tetrahedra.boundary_surface(mesh)
     walls = gap_walls(surface)
     return {
@@ -262,10 +260,8 @@ def refuse_bad_mesh(
                 f" {values[worst]:.4g} at {place} mm"
             )
             faults.append((fault, f"{name} at least {least:g}"))
-    change, distance = (
-        summary["volume_change"],
-        summary["surface_distance_mm"]["hausdorff99"],
-    )
+    change = summary["volume_change"]
+    distance = summary["surface_distance_mm"]["hausdorff99"]
     if abs(change) > max_volume_change:
         fault = (
             f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} %"

@@ -241,15 +241,11 @@ def _balls(
     for start in range(0, len(vertices), CHUNK):
         centres = np.arange(start, min(start + CHUNK, len(vertices)))
         reached = np.zeros((len(centres), len(vertices)), dtype=bool)
-        found, ring = (
-            [],
-            sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr"),
-        )
+        found = []
+        ring = sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr")
         while ring.nnz:
-            row, column = (
-                np.repeat(np.arange(len(centres)), np.diff(ring.indptr)),
-                ring.indices,
-            )
+            row = np.repeat(np.arange(len(centres)), np.diff(ring.indptr))
+            column = ring.indices
             offset = vertices[column] - vertices[centres[row]]
             is_new = ~reached[row, column] & (
                 np.einsum("ij,ij->i", offset, offset) < radii_mm[centres[row]] ** 2
@@ -311,9 +307,8 @@ def _fit(
     values = np.linalg.eigvalsh(matrices)
     fitted = values[:, 0] > 1e-9 * np.abs(values[:, -1])
     coefficients = np.zeros((len(centres), 6))
-    coefficients[fitted] = np.linalg.solve(matrices[fitted], right[fitted, :, None])[
-        ..., 0
-    ]
+    solved = np.linalg.solve(matrices[fitted], right[fitted, :, None])
+    coefficients[fitted] = solved[..., 0]
     # back from units of the radius
     coefficients *= radii_mm[centres, None] ** np.array([-1, -1, -1, 0, 0, 1])
     return coefficients, fitted

@@ -85,10 +85,8 @@ def envelope(mesh: TriangleMesh) -> TriangleMesh:
     0.3 % small.
     """
     document = in_meshlab(cap(mesh))
-    alpha, offset = (
-        pymeshlab.PureValue(ENVELOPE_RADIUS_MM),
-        pymeshlab.PureValue(ENVELOPE_OFFSET_MM),
-    )
+    alpha = pymeshlab.PureValue(ENVELOPE_RADIUS_MM)
+    offset = pymeshlab.PureValue(ENVELOPE_OFFSET_MM)
     document.generate_alpha_wrap(alpha=alpha, offset=offset)
     outside = from_meshlab(document)
     return TriangleMesh(

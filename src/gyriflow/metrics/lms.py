@@ -81,10 +81,8 @@ class WeeklyNorm:
     freedom: float
 
     def _bases(self, weeks: ArrayLike) -> tuple[Floats, Floats]:
-        at, sizes = (
-            np.atleast_1d(np.asarray(weeks, dtype=float)),
-            (len(self.location), len(self.scale)),
-        )
+        at = np.atleast_1d(np.asarray(weeks, dtype=float))
+        sizes = (len(self.location), len(self.scale))
         location, scale = (
             _basis(at, self.first, self.last, size, self.is_spline) for size in sizes
         )
@@ -94,10 +92,8 @@ class WeeklyNorm:
         """Return the variances of the location, in squared scales, and of ln S at
         weeks."""
         size, end = len(self.location), len(self.location) + len(self.scale)
-        location, scale = (
-            self.covariance[:size, :size],
-            self.covariance[size:end, size:end],
-        )
+        location = self.covariance[:size, :size]
+        scale = self.covariance[size:end, size:end]
         return _squares(locations, location) * np.exp(
             -2 * (scales @ self.scale)
         ), _squares(scales, scale)
@@ -179,10 +175,8 @@ class WeeklyNorm:
         left = 1 - np.minimum(self._errors(locations, scales)[0], MAX_LEVERAGE)
         slope = _slope(terms, locations, scales, np.ones(1), left)
         step, size = self.covariance @ slope[: len(self.covariance)], len(self.location)
-        location, scale = (
-            self.location - step[:size],
-            self.scale - step[size : size + len(self.scale)],
-        )
+        location = self.location - step[:size]
+        scale = self.scale - step[size : size + len(self.scale)]
         skewness = self.skewness - float(step[size + len(self.scale) :].sum())
         return replace(
             self,
@@ -257,10 +251,8 @@ def fit_norm(
     variance = float(weights @ (start - rows @ location) ** 2) / max(
         subjects - freedom, 1.0
     )
-    has_scatter, unit = (
-        variance > MIN_SCATTER**2,
-        max(float(np.sqrt(variance)), MIN_SCATTER),
-    )
+    has_scatter = variance > MIN_SCATTER**2
+    unit = max(float(np.sqrt(variance)), MIN_SCATTER)
     with_skewness = is_positive and subjects >= MIN_SUBJECTS_FOR_SKEWNESS
     mean = np.zeros(size + scale_size + with_skewness)
     mean[size + scale_size :] = SKEWNESS
@@ -273,10 +265,8 @@ def fit_norm(
     fit: Floats = mean.copy()
     fit[:size], fit[size] = location / unit, np.log(unit)
     for number in range(ROUNDS):
-        log_scale, skewness = (
-            scale_rows @ fit[size : size + scale_size],
-            _skewness(fit, with_skewness, is_positive),
-        )
+        log_scale = scale_rows @ fit[size : size + scale_size]
+        skewness = _skewness(fit, with_skewness, is_positive)
         terms = _terms(rows @ fit[:size], log_scale, skewness, values, is_positive)
         scans = scans.correlated(terms.z)
         information, left = _information(
@@ -307,16 +297,12 @@ def fit_norm(
             first,
             last,
         )
-    skewness, inverse = (
-        _skewness(fit, with_skewness, is_positive),
-        np.linalg.inv(information),
-    )
+    skewness = _skewness(fit, with_skewness, is_positive)
+    inverse = np.linalg.inv(information)
     if scans.correlation is not None:
         # the scatter of the slopes with correlated scans
-        scatter, parts = (
-            information.copy(),
-            (slice(0, size), slice(size, size + scale_size)),
-        )
+        scatter = information.copy()
+        parts = (slice(0, size), slice(size, size + scale_size))
         scaled_rows = (
             rows * np.exp(-log_scale)[:, None],
             np.sqrt(2 * left)[:, None] * scale_rows,

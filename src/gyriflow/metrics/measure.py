@@ -103,12 +103,11 @@ def hemisphere_spectra(
     basis = spectral_basis(mesh, spangy_modes, mass)
     # values near a cut are not reliable and are replaced by a harmonic continuation
     reliable = np.flatnonzero(curvature_maps.reliable)
-    values = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])[
-        reliable
-    ]
-    maps = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(
-        values
-    ).T
+    values = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])
+    continued = harmonic_continuation(
+        mesh.vertices, mesh.faces, reliable, tolerance=1e-12
+    )
+    maps = continued(values[reliable]).T
     radius = float(curvature_maps.radius_mm.mean())
     return {
         proxy: spectrum(proxy_map, basis, radius_mm=radius)
@@ -176,14 +175,10 @@ def size_metrics(
 
     The area of the whole is that of its `hemispheres`, without caps of medial walls.
     """
-    volume, cm2 = (
-        volume_ml(cap(mesh)),
-        sum(map(area_cm2, hemispheres)) or area_cm2(mesh),
-    )
-    relative, crossing = (
-        cm2 / volume ** (2 / 3) if volume > 0 else np.nan,
-        float(crossing_faces(mesh)),
-    )
+    volume = volume_ml(cap(mesh))
+    cm2 = sum(map(area_cm2, hemispheres)) or area_cm2(mesh)
+    relative = cm2 / volume ** (2 / 3) if volume > 0 else np.nan
+    crossing = float(crossing_faces(mesh))
     return {
         "volume": volume,
         "area": cm2,

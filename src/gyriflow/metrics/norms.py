@@ -348,10 +348,8 @@ def _score(
             individuals=cohort.individuals
         ):
             return {"brains": subjects, "flag": "too few brains"}
-        is_single, scan = (
-            len(brains) == norm.subjects,
-            (float(own["week"].iloc[0]), float(own["value"].iloc[0])),
-        )
+        is_single = len(brains) == norm.subjects
+        scan = (float(own["week"].iloc[0]), float(own["value"].iloc[0]))
         if (
             is_single
             and not is_small

@@ -147,10 +147,8 @@ def spectral_basis(
     same matrix. MeshError where the surface is not in one piece.
     """
     stiffness, matrix = laplacian(mesh, mass)
-    first, places = (
-        first_eigenvalue(stiffness, matrix),
-        sparse.eye(len(mesh.vertices), format="csr"),
-    )
+    first = first_eigenvalue(stiffness, matrix)
+    places = sparse.eye(len(mesh.vertices), format="csr")
     energy = (
         matrix
         if mass == "consistent"

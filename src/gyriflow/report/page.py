@@ -162,11 +162,9 @@ def study_page(
     and `tests`, the output of `compare.accuracy.prediction_facts`.
     """
     runs, validation, centiles = tables.runs, tables.validation, tables.centiles
-    title, sentence, scores = (
-        "Measured cortical folding",
-        quality_verdict(tables.quality),
-        "",
-    )
+    title = "Measured cortical folding"
+    sentence = quality_verdict(tables.quality)
+    scores = ""
     if runs is not None:
         title = (
             f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
@@ -431,10 +429,8 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
 
     Where the atlas' own brain was better, that comes first.
     """
-    rows, weeks_ahead = (
-        pd.DataFrame(prediction["accuracy"]["rows"]),
-        prediction["week"] - prediction["start_week"],
-    )
+    rows = pd.DataFrame(prediction["accuracy"]["rows"])
+    weeks_ahead = prediction["week"] - prediction["start_week"]
     # the next longer horizon that was tested, or the longest
     horizon = min(
         (tested for tested in rows["horizon"] if tested >= weeks_ahead - 1e-6),
@@ -528,11 +524,9 @@ def verdict(
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and the limitations of its folds."""
     # the table has the list as JSON
-    reached, end, order = (
-        max(json.loads(run["weeks"])),
-        float(run["end_week"]),
-        int(run["order"]),
-    )
+    reached = max(json.loads(run["weeks"]))
+    end = float(run["end_week"])
+    order = int(run["order"])
     words = [
         (
             f"reached {week_label(reached)}"

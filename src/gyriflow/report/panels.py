@@ -150,11 +150,9 @@ def panel_grid(
         0.15 * -(-len(legend) // legend_columns) + 0.16,
     )
     total = _TOP_IN + _dots(foot_in) + sum(heights.sum() for heights in heights_in)
-    figure, top, letters = (
-        Figure(figsize=(width, total)),
-        total - _TOP_IN,
-        iter(ascii_lowercase),
-    )
+    figure = Figure(figsize=(width, total))
+    top = total - _TOP_IN
+    letters = iter(ascii_lowercase)
     for block, block_rows, heights in zip(blocks, drawn, heights_in, strict=True):
         ends = {
             "left": left / width,
@@ -334,9 +332,8 @@ def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Float
     Vectors of length 1 or more give lines as long as a cube.
     """
     normals = vertex_normals(mesh)
-    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[
-        1
-    ]
+    cubes = np.floor(mesh.vertices / LINES_MM)
+    _, vertices = np.unique(cubes, axis=0, return_index=True)
     vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
     half = (
         directions[vertices]

@@ -55,18 +55,14 @@ DIRECTION_QUANTILE = 0.9
 ABSENT = "ended\nbefore\nthis week"
 """Text in place of a run that ended before the week."""
 ZONE_COLOURS = {
-    **{
-        "free": "#D55E00",
-        "clamped": "#009E73",
-        "left contact": "#0072B2",
-        "right contact": RIGHT_COLOUR,
-    },
-    **{
-        "between planes": "#CC79A7",
-        "base": "#999999",
-        "side x": "#56B4E9",
-        "side y": "#E69F00",
-    },
+    "free": "#D55E00",
+    "clamped": "#009E73",
+    "left contact": "#0072B2",
+    "right contact": RIGHT_COLOUR,
+    "between planes": "#CC79A7",
+    "base": "#999999",
+    "side x": "#56B4E9",
+    "side y": "#E69F00",
     "medial wall": "#8C6D31",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and
@@ -225,8 +221,9 @@ def displacement_maps(frames: Mapping[str, Mapping[float, SurfaceMaps]]) -> Figu
         place = mesh.vertices[int(np.nanargmax(norms))]
         where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
         words = (
-            f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean"
-            f" {np.nanmean(norms):.2f} mm"
+            f"max {np.nanmax(norms):.2f} mm\n"
+            f"at {where}\n"
+            f"mean {np.nanmean(norms):.2f} mm"
         )
         return replace(_mapped((mesh, norms), scale), caption=words, mark=place)
 
@@ -258,9 +255,8 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
         return colour_scale(record.colours, *record.limits)
     finite = values[np.isfinite(values)]
     # below zero by more than rounding
-    signed = record.is_signed or finite.min(initial=0.0) < -ROUNDING * np.abs(
-        finite
-    ).max(initial=0.0)
+    rounding = ROUNDING * np.abs(finite).max(initial=0.0)
+    signed = record.is_signed or finite.min(initial=0.0) < -rounding
     sizes = np.abs(finite) if signed else finite
     high = float(np.quantile(sizes, record.quantile)) if len(sizes) else 1.0
     end = round_up(high) if high > 0 else 1.0
@@ -417,10 +413,8 @@ def influence_picture(
         for name, halves in brains.items()
         if halves
     }
-    scale, colours = (
-        scale_of("shape_index", np.empty(0)),
-        {observed_name: OBSERVED_SURFACE_COLOUR},
-    )
+    scale = scale_of("shape_index", np.empty(0))
+    colours = {observed_name: OBSERVED_SURFACE_COLOUR}
     groups = {
         "": {
             name: plain_panel(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR))

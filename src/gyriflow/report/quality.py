@@ -170,10 +170,8 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
     """Draw three planes through the middle, the sagittal one through the middle of a
     hemisphere."""
     low, high = brain.pial.vertices.min(axis=0), brain.pial.vertices.max(axis=0)
-    middle, fissure = (
-        (low + high) / 2,
-        float(np.clip(brain.fissure_x_mm, low[0], high[0])),
-    )
+    middle = (low + high) / 2
+    fissure = float(np.clip(brain.fissure_x_mm, low[0], high[0]))
     # the larger hemisphere, of equal ones the right one
     outer = high[0] if high[0] - fissure > 0.8 * (fissure - low[0]) else low[0]
     at = {"coronal": middle[1], "axial": middle[2], "sagittal": (fissure + outer) / 2}
@@ -190,11 +188,9 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
     )
     for axes, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
         points = np.empty((len(dots[up]), len(dots[right]), 3))
-        points[..., normal], points[..., right], points[..., up] = (
-            at[plane],
-            dots[right],
-            dots[up][:, None],
-        )
+        points[..., normal] = at[plane]
+        points[..., right] = dots[right]
+        points[..., up] = dots[up][:, None]
         style: dict[str, Any] = {
             "origin": "lower",
             "extent": (*ends[right], *ends[up]),

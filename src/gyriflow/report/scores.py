@@ -71,10 +71,8 @@ def _gain_line(
     """Draw a gain with its interval; filled marks are explained weeks, open ones
     predicted."""
     gain = rows[f"gain_{measure}"]
-    below, above = (
-        gain - rows[f"gain_low_{measure}"],
-        rows[f"gain_high_{measure}"] - gain,
-    )
+    below = gain - rows[f"gain_low_{measure}"]
+    above = rows[f"gain_high_{measure}"] - gain
     lengths = np.stack([below, above]).clip(min=0)
     axes.errorbar(x, gain, yerr=lengths, color=colour, linewidth=1.0, elinewidth=0.7)
     for kind, face in (("explained", colour), ("predicted", "white")):

@@ -132,10 +132,8 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
             scale=1,
             width=0.005,
         )
-        (left, bottom), (right, top) = (
-            points.min(axis=0) - ARROW_MM,
-            points.max(axis=0) + ARROW_MM,
-        )
+        left, bottom = points.min(axis=0) - ARROW_MM
+        right, top = points.max(axis=0) + ARROW_MM
         for axes in row:
             axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
             axes.set_axis_off()

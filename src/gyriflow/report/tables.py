@@ -32,36 +32,36 @@ _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+| %| \([+−][\d.]+\))?|–")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TABLE = Environment(autoescape=True).from_string(
-    "<table><thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor"
-    " %}</tr></thead>\n<tbody>{% for row in rows %}<tr>{% for kind, text in row %}<td"
-    ' class="{{ kind }}">{{ text }}</td>{% endfor %}</tr>\n{% endfor %}</tbody></table>'
+    "<table><thead><tr>"
+    "{% for head in heads %}<th>{{ head }}</th>{% endfor %}"
+    "</tr></thead>\n"
+    "<tbody>{% for row in rows %}<tr>"
+    '{% for kind, text in row %}<td class="{{ kind }}">{{ text }}</td>{% endfor %}'
+    "</tr>\n{% endfor %}</tbody></table>"
 )
 
 COMMON_PARAMETERS = (
-    *(
-        "thickness_mm",
-        "shear_modulus_cortex_pa",
-        "shear_modulus_core_pa",
-        "material",
-        "poisson_ratio",
-    ),
-    *(
-        "growth_of",
-        "growth_rate_per_s",
-        "core_growth_rate_per_s",
-        "stress_memory_gw",
-        "support",
-    ),
-    *(
-        "contact.kind",
-        "no_growth.kind",
-        "step_s",
-        "tets",
-        "order",
-        "elements_through_cortex",
-        "element_error_percent",
-    ),
-    *("steps", "newton", "seconds", "peak_memory_MiB"),
+    "thickness_mm",
+    "shear_modulus_cortex_pa",
+    "shear_modulus_core_pa",
+    "material",
+    "poisson_ratio",
+    "growth_of",
+    "growth_rate_per_s",
+    "core_growth_rate_per_s",
+    "stress_memory_gw",
+    "support",
+    "contact.kind",
+    "no_growth.kind",
+    "step_s",
+    "tets",
+    "order",
+    "elements_through_cortex",
+    "element_error_percent",
+    "steps",
+    "newton",
+    "seconds",
+    "peak_memory_MiB",
 )
 """Parameters and summaries that are listed even if all runs share them."""
 MESH_MEASURES = {

@@ -2,6 +2,7 @@
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -27,11 +28,9 @@ _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
 _DRAWN = [name for name, record in VERTEX_MAPS.items() if record.colours]
 # base64 writes three bytes as four letters; a vertex has about two triangles, of three
 # indices of two bytes
-_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = (
-    4 / 3,
-    6 + len(_DRAWN),
-    12,
-)
+_LETTERS_PER_BYTE = 4 / 3
+_BYTES_PER_FRAME = 6 + len(_DRAWN)
+_BYTES_PER_TRIANGULATION = 12
 
 Timed = tuple[float, TriangleMesh, dict[str, Floats]]
 """A week, a surface in RAS+ mm and its maps by name; NaN for unknown values."""
@@ -59,9 +58,7 @@ def surfaces_view(
         for name, frames in runs.items()
     }
     observed_frames = [_timed(*frame) for frame in observed]
-    everything = [
-        frame for frames in simulated.values() for frame in frames
-    ] + observed_frames
+    everything = [*chain.from_iterable(simulated.values()), *observed_frames]
     if not everything:
         return {"groups": [], "maps": []}
     bytes_per_vertex = (
@@ -119,9 +116,8 @@ def surfaces_view(
     maps = []
     for name, scale in scales.items():
         bottom, top = scale.get_clim()
-        colours = scale.to_rgba(
-            np.linspace(bottom, top, _VALUE_LEVELS + 1), bytes=True
-        )[:, :3]
+        levels = np.linspace(bottom, top, _VALUE_LEVELS + 1)
+        colours = scale.to_rgba(levels, bytes=True)[:, :3]
         maps.append(
             {
                 "name": name,

@@ -217,10 +217,8 @@ def metrics_chart(
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     rows, titles = _shown(whole, Shown.CHART)
     colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == MEASURED]
-    markers, (shades, entries) = (
-        subject_markers(whole, subjects),
-        group_shades(groups, colours),
-    )
+    markers = subject_markers(whole, subjects)
+    shades, entries = group_shades(groups, colours)
     marks = observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
     figure, _ = weeks_chart(titles, [*run_lines(rows, colours), *marks], whole["week"])
     named = [*(subjects if markers else ()), *shades]
@@ -291,10 +289,8 @@ def norms_chart(
     norm = curves[(curves["hemisphere"] == "whole") & curves["metric"].isin(titles)]
     norm = norm.assign(panel=norm["metric"])
     colours = run_colours(whole["run"], runs)
-    markers, (shades, extra) = (
-        subject_markers(whole, subjects),
-        group_shades(groups, colours),
-    )
+    markers = subject_markers(whole, subjects)
+    shades, extra = group_shades(groups, colours)
     observed = rows[rows["run"] == MEASURED]
     own, others = (
         observed[observed["subject"].isin(reference) == is_own]
@@ -348,14 +344,11 @@ def regions_chart(
     asymmetry_index.
     """
     rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
-    colours, lines = (
-        region_colours(rows["region"]),
-        dict(zip(run_colours(rows["run"]), LINES, strict=False)),
-    )
+    colours = region_colours(rows["region"])
+    lines = dict(zip(run_colours(rows["run"]), LINES, strict=False))
     # both sides together
-    rows = rows.groupby(["panel", "subject", "run", "week", "region"], sort=False)[
-        "value"
-    ].agg(["sum", "mean"])
+    keys = ["panel", "subject", "run", "week", "region"]
+    rows = rows.groupby(keys, sort=False)["value"].agg(["sum", "mean"])
     rows = rows.reset_index().assign(
         value=lambda both: both["sum"].where(both["panel"] == "area", both["mean"])
     )
@@ -494,14 +487,10 @@ def displacement_chart(
     ("all" or "pial"), max_mm, mean_mm; that of `published` has `from_weeks` (intervals
     of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
-    named, moved = (
-        runs_by_name(displacement),
-        published["displacement"] if published else {"from_weeks": [], "rows": []},
-    )
-    colours, weeks = (
-        run_colours(named["run"], runs),
-        np.array(moved["from_weeks"], dtype=float),
-    )
+    named = runs_by_name(displacement)
+    moved = published["displacement"] if published else {"from_weeks": [], "rows": []}
+    colours = run_colours(named["run"], runs)
+    weeks = np.array(moved["from_weeks"], dtype=float)
     markers = dict(
         zip(
             dict.fromkeys(row["source"] for row in moved["rows"]),
@@ -516,10 +505,8 @@ def displacement_chart(
         for row in moved["rows"]
     ]
     rows = pd.concat([*tables, named[named["nodes"] == "all"]])
-    rows["week"], duration = (
-        (rows["from_week"] + rows["to_week"]) / 2,
-        rows["to_week"] - rows["from_week"],
-    )
+    rows["week"] = (rows["from_week"] + rows["to_week"]) / 2
+    duration = rows["to_week"] - rows["from_week"]
     titles = {
         "max_mm": "maximal displacement, all nodes",
         "mean_mm": "mean displacement, all nodes",
@@ -559,9 +546,8 @@ def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.Da
     trusted = (
         spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
     )
-    return spectra.assign(trusted=trusted)[
-        spectra["band"].isin(bands) & (spectra["proxy"] == proxy)
-    ]
+    is_shown = spectra["band"].isin(bands) & (spectra["proxy"] == proxy)
+    return spectra.assign(trusted=trusted)[is_shown]
 
 
 def _beyond_the_modes(

@@ -222,10 +222,8 @@ def _path_from(study: Study, brain: str) -> Chain:
 
 def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
     """Predict the time for the shapes that an atlas' growth gives a start brain."""
-    chain, file = (
-        study.chains[brain, origin],
-        TARGETS.format(brain=brain, origin=origin),
-    )
+    chain = study.chains[brain, origin]
+    file = TARGETS.format(brain=brain, origin=origin)
     end = max(
         simulation.weeks[-1]
         for simulation in study.simulations.values()

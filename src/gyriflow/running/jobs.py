@@ -17,10 +17,11 @@ from ..step import USAGE_COLUMNS
 NEXT = r"(?!\d{4}-\d\d-\d\d |warning: |gyriflow: )"
 """Lookahead: the line does not begin another message."""
 MESSAGE = re.compile(
-    r"^\d{4}-\d\d-\d\d \S+ (?P<level>WARNING|ERROR) (?P<logger>\S+):"
-    rf" (?P<logged>.*(?:\n{NEXT}.*)*)"
+    r"^\d{4}-\d\d-\d\d \S+ (?P<level>WARNING|ERROR) (?P<logger>\S+): "
+    rf"(?P<logged>.*(?:\n{NEXT}.*)*)"
     # a simulation is a program whose output is its log
-    r"|^(?:gyriflow: )?warning: (?P<warning>.+)|^gyriflow: (?P<error>.+(?:\n {2,}.+)*)",
+    r"|^(?:gyriflow: )?warning: (?P<warning>.+)"
+    r"|^gyriflow: (?P<error>.+(?:\n {2,}.+)*)",
     re.MULTILINE,
 )
 OWN_LOGGERS = ("", "root", "__main__")
@@ -141,10 +142,8 @@ def gather_messages(
     Subject and run are empty if not applicable. Only logs written after `since_s` (s
     since the epoch) are read.
     """
-    folder, known = (
-        Path(folder),
-        {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)},
-    )
+    folder = Path(folder)
+    known = {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)}
     rows = []
     for path in sorted(folder.glob("results/*/**/logs/*.log")):
         kind, *names = path.relative_to(folder / "results").parts[:-2]

@@ -47,40 +47,35 @@ GRACE_S = 4.0
 """Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers
 allow 10 s or more in all."""
 READ_ONLY_OPTIONS = (
-    *(
-        "dryrun",
-        "nolock",
-        "summary",
-        "detailed_summary",
-        "rulegraph",
-        "dag",
-        "filegraph",
-        "list_rules",
-        "lint",
-    ),
+    "dryrun",
+    "nolock",
+    "summary",
+    "detailed_summary",
+    "rulegraph",
+    "dag",
+    "filegraph",
+    "list_rules",
+    "lint",
 )
 """Options with which Snakemake runs nothing and takes no lock."""
 VERBOSE_OPTIONS = (
-    *(
-        "verbose",
-        "quiet",
-        "printshellcmds",
-        "logger",
-        "debug",
-        "debug_dag",
-        "unlock",
-        "touch",
-        "report",
-        "archive",
-    ),
-    *(
-        "delete_all_output",
-        "delete_temp_output",
-        "cleanup_metadata",
-        "list_changes",
-        "list_input_changes",
-    ),
-    *("list_params_changes", "generate_unit_tests"),
+    "verbose",
+    "quiet",
+    "printshellcmds",
+    "logger",
+    "debug",
+    "debug_dag",
+    "unlock",
+    "touch",
+    "report",
+    "archive",
+    "delete_all_output",
+    "delete_temp_output",
+    "cleanup_metadata",
+    "list_changes",
+    "list_input_changes",
+    "list_params_changes",
+    "generate_unit_tests",
 )
 """Options that ask for Snakemake's own messages, or for something else than running
 steps."""
@@ -222,9 +217,8 @@ def refused_brains() -> dict[str, str]:
 def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
     """Return the causes of the brains that had a failed step since a time (s since the
     epoch), by id."""
-    from .jobs import (
-        gather_messages,
-    )  # takes a second to import, and only failed runs need it
+    # takes a second to import, and only failed runs need it
+    from .jobs import gather_messages
 
     brains = [folder.name for folder in directory.glob("results/brains/*")]
     messages = gather_messages(directory, brains, [], since_s=since_s)
@@ -439,9 +433,8 @@ def main(arguments: Sequence[str]) -> int:
     own."""
     # the program name in Snakemake's usage messages
     sys.argv[0] = "snakemake"
-    from snakemake import (
-        cli,
-    )  # takes a second to import; the Snakefile imports this module without needing it
+    # takes a second to import; the Snakefile imports this module without needing it
+    from snakemake import cli
 
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)

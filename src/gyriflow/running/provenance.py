@@ -17,37 +17,32 @@ from ..settings.root import Config
 from ..version import commit, version
 
 PACKAGES = (
-    *(
-        "fenics-dolfinx",
-        "dolfinx-solver-real",
-        "fenics-basix",
-        "fenics-ffcx",
-        "fenics-ufl",
-        "petsc4py",
-        "mpi4py",
-    ),
-    *("mpich", "numpy"),
-    *(
-        "scipy",
-        "snakemake",
-        "nibabel",
-        "scikit-image",
-        "pymeshlab",
-        "pytetwild",
-        "trimesh",
-        "libigl",
-        "ipctk",
-    ),
-    *(
-        "pandas",
-        "picsl-greedy",
-        "SimpleITK",
-        "pyvista",
-        "vtk",
-        "matplotlib",
-        "h5py",
-        "pydantic",
-    ),
+    "fenics-dolfinx",
+    "dolfinx-solver-real",
+    "fenics-basix",
+    "fenics-ffcx",
+    "fenics-ufl",
+    "petsc4py",
+    "mpi4py",
+    "mpich",
+    "numpy",
+    "scipy",
+    "snakemake",
+    "nibabel",
+    "scikit-image",
+    "pymeshlab",
+    "pytetwild",
+    "trimesh",
+    "libigl",
+    "ipctk",
+    "pandas",
+    "picsl-greedy",
+    "SimpleITK",
+    "pyvista",
+    "vtk",
+    "matplotlib",
+    "h5py",
+    "pydantic",
 )
 """Packages whose versions are recorded because results depend on them."""
 STUDY_RECORD = Path("results", "study", "study.json")
@@ -121,10 +116,8 @@ def check_results_belong_to(
             "Choose another --directory, or delete these results (or only"
             f" study/{path.name}, to keep both here)."
         )
-        problem, results = (
-            "the results here belong to another study",
-            path.parents[1].resolve(),
-        )
+        problem = "the results here belong to another study"
+        results = path.parents[1].resolve()
         raise InputError(
             problem, path=results, found=results_of, expected=expected, remedy=remedy
         )

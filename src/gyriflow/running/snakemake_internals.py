@@ -82,11 +82,9 @@ def know_inputs_by_content(
     from snakemake.io import _IOFile
     from snakemake.persistence import PersistenceBase
 
-    recorded_input, recorded_params, is_newer = (
-        PersistenceBase._input,
-        PersistenceBase._params,
-        _IOFile.is_newer,
-    )
+    recorded_input = PersistenceBase._input
+    recorded_params = PersistenceBase._params
+    is_newer = _IOFile.is_newer
     names = {path: f"input {content}" for path, content in contents.items()}
     names |= dict.fromkeys([*folders, str(Path.cwd()), str(SHIPPED)], "a folder")
     # as parameters are written
@@ -223,10 +221,8 @@ def _made_files(directory: Path) -> Iterator[_MadeFile]:
         # a record may be torn
         with suppress(OSError, ValueError, KeyError, TypeError):
             name = urlsafe_b64decode("".join(parts)).decode()
-            path, date_s = (
-                directory / name,
-                float(json.loads(record.read_text())["endtime"]),
-            )
+            path = directory / name
+            date_s = float(json.loads(record.read_text())["endtime"])
             if not Path(name).is_absolute() and path.is_file():
                 yield _MadeFile(path, record, date_s)
 

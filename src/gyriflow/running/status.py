@@ -170,10 +170,8 @@ def _row(run: str, folder: Path) -> dict[str, str]:
 
 def _simulation_progress(folder: Path) -> str:
     with suppress(InputError, KeyError, IndexError):
-        return (
-            "done, GW"
-            f" {week_tag(read_json(folder / 'folding' / 'summary.json')['weeks'][-1])}"
-        )
+        summary = read_json(folder / "folding" / "summary.json")
+        return f"done, GW {week_tag(summary['weeks'][-1])}"
     steps = [
         event
         for event in events_in(read_log(folder / "logs" / "simulate.jsonl"))

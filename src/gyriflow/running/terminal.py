@@ -49,12 +49,11 @@ INTERRUPTED_PREFIXES = (
     "Cancelling snakemake on user request",
 )
 FAILED_JOB_PREFIXES = (
-    *(
-        "Exiting because a job execution failed",
-        "At least one job did not",
-        "WorkflowError:\nAt least one job did not",
-    ),
-    *("RuleException:", "CalledProcessError"),
+    "Exiting because a job execution failed",
+    "At least one job did not",
+    "WorkflowError:\nAt least one job did not",
+    "RuleException:",
+    "CalledProcessError",
 )
 """Beginnings of Snakemake's messages about a failed job. The job's own log has the
 cause."""
@@ -83,10 +82,8 @@ class RunDisplay:
             file=stream, markup=False, highlight=False, soft_wrap=True
         )
         self.live = self.console.is_terminal and not self.console.is_dumb_terminal
-        percent, running = (
-            TextColumn("{task.percentage:3.0f} %"),
-            TextColumn("{task.description}", markup=False),
-        )
+        percent = TextColumn("{task.percentage:3.0f} %")
+        running = TextColumn("{task.description}", markup=False)
         columns = percent, BarColumn(20), TimeRemainingColumn(), running
         self.bar = Progress(
             *columns,

@@ -268,8 +268,8 @@ def absent_content(path: Path, start: bytes = b"") -> str:
     this `start`, or ""."""
     if start.startswith(b"version https://git-lfs.github.com"):
         return (
-            "its content is not here (Git LFS). Get it with `git lfs pull --include"
-            f" {path}`"
+            "its content is not here (Git LFS). Get it with"
+            f" `git lfs pull --include {path}`"
         )
     is_broken = (
         path.is_symlink()
@@ -278,8 +278,8 @@ def absent_content(path: Path, start: bytes = b"") -> str:
     )
     if is_broken or start.startswith(b"/annex/objects/"):
         return (
-            f"its content is not here (git-annex). Get it with `datalad get {path}` or"
-            f" `git annex get {path}`"
+            "its content is not here (git-annex). Get it with"
+            f" `datalad get {path}` or `git annex get {path}`"
         )
     return ""
 
@@ -303,10 +303,8 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     if absent := absent_content(place):
         raise refused(absent)
     if not place.is_file() and path not in info.context.get("awaited", ()):
-        raise refused(
-            "no such file:"
-            f" {path_in(folder, path)}{hint_for_missing(path_in(folder, path))}"
-        )
+        missing = path_in(folder, path)
+        raise refused(f"no such file: {missing}{hint_for_missing(missing)}")
     if not WILDCARD.search(str(place)):
         return str(place)
     # a relative path avoids the braces of the working directory
@@ -353,10 +351,8 @@ def hint_for_missing(path: Path) -> str:
         if path.is_symlink() and not path.exists():
             return f"; it is a link to {path.readlink()}, which does not exist"
         if path.is_dir():
-            return (
-                f"; it is a folder{_listed(' with', sorted(path.iterdir()))}; expected"
-                " a file"
-            )
+            content = _listed(" with", sorted(path.iterdir()))
+            return f"; it is a folder{content}; expected a file"
         absent = [folder for folder in path.parents if not folder.exists()]
         if absent:
             return f"; there is no folder {absent[-1]}"

@@ -16,10 +16,8 @@ from .weeks import Week, WeekNotation
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """A brain has exactly one of these keys."""
 
-HEMISPHERE_LABELS, HEMISPHERE_SURFACE = (
-    "labels of a hemisphere",
-    "a hemisphere's surface",
-)
+HEMISPHERE_LABELS = "labels of a hemisphere"
+HEMISPHERE_SURFACE = "a hemisphere's surface"
 LABEL_SOURCES = ("labels", HEMISPHERE_LABELS)
 SURFACE_SOURCES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
 KEY_SOURCES: dict[str, tuple[str, ...]] = {

@@ -227,9 +227,8 @@ def growing_groups(
         for brain in brains:
             if given is None or brain.id in given:
                 side = f"{brain.sides[0]} hemisphere" if len(brain.sides) == 1 else ""
-                groups.setdefault((brain.subject, brain.population, side), []).append(
-                    brain
-                )
+                group = brain.subject, brain.population, side
+                groups.setdefault(group, []).append(brain)
         for (subject, population, side), members in groups.items():
             by_kind = _series_by_kind(members)
             for kind, same_kind in by_kind.items():

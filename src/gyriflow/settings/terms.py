@@ -57,16 +57,14 @@ MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
 ) = range(9)
 """Zones of the boundary's facets."""
 ZONE_NAMES = (
-    *(
-        "free",
-        "clamped",
-        "left contact",
-        "right contact",
-        "between planes",
-        "base",
-        "side x",
-        "side y",
-    ),
+    "free",
+    "clamped",
+    "left contact",
+    "right contact",
+    "between planes",
+    "base",
+    "side x",
+    "side y",
     "medial wall",
 )
 """Their names, by code."""

@@ -67,8 +67,8 @@ PARENT_WORDS = frozenset(
 )
 Kind = Literal["scan", "gestational", "age", "postnatal"]
 SINCE_BIRTH = (
-    r"(?<![a-z])(post|neo)[- ]?natal|chronolog|(since|after|from) (the"
-    r" )?(birth|delivery|term)|mother|maternal"
+    r"(?<![a-z])(post|neo)[- ]?natal|chronolog"
+    r"|(since|after|from) (the )?(birth|delivery|term)|mother|maternal"
 )
 OTHER_TYPE = re.compile(
     rf"{SINCE_BIRTH}|birth|born|deliver|\bdob\b|correct|concept|\bpna\b|\bpca\b|\bterm\b",

@@ -85,9 +85,8 @@ class UsedAtlas:
                 path = series.files[key].format(
                     week=int(week) if week == int(week) else week
                 )
-                copies = self._in_folder[series.files[key]].get(week) or self._shipped(
-                    path
-                )
+                in_folder = self._in_folder[series.files[key]].get(week)
+                copies = in_folder or self._shipped(path)
                 # unpublished files have no address
                 url = f"{root}/{path}" if root and week in series.weeks else None
                 record = series.weeks.get(week, {}).get(key, AtlasFileRecord())
@@ -140,10 +139,8 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
     have yet to be fetched."""
     entries: dict[str, dict[str, Any]] = {}
     for file in used.files:
-        series, name = (
-            used.atlas.series[file.series],
-            used.atlas.brain_id(file.series, file.week),
-        )
+        series = used.atlas.series[file.series]
+        name = used.atlas.brain_id(file.series, file.week)
         entry = entries.setdefault(
             name, {"id": name, "week": file.week, "population": series.population}
         )

@@ -50,17 +50,15 @@ RESULT_COLUMNS = re.compile(
 )
 """Columns of `metrics_wide.csv`, which covariates stand in as well."""
 RESERVED_STUDIES = (
-    *(
-        "benchmarks",
-        "calibration",
-        "figures",
-        "growth",
-        "logs",
-        "matched",
-        "registration",
-        "tables",
-        "validation",
-    ),
+    "benchmarks",
+    "calibration",
+    "figures",
+    "growth",
+    "logs",
+    "matched",
+    "registration",
+    "tables",
+    "validation",
 )
 """Names that sweeps may not have, since other results of the study have folders of
 these names."""
@@ -269,10 +267,8 @@ def growth(config: Config) -> Iterator[KeyProblem]:
                 " a population"
             )
             yield KeyProblem(text, ("growth", "brains"))
-    series, preferred = (
-        growth_series(config.brains, config.growth.brains),
-        config.growth.series,
-    )
+    series = growth_series(config.brains, config.growth.brains)
+    preferred = config.growth.series
     if preferred is not None and series and preferred not in series:
         yield KeyProblem(
             f"found {preferred!r}; the series are {', '.join(series)}",
@@ -437,10 +433,8 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
 def _comparison_problems(
     settings: ComparisonSettings, config: Config, key: Key
 ) -> Iterator[KeyProblem]:
-    weeks, week = (
-        {brain.id: brain.week for brain in config.brains},
-        settings.compare_week,
-    )
+    weeks = {brain.id: brain.week for brain in config.brains}
+    week = settings.compare_week
     if settings.base not in config.runs:
         yield KeyProblem(
             f"found {settings.base!r}; expected a run: {', '.join(config.runs)}",

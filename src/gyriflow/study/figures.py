@@ -384,9 +384,8 @@ def expected_figure(kind: Kind, study: Study) -> Iterator[Figure]:
         surfaces, observed = simulation.surfaces, simulation.observed_with_start
         deviations = _deviations(simulation)
         # the last week, and others at equal steps
-        weeks = sorted(deviations, reverse=True)[
-            :: -(-len(deviations) // MAX_DEVIATIONS)
-        ]
+        every = -(-len(deviations) // MAX_DEVIATIONS)
+        weeks = sorted(deviations, reverse=True)[::every]
         weeks_drawn = {min(surfaces), *weeks}
         inputs = {
             "runs": {

@@ -34,17 +34,19 @@ from .ages import (
 IDS = ("participant_id", "id")
 """Possible names of the column of participants."""
 SESSIONS = (
-    *(
-        "session_id",
-        "session",
-        "ses",
-        "ses_id",
-        "session_label",
-        "session_number",
-        "visit",
-        "visit_id",
-    ),
-    *("visit_number", "timepoint", "time_point", "tp", "wave"),
+    "session_id",
+    "session",
+    "ses",
+    "ses_id",
+    "session_label",
+    "session_number",
+    "visit",
+    "visit_id",
+    "visit_number",
+    "timepoint",
+    "time_point",
+    "tp",
+    "wave",
 )
 """Possible names of the column of sessions; the first one of a table counts."""
 SUBJECT_FOLDER = re.compile(r"sub-[^_/.]+")
@@ -616,10 +618,8 @@ def _entry(
         **covariates(values),
     }
     if FILES in values:
-        files, side = (
-            [part.strip() for part in values[FILES].split(";")],
-            values.get(SIDE),
-        )
+        files = [part.strip() for part in values[FILES].split(";")]
+        side = values.get(SIDE)
         limit, expected = (
             (2, "at most a left and a right hemisphere")
             if side is None

@@ -330,10 +330,8 @@ class Simulation:
 
     def at(self, week: float) -> Measurement:
         """Return the measurement of the simulated brain at a week."""
-        metrics, week_folder = (
-            f"runs/{self.run}/{self.start.id}/metrics",
-            paths.file_of(paths.WEEK, week=week),
-        )
+        metrics = f"runs/{self.run}/{self.start.id}/metrics"
+        week_folder = paths.file_of(paths.WEEK, week=week)
         surfaces = f"{self.file(paths.RUN)}/surfaces/{week_folder}"
         return Measurement(
             where=f"{metrics}/{week_folder}",

@@ -302,10 +302,8 @@ def member_chain(
     name = names[variation.number % len(names)]
     atlas_weeks = [brain.week for brain in series.brains[name]]
     # the age of the whole run is shifted, as far as the atlas goes, or a little further
-    low, high = (
-        min(atlas_weeks) - BEFORE_GW - start.week,
-        max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end,
-    )
+    low = min(atlas_weeks) - BEFORE_GW - start.week
+    high = max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
     shift = round(min(max(variation.age_shift_gw, low), high), 2)
     further = sorted(
         {*(week for week in later_observed_weeks(start, brains) if week <= end), end}

@@ -445,12 +445,11 @@ class Study:
         )
         atlas = self.atlases.get(atlas_brain.id)
         return {
-            **{
-                **simulation.names,
-                "start_week": simulation.start.week,
-                "week": last.week,
-            },
-            **{"atlas_brain": atlas_brain.id, "atlas_week": atlas_brain.week},
+            **simulation.names,
+            "start_week": simulation.start.week,
+            "week": last.week,
+            "atlas_brain": atlas_brain.id,
+            "atlas_week": atlas_brain.week,
             # the population whose growth was used
             "population": atlas_brain.population,
             "atlas": (

@@ -263,7 +263,7 @@ def test_ventricles_without_labels_are_filled_and_no_fissure_or_cistern(
 
 @pytest.mark.parametrize("scheme", [SOLID, SCHEMES["spina-bifida-atlas"]])
 def test_nothing_is_filled_where_the_cerebrum_is_whole(atlas_brain, scheme):
-    assert not unlabelled_ventricles(*(atlas_brain[0], scheme, atlas_brain[1])).any()
+    assert not unlabelled_ventricles(atlas_brain[0], scheme, atlas_brain[1]).any()
 
 
 def test_a_filled_ventricle_is_told_and_counts_as_ventricle_and_not_as_tissue(

@@ -297,10 +297,8 @@ def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
         < surface.right.vertices[:, 0].mean()
     )
     for name, file in (("left", left), ("right", right)):
-        there, ended = (
-            transformed(file, surface.pose.of_file(name)).vertices,
-            getattr(surface, name).vertices,
-        )
+        there = transformed(file, surface.pose.of_file(name)).vertices
+        ended = getattr(surface, name).vertices
         for edge in (np.min, np.max):
             np.testing.assert_allclose(
                 edge(there, axis=0), edge(ended, axis=0), atol=1.0

@@ -183,10 +183,8 @@ def test_cortex_of_a_voxel_stays_fused_and_has_one_number_of_voxels():
 
 def test_uneven_cortex_is_opened_on_both_sides():
     body, places, depth, affine = ball()
-    across, along = (
-        np.abs(places @ np.array([0.8, 0.36, 0.48])),
-        places @ np.array([0.0, 0.8, -0.6]),
-    )
+    across = np.abs(places @ np.array([0.8, 0.36, 0.48]))
+    along = places @ np.array([0.0, 0.8, -0.6])
     thickness = np.where(along < 0, 1.3, 2.6)
     to_end = np.hypot(across, np.maximum(depth - 6.0, 0.0))
     core = body & (depth > thickness) & (to_end > thickness)

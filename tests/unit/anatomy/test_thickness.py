@@ -224,10 +224,8 @@ def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
 def test_long_voxels_have_their_length_along_their_own_axis(ball, order):
     pial, depth, inside, affine = ball
-    inside, depth = (
-        inside[:, :, ::3].transpose(order),
-        depth[:, :, ::3].transpose(order),
-    )
+    inside = inside[:, :, ::3].transpose(order)
+    depth = depth[:, :, ::3].transpose(order)
     turn = rigid(20, -30, 10, shift=(5, -7, 2))
     affine = turn @ affine @ np.diag([1.0, 1.0, 3.0, 1.0])[:, [*order, 3]]
     # bare below, where the next cortex is a long voxel away

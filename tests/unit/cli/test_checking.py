@@ -714,10 +714,8 @@ def test_a_path_is_said_to_be_of_this_study_or_of_all_with_its_folder(
     }
     prediction |= {"folding": {"preset": "expected", "end_week": 24}}
     atlas = {"name": "spina-bifida", "series": "unoperated", "weeks": [22, 23, 24]}
-    in_study, outside = (
-        {"folder": str(tmp_path / "study" / "atlas")},
-        {"folder": str(tmp_path / "atlas")},
-    )
+    in_study = {"folder": str(tmp_path / "study" / "atlas")}
+    outside = {"folder": str(tmp_path / "atlas")}
     # by default in the working directory, which need not be the current folder
     for more, fact in (
         ({}, "this study only"),

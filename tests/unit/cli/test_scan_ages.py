@@ -11,11 +11,9 @@ from gyriflow.errors import InputError
 FIRST, SECOND = (
     f"sub-01/ses-{session}/anat/sub-01_ses-{session}_dseg.nii.gz" for session in (1, 2)
 )
-TABLE, SESSIONS, SIDECAR = (
-    "participants.tsv",
-    "sub-01/sub-01_sessions.tsv",
-    "participants.json",
-)
+TABLE = "participants.tsv"
+SESSIONS = "sub-01/sub-01_sessions.tsv"
+SIDECAR = "participants.json"
 LONE = "sub-01/anat/sub-01_dseg.nii.gz"
 
 

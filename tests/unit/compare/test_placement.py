@@ -25,11 +25,9 @@ def noise(seed: int) -> np.ndarray:
 
 
 def test_weighted_correlation_is_that_of_repeated_values():
-    x, y, weights = (
-        np.array([1.0, 2.0, 4.0]),
-        np.array([1.0, 3.0, 2.0]),
-        np.array([1, 2, 3]),
-    )
+    x = np.array([1.0, 2.0, 4.0])
+    y = np.array([1.0, 3.0, 2.0])
+    weights = np.array([1, 2, 3])
     repeated = np.corrcoef(np.repeat(x, weights), np.repeat(y, weights))[0, 1]
     assert correlation(x, y, weights.astype(float)) == pytest.approx(repeated)
     assert np.isnan(correlation(x, np.full(3, 0.3), np.ones(3)))

@@ -151,10 +151,8 @@ def test_each_week_and_model_is_compared_with_its_observed_brain_and_baselines()
 
 
 def test_a_run_is_off_the_curve_that_it_followed_as_a_fraction_of_the_curve():
-    models, brain = (
-        {week: {"run": REAL} for week in (22.0, 25.0)},
-        ObservedBrain("b", REAL, PREPARED),
-    )
+    models = {week: {"run": REAL} for week in (22.0, 25.0)}
+    brain = ObservedBrain("b", REAL, PREPARED)
     table = comparison_table(
         LABELS, models, dict.fromkeys(models, brain), radius_mm=3.0
     )

@@ -148,9 +148,8 @@ def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
         == resolution_warning(rows(0.796), 2)
         == ""
     )
-    assert resolution_warning(rows(np.nan), 1) == Facts(
-        2
-    )  # no element lies in the cortex at all
+    # no element lies in the cortex at all
+    assert resolution_warning(rows(np.nan), 1) == Facts(2)
 
 
 @pytest.mark.parametrize(
@@ -188,22 +187,17 @@ def test_a_step_above_its_tolerance_gives_a_warning():
 @pytest.mark.parametrize(
     ("order", "tets", "ranks", "contact", "measured"),
     [
-        *(
-            (1, 182_779, 1, "planes", 564),
-            (1, 182_779, 1, "global", 649),
-            (1, 448_597, 1, "planes", 877),
-        ),
-        *(
-            (1, 448_597, 1, "global", 1001),
-            (1, 499_373, 1, "global", 914),
-            (1, 499_373, 2, "global", 1580),
-        ),
-        *(
-            (2, 23_910, 1, "global", 600),
-            (2, 23_910, 2, "global", 955),
-            (2, 23_910, 2, "none", 838),
-        ),
-        *((2, 34_684, 1, "global", 784), (2, 34_684, 2, "global", 1141)),
+        (1, 182_779, 1, "planes", 564),
+        (1, 182_779, 1, "global", 649),
+        (1, 448_597, 1, "planes", 877),
+        (1, 448_597, 1, "global", 1001),
+        (1, 499_373, 1, "global", 914),
+        (1, 499_373, 2, "global", 1580),
+        (2, 23_910, 1, "global", 600),
+        (2, 23_910, 2, "global", 955),
+        (2, 23_910, 2, "none", 838),
+        (2, 34_684, 1, "global", 784),
+        (2, 34_684, 2, "global", 1141),
     ],
 )
 def test_predicted_memory_is_what_runs_have_taken(

@@ -67,10 +67,8 @@ def grown_by_sizes(area_ratio, volume_ratio, correction=None, **changes):
     inputs = GrowthInputs(mesh, zones_of_run(mesh, plain, GAP_MM), {})
     start = inputs.size(mesh.vertices)
     area, volume = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
-    areas, volumes = (
-        {21.0: area, 22.0: area_ratio * area},
-        {21.0: volume, 22.0: volume_ratio * volume},
-    )
+    areas = {21.0: area, 22.0: area_ratio * area}
+    volumes = {21.0: volume, 22.0: volume_ratio * volume}
     p = parameters_from(
         values | {"growth": {"model": "sizes", "area_cm2": areas, "volume_ml": volumes}}
     )
@@ -108,10 +106,8 @@ def test_growth_of_the_surface_is_a_mean_over_area_where_a_part_does_not_grow():
     p = parameters_from(RUN | {"support": "free", "thickness_mm": 2.0})
     inputs = GrowthInputs(mesh, zones_of_run(mesh, p, GAP_MM), {})
     faces = inputs.zones.measured_facets
-    growing, areas = (
-        inputs.zones.growth[faces].mean(axis=1),
-        face_areas(TriangleMesh(mesh.vertices, faces)),
-    )
+    growing = inputs.zones.growth[faces].mean(axis=1)
+    areas = face_areas(TriangleMesh(mesh.vertices, faces))
     share = float(np.average(growing, weights=areas))
     assert 0.1 < share < 0.95
     assert abs(share - growing.mean()) > 0.01
@@ -160,12 +156,10 @@ def test_bending_curves_are_met_at_output_weeks_by_a_body_that_realises_part_of_
 ):
     """The area of the body grows by two thirds of its volume, and by a share of what
     the cortex grows more."""
-    p, size, correction, step_s = (
-        parameters_from(RUN),
-        Size(1e4, 5e4),
-        None,
-        days * DAY_S,
-    )
+    p = parameters_from(RUN)
+    size = Size(1e4, 5e4)
+    correction = None
+    step_s = days * DAY_S
     steps_a_week = round(7 / days)
     for number in range(4 * steps_a_week):
         weeks = (number + 1) / steps_a_week

@@ -57,10 +57,8 @@ def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):
     found = []
     for order in (1, 2):
         problem = problem_of(law, order)
-        x, cells = (
-            problem.domain.local(problem.domain.positions),
-            len(problem.domain.cells),
-        )
+        x = problem.domain.local(problem.domain.positions)
+        cells = len(problem.domain.cells)
         ones, points = np.ones(len(x)), len(problem.points.weights)
         V = None if stretch is None else np.tile(stretch, (cells, points, 1, 1))
         set_layers(

@@ -55,10 +55,8 @@ def test_the_ellipsoid_stands_where_the_model_puts_it():
 def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
     zones = find_zones(brain)
     x = brain.vertices[zones.facets, 0]
-    left, right = (
-        x[zones.facet_zone == LEFT_CONTACT],
-        x[zones.facet_zone == RIGHT_CONTACT],
-    )
+    left = x[zones.facet_zone == LEFT_CONTACT]
+    right = x[zones.facet_zone == RIGHT_CONTACT]
     assert len(left)
     assert left.min() > -5.0
     assert left.max() <= -0.625

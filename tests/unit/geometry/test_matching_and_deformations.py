@@ -54,10 +54,8 @@ def test_points_go_through_displacement_and_then_the_matrix():
 def test_a_correspondence_of_moved_brains_says_the_same_of_the_same_places():
     rng = np.random.default_rng(3)
     matrix = rigid(20, 0, 5, shift=(1, 2, 3)) @ np.diag([1.1, 1.2, 1.3, 1.0])
-    first, second = (
-        rigid(10, -70, 150, shift=(4.0, 5.0, 6.0)),
-        rigid(80, 20, -30, shift=(-9.0, 0.0, 1.0)),
-    )
+    first = rigid(10, -70, 150, shift=(4.0, 5.0, 6.0))
+    second = rigid(80, 20, -30, shift=(-9.0, 0.0, 1.0))
     points = rng.uniform(-6, 6, (50, 3))
     found = Deformation(
         matrix, rng.normal(size=(9, 6, 9, 3)), scaling((2.0, 3.0, 2.0), -8.0)

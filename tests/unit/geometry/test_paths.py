@@ -157,10 +157,8 @@ def test_the_check_agrees_with_many_points_on_the_way(order):
     before = mesh.vertices - mesh.vertices.mean(axis=0)
     if order == 2:
         mesh = quadratic(TetrahedralMesh(before, mesh.tets))
-        before, after = (
-            mesh.vertices,
-            quadratic(TetrahedralMesh(after, mesh.corners)).vertices,
-        )
+        before = mesh.vertices
+        after = quadratic(TetrahedralMesh(after, mesh.corners)).vertices
     found = inverted_on_the_way(before, after, mesh.tets)
     volumes = np.stack(
         [

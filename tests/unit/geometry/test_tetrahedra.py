@@ -115,11 +115,8 @@ def test_an_element_that_folds_over_at_a_corner_only_is_seen():
     curved = quadratic(mesh)
     for part, sound in ((0.24, True), (0.26, False)):
         vertices = curved.vertices.copy()
-        vertices[curved.tets[0, 4]] += [
-            part,
-            0.0,
-            0.0,
-        ]  # along its edge: det = 1 + 4 part (λ0 − λ1)
+        # along its edge: det = 1 + 4 part (λ0 − λ1)
+        vertices[curved.tets[0, 4]] += [part, 0.0, 0.0]
         assert (lower_bounds(vertices, curved.tets)[0] > 0) == sound
         assert (
             jacobians(vertices, curved.tets, shape_slopes(np.full((1, 4), 0.25)))[0, 0]

@@ -88,10 +88,8 @@ def test_a_smoothed_surface_is_fitted_onto_the_folded_one():
 
 def test_needles_do_not_throw_vertices_off_the_surface():
     bands, around = 6, 60
-    heights, angles = (
-        np.cos(np.linspace(0, np.pi, bands)[1:-1]),
-        np.linspace(0, 2 * np.pi, around, endpoint=False),
-    )
+    heights = np.cos(np.linspace(0, np.pi, bands)[1:-1])
+    angles = np.linspace(0, 2 * np.pi, around, endpoint=False)
     # rings turned against each other: faces along them have angles of almost 180°
     rings = [(np.sqrt(1 - z * z), angles + 8 * z, z) for z in heights]
     points = [

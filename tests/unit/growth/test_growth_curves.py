@@ -55,10 +55,8 @@ SCATTERED = VOLUMES * np.exp(0.01 * np.random.default_rng(5).normal(size=10))
 def test_a_week_without_weight_counts_neither_for_the_curve_nor_for_its_error():
     leaping = SCATTERED.copy()
     leaping[4] *= 1.5
-    fit, without = (
-        fitted(WEEKS, leaping),
-        fitted(np.delete(WEEKS, 4), np.delete(SCATTERED, 4)),
-    )
+    fit = fitted(WEEKS, leaping)
+    without = fitted(np.delete(WEEKS, 4), np.delete(SCATTERED, 4))
     assert fit.weights[4] == 0
     for found, expected in zip(
         interval(fit.curve, WEEKS), interval(without.curve, WEEKS), strict=True
@@ -281,13 +279,11 @@ def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_to
         name: found[name]
         for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")
     } == {
-        **{
-            "start_week": 21.0,
-            "output_weeks": weeks,
-            "fissure_x_mm": 0.5,
-            "side": "left",
-            "end_week": 22.0,
-        }
+        "start_week": 21.0,
+        "output_weeks": weeks,
+        "fissure_x_mm": 0.5,
+        "side": "left",
+        "end_week": 22.0,
     }
     assert found["growth"]["area_cm2"][22.0] == pytest.approx(99, rel=5e-3)
     assert found["thickness_mm"]["weeks"][22.0] == pytest.approx(2.3, rel=5e-3)

@@ -288,10 +288,8 @@ def test_a_series_is_followed_through_the_poses_of_its_brains(tmp_path):
 @pytest.mark.parametrize("posed", [(False, False), (True, False), (False, True)])
 def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
     """The brain is the atlas' of 22 GW, and grows as it does: by 4 % a week."""
-    atlas, brain = (
-        ellipsoid_mesh(6, (14.0, 20.0, 16.0)),
-        ellipsoid_mesh(5, (14.0, 20.0, 16.0)),
-    )
+    atlas = ellipsoid_mesh(6, (14.0, 20.0, 16.0))
+    brain = ellipsoid_mesh(5, (14.0, 20.0, 16.0))
     weeks = np.array([21.0, 22.0, 23.0, 24.0, 25.0])
     positions = [
         transform_points(1.04 ** (week - 22.0) * atlas.vertices, FAR[1])
@@ -360,10 +358,8 @@ def test_regions_move_with_the_tissue_of_their_own_side(tmp_path):
     side_of_facet = np.where(
         mesh.vertices[facets][:, :, 0].mean(axis=1) < 0, LEFT, RIGHT
     )
-    fields, cell_tags = (
-        {"growing": np.ones(len(mesh.vertices))},
-        {"zone": np.ones(len(mesh.tets), dtype=np.int32)},
-    )
+    fields = {"growing": np.ones(len(mesh.vertices))}
+    cell_tags = {"zone": np.ones(len(mesh.tets), dtype=np.int32)}
     regions = Regions(mesh, facets, fields, cell_tags, {"hemisphere": side_of_facet})
     write_regions(tmp_path / "regions.xdmf", regions)
     inputs = {"mesh": "regions.xdmf"}

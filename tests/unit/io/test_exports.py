@@ -443,10 +443,8 @@ def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, brain):
     assert read_vertex_maps(place)["sulc"] == pytest.approx(-np.arange(5))
     assert place.with_name(place.name.replace("_sulc", "_desc-agw2500_sulc")).exists()
     assert read_json(folder / "space-sub01ses1_sulc.json") == {
-        **{
-            "Description": read_json(folder / "sulc.json")["Description"],
-            "Units": "mm",
-        },
+        "Description": read_json(folder / "sulc.json")["Description"],
+        "Units": "mm",
         "SpatialReference": {
             side: f"bids::sub-01/ses-1/anat/sub-01_ses-1_hemi-{side}_pial.surf.gii"
             for side in ("L", "R")

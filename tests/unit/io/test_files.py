@@ -297,10 +297,8 @@ def test_content_that_is_not_here_is_named_with_the_command_that_gets_it(
 
 
 def test_a_link_to_a_key_is_read_as_its_own_name_says(tmp_path):
-    key, link = (
-        tmp_path / ".git" / "annex" / "objects" / "K" / "K",
-        tmp_path / "a.surf.gii",
-    )
+    key = tmp_path / ".git" / "annex" / "objects" / "K" / "K"
+    link = tmp_path / "a.surf.gii"
     write_surface(tmp_path / "b.surf.gii", sphere(10, 1))
     key.parent.mkdir(parents=True)
     (tmp_path / "b.surf.gii").rename(key)

@@ -40,8 +40,8 @@ TEXTS = {
     ),
     "a.json": b'{"a": [1, 2.5, null], "b": {"c": "text"}}',
     "study.yaml": (
-        b"brains:\n  - {id: a, week: 21.5}\nstart: a\nfolding: &f {end_week: 23}\nruns:"
-        b" {b: *f}\n"
+        b"brains:\n  - {id: a, week: 21.5}\nstart: a\n"
+        b"folding: &f {end_week: 23}\nruns: {b: *f}\n"
     ),
 }
 
@@ -166,8 +166,8 @@ def test_vtk_cells_that_name_missing_points_do_not_end_the_process(tmp_path, old
     points = "0 0 0 1 0 0 0 1 0 0 0 1"
     faces = "\n3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n"
     text = (
-        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4"
-        f" float\n{points}\nPOLYGONS 4 16{faces}"
+        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n"
+        f"POINTS 4 float\n{points}\nPOLYGONS 4 16{faces}"
     )
     path = tmp_path / "a.vtk"
     path.write_bytes(text.encode())

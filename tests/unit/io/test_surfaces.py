@@ -242,11 +242,9 @@ def test_maps_and_labels_of_the_other_hemisphere_are_refused(tmp_path, ball):
             tmp_path / f"{side}.label.gii", np.ones(162, int), {1: "frontal"}, structure
         )
     write_surface(tmp_path / "unnamed.ply", ball)
-    left, right, surfaces = (
-        tmp_path / "aleft.gii",
-        tmp_path / "aright.gii",
-        [tmp_path / "left.surf.gii"],
-    )
+    left = tmp_path / "aleft.gii"
+    right = tmp_path / "aright.gii"
+    surfaces = [tmp_path / "left.surf.gii"]
     read_surface_map(left, surfaces[0])
     read_surface_map(right, tmp_path / "unnamed.ply")
     facts = Facts("CortexLeft", "CortexRight")
@@ -278,14 +276,14 @@ def test_hemispheres_whose_files_name_different_spaces_are_told(tmp_path, ball, 
 
 def legacy(path, ball, order, kind="f4"):
     """Write a surface as MRtrix does (order "<") or as VTK does (">")."""
-    count, cells = (
-        len(ball.faces),
-        np.column_stack([np.full(len(ball.faces), 3), ball.faces]).astype(f"{order}i4"),
+    count = len(ball.faces)
+    cells = np.column_stack([np.full(len(ball.faces), 3), ball.faces]).astype(
+        f"{order}i4"
     )
     name = {"f4": "float", "f8": "double"}[kind]
     head = (
-        "# vtk DataFile Version 1.0\nmesh\nBINARY\nDATASET POLYDATA\nPOINTS"
-        f" {len(ball.vertices)} {name}\n"
+        "# vtk DataFile Version 1.0\nmesh\nBINARY\nDATASET POLYDATA\n"
+        f"POINTS {len(ball.vertices)} {name}\n"
     )
     points = ball.vertices.astype(order + kind).tobytes()
     path.write_bytes(
@@ -330,10 +328,8 @@ def test_vertices_that_are_no_places_and_faces_beyond_the_vertices_are_refused(
 def test_named_maps_come_back_and_are_what_workbench_calls_metric_files(tmp_path):
     maps = {"shape_index": np.linspace(-1, 1, 50), "curvedness": np.arange(50)}
     write_vertex_maps(tmp_path / "a.shape.gii", maps, "CortexRight")
-    back, image = (
-        read_vertex_maps(tmp_path / "a.shape.gii"),
-        nib.load(tmp_path / "a.shape.gii"),
-    )
+    back = read_vertex_maps(tmp_path / "a.shape.gii")
+    image = nib.load(tmp_path / "a.shape.gii")
     assert list(back) == list(maps)
     assert image.meta["AnatomicalStructurePrimary"] == "CortexRight"
     for (name, values), array in zip(maps.items(), image.darrays, strict=True):
@@ -357,10 +353,8 @@ def test_maps_of_hemispheres_stand_side_by_side_each_value_at_its_vertex(
     tmp_path, ball, name
 ):
     left = moved(ball, -60.0)
-    paths, surfaces = (
-        [tmp_path / "a.shape.gii", tmp_path / "b.shape.gii"],
-        [tmp_path / "left.surf.gii", tmp_path / name],
-    )
+    paths = [tmp_path / "a.shape.gii", tmp_path / "b.shape.gii"]
+    surfaces = [tmp_path / "left.surf.gii", tmp_path / name]
     for path, file, mesh in zip(paths, surfaces, (left, ball), strict=True):
         write_surface(file, mesh)
         write_vertex_maps(path, {"x": mesh.vertices[:, 0]})

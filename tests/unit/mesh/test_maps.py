@@ -89,10 +89,8 @@ def test_equally_near_pial_vertices_are_chosen_by_coordinates_not_by_order():
 
 
 def test_two_hemispheres_count_as_one_surface():
-    left, right = (
-        box_mesh((2, 4, 4), (8.0, 20.0, 20.0)),
-        box_mesh((2, 4, 4), (8.0, 20.0, 20.0)),
-    )
+    left = box_mesh((2, 4, 4), (8.0, 20.0, 20.0))
+    right = box_mesh((2, 4, 4), (8.0, 20.0, 20.0))
     vertices = np.concatenate([left.vertices - [6, 0, 0], right.vertices + [6, 0, 0]])
     mesh = TetrahedralMesh(
         vertices, np.concatenate([left.tets, right.tets + len(left.vertices)])

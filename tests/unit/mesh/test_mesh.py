@@ -208,8 +208,8 @@ def stand_in(tmp_path, monkeypatch):
             (tmp_path / folder / "__init__.py").touch()
         body = "\n".join(f"    {line}" for line in code)
         path.write_text(
-            "import os, signal, time\ndef tetrahedralize(*arrays,"
-            f" **settings):\n{body}\n"
+            "import os, signal, time\n"
+            f"def tetrahedralize(*arrays, **settings):\n{body}\n"
         )
         # the mesher's process is given this path
         monkeypatch.syspath_prepend(tmp_path)
@@ -272,10 +272,8 @@ def mesh_in(folder, mesher, gates=GATES):
     wrote for good."""
     write_surface(folder / "pial.surf.gii", BALL)
     settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5}
-    params, code = (
-        {"settings": settings, "gates": gates, "refused": str(folder / "refused")},
-        0,
-    )
+    params = {"settings": settings, "gates": gates, "refused": str(folder / "refused")}
+    code = 0
     try:
         run_script("tetrahedralise.py", folder, {0: "pial.surf.gii"}, OUTPUTS, params)
     except SystemExit as end:
@@ -307,10 +305,8 @@ def test_the_step_of_a_mesher_that_dies_exits_with_three_and_logs_all_that_it_pr
 def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_attempt(
     tmp_path, capsys
 ):
-    refused, coarse = (
-        tmp_path / "refused",
-        GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.1},
-    )
+    refused = tmp_path / "refused"
+    coarse = GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.1}
     strict = {"min_radius_ratio": 0.99, "max_surface_distance_mm": 1e-3}
     assert mesh_in(tmp_path, "tetgen", coarse | strict) == (3, [])
     said, log = capsys.readouterr().err, (tmp_path / "log").read_text()
@@ -318,10 +314,8 @@ def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_at
         refused / "brain.xdmf", 0.99, "0.001 mm", "mesh.max_surface_distance_mm"
     )
     assert said.removeprefix("gyriflow: ") in log
-    quality, mesh = (
-        read_json(refused / "quality.json"),
-        read_tetrahedral_mesh(refused / "brain.xdmf"),
-    )
+    quality = read_json(refused / "quality.json")
+    mesh = read_tetrahedral_mesh(refused / "brain.xdmf")
     assert quality["tets"] == len(mesh.tets)
     assert quality["min_radius_ratio"] == pytest.approx(radius_ratios(mesh).min())
     assert mesh_in(tmp_path, "tetgen", coarse) == (0, list(OUTPUTS))

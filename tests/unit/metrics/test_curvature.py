@@ -91,11 +91,9 @@ def test_torus() -> None:
 
 def test_walls_of_a_narrow_sulcus_do_not_see_each_other() -> None:
     x, y = np.meshgrid(np.arange(30.0), np.arange(30.0), indexing="ij")
-    lower, upper, third = (
-        sheet(x, y, 0 * x),
-        flipped(sheet(x, y, 0 * x + 0.5)),
-        sheet(x, y, 1.0 + 0.01 * x**2),
-    )
+    lower = sheet(x, y, 0 * x)
+    upper = flipped(sheet(x, y, 0 * x + 0.5))
+    third = sheet(x, y, 1.0 + 0.01 * x**2)
     alone = curvature(lower, radius_mm=3.0)
     between = curvature(merged(lower, upper, third), radius_mm=3.0)
     np.testing.assert_allclose(
@@ -202,9 +200,8 @@ def expected() -> dict[str, float]:
     """Return the measures of the torus: c = R/r; the outer half of a torus has ∫K dA =
     4π, as a sphere."""
     c = LARGE / SMALL
-    ring = np.cos(ANGLES) / (
-        c + np.cos(ANGLES)
-    )  # r times the smaller principal curvature
+    # r times the smaller principal curvature
+    ring = np.cos(ANGLES) / (c + np.cos(ANGLES))
     weight = c + np.cos(ANGLES)
     return {
         "intrinsic_curvature_index": 1.0,
@@ -236,10 +233,8 @@ def test_a_cylinder_folds_but_has_no_intrinsic_curvature() -> None:
     # κ = 1/r and 0, area 2πrh: FI = 1/4π · h 2π/r = h/2r, inwards as outwards
     for sign in (1.0, -1.0):
         pair = np.sort([np.full(8, sign / 4.0), np.zeros(8)], axis=0)
-        bend, areas = (
-            Curvature(pair[1], pair[0], np.ones(8, bool), np.ones(8)),
-            np.full(8, 2 * np.pi * 4.0 * 10.0 / 8),
-        )
+        bend = Curvature(pair[1], pair[0], np.ones(8, bool), np.ones(8))
+        areas = np.full(8, 2 * np.pi * 4.0 * 10.0 / 8)
         found = curvature_integrals(bend, areas)
         assert found["folding_index"] == pytest.approx(10.0 / 8.0)
         assert found["intrinsic_curvature_index"] == 0.0

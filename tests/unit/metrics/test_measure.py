@@ -195,10 +195,8 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
             mesh.faces,
         )
 
-    left, right = (
-        bumpy((18.0, 26.0, 20.0), 4, -40.0),
-        bumpy((24.0, 34.0, 22.0), 3, 40.0),
-    )
+    left = bumpy((18.0, 26.0, 20.0), 4, -40.0)
+    right = bumpy((24.0, 34.0, 22.0), 3, 40.0)
     thickness = np.concatenate(
         [
             np.linspace(1.0, 2.0, len(left.vertices)),
@@ -207,7 +205,9 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
     )
     sides = {"left": left, "right": right}
     found = measure_brain(
-        *(merged(left, right), left, right),
+        merged(left, right),
+        left,
+        right,
         thickness_mm=thickness,
         curvature_radius_mm=6.0,
         spangy_modes=30,
@@ -298,7 +298,9 @@ def test_each_map_and_metric_has_a_record_and_each_record_is_written(
     ball = octasphere(20.0)
     volumes = {"tissue": 30.0, "ventricles": 1.0, "cortex": 8.0}
     thick = measure_brain(
-        *(ball, ball, None),
+        ball,
+        ball,
+        None,
         thickness_mm=np.full(len(ball.vertices), 2.0),
         label_volumes_ml=volumes,
         spangy_modes=60,

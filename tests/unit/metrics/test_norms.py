@@ -202,10 +202,8 @@ def test_skewness_is_estimated_from_many_subjects() -> None:
         (1.0, 400),
         (1.0, MIN_SUBJECTS_FOR_SKEWNESS - 1),
     ):
-        weeks, z = (
-            random.uniform(21, 37, subjects),
-            random.standard_normal(subjects).clip(-3, 3),
-        )
+        weeks = random.uniform(21, 37, subjects)
+        z = random.standard_normal(subjects).clip(-3, 3)
         values = CENTILES.volume(weeks) * np.where(
             share, 1 + 0.25 * z, np.exp(0.25 * z)
         )
@@ -416,10 +414,8 @@ def test_a_norm_gives_median_volumes_within_its_weeks() -> None:
 
 
 def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
-    weeks, values = (
-        np.repeat([24.0, 25.0, 26.0, 27.0], 6),
-        np.random.default_rng(1).normal(100, 5, 24),
-    )
+    weeks = np.repeat([24.0, 25.0, 26.0, 27.0], 6)
+    values = np.random.default_rng(1).normal(100, 5, 24)
     metrics, reference = table(weeks, values)
     few, many = (
         metrics.assign(person=[f"s{number % count}" for number in range(24)])
@@ -713,10 +709,8 @@ def test_columns_are_described_by_side_region_and_unit() -> None:
 
 
 def test_asymmetry_of_sides() -> None:
-    sides, regions = (
-        ["right", "left", "left", "right"],
-        ["frontal"] * 2 + ["insula"] * 2,
-    )
+    sides = ["right", "left", "left", "right"]
+    regions = ["frontal"] * 2 + ["insula"] * 2
     table = pd.DataFrame({"hemisphere": sides, "region": regions})
     table = table.assign(metric="area", unit="cm2", value=[30.0, 10.0, 0.0, 0.0])
     found = asymmetry(table).set_index("region")

@@ -269,10 +269,8 @@ def test_a_distance_has_no_edges_between_bands() -> None:
     # 8 mm is the border of B3 and B4 where L is 64 mm; of another L, the same waves are
     # elsewhere in their bands
     for longest in (60.0, 64.0, 70.0):
-        own, real = (
-            written("a", "sim", {8.1: 1.0, 20.0: 1.0}),
-            written("b", "real", {7.9: 1.0, 20.0: 1.0}, longest),
-        )
+        own = written("a", "sim", {8.1: 1.0, 20.0: 1.0})
+        real = written("b", "real", {7.9: 1.0, 20.0: 1.0}, longest)
         assert distances(own, real)["value"].iloc[0] < 0.1
 
 

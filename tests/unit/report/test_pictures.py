@@ -245,10 +245,8 @@ def test_a_map_that_one_hemisphere_lacks_is_grey_there():
     )
     assert {"simulated", "not measured"} <= words(figure)
     image = picture(figure).astype(float)
-    left, right = (
-        tone(image[:, : image.shape[1] // 2]),
-        tone(image[:, image.shape[1] // 2 :]),
-    )
+    left = tone(image[:, : image.shape[1] // 2])
+    right = tone(image[:, image.shape[1] // 2 :])
     assert np.ptp(right) < 3 < np.ptp(left)
 
 
@@ -289,10 +287,8 @@ def test_an_observed_surface_outside_of_the_expected_one_is_red_and_inside_blue(
     )
     # rows: the run in two weeks, the observed brain, the distance
     image = picture(figure, 3).astype(float)
-    front, back = (
-        tone(image[: image.shape[0] // 3]),
-        tone(image[-image.shape[0] // 3 :]),
-    )
+    front = tone(image[: image.shape[0] // 3])
+    back = tone(image[-image.shape[0] // 3 :])
     assert front[0] > front[2] + 30
     assert back[2] > back[0] + 10
     assert colour_bar(figure, "distance").get_xlim() == pytest.approx((-3.0, 3.0))

@@ -310,10 +310,8 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
     for brain, run, (name, start), thickness in zip(
         brains, outputs["runs"], FOLDED, (1.5, 2.5), strict=True
     ):
-        alone, folded = (
-            read_json(f"results/brains/{start}/provenance.json"),
-            read_json(run),
-        )
+        alone = read_json(f"results/brains/{start}/provenance.json")
+        folded = read_json(run)
         found = [
             {path: file["sha256"] for path, file in record["inputs"].items()}
             for record in (alone, folded)

@@ -67,16 +67,13 @@ def test_metrics_of_the_last_common_week_have_a_difference_from_the_measured_bra
 
 def test_a_predicted_brain_is_between_its_start_and_the_atlas_brain_nearest_in_week():
     rows = [
-        *(
-            ("s", "real", 22.4, "area", 100.0),
-            ("s", "a", 29.9, "area", 210.0),
-            ("s", "a", 22.4, "area", 101.0),
-        ),
-        *(
-            ("atlas30", "real", 30.0, "area", 200.0),
-            ("atlas29", "real", 29.0, "area", 190.0),
-        ),
-        *(("s", "a", 29.9, "volume", 150.0), ("s", "a", 29.9, "crossing_faces", 0.0)),
+        ("s", "real", 22.4, "area", 100.0),
+        ("s", "a", 29.9, "area", 210.0),
+        ("s", "a", 22.4, "area", 101.0),
+        ("atlas30", "real", 30.0, "area", 200.0),
+        ("atlas29", "real", 29.0, "area", 190.0),
+        ("s", "a", 29.9, "volume", 150.0),
+        ("s", "a", 29.9, "crossing_faces", 0.0),
     ]
     units = {"area": "cm2", "volume": "mL"}
     table = [
@@ -158,8 +155,10 @@ def test_what_predictions_were_worth_stands_by_horizon_with_what_the_starts_span
         {"rows": [dict(zip(names, row, strict=True)) for row in rows]}
     ).to_dict("records")
     assert list(row.items()) == [
-        *((Facts("mm"), Facts("0.20", "0.30")), ("r", Facts("0.80", "0.90"))),
-        *(("area (%)", Facts("−2.0", "+1.0")), ("volume (%)", "–")),
+        (Facts("mm"), Facts("0.20", "0.30")),
+        ("r", Facts("0.80", "0.90")),
+        ("area (%)", Facts("−2.0", "+1.0")),
+        ("volume (%)", "–"),
         (SIMPLER_PREDICTIONS["atlas"], Facts("0.50", "0.70 mm", "r", "0.40")),
     ]
 

@@ -94,33 +94,35 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path):
     [
         (
             (
-                "2026-11-22 00:54:57,955 INFO gyriflow.io: read\n2026-11-22"
-                " 00:54:58,001 ERROR root: a.nii: is no image;\n  found"
-                " text\n2026-11-22 00:54:59,000 INFO gyriflow.io: end\n"
+                "2026-11-22 00:54:57,955 INFO gyriflow.io: read\n"
+                "2026-11-22 00:54:58,001 ERROR root: a.nii: is no image;\n"
+                "  found text\n"
+                "2026-11-22 00:54:59,000 INFO gyriflow.io: end\n"
             ),
             "a.nii: is no image;\n  found text",
         ),
         (
             (
-                "GW 21.071/23  step 1\n2026-11-22 00:54:58,001 INFO root: a\ngyriflow:"
-                " no step left. Use smaller steps\n"
+                "GW 21.071/23  step 1\n2026-11-22 00:54:58,001 INFO root: a\n"
+                "gyriflow: no step left. Use smaller steps\n"
             ),
             "no step left. Use smaller steps",
         ),
         (
             (
-                "2026-11-22 00:54:58,001 ERROR root: unexpected error\nTraceback (most"
-                ' recent call last):\n  File "a.py", line 1, in <module>\n    1 /'
-                " 0\nZeroDivisionError: division by zero\n"
+                "2026-11-22 00:54:58,001 ERROR root: unexpected error\n"
+                "Traceback (most recent call last):\n"
+                '  File "a.py", line 1, in <module>\n    1 / 0\n'
+                "ZeroDivisionError: division by zero\n"
             ),
             Facts("ZeroDivisionError: division by zero"),
         ),
         (
             (
-                "ValueError: no such"
-                " week\nsnakemake_interface_common.exceptions.WorkflowError: At least"
-                " one job did not complete successfully.\nWorkflowError:\nAt least one"
-                " job did not complete successfully.\n"
+                "ValueError: no such week\n"
+                "snakemake_interface_common.exceptions.WorkflowError:"
+                " At least one job did not complete successfully.\n"
+                "WorkflowError:\nAt least one job did not complete successfully.\n"
             ),
             Facts("ValueError: no such week"),
         ),
@@ -191,8 +193,8 @@ def package(tmp_path, monkeypatch):
         "mesh/__init__.py": "import numpy",
         "mesh/quality.py": "import gyriflow.units",
         "mesh/fill.py": (
-            "from .. import (\n    surface,  # one\n    units as u,\n)\nimport"
-            " gyriflow.unused as o"
+            "from .. import (\n    surface,  # one\n    units as u,\n)\n"
+            "import gyriflow.unused as o"
         ),
         "unused.py": "",
     }

@@ -97,8 +97,8 @@ def test_a_folding_tells_its_size_weeks_and_warnings(run):
     run.tell("run_info", stats={"simulate": 1})
     log = run.begin("simulate", run="r", brain="a")
     size = (
-        '{"event": "size", "elements": 12, "unknowns": 9, "ranks": 1, "memory_mib":'
-        " 70}\n"
+        '{"event": "size", "elements": 12, "unknowns": 9, "ranks": 1,'
+        ' "memory_mib": 70}\n'
     )
     coarse = '{"event": "warning", "message": "coarse"}\n'
     log.with_suffix(".jsonl").write_text(
@@ -290,8 +290,8 @@ def test_stages_of_brains_and_runs_are_told_from_their_files(study):
     assert ["b", "-", "-", "-"] in [line.split() for line in text(study).splitlines()]
     progress = study / "results/runs/r/a/logs/simulate.jsonl"
     progress.write_text(
-        '{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s":'
-        " 142.0}\n"
+        '{"event": "size"}\n'
+        '{"event": "step", "week": 21.5, "end_week": 23.0, "left_s": 142.0}\n'
     )
     assert Facts("r", "a", "GW 21.50", 23) in text(study).splitlines()
     write_json(
@@ -304,7 +304,8 @@ def test_stages_of_brains_and_runs_are_told_from_their_files(study):
 def test_what_is_done_of_each_brain_and_run_is_counted(tmp_path):
     touched(
         tmp_path / "results" / "brains" / "a",
-        *("surface/pial.surf.gii", "metrics/metrics.csv"),
+        "surface/pial.surf.gii",
+        "metrics/metrics.csv",
     )
     touched(
         tmp_path / "results" / "brains" / "b",
@@ -321,15 +322,11 @@ def test_what_is_done_of_each_brain_and_run_is_counted(tmp_path):
     rows = [line.split() for line in text(tmp_path).splitlines() if line]
     assert rows == [
         ["nothing", "is", "running"],
-        *(
-            ["brain", "surface", "mesh", "metrics"],
-            ["a", "done", "-", "done"],
-            ["b", "done", "done", "-"],
-        ),
-        *(
-            ["run", "brain", "folding", "surfaces", "metrics", "figures"],
-            ["r", "a", "-", "3", "2", "1"],
-        ),
+        ["brain", "surface", "mesh", "metrics"],
+        ["a", "done", "-", "done"],
+        ["b", "done", "done", "-"],
+        ["run", "brain", "folding", "surfaces", "metrics", "figures"],
+        ["r", "a", "-", "3", "2", "1"],
     ]
 
 

@@ -24,10 +24,8 @@ from gyriflow.study.atlases import known_checksums, retrieval_note, used_atlases
 from gyriflow.study.loading import load
 from gyriflow.study.registry import observed_name
 
-UNOPERATED, OPERATED = (
-    "spina bifida aperta, unoperated",
-    "spina bifida aperta, operated",
-)
+UNOPERATED = "spina bifida aperta, unoperated"
+OPERATED = "spina bifida aperta, operated"
 HERE = {"folder": "."}
 SURFACES = "atlas/fetal.week{}.{}.pial.surf.gii"
 

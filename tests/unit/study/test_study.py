@@ -438,15 +438,11 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
         labels(week, population="third", id=f"third{week}")
         for week in (21, 22, 23, 24, 25)
     ]
-    brains, run = (
-        [*of_two(22, 24), *third],
-        {"preset": "expected", "ensemble": {"members": 4, "seed": 1}},
-    )
+    brains = [*of_two(22, 24), *third]
+    run = {"preset": "expected", "ensemble": {"members": 4, "seed": 1}}
     found = study(brains, runs={"a": run}, growth={"series": "atlas"})
-    simulation, members = (
-        found.simulations["a", "own22"],
-        found.members(found.simulations["a", "own22"]),
-    )
+    simulation = found.simulations["a", "own22"]
+    members = found.members(found.simulations["a", "own22"])
     assert [member.run for member in members] == [
         f"a-member-{number}" for number in (1, 2, 3, 4)
     ]
@@ -676,16 +672,16 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
     described = found.prediction_facts
     at = "results/runs/a/own22.4/surfaces/week-23.90"
     assert described | {"surfaces": described["surfaces"][:1]} == {
-        **{
-            "run": "a",
-            "brain": "own22.4",
-            "start_week": 22.4,
-            "week": 23.9,
-            "atlas_brain": "b24",
-            "atlas_week": 24,
-        },
+        "run": "a",
+        "brain": "own22.4",
+        "start_week": 22.4,
+        "week": 23.9,
+        "atlas_brain": "b24",
+        "atlas_week": 24,
         # a series of one's own is no atlas with a licence
-        **{"population": "atlas", "atlas": None, "surfaces": [f"{at}/pial.surf.gii"]},
+        "population": "atlas",
+        "atlas": None,
+        "surfaces": [f"{at}/pial.surf.gii"],
         "atlas_surface": f"{at}/atlas.pial.surf.gii",
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
