@@ -115,8 +115,8 @@ def test_a_piece_beside_a_hemisphere_is_left_out_or_refused_with_its_place(
     )
     labels[from_centre < radius_mm] = 3
     labels[from_centre < radius_mm - 2.0] = 5
-    # the place is told in the coordinates of the file, which is back to front
-    to_file = rigid(0.0, 0.0, 180.0, shift=(0.0, 90.0, 0.0))
+    # the place is told in the coordinates of the file, which lies on its back
+    to_file = rigid(90.0, 0.0, 0.0, shift=(0.0, 90.0, 0.0))
 
     def make():
         return from_labels(
