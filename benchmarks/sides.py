@@ -29,7 +29,7 @@ from common import print_rows
 from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.anatomy.plausible import require_left_and_right
-from gyriflow.anatomy.pose import axes_of_file, hemisphere_warnings, pose_of_pair
+from gyriflow.anatomy.pose import axes_of_file, pose_of_pair, require_coordinates
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.poses import CONVENTIONS
@@ -99,7 +99,7 @@ def answer(
                 transformed(mesh, CONVENTIONS[coordinates]) for mesh in (left, right)
             )
             require_left_and_right(left, right, coordinates)
-            warnings = tuple(hemisphere_warnings(left, right, coordinates))
+            warnings = tuple(require_coordinates(left, right, coordinates))
     except InputError as error:
         return f"refused: {str(error).partition(';')[0]}", False
     return "wrong" if is_exchanged else "right", bool(warnings)

@@ -202,6 +202,16 @@ def test_stress_is_a_rate_where_it_is_forgotten_and_whole_where_it_is_kept(memor
     assert set(of_elements) == elastic | {"total_strain", "area_stretch"}
 
 
+@pytest.mark.one_rank
+def test_pressure_and_volume_that_tissue_keeps_are_no_rates():
+    folding, _ = pressed(43200.0, days=0.5, relaxation="shape")
+    _, of_elements = step_fields(folding, ["stress", "strain"])
+    forgotten = {"von_mises_pa_per_gw", "elastic_strain_per_gw"}
+    kept = {"pressure_pa", "elastic_volume_strain"}
+    whole = {"total_strain", "area_stretch"}
+    assert set(of_elements) == forgotten | kept | whole
+
+
 @pytest.mark.slow
 @pytest.mark.one_rank
 def test_forgotten_stress_is_written_as_a_rate_that_does_not_depend_on_the_step():

@@ -428,7 +428,7 @@ def from_hemispheres(
     length = float(np.ptp(triangles.merged(left, right).vertices, axis=0).max())
     brain.warn(plausible.require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
-        brain.warn(posing.hemisphere_warnings(left, right, coordinates))
+        brain.warn(posing.require_coordinates(left, right, coordinates))
     parts = [
         repair.make_pieces_sound(replace(part, mesh=mesh), edge_length_mm)
         for part, mesh in zip(parts, (left, right), strict=True)

@@ -134,7 +134,7 @@ def pose_of_pair(
     are taken as RAS+ with a warning. InputError if that does not fit, or the two seem
     swapped or of one side.
     """
-    shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
+    shapes = _shapes_of_pair(left, right)
     _require_sides(shapes)
     if not all(hemisphere.is_clear for hemisphere in shapes):
         poses = [
@@ -208,16 +208,25 @@ def pose_of_pair(
     )
 
 
+def _shapes_of_pair(left: TriangleMesh, right: TriangleMesh) -> list[PosedShape]:
+    return [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
+
+
 def _mean_side_ratio(shapes: list[PosedShape]) -> float:
     return float(np.exp(np.mean(np.log([shape.side_ratio for shape in shapes]))))
 
 
+def _distances_from_templates(shapes: list[PosedShape]) -> str:
+    left, right = (shape.side_ratio for shape in shapes)
+    return (
+        f"{left:.2f} (left) and {right:.2f} (right) times the distance from the other"
+        " side's template"
+    )
+
+
 def _require_sides(shapes: list[PosedShape]) -> None:
     ratios = [shape.side_ratio for shape in shapes]
-    found = (
-        f"{ratios[0]:.2f} (left) and {ratios[1]:.2f} (right) times the distance from"
-        " the other side's template"
-    )
+    found = _distances_from_templates(shapes)
     if min(ratios) < 1 / MIN_SIDE_RATIO and max(ratios) > MIN_SIDE_RATIO:
         raise InputError(
             "both hemispheres seem to be of one side",
@@ -395,26 +404,53 @@ def pitch_deg(rotation: Floats) -> float:
     )
 
 
-def hemisphere_warnings(
+def require_coordinates(
     left: TriangleMesh, right: TriangleMesh, coordinates: str
 ) -> list[str]:
-    """Return warnings if the shapes of two hemispheres contradict their sides or the
-    coordinates, "ras" or "lps"."""
-    shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
+    """Return warnings if the shapes of two hemispheres in RAS+ contradict their sides
+    or the `coordinates` that the configuration names, "ras" or "lps".
+
+    InputError if each clearly is the other side's in other coordinates: the files are
+    exchanged, or the coordinates mirrored, and not the named ones in either case.
+    """
+    shapes = _shapes_of_pair(left, right)
     if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
-        exchanged = (
+        causes = (
             "left and right are exchanged and the coordinates are not"
-            f" {coordinates.upper()}"
+            f" {coordinates.upper()}, or these are mirrored"
         )
-        check = "set coordinates: auto, and do not swap before"
+        if _are_exchanged_in_other_axes(left, right, shapes):
+            raise InputError(
+                f"the hemispheres contradict their sides: {causes}",
+                found=_distances_from_templates(shapes),
+                expected="more than 1 for both",
+                remedy=(
+                    "Set coordinates: auto, which shows the axes in both cases, and do"
+                    " not swap `left` and `right` before."
+                ),
+            )
         return [
-            f"the shapes fit the other sides better: {exchanged}, or these are"
-            f" mirrored: {check}"
+            f"the shapes fit the other sides better: {causes}: set coordinates: auto,"
+            " and do not swap before"
         ]
     turns = [angle_deg(shape.rotation) for shape in shapes]
     if all(shape.is_clear for shape in shapes) and min(turns) > MIN_TURN_DEG:
         return [_contradiction(coordinates, "hemispheres are", float(np.mean(turns)))]
     return []
+
+
+def _are_exchanged_in_other_axes(
+    left: TriangleMesh, right: TriangleMesh, shapes: list[PosedShape]
+) -> bool:
+    """Return whether both shapes clearly are the other side's, far from RAS.
+
+    Both have to be: an odd brain, whose coordinates are right, is not to be refused.
+    """
+    if max(shape.side_ratio for shape in shapes) >= 1 / MIN_SIDE_RATIO:
+        return False
+    exchanged = _shapes_of_pair(right, left)
+    turns = [angle_deg(shape.rotation) for shape in exchanged]
+    return all(shape.is_clear for shape in exchanged) and min(turns) > MIN_TURN_DEG
 
 
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:

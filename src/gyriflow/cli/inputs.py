@@ -16,10 +16,10 @@ from ..anatomy.plausible import (
     require_single_hemisphere,
 )
 from ..anatomy.pose import (
-    hemisphere_warnings,
     pose_of_hemisphere,
     pose_of_pair,
     pose_of_surface,
+    require_coordinates,
 )
 from ..errors import GyriflowError, InputError
 from ..formats import is_volume
@@ -164,7 +164,7 @@ def _check_pair(
         if brain.coordinates == "auto":
             yield from pose_of_pair(left, right, declared=declared).warnings
         else:
-            yield from hemisphere_warnings(left, right, brain.coordinates)
+            yield from require_coordinates(left, right, brain.coordinates)
 
 
 def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:

@@ -12,6 +12,7 @@ from skimage.measure import euler_number as euler_number_of_mask
 from gyriflow.anatomy.extraction import (
     dilated,
     handles,
+    is_simple,
     isosurface,
     main_parts,
     make_simple,
@@ -174,6 +175,32 @@ def test_a_thin_bridge_is_cut_and_a_narrow_tunnel_filled_with_the_least_change(
         filled,
     )
     assert ((repaired > 0.5) != mask).sum() == cut + filled
+
+
+@pytest.mark.parametrize(
+    ("inside", "expected"),
+    [
+        # two faces, apart for voxels inside, which join by faces only
+        ([(0, 1, 1), (1, 0, 1)], False),
+        ([(0, 1, 1), (1, 0, 1), (0, 0, 1)], True),
+        # two voxels outside, joined at an edge
+        (~np.isin(np.arange(27), [4, 10]), True),
+        (~np.isin(np.arange(27), [4, 22]), False),
+        # a hole, and a voxel alone
+        (np.ones(27, dtype=bool), False),
+        ([], False),
+    ],
+)
+def test_a_voxel_is_simple_where_it_joins_and_parts_nothing(inside, expected):
+    block = np.zeros((3, 3, 3), dtype=bool)
+    if isinstance(inside, list):
+        for voxel in inside:
+            block[voxel] = True
+    else:
+        block = inside.reshape(3, 3, 3)
+    for middle in (False, True):
+        block[1, 1, 1] = middle
+        assert is_simple(block.tobytes()) == expected
 
 
 def test_storage_order_does_not_decide_which_of_two_bridges_is_cut():

@@ -9,7 +9,17 @@ import pytest
 from facts import Facts
 from phantoms import CENTRE_MM
 from scipy import ndimage
-from shapes import cerebrum_surface, ellipsoid, phantom, rigid, sheet, sphere
+from shapes import (
+    FAR,
+    LONG_MM,
+    cerebrum_surface,
+    ellipsoid,
+    phantom,
+    rigid,
+    scaling,
+    sheet,
+    sphere,
+)
 
 from gyriflow.anatomy.extraction import handles, isosurface, smooth_mask
 from gyriflow.anatomy.fissure import (
@@ -22,12 +32,14 @@ from gyriflow.anatomy.fissure import (
     left_faces,
     mid_plane,
     open_fissure,
+    plane_between_labels,
     side_distance,
     upright,
 )
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import (
     TriangleMesh,
@@ -140,6 +152,34 @@ def test_a_cut_that_does_not_part_the_surface_is_refused():
     stripes = np.sin(corners(mesh)[:, :, 0].mean(axis=1) * 1.2)
     with pytest.raises(InputError, check=Facts("37 %", "5 %")):
         left_faces(mesh, stripes)
+
+
+@pytest.mark.parametrize("is_left", [True, False])
+def test_a_brain_on_one_side_of_the_fissure_is_refused(is_left):
+    mesh = ball_at(0.0, 0.0, 0.0)
+    left = np.full(len(mesh.faces), is_left)
+    count = len(mesh.faces)
+    with pytest.raises(InputError, check=Facts(f"{count * is_left} of {count}")):
+        cut_sides(mesh, left)
+
+
+def test_the_plane_between_labels_is_half_way_in_mm_wherever_the_brain_lies():
+    # a wedge of 40° without labels, in long voxels
+    shape = (80, 64, 40)
+    grid = scaling(LONG_MM, -0.5 * np.array(shape) * LONG_MM)
+    x, y, z = transform_points(np.indices(shape).reshape(3, -1).T, grid).T
+    bottom = -18.0
+    left = x < 0
+    right = x > np.tan(np.radians(40)) * (z - bottom)
+    inside = (x / 14) ** 2 + (y / 20) ** 2 + (z / 10) ** 2 < 1
+    masks = [mask.reshape(shape) for mask in (left, right, inside)]
+    left, right, brain = masks
+    plane = plane_between_labels(left, right, FAR[1] @ grid, brain)
+    tilt = np.radians(20)
+    normal = FAR[1][:3, :3] @ [np.cos(tilt), 0.0, -np.sin(tilt)]
+    assert angle_to(plane, normal) < 1.0
+    on_plane = transform_points(np.array([[0.0, 0.0, bottom]]), FAR[1])[0]
+    assert plane.offset == pytest.approx(plane.normal @ on_plane, abs=0.5)
 
 
 def test_a_bend_of_more_than_5_mm_is_followed():

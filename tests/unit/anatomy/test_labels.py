@@ -383,3 +383,14 @@ def test_numbers_that_occur_in_a_scheme_of_sides_by_accident_contradict_it(left,
     volume = labels + (labels > 0) * np.where(is_left, left, right)
     found = list(scheme_contradictions(layout_of(volume), SCHEMES["multi-bounti-43"]))
     assert "left and right would be mixed" in " ".join(found)
+
+
+def test_voids_between_labels_are_neither_inside_nor_outside():
+    brain = np.full((21, 21, 21), 5)
+    brain[4:-4, 4:-4, 4:-4] = 1
+    brain[5:-5:2, 5:-5:2, 5:-5:2] = 0
+    layout = layout_of(brain)
+    air, white, cortex = (layout.labels == label for label in (0, 1, 5))
+    # air touches cortex only
+    assert layout.contact[np.ix_(air, white)].sum() == 0
+    assert layout.contact[np.ix_(air, cortex)].sum() == 6 * 21**2

@@ -15,6 +15,7 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.triangles import transformed
 from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.settings.terms import SIDES
 
 QUICK = {"week": 24.0, "edge_length_mm": 2.0}
 DHCP = SCHEMES["dhcp-19"]
@@ -58,8 +59,9 @@ def test_a_hemisphere_in_any_pose_is_posed(sides, side, degrees, by):
 def test_the_other_side_and_a_whole_brain_are_refused(brain, sides):
     with pytest.raises(InputError, match=r"0\.\d\d ", check=Facts("right", 1)):
         from_surface(atlas_halves()[1], "left", coordinates="auto", **QUICK)
-    with pytest.raises(InputError, match=r"0\.[67]\d ", check=Facts(0.56)):
-        from_surface(cerebrum_surface(*brain), "left", coordinates="auto", **QUICK)
+    for side in SIDES:
+        with pytest.raises(InputError, match=r"0\.[67]\d ", check=Facts(0.56)):
+            from_surface(cerebrum_surface(*brain), side, coordinates="auto", **QUICK)
 
 
 def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain):

@@ -11,6 +11,7 @@ import shapes
 from atlas_brains import atlas_halves
 from facts import Facts
 from phantoms import CENTRE_MM
+from scripts import run_script
 from shapes import LPS, rigid, scaling, sphere
 
 from gyriflow.anatomy.fissure import smallest_gap, split
@@ -36,11 +37,12 @@ from gyriflow.geometry.triangles import (
     submesh,
     transformed,
 )
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.mesh.maps import move_to_mesh
 from gyriflow.metrics.measure import measure_brain
+from gyriflow.settings.terms import SIDES
 from gyriflow.shipped import SHIPPED
 
 DATA = Path(
@@ -268,6 +270,29 @@ def test_hemispheres_that_share_the_vertices_of_their_cut_are_joined_along_it(
         )
 
 
+def test_the_files_of_hemispheres_are_the_left_and_the_right_one_in_turn(tmp_path):
+    left, right, _ = shapes.cut_ellipsoid()
+    write_surface(tmp_path / "lh.gii", left)
+    write_surface(tmp_path / "rh.gii", right)
+    inputs = {"given": ["lh.gii", "rh.gii"], "white": []}
+    outputs = {name: f"{name}.gii" for name in ("whole", *SIDES)}
+    outputs |= {"report": "report.json"}
+    params = {
+        "source": "hemispheres",
+        "week": 24.0,
+        "side": None,
+        "labels": None,
+        "coordinates": "ras",
+        "checksums": {},
+        "settings": QUICK,
+        "limits": {},
+    }
+    run_script("pial.py", tmp_path, inputs, outputs, params)
+    for name, given in zip(SIDES, (left, right), strict=True):
+        found = read_surface(tmp_path / f"{name}.gii").vertices[:, 0]
+        assert found.mean() == pytest.approx(given.vertices[:, 0].mean(), abs=1.0)
+
+
 def test_overlapping_hemispheres_are_moved_apart(halves):
     left = TriangleMesh(halves[0].vertices - [-2.5, 0, 0], halves[0].faces)
     surface = from_hemispheres(left, halves[1], week=24.0, **QUICK)
@@ -351,6 +376,7 @@ def test_pial_surface_with_a_small_hole_is_closed(phantom):
     )
     require_sound(surface)
     assert surface.report["repair"]["holes_closed"] == 1
+    assert surface.report["self_intersections"] == 0
     assert area(surface.whole) == pytest.approx(area(phantom.whole), rel=0.02)
     assert surface.fissure_x_mm == pytest.approx(phantom.fissure_x_mm, abs=0.2)
 

@@ -20,19 +20,20 @@ from gyriflow.anatomy.fissure import smallest_gap
 from gyriflow.anatomy.pial import from_hemispheres
 from gyriflow.anatomy.plausible import facing_warnings, require_left_and_right
 from gyriflow.anatomy.pose import (
+    PosedShape,
     axes_of_file,
     hemisphere_by_shape,
-    hemisphere_warnings,
     pose_of_hemisphere,
     pose_of_labels,
     pose_of_pair,
     pose_of_surface,
     pose_of_volume_by_shape,
+    require_coordinates,
 )
 from gyriflow.anatomy.repair import pieces
 from gyriflow.anatomy.template import medial_wall, shape_of
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import CUBE_ROTATIONS, angle_deg, motion
+from gyriflow.geometry.alignment import angle_deg, motion
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     euler_number,
@@ -160,12 +161,13 @@ AXES = {
     "RAS": np.eye(3),
     "LAS": np.diag([-1.0, 1.0, 1.0]),
     "RPS": np.diag([1.0, -1.0, 1.0]),
+    "RPI": np.diag([1.0, -1.0, -1.0]),
     "LPI": -np.eye(3),
     "SAR": np.eye(3)[[2, 1, 0]],
     "PIR": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
 }
-"""Coordinates of files as (3, 3) matrices from RAS+, by their axes; all but the first
-and the last mirror."""
+"""Coordinates of files as (3, 3) matrices from RAS+, by their axes; all but RAS, RPI
+and PIR mirror."""
 
 
 def test_the_axes_of_a_file_are_named():
@@ -232,8 +234,26 @@ def test_a_hemisphere_of_the_other_shape_is_mirrored_or_of_the_other_side(halves
     assert doubt == Facts("right", "left", "axis")
 
 
+@pytest.fixture
+def shapes_once(monkeypatch):
+    """Let the pose of a hemisphere that several pairs have be found once."""
+    found = {}
+
+    def once(mesh):
+        # without negative zeros
+        key = (mesh.vertices.round(6) + 0.0).tobytes()
+        if key not in found:
+            found[key] = hemisphere_by_shape(mesh)
+        return found[key]
+
+    monkeypatch.setattr(posing, "hemisphere_by_shape", once)
+
+
+# of the axes mirrored by these, some are those of exchanged files in RAS and some are
+# not; `benchmarks/sides.py` has all 48
 @pytest.mark.slow
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no example hemispheres in {DATA}")
+@pytest.mark.usefixtures("shapes_once")
 def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
     truth = json.loads((DATA / "truth.json").read_text())
     halves = []
@@ -241,8 +261,8 @@ def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
         file = f"fetal.week22.{side}.pial.surf.gii"
         mesh = transformed(read_surface(DATA / file), truth[file]["to_ras"])
         halves.append(flipped(mesh) if signed_volume(mesh) < 0 else mesh)
-    for turn in CUBE_ROTATIONS[::3]:
-        named = axes_of_file(turn.T)
+    for named in ("RAS", "RPI"):
+        turn = AXES[named]
         pose = pose_of_pair(*(linear(half, turn) for half in halves))
         require_upright(pose, [motion(turn)] * 2)
         for pair, axes in ((halves[::-1], turn), (halves, -turn)):
@@ -479,14 +499,51 @@ def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, path
     assert pose.warnings[0] == Facts("RAS+", "coordinates")
 
 
-def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted():
-    left, right = atlas_halves()
-    assert hemisphere_warnings(left, right, "ras") == []
-    # files that are swapped, and in the other one of RAS and LPS: back to front
-    about = [transformed(side, LPS) for side in (right, left)]
-    (doubt,) = hemisphere_warnings(*about, "lps")
-    assert doubt == Facts("left", "right", "LPS", "coordinates: auto")
-    (doubt,) = hemisphere_warnings(
+def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted(halves):
+    left, right = halves
+    assert require_coordinates(left, right, "ras") == []
+    (doubt,) = require_coordinates(
         *(transformed(side, rigid(180, 0, 0)) for side in (left, right)), "ras"
     )
     assert re.search(r"1[78]\d° .*\bras\b", doubt)
+
+
+def test_exchanged_files_are_refused_though_the_left_one_lies_on_the_left(halves):
+    # back to front in the named coordinates; so are mirrored ones, RPS
+    right, left = (transformed(half, LPS) for half in halves)
+    require_left_and_right(left, right, "lps")
+    facts = Facts("left", "right", "exchanged", "mirrored", "LPS")
+    with pytest.raises(InputError, match=r"0\.\d\d .*0\.\d\d ", check=facts) as caught:
+        require_coordinates(left, right, "lps")
+    assert str(caught.value) == Facts("coordinates: auto", "do not swap")
+
+
+@pytest.mark.parametrize(
+    ("turn", "confidence", "ratios"),
+    [
+        (LPS, 1.05, [0.8, 0.8]),
+        (LPS, 1.5, [0.7, 0.95]),
+        (np.eye(4), 1.5, [0.8, 0.8]),
+    ],
+    ids=[
+        "of no clear pose",
+        "of which one fits both sides",
+        "exchanged, but in RAS",
+    ],
+)
+def test_odd_shapes_in_named_coordinates_are_doubted_and_measured(
+    halves, monkeypatch, turn, confidence, ratios
+):
+    # as if hemispheres in RAS fitted the other sides better, in axes turned by `turn`
+    shape = shape_of(halves[1])
+    posed = PosedShape(
+        "hemisphere", shape, turn[:3, :3], 0.0, 0.05, confidence, 1.2, np.eye(3)
+    )
+    found = iter([*ratios, 1.2, 1.2])
+    monkeypatch.setattr(
+        posing,
+        "hemisphere_by_shape",
+        lambda _: replace(posed, side_ratio=next(found)),
+    )
+    (doubt,) = require_coordinates(*halves, "ras")
+    assert doubt == Facts("left", "right", "RAS", "coordinates: auto")

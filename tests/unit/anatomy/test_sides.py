@@ -6,11 +6,12 @@ import odd_brains
 import pytest
 from facts import Facts
 from phantoms import CENTRE_MM
-from shapes import phantom, sphere
+from shapes import phantom, rigid, sphere
 
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import pieces, with_volume
 from gyriflow.errors import InputError
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
 from gyriflow.io.yaml_files import SCHEMES
@@ -114,15 +115,16 @@ def test_a_piece_beside_a_hemisphere_is_left_out_or_refused_with_its_place(
     )
     labels[from_centre < radius_mm] = 3
     labels[from_centre < radius_mm - 2.0] = 5
+    # the place is told in the coordinates of the file, which lies on its back
+    to_file = rigid(90.0, 0.0, 0.0, shift=(0.0, 90.0, 0.0))
 
     def make():
         return from_labels(
-            labels, affine, SCHEMES["dhcp-19"], week=28.0, edge_length_mm=1.5
+            labels, to_file @ affine, SCHEMES["dhcp-19"], week=28.0, edge_length_mm=1.5
         )
 
-    facts = Facts(
-        "left", "2 pieces", f"({', '.join(str(round(x)) for x in place + CENTRE_MM)})"
-    )
+    (x, y, z) = transform_points((place + CENTRE_MM)[None], to_file)[0]
+    facts = Facts("left", "2 pieces", f"({x:.0f}, {y:.0f}, {z:.0f})")
     if refuses:
         with pytest.raises(InputError, check=facts):
             make()

@@ -3,6 +3,8 @@ it takes: nothing is solved."""
 
 import logging
 import math
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,6 +117,22 @@ def test_bodies_are_aligned_with_their_shapes_by_area_and_by_volume(steps):
     assert np.average(fitted - UNEVEN.vertices, axis=0, weights=sizes) == pytest.approx(
         0, abs=1e-6
     )
+
+
+def test_a_step_is_as_long_as_the_shortest_that_a_contribution_allows():
+    problem = ElasticFit(UNEVEN)._problem
+    rest = problem.rest()
+    allowed = []
+    for share in (0.7, 0.3, 1.0):
+        allowed.append(SimpleNamespace(max_step=partial(_fraction, share)))
+    problem.contributions = allowed
+    assert problem.max_step(rest, rest) == 0.3
+    problem.contributions = []
+    assert problem.max_step(rest, rest) == 1.0
+
+
+def _fraction(share, u, direction):
+    return share
 
 
 def test_springs_are_as_strong_as_their_area():

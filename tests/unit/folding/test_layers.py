@@ -73,7 +73,7 @@ def test_rates_that_change_with_the_weeks_are_those_of_the_middle_of_a_step():
 def test_distance_is_to_the_triangles_not_to_the_vertices_within_reach():
     # one coarse cell: the middle of a wall is far from every vertex
     search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
-    points = np.array([[0.0, 0.0, 0.0], [4.0, 1.0, 2.0], [0.0, -3.0, 0.0]])
+    points = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, -3.0, 0.0]])
     np.testing.assert_allclose(search.distance(points), [5.0, 1.0, 2.0], atol=1e-12)
     assert search.distance(points[1:2], reach=1.5)[0] == pytest.approx(1.0)
     assert search.distance(points[:1], reach=1.0)[0] == pytest.approx(5 * np.sqrt(3))

@@ -14,6 +14,7 @@ from gyriflow.geometry.triangles import Floats, TriangleMesh, flipped
 from gyriflow.growth.series_shapes import (
     INNER_MM,
     MAX_OPENING_DRAWS,
+    SeriesShapes,
     WeekShape,
     _carried,
     fit_body,
@@ -160,6 +161,12 @@ def test_stops_that_round_to_a_week_are_no_stops():
         (23.0, False),
     ]
     assert shapes[0].positions == pytest.approx(2 * BALL.vertices)
+    # an interrupted series goes on from what it was
+    again = SeriesShapes.of(shapes).by_week()
+    assert [(shape.week, shape.is_stop) for shape in again] == [
+        (22.5, True),
+        (23.0, False),
+    ]
 
 
 def test_tissue_below_is_that_of_the_observed_surface_and_of_the_body_at_the_start():

@@ -80,6 +80,9 @@ def test_the_corner_element_has_its_known_quality():
     assert radius_ratios(corner)[0] == pytest.approx(
         3 * inscribed / circumscribed, rel=1e-12
     )
+    # edges of 1, 2 and 3 mm: inradius 1/3, circumradius half the diagonal
+    uneven = TetrahedralMesh(corner.vertices * [1.0, 2.0, 3.0], corner.tets)
+    assert radius_ratios(uneven)[0] == pytest.approx(2 / np.sqrt(14), rel=1e-12)
     angles = np.sort(dihedral_angles(corner)[0])
     np.testing.assert_allclose(
         angles, [np.degrees(np.arccos(1 / np.sqrt(3)))] * 3 + [90] * 3, rtol=1e-12

@@ -254,6 +254,21 @@ def test_the_interval_of_a_median_is_that_of_a_mean() -> None:
     assert curve["sd"] == pytest.approx(values.std(), rel=0.05)
 
 
+def test_two_scans_say_as_much_as_two_subjects_unless_they_agree() -> None:
+    weeks, subjects = np.full(200, 25.0), np.arange(200)
+    values = np.random.default_rng(3).normal(50.0, 6.0, 200)
+    variances = [
+        fit_norm(weeks, found, people, is_positive=True).covariance[0, 0]
+        for found, people in (
+            (values, subjects),
+            (values, subjects // 2),
+            (np.repeat(values[:100], 2), subjects // 2),
+        )
+    ]
+    assert variances[1] / variances[0] == pytest.approx(1.0, abs=0.2)
+    assert variances[2] / variances[0] == pytest.approx(2.0, rel=0.3)
+
+
 @pytest.mark.parametrize(
     ("subjects", "weeks"), [(200, 160), (200, 7), (200, 1), (20, 16), (20, 3)]
 )

@@ -358,6 +358,15 @@ def test_power_of_a_wave_is_its_squared_integral_on_uneven_vertices_and_on_a_cop
     )
 
 
+def test_the_copy_for_long_waves_has_edges_short_enough_for_sulci() -> None:
+    mesh = sphere(30.0, 5)
+    copy_vertices = spectral_basis(mesh, 20).places.shape[1]
+    assert copy_vertices < 0.8 * len(mesh.vertices)
+    # of the even triangles that so many vertices have; the waves are 40 mm long
+    edge_mm = np.sqrt(area(mesh) / copy_vertices / np.sqrt(0.75))
+    assert edge_mm == pytest.approx(1.8, abs=0.05)
+
+
 def test_a_copy_gives_the_same_dominant_bands(monkeypatch) -> None:
     mesh = uneven(5)
     proxy = waves(mesh, 8) + 0.7 * waves(mesh, 3) + 0.3

@@ -193,6 +193,7 @@ def test_the_run_of_a_single_value_may_differ_further():
         ({"vary": {"thickness_mm": [-1]}}, "vary.thickness_mm", [0, -1]),
         ({"vary": {"thickness_mm": [1, 1]}}, "vary.thickness_mm", [[1.0, 1.0]]),
         ({"vary": {"preset": ["measured"]}}, "vary.preset", ["base"]),
+        ({"fixed": {"preset": "measured"}}, "fixed.preset", ["base"]),
         ({"vary": {}}, "vary", ["folding"]),
         ({"fixed": {"contact.gap": 2}}, "fixed.contact.gap", []),
         ({"fixed_at": {1.2: {"step_s": 43200}}}, "fixed_at", [1.2]),

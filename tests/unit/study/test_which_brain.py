@@ -280,6 +280,34 @@ def test_a_second_hemisphere_is_of_another_series_norm_and_template(side):
     assert other not in str(found.simulations["reference", f"{side}22"].at(23).parts)
 
 
+def test_a_brain_has_white_surfaces_that_are_given_or_follow_from_its_labels():
+    pial = {"week": 23, "pial": __file__}
+    brains = [
+        {"id": "bare", **pial},
+        {"id": "white", **pial, "white": __file__},
+        *labelled(22),
+    ]
+    for wanted, expected in (("given", {"white"}), ("all", {"white", "a"})):
+        found = resolved(brains, start="bare", metrics={"white_surfaces": wanted})
+        brains_found = found.brains.values()
+        assert {brain.id for brain in brains_found if brain.has_white} == expected
+
+
+def test_charts_have_the_colours_of_a_covariate_for_each_scan_of_a_subject():
+    brains = [
+        brain(f"{subject}w{week}", week, subject=subject, covariates={"sex": sex})
+        for subject, sex in (("p", "F"), ("q", "M"), ("r", "F"))
+        for week in (21, 22)
+    ]
+    found = resolved(brains, start="pw21", runs={"reference": {"end_week": 22}})
+    (chart,) = (
+        figure for figure in figures_of(found) if figure.kind.name == "metrics_figure"
+    )
+    assert chart.options["groups"] == {
+        given["id"]: f"sex: {given['covariates']['sex']}" for given in brains
+    }
+
+
 @pytest.mark.parametrize(("weeks", "similar"), [((22, 26), "x"), ((21, 23.4), "y")])
 def test_thickness_is_of_the_brain_nearest_in_week_with_labels_or_else_white_surfaces(
     weeks, similar
