@@ -15,6 +15,9 @@ from .triangles import Floats
 
 ROUNDS = 3
 """Rounds over the flat elements: one may open only after another."""
+KEPT_RATIO = 0.02
+"""Fraction of their volume below which elements do not lose any, or turn over, for one
+that is inverted."""
 COST_PER_MM = 1e-3
 """Relative volume that a displacement of 1 mm has to gain: a vertex moves no further
 than that needs."""
@@ -30,8 +33,8 @@ def open_flat_elements(
     """Return (n, 3) positions in mm at which elements have the fraction `least` of
     their volume, where possible.
 
-    `tets` are (m, 4) linear elements of positive volume, `start_volumes` (m,) in mm³
-    those of which this is a fraction. A vertex moves by at most `longest_mm` (n,) along
+    `tets` are (m, 4) linear elements, of which a few may be inverted, `start_volumes`
+    (m,) in mm³ those of which this is a fraction. A vertex moves by at most `longest_mm` (n,) along
     each axis. No element below this fraction loses volume unless a flatter one at the
     same vertex gains.
     """
@@ -86,10 +89,18 @@ def _best_move(
     )
     sides = np.vstack([np.eye(3), -np.eye(3)])
     bound_move = np.column_stack([sides, np.zeros(6), -np.ones(6)])
+    ratios = volumes / start_volumes
+    rows, limits = [stay_open, bound_move], [ratios, np.zeros(6)]
+    if ratios.min() <= 0:
+        # the others are not as flat as the inverted one becomes
+        stay_positive = stay_open.copy()
+        stay_positive[:, 3] = 0.0
+        rows.append(stay_positive)
+        limits.append(np.maximum(ratios - KEPT_RATIO, 0.0))
     found = linprog(
         [0.0, 0.0, 0.0, -1.0, COST_PER_MM],
-        A_ub=np.vstack([stay_open, bound_move]),
-        b_ub=np.concatenate([volumes / start_volumes, np.zeros(6)]),
+        A_ub=np.vstack(rows),
+        b_ub=np.concatenate(limits),
         bounds=[*[(None, None)] * 3, (None, least), (0.0, longest_mm)],
     )
     # without a solution, by round-off, the vertex stays

@@ -74,3 +74,17 @@ def test_the_flattest_of_many_elements_never_becomes_flatter():
     assert after.min() > before.min()
     assert (after < 0.2).sum() < 0.3 * (before < 0.2).sum()
     assert np.array_equal(found[USED], places[USED])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_opens_inverted_elements_turns_no_others_over(seed):
+    noise = np.random.default_rng(seed).uniform(-2.0, 2.0, BODY.vertices.shape)
+    noise[USED] = 0.0
+    places = BODY.vertices + noise
+    before = ratios(places)
+    longest_mm = np.minimum(LONGEST_MM, 0.3)
+    assert (before < 0).sum() > 10
+    found = open_flat_elements(places, BODY.tets, VOLUMES, longest_mm, 0.2)
+    after = ratios(found)
+    assert (after < 0).sum() < (before < 0).sum()
+    assert (after[before > 0] > 0).all()
