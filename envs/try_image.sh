@@ -59,6 +59,6 @@ inside() {
 }
 inside gyriflow --version
 inside python -c 'import gyriflow.folding, dolfinx, pymeshlab, pytetwild, pyvista; print("dolfinx", dolfinx.__version__)'
-inside gyriflow /study/data /study/out participant --settings /study/settings.yaml --cores 2
+inside gyriflow /study/data /study/out participant --fold --settings /study/settings.yaml --cores 2
 test -s "$work/study/out/sub-01/anat/sub-01_hemi-L_desc-referencegw2200_pial.surf.gii"
 echo "the image works"
