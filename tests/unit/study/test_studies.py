@@ -303,6 +303,7 @@ def test_folders_of_results_are_no_names_of_studies():
             "parameters.stiffness_ratio",
             [0],
         ),
+        ({"parameters": {}}, "parameters", [0, 1]),
         ({"rounds": [30, 11]}, "rounds", [[30, 11], 3, 40]),
         ({"score": {}}, "score", ["shape_index", "surface_distance"]),
         (
