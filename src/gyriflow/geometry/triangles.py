@@ -90,6 +90,11 @@ def volume_ml(mesh: TriangleMesh) -> float:
     return signed_volume(mesh) * ML_PER_MM3
 
 
+def dots(first: Floats, second: Floats) -> Floats:
+    """Return the (n,) scalar products of the rows of two (n, 3) arrays."""
+    return np.einsum("ij,ij->i", first, second)
+
+
 def unit(vectors: Floats) -> Floats:
     """Return (n, 3) vectors scaled to length one; zero vectors stay zero."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -348,7 +353,7 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
     faces = found.simplices.astype(np.int64)
     normals = area_vectors(TriangleMesh(mesh.vertices, faces))
     outward = found.equations[:, :3]
-    is_inward = np.einsum("ij,ij->i", normals, outward) < 0
+    is_inward = dots(normals, outward) < 0
     faces[is_inward] = faces[is_inward][:, ::-1]
     hull, _ = used_part(TriangleMesh(mesh.vertices, faces))
     return hull
