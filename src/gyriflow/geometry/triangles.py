@@ -247,11 +247,13 @@ def _angles_around_edge(mesh: TriangleMesh, half_edges: Ints) -> Floats:
     apex = mesh.faces[face, (corner + 2) % 3]
     low = mesh.vertices[min(start[0], end[0])]
     high = mesh.vertices[max(start[0], end[0])]
-    axis = (high - low) / np.linalg.norm(high - low)
+    axis = high - low
+    axis /= np.linalg.norm(axis)
     arms = mesh.vertices[apex] - low
     first = arms[0]
     radial = first - (first @ axis) * axis
-    return np.arctan2(arms @ np.cross(axis, radial), arms @ radial)
+    across = np.cross(axis, radial)
+    return np.arctan2(arms @ across, arms @ radial)
 
 
 def _cheapest_pairs(
