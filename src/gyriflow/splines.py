@@ -38,8 +38,10 @@ def design(weeks: Floats, first: float, last: float, intervals: int) -> Floats:
     integral = rates.antiderivative()
     inside = np.clip(weeks, first, last)
     beyond = (weeks - inside)[:, None] * rates(inside)
-    changes = integral(inside) - integral(first) + beyond
-    return np.column_stack([np.ones(len(weeks)), changes])
+    changes = integral(inside) - integral(first)
+    changes += beyond
+    first_value = np.ones(len(weeks))
+    return np.column_stack([first_value, changes])
 
 
 def penalty(first: float, last: float, intervals: int, order: int) -> Floats:

@@ -27,14 +27,14 @@ def open_flat_elements(
     least: float,
 ) -> Floats:
     """Return (n, 3) positions in mm at which elements have the fraction `least` of
-    their volume, where possible.
+    their volume, where possible; `positions` itself if no vertex can be moved.
 
     `tets` are (m, 4) linear elements of positive volume, `start_volumes` (m,) in mm³
     those of which this is a fraction. A vertex moves by at most `longest_mm` (n,) along
     each axis. No element below this fraction loses volume unless a flatter one at the
     same vertex gains.
     """
-    places = positions.copy()
+    places = positions
     left_mm = longest_mm.copy()
     for _ in range(ROUNDS):
         ratios = volumes_between(places, tets) / start_volumes
@@ -44,6 +44,8 @@ def open_flat_elements(
         vertices = vertices[left_mm[vertices] > 0]
         if not len(vertices):
             break
+        if places is positions:
+            places = positions.copy()
         near = np.flatnonzero(np.isin(tets, vertices).any(axis=1))
         for vertex in dict.fromkeys(vertices.tolist()):
             around = near[(tets[near] == vertex).any(axis=1)]

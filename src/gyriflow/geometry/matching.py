@@ -134,7 +134,8 @@ def _inside(mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats) -> Mask:
     change = np.where(is_upwards, -1, 1)
     np.add.at(changes, (*lines.T, first), change)
     winding = changes.cumsum(axis=2)
-    return winding[..., :layers] > 0
+    is_inside = winding > 0
+    return is_inside[..., :layers]
 
 
 def _crossings(mesh: TriangleMesh, shape: tuple[int, ...]) -> tuple[Ints, Floats, Mask]:
