@@ -100,7 +100,9 @@ def determinants(deformation: Deformation) -> Floats:
     differences); ≤ 0 where it folds."""
     displacement = deformation.displacement.astype(np.float64)
     slopes = np.gradient(displacement, axis=(0, 1, 2))
-    per_mm = np.linalg.inv(deformation.affine[:3, :3])
-    gradient = np.stack(slopes, axis=-1) @ per_mm
-    local = np.linalg.det(np.eye(3) + gradient)
-    return local * np.linalg.det(deformation.matrix[:3, :3])
+    gradient = np.stack(list(slopes), axis=-1)
+    voxel = deformation.affine[:3, :3]
+    gradient = gradient @ np.linalg.inv(voxel)
+    of_displacement = np.linalg.det(np.eye(3) + gradient)
+    of_affine = np.linalg.det(deformation.matrix[:3, :3])
+    return of_displacement * of_affine

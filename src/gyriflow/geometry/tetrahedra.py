@@ -198,8 +198,7 @@ def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
     coordinates in mm."""
     axes = np.meshgrid(*ticks, indexing="ij")
     points = np.stack(axes, axis=-1).reshape(-1, 3)
-    number = np.arange(len(points))
-    number = number.reshape(axes[0].shape)
+    number = np.arange(len(points)).reshape(axes[0].shape)
     low = slice(None, -1)
     high = slice(1, None)
     corners = []

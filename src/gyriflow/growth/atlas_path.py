@@ -126,14 +126,21 @@ class AtlasPath:
         number = self.shapes.weeks.index(week)
         return TetrahedralMesh(self.shapes.positions[number], self.tets)
 
+    @property
+    def observed(self) -> Ints:
+        """The numbers of the weeks with a brain of the atlas."""
+        return np.flatnonzero(~np.isin(self.shapes.weeks, self.shapes.stops))
+
     def ages(self, norm_ml: Sequence[float] | Floats = ()) -> AtlasAges:
         """Return the ages by size of the atlas' brains in all its weeks; `norm_ml` as
         for `ages_by_size`."""
-        brains = [shape for shape in self.shapes.by_week() if not shape.is_stop]
-        mesh = TetrahedralMesh(brains[0].positions, self.tets)
-        sizes = sizes_of(mesh, [brain.positions for brain in brains])
-        weeks = [brain.week for brain in brains]
-        return ages_by_size(weeks, sizes["volume_ml"].tolist(), norm_ml)
+        shapes = self.shapes
+        weeks = [shapes.weeks[number] for number in self.observed]
+        positions = shapes.positions[self.observed]
+        mesh = self.mesh(weeks[0])
+        sizes = sizes_of(mesh, positions)
+        volumes = sizes["volume_ml"].tolist()
+        return ages_by_size(weeks, volumes, norm_ml)
 
     def knots(self, ages: AtlasAges) -> Floats:
         """Return the age by size of each shape, stops between those of their
@@ -179,8 +186,10 @@ def _weights_in(tetrahedra: Floats, points: Floats) -> Floats:
     first = tetrahedra[:, :1]
     edges = np.moveaxis(tetrahedra[:, 1:] - first, 1, 2)
     offset = points - first[:, 0]
-    weights = np.linalg.solve(edges, offset[..., None])[..., 0]
-    return np.column_stack([1 - weights.sum(axis=1), weights])
+    solution = np.linalg.solve(edges, offset[..., None])
+    others = solution[..., 0]
+    of_first = 1 - others.sum(axis=1)
+    return np.column_stack([of_first, others])
 
 
 def _weighted(places: Floats, weights: Floats) -> Floats:
@@ -248,4 +257,4 @@ def positions_at(
     part = (week - weeks[first]) / (weeks[second] - weeks[first])
     motion = rigid_fit(atlas[second], atlas[first], sizes)
     aligned = transform_points(atlas[second], motion)
-    return (1 - part) * atlas[first] + part * aligned
+    return np.asarray((1 - part) * atlas[first] + part * aligned)
