@@ -33,14 +33,15 @@ RIDGE = 1e-13
 def design(weeks: Floats, first: float, last: float, intervals: int) -> Floats:
     """Return the matrix (n, k) that gives a curve's values at weeks (n,) from its
     coefficients."""
-    rates = BSpline(
-        _knots(first, last, intervals), np.eye(intervals + 2), 2, extrapolate=False
-    )
-    integral, inside = rates.antiderivative(), np.clip(weeks, first, last)
+    knots = _knots(first, last, intervals)
+    rates = BSpline(knots, np.eye(intervals + 2), 2, extrapolate=False)
+    integral = rates.antiderivative()
+    inside = np.clip(weeks, first, last)
     beyond = (weeks - inside)[:, None] * rates(inside)
-    return np.column_stack(
-        [np.ones(len(weeks)), integral(inside) - integral(first) + beyond]
-    )
+    changes = integral(inside) - integral(first)
+    changes += beyond
+    first_value = np.ones(len(weeks))
+    return np.column_stack([first_value, changes])
 
 
 def penalty(first: float, last: float, intervals: int, order: int) -> Floats:
@@ -52,10 +53,16 @@ def penalty(first: float, last: float, intervals: int, order: int) -> Floats:
     """
     knots = _knots(first, last, intervals)
     middles = 0.5 * (knots[1:-2] + knots[2:-1])
-    slopes = np.diff(np.eye(len(middles)), axis=0) / np.diff(middles)[:, None]
+    distances = np.diff(middles)
+    slopes = np.diff(np.eye(len(middles)), axis=0)
+    slopes /= distances[:, None]
     if order == 2:
-        slopes = np.diff(slopes, axis=0) / (0.5 * (middles[2:] - middles[:-2]))[:, None]
-    return np.pad(slopes.T @ slopes, ((1, 0), (1, 0)))
+        distances = 0.5 * (middles[2:] - middles[:-2])
+        slopes = np.diff(slopes, axis=0)
+        slopes /= distances[:, None]
+    of_rate = slopes.T @ slopes
+    # the value at the first week has no penalty
+    return np.pad(of_rate, ((1, 0), (1, 0)))
 
 
 def strength(
@@ -92,9 +99,7 @@ def strength(
     elif freedom >= highest - FREEDOM_TOL:
         exponent = weakest
     else:
-        exponent = brentq(
-            lambda exponent: freedom_at(exponent) - freedom, weakest, strongest
-        )
+        exponent = brentq(lambda x: freedom_at(x) - freedom, weakest, strongest)
     return float(unit * 10**exponent)
 
 
@@ -114,11 +119,14 @@ def _data_shares(normal: Floats, penalty: Floats) -> Floats:
     # directions that neither decides, of weeks that nearly coincide, count as decided
     # by data
     ridge = RIDGE * np.eye(len(both))
-    shares = eigh(scales * normal + ridge, scales * both + ridge, eigvals_only=True)
+    shares = eigh(
+        scales * normal + ridge,
+        scales * both + ridge,
+        eigvals_only=True,
+    )
     return np.clip(shares, 0.0, 1.0)
 
 
 def _knots(first: float, last: float, intervals: int) -> Floats:
-    return np.concatenate(
-        [[first] * 2, np.linspace(first, last, intervals + 1), [last] * 2]
-    )
+    inner = np.linspace(first, last, intervals + 1)
+    return np.concatenate([[first, first], inner, [last, last]])

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from .triangles import Floats, TriangleMesh, face_normals, transformed
+from .triangles import Floats, TriangleMesh, dots, face_normals, transformed
 
-CUBE_ROTATIONS: Floats = np.array(
-    sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn))
-)
+_TURNS = Rotation.create_group("O").as_matrix()
+CUBE_ROTATIONS: Floats = np.array(sorted(_TURNS, key=np.trace, reverse=True))
 """The 24 rotations of a cube, the identity first. Every rotation is within 63 degrees
 of one of them."""
 
@@ -49,7 +48,8 @@ def motion(rotation: ArrayLike = IDENTITY, shift: ArrayLike = 0.0) -> Floats:
     """Return the (4, 4) motion p → rotation p + shift. The default of each is the
     identity."""
     matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation, shift
+    matrix[:3, :3] = rotation
+    matrix[:3, 3] = shift
     return matrix
 
 
@@ -61,18 +61,22 @@ def angle_deg(rotation: Floats) -> float:
 def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
     """Return the (4, 4) least-squares motion of (n, 3) points onto others (Kabsch 1976,
     10.1107/S0567739476001873)."""
-    source, target = (
-        np.average(group, axis=0, weights=weights) for group in (points, onto)
+    source = np.average(points, axis=0, weights=weights)
+    target = np.average(onto, axis=0, weights=weights)
+    turn, _ = Rotation.align_vectors(
+        onto - target,
+        points - source,
+        weights=weights,
     )
-    turn, _ = Rotation.align_vectors(onto - target, points - source, weights=weights)
-    return motion(turn.as_matrix(), target - turn.apply(source))
+    shift = target - turn.apply(source)
+    return motion(turn.as_matrix(), shift)
 
 
 def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floats:
     """Return the (n, 3) displacement from `first` to `second` after the latter is
     rigidly aligned to the former."""
     back = rigid_fit(second, first, weights)
-    return np.asarray(second @ back[:3, :3].T + back[:3, 3] - first)
+    return second @ back[:3, :3].T + back[:3, 3] - first
 
 
 def step_towards_planes(
@@ -86,11 +90,14 @@ def step_towards_planes(
     sphere, are not changed.
     """
     centre = points.mean(axis=0)
-    rows = np.hstack([np.cross(points - centre, normals), normals])
-    size = np.ones(len(points)) if weights is None else np.sqrt(weights)
-    turn, move = np.split(
-        np.linalg.lstsq(rows * size[:, None], distances * size, rcond=1e-6)[0], 2
-    )
+    turns = np.cross(points - centre, normals)
+    rows = np.hstack([turns, normals])
+    if weights is not None:
+        roots = np.sqrt(weights)
+        rows = rows * roots[:, None]
+        distances = distances * roots
+    solution, *_ = np.linalg.lstsq(rows, distances, rcond=1e-6)
+    turn, move = np.split(solution, 2)
     rotation = Rotation.from_rotvec(turn).as_matrix()
     return rotation, centre + move - rotation @ centre
 
@@ -113,32 +120,40 @@ def follow_planes(
         turn, move = step_towards_planes(points, normals, distances, weights)
         # as (4, 4) matrices, since round-off decides between two equally close faces
         whole = motion(turn, move) @ motion(rotation, shift)
-        rotation, shift = whole[:3, :3], whole[:3, 3]
+        rotation = whole[:3, :3]
+        shift = whole[:3, 3]
         if is_converged(points, turn, move):
             break
     return rotation, shift
 
 
 def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floats]]:
-    tree, normals = igl.AABB(), face_normals(mesh)
+    """Return a function that finds the nearest points of a surface, and the normals
+    there."""
+    normals = face_normals(mesh)
+    tree = igl.AABB()
     tree.init(mesh.vertices, mesh.faces)
 
     def nearest(points: Floats) -> tuple[Floats, Floats]:
-        _, face, on = tree.squared_distance(mesh.vertices, mesh.faces, points)
-        return on, normals[face]
+        _, face, places = tree.squared_distance(mesh.vertices, mesh.faces, points)
+        return places, normals[face]
 
     return nearest
 
 
-def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
+def _some_points(mesh: TriangleMesh) -> Floats:
+    step = max(1, len(mesh.vertices) // N_POINTS)
+    return mesh.vertices[::step]
+
+
+def _fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
     """Return the (4, 4) rigid motion that aligns a surface to one in a similar pose:
     point to plane, both ways."""
-    history: list[float] = []
-    nearest_of_a, nearest_of_b = _nearest_planes(mesh), _nearest_planes(onto)
-    points_a, points_b = (
-        surface.vertices[:: max(1, len(surface.vertices) // N_POINTS)]
-        for surface in (mesh, onto)
-    )
+    residuals: list[float] = []
+    nearest_of_a = _nearest_planes(mesh)
+    nearest_of_b = _nearest_planes(onto)
+    points_a = _some_points(mesh)
+    points_b = _some_points(onto)
 
     def planes(rotation: Floats, shift: Floats) -> Planes:
         moved = points_a @ rotation.T + shift
@@ -146,29 +161,30 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         # points of b are moved back to the original place of a
         on_a, normals_a = nearest_of_a((points_b - shift) @ rotation)
         points = np.concatenate([moved, on_a @ rotation.T + shift])
+        targets = np.concatenate([on_b, points_b])
         normals = np.concatenate([normals_b, normals_a @ rotation.T])
-        distances = np.einsum(
-            "ij,ij->i", np.concatenate([on_b, points_b]) - points, normals
-        )
-        history.append(float(np.linalg.norm(distances)))
+        distances = dots(targets - points, normals)
+        residuals.append(float(np.linalg.norm(distances)))
         return points, normals, distances, None
 
     def is_converged(points: Floats, turn: Floats, move: Floats) -> bool:
-        before, last = history[:-STALL_ROUNDS], history[-STALL_ROUNDS:]
+        before = residuals[:-STALL_ROUNDS]
+        last = residuals[-STALL_ROUNDS:]
         if before and min(last) > (1 - STALL_TOL) * min(before):
             return True
-        moved = points[: len(points_a)]
-        return bool(
-            np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < MOVE_TOL_MM
-        )
+        start = points[: len(points_a)]
+        moves = start @ turn.T + move - start
+        return bool(np.linalg.norm(moves, axis=1).max() < MOVE_TOL_MM)
 
     shift = points_b.mean(axis=0) - points_a.mean(axis=0)
-    return motion(*follow_planes(np.eye(3), shift, planes, MAX_ROUNDS, is_converged))
+    found = follow_planes(np.eye(3), shift, planes, MAX_ROUNDS, is_converged)
+    return motion(*found)
 
 
 def align(mesh: TriangleMesh, onto: TriangleMesh) -> TriangleMesh:
-    """Align a surface rigidly to another in a similar pose, by `fit_onto`."""
-    return transformed(mesh, fit_onto(mesh, onto))
+    """Align a surface rigidly to another in a similar pose, by iterative closest
+    points."""
+    return transformed(mesh, _fit_onto(mesh, onto))
 
 
 def fits_from_all_sides(
@@ -186,14 +202,14 @@ def fits_from_all_sides(
     `distinct_deg` are refined.
     """
     coarse = [coarse_fit(start) for start in starts]
+    residuals = [fit.residual for fit in coarse]
     distinct: list[int] = []
-    for i in map(int, np.argsort([fit.residual for fit in coarse], kind="stable")):
-        if all(
-            angle_deg(coarse[i].rotation @ coarse[j].rotation.T) > distinct_deg
-            for j in distinct
-        ):
-            distinct.append(i)
-    return [refine(coarse[i]) for i in dict.fromkeys([0, *distinct[:candidates]])]
+    for number in np.argsort(residuals, kind="stable").tolist():
+        turns = [_turn_deg(coarse[number], coarse[other]) for other in distinct]
+        if min(turns, default=np.inf) > distinct_deg:
+            distinct.append(number)
+    refined = dict.fromkeys([0, *distinct[:candidates]])
+    return [refine(coarse[number]) for number in refined]
 
 
 def residual_ratio(
@@ -201,9 +217,13 @@ def residual_ratio(
 ) -> float:
     """Return the least residual in another pose over that of the best fit, ∞ without;
     near 1 it is ambiguous."""
-    alternatives = [
-        fit.residual
-        for fit in fits
-        if angle_deg(fit.rotation @ best.rotation.T) > distinct_deg
-    ]
-    return float(min(alternatives, default=np.inf) / best.residual)
+    residuals = []
+    for fit in fits:
+        if _turn_deg(fit, best) > distinct_deg:
+            residuals.append(fit.residual)
+    return min(residuals, default=np.inf) / best.residual
+
+
+def _turn_deg(first: RigidFit, second: RigidFit) -> float:
+    """Return the angle between the rotations of two fits in degrees."""
+    return angle_deg(first.rotation @ second.rotation.T)

@@ -58,15 +58,16 @@ def transform_points(
     points: NDArray[np.number], matrix: NDArray[np.floating]
 ) -> Floats:
     """Apply a (4, 4) affine map to (n, 3) points."""
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
+    linear = matrix[:3, :3]
+    shift = matrix[:3, 3]
+    return np.asarray(points @ linear.T + shift, dtype=np.float64)
 
 
 def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
     """Return the (3, …) fractional voxel indices of (…, 3) points in mm, for a volume's
     (4, 4) affine."""
-    return np.moveaxis(
-        transform_points(points, np.linalg.inv(np.asarray(affine, dtype=float))), -1, 0
-    )
+    to_index = np.linalg.inv(np.asarray(affine, dtype=float))
+    return np.moveaxis(transform_points(points, to_index), -1, 0)
 
 
 def between_moved(
@@ -75,13 +76,12 @@ def between_moved(
     """Return the correspondence of two brains after (4, 4) rigid motions of the first
     and of the second."""
     if isinstance(pair, MatchedSurfaces):
-        return MatchedSurfaces(
-            transformed(pair.first, first), transform_points(pair.second, second)
-        )
-    turned = (pair.displacement @ first[:3, :3].T).astype(pair.displacement.dtype)
-    return Deformation(
-        second @ pair.matrix @ np.linalg.inv(first), turned, first @ pair.affine
-    )
+        moved = transformed(pair.first, first)
+        return MatchedSurfaces(moved, transform_points(pair.second, second))
+    matrix = second @ pair.matrix @ np.linalg.inv(first)
+    turned = pair.displacement @ first[:3, :3].T
+    turned = turned.astype(pair.displacement.dtype)
+    return Deformation(matrix, turned, first @ pair.affine)
 
 
 def carry(deformation: Deformation, points: Floats) -> Floats:
@@ -98,9 +98,11 @@ def carry(deformation: Deformation, points: Floats) -> Floats:
 def determinants(deformation: Deformation) -> Floats:
     """Return the (i, j, k) local change of volume on the map's grid (central
     differences); ≤ 0 where it folds."""
-    slopes = np.gradient(deformation.displacement.astype(np.float64), axis=(0, 1, 2))
+    displacement = deformation.displacement.astype(np.float64)
+    slopes = np.gradient(displacement, axis=(0, 1, 2))
     gradient = np.stack(list(slopes), axis=-1)
-    gradient = gradient @ np.linalg.inv(deformation.affine[:3, :3])
-    return np.asarray(
-        np.linalg.det(np.eye(3) + gradient) * np.linalg.det(deformation.matrix[:3, :3])
-    )
+    voxel = deformation.affine[:3, :3]
+    gradient = gradient @ np.linalg.inv(voxel)
+    of_displacement = np.linalg.det(np.eye(3) + gradient)
+    of_affine = np.linalg.det(deformation.matrix[:3, :3])
+    return of_displacement * of_affine

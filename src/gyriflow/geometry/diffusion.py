@@ -5,12 +5,11 @@ from collections.abc import Callable
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import cg
 
 from .tetrahedra import volumes_between
-from .triangles import Floats, TriangleMesh, face_areas
+from .triangles import Floats, Indices, TriangleMesh, face_areas
 
 SMOOTH_TOL = 1e-3
 """Relative tolerance of smoothing in one step."""
@@ -20,7 +19,7 @@ shape."""
 MAX_ITERATIONS = 10_000
 
 
-def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
+def cell_sizes(vertices: Floats, cells: Indices) -> Floats:
     """Return the (m,) areas in mm² of (m, 3) triangles, or signed volumes in mm³ of (m,
     4) tetrahedra."""
     if cells.shape[1] == 3:
@@ -28,16 +27,25 @@ def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
     return volumes_between(vertices, cells)
 
 
-def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
+def vertex_sizes(vertices: Floats, cells: Indices) -> Floats:
     """Return the (n,) areas or volumes of the vertices: equal parts of the cells around
     them."""
-    share = np.repeat(cell_sizes(vertices, cells) / cells.shape[1], cells.shape[1])
-    return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
+    sizes = cell_sizes(vertices, cells)
+    return _parts_at_vertices(sizes, cells, len(vertices))
+
+
+def _parts_at_vertices(values: Floats, cells: Indices, count: int) -> Floats:
+    """Return the (n,) sums of equal parts of the (m,) values of the cells around each
+    of `count` vertices."""
+    corners = cells.shape[1]
+    parts = np.repeat(values / corners, corners)
+    sums = np.bincount(cells.ravel(), parts, count)
+    return sums.astype(np.float64)
 
 
 def diffuse(
     vertices: Floats,
-    cells: NDArray[np.integer],
+    cells: Indices,
     values: Floats,
     sigma_mm: float,
     tolerance: float = 1e-8,
@@ -51,32 +59,38 @@ def diffuse(
     """
     if sigma_mm == 0:
         return values.copy()
-    mass = vertex_sizes(vertices, cells)
-    mass = np.where(mass > 0, mass, 1.0)
-    matrix = sparse.csr_matrix(
-        sparse.diags(mass) + sigma_mm**2 / 2 / STEPS * stiffness_matrix(vertices, cells)
-    )
+    mass, matrix = _implicit_step(vertices, cells, sigma_mm**2 / 2 / STEPS)
     smooth: Floats = values.reshape(len(values), -1).astype(float)
     for _ in range(STEPS):
-        smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, tolerance)
+        smooth = _solve(matrix, mass[:, None] * smooth, smooth, tolerance)
     return smooth.reshape(values.shape)
 
 
-def integrals_at_vertices(
-    vertices: Floats, cells: NDArray[np.integer], values: Floats
-) -> Floats:
+def _implicit_step(
+    vertices: Floats, cells: Indices, time: float
+) -> tuple[Floats, sparse.csr_matrix]:
+    """Return the (n,) lumped masses, and the matrix of an implicit step of the heat
+    equation."""
+    mass = vertex_sizes(vertices, cells)
+    mass[mass <= 0] = 1.0
+    stiffness = stiffness_matrix(vertices, cells)
+    return mass, sparse.csr_matrix(sparse.diags(mass) + time * stiffness)
+
+
+def integrals_at_vertices(vertices: Floats, cells: Indices, values: Floats) -> Floats:
     """Return the (n, k) integrals around the vertices of the (m, k) values of cells:
     equal parts of the cells' own."""
-    shares = values * (cell_sizes(vertices, cells) / cells.shape[1])[:, None]
-    columns = [
-        np.bincount(cells.ravel(), np.repeat(column, cells.shape[1]), len(vertices))
-        for column in shares.T
-    ]
-    return np.stack(columns, axis=1)
+    corners = cells.shape[1]
+    shares = cell_sizes(vertices, cells) / corners
+    integrals = []
+    for column in values.T:
+        parts = np.repeat(column * shares, corners)
+        integrals.append(np.bincount(cells.ravel(), parts, len(vertices)))
+    return np.stack(integrals, axis=1)
 
 
 def smooth_integrals(
-    vertices: Floats, cells: NDArray[np.integer], integrals: Floats, length_mm: float
+    vertices: Floats, cells: Indices, integrals: Floats, length_mm: float
 ) -> Floats:
     """Return (n, k) smooth values at the vertices from their integrals around them, by
     one implicit step of diffusion.
@@ -84,40 +98,34 @@ def smooth_integrals(
     The step has longer tails than a Gaussian of the standard deviation `length_mm`. Its
     relative error is `SMOOTH_TOL`.
     """
-    sizes = vertex_sizes(vertices, cells)
-    sizes = np.where(sizes > 0, sizes, 1.0)
-    matrix = sparse.csr_matrix(
-        sparse.diags(sizes) + length_mm**2 / 2 * stiffness_matrix(vertices, cells)
-    )
-    return conjugate_gradients(
-        matrix, integrals, integrals / sizes[:, None], SMOOTH_TOL
-    )
+    sizes, matrix = _implicit_step(vertices, cells, length_mm**2 / 2)
+    return _solve(matrix, integrals, integrals / sizes[:, None], SMOOTH_TOL)
 
 
 def harmonic_continuation(
     vertices: Floats,
-    cells: NDArray[np.integer],
-    fixed: NDArray[np.integer],
+    cells: Indices,
+    fixed: Indices,
     tolerance: float = 1e-8,
 ) -> Callable[[Floats], Floats]:
     """Return a function that extends (m, k) values at `fixed` vertices to (n, k); the
     other boundary is free."""
     free = np.setdiff1d(np.unique(cells), fixed)
     rows = stiffness_matrix(vertices, cells)[free]
-    matrix, to_fixed = rows[:, free], rows[:, fixed]
+    matrix = rows[:, free]
+    to_fixed = rows[:, fixed]
 
     def extend(values: Floats) -> Floats:
+        right = -(to_fixed @ values)
         everywhere = np.zeros((len(vertices), values.shape[1]))
-        everywhere[fixed], right = values, -(to_fixed @ values)
-        everywhere[free] = conjugate_gradients(
-            matrix, right, np.zeros_like(right), tolerance
-        )
+        everywhere[fixed] = values
+        everywhere[free] = _solve(matrix, right, np.zeros_like(right), tolerance)
         return everywhere
 
     return extend
 
 
-def conjugate_gradients(
+def _solve(
     matrix: sparse.csr_matrix, right: Floats, start: Floats, tolerance: float
 ) -> Floats:
     """Solve for all (n, k) columns by conjugate gradients with the Jacobi
@@ -126,20 +134,27 @@ def conjugate_gradients(
     `tolerance` is relative to the right-hand side. ValueError if it is not reached, as
     with degenerate cells.
     """
-    jacobi = sparse.diags(1.0 / matrix.diagonal())
-    columns = [
-        cg(matrix, column, guess, rtol=tolerance, maxiter=MAX_ITERATIONS, M=jacobi)
-        for column, guess in zip(right.T, start.T, strict=True)
-    ]
-    if any(code for _, code in columns):
-        raise ValueError("diffusion does not converge: the mesh has degenerate cells")
-    return np.stack([solution for solution, _ in columns], axis=1)
+    options = {
+        "rtol": tolerance,
+        "maxiter": MAX_ITERATIONS,
+        "M": sparse.diags(1.0 / matrix.diagonal()),
+    }
+    solutions = []
+    for column, guess in zip(right.T, start.T, strict=True):
+        solution, failure = cg(matrix, column, guess, **options)
+        if failure:
+            raise ValueError(
+                "diffusion does not converge: the mesh has degenerate cells"
+            )
+        solutions.append(solution)
+    return np.stack(solutions, axis=1)
 
 
-def stiffness_matrix(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:
+def stiffness_matrix(vertices: Floats, cells: Indices) -> sparse.csr_matrix:
     """Return the (n, n) stiffness matrix of linear finite elements, positive
     semidefinite."""
     cotangents = igl.cotmatrix(
-        np.ascontiguousarray(vertices), np.ascontiguousarray(cells, dtype=np.int64)
+        np.ascontiguousarray(vertices),
+        np.ascontiguousarray(cells, dtype=np.int64),
     )
     return sparse.csr_matrix(-cotangents)

@@ -5,14 +5,12 @@ It lies between the smallest and the largest of its 20 Bernstein coefficients (J
 Remacle and Geuzaine 2013, J. Comput. Phys. 233, 359-372).
 """
 
-import math
 from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .triangles import Floats
+from .triangles import Floats, Indices, Mask
 
 # corners of the edges whose midpoints are nodes 4 to 9, in the order of VTK
 EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
@@ -20,19 +18,15 @@ EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 # axis from node 4 to node 9
 CORNER_PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
 PARTS = (*CORNER_PARTS, (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
-NODES = np.array(
-    [np.eye(4)[i] for i in range(4)]
-    + [(np.eye(4)[a] + np.eye(4)[b]) / 2 for a, b in EDGES]
-)
+FIRST, SECOND = np.transpose(EDGES)
+NODES = np.vstack([np.eye(4), (np.eye(4)[FIRST] + np.eye(4)[SECOND]) / 2])
 """Barycentric coordinates (10, 4) of the nodes."""
 POWERS = np.array(
     [powers for powers in product(range(4), repeat=4) if sum(powers) == 3]
 )
 """Exponents (20, 4) of the barycentric coordinates in Bernstein's polynomials of third
 degree."""
-SLOPES = np.array(
-    [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-)
+SLOPES = np.vstack([-np.ones(3), np.eye(3)])
 """Gradients of the barycentric coordinates in the regular element."""
 DEPTH = 3
 """Number of subdivisions of an element whose bounds are inconclusive."""
@@ -43,39 +37,34 @@ CHUNK = 4096
 def shape_values(places: Floats) -> Floats:
     """Return the (p, 10) shape functions of the nodes at (p, 4) barycentric
     coordinates."""
-    corner = places * (2 * places - 1)
-    middle = np.stack([4 * places[:, a] * places[:, b] for a, b in EDGES], axis=1)
-    return np.concatenate([corner, middle], axis=1)
+    at_corners = places * (2 * places - 1)
+    at_middles = 4 * places[:, FIRST] * places[:, SECOND]
+    return np.hstack([at_corners, at_middles])
 
 
 def shape_slopes(places: Floats) -> Floats:
     """Return the (p, 10, 3) gradients of the shape functions in the regular element."""
-    corner = (4 * places - 1)[:, :, None] * SLOPES
-    middle = np.stack(
-        [
-            4 * (places[:, a, None] * SLOPES[b] + places[:, b, None] * SLOPES[a])
-            for a, b in EDGES
-        ],
-        axis=1,
-    )
-    return np.concatenate([corner, middle], axis=1)
+    values = places[:, :, None]
+    at_corners = (4 * values - 1) * SLOPES
+    first = values[:, FIRST] * SLOPES[SECOND]
+    second = values[:, SECOND] * SLOPES[FIRST]
+    return np.hstack([at_corners, 4 * (first + second)])
 
 
-def bernstein(places: Floats) -> Floats:
+def _bernstein(places: Floats) -> Floats:
     """Return the (p, 20) Bernstein polynomials of third degree at (p, 4) barycentric
     coordinates."""
-    factors = [
-        6 / math.prod(math.factorial(int(power)) for power in powers)
-        for powers in POWERS
-    ]
-    return np.asarray((places[:, None, :] ** POWERS).prod(axis=2) * factors)
+    factorials = np.array([1, 1, 2, 6])
+    factors = 6 / factorials[POWERS].prod(axis=1)
+    powers = places[:, None, :] ** POWERS
+    return powers.prod(axis=2) * factors
 
 
-FROM_VALUES = np.linalg.inv(bernstein(POWERS / 3))
+FROM_VALUES = np.linalg.inv(_bernstein(POWERS / 3))
 """Matrix from a polynomial's values at the 20 lattice points to its coefficients."""
 LATTICE_SLOPES = shape_slopes(POWERS / 3)
 ON_PARTS = np.stack(
-    [FROM_VALUES @ bernstein(POWERS / 3 @ NODES[list(part)]) for part in PARTS]
+    [FROM_VALUES @ _bernstein(POWERS / 3 @ NODES[list(part)]) for part in PARTS]
 )
 """The (8, 20, 20) matrices from a polynomial's coefficients on the whole element to
 those on its parts."""
@@ -85,12 +74,14 @@ AT_CORNERS = np.flatnonzero(POWERS.max(axis=1) == 3)
 def determinants(matrices: Floats) -> Floats:
     """Return the determinants of (..., 3, 3) matrices, written out: many times faster
     than factorisations."""
-    a, b, c = matrices[..., 0, :], matrices[..., 1, :], matrices[..., 2, :]
-    return np.asarray(
-        a[..., 0] * (b[..., 1] * c[..., 2] - b[..., 2] * c[..., 1])
-        + a[..., 1] * (b[..., 2] * c[..., 0] - b[..., 0] * c[..., 2])
-        + a[..., 2] * (b[..., 0] * c[..., 1] - b[..., 1] * c[..., 0])
-    )
+    rows = np.moveaxis(matrices, (-2, -1), (0, 1))
+    a, b, c = rows[0]
+    d, e, f = rows[1]
+    g, h, i = rows[2]
+    first = a * (e * i - f * h)
+    second = b * (f * g - d * i)
+    third = c * (d * h - e * g)
+    return np.asarray(first + second + third)
 
 
 def chunks(count: int) -> Iterator[slice]:
@@ -99,50 +90,52 @@ def chunks(count: int) -> Iterator[slice]:
         yield slice(first, first + CHUNK)
 
 
-def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Floats:
+def jacobians(vertices: Floats, tets: Indices, slopes: Floats) -> Floats:
     """Return the (m, p) Jacobian determinants of (m, 10) elements, from (p, 10, 3)
     shape function gradients."""
     values = np.empty((len(tets), len(slopes)))
-    by_node = slopes.transpose(0, 2, 1).reshape(-1, 10)
+    by_node = slopes.transpose(0, 2, 1)
+    by_node = by_node.reshape(-1, 10)
     for chunk in chunks(len(tets)):
-        maps = np.matmul(by_node, np.take(vertices, tets[chunk], axis=0))
-        values[chunk] = determinants(maps.reshape(len(maps), -1, 3, 3))
+        places = np.take(vertices, tets[chunk], axis=0)
+        maps = by_node @ places
+        maps = maps.reshape(len(places), -1, 3, 3)
+        values[chunk] = determinants(maps)
     return values
 
 
-def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
+def coefficients(vertices: Floats, tets: Indices) -> Floats:
     """Return the (m, 20) Bernstein coefficients of (m, 10) elements' determinants;
     their mean is 6 volumes."""
     return jacobians(vertices, tets, LATTICE_SLOPES) @ FROM_VALUES.T
 
 
-def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
+def lower_bounds(vertices: Floats, tets: Indices) -> Floats:
     """Return a lower bound of the Jacobian determinant of each (m, 10) element: if
     positive, it folds nowhere.
 
     Inconclusive elements are subdivided up to three times, since the bounds of smaller
     parts are tighter.
     """
-    whole = coefficients(vertices, tets)
-    bounds = whole.min(axis=1)
-    undecided = np.flatnonzero((bounds <= 0) & (whole[:, AT_CORNERS].min(axis=1) > 0))
-    if len(undecided):
-        bounds[undecided] = _subdivided_bounds(whole[undecided], DEPTH)
+    return _bounds(coefficients(vertices, tets), DEPTH)
+
+
+def _bounds(values: Floats, depth: int) -> Floats:
+    """Return the (k,) lower bounds from (k, 20) coefficients, with up to `depth`
+    subdivisions."""
+    bounds = values.min(axis=1)
+    least_at_corners = values[:, AT_CORNERS].min(axis=1)
+    undecided = (bounds <= 0) & (least_at_corners > 0)
+    if depth > 0 and undecided.any():
+        parts = np.einsum("sij,kj->ksi", ON_PARTS, values[undecided])
+        of_parts = _bounds(parts.reshape(-1, len(POWERS)), depth - 1)
+        bounds[undecided] = of_parts.reshape(-1, len(PARTS)).min(axis=1)
     return bounds
 
 
-def _subdivided_bounds(whole: Floats, depth: int) -> Floats:
-    parts = np.einsum("sij,kj->ksi", ON_PARTS, whole)
-    bounds = parts.min(axis=2)
-    undecided = (bounds <= 0) & (parts[:, :, AT_CORNERS].min(axis=2) > 0)
-    if depth > 1 and undecided.any():
-        bounds[undecided] = _subdivided_bounds(parts[undecided], depth - 1)
-    return np.asarray(bounds.min(axis=1))
-
-
 def inverted_on_the_way(
-    before: Floats, after: Floats, tets: NDArray[np.integer], least: float = 0.0
-) -> NDArray[np.bool_]:
+    before: Floats, after: Floats, tets: Indices, least: float = 0.0
+) -> Mask:
     """Return whether each (m, 4) or (m, 10) element is inverted anywhere on the
     straight way of its vertices.
 
@@ -150,34 +143,43 @@ def inverted_on_the_way(
     coefficients, else its roots; it must stay above the fraction `least` of that
     before. Quadratic ones are checked by `lower_bounds` at quarters of the way.
     """
-    if tets.shape[1] == len(NODES):
-        on_way = (before + part * (after - before) for part in (0.25, 0.5, 0.75, 1.0))
-        return np.any([lower_bounds(places, tets) <= 0 for places in on_way], axis=0)
     inverted = np.zeros(len(tets), dtype=bool)
+    if tets.shape[1] == len(NODES):
+        for part in (0.25, 0.5, 0.75, 1.0):
+            places = before + part * (after - before)
+            inverted |= lower_bounds(places, tets) <= 0
+        return inverted
     for chunk in chunks(len(tets)):
-        first, last = (
-            np.take(x, tets[chunk, 1:], axis=0) - x[tets[chunk, :1]]
-            for x in (before, after)
-        )
-        # rows of one end, with one or two of the other
-        mixed = [
-            np.where(np.isin(range(3), rows)[:, None], last, first)
-            for rows in ((0,), (1,), (2,))
+        first = edge_vectors(before, tets[chunk])
+        last = edge_vectors(after, tets[chunk])
+        on_way = [
+            determinants(first),
+            _mixed_determinants(first, last),
+            _mixed_determinants(last, first),
+            determinants(last),
         ]
-        opposite = [
-            np.where(np.isin(range(3), rows)[:, None], first, last)
-            for rows in ((0,), (1,), (2,))
-        ]
-        ends = [first], mixed, opposite, [last]
-        bernstein_values = np.stack(
-            [sum(map(determinants, maps)) / len(maps) for maps in ends], axis=1
-        )
-        bernstein_values -= least * np.maximum(bernstein_values[:, :1], 0.0)
-        undecided = np.flatnonzero(bernstein_values.min(axis=1) <= 0)
-        inverted[chunk.start + undecided] = [
-            _has_root(*values) for values in bernstein_values[undecided]
-        ]
+        values = np.stack(on_way, axis=1)
+        values -= least * np.maximum(values[:, :1], 0.0)
+        undecided = np.flatnonzero(values.min(axis=1) <= 0)
+        for element in undecided:
+            inverted[chunk.start + element] = _has_root(*values[element])
     return inverted
+
+
+def edge_vectors(places: Floats, tets: Indices) -> Floats:
+    """Return the (m, 3, 3) edges of (m, 4) elements from their first corners."""
+    return np.take(places, tets[:, 1:], axis=0) - places[tets[:, :1]]
+
+
+def _mixed_determinants(first: Floats, last: Floats) -> Floats:
+    """Return the (m,) mean determinant of (m, 3, 3) matrices with one of three rows
+    taken from `last`."""
+    total = np.zeros(len(first))
+    for row in range(3):
+        mixed = first.copy()
+        mixed[:, row] = last[:, row]
+        total += determinants(mixed)
+    return total / 3
 
 
 def _has_root(a: float, b: float, c: float, d: float) -> bool:
@@ -185,6 +187,10 @@ def _has_root(a: float, b: float, c: float, d: float) -> bool:
     zero or negative there."""
     if min(a, d) <= 0:
         return True
-    roots = np.roots([d - 3 * c + 3 * b - a, 3 * (c - 2 * b + a), 3 * (b - a), a])
+    cubic = d - 3 * c + 3 * b - a
+    square = 3 * (c - 2 * b + a)
+    linear = 3 * (b - a)
+    roots = np.roots([cubic, square, linear, a])
     real = roots.real[np.abs(roots.imag) < 1e-9]
-    return bool(((real >= 0) & (real <= 1)).any())
+    is_inside = (real >= 0) & (real <= 1)
+    return bool(is_inside.any())

@@ -13,9 +13,12 @@ from scipy.spatial import cKDTree
 
 from .triangles import (
     Floats,
+    Indices,
     Ints,
+    Mask,
     TriangleMesh,
     corners,
+    dots,
     edges,
     face_normals,
     transformed,
@@ -41,14 +44,16 @@ class Match:
     corners: Ints
     weights: Floats
     distance_mm: Floats
-    agrees: NDArray[np.bool_]
+    agrees: Mask
 
 
 def nearest_on(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Floats]:
     """Return the (n,) distances of points from a surface, and faces and (n, 3)
     positions of its nearest points."""
     squared, face, place = igl.point_mesh_squared_distance(
-        points, surface.vertices, surface.faces
+        points,
+        surface.vertices,
+        surface.faces,
     )
     return np.sqrt(squared), face.astype(np.int64), place
 
@@ -62,15 +67,13 @@ def surface_distance(
     The first value is the mean of both weighted means, the second the larger of both
     weighted quantiles at `share`.
     """
-    both = list(ways)
-    mean = float(
-        np.mean([np.average(distance, weights=weights) for distance, weights in both])
-    )
-    far = [
-        np.quantile(distance, share, weights=weights, method="inverted_cdf")
-        for distance, weights in both
-    ]
-    return mean, float(max(far))
+    means = []
+    quantiles = []
+    for distances, weights in ways:
+        means.append(np.average(distances, weights=weights))
+        quantile = np.quantile(distances, share, weights=weights, method="inverted_cdf")
+        quantiles.append(float(quantile))
+    return float(np.mean(means)), max(quantiles)
 
 
 def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
@@ -90,14 +93,15 @@ def surface_mask(
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return a volume, 1 inside a closed surface, and its affine; 4 voxels around it or
     a (2, 3) `box`."""
-    low, high = (
-        (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) if box is None else box
-    )
+    if box is None:
+        box = np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
+    low, high = box
     low = low - 4 * voxel_mm
-    shape = np.ceil((high - low) / voxel_mm + 4).astype(int) + 1
+    size = np.ceil((high - low) / voxel_mm + 4)
+    shape = tuple(size.astype(int) + 1)
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = low
-    return _inside(mesh, tuple(shape), affine).astype(np.int32), affine
+    return _inside(mesh, shape, affine).astype(np.int32), affine
 
 
 def layer_labels(
@@ -105,55 +109,90 @@ def layer_labels(
 ) -> NDArray[np.int32]:
     """Return labels in a volume's grid, its (4, 4) affine in mm: 2 less deep than (n,)
     thickness in mm, 1 deeper."""
-    inside = np.argwhere(_inside(mesh, shape, affine))
-    depth, faces, _ = nearest_on(inside @ affine[:3, :3].T + affine[:3, 3], mesh)
+    index = np.argwhere(_inside(mesh, shape, affine))
+    centres = index @ affine[:3, :3].T + affine[:3, 3]
+    depth, faces, _ = nearest_on(centres, mesh)
+    thickness_there = thickness[mesh.faces[faces]].mean(axis=1)
     labels = np.zeros(shape, dtype=np.int32)
-    labels[tuple(inside.T)] = np.where(
-        depth <= thickness[mesh.faces[faces]].mean(axis=1), 2, 1
-    )
+    labels[tuple(index.T)] = np.where(depth <= thickness_there, 2, 1)
     return labels
 
 
-def _inside(
-    mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats
-) -> NDArray[np.bool_]:
+def _inside(mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats) -> Mask:
     """Return the (i, j, k) mask of the voxels whose centres lie inside a closed
     surface, by winding numbers.
 
-    These change by ±1 where a line of voxels along k crosses a face. Both faces of an
-    edge agree on which side a line passes, and a line through an edge or vertex counts
-    as shifted by (ε, ε²), ε → 0, so each crossing counts once.
+    These change by ±1 where a line of voxels along k crosses a face.
     """
-    index = transformed(mesh, np.linalg.inv(affine))
-    flat, heights, faces = index.vertices[:, :2], index.vertices[:, 2], index.faces
-    # the lines (i, j) that may cross each face
-    low = np.maximum(np.ceil(flat[faces].min(axis=1)), 0).astype(np.int64)
-    high = np.minimum(
-        np.floor(flat[faces].max(axis=1)), np.array(shape[:2]) - 1
-    ).astype(np.int64)
+    in_voxels = transformed(mesh, np.linalg.inv(affine))
+    lines, heights, is_upwards = _crossings(in_voxels, shape)
+    columns, rows, layers = shape
+    first = np.clip(np.ceil(heights), 0, layers)
+    first = first.astype(np.int64)
+    # crossings above the volume count in a layer of their own
+    changes = np.zeros((columns, rows, layers + 1), dtype=np.int64)
+    change = np.where(is_upwards, -1, 1)
+    np.add.at(changes, (*lines.T, first), change)
+    winding = changes.cumsum(axis=2)
+    is_inside = winding > 0
+    return is_inside[..., :layers]
+
+
+def _crossings(mesh: TriangleMesh, shape: tuple[int, ...]) -> tuple[Ints, Floats, Mask]:
+    """Return where lines along k through a volume of this shape cross a surface: the
+    (n, 2) indices of the lines, the (n,) heights, and whether faces look upwards there.
+
+    Both faces of an edge agree on which side a line passes, and a line through an edge
+    or vertex counts as shifted by (ε, ε²), ε → 0, so each crossing counts once.
+    """
+    flat = mesh.vertices[:, :2]
+    lines, face = _lines_near_faces(flat[mesh.faces], shape)
+    corners_of_face = mesh.faces[face]
+    all_sides = []
+    all_left = []
+    for corner in range(3):
+        start = corners_of_face[:, corner - 2]
+        end = corners_of_face[:, corner - 1]
+        # along the edge from the vertex of the smaller number
+        low = np.minimum(start, end)
+        along = flat[np.maximum(start, end)] - flat[low]
+        offset = lines - flat[low]
+        along_x, along_y = along.T
+        offset_x, offset_y = offset.T
+        side = along_x * offset_y - along_y * offset_x
+        is_shifted_left = (along_y < 0) | ((along_y == 0) & (along_x > 0))
+        is_left = (side > 0) | ((side == 0) & is_shifted_left)
+        all_sides.append(np.abs(side))
+        all_left.append(is_left == (start < end))
+    is_upwards = np.all(all_left, axis=0)
+    is_downwards = ~np.any(all_left, axis=0)
+    sides = np.stack(all_sides)
+    crosses = (is_upwards | is_downwards) & (sides.sum(axis=0) > 0)
+    sides = sides[:, crosses]
+    weights = sides / sides.sum(axis=0)
+    corner_heights = mesh.vertices[corners_of_face[crosses], 2]
+    heights = np.einsum("ij,ji->j", weights, corner_heights)
+    return lines[crosses], heights, is_upwards[crosses]
+
+
+def _lines_near_faces(corners: Floats, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
+    """Return the (n, 2) lines of voxels that may cross the (m, 3, 2) corners of faces,
+    and the (n,) face of each."""
+    last = np.array(shape[:2]) - 1
+    low = np.ceil(corners.min(axis=1))
+    low = np.maximum(low, 0).astype(np.int64)
+    high = np.floor(corners.max(axis=1))
+    high = np.minimum(high, last).astype(np.int64)
     sizes = np.maximum(high - low + 1, 0)
     counts = sizes.prod(axis=1)
-    face = np.repeat(np.arange(len(faces)), counts)
-    order = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts)
-    lines = low[face] + np.stack(np.divmod(order, sizes[face, 1]), axis=1)
-    sides, is_left = np.zeros((3, len(face))), np.zeros((3, len(face)), dtype=bool)
-    for corner in range(3):
-        ends = faces[face][:, [corner - 2, corner - 1]]
-        forwards = ends[:, 0] < ends[:, 1]
-        along = np.diff(flat[np.sort(ends)], axis=1)[:, 0]
-        offset = lines - flat[ends.min(axis=1)]
-        side = along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]
-        shifted = (along[:, 1] < 0) | ((along[:, 1] == 0) & (along[:, 0] > 0))
-        sides[corner] = np.abs(side)
-        is_left[corner] = ((side > 0) | ((side == 0) & shifted)) == forwards
-    upwards, downwards = (np.asarray(way.all(axis=0)) for way in (is_left, ~is_left))
-    crosses = (upwards | downwards) & (sides.sum(axis=0) > 0)
-    weights = sides[:, crosses] / sides[:, crosses].sum(axis=0)
-    crossing = np.einsum("ij,ji->j", weights, heights[faces[face[crosses]]])
-    first = np.clip(np.ceil(crossing), 0, shape[2]).astype(np.int64)
-    winding = np.zeros((shape[0], shape[1], shape[2] + 1), dtype=np.int64)
-    np.add.at(winding, (*lines[crosses].T, first), np.where(upwards[crosses], -1, 1))
-    return np.asarray(winding.cumsum(axis=2)[:, :, :-1] > 0)
+    faces = np.arange(len(corners))
+    face = np.repeat(faces, counts)
+    first = np.cumsum(counts) - counts
+    # the lines of a face are numbered by rows
+    number = np.arange(len(face)) - first[face]
+    widths = sizes[face, 1]
+    offset = np.stack(np.divmod(number, widths), axis=1)
+    return low[face] + offset, face
 
 
 def faces_that_cross(mesh: TriangleMesh) -> Ints:
@@ -175,28 +214,23 @@ def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
     nearest point of the surface if the normal of its face agrees, or else the closest
     agreeing one of the 256 nearest vertices.
     """
-    distance, face, on = nearest_on(points, mesh)
-    nearest_corners = mesh.faces[face].astype(np.int64)
-    weights = barycentric(on, corners(mesh)[face])
-    agrees = (
-        np.einsum("ij,ij->i", normals, face_normals(mesh)[face]) >= MIN_NORMAL_COSINE
-    )
-    tree, directions = cKDTree(mesh.vertices), vertex_normals(mesh)
+    distance, face, places = nearest_on(points, mesh)
+    nearest_corners = mesh.faces[face]
+    weights = barycentric(places, corners(mesh)[face])
+    agrees = dots(normals, face_normals(mesh)[face]) >= MIN_NORMAL_COSINE
+    tree = cKDTree(mesh.vertices)
+    directions = vertex_normals(mesh)
     for count in NEIGHBOURS:
         unmatched = np.flatnonzero(~agrees)
         if not len(unmatched):
             break
-        distances, vertices = tree.query(
-            points[unmatched], k=min(count, len(mesh.vertices))
-        )
-        distances = distances.reshape(len(unmatched), -1)
-        vertices = vertices.reshape(len(unmatched), -1)
-        agreeing = (
-            np.einsum("ik,ijk->ij", normals[unmatched], directions[vertices])
-            >= MIN_NORMAL_COSINE
-        )
-        is_matched = agreeing.any(axis=1)
-        first = agreeing.argmax(axis=1)[is_matched]
+        # a list of ranks, so that also one neighbour is a column
+        ranks = np.arange(min(count, len(mesh.vertices))) + 1
+        distances, vertices = tree.query(points[unmatched], k=ranks)
+        cosines = np.einsum("ik,ijk->ij", normals[unmatched], directions[vertices])
+        is_agreeing = cosines >= MIN_NORMAL_COSINE
+        is_matched = is_agreeing.any(axis=1)
+        first = is_agreeing.argmax(axis=1)[is_matched]
         rows = unmatched[is_matched]
         nearest_corners[rows] = vertices[is_matched, first][:, None]
         weights[rows] = [1.0, 0.0, 0.0]
@@ -222,28 +256,24 @@ def match_layers(
     its edges.
     """
     match = match_points(points, normals, mesh)
-    misfit = [
-        values_at(match, mesh.vertices) - points,
-        values_at(match, inner_of_mesh) - inner,
-    ]
-    ends = np.concatenate(
-        [np.repeat(np.arange(len(mesh.vertices))[:, None], 2, axis=1), edges(mesh)[0]]
-    )
-    places = np.hstack(
-        [mesh.vertices[ends].mean(axis=1), inner_of_mesh[ends].mean(axis=1)]
-    )
-    distance, nearest = cKDTree(places).query(np.hstack([points, inner]))
-    better = distance < np.linalg.norm(np.hstack(misfit), axis=1)
-    rows, nearest = np.flatnonzero(better), nearest[better]
+    misfit = values_at(match, mesh.vertices) - points
+    inner_misfit = values_at(match, inner_of_mesh) - inner
+    distance = np.linalg.norm(np.hstack([misfit, inner_misfit]), axis=1)
+    # a vertex is an edge with equal ends
+    vertices = np.arange(len(mesh.vertices))
+    pairs, _ = edges(mesh)
+    ends = np.concatenate([np.column_stack([vertices, vertices]), pairs])
+    places = mesh.vertices[ends].mean(axis=1)
+    inner_places = inner_of_mesh[ends].mean(axis=1)
+    tree = cKDTree(np.hstack([places, inner_places]))
+    other_distance, nearest = tree.query(np.hstack([points, inner]))
+    rows = np.flatnonzero(other_distance < distance)
+    nearest = nearest[rows]
     match.corners[rows] = ends[nearest][:, [0, 1, 1]]
     match.weights[rows] = [0.5, 0.5, 0.0]
-    match.distance_mm[rows] = np.linalg.norm(places[nearest, :3] - points[rows], axis=1)
-    return Match(
-        match.corners,
-        match.weights,
-        match.distance_mm,
-        np.ones(len(points), dtype=bool),
-    )
+    match.distance_mm[rows] = np.linalg.norm(places[nearest] - points[rows], axis=1)
+    match.agrees[:] = True
+    return match
 
 
 def match_surface(mesh: TriangleMesh, surface: TriangleMesh) -> Match:
@@ -262,33 +292,44 @@ def values_at(match: Match, values: NDArray) -> Floats:
 def interpolation(match: Match, size: int) -> sparse.csr_matrix:
     """Return the matrix (n, size) that takes values at the vertices of a surface to the
     n matching points."""
-    rows = np.repeat(np.arange(len(match.corners)), 3)
+    count = len(match.corners)
+    rows = np.repeat(np.arange(count), 3)
+    columns = match.corners.ravel()
+    weights = match.weights.ravel()
     return sparse.csr_matrix(
-        (match.weights.ravel(), (rows, match.corners.ravel())),
-        (len(match.corners), size),
+        (weights, (rows, columns)),
+        shape=(count, size),
     )
 
 
-def labels_at(match: Match, labels: NDArray[np.integer]) -> Ints:
+def labels_at(match: Match, labels: Indices) -> Ints:
     """Return the (n,) labels at matched points, those of the nearest corner of the
     face."""
     nearest = match.weights.argmax(axis=1)
-    return np.asarray(
-        labels[match.corners[np.arange(len(nearest)), nearest]], dtype=np.int64
-    )
+    rows = np.arange(len(nearest))
+    vertices = match.corners[rows, nearest]
+    return labels[vertices].astype(np.int64)
 
 
 def barycentric(points: Floats, triangles: Floats) -> Floats:
     """Return the (n, 3) coordinates of points in the planes of (n, 3, 3) triangles;
     flat triangles give a corner."""
     a, b, c = triangles.transpose(1, 0, 2)
-    u, v, w = b - a, c - a, points - a
-    uu, uv, vv = (np.einsum("ij,ij->i", *pair) for pair in ((u, u), (u, v), (v, v)))
-    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+    u = b - a
+    v = c - a
+    w = points - a
+    uu = dots(u, u)
+    uv = dots(u, v)
+    vv = dots(v, v)
+    wu = dots(w, u)
+    wv = dots(w, v)
     size = uu * vv - uv * uv
     flat = size <= 1e-12 * np.maximum(uu, vv) ** 2
-    size = np.where(flat, 1.0, size)
-    second = np.where(flat, 0.0, (vv * wu - uv * wv) / size)
-    third = np.where(flat, 0.0, (uu * wv - uv * wu) / size)
-    weights = np.clip(np.stack([1.0 - second - third, second, third], axis=1), 0.0, 1.0)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    size[flat] = 1.0
+    second = (vv * wu - uv * wv) / size
+    third = (uu * wv - uv * wu) / size
+    second[flat] = 0.0
+    third[flat] = 0.0
+    weights = np.stack([1.0 - second - third, second, third], axis=1)
+    weights = np.clip(weights, 0.0, 1.0)
+    return weights / weights.sum(axis=1, keepdims=True)

@@ -62,50 +62,51 @@ def path_through(
     sizes = vertex_sizes(shapes[0], linear_pieces(mesh))
     aligned = [shapes[0]]
     for shape in shapes[1:]:
-        aligned.append(transform_points(shape, rigid_fit(shape, aligned[-1], sizes)))
+        motion = rigid_fit(shape, aligned[-1], sizes)
+        aligned.append(transform_points(shape, motion))
     at, places = merged_shapes(np.asarray(weeks, dtype=float), np.stack(aligned), stops)
     velocities = limited_velocities(at, places)
     # by interval, since velocities may differ on the two sides of a week: control
     # points of Bernstein's polynomials
-    lengths = np.diff(at)[:, None, None]
-    first, last = places[:-1], places[1:]
-    control = np.stack(
-        [
-            first,
-            first + velocities[:-1] * lengths / 3,
-            last - velocities[1:] * lengths / 3,
-            last,
-        ]
-    )
+    lengths = np.diff(at)
+    controls = []
     inverted = []
-    for i, length in enumerate(np.diff(at)):
+    for i, length in enumerate(lengths):
+        first = places[i]
+        last = places[i + 1]
+        after_first = first + velocities[i] * length / 3
+        before_last = last - velocities[i + 1] * length / 3
+        control = np.stack([first, after_first, before_last, last])
         steps = max(1, int(np.ceil(length / step_gw - 1e-6)))
-        ends = np.arange(steps + 1) / steps
-        straight = control[0, i] + np.array([1 / 3, 2 / 3])[:, None, None] * (
-            control[3, i] - control[0, i]
-        )
-        for _ in range(STRAIGHTENING_ROUNDS):
-            faults = _inverted_between(control[:, i], ends, mesh)
-            if not len(faults):
-                break
-            distance, _ = cKDTree(places[i][mesh.corners[faults]].mean(axis=1)).query(
-                places[i]
-            )
-            near = np.exp(-((distance / STRAIGHT_MM) ** 2))[:, None]
-            control[1:3, i] += near * (straight - control[1:3, i])
-        else:
-            control[1:3, i] = straight
-            faults = _inverted_between(control[:, i], ends, mesh)
-        inverted.append(faults)
-    return Path(at, BPoly(control, at), inverted)
+        inverted.append(_straighten(control, steps, mesh))
+        controls.append(control)
+    return Path(at, BPoly(np.stack(controls, axis=1), at), inverted)
 
 
-def _inverted_between(control: Floats, ends: Floats, mesh: TetrahedralMesh) -> Ints:
+def _straighten(control: Floats, steps: int, mesh: TetrahedralMesh) -> Ints:
+    """Straighten a path with (4, n, 3) control points, in place, near elements that its
+    steps invert; return those that they still invert."""
+    first, _, _, last = control
+    thirds = np.array([1 / 3, 2 / 3])
+    straight = first + thirds[:, None, None] * (last - first)
+    for _ in range(STRAIGHTENING_ROUNDS):
+        faults = _inverted_by_steps(control, steps, mesh)
+        if not len(faults):
+            return faults
+        centres = first[mesh.corners[faults]].mean(axis=1)
+        distance, _ = cKDTree(centres).query(first)
+        near = np.exp(-((distance / STRAIGHT_MM) ** 2))
+        control[1:3] += near[:, None] * (straight - control[1:3])
+    control[1:3] = straight
+    return _inverted_by_steps(control, steps, mesh)
+
+
+def _inverted_by_steps(control: Floats, steps: int, mesh: TetrahedralMesh) -> Ints:
     curve = BPoly(control[:, None], [0.0, 1.0])
     found = np.zeros(len(mesh.tets), dtype=bool)
-    before = curve(ends[0])
-    for end in ends[1:]:
-        after = curve(end)
+    before = control[0]
+    for step in range(1, steps + 1):
+        after = curve(step / steps)
         found |= inverted_on_the_way(before, after, mesh.tets)
         before = after
     return np.flatnonzero(found)
@@ -122,29 +123,31 @@ def merged_shapes(
     not bend the path. Stops next to them are left out.
     """
     observed = np.flatnonzero(~np.isin(weeks, list(stops)))
-    groups = np.split(
-        observed, np.flatnonzero(np.diff(weeks[observed]) >= MIN_SPACING_GW) + 1
-    )
-    if len(groups) == 1 or max(map(len, groups)) == 1:
+    is_spaced = np.diff(weeks[observed]) >= MIN_SPACING_GW
+    groups = np.split(observed, np.flatnonzero(is_spaced) + 1)
+    if len(groups) == 1 or len(groups) == len(observed):
         return weeks, places
-    means = [
-        (float(weeks[group].mean()), places[group].mean(axis=0)) for group in groups
-    ]
-    means[0] = (float(weeks[0]), places[0])
+    mean_weeks = [weeks[group].mean() for group in groups]
+    mean_places = [places[group].mean(axis=0) for group in groups]
+    mean_weeks[0] = weeks[0]
+    mean_places[0] = places[0]
     merged = places.copy()
-    kept = np.ones(len(weeks), dtype=bool)
+    keep = np.ones(len(weeks), dtype=bool)
+    is_stop = np.isin(np.arange(len(weeks)), observed, invert=True)
     for number, group in enumerate(groups):
-        if len(group) > 1:
-            early, first = means[max(number - 1, 0)]
-            late, last = means[min(number + 1, len(groups) - 1)]
-            week, mean = means[number]
-            fractions = (weeks[group] - week) / (late - early)
-            merged[group] = mean + fractions[:, None, None] * (last - first)
-            before, after = np.searchsorted(observed, [group[0], group[-1]]) + [-1, 1]
-            end = observed[after] if after < len(observed) else group[-1] + 1
-            around = slice(observed[max(before, 0)], end)
-            kept[around] &= np.isin(np.arange(len(weeks))[around], observed)
-    return weeks[kept], merged[kept]
+        if len(group) == 1:
+            continue
+        before = max(number - 1, 0)
+        after = min(number + 1, len(groups) - 1)
+        duration = mean_weeks[after] - mean_weeks[before]
+        parts = (weeks[group] - mean_weeks[number]) / duration
+        change = mean_places[after] - mean_places[before]
+        merged[group] = mean_places[number] + parts[:, None, None] * change
+        # from the group before to the one after
+        first = groups[before][-1] if before < number else group[0]
+        last = groups[after][0] if after > number else group[-1] + 1
+        keep[first:last] &= ~is_stop[first:last]
+    return weeks[keep], merged[keep]
 
 
 def limited_velocities(weeks: Floats, places: Floats) -> Floats:
@@ -155,8 +158,11 @@ def limited_velocities(weeks: Floats, places: Floats) -> Floats:
     ends, limited in length.
     """
     velocities = np.gradient(places, weeks, axis=0)
-    speed = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(weeks)[:, None]
+    distance = np.linalg.norm(np.diff(places, axis=0), axis=2)
+    speed = distance / np.diff(weeks)[:, None]
     limit = MAX_VELOCITY_RATIO * np.minimum(speed[:-1], speed[1:])
-    length = np.linalg.norm(velocities[1:-1], axis=2)
-    velocities[1:-1] *= np.minimum(1.0, limit / np.maximum(length, 1e-12))[..., None]
-    return np.asarray(velocities)
+    inner = velocities[1:-1]
+    length = np.linalg.norm(inner, axis=2)
+    factor = np.minimum(1.0, limit / np.maximum(length, 1e-12))
+    inner *= factor[..., None]
+    return velocities

@@ -51,14 +51,14 @@ class Pose:
         if the sides have two."""
         if self.together:
             return self.world
-        problem = (
-            "a volume cannot belong to a brain whose hemispheres were posed separately"
+        raise InputError(
+            "a volume cannot belong to a brain whose hemispheres were posed separately",
+            path=path,
+            remedy=(
+                "Give the values per vertex (GIFTI), on surfaces of the brain, or"
+                " hemispheres posed as one brain."
+            ),
         )
-        remedy = (
-            "Give the values per vertex (GIFTI), on surfaces of the brain, or"
-            " hemispheres posed as one brain."
-        )
-        raise InputError(problem, path=path, remedy=remedy)
 
     def then(self, matrix: Floats) -> "Pose":
         """Return the pose with a (4, 4) motion after it."""
@@ -67,14 +67,11 @@ class Pose:
 
     def plain(self) -> dict[str, Any]:
         """Return the pose in plain values for JSON."""
-        files = {name: pose.tolist() for name, pose in self.files.items()}
-        plain = {
+        return {
             "by": self.by,
             "together": self.together,
             "world": self.world.tolist(),
-            "files": files,
-        }
-        return plain | {
+            "files": {name: pose.tolist() for name, pose in self.files.items()},
             "evidence": dict(self.evidence),
             "warnings": list(self.warnings),
         }
@@ -82,15 +79,13 @@ class Pose:
 
 def pose_from(plain: Mapping[str, Any]) -> Pose:
     """Return the pose from its plain values (see `Pose.plain`)."""
-    files = {name: np.array(pose) for name, pose in plain["files"].items()}
-    warnings = tuple(plain["warnings"])
     return Pose(
         np.array(plain["world"]),
-        files,
+        {name: np.array(pose) for name, pose in plain["files"].items()},
         plain["by"],
         plain["together"],
         plain["evidence"],
-        warnings,
+        tuple(plain["warnings"]),
     )
 
 
@@ -98,6 +93,5 @@ def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) 
     """Return the pose of a file that a (3, 3) rotation brings to RAS+; the brain's
     volumes are in RAS+ already."""
     whole = motion(rotation)
-    return Pose(
-        whole @ CONVENTIONS[coordinates], {"whole": whole}, by, warnings=warnings
-    )
+    world = whole @ CONVENTIONS[coordinates]
+    return Pose(world, {"whole": whole}, by, warnings=warnings)

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from .jacobians import EDGES, lower_bounds
 from .tetrahedra import PIECES, TetrahedralMesh, boundary_faces, volumes_between
-from .triangles import Floats, Ints, Mask
+from .triangles import Floats, Indices, Ints, Mask
 
 ROUNDS = 6
 """Number of rounds in which nodes are moved."""
@@ -21,7 +20,7 @@ MIN_GAIN = 1e-3
 """Least gain of straightness for which a node moves."""
 
 
-def straighten_sides(positions: Floats, tets: NDArray[np.integer]) -> Floats:
+def straighten_sides(positions: Floats, tets: Indices) -> Floats:
     """Return (n, 3) positions with straighter sides of (m, 10) elements that may fold
     over.
 
@@ -36,18 +35,19 @@ def straighten_sides(positions: Floats, tets: NDArray[np.integer]) -> Floats:
             break
         middles = bent[:, 4:]
         straight = places[bent[:, EDGES]].mean(axis=2)
-        places[middles] = (
-            straight if number >= ROUNDS else (straight + places[middles]) / 2
-        )
+        is_full = number >= ROUNDS
+        places[middles] = straight if is_full else (straight + places[middles]) / 2
     return places
 
 
-def may_fold_over(positions: Floats, tets: NDArray[np.integer]) -> Mask:
+def may_fold_over(positions: Floats, tets: Indices) -> Mask:
     """Return (m,) whether (m, 10) elements may fold over, or a linear piece between
     their nodes is inverted."""
-    volumes = volumes_between(positions, tets[:, PIECES].reshape(-1, 4))
-    has_inverted_piece = (volumes <= 0).reshape(len(tets), -1).any(axis=1)
-    return has_inverted_piece | (lower_bounds(positions, tets) <= 0)
+    pieces = tets[:, PIECES]
+    volumes = volumes_between(positions, pieces.reshape(-1, 4))
+    volumes = volumes.reshape(len(tets), -1)
+    bounds = lower_bounds(positions, tets)
+    return (volumes.min(axis=1) <= 0) | (bounds <= 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +67,14 @@ class InnerSides:
         """Return the inner sides of a mesh of quadratic elements."""
         ends = np.full((len(mesh.vertices), 2), -1)
         ends[mesh.tets[:, 4:]] = mesh.tets[:, EDGES]
-        ends[boundary_faces(mesh)[0]] = -1
+        on_surface, _ = boundary_faces(mesh)
+        ends[on_surface] = -1
         elements = np.repeat(np.arange(len(mesh.tets)), mesh.tets.shape[1])
-        shape = len(mesh.vertices), len(mesh.tets)
+        places = mesh.tets.ravel(), elements
+        is_around = np.ones(len(elements), dtype=bool)
         around = sparse.coo_array(
-            (np.ones(len(elements), dtype=bool), (mesh.tets.ravel(), elements)),
-            shape=shape,
+            (is_around, places),
+            shape=(len(mesh.vertices), len(mesh.tets)),
         )
         return cls(mesh.tets, ends, around.tocsr())
 
@@ -87,9 +89,8 @@ class InnerSides:
         for _ in range(ROUNDS):
             bent = straightness(places, self.tets) <= least
             nodes = np.unique(self.tets[bent])
-            moved = [
-                self._move(places, node) for node in nodes[self.ends[nodes, 0] >= 0]
-            ]
+            is_inner = self.ends[nodes, 0] >= 0
+            moved = [self._move(places, node) for node in nodes[is_inner]]
             if not any(moved):
                 break
         return places
@@ -99,26 +100,26 @@ class InnerSides:
         around; return whether it did."""
         start = places[node].copy()
         way = places[self.ends[node]].mean(axis=0) - start
-        elements = self.tets[
-            self.around.indices[self.around.indptr[node] : self.around.indptr[node + 1]]
-        ]
-        best, best_part = straightness(places, elements).min(), 0.0
+        first, last = self.around.indptr[[node, node + 1]]
+        elements = self.tets[self.around.indices[first:last]]
+        best = straightness(places, elements).min()
+        best_part = 0.0
         for part in PARTS:
             places[node] = start + part * way
             least = straightness(places, elements).min()
             if least > best + MIN_GAIN:
-                best, best_part = least, part
+                best = least
+                best_part = part
         places[node] = start + best_part * way
         return best_part > 0
 
 
-def straightness(positions: Floats, tets: NDArray[np.integer]) -> Floats:
+def straightness(positions: Floats, tets: Indices) -> Floats:
     """Return how straight the sides of (m, 10) elements are: 1 if all are straight, at
     most 0 if one may fold over.
 
     It is the lower bound of the Jacobian determinant in an element over the mean.
     """
     means = 6 * np.abs(volumes_between(positions, tets))
-    return np.asarray(
-        lower_bounds(positions, tets) / np.maximum(means, np.finfo(float).tiny)
-    )
+    bounds = lower_bounds(positions, tets)
+    return bounds / np.maximum(means, np.finfo(float).tiny)

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from .jacobians import (
@@ -13,10 +13,22 @@ from .jacobians import (
     chunks,
     coefficients,
     determinants,
+    edge_vectors,
     lower_bounds,
     shape_values,
 )
-from .triangles import Floats, Ints, TriangleMesh, connected, frozen
+from .triangles import (
+    Floats,
+    Indices,
+    Ints,
+    Mask,
+    TriangleMesh,
+    connected,
+    dots,
+    frozen,
+    require_indices,
+    used_part,
+)
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
 KUHN = (
@@ -30,15 +42,30 @@ KUHN = (
 NODES_OF_ORDER = {1: 4, 2: 10}
 MIN_RADIUS_RATIO = 0.02
 """Least accepted quality of an element (`radius_ratios`)."""
-# the face opposite to each corner, outward; and its four triangles if its edges have
-# nodes: at its corners, between
+# the face opposite to each corner, outward
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
-FINE_FACES = (
-    ((1, 5, 8), (5, 2, 9), (8, 9, 3), (5, 9, 8)),
-    ((0, 7, 6), (7, 3, 9), (6, 9, 2), (7, 9, 6)),
-    ((0, 4, 7), (4, 1, 8), (7, 8, 3), (4, 8, 7)),
-    ((0, 6, 4), (6, 2, 5), (4, 5, 1), (6, 5, 4)),
-)
+_MIDDLES = {frozenset(edge): node for node, edge in enumerate(EDGES, start=4)}
+
+
+def _quarters(face: tuple[int, int, int]) -> list[tuple[int, int, int]]:
+    """Return the triangles between the six nodes of a face: at its corners, between."""
+    a, b, c = face
+    ab = _MIDDLES[frozenset((a, b))]
+    bc = _MIDDLES[frozenset((b, c))]
+    ca = _MIDDLES[frozenset((c, a))]
+    return [
+        (a, ab, ca),
+        (ab, b, bc),
+        (ca, bc, c),
+        (ab, bc, ca),
+    ]
+
+
+TRIANGLES_OF_ORDER = {
+    1: np.array([[face] for face in FACES]),
+    2: np.array([_quarters(face) for face in FACES]),
+}
+"""Corners (4, 1, 3) or nodes (4, 4, 3) of the triangles of the faces."""
 # the linear elements between the nodes of a quadratic one: at its corners, and around
 # the diagonal from node 6 to 8
 PIECES = (*CORNER_PARTS, (6, 8, 4, 5), (6, 8, 5, 9), (6, 8, 9, 7), (6, 8, 7, 4))
@@ -48,23 +75,28 @@ the middle."""
 
 FINER = 4
 """Number of pieces of each edge of a face: two between neighbouring nodes."""
-LATTICE = np.array(
-    [(i, j, FINER - i - j) for i in range(FINER + 1) for j in range(FINER + 1 - i)]
-)
+PLACES = [
+    (i, j, k) for i, j, k in product(range(FINER + 1), repeat=3) if i + j + k == FINER
+]
+LATTICE = np.array(PLACES)
 """Vertices of the triangles within a face: barycentric coordinates times `FINER`."""
-PLACE = {(i, j, k): place for place, (i, j, k) in enumerate(LATTICE.tolist())}
-LATTICE_TRIANGLES = np.array(
-    [
-        (PLACE[i, j, k], PLACE[second], PLACE[third])
-        for i, j, k in PLACE
-        for second, third in (
-            ((i + 1, j, k - 1), (i, j + 1, k - 1)),
-            ((i, j + 1, k - 1), (i - 1, j + 1, k)),
-        )
-        if second in PLACE and third in PLACE
-    ]
-)
-"""The (16, 3) triangles of the lattice, all with the same orientation."""
+
+
+def _lattice_triangles() -> Ints:
+    """Return the (16, 3) triangles of the lattice, all with the same orientation."""
+    number = {place: vertex for vertex, place in enumerate(PLACES)}
+    triangles = []
+    for i, j, k in PLACES:
+        along = (i + 1, j, k - 1)
+        across = (i, j + 1, k - 1)
+        back = (i - 1, j + 1, k)
+        for triangle in ([(i, j, k), along, across], [(i, j, k), across, back]):
+            if number.keys() >= set(triangle):
+                triangles.append([number[place] for place in triangle])
+    return np.array(triangles)
+
+
+LATTICE_TRIANGLES = _lattice_triangles()
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +112,13 @@ class TetrahedralMesh:
     tets: Ints
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen(self.vertices, np.float64, 3))
-        wide = np.ndim(self.tets) == 2 and np.shape(self.tets)[1] == NODES_OF_ORDER[2]
-        object.__setattr__(
-            self, "tets", frozen(self.tets, np.int64, NODES_OF_ORDER[2 if wide else 1])
-        )
-        if len(self.tets) and not 0 <= self.tets.min() <= self.tets.max() < len(
-            self.vertices
-        ):
-            raise ValueError("a tetrahedron has a vertex index out of range")
+        vertices = frozen(self.vertices, np.float64, 3)
+        is_quadratic = np.shape(self.tets)[1:] == (NODES_OF_ORDER[2],)
+        width = NODES_OF_ORDER[2 if is_quadratic else 1]
+        tets = frozen(self.tets, np.int64, width)
+        require_indices(tets, len(vertices), "tetrahedron")
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "tets", tets)
 
     @property
     def order(self) -> int:
@@ -101,25 +131,23 @@ class TetrahedralMesh:
         return self.tets[:, : NODES_OF_ORDER[1]]
 
 
-def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
+def volumes_between(vertices: Floats, tets: Indices) -> Floats:
     """Return the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in
     cubes of the vertices' unit."""
     if tets.shape[1] == NODES_OF_ORDER[2]:
-        return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
+        return coefficients(vertices, tets).mean(axis=1) / 6
     volumes = np.empty(len(tets))
-    for part in chunks(len(tets)):
-        places = np.take(vertices, tets[part], axis=0)
-        volumes[part] = determinants(places[:, 1:] - places[:, :1]) / 6.0
+    for chunk in chunks(len(tets)):
+        volumes[chunk] = determinants(edge_vectors(vertices, tets[chunk])) / 6.0
     return volumes
 
 
-def has_volume(positions: Floats, tets: NDArray[np.integer]) -> NDArray[np.bool_]:
+def has_volume(positions: Floats, tets: Indices) -> Mask:
     """Return whether each (m, 4) or (m, 10) element is valid everywhere, for (n, 3)
     positions of its nodes."""
     is_linear = tets.shape[1] == NODES_OF_ORDER[1]
-    return (
-        volumes_between(positions, tets) if is_linear else lower_bounds(positions, tets)
-    ) > 0
+    bounds = volumes_between if is_linear else lower_bounds
+    return bounds(positions, tets) > 0
 
 
 def signed_volumes(mesh: TetrahedralMesh) -> Floats:
@@ -131,74 +159,80 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
     """Return the (m,) ratios 3 × inscribed / circumscribed radius of the corners: 1
     regular, 0 flat."""
     ratios = np.empty(len(mesh.tets))
-    for part in chunks(len(ratios)):
-        a, b, c, d = mesh.vertices[mesh.corners[part].T]
-        p, q, r = b - a, c - a, d - a
-        volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
-        surface2 = sum(
-            np.linalg.norm(np.cross(x, y), axis=1)
-            for x, y in ((p, q), (q, r), (r, p), (q - p, r - p))
-        )
+    for chunk in chunks(len(ratios)):
+        a, b, c, d = mesh.vertices[mesh.corners[chunk].T]
+        p = b - a
+        q = c - a
+        r = d - a
+        pq = np.cross(p, q)
+        qr = np.cross(q, r)
+        rp = np.cross(r, p)
+        opposite = np.cross(q - p, r - p)
         # circumradius = |p|²(q×r) + |q|²(r×p) + |r|²(p×q)| / (2·6V), inradius = 6V /
         # (sum of twice the face areas)
-        squared = [np.einsum("ij,ij->i", x, x)[:, None] for x in (p, q, r)]
-        numerator = np.linalg.norm(
-            squared[0] * np.cross(q, r)
-            + squared[1] * np.cross(r, p)
-            + squared[2] * np.cross(p, q),
-            axis=1,
-        )
-        ratios[part] = (
-            6 * volume6**2 / np.maximum(surface2 * numerator, np.finfo(float).tiny)
-        )
+        volume6 = np.abs(dots(pq, r))
+        surface2 = np.zeros(len(a))
+        for normal in (pq, qr, rp, opposite):
+            surface2 += np.linalg.norm(normal, axis=1)
+        centre = np.zeros_like(p)
+        for edge, normal in ((p, qr), (q, rp), (r, pq)):
+            centre += dots(edge, edge)[:, None] * normal
+        product = surface2 * np.linalg.norm(centre, axis=1)
+        ratios[chunk] = 6 * volume6**2 / np.maximum(product, np.finfo(float).tiny)
     return ratios
 
 
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
     """Return the (n,) number of the connected part of the mesh that each vertex belongs
     to."""
-    pairs = np.stack(
-        np.broadcast_arrays(mesh.tets[:, :1], mesh.tets[:, 1:]), axis=-1
-    ).reshape(-1, 2)
-    return connected(pairs, len(mesh.vertices)).astype(np.int64)
+    first = mesh.tets[:, 0]
+    links = []
+    for other in mesh.tets.T[1:]:
+        links.append(np.column_stack([first, other]))
+    parts = connected(np.concatenate(links), len(mesh.vertices))
+    return parts.astype(np.int64)
 
 
 def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
     """Return a box of six tetrahedra per cell on the grid of three ascending arrays of
     coordinates in mm."""
-    points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
-    x, y, z = points.shape[:3]
-    number = np.arange(x * y * z).reshape(x, y, z)
-    corner = [
-        number[i : x - 1 + i, j : y - 1 + j, k : z - 1 + k].ravel()
-        for i in (0, 1)
-        for j in (0, 1)
-        for k in (0, 1)
-    ]
-    tets = np.concatenate([np.stack([corner[c] for c in tet], axis=1) for tet in KUHN])
-    return TetrahedralMesh(points.reshape(-1, 3), tets)
+    axes = np.meshgrid(*ticks, indexing="ij")
+    points = np.stack(axes, axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape(axes[0].shape)
+    low = slice(None, -1)
+    high = slice(1, None)
+    corners = []
+    for side in product((low, high), repeat=3):
+        corners.append(number[side].ravel())
+    tets = []
+    for tet in KUHN:
+        nodes = [corners[corner] for corner in tet]
+        tets.append(np.stack(nodes, axis=1))
+    return TetrahedralMesh(points, np.concatenate(tets))
 
 
 def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
     """Add nodes at the midpoints of a linear mesh's edges; corners keep their
     numbers."""
-    pairs = np.sort(mesh.tets[:, EDGES], axis=2).reshape(-1, 2)
-    names, place = np.unique(pairs @ [len(mesh.vertices), 1], return_inverse=True)
-    ends = np.stack(np.divmod(names, len(mesh.vertices)), axis=1)
-    tets = np.hstack([mesh.tets, len(mesh.vertices) + place.reshape(-1, len(EDGES))])
-    return TetrahedralMesh(
-        np.concatenate([mesh.vertices, mesh.vertices[ends].mean(axis=1)]), tets
-    )
+    count = len(mesh.vertices)
+    pairs = np.sort(mesh.tets[:, EDGES], axis=2)
+    # one number per edge: much faster than comparing rows
+    numbers = pairs @ [count, 1]
+    edges, place = np.unique(numbers, return_inverse=True)
+    ends = np.stack(np.divmod(edges, count), axis=1)
+    middles = mesh.vertices[ends].mean(axis=1)
+    vertices = np.concatenate([mesh.vertices, middles])
+    nodes = count + place.reshape(-1, len(EDGES))
+    tets = np.hstack([mesh.tets, nodes])
+    return TetrahedralMesh(vertices, tets)
 
 
 def linear_pieces(mesh: TetrahedralMesh) -> Ints:
     """Return the (p, 4) linear tetrahedra between the nodes: the elements, or eight for
     each quadratic one."""
-    return (
-        mesh.tets
-        if mesh.order == 1
-        else np.asarray(mesh.tets[:, PIECES]).reshape(-1, 4)
-    )
+    if mesh.order == 1:
+        return mesh.tets
+    return mesh.tets[:, PIECES].reshape(-1, 4)
 
 
 def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
@@ -209,28 +243,35 @@ def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     are consecutive: with corners a, b, c, these are (a, ab, ca), (ab, b, bc), (ca, bc,
     c) and (ab, bc, ca).
     """
-    faces = np.sort(mesh.tets[:, FACES].reshape(-1, 3))
+    faces = mesh.tets[:, FACES].reshape(-1, 3)
+    faces = np.sort(faces)
     # one number per face: much faster than comparing rows
     count = len(mesh.vertices)
-    _, first, counts = np.unique(
-        faces @ [count * count, count, 1], return_index=True, return_counts=True
+    numbers = faces @ [count * count, count, 1]
+    _, first, uses = np.unique(
+        numbers,
+        return_index=True,
+        return_counts=True,
     )
-    outer = np.sort(first[counts == 1])
-    pieces = PIECES_OF_ORDER[mesh.order]
-    triangles = mesh.tets[:, FACES if mesh.order == 1 else FINE_FACES]
-    triangles = triangles.reshape(-1, pieces, 3)[outer]
-    return triangles.reshape(-1, 3), np.repeat(outer // 4, pieces)
+    outer = np.sort(first[uses == 1])
+    element, face = np.divmod(outer, len(FACES))
+    nodes = TRIANGLES_OF_ORDER[mesh.order][face]
+    triangles = mesh.tets[element[:, None, None], nodes]
+    element = np.repeat(element, nodes.shape[1])
+    return triangles.reshape(-1, 3), element
 
 
-def whole_faces(triangles: NDArray[np.integer], order: int) -> NDArray[np.integer]:
+def whole_faces(triangles: Indices, order: int) -> Indices:
     """Return the (f, 3) corners of the faces whose triangles are those of
     `boundary_faces`."""
     if order == 1:
         return triangles
-    return triangles.reshape(-1, PIECES_OF_ORDER[2], 3)[:, [0, 1, 2], [0, 1, 2]]
+    by_face = triangles.reshape(-1, PIECES_OF_ORDER[2], 3)
+    corner = [0, 1, 2]
+    return by_face[:, corner, corner]
 
 
-def on_whole_faces(selected: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
+def on_whole_faces(selected: Mask, order: int) -> Mask:
     """Return the (f,) mask of the triangles of `boundary_faces` whose whole face is
     selected."""
     pieces = PIECES_OF_ORDER[order]
@@ -241,8 +282,7 @@ def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
     """Return the outward surface of the mesh and the indices of its vertices in the
     mesh."""
     faces, _ = boundary_faces(mesh)
-    used, local = np.unique(faces, return_inverse=True)
-    return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3)), used
+    return used_part(TriangleMesh(mesh.vertices, faces))
 
 
 def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
@@ -252,35 +292,46 @@ def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     Its first n vertices are the nodes. `triangles` (4 f, 3) are those of
     `boundary_faces`.
     """
-    split = triangles.reshape(-1, 4, 3)
-    nodes = np.concatenate([split[:, [0, 1, 2], [0, 1, 2]], split[:, 3]], axis=1)
+    corners = whole_faces(triangles, order=2)
+    # the triangle between has the nodes on the edges
+    nodes = np.hstack([corners, triangles[3::4]])
+    nodes = np.repeat(nodes, len(LATTICE), axis=0)
     # shape functions on a tetrahedron's face with the nodes 0, 1, 2 and 4, 5, 6
-    on_lattice = shape_values(np.pad(LATTICE / FINER, ((0, 0), (0, 1))))
+    places = np.pad(LATTICE / FINER, ((0, 0), (0, 1)))
+    on_lattice = shape_values(places)
     on_lattice = on_lattice[:, [0, 1, 2, 4, 5, 6]]
-    weights = np.broadcast_to(on_lattice, (len(nodes), len(LATTICE), 6)).reshape(-1, 6)
-    names = np.repeat(nodes, len(LATTICE), axis=0)
-    # faces share a vertex if it has the same nodes with the same weights
-    parts = np.rint(weights * 2 * FINER).astype(np.int64)
-    names = np.where(parts == 0, -1, names)
-    order = np.argsort(names, axis=1, kind="stable")
-    keys = np.concatenate(
-        [np.take_along_axis(names, order, 1), np.take_along_axis(parts, order, 1)],
-        axis=1,
-    )
-    at_node = (parts == 2 * FINER).sum(axis=1) * ((parts != 0).sum(axis=1) == 1) > 0
+    weights = np.tile(on_lattice, (len(corners), 1))
+    nodes[weights == 0] = -1
     count = int(triangles.max()) + 1
-    number = np.empty(len(keys), dtype=np.int64)
-    number[at_node] = names[at_node].max(axis=1)
-    _, first, place = np.unique(
-        keys[~at_node], axis=0, return_index=True, return_inverse=True
-    )
-    number[~at_node] = count + place.ravel()
-    between = np.flatnonzero(~at_node)[first]
-    rows = np.repeat(np.arange(count, count + len(between)), 6)
-    columns = np.maximum(names[between], 0).ravel()
+    is_new = ~(weights == 1).any(axis=1)
+    new_nodes = nodes[is_new]
+    new_weights = weights[is_new]
+    first, place = _distinct_points(new_nodes, new_weights)
+    # at a node there is no other
+    number = nodes.max(axis=1)
+    number[is_new] = count + place
+    columns = np.maximum(new_nodes[first], 0)
+    rows = np.repeat(np.arange(len(first)), columns.shape[1])
     new = sparse.coo_array(
-        (weights[between].ravel(), (rows - count, columns)), shape=(len(between), count)
+        (new_weights[first].ravel(), (rows, columns.ravel())),
+        shape=(len(first), count),
     )
-    matrix = sparse.csr_array(sparse.vstack([sparse.eye_array(count), new]))
-    faces = number.reshape(-1, len(LATTICE))[:, LATTICE_TRIANGLES].reshape(-1, 3)
-    return matrix, faces
+    matrix = sparse.vstack([sparse.eye_array(count), new])
+    by_face = number.reshape(-1, len(LATTICE))
+    faces = by_face[:, LATTICE_TRIANGLES].reshape(-1, 3)
+    return sparse.csr_array(matrix), faces
+
+
+def _distinct_points(nodes: Ints, weights: Floats) -> tuple[Ints, Ints]:
+    """Number points with the same (p, 6) nodes and weights, in any order; return where
+    each point is first, and the (p,) numbers."""
+    order = np.argsort(nodes, axis=1, kind="stable")
+    sorted_nodes = np.take_along_axis(nodes, order, axis=1)
+    sorted_weights = np.take_along_axis(weights, order, axis=1)
+    _, first, number = np.unique(
+        np.hstack([sorted_nodes, sorted_weights]),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+    )
+    return first, number.ravel()

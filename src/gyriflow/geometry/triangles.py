@@ -12,6 +12,8 @@ from ..units import CM2_PER_MM2, ML_PER_MM3
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.integer]
+"""Integers of any size."""
 
 # faces whose angle (radians) is smaller coincide
 COINCIDENCE_TOL = 1e-3
@@ -26,6 +28,13 @@ def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
     return array
 
 
+def require_indices(cells: Ints, count: int, cell: str) -> None:
+    """Raise ValueError, with the name of a `cell`, if cells have a vertex outside of
+    the first `count`."""
+    if len(cells) and not 0 <= cells.min() <= cells.max() < count:
+        raise ValueError(f"a {cell} has a vertex index out of range")
+
+
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
     """A triangle surface: (n, 3) vertices in mm, and (m, 3) faces, their indices
@@ -35,12 +44,11 @@ class TriangleMesh:
     faces: Ints
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen(self.vertices, np.float64, 3))
-        object.__setattr__(self, "faces", frozen(self.faces, np.int64, 3))
-        if len(self.faces) and not 0 <= self.faces.min() <= self.faces.max() < len(
-            self.vertices
-        ):
-            raise ValueError("a face has a vertex index out of range")
+        vertices = frozen(self.vertices, np.float64, 3)
+        faces = frozen(self.faces, np.int64, 3)
+        require_indices(faces, len(vertices), "face")
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
 
 
 def corners(mesh: TriangleMesh) -> Floats:
@@ -82,6 +90,11 @@ def volume_ml(mesh: TriangleMesh) -> float:
     return signed_volume(mesh) * ML_PER_MM3
 
 
+def dots(first: Floats, second: Floats) -> Floats:
+    """Return the (n,) scalar products of the rows of two (n, 3) arrays."""
+    return np.einsum("ij,ij->i", first, second)
+
+
 def unit(vectors: Floats) -> Floats:
     """Return (n, 3) vectors scaled to length one; zero vectors stay zero."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -93,53 +106,59 @@ def face_normals(mesh: TriangleMesh) -> Floats:
     return unit(area_vectors(mesh))
 
 
-def scatter_to_vertices(mesh: TriangleMesh, face_values: NDArray) -> Floats:
+def _sums_at_vertices(mesh: TriangleMesh, face_values: Floats) -> Floats:
     """Return per vertex the sum of (m,) or (m, k) values over its faces."""
-    corner = np.repeat(np.arange(len(mesh.faces)), 3)
-    incidence = scipy.sparse.csr_matrix(
-        (np.ones(corner.size), (mesh.faces.ravel(), corner)),
+    number = np.repeat(np.arange(len(mesh.faces)), 3)
+    at_corners = scipy.sparse.csr_matrix(
+        (np.ones(number.size), (mesh.faces.ravel(), number)),
         shape=(len(mesh.vertices), len(mesh.faces)),
     )
-    return incidence @ face_values
+    return np.asarray(at_corners @ face_values)
 
 
 def vertex_normals(mesh: TriangleMesh) -> Floats:
     """Return the (n, 3) unit vertex normals: area-weighted means of the normals of
     adjacent faces."""
-    return unit(scatter_to_vertices(mesh, area_vectors(mesh)))
+    return unit(_sums_at_vertices(mesh, area_vectors(mesh)))
 
 
 def vertex_areas(mesh: TriangleMesh) -> Floats:
     """Return the (n,) areas of the vertices in mm²: a third of each adjacent face."""
-    return np.asarray(
-        scatter_to_vertices(mesh, face_areas(mesh)) / 3.0, dtype=np.float64
-    )
+    return _sums_at_vertices(mesh, face_areas(mesh)) / 3.0
+
+
+def _half_edges(mesh: TriangleMesh) -> Ints:
+    """Return the (3 m, 2) starts and ends of the edges of each face, in turn."""
+    return mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
     """Return the (e, 2) undirected edges, each once and sorted, and the (e,) number of
     faces at each."""
-    pairs = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    directed = _half_edges(mesh)
+    pairs = np.sort(directed, axis=1)
     # one number per edge: much faster than comparing rows
     count = len(mesh.vertices)
-    keys, uses = np.unique(pairs @ [count, 1], return_counts=True)
-    return np.stack(np.divmod(keys, count), axis=1), uses
+    numbers = pairs @ [count, 1]
+    numbers, uses = np.unique(numbers, return_counts=True)
+    low, high = np.divmod(numbers, count)
+    return np.stack([low, high], axis=1), uses
 
 
 def mean_edge_length(mesh: TriangleMesh) -> float:
     """Return the mean edge length in mm."""
-    return mean_length(mesh.vertices, edges(mesh)[0])
+    pairs, _ = edges(mesh)
+    return mean_length(mesh.vertices, pairs)
 
 
-def edge_lengths(vertices: Floats, pairs: NDArray[np.integer]) -> Floats:
+def edge_lengths(vertices: Floats, pairs: Indices) -> Floats:
     """Return the (e,) lengths of edges given as (e, 2) vertex indices, in the vertices'
     unit."""
-    return np.asarray(
-        np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1)
-    )
+    first, second = pairs.T
+    return np.linalg.norm(vertices[second] - vertices[first], axis=1)
 
 
-def mean_length(vertices: Floats, pairs: NDArray[np.integer]) -> float:
+def mean_length(vertices: Floats, pairs: Indices) -> float:
     """Return the mean length of edges given as (e, 2) vertex indices, in the vertices'
     unit."""
     return float(edge_lengths(vertices, pairs).mean())
@@ -148,27 +167,30 @@ def mean_length(vertices: Floats, pairs: NDArray[np.integer]) -> float:
 def is_closed(mesh: TriangleMesh) -> bool:
     """Return whether every edge has exactly two faces that run along it in opposite
     directions."""
-    directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    if not len(directed) or len(np.unique(directed @ [len(mesh.vertices), 1])) != len(
-        directed
-    ):
+    if not len(mesh.faces):
         return False
-    _, counts = edges(mesh)
-    return bool((counts == 2).all())
+    _, uses = edges(mesh)
+    directed = _half_edges(mesh)
+    keys = directed @ [len(mesh.vertices), 1]
+    has_repeated = len(np.unique(keys)) < len(keys)
+    return not has_repeated and bool((uses == 2).all())
 
 
 def euler_number(mesh: TriangleMesh) -> int:
     """Return vertices − edges + faces, counting used vertices only: 2 for each closed
     surface without handles."""
-    return int(len(np.unique(mesh.faces)) - len(edges(mesh)[0]) + len(mesh.faces))
+    pairs, _ = edges(mesh)
+    return len(np.unique(mesh.faces)) - len(pairs) + len(mesh.faces)
 
 
 def face_components(mesh: TriangleMesh) -> Ints:
     """Return the (m,) number of the connected component of each face, the largest area
     first (0)."""
-    label = connected(mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2), len(mesh.vertices))
-    _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
-    order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
+    of_vertex = connected(_half_edges(mesh), len(mesh.vertices))
+    of_face = of_vertex[mesh.faces[:, 0]]
+    _, component = np.unique(of_face, return_inverse=True)
+    areas = np.bincount(component, weights=face_areas(mesh))
+    order = np.argsort(-areas, kind="stable")
     return np.argsort(order)[component]
 
 
@@ -180,69 +202,91 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
     and have the inside between them: those with the smallest sum of angles inside are
     paired. A manifold surface is returned unchanged.
     """
-    faces, count = mesh.faces, len(mesh.vertices)
+    faces = mesh.faces
     # half-edge 3 f + k starts at corner k of face f
-    start, end, apex = (np.roll(faces, -k, axis=1).ravel() for k in range(3))
+    start = faces.ravel()
+    end = np.roll(faces, -1, axis=1).ravel()
     following = np.roll(np.arange(faces.size).reshape(-1, 3), -1, axis=1).ravel()
-    keys = np.minimum(start, end) * count + np.maximum(start, end)
+    is_forward = (start < end) == (signed_volume(mesh) >= 0)
+    keys = np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end)
     order = np.argsort(keys, kind="stable")
     _, first, uses = np.unique(keys[order], return_index=True, return_counts=True)
-    pairs, ambiguous = [order[first[uses == 2, None] + [0, 1]]], []
-    is_forward = (start < end) == (signed_volume(mesh) >= 0)
+    pairs = [order[first[uses == 2, None] + [0, 1]]]
+    overlapping = []
     for place, number in zip(first[uses > 2], uses[uses > 2], strict=True):
         around = order[place : place + number]
-        sides = around[~is_forward[around]], around[is_forward[around]]
-        low, high = mesh.vertices[np.sort([start[around[0]], end[around[0]]])]
-        axis = (high - low) / np.linalg.norm(high - low)
-        arms = [mesh.vertices[apex[side]] - low for side in (around[:1], *sides)]
-        radial = arms[0][0] - (arms[0][0] @ axis) * axis
-        backward, forward = (
-            np.arctan2(arm @ np.cross(axis, radial), arm @ radial) for arm in arms[1:]
-        )
-        inside = (forward - backward[:, None] - COINCIDENCE_TOL) % (2.0 * np.pi)
-        matched = scipy.optimize.linear_sum_assignment(inside)
-        if inside[matched].sum() <= 2.0 * np.pi:
-            pairs.append(
-                np.stack(
-                    [side[index] for side, index in zip(sides, matched, strict=True)],
-                    axis=1,
-                )
-            )
+        angles = _angles_around_edge(mesh, around)
+        forward = is_forward[around]
+        inside = angles[forward] - angles[~forward, None]
+        inside = (inside - COINCIDENCE_TOL) % (2.0 * np.pi)
+        sides = around[~forward], around[forward]
+        paired, total = _cheapest_pairs(inside, *sides)
+        if total <= 2.0 * np.pi:
+            pairs.append(paired)
         else:
-            ambiguous.append(sides)
+            overlapping.append(sides)
     # where faces overlap, faces of the same sheet elsewhere are paired
     sheet = connected(np.concatenate(pairs) // 3, len(faces))
-    for sides in ambiguous:
-        matched = scipy.optimize.linear_sum_assignment(
-            sheet[sides[0] // 3][:, None] != sheet[sides[1] // 3]
-        )
-        pairs.append(
-            np.stack(
-                [side[index] for side, index in zip(sides, matched, strict=True)],
-                axis=1,
-            )
-        )
-    edge, partner = np.concatenate(pairs).T
-    is_opposite = start[edge] != start[partner]
-    joined = np.where(
-        is_opposite, [following[partner], partner], [partner, following[partner]]
-    )
-    corner = connected(
-        np.concatenate([[edge, following[edge]], joined]).reshape(2, -1).T, faces.size
-    )
+    for backward, forward in overlapping:
+        differs = sheet[backward // 3][:, None] != sheet[forward // 3]
+        paired, _ = _cheapest_pairs(differs, backward, forward)
+        pairs.append(paired)
+    corner = _joined_corners(np.concatenate(pairs), start, following)
     _, first = np.unique(corner, return_index=True)
     if len(first) == len(np.unique(faces)):
         return mesh
-    return TriangleMesh(mesh.vertices[faces.ravel()[first]], corner.reshape(-1, 3))
+    return TriangleMesh(mesh.vertices[start[first]], corner.reshape(-1, 3))
 
 
-def connected(pairs: NDArray[np.integer], count: int) -> Ints:
+def _angles_around_edge(mesh: TriangleMesh, half_edges: Ints) -> Floats:
+    """Return the (n,) angles in radians of the faces of one edge's half-edges around
+    it, from the first."""
+    face, corner = np.divmod(half_edges, 3)
+    start = mesh.faces[face, corner]
+    end = mesh.faces[face, (corner + 1) % 3]
+    apex = mesh.faces[face, (corner + 2) % 3]
+    low = mesh.vertices[min(start[0], end[0])]
+    high = mesh.vertices[max(start[0], end[0])]
+    axis = high - low
+    axis /= np.linalg.norm(axis)
+    arms = mesh.vertices[apex] - low
+    first = arms[0]
+    radial = first - (first @ axis) * axis
+    across = np.cross(axis, radial)
+    return np.arctan2(arms @ across, arms @ radial)
+
+
+def _cheapest_pairs(
+    costs: NDArray, backward: Ints, forward: Ints
+) -> tuple[Ints, float]:
+    """Return the (k, 2) pairs of half-edges of both directions with the smallest sum of
+    (b, f) costs, and that sum."""
+    rows, columns = scipy.optimize.linear_sum_assignment(costs)
+    pairs = np.column_stack([backward[rows], forward[columns]])
+    return pairs, float(costs[rows, columns].sum())
+
+
+def _joined_corners(pairs: Ints, start: Ints, following: Ints) -> Ints:
+    """Return the (3 m,) number of the vertex at each corner of the faces, which share
+    vertices only along (k, 2) paired half-edges."""
+    edge, partner = pairs.T
+    is_opposite = start[edge] != start[partner]
+    at_start = np.where(is_opposite, following[partner], partner)
+    at_end = np.where(is_opposite, partner, following[partner])
+    corners_of_edge = np.concatenate([edge, following[edge]])
+    corners_of_partner = np.concatenate([at_start, at_end])
+    links = np.column_stack([corners_of_edge, corners_of_partner])
+    return connected(links, len(start))
+
+
+def connected(pairs: Indices, count: int) -> Ints:
     """Return the (count,) number of the connected component of each of `count` nodes,
     from (k, 2) links."""
-    graph = scipy.sparse.coo_matrix(
-        (np.ones(len(pairs)), pairs.T), shape=(count, count)
-    )
-    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    ones = np.ones(len(pairs))
+    graph = scipy.sparse.coo_matrix((ones, pairs.T), shape=(count, count))
+    components = scipy.sparse.csgraph.connected_components
+    _, component = components(graph, directed=False)
+    return component
 
 
 def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:
@@ -252,68 +296,94 @@ def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:
     No edge of the surface is used inside the patch (Barequet and Sharir 1995, doi
     10.1016/0167-8396(94)00011-G).
     """
-    count, points = len(loop), mesh.vertices[loop]
-    place = np.full(len(mesh.vertices), -1)
-    place[loop] = np.arange(count)
-    pairs = np.sort(place[edges(mesh)[0]], axis=1)
-    low, high = pairs[pairs[:, 0] >= 0].T
+    count = len(loop)
+    points = mesh.vertices[loop]
+    is_edge = _edges_within(mesh, loop)
     # smallest area that the loop from vertex i to j and the edge j-i enclose, and the
     # third vertex of the face there
-    cost, third = np.zeros((count, count)), np.zeros((count, count), dtype=int)
+    cost = np.zeros((count, count))
+    third = np.zeros((count, count), dtype=int)
     for gap in range(2, count):
-        first = np.arange(count - gap)
-        middle = first[:, None] + np.arange(1, gap)
-        a, b, c = points[first][:, None], points[middle], points[first + gap][:, None]
+        start = np.arange(count - gap)
+        end = start + gap
+        middle = start[:, None] + np.arange(1, gap)
+        a = points[start][:, None]
+        b = points[middle]
+        c = points[end][:, None]
         areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
-        totals = (
-            cost[first[:, None], middle] + cost[middle, first[:, None] + gap] + areas
-        )
-        third[first, first + gap] = first + 1 + totals.argmin(axis=1)
-        cost[first, first + gap] = totals.min(axis=1)
+        before = cost[start[:, None], middle]
+        after = cost[middle, end[:, None]]
+        totals = before + after + areas
+        third[start, end] = start + 1 + totals.argmin(axis=1)
+        least = totals.min(axis=1)
         if gap < count - 1:
-            cost[low[high - low == gap], high[high - low == gap]] = np.inf
-    faces, spans = [], [(0, count - 1)]
+            least[is_edge[start, end]] = np.inf
+        cost[start, end] = least
+    faces = []
+    spans = [(0, count - 1)]
     while spans:
-        start, end = spans.pop()
-        if end - start > 1:
-            middle = third[start, end]
-            faces.append((start, middle, end))
-            spans += [(start, middle), (middle, end)]
+        first, last = spans.pop()
+        if last - first > 1:
+            between = third[first, last]
+            faces.append((first, between, last))
+            spans.append((first, between))
+            spans.append((between, last))
     return loop[np.array(faces)]
+
+
+def _edges_within(mesh: TriangleMesh, loop: Ints) -> Mask:
+    """Return the (n, n) mask of the pairs of places in a loop whose vertices have an
+    edge, for the first before the second."""
+    place = np.full(len(mesh.vertices), -1)
+    place[loop] = np.arange(len(loop))
+    pairs, _ = edges(mesh)
+    inside = np.sort(place[pairs], axis=1)
+    inside = inside[inside[:, 0] >= 0]
+    is_edge = np.zeros((len(loop), len(loop)), dtype=bool)
+    is_edge[tuple(inside.T)] = True
+    return is_edge
 
 
 def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
     """Return the convex hull, its faces outward; MeshError for a flat surface."""
     try:
-        hull = scipy.spatial.ConvexHull(mesh.vertices)
+        found = scipy.spatial.ConvexHull(mesh.vertices)
     except scipy.spatial.QhullError as error:
         raise MeshError(
             "the surface has no convex hull", remedy="It must enclose a volume"
         ) from error
-    faces = np.asarray(hull.simplices, dtype=np.int64)
-    a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    used, local = np.unique(faces, return_inverse=True)
-    return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3))
+    faces = found.simplices.astype(np.int64)
+    normals = area_vectors(TriangleMesh(mesh.vertices, faces))
+    outward = found.equations[:, :3]
+    is_inward = dots(normals, outward) < 0
+    faces[is_inward] = faces[is_inward][:, ::-1]
+    hull, _ = used_part(TriangleMesh(mesh.vertices, faces))
+    return hull
 
 
-def submesh(mesh: TriangleMesh, keep: NDArray[np.bool_]) -> tuple[TriangleMesh, Ints]:
+def used_part(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
+    """Return the surface without vertices that have no face, and the indices of the
+    others in `mesh`."""
+    used, faces = np.unique(mesh.faces, return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3)), used
+
+
+def submesh(mesh: TriangleMesh, keep: Mask) -> tuple[TriangleMesh, Ints]:
     """Return the surface of the faces where the (m,) mask `keep` holds, and its
     vertices' indices in `mesh`."""
-    used, faces = np.unique(mesh.faces[keep], return_inverse=True)
-    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3)), used
+    return used_part(TriangleMesh(mesh.vertices, mesh.faces[keep]))
 
 
 def merged(*meshes: TriangleMesh) -> TriangleMesh:
     """Return the surfaces side by side in one, without joining vertices."""
-    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    return TriangleMesh(
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate(
-            [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=True)]
-        ),
-    )
+    vertices = []
+    faces = []
+    count = 0
+    for mesh in meshes:
+        vertices.append(mesh.vertices)
+        faces.append(mesh.faces + count)
+        count += len(mesh.vertices)
+    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
 
 
 def flipped(mesh: TriangleMesh) -> TriangleMesh:
@@ -323,6 +393,9 @@ def flipped(mesh: TriangleMesh) -> TriangleMesh:
 
 def transformed(mesh: TriangleMesh, matrix: ArrayLike) -> TriangleMesh:
     """Apply a (4, 4) affine matrix to a surface; faces are flipped if it mirrors."""
-    matrix = np.asarray(matrix, dtype=float)
-    moved = TriangleMesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces)
-    return flipped(moved) if np.linalg.det(matrix[:3, :3]) < 0 else moved
+    affine = np.asarray(matrix, dtype=float)
+    linear = affine[:3, :3]
+    vertices = mesh.vertices @ linear.T + affine[:3, 3]
+    moved = TriangleMesh(vertices, mesh.faces)
+    is_mirrored = np.linalg.det(linear) < 0
+    return flipped(moved) if is_mirrored else moved

@@ -51,15 +51,13 @@ class AtlasAges:
     def table(self) -> pd.DataFrame:
         """Return a row per brain: stated_week, age_by_size, volume_ml and curve_ml, the
         curve at the stated week."""
-        curve = value(self.curve, self.weeks)
-        return pd.DataFrame(
-            {
-                "stated_week": self.weeks,
-                "age_by_size": self.ages,
-                "volume_ml": self.volumes,
-                "curve_ml": curve,
-            }
-        )
+        columns = {
+            "stated_week": self.weeks,
+            "age_by_size": self.ages,
+            "volume_ml": self.volumes,
+            "curve_ml": value(self.curve, self.weeks),
+        }
+        return pd.DataFrame(columns)
 
 
 def ages_by_size(
@@ -80,37 +78,35 @@ def ages_by_size(
     volumes = np.asarray(volumes_ml, dtype=float)
     points = pd.DataFrame({"week": stated, "volume": volumes})
     if len(norm_ml):
-        points = pd.concat(
-            [points, points.assign(volume=norm_ml).dropna()]
-        ).sort_values("week", kind="stable")
-    curve = fitted(
+        norm = points.assign(volume=norm_ml).dropna()
+        points = pd.concat([points, norm]).sort_values("week", kind="stable")
+    fit = fitted(
         points["week"].tolist(),
         points["volume"].tolist(),
         name="volume of the atlas",
         keeps_first=True,
-    ).curve
-    logs, sizes = np.log(curve.values), np.log(volumes)
+    )
+    curve = fit.curve
+    logs = np.log(curve.values)
+    sizes = np.log(volumes)
     # the curve is flat where brains do not grow; beyond its ends ages follow its rate
     # there, or its mean rate if higher
-    inside = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)
+    ages = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)
     mean_rate = (logs[-1] - logs[0]) / (curve.weeks[-1] - curve.weeks[0])
-    end_rates = [
-        max(float(rate(curve, curve.weeks[end])), mean_rate) for end in (0, -1)
-    ]
-    ages = np.where(
-        sizes < logs[0], curve.weeks[0] + (sizes - logs[0]) / end_rates[0], inside
-    )
-    ages = np.where(
-        sizes > logs[-1], curve.weeks[-1] + (sizes - logs[-1]) / end_rates[1], ages
-    )
+    for end, is_beyond in ((0, sizes < logs[0]), (-1, sizes > logs[-1])):
+        week = curve.weeks[end]
+        end_rate = max(float(rate(curve, week)), mean_rate)
+        ages[is_beyond] = week + (sizes[is_beyond] - logs[end]) / end_rate
     spacing = MIN_AGE_SPACING_GW * np.arange(len(ages))
     ages = isotonic_regression(ages - spacing).x + spacing
-    for number in np.flatnonzero(np.abs(ages - stated) > MAX_AGE_ERROR_GW):
-        text = (
-            "the brain of the atlas at %g GW has the size of %.1f GW, and its shape is"
-            " used at that age"
-        )
-        log.warning(text, stated[number], ages[number])
+    for week, age in zip(stated, ages, strict=True):
+        if abs(age - week) > MAX_AGE_ERROR_GW:
+            log.warning(
+                "the brain of the atlas at %g GW has the size of %.1f GW, and its shape"
+                " is used at that age",
+                week,
+                age,
+            )
     return AtlasAges(stated, volumes, curve, ages)
 
 
@@ -127,9 +123,8 @@ class AtlasPath:
 
     def mesh(self, week: float) -> TetrahedralMesh:
         """Return the mesh at one of the weeks."""
-        return TetrahedralMesh(
-            self.shapes.positions[self.shapes.weeks.index(week)], self.tets
-        )
+        number = self.shapes.weeks.index(week)
+        return TetrahedralMesh(self.shapes.positions[number], self.tets)
 
     @property
     def observed(self) -> Ints:
@@ -139,13 +134,13 @@ class AtlasPath:
     def ages(self, norm_ml: Sequence[float] | Floats = ()) -> AtlasAges:
         """Return the ages by size of the atlas' brains in all its weeks; `norm_ml` as
         for `ages_by_size`."""
-        positions = self.shapes.positions[self.observed]
-        sizes = sizes_of(TetrahedralMesh(positions[0], self.tets), positions)
-        return ages_by_size(
-            [self.shapes.weeks[number] for number in self.observed],
-            list(sizes["volume_ml"]),
-            norm_ml,
-        )
+        shapes = self.shapes
+        weeks = [shapes.weeks[number] for number in self.observed]
+        positions = shapes.positions[self.observed]
+        mesh = self.mesh(weeks[0])
+        sizes = sizes_of(mesh, positions)
+        volumes = sizes["volume_ml"].tolist()
+        return ages_by_size(weeks, volumes, norm_ml)
 
     def knots(self, ages: AtlasAges) -> Floats:
         """Return the age by size of each shape, stops between those of their
@@ -161,30 +156,45 @@ class AtlasPath:
         with the face.
         """
         mesh = self.mesh(week)
-        pieces, (boundary, used) = linear_pieces(mesh), boundary_surface(mesh)
+        pieces = linear_pieces(mesh)
+        boundary, used = boundary_surface(mesh)
         tree = igl.AABB()
         tree.init(mesh.vertices, pieces)
-        element = igl.in_element(
-            mesh.vertices, pieces, np.ascontiguousarray(points), tree
-        )
-        inside = element >= 0
-        at_corners = mesh.vertices[pieces[element[inside]]]
-        edges = np.moveaxis(at_corners[:, 1:] - at_corners[:, :1], 1, 2)
-        offsets = points[inside] - at_corners[:, 0]
-        weights = np.linalg.solve(edges, offsets[..., None])[..., 0]
-        weights = np.column_stack([1 - weights.sum(axis=1), weights])
-        _, face, on = nearest_on(points[~inside], boundary)
-        on_face = barycentric(on, corners(boundary)[face])
-        offset = np.einsum("nij,ni->nj", _frames(boundary, face), points[~inside] - on)
+        points = np.ascontiguousarray(points)
+        element = igl.in_element(mesh.vertices, pieces, points, tree)
+        is_inside = element >= 0
+        corner_nodes = pieces[element[is_inside]]
+        weights = _weights_in(mesh.vertices[corner_nodes], points[is_inside])
+        others = points[~is_inside]
+        _, face, nearest = nearest_on(others, boundary)
+        on_face = barycentric(nearest, corners(boundary)[face])
+        frames = _frames(boundary, face)
+        offset = np.einsum("nij,ni->nj", frames, others - nearest)
         carried = np.empty((len(self.shapes.weeks), *points.shape))
         for places, shape in zip(carried, self.shapes.positions, strict=True):
             surface = TriangleMesh(shape[used], boundary.faces)
-            places[inside] = (weights[..., None] * shape[pieces[element[inside]]]).sum(
-                axis=1
-            )
-            places[~inside] = (on_face[..., None] * corners(surface)[face]).sum(axis=1)
-            places[~inside] += np.einsum("nij,nj->ni", _frames(surface, face), offset)
+            places[is_inside] = _weighted(shape[corner_nodes], weights)
+            nearest = _weighted(corners(surface)[face], on_face)
+            turned = np.einsum("nij,nj->ni", _frames(surface, face), offset)
+            places[~is_inside] = nearest + turned
         return carried
+
+
+def _weights_in(tetrahedra: Floats, points: Floats) -> Floats:
+    """Return the (n, 4) barycentric coordinates of points in tetrahedra with (n, 4, 3)
+    corners."""
+    first = tetrahedra[:, :1]
+    edges = np.moveaxis(tetrahedra[:, 1:] - first, 1, 2)
+    offset = points - first[:, 0]
+    solution = np.linalg.solve(edges, offset[..., None])
+    others = solution[..., 0]
+    of_first = 1 - others.sum(axis=1)
+    return np.column_stack([of_first, others])
+
+
+def _weighted(places: Floats, weights: Floats) -> Floats:
+    """Return the (n, 3) sums of (n, k, 3) places times (n, k) weights."""
+    return (weights[..., None] * places).sum(axis=1)
 
 
 def _frames(surface: TriangleMesh, faces: Ints) -> Floats:
@@ -193,8 +203,10 @@ def _frames(surface: TriangleMesh, faces: Ints) -> Floats:
     at = corners(surface)[faces]
     normal = face_normals(surface)[faces]
     along = at[:, 1] - at[:, 0]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    return np.stack([along, np.cross(normal, along), normal], axis=2)
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along /= np.maximum(length, 1e-12)
+    across = np.cross(normal, along)
+    return np.stack([along, across, normal], axis=2)
 
 
 def resample_by_size(
@@ -213,23 +225,20 @@ def resample_by_size(
     shape.
     """
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    shapes = np.stack(
-        [
-            positions_at(week, atlas, knots, sizes)
-            for week in np.clip(weeks, *knots[[0, -1]])
-        ]
-    )
-    volumes = sizes_of(mesh, shapes)["volume_ml"]
-    own = sizes_of(mesh, atlas)["volume_ml"]
     # a mesh that is not quite the atlas' has another volume: the mean ratio over all
     # its weeks
-    ratio = np.exp(np.mean(np.log(own / np.array([ages.volume(age) for age in knots]))))
-    scales = [
-        (ratio * ages.volume(week) / volume) ** (1 / 3)
-        for week, volume in zip(weeks, volumes, strict=True)
-    ]
-    centres = np.average(shapes, axis=1, weights=sizes)[:, None]
-    return centres + np.array(scales)[:, None, None] * (shapes - centres)
+    atlas_volumes = np.array([ages.volume(age) for age in knots])
+    own_volumes = sizes_of(mesh, atlas)["volume_ml"]
+    ratio = np.exp(np.mean(np.log(own_volumes / atlas_volumes)))
+    resampled = []
+    for week in weeks:
+        inside = np.clip(week, knots[0], knots[-1])
+        shape = positions_at(inside, atlas, knots, sizes)
+        volume = sizes_of(mesh, [shape])["volume_ml"][0]
+        scale = (ratio * ages.volume(week) / volume) ** (1 / 3)
+        centre = np.average(shape, axis=0, weights=sizes)
+        resampled.append(centre + scale * (shape - centre))
+    return np.stack(resampled)
 
 
 def positions_at(
@@ -241,15 +250,11 @@ def positions_at(
     The later week is first aligned rigidly to the earlier one, with points weighted by
     their (n,) sizes.
     """
-    first = int(
-        np.clip(
-            np.searchsorted(np.asarray(weeks), week, side="right") - 1,
-            0,
-            len(weeks) - 2,
-        )
-    )
-    part = (week - weeks[first]) / (weeks[first + 1] - weeks[first])
-    motion = rigid_fit(atlas[first + 1], atlas[first], sizes)
-    return np.asarray(
-        (1 - part) * atlas[first] + part * transform_points(atlas[first + 1], motion)
-    )
+    later = np.searchsorted(np.asarray(weeks), week, side="right")
+    # beyond the ends along the line of the first or last two weeks
+    second = int(np.clip(later, 1, len(weeks) - 1))
+    first = second - 1
+    part = (week - weeks[first]) / (weeks[second] - weeks[first])
+    motion = rigid_fit(atlas[second], atlas[first], sizes)
+    aligned = transform_points(atlas[second], motion)
+    return np.asarray((1 - part) * atlas[first] + part * aligned)

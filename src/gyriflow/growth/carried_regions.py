@@ -4,12 +4,11 @@ import logging
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..geometry.matching import labels_at, match_points
-from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
+from ..geometry.matching import labels_at, match_surface
+from ..geometry.triangles import Floats, Indices, Ints, TriangleMesh
 from ..settings.terms import NO_REGION
 
 log = logging.getLogger(__name__)
@@ -28,24 +27,25 @@ def number_regions(*tables: Mapping[int, str]) -> dict[str, int]:
 
     Labels with the same name, such as those of left and right, are one region.
     """
-    names = dict.fromkeys(table[label] for table in tables for label in sorted(table))
-    return {name: number for number, name in enumerate(names, start=1)}
+    numbers: dict[str, int] = {}
+    for table in tables:
+        for label in sorted(table):
+            numbers.setdefault(table[label], len(numbers) + 1)
+    return numbers
 
 
 def renumber(
-    labels: NDArray[np.integer], names: Mapping[int, str], numbers: Mapping[str, int]
+    labels: Indices, names: Mapping[int, str], numbers: Mapping[str, int]
 ) -> Ints:
     """Convert labels to the numbers of their regions; 0 for labels without a name."""
-    values, back = np.unique(labels, return_inverse=True)
-    regions = [
-        numbers[names[int(value)]] if int(value) in names else NO_REGION
-        for value in values
-    ]
-    return np.array(regions, dtype=np.int64)[back].reshape(np.shape(labels))
+    regions = np.full(np.shape(labels), NO_REGION, dtype=np.int64)
+    for label, name in names.items():
+        regions[labels == label] = numbers[name]
+    return regions
 
 
 def regions_from_volume(
-    points: Mapping[str, Floats], regions: NDArray[np.integer], affine: Floats
+    points: Mapping[str, Floats], regions: Indices, affine: Floats
 ) -> dict[str, Ints]:
     """Return the region of the voxel nearest to each vertex; 0 if none is within 4 mm.
 
@@ -72,15 +72,15 @@ def regions_from_volume(
                 expected="regions along the cortex, in the space of the brain's labels",
             )
         reached.append(near)
+        voxels = inside[nearest[near]]
         by_side[side] = np.full(len(vertices), NO_REGION, dtype=np.int64)
-        by_side[side][near] = regions[tuple(inside[nearest[near]].T)]
+        by_side[side][near] = regions[tuple(voxels.T)]
     share = float(np.concatenate(reached).mean())
     if share < USUAL_NEAR:
         # with few regions most vertices have none, but the regions themselves lie along
         # the surface
-        distance, _ = cKDTree(np.concatenate(list(points.values()))).query(
-            centres, distance_upper_bound=REACH_MM
-        )
+        tree = cKDTree(np.concatenate(list(points.values())))
+        distance, _ = tree.query(centres, distance_upper_bound=REACH_MM)
         share = max(share, float(np.isfinite(distance).mean()))
     if share < MIN_NEAR:
         raise InputError(
@@ -94,16 +94,17 @@ def regions_from_volume(
             ),
         )
     if share < USUAL_NEAR:
-        text = (
+        log.warning(
             "only %.0f %% of the regions and the pial surface are within %g mm of each"
-            " other: are they in one space?"
+            " other: are they in one space?",
+            100 * share,
+            REACH_MM,
         )
-        log.warning(text, 100 * share, REACH_MM)
     return by_side
 
 
 def regions_from_surface(
-    target: TriangleMesh, surface: TriangleMesh, regions: NDArray[np.integer]
+    target: TriangleMesh, surface: TriangleMesh, regions: Indices
 ) -> Ints:
     """Return the regions at the vertices of `target`, from another surface of the same
     hemisphere.
@@ -118,11 +119,12 @@ def regions_from_surface(
             found=f"{len(regions)} labels",
             expected=f"{len(surface.vertices)}, the number of its vertices",
         )
-    match = match_points(target.vertices, vertex_normals(target), surface)
-    if match.distance_mm.mean() > MAX_MEAN_DISTANCE_MM:
+    match = match_surface(target, surface)
+    distance_mm = match.distance_mm.mean()
+    if distance_mm > MAX_MEAN_DISTANCE_MM:
         raise InputError(
             "the surface of the regions is not that of the brain",
-            found=f"{match.distance_mm.mean():.1f} mm between them on average",
+            found=f"{distance_mm:.1f} mm between them on average",
             expected=f"at most {MAX_MEAN_DISTANCE_MM:g} mm",
             remedy="Give it in the coordinates of the brain's own files.",
         )

@@ -19,14 +19,15 @@ from ..geometry.deformations import (
     carry,
     transform_points,
 )
-from ..geometry.matching import labels_at, match_points, values_at
+from ..geometry.matching import labels_at, match_surface, values_at
 from ..geometry.triangles import (
     Floats,
+    Indices,
+    Ints,
     TriangleMesh,
     flipped,
     signed_volume,
     vertex_areas,
-    vertex_normals,
 )
 
 MAX_DISTANCE_MM = 2.0
@@ -59,9 +60,8 @@ def match_surfaces(
     InputError if vertices or triangles differ, or if vertices with the same number are
     different places: equal triangles alone do not imply correspondence.
     """
-    if len(first.vertices) != len(second.vertices) or not np.array_equal(
-        _triangles(first), _triangles(second)
-    ):
+    has_same_number = len(first.vertices) == len(second.vertices)
+    if not has_same_number or not np.array_equal(_triangles(first), _triangles(second)):
         raise InputError(
             "the surfaces have different vertices or triangles",
             found=f"{len(second.vertices)} vertices and {len(second.faces)} triangles",
@@ -77,25 +77,18 @@ def match_surfaces(
     first = outward(first)
     weights = vertex_areas(first)
     motion = rigid_fit(first.vertices, second.vertices, weights)
-    aligned = (
-        first.vertices - np.average(first.vertices, axis=0, weights=weights)
-    ) @ motion[:3, :3].T
-    target = second.vertices - np.average(second.vertices, axis=0, weights=weights)
-    sizes = [
-        np.sqrt(np.average((places**2).sum(axis=1), weights=weights))
-        for places in (aligned, target)
-    ]
-    variance = np.average(
-        ((aligned / sizes[0] - target / sizes[1]) ** 2).sum(axis=1), weights=weights
+    from_centre = _from_centre(first.vertices, weights)
+    aligned = from_centre @ motion[:3, :3].T
+    target = _from_centre(second.vertices, weights)
+    scatter = _radius(
+        aligned / _radius(aligned, weights) - target / _radius(target, weights), weights
     )
+    later_areas = vertex_areas(TriangleMesh(second.vertices, first.faces))
     numbers = {
         "vertices": float(len(first.vertices)),
         "turn_deg": angle_deg(motion[:3, :3]),
-        "scatter": float(np.sqrt(variance)),
-        "area_ratio": float(
-            vertex_areas(TriangleMesh(second.vertices, first.faces)).sum()
-            / weights.sum()
-        ),
+        "scatter": scatter,
+        "area_ratio": float(later_areas.sum() / weights.sum()),
     }
     if numbers["turn_deg"] > MAX_TURN_DEG or numbers["scatter"] > MAX_SCATTER:
         raise InputError(
@@ -117,6 +110,21 @@ def match_surfaces(
     return MatchedSurfaces(first, second.vertices), numbers
 
 
+def _triangles(mesh: TriangleMesh) -> Ints:
+    """Return the triangles in one order, whatever their orientation."""
+    return np.unique(np.sort(mesh.faces, axis=1), axis=0)
+
+
+def _from_centre(points: Floats, weights: Floats) -> Floats:
+    return points - np.average(points, axis=0, weights=weights)
+
+
+def _radius(points: Floats, weights: Floats) -> float:
+    """Return the root mean square distance of (n, 3) points from the origin."""
+    squares = (points**2).sum(axis=1)
+    return float(np.sqrt(np.average(squares, weights=weights)))
+
+
 def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
     """Return the (w + 1, n, 3) positions of a surface's vertices that follow w pairs of
     matched surfaces.
@@ -126,10 +134,8 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
     of the same brain in the first week, with other triangles. InputError if it is far
     from the first matched surface.
     """
-    faces = chain[0].first.faces
-    surfaces = np.stack([chain[0].first.vertices, *(pair.second for pair in chain)])
-    start = TriangleMesh(surfaces[0], faces)
-    match = match_points(mesh.vertices, vertex_normals(mesh), start)
+    start = chain[0].first
+    match = match_surface(mesh, start)
     if match.distance_mm.mean() > MAX_DISTANCE_MM:
         raise InputError(
             "the surface does not belong to the first matched surface",
@@ -142,19 +148,11 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
         )
     offsets = mesh.vertices - values_at(match, start.vertices)
     weights = vertex_areas(start)
-    turns = [
-        rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces
-    ]
-    return np.stack(
-        [
-            values_at(match, surface) + offsets @ turn.T
-            for surface, turn in zip(surfaces, turns, strict=True)
-        ]
-    )
-
-
-def _triangles(mesh: TriangleMesh) -> NDArray[np.integer]:
-    return np.unique(np.sort(mesh.faces, axis=1), axis=0)
+    positions = []
+    for surface in (start.vertices, *(pair.second for pair in chain)):
+        turn = rigid_fit(start.vertices, surface, weights)[:3, :3]
+        positions.append(values_at(match, surface) + offsets @ turn.T)
+    return np.stack(positions)
 
 
 def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:
@@ -165,9 +163,8 @@ def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Flo
     """
     positions = [points]
     for number, deformation in enumerate(deformations):
-        _require_on_grid(
-            deformation, positions[-1], f"interval {number + 1} of {len(deformations)}"
-        )
+        interval = f"interval {number + 1} of {len(deformations)}"
+        _require_on_grid(deformation, positions[-1], interval)
         positions.append(carry(deformation, positions[-1]))
     return np.stack(positions)
 
@@ -179,17 +176,17 @@ def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floa
         return mesh.vertices
     matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
     if matched:
-        return np.asarray(follow_surfaces(mesh, matched)[-1])
-    deformations = [pair for pair in between if isinstance(pair, Deformation)]
-    return np.asarray(carry_over_weeks(mesh.vertices, deformations)[-1])
+        return follow_surfaces(mesh, matched)[-1]
+    registered = [pair for pair in between if isinstance(pair, Deformation)]
+    return carry_over_weeks(mesh.vertices, registered)[-1]
 
 
 def carry_regions(
-    labels: NDArray[np.integer],
+    labels: Indices,
     source: TriangleMesh,
     target: TriangleMesh,
     between: Correspondence,
-) -> NDArray[np.int64]:
+) -> Ints:
     """Transfer the region labels of the (n,) vertices of `source` to those of `target`.
 
     The source is carried into the target's space. Each vertex of the target gets the
@@ -198,9 +195,7 @@ def carry_regions(
     if isinstance(between, Deformation):
         _require_on_grid(between, source.vertices, "the surface")
     shape = TriangleMesh(carry_surface(source, [between]), source.faces)
-    return labels_at(
-        match_points(target.vertices, vertex_normals(target), shape), labels
-    )
+    return labels_at(match_surface(target, shape), labels)
 
 
 def maps_on_template(
@@ -221,30 +216,26 @@ def maps_on_template(
         if isinstance(pair, Deformation):
             _require_on_grid(pair, template.vertices, "the template")
     shape = TriangleMesh(carry_surface(template, between), template.faces)
-    match = match_points(shape.vertices, vertex_normals(shape), surface)
-    at_template: dict[str, NDArray] = {
-        name: (
-            labels_at(match, values)
-            if (values == np.round(values)).all()
-            else values_at(match, values)
-        )
-        for name, values in maps.items()
-    }
+    match = match_surface(shape, surface)
+    at_template: dict[str, NDArray] = {}
+    for name, values in maps.items():
+        is_integer = (values == np.round(values)).all()
+        resample = labels_at if is_integer else values_at
+        at_template[name] = resample(match, values)
     return {**at_template, "template_distance_mm": match.distance_mm}
 
 
 def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> None:
     index = transform_points(points, np.linalg.inv(deformation.affine))
     last = np.array(deformation.displacement.shape[:3]) - 1
-    outside = ((index < 0) | (index > last)).any(axis=1)
-    if outside.mean() > MAX_OUTSIDE:
-        distance = np.linalg.norm(
-            (index - np.clip(index, 0, last)) @ deformation.affine[:3, :3].T, axis=1
-        )
+    beyond = index - np.clip(index, 0, last)
+    is_outside = beyond.any(axis=1)
+    if is_outside.mean() > MAX_OUTSIDE:
+        distance = np.linalg.norm(beyond @ deformation.affine[:3, :3].T, axis=1)
         raise InputError(
             f"points lie outside the grid of the registration ({what})",
             found=(
-                f"{np.count_nonzero(outside)} of {len(points)} points, up to"
+                f"{np.count_nonzero(is_outside)} of {len(points)} points, up to"
                 f" {distance.max():.3g} mm"
             ),
             expected="points inside the brain that was registered",

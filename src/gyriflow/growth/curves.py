@@ -72,12 +72,14 @@ class CurveFit:
 
 def value(curve: Curve, week: ArrayLike) -> Floats:
     """Return the values of a curve at weeks, in the curve's unit."""
-    return np.exp(_log_and_rate(curve, week)[0])
+    logs, _ = _log_and_rate(curve, week)
+    return np.exp(logs)
 
 
 def rate(curve: Curve, week: ArrayLike) -> Floats:
     """Return the rate of growth d(ln y)/dt at weeks, in 1/week."""
-    return _log_and_rate(curve, week)[1]
+    _, rates = _log_and_rate(curve, week)
+    return rates
 
 
 def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
@@ -85,7 +87,9 @@ def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     beyond the ends."""
     sd = np.interp(np.asarray(week, dtype=float), curve.weeks, curve.sd)
     middle = value(curve, week)
-    return middle * np.exp(-Z_95 * sd), middle * np.exp(Z_95 * sd)
+    low = middle * np.exp(-Z_95 * sd)
+    high = middle * np.exp(Z_95 * sd)
+    return low, high
 
 
 def tabulated(
@@ -104,8 +108,9 @@ def tabulated(
             found=weeks_.tolist(),
             expected="one value for each week",
         )
-    if not may_shrink and (np.diff(values_) < 0).any():
-        _refuse_shrinking(name, weeks_[1:][np.diff(values_) < 0])
+    shrinks = np.diff(values_) < 0
+    if not may_shrink and shrinks.any():
+        _refuse_shrinking(name, weeks_[1:][shrinks])
     return Curve(weeks_, values_, np.zeros(len(weeks_)))
 
 
@@ -136,7 +141,8 @@ def fitted(
     count = len(np.unique(weeks_))
     degrees = min(degrees_of_freedom, max(count - 1.0, 2.0))
     ends = weeks_[0], weeks_[-1]
-    design, logs = splines.design(weeks_, *ends, KNOT_INTERVALS), np.log(values_)
+    logs = np.log(values_)
+    design = splines.design(weeks_, *ends, KNOT_INTERVALS)
     penalty = splines.penalty(*ends, KNOT_INTERVALS, order=2 if degrees >= 3 else 1)
     strength = splines.strength(design.T @ design, penalty, degrees, name)
     weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
@@ -148,27 +154,26 @@ def fitted(
     residual_degrees = weights.sum() - degrees
     squares = (weights * (logs - design @ coefficients) ** 2).sum()
     spread = np.sqrt(squares / residual_degrees) if residual_degrees > 0.5 else np.nan
-    at = np.linspace(*ends, max(2, round((ends[1] - ends[0]) / SPACING_WEEKS) + 1))
+    count = round((weeks_[-1] - weeks_[0]) / SPACING_WEEKS) + 1
+    at = np.linspace(*ends, max(2, count))
     rows = splines.design(at, *ends, KNOT_INTERVALS)
+    # rates at their bound of 0 are not free
     free = np.ones(len(coefficients), dtype=bool)
     free[1:] = may_shrink | (coefficients[1:] > 1e-8)
     normal = (design.T * weights) @ design + strength * penalty
     covariance = np.linalg.pinv(normal[np.ix_(free, free)])
-    sd = spread * np.sqrt(
-        np.maximum(
-            np.einsum("ij,jk,ik->i", rows[:, free], covariance, rows[:, free]), 0.0
-        )
-    )
+    free_rows = rows[:, free]
+    variance = np.einsum("ij,jk,ik->i", free_rows, covariance, free_rows)
+    sd = spread * np.sqrt(np.maximum(variance, 0.0))
     outliers = weeks_[weights < 0.5]
     if len(outliers):
-        log.warning(
-            "%s: weeks %s are outliers of the curve",
-            name,
-            ", ".join(f"{week:g}" for week in outliers),
-        )
-    return CurveFit(
-        Curve(at, np.exp(rows @ coefficients), sd), weeks_, values_, weights
-    )
+        log.warning("%s: weeks %s are outliers of the curve", name, _listed(outliers))
+    curve = Curve(at, np.exp(rows @ coefficients), sd)
+    return CurveFit(curve, weeks_, values_, weights)
+
+
+def _listed(weeks: Floats) -> str:
+    return ", ".join(f"{week:g}" for week in weeks)
 
 
 def errors(fits: Mapping[str, CurveFit]) -> pd.DataFrame:
@@ -188,9 +193,10 @@ def errors(fits: Mapping[str, CurveFit]) -> pd.DataFrame:
             "curve": middle,
             "low": low,
             "high": high,
+            "error": middle / fit.measured - 1,
+            "weight": fit.weights,
         }
-        columns |= {"error": middle / fit.measured - 1, "weight": fit.weights}
-        tables.append(pd.DataFrame({"quantity": name} | columns))
+        tables.append(pd.DataFrame({"quantity": name, **columns}))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -200,14 +206,14 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
     tables = []
     for name, curve in curves.items():
         low, high = interval(curve, curve.weeks)
-        columns = {"week": curve.weeks, "value": curve.values, "low": low, "high": high}
-        tables.append(
-            pd.DataFrame(
-                {"quantity": name}
-                | columns
-                | {"rate_per_week": rate(curve, curve.weeks)}
-            )
-        )
+        columns = {
+            "week": curve.weeks,
+            "value": curve.values,
+            "low": low,
+            "high": high,
+            "rate_per_week": rate(curve, curve.weeks),
+        }
+        tables.append(pd.DataFrame({"quantity": name, **columns}))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -216,13 +222,18 @@ def _solve(
 ) -> Floats:
     # eigenvalues of a strong penalty that should be 0 are not, because of round-off
     sizes, directions = np.linalg.eigh(penalty)
-    root = (directions * np.sqrt(np.clip(sizes, 1e-10, None))).T
-    rows = np.concatenate([np.sqrt(weights)[:, None] * design, root])
-    right = np.concatenate([np.sqrt(weights) * logs, np.zeros(len(root))])
+    sizes = np.clip(sizes, 1e-10, None)
+    root = (directions * np.sqrt(sizes)).T
+    factors = np.sqrt(weights)
+    rows = np.concatenate([factors[:, None] * design, root])
+    right = np.concatenate([factors * logs, np.zeros(len(root))])
     if may_shrink:
-        return np.linalg.lstsq(rows, right, rcond=None)[0]
-    lowest = np.append(-np.inf, np.zeros(design.shape[1] - 1))
-    return np.asarray(lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls").x)
+        coefficients, *_ = np.linalg.lstsq(rows, right, rcond=None)
+        return coefficients
+    lowest = np.zeros(design.shape[1])
+    lowest[0] = -np.inf
+    found = lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls")
+    return np.asarray(found.x)
 
 
 def _robust_weights(
@@ -238,43 +249,41 @@ def _robust_weights(
     if count < MIN_WEEKS_PER_DEGREE * degrees:
         return weights
     for _ in range(ROUNDS):
-        residuals = logs - design @ _solve(
-            design, logs, weights, strength * penalty, may_shrink
-        )
+        coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
+        residuals = logs - design @ coefficients
         weights = 1.0 / np.maximum(np.abs(residuals), MIN_SCATTER)
         weights *= count / weights.sum()
     for _ in range(ROUNDS):
-        scale = max(
-            1.4826
-            * float(np.median(np.abs(residuals)))
-            * np.sqrt(count / (count - degrees)),
-            MIN_SCATTER,
-        )
-        weights = np.clip(1 - (residuals / (TUKEY * scale)) ** 2, 0, None) ** 2
-        residuals = logs - design @ _solve(
-            design, logs, weights, strength * penalty, may_shrink
-        )
+        scatter = 1.4826 * float(np.median(np.abs(residuals)))
+        scatter *= np.sqrt(count / (count - degrees))
+        scale = TUKEY * max(scatter, MIN_SCATTER)
+        weights = np.clip(1 - (residuals / scale) ** 2, 0, None) ** 2
+        coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
+        residuals = logs - design @ coefficients
     return weights
 
 
 def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     at = np.asarray(week, dtype=float)
     inside = np.clip(at, curve.weeks[0], curve.weeks[-1])
-    logs = PchipInterpolator(curve.weeks, np.log(curve.values))
-    rates = logs.derivative()(inside)
-    return logs(inside) + rates * (at - inside), rates
+    log_curve = PchipInterpolator(curve.weeks, np.log(curve.values))
+    rate_curve = log_curve.derivative()
+    rates = rate_curve(inside)
+    logs = log_curve(inside) + rates * (at - inside)
+    return logs, rates
 
 
 def _checked(
     weeks: Sequence[float], values: Sequence[float], name: str
 ) -> tuple[Floats, Floats]:
-    weeks_, values_ = np.asarray(weeks, dtype=float), np.asarray(values, dtype=float)
-    good = (
+    weeks_ = np.asarray(weeks, dtype=float)
+    values_ = np.asarray(values, dtype=float)
+    is_valid = (
         weeks_.shape == values_.shape
         and np.isfinite([*weeks_, *values_]).all()
         and (values_ > 0).all()
     )
-    if not good or len(np.unique(weeks_)) < 2:
+    if not is_valid or len(np.unique(weeks_)) < 2:
         raise InputError(
             f"the {name} cannot be fitted to these weeks",
             found=f"weeks {weeks_.tolist()}, values {values_.tolist()}",
@@ -287,7 +296,7 @@ def _checked(
 def _refuse_shrinking(name: str, weeks: Floats) -> None:
     raise InputError(
         f"the {name} shrinks",
-        found=f"at weeks {', '.join(f'{week:g}' for week in weeks)}",
+        found=f"at weeks {_listed(weeks)}",
         expected="growth",
         remedy="Leave out the brains that do not fit, or correct the table.",
     )
@@ -301,17 +310,23 @@ def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:
     `THICKNESS`; each series has two weeks or more. A curve of thickness needs brains of
     two weeks with a thickness.
     """
+    quantities = list(SIZES)
+    if THICKNESS in areas:
+        quantities.append(THICKNESS)
     fits: dict[str, dict[str, CurveFit]] = {}
     for name, brains in areas.groupby("series", sort=False):
-        fits[str(name)] = {}
-        for quantity in (*SIZES, *([THICKNESS] if THICKNESS in brains else [])):
+        of_series: dict[str, CurveFit] = {}
+        for quantity in quantities:
             complete = brains.dropna(subset=quantity)
-            if quantity in SIZES or len(complete["week"].unique()) > 1:
-                fits[str(name)][quantity] = fitted(
-                    *complete[["week", quantity]].to_numpy().T,
-                    name=quantity,
-                    may_shrink=quantity == THICKNESS,
-                )
+            if quantity == THICKNESS and complete["week"].nunique() < 2:
+                continue
+            of_series[quantity] = fitted(
+                complete["week"].tolist(),
+                complete[quantity].tolist(),
+                name=quantity,
+                may_shrink=quantity == THICKNESS,
+            )
+        fits[str(name)] = of_series
     return fits
 
 
@@ -332,23 +347,21 @@ def followed_sizes(
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in [
-        name for name in (*SIZES, THICKNESS) if growth.get(name) is not None
-    ]:
-        source = growth[quantity]
+    for quantity in (*SIZES, THICKNESS):
+        source = growth.get(quantity)
+        if source is None:
+            continue
         if source == "measured":
             curve = _measured_curve(curves, series, quantity)
         else:
-            by_week = {float(week): number for week, number in source.items()}
-            shrinks = shrink or quantity == THICKNESS
             curve = tabulated(
-                list(by_week), list(by_week.values()), name=quantity, may_shrink=shrinks
+                [float(week) for week in source],
+                list(source.values()),
+                name=quantity,
+                may_shrink=shrink or quantity == THICKNESS,
             )
-        sizes = value(curve, at)
-        tables[quantity] = {
-            round(float(week), 6): float(size)
-            for week, size in zip(at, sizes, strict=True)
-        }
+        by_week = zip(at.tolist(), value(curve, at).tolist(), strict=True)
+        tables[quantity] = {round(week, 6): size for week, size in by_week}
     return tables
 
 
@@ -370,27 +383,23 @@ def run_parameters(
     the weeks without an observed brain. Curves and series are as for `followed_sizes`.
     """
     growth = {**settings["growth"], **target_sizes}
-    targets = list(next(iter(target_sizes.values()), ()))[1:]
-    shapes = (
-        {"targets": {week: target_map(week) for week in targets}, "stops": list(stops)}
-        if target_sizes
-        else {}
-    )
     sizes = followed_sizes(growth, curves, series, weeks, shrink=bool(target_sizes))
-    thickness = {THICKNESS: {"weeks": sizes[THICKNESS]}} if THICKNESS in sizes else {}
-    start = {
+    parameters = {
         "start_week": weeks[0],
         "output_weeks": list(weeks),
         "fissure_x_mm": surface["fissure_x_mm"],
-    }
-    return {
-        **start,
         "side": surface.get("side"),
         **settings,
-        **shapes,
-        "growth": growth | sizes,
-        **thickness,
     }
+    if target_sizes:
+        sizes_by_week = next(iter(target_sizes.values()))
+        later = list(sizes_by_week)[1:]
+        parameters["targets"] = {week: target_map(week) for week in later}
+        parameters["stops"] = list(stops)
+    parameters["growth"] = growth | sizes
+    if THICKNESS in sizes:
+        parameters[THICKNESS] = {"weeks": sizes[THICKNESS]}
+    return parameters
 
 
 def sizes_on_curves(
@@ -406,44 +415,40 @@ def sizes_on_curves(
     followed any. `curves` has the columns series, quantity, week and value; InputError
     where it is given without the start brain's `series`.
     """
-    if SIZES[0] in growth:
-        found = [
-            tabulated(list(growth[name]), list(growth[name].values()), may_shrink=True)
-            for name in SIZES
-        ]
-    elif curves is not None:
-        found = [_measured_curve(curves, series, name) for name in SIZES]
-    else:
-        found = []
-    by_name = dict(zip(SIZES, found, strict=False))
-    return {
-        week: {name: float(value(curve, week)) for name, curve in by_name.items()}
-        for week in weeks
-    }
+    found = {}
+    for name in SIZES:
+        if SIZES[0] in growth:
+            sizes = growth[name]
+            found[name] = tabulated(list(sizes), list(sizes.values()), may_shrink=True)
+        elif curves is not None:
+            found[name] = _measured_curve(curves, series, name)
+    by_week = {}
+    for week in weeks:
+        sizes = {name: float(value(curve, week)) for name, curve in found.items()}
+        by_week[week] = sizes
+    return by_week
 
 
 def _measured_curve(
     curves: pd.DataFrame | None, series: str | None, quantity: str
 ) -> Curve:
-    table = (
-        pd.DataFrame(columns=["series", "quantity", "week", "value"])
-        if curves is None
-        else curves
-    )
-    series_rows = table[table["series"] == series]
-    rows = series_rows[series_rows["quantity"] == quantity]
+    if curves is None:
+        curves = pd.DataFrame(columns=["series", "quantity", "week", "value"])
+    of_series = curves[curves["series"] == series]
+    rows = of_series[of_series["quantity"] == quantity]
     if not len(rows):
-        reason = (
-            f"its brains have no {quantity} in two weeks or more"
-            if len(series_rows)
-            else "the start brain is in no series of brains of two weeks or more"
-        )
-        remedy = (
-            "List brains of other weeks, or give growth a table such as {area_cm2: {21:"
-            " 99, 30: 252}}"
-        )
+        if len(of_series):
+            reason = f"its brains have no {quantity} in two weeks or more"
+        else:
+            reason = "the start brain is in no series of brains of two weeks or more"
         raise InputError(
-            f"no measured curve of {quantity} to follow", found=reason, remedy=remedy
+            f"no measured curve of {quantity} to follow",
+            found=reason,
+            remedy=(
+                "List brains of other weeks, or give growth a table such as"
+                " {area_cm2: {21: 99, 30: 252}}"
+            ),
         )
-    weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
+    weeks = rows["week"].to_numpy(dtype=float)
+    values = rows["value"].to_numpy(dtype=float)
     return Curve(weeks, values, np.zeros(len(rows)))

@@ -76,15 +76,14 @@ def place_in_atlas(
     `pair` is the registration to that brain, whose mesh is `atlas`. A body makes the
     map, so that no element is inverted.
     """
-    (boundary, used), (surface, _) = boundary_surface(mesh), boundary_surface(atlas)
+    boundary, used = boundary_surface(mesh)
+    surface, _ = boundary_surface(atlas)
     inner = tissue_below(boundary, boundary, pair) if open_sulci else None
     places = carry(pair, mesh.vertices)
-    goals = fit_onto_surface(
-        TriangleMesh(places[used], boundary.faces), surface, inner=inner
-    )
-    shape = places + harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)(
-        goals - places[used]
-    )
+    carried = TriangleMesh(places[used], boundary.faces)
+    goals = fit_onto_surface(carried, surface, inner=inner)
+    extend = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)
+    shape = places + extend(goals - places[used])
     body = make_body(mesh)
     fit_body(body, shape, (surface, inner), used, open_sulci=open_sulci)
     return body.positions_mm
@@ -114,19 +113,18 @@ def expected_positions(
     InputError if the start is long before the first week of the atlas, or not before
     the last one.
     """
-    if (
-        len(atlas_weeks) < 2
-        or not atlas_weeks[0] - BEFORE_GW <= start_week < atlas_weeks[-1]
-    ):
-        first, last = atlas_weeks[0], atlas_weeks[-1]
+    first = atlas_weeks[0]
+    last = atlas_weeks[-1]
+    earliest = first - BEFORE_GW
+    if len(atlas_weeks) < 2 or not earliest <= start_week < last:
         raise InputError(
             "the atlas does not cover the growth of a brain of this week",
             found=(
                 f"a start at {start_week:g} GW and an atlas of {first:g} to {last:g} GW"
             ),
             expected=(
-                f"two weeks or more, and a start from {first - BEFORE_GW:g} GW to"
-                f" before {last:g} GW"
+                f"two weeks or more, and a start from {earliest:g} GW to before"
+                f" {last:g} GW"
             ),
         )
     pieces = linear_pieces(mesh)
@@ -144,9 +142,8 @@ def expected_positions(
         places = positions_at(week, atlas, atlas_weeks, sizes)
         scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
         fading = np.exp((start_week - week) / fading_gw)
-        positions.append(
-            aligned(places, start) + scale * (smooth + fading * (difference - smooth))
-        )
+        remaining = smooth + fading * (difference - smooth)
+        positions.append(aligned(places, start) + scale * remaining)
     return np.stack(positions)
 
 
@@ -179,20 +176,24 @@ def predict_shapes(
     `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm`
     and `fading_gw` vary in an ensemble; `norm_ml` as for `ages_by_size`.
     """
-    used = boundary_surface(mesh)[1]
-    inside = place_in_atlas(
-        mesh, pair, path.mesh(pair_week), make_body, open_sulci=open_sulci
-    )
-    carried, ages = path.carry(inside, pair_week), path.ages(norm_ml)
-    knots = path.knots(ages)
-    at = ages.weeks - age_shift_gw
-    grown = resample_by_size(mesh, carried, ages.weeks, ages, knots)
-    later = [
-        round(float(week), 2) for week in at if week > start_week + MIN_AGE_SPACING_GW
-    ]
+    atlas_brain = path.mesh(pair_week)
+    inside = place_in_atlas(mesh, pair, atlas_brain, make_body, open_sulci=open_sulci)
+    carried = path.carry(inside, pair_week)
+    ages = path.ages(norm_ml)
+    grown = resample_by_size(mesh, carried, ages.weeks, ages, path.knots(ages))
+    atlas_weeks = ages.weeks - age_shift_gw
+    is_later = atlas_weeks > start_week + MIN_AGE_SPACING_GW
+    later = [round(week, 2) for week in atlas_weeks[is_later].tolist()]
     later = later[: int(np.searchsorted(later, end_week)) + 2]
-    individual = {"smoothing_mm": smoothing_mm, "fading_gw": fading_gw}
-    expected = expected_positions(mesh, start_week, grown, at, later, **individual)
+    expected = expected_positions(
+        mesh,
+        start_week,
+        grown,
+        atlas_weeks,
+        later,
+        smoothing_mm=smoothing_mm,
+        fading_gw=fading_gw,
+    )
     body = make_body(mesh)
     shapes = [WeekShape(start_week, mesh.vertices)]
     for week, shape in zip(later, expected[1:], strict=True):
@@ -201,25 +202,25 @@ def predict_shapes(
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
     between = sorted({*further_weeks} - {*found.weeks})
-    by_week = dict(zip(found.weeks, found.positions, strict=True)) | {
-        week: way(week) for week in between
-    }
+    by_week = dict(zip(found.weeks, found.positions, strict=True))
+    for week in between:
+        by_week[week] = way(week)
     weeks = sorted(by_week)
-    sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    baselines = {
-        "atlas": [
-            positions_at(week, carried, path.shapes.weeks, sizes)[used]
-            for week in weeks
-        ]
-    }
-    individual["smoothing_mm"] = 0
-    differing = expected_positions(mesh, start_week, grown, at, weeks[1:], **individual)
-    baselines["atlas_deformed"] = [places[used] for places in differing]
-    return Prediction(
-        weeks,
-        np.stack([by_week[week] for week in weeks]),
-        found,
-        between,
-        baselines,
-        ages,
+    deformed = expected_positions(
+        mesh,
+        start_week,
+        grown,
+        atlas_weeks,
+        weeks[1:],
+        smoothing_mm=0,
+        fading_gw=fading_gw,
     )
+    _, used = boundary_surface(mesh)
+    sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
+    atlas = [positions_at(week, carried, path.shapes.weeks, sizes) for week in weeks]
+    baselines = {
+        "atlas": [places[used] for places in atlas],
+        "atlas_deformed": [places[used] for places in deformed],
+    }
+    positions = np.stack([by_week[week] for week in weeks])
+    return Prediction(weeks, positions, found, between, baselines, ages)

@@ -31,13 +31,12 @@ def growth_rates(
     Columns from_week, to_week, area_ratio (θ), rate_per_s, compound_rate_per_s,
     volume_ratio, core_rate_per_s, core_compound_rate_per_s, by ascending week.
     """
-    order = np.argsort(weeks)
-    week, area, volume = (
-        np.asarray(column, dtype=float)[order]
-        for column in (weeks, areas_mm2, volumes_mm3)
-    )
+    columns = {"week": weeks, "area": areas_mm2, "volume": volumes_mm3}
+    sizes = pd.DataFrame(columns, dtype=float).sort_values("week", kind="stable")
+    week = sizes["week"].to_numpy()
     seconds = np.diff(week) * SECONDS_PER_GW
-    area_ratio, volume_ratio = area[1:] / area[:-1], volume[1:] / volume[:-1]
+    area_ratio = _ratios(sizes["area"])
+    volume_ratio = _ratios(sizes["volume"])
     return pd.DataFrame(
         {
             "from_week": week[:-1],
@@ -52,6 +51,12 @@ def growth_rates(
     )
 
 
+def _ratios(sizes: pd.Series) -> Floats:
+    """Return the ratios of each but the first size to the one before."""
+    values = sizes.to_numpy(dtype=float)
+    return values[1:] / values[:-1]
+
+
 def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
     """Return the growth rates of named series of brains: tables of `growth_rates` with
     the column `series`.
@@ -61,32 +66,26 @@ def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
     from labels, the table has tissue_ratio, … and tissue_compound_rate_per_s, …,
     ln(V₂/V₁)/(3Δt), NaN where unknown.
     """
-    tables = []
-    for name, brains in areas[areas["series"].isin(names)].groupby(
-        "series", sort=False
-    ):
-        weekly = brains.groupby("week")[["area_cm2", "volume_ml"]].mean()
-        areas_mm2 = weekly["area_cm2"] / CM2_PER_MM2
-        volumes_mm3 = weekly["volume_ml"] / ML_PER_MM3
+    tables = [growth_rates([], [], []).assign(series=[])]
+    chosen = areas[areas["series"].isin(names)]
+    for name, brains in chosen.groupby("series", sort=False):
+        weekly = brains.groupby("week").mean(numeric_only=True)
         rates = growth_rates(
-            weekly.index.tolist(), areas_mm2.tolist(), volumes_mm3.tolist()
+            weekly.index.tolist(),
+            (weekly["area_cm2"] / CM2_PER_MM2).tolist(),
+            (weekly["volume_ml"] / ML_PER_MM3).tolist(),
         )
         rates.insert(0, "series", name)
         seconds = (rates["to_week"] - rates["from_week"]) * SECONDS_PER_GW
         for tissue in TISSUES:
-            if f"{tissue}_ml" in brains:
-                volumes_ml = (
-                    brains.groupby("week")[f"{tissue}_ml"].mean().to_numpy(dtype=float)
-                )
-                ratio = volumes_ml[1:] / volumes_ml[:-1]
+            if f"{tissue}_ml" in weekly:
+                ratio = _ratios(weekly[f"{tissue}_ml"])
                 rates[f"{tissue}_ratio"] = ratio
                 rates[f"{tissue}_compound_rate_per_s"] = np.log(ratio) / (3 * seconds)
         tables.append(rates)
-    return (
-        pd.concat(tables, ignore_index=True)
-        if tables
-        else growth_rates([], [], []).assign(series=[])
-    )
+    if len(tables) > 1:
+        del tables[0]
+    return pd.concat(tables, ignore_index=True)
 
 
 def growth_sd(
@@ -97,12 +96,16 @@ def growth_sd(
 
     All are maps of `growth_per_week`. The result is NaN for fewer than two members.
     """
-    names = [name for name in run if not name.startswith("growth_direction")]
-    if len(members) < 2:
-        return {name: np.full_like(run[name], np.nan) for name in names}
-    return {
-        name: np.std([maps[name] for maps in members], axis=0, ddof=1) for name in names
-    }
+    deviations = {}
+    for name, values in run.items():
+        if name.startswith("growth_direction"):
+            continue
+        if len(members) < 2:
+            deviations[name] = np.full_like(values, np.nan)
+        else:
+            of_members = [maps[name] for maps in members]
+            deviations[name] = np.std(of_members, axis=0, ddof=1)
+    return deviations
 
 
 def growth_per_week(
@@ -121,22 +124,18 @@ def growth_per_week(
     growth_direction_x, _y, _z, the vectors of the frames as logarithms per week.
     """
     steps = SECONDS_PER_GW / step_s
-    # area grows with the square of the mean tangential stretch
-    return {
-        (before, week): {
-            "area_growth_percent_per_gw": (
-                100
-                * np.expm1(2 * steps * frames[week][1]["tangential_growth_per_step"])
-            ),
-            "thickness_growth_percent_per_gw": (
-                100 * np.expm1(steps * frames[week][1]["radial_growth_per_step"])
-            ),
-            **{
-                f"growth_direction_{axis}": steps * values
-                for axis, values in zip(
-                    "xyz", frames[week][1]["growth_direction_per_step"].T, strict=True
-                )
-            },
+    maps = {}
+    for before, week in pairwise(sorted(frames)):
+        _, fields = frames[week]
+        tangential = fields["tangential_growth_per_step"]
+        radial = fields["radial_growth_per_step"]
+        x, y, z = steps * fields["growth_direction_per_step"].T
+        maps[before, week] = {
+            # area grows with the square of the mean tangential stretch
+            "area_growth_percent_per_gw": 100 * np.expm1(2 * steps * tangential),
+            "thickness_growth_percent_per_gw": 100 * np.expm1(steps * radial),
+            "growth_direction_x": x,
+            "growth_direction_y": y,
+            "growth_direction_z": z,
         }
-        for before, week in pairwise(sorted(frames))
-    }
+    return maps

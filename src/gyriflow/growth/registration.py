@@ -27,10 +27,10 @@ from scipy.ndimage import (
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.alignment import motion
+from ..geometry.alignment import angle_deg, motion
 from ..geometry.deformations import Deformation, carry, determinants, transform_points
 from ..geometry.poses import LPS_TO_RAS
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Indices, Mask
 
 log = logging.getLogger(__name__)
 
@@ -38,8 +38,10 @@ SMOOTHING_MM = 0.8
 """Standard deviation of the Gaussian that smooths both masks."""
 MARGIN_MM = 6.0
 """Margin around the cerebrum."""
-CEREBRUM_BIT, CORTEX_BIT = 1, 2
-PERTURBATION_VOXELS, PERTURBATION_SCALE = 0.5, 2.0
+CEREBRUM_BIT = 1
+CORTEX_BIT = 2
+PERTURBATION_VOXELS = 0.5
+PERTURBATION_SCALE = 2.0
 """Root mean square shift of perturbed boundaries along each axis, and the SD of the
 Gaussian that makes it smooth."""
 BRIGHT = 0.99
@@ -55,10 +57,8 @@ rotation."""
 N_POINTS = 3000
 """Number of points of the cerebrum at which starts are compared."""
 _ANGLES = list(product(range(0, 360, 45), range(-90, 91, 45), range(0, 360, 45)))
-START_ROTATIONS: Floats = Rotation.from_euler("xyz", _ANGLES, degrees=True).as_matrix()
-START_ROTATIONS = START_ROTATIONS[
-    np.argsort(-np.trace(START_ROTATIONS, axis1=1, axis2=2), kind="stable")
-]
+_TURNS = Rotation.from_euler("xyz", _ANGLES, degrees=True).as_matrix()
+START_ROTATIONS = sorted(_TURNS, key=np.trace, reverse=True)
 """Rotations of the start, the identity first. Every rotation is within about 35 degrees
 of one of them."""
 REFINED_DEG = (20.0, 10.0, 5.0)
@@ -70,6 +70,10 @@ MIN_DICE = {"cerebrum": 0.95, "cortex": 0.60}
 low."""
 MAX_FOLDED = 0.005
 """Largest share of the cerebrum's volume where the map may fold."""
+
+
+VolumePair = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""A channel (i, j, k) of an earlier and of a later brain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +99,7 @@ class Channels:
 
 
 def channels(
-    labels: NDArray[np.integer],
+    labels: Indices,
     affine: Floats,
     *,
     cerebrum: Sequence[int],
@@ -113,54 +117,54 @@ def channels(
     InputError if no voxel belongs to the cerebrum or to a named cortex, if the edge of
     the volume cuts the cerebrum, or if the image does not cover it.
     """
-    inside = np.isin(labels, cerebrum)
-    if not inside.any():
-        raise InputError(
-            "no voxel belongs to the cerebrum",
-            found="other labels only",
-            expected=f"labels {cerebrum}",
-        )
-    _require_whole(inside)
+    masks = {CEREBRUM_BIT: _mask(labels, cerebrum, "cerebrum")}
+    _require_whole(masks[CEREBRUM_BIT])
+    if cortex:
+        masks[CORTEX_BIT] = _mask(labels, cortex, "cortex")
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
     voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
-    centres = transform_points(np.argwhere(inside), affine)
-    low, high = centres.min(axis=0) - MARGIN_MM, centres.max(axis=0) + MARGIN_MM
+    centres = transform_points(np.argwhere(masks[CEREBRUM_BIT]), affine)
+    low = centres.min(axis=0) - MARGIN_MM
+    high = centres.max(axis=0) + MARGIN_MM
     # start at a voxel's centre, so that a suitable grid is not resampled
-    low = transform_points(
-        np.rint(transform_points(low, np.linalg.inv(affine))), affine
-    )
+    index = np.rint(transform_points(low, np.linalg.inv(affine)))
+    low = transform_points(index, affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
     grid[:3, 3] = low
 
-    masks = {CEREBRUM_BIT: inside}
-    if cortex:
-        masks[CORTEX_BIT] = np.isin(labels, cortex)
-        if not masks[CORTEX_BIT].any():
-            raise InputError(
-                "no voxel belongs to the cortex",
-                found="other labels only",
-                expected=f"labels {cortex}",
-            )
     tissue = np.zeros(shape, dtype=np.uint8)
     smoothed = {}
     for bit, mask in masks.items():
         solid = mask.astype(np.float32)
         tissue[_resample(solid, affine, grid, shape) > 0.5] |= bit
-        smoothed[bit] = _resample(
-            gaussian_filter(solid, SMOOTHING_MM / sizes), affine, grid, shape
-        )
-    intensity = (
-        _intensity(image, grid, shape, tissue & CEREBRUM_BIT > 0) if image else None
-    )
+        smooth = gaussian_filter(solid, SMOOTHING_MM / sizes)
+        smoothed[bit] = _resample(smooth, affine, grid, shape)
+    intensity = None
+    if image:
+        intensity = _intensity(image, grid, shape, tissue & CEREBRUM_BIT > 0)
     return Channels(
-        grid, tissue, smoothed[CEREBRUM_BIT], smoothed.get(CORTEX_BIT), intensity
+        grid,
+        tissue,
+        smoothed[CEREBRUM_BIT],
+        smoothed.get(CORTEX_BIT),
+        intensity,
     )
 
 
-def perturb_labels(
-    labels: NDArray[np.integer], seed: int, brain: str
-) -> NDArray[np.integer]:
+def _mask(labels: Indices, numbers: Sequence[int], name: str) -> Mask:
+    """Return where labels have some numbers; InputError if nowhere."""
+    mask = np.isin(labels, numbers)
+    if not mask.any():
+        raise InputError(
+            f"no voxel belongs to the {name}",
+            found="other labels only",
+            expected=f"labels {numbers}",
+        )
+    return mask
+
+
+def perturb_labels(labels: Indices, seed: int, brain: str) -> Indices:
     """Return labels (i, j, k) with their boundaries shifted by a random smooth
     displacement of half a voxel.
 
@@ -170,32 +174,27 @@ def perturb_labels(
     random = np.random.default_rng([seed, crc32(brain.encode())])
     index = np.indices(labels.shape, dtype=np.float32)
     for axis in index:
-        shift = gaussian_filter(
-            random.normal(size=labels.shape).astype(np.float32), PERTURBATION_SCALE
-        )
-        axis += PERTURBATION_VOXELS / shift.std() * shift
-    return np.asarray(
-        map_coordinates(labels, index, order=0, mode="nearest"), dtype=labels.dtype
-    )
+        noise = random.normal(size=labels.shape)
+        shift = gaussian_filter(noise.astype(np.float32), PERTURBATION_SCALE)
+        factor = PERTURBATION_VOXELS / shift.std()
+        axis += factor * shift
+    shifted = map_coordinates(labels, index, order=0, mode="nearest")
+    return np.asarray(shifted)
 
 
-def _require_whole(inside: NDArray[np.bool_]) -> None:
-    sides = {
-        f"{'ijk'[axis]} = {'last' if end else 0}": int(
-            np.count_nonzero(np.take(inside, end, axis=axis))
-        )
-        for axis in range(3)
-        for end in (0, -1)
-    }
-    cut = {
-        side: count
-        for side, count in sides.items()
-        if count > 0.02 * np.count_nonzero(inside) ** (2 / 3)
-    }
+def _require_whole(inside: Mask) -> None:
+    # in proportion to the area of a cut through the cerebrum
+    allowed = 0.02 * np.count_nonzero(inside) ** (2 / 3)
+    cut = []
+    for axis, name in enumerate("ijk"):
+        for end, place in ((0, "0"), (-1, "last")):
+            count = np.count_nonzero(inside.take(end, axis=axis))
+            if count > allowed:
+                cut.append(f"{count} voxels at {name} = {place}")
     if cut:
         raise InputError(
             "the edge of the volume cuts the cerebrum, so it cannot be registered",
-            found=", ".join(f"{count} voxels at {side}" for side, count in cut.items()),
+            found=", ".join(cut),
             expected="a whole cerebrum",
             remedy="Leave this brain out of the registration.",
         )
@@ -205,12 +204,11 @@ def _intensity(
     image: tuple[NDArray[np.number], Floats],
     grid: Floats,
     shape: tuple[int, ...],
-    inside: NDArray[np.bool_],
+    inside: Mask,
 ) -> NDArray[np.float32]:
     values, affine = image
-    finite = np.nan_to_num(
-        np.asarray(values, dtype=np.float32), nan=0.0, posinf=0.0, neginf=0.0
-    )
+    values = np.asarray(values, dtype=np.float32)
+    finite = np.where(np.isfinite(values), values, np.float32(0))
     intensity = _resample(finite, affine, grid, shape)
     bright = float(np.quantile(intensity[inside], BRIGHT))
     covered = float((intensity[inside] != 0).mean())
@@ -234,12 +232,14 @@ def _resample(
     values: NDArray[np.float32], affine: Floats, grid: Floats, shape: tuple[int, ...]
 ) -> NDArray[np.float32]:
     index = np.linalg.inv(affine) @ grid
-    return np.asarray(
-        affine_transform(
-            values, index[:3, :3], index[:3, 3], output_shape=shape, order=1
-        ),
-        dtype=np.float32,
+    resampled = affine_transform(
+        values,
+        index[:3, :3],
+        index[:3, 3],
+        output_shape=shape,
+        order=1,
     )
+    return np.asarray(resampled, dtype=np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,19 +269,15 @@ def register(
     factor of `SMOOTHING_VOXELS`.
     """
     began = time.perf_counter()
-    names = tuple(
-        name
-        for name in WEIGHTS
-        if getattr(earlier, name) is not None and getattr(later, name) is not None
-    )
-    turn, start = _find_start(earlier, later, names)
-    images = {
-        f"fixed_{name}": _image(getattr(earlier, name), earlier.affine)
-        for name in names
-    }
+    pairs_of_volumes = _common_channels(earlier, later)
+    names = tuple(pairs_of_volumes)
+    turn, start = _find_start(earlier, later, pairs_of_volumes)
     # greedy starts at the identity, so the later brain is passed in its start position
     placed = np.linalg.inv(start) @ later.affine
-    images |= {f"moving_{name}": _image(getattr(later, name), placed) for name in names}
+    images = {}
+    for name, (fixed, moving) in pairs_of_volumes.items():
+        images[f"fixed_{name}"] = _image(fixed, earlier.affine)
+        images[f"moving_{name}"] = _image(moving, placed)
     rounds = int(np.ceil(NEAR_MM / earlier.voxel_mm))
     near_cerebrum = binary_dilation(
         earlier.tissue & CEREBRUM_BIT > 0, iterations=rounds
@@ -290,22 +286,17 @@ def register(
     pairs = " ".join(
         f"-w {WEIGHTS[name]:g} -i fixed_{name} moving_{name}" for name in names
     )
-    common = f"-threads {threads} -seed 1 -V 0"
+    common = f"-threads {threads} -seed 1 -V 0 {pairs}"
+    update, total = (f"{smoothing * voxels:g}vox" for voxels in SMOOTHING_VOXELS)
+    affine = f"{AFFINE} {common} -ia-identity -o found"
+    deformable = (
+        f"{DEFORMABLE} -s {update} {total} {common} -gm where -it found -o warp"
+    )
     greedy = Greedy3D()
     output = io.StringIO()
     try:
-        greedy.execute(
-            f"{AFFINE} {common} {pairs} -ia-identity -o found",
-            out=output,
-            err=output,
-            found=None,
-            **images,
-        )
-        smooth = "-s " + " ".join(
-            f"{smoothing * voxels:g}vox" for voxels in SMOOTHING_VOXELS
-        )
-        options = f"{DEFORMABLE} {smooth} {common} {pairs} -gm where -it found"
-        greedy.execute(f"{options} -o warp", out=output, err=output, warp=None)
+        greedy.execute(affine, out=output, err=output, found=None, **images)
+        greedy.execute(deformable, out=output, err=output, warp=None)
     except RuntimeError as error:
         raise InputError(
             f"greedy cannot register the brains: {error}",
@@ -318,73 +309,78 @@ def register(
     # greedy returns matrices in RAS; all else is in LPS
     matrix = start @ LPS_TO_RAS @ np.asarray(greedy["found"], dtype=float) @ LPS_TO_RAS
     # SimpleITK's arrays have reversed axes
-    warp = (
-        SimpleITK.GetArrayFromImage(greedy["warp"])
-        .transpose(2, 1, 0, 3)
-        .astype(np.float32)
-    )
+    warp = SimpleITK.GetArrayFromImage(greedy["warp"]).transpose(2, 1, 0, 3)
+    displacement = np.ascontiguousarray(warp.astype(np.float32))
     seconds = time.perf_counter() - began
     log.info("registered by %s in %.0f s", ", ".join(names), seconds)
-    return Registration(
-        Deformation(matrix, np.ascontiguousarray(warp), earlier.affine),
-        float(np.degrees(Rotation.from_matrix(turn).magnitude())),
-        seconds,
-        names,
-    )
+    deformation = Deformation(matrix, displacement, earlier.affine)
+    return Registration(deformation, angle_deg(turn), seconds, names)
+
+
+def _common_channels(earlier: Channels, later: Channels) -> dict[str, VolumePair]:
+    """Return the volumes of the channels that both brains have, by name."""
+    common = {}
+    for name in WEIGHTS:
+        first = getattr(earlier, name)
+        second = getattr(later, name)
+        if first is not None and second is not None:
+            common[name] = (first, second)
+    return common
 
 
 def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
-    image = SimpleITK.GetImageFromArray(np.ascontiguousarray(values.transpose(2, 1, 0)))
+    """Return a volume as SimpleITK has it, with reversed axes."""
+    reversed_values = np.ascontiguousarray(values.transpose(2, 1, 0))
+    image = SimpleITK.GetImageFromArray(reversed_values)
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
+    direction = affine[:3, :3] / spacing
     image.SetSpacing(spacing.tolist())
-    image.SetDirection((affine[:3, :3] / spacing).ravel().tolist())
+    image.SetDirection(direction.ravel().tolist())
     image.SetOrigin(affine[:3, 3].tolist())
     return image
 
 
 def _find_start(
-    earlier: Channels, later: Channels, names: tuple[str, ...]
+    earlier: Channels, later: Channels, volumes: Mapping[str, VolumePair]
 ) -> tuple[Floats, Floats]:
-    (first, first_size), (second, second_size) = _place(earlier), _place(later)
+    """Return the (3, 3) rotation of a start, and the start as a (4, 4) affine map."""
+    first, first_size = _centre_and_size(earlier)
+    second, second_size = _centre_and_size(later)
     scale = (second_size / first_size) ** (1 / 3)
     index = np.argwhere(earlier.cerebrum > 0.01)
     index = index[:: max(1, len(index) // N_POINTS)]
     points = transform_points(index, earlier.affine)
+    to_later_index = np.linalg.inv(later.affine)
 
     def start_of(turn: Floats) -> Floats:
         return motion(scale * turn, second - scale * turn @ first)
 
     def difference(turn: Floats) -> float:
-        at = transform_points(
-            transform_points(points, start_of(turn)), np.linalg.inv(later.affine)
-        ).T
-        squares = [
-            WEIGHTS[name]
-            * np.square(
-                getattr(earlier, name)[tuple(index.T)]
-                - map_coordinates(getattr(later, name), at, order=1)
-            )
-            for name in names
-        ]
-        return float(np.sum([square.mean() for square in squares]))
+        moved = transform_points(points, start_of(turn))
+        places = transform_points(moved, to_later_index).T
+        means = []
+        for name, (fixed, moving) in volumes.items():
+            there = map_coordinates(moving, places, order=1)
+            squares = np.square(fixed[tuple(index.T)] - there)
+            means.append((WEIGHTS[name] * squares).mean())
+        return float(np.sum(means))
 
     turn = min(START_ROTATIONS, key=difference)
     for step in REFINED_DEG:
-        nearby = Rotation.from_euler(
-            "xyz", list(product((0, -step, step), repeat=3)), degrees=True
-        )
+        angles = list(product((0, -step, step), repeat=3))
+        nearby = Rotation.from_euler("xyz", angles, degrees=True)
         turn = min(nearby.as_matrix() @ turn, key=difference)
     if difference(turn) >= MAX_ROTATED_SHARE * difference(np.eye(3)):
         turn = np.eye(3)
     return turn, start_of(turn)
 
 
-def _place(brain: Channels) -> tuple[Floats, float]:
+def _centre_and_size(brain: Channels) -> tuple[Floats, float]:
+    """Return the centroid (3,) in mm and the volume in mm³ of the cerebrum."""
     index = np.argwhere(brain.tissue & CEREBRUM_BIT > 0)
-    return (
-        transform_points(index, brain.affine).mean(axis=0),
-        len(index) * brain.voxel_mm**3,
-    )
+    points = transform_points(index, brain.affine)
+    volume = len(points) * brain.voxel_mm**3
+    return points.mean(axis=0), volume
 
 
 def measure_quality(
@@ -402,36 +398,31 @@ def measure_quality(
     inside_mm are 95 % quantiles of the displacement at the rim of the grid and in the
     cerebrum; the rim should have less, since nothing is compared there.
     """
-    grid = transform_points(
-        np.indices(earlier.tissue.shape).reshape(3, -1).T, earlier.affine
+    index = np.indices(earlier.tissue.shape).reshape(3, -1).T
+    carried = carry(deformation, transform_points(index, earlier.affine))
+    places = transform_points(carried, np.linalg.inv(later.affine)).T
+    dice_cortex = float("nan")
+    if earlier.cortex is not None and later.cortex is not None:
+        dice_cortex = _dice(earlier, later, CORTEX_BIT, places)
+    inside = np.argwhere(earlier.tissue & CEREBRUM_BIT > 0)
+    inside_mm = transform_points(inside, earlier.affine)
+    on_grid = transform_points(inside_mm, np.linalg.inv(deformation.affine)).T
+    growth = map_coordinates(
+        determinants(deformation), on_grid, order=1, mode="nearest"
     )
-    places = transform_points(carry(deformation, grid), np.linalg.inv(later.affine)).T
-    inside = earlier.tissue & CEREBRUM_BIT > 0
-    with_cortex = earlier.cortex is not None and later.cortex is not None
-    growth = determinants(deformation)
-    index = transform_points(
-        transform_points(np.argwhere(inside), earlier.affine),
-        np.linalg.inv(deformation.affine),
-    )
-    growth = map_coordinates(growth, index.T, order=1, mode="nearest")
     lengths = np.linalg.norm(deformation.displacement, axis=-1)
+    lengths_inside = map_coordinates(lengths, on_grid, order=1, mode="nearest")
     rim = np.ones(lengths.shape, dtype=bool)
     rim[1:-1, 1:-1, 1:-1] = False
     return {
         "dice_cerebrum": _dice(earlier, later, CEREBRUM_BIT, places),
-        "dice_cortex": (
-            _dice(earlier, later, CORTEX_BIT, places) if with_cortex else float("nan")
-        ),
+        "dice_cortex": dice_cortex,
         "least_determinant": float(growth.min()),
         "folded_share": float((growth <= 0).mean()),
         "log_growth_sd": float(np.log(growth[growth > 0]).std()),
         "volume_ratio": float(growth.mean()),
         "rim_mm": float(np.quantile(lengths[rim], 0.95)),
-        "inside_mm": float(
-            np.quantile(
-                map_coordinates(lengths, index.T, order=1, mode="nearest"), 0.95
-            )
-        ),
+        "inside_mm": float(np.quantile(lengths_inside, 0.95)),
     }
 
 
@@ -453,17 +444,18 @@ def register_and_measure(
     quality = measure_quality(earlier, later, found.deformation)
     if not (is_filled and quality["dice_cortex"] < MIN_DICE["cortex"]):
         return found, quality
-    overlap = (
-        f"Dice {quality['dice_cortex']:.2f}, expected {MIN_DICE['cortex']:.2f} or more"
-    )
     log.warning(
-        "the cortex filled from surfaces is not that of the labels (%s): registered"
-        " without cortex",
-        overlap,
+        "the cortex filled from surfaces is not that of the labels (Dice %.2f, expected"
+        " %.2f or more): registered without cortex",
+        quality["dice_cortex"],
+        MIN_DICE["cortex"],
     )
-    brains = [replace(brain, cortex=None) for brain in (earlier, later)]
     return register_and_measure(
-        *brains, is_filled=False, smoothing=smoothing, threads=threads
+        replace(earlier, cortex=None),
+        replace(later, cortex=None),
+        is_filled=False,
+        smoothing=smoothing,
+        threads=threads,
     )
 
 
@@ -475,37 +467,38 @@ def require_good(
 
     With `only_warn`, log a warning instead.
     """
-    faults = [
-        f"Dice of the {mask} {quality[f'dice_{mask}']:.3f} below {limit:g}"
-        for mask, limit in MIN_DICE.items()
-        if quality[f"dice_{mask}"] < limit
-    ]
-    if (folded := quality["folded_share"]) > MAX_FOLDED:
+    faults = []
+    for mask, limit in MIN_DICE.items():
+        dice = quality[f"dice_{mask}"]
+        if dice < limit:
+            faults.append(f"Dice of the {mask} {dice:.3f} below {limit:g}")
+    folded = quality["folded_share"]
+    if folded > MAX_FOLDED:
         faults.append(
             f"the map folds in {folded:.2%} of the cerebrum, above {MAX_FOLDED:.2%}"
         )
-    if faults:
-        numbers = ", ".join(f"{name} {value:.3g}" for name, value in quality.items())
-        error = InputError(
-            f"the registration {pair} has failed: {'; '.join(faults)}",
-            found=numbers,
-            expected="two brains that differ by some weeks of growth",
-            remedy=(
-                "Look at both label volumes; leave out the one that does not fit, or"
-                " use brains of closer weeks."
-            ),
-        )
-        if not only_warn:
-            raise error
-        log.warning("%s", error)
+    if not faults:
+        return
+    error = InputError(
+        f"the registration {pair} has failed: {'; '.join(faults)}",
+        found=", ".join(f"{name} {value:.3g}" for name, value in quality.items()),
+        expected="two brains that differ by some weeks of growth",
+        remedy=(
+            "Look at both label volumes; leave out the one that does not fit, or use"
+            " brains of closer weeks."
+        ),
+    )
+    if not only_warn:
+        raise error
+    log.warning("%s", error)
 
 
 def _dice(earlier: Channels, later: Channels, bit: int, places: Floats) -> float:
-    first = (earlier.tissue & bit > 0).ravel()
-    second = (
-        map_coordinates((later.tissue & bit > 0).astype(np.float32), places, order=1)
-        > 0.5
-    )
-    both = int(np.count_nonzero(first & second))
-    total = int(np.count_nonzero(first)) + int(np.count_nonzero(second))
-    return 2 * both / max(total, 1)
+    first = earlier.tissue & bit > 0
+    first = first.ravel()
+    mask = later.tissue & bit > 0
+    carried = map_coordinates(mask.astype(np.float32), places, order=1)
+    second = carried > 0.5
+    both = np.count_nonzero(first & second)
+    total = np.count_nonzero(first) + np.count_nonzero(second)
+    return float(2 * both / max(total, 1))

@@ -11,8 +11,8 @@ import numpy as np
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry
 from ..geometry.diffusion import diffuse, harmonic_continuation
 from ..geometry.matching import (
+    Match,
     match_layers,
-    match_points,
     match_surface,
     nearest_on,
     surface_distance,
@@ -22,6 +22,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_piec
 from ..geometry.triangles import (
     Floats,
     Ints,
+    Mask,
     TriangleMesh,
     area_cm2,
     vertex_areas,
@@ -77,41 +78,52 @@ def fit_onto_surface(
     of the other surface, points are matched by that, too (`match_layers`). So a fold
     without a slit opens to both banks of a sulcus.
     """
-    vertices, faces = moving.vertices, moving.faces
-    normals = vertex_normals(surface)
-    areas = vertex_areas(surface)
-    below = points_below(surface)
+    vertices = moving.vertices
     reach_mm = REACH_MM if inner is None else REACH_BY_TISSUE_MM
-    for spread in pull_mm:
-        moved = TriangleMesh(vertices, faces)
-        moved_areas, moved_normals = vertex_areas(moved), vertex_normals(moved)
-        if inner is None:
-            forward = match_points(vertices, moved_normals, surface)
-            backward = match_points(surface.vertices, normals, moved)
-        else:
-            forward = match_layers(vertices, moved_normals, inner, surface, below)
-            backward = match_layers(surface.vertices, normals, below, moved, inner)
-        weight = moved_areas * (forward.agrees & (forward.distance_mm < reach_mm))
-        pull = (values_at(forward, surface.vertices) - vertices) * weight[:, None]
-        shares = (
-            backward.weights
-            * (areas * (backward.agrees & (backward.distance_mm < reach_mm)))[:, None]
-        )
-        misfit = surface.vertices - values_at(backward, vertices)
-        np.add.at(weight, backward.corners, shares)
-        np.add.at(pull, backward.corners, shares[..., None] * misfit[:, None])
-        pulled = (
-            np.column_stack([pull, weight]) / np.maximum(moved_areas, 1e-9)[:, None]
-        )
-        smooth = diffuse(vertices, faces, pulled, spread, PULL_TOL)
+    for spread_mm in pull_mm:
+        moved = TriangleMesh(vertices, moving.faces)
+        pull, weight = _pulls(moved, surface, inner, reach_mm)
+        areas = np.maximum(vertex_areas(moved), 1e-9)
+        pulled = np.column_stack([pull, weight]) / areas[:, None]
+        smooth = diffuse(vertices, moving.faces, pulled, spread_mm, PULL_TOL)
         move = smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
         # a mean of pulls is at most as long as these; near obtuse faces smoothed
         # weights may be zero or negative
         length = np.linalg.norm(move, axis=1, keepdims=True)
-        vertices = vertices + move * np.minimum(
-            1.0, reach_mm / np.maximum(length, 1e-9)
+        factor = np.minimum(1.0, reach_mm / np.maximum(length, 1e-9))
+        vertices = vertices + move * factor
+    return vertices
+
+
+def _pulls(
+    moved: TriangleMesh, surface: TriangleMesh, inner: Floats | None, reach_mm: float
+) -> tuple[Floats, Floats]:
+    """Return the (n, 3) sums of the weighted pulls of a surface on the vertices of a
+    moved one, and the (n,) sums of the weights, which are areas."""
+    if inner is None:
+        forward = match_surface(moved, surface)
+        backward = match_surface(surface, moved)
+    else:
+        below = points_below(surface)
+        forward = match_layers(
+            moved.vertices, vertex_normals(moved), inner, surface, below
         )
-    return np.asarray(vertices)
+        backward = match_layers(
+            surface.vertices, vertex_normals(surface), below, moved, inner
+        )
+    misfit = values_at(forward, surface.vertices) - moved.vertices
+    weight = vertex_areas(moved) * _is_near(forward, reach_mm)
+    pull = misfit * weight[:, None]
+    misfit = surface.vertices - values_at(backward, moved.vertices)
+    areas = vertex_areas(surface) * _is_near(backward, reach_mm)
+    shares = backward.weights * areas[:, None]
+    np.add.at(weight, backward.corners, shares)
+    np.add.at(pull, backward.corners, shares[..., None] * misfit[:, None])
+    return pull, weight
+
+
+def _is_near(match: Match, reach_mm: float) -> Mask:
+    return match.agrees & (match.distance_mm < reach_mm)
 
 
 def points_below(surface: TriangleMesh) -> Floats:
@@ -155,15 +167,22 @@ class SeriesShapes:
     @classmethod
     def of(cls, shapes: Sequence[WeekShape]) -> "SeriesShapes":
         """Return the shapes from those of ascending weeks."""
-        weeks = [shape.week for shape in shapes]
-        stops = [shape.week for shape in shapes if shape.is_stop]
-        return cls(weeks, np.stack([shape.positions for shape in shapes]), stops)
+        weeks = []
+        positions = []
+        stops = []
+        for shape in shapes:
+            weeks.append(shape.week)
+            positions.append(shape.positions)
+            if shape.is_stop:
+                stops.append(shape.week)
+        return cls(weeks, np.stack(positions), stops)
 
     def by_week(self) -> list[WeekShape]:
         """Return the shape of each week."""
         shapes = []
         for week, positions in zip(self.weeks, self.positions, strict=True):
-            shapes.append(WeekShape(week, positions, is_stop=week in self.stops))
+            is_stop = week in self.stops
+            shapes.append(WeekShape(week, positions, is_stop))
         return shapes
 
 
@@ -171,8 +190,9 @@ def with_stops(before: WeekShape, week: float, body: FittedBody) -> list[WeekSha
     """Return the shape of a body at a week, after the stops on its way from the shape
     before."""
     stops = {}
+    duration = week - before.week
     for fraction, positions in body.way_from(before.positions):
-        stop_week = round(before.week + fraction * (week - before.week), 2)
+        stop_week = round(before.week + fraction * duration, 2)
         # a stop that rounds to one of the two weeks is that week's shape itself
         if before.week < stop_week < week:
             stops[stop_week] = WeekShape(stop_week, positions, is_stop=True)
@@ -196,9 +216,7 @@ def fit_body(
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
-        left_mm = float(
-            np.sqrt(3 * np.mean((body.boundary.vertices - shape[used]) ** 2))
-        )
+        left_mm = _rms_mm(body.boundary.vertices - shape[used])
         if left_mm > MAX_MISFIT_MM:
             log.warning(
                 "a body stays %.2f mm (root mean square) from a shape that it cannot"
@@ -211,11 +229,16 @@ def fit_body(
     for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
         last_mm = gap_mm
-        gap_mm = float(np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2)))
+        gap_mm = _rms_mm(goals - body.boundary.vertices)
         if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
+
+
+def _rms_mm(misfit: Floats) -> float:
+    """Return the root mean square length of (n, 3) vectors in mm."""
+    return float(np.sqrt(3 * np.mean(misfit**2)))
 
 
 def follow_series(
@@ -268,21 +291,19 @@ def follow_series(
     for week, (places, goals, target) in zip(weeks[n_done + 1 :], carried, strict=True):
         before = shapes[-1]
         if target is not None:
-            goals = fit_onto_surface(
-                TriangleMesh(goals, boundary.faces), target[0], PULL_MM, target[1]
-            )
-        if body is not None:
+            moved = TriangleMesh(goals, boundary.faces)
+            goals = fit_onto_surface(moved, target[0], PULL_MM, target[1])
+        if body is None:
+            shape = places + extend(goals - places[used])
+            shapes.append(WeekShape(week, shape))
+        else:
             # on the shape of the week before, which has no inverted elements
             extend = harmonic_continuation(
                 before.positions, pieces, used, CONTINUATION_TOL
             )
-        shape = places + extend(goals - places[used])
-        if body is None:
-            shapes.append(WeekShape(week, shape))
-        else:
-            fit_body(
-                body, shape, target, used, open_sulci=open_sulci and target is not None
-            )
+            shape = places + extend(goals - places[used])
+            is_open = open_sulci and target is not None
+            fit_body(body, shape, target, used, open_sulci=is_open)
             if target is not None:
                 warn_of_misfit(body.boundary, target[0], week)
             shapes += with_stops(before, week, body)
@@ -302,22 +323,23 @@ def _carried(
     """Yield for each week that has no shape yet the (n, 3) places of the last shape,
     the boundary's, and its target."""
     first = sum(not shape.is_stop for shape in shapes) - 1
-    if matched := [pair for pair in pairs if isinstance(pair, MatchedSurfaces)]:
+    matched = [pair for pair in pairs if isinstance(pair, MatchedSurfaces)]
+    if matched:
         for moved in follow_surfaces(boundary, matched)[first + 1 :]:
             yield shapes[-1].positions, moved, None
         return
     for number in range(first, len(pairs)):
-        pair, now = pairs[number], shapes[-1].positions
+        pair = pairs[number]
+        now = shapes[-1].positions
         assert isinstance(pair, Deformation)
         places = carry_over_weeks(now, [pair])[-1]
-        before = TriangleMesh(now[used], boundary.faces)
-        # below the observed surface: with the body's normals its roughness would add up
-        # from week to week
-        inner = (
-            tissue_below(before, surfaces[number - 1] if number else before, pair)
-            if open_sulci
-            else None
-        )
+        inner = None
+        if open_sulci:
+            before = TriangleMesh(now[used], boundary.faces)
+            # below the observed surface: with the body's normals its roughness would
+            # add up from week to week
+            observed = surfaces[number - 1] if number else before
+            inner = tissue_below(before, observed, pair)
         yield places, places[used], (surfaces[number], inner)
 
 
@@ -326,19 +348,18 @@ def tissue_below(
 ) -> Floats:
     """Return the (n, 3) places, after a registration, of the tissue below the vertices
     of a boundary before it."""
-    return carry(
-        pair, values_at(match_surface(boundary, observed), points_below(observed))
-    )
+    match = match_surface(boundary, observed)
+    return carry(pair, values_at(match, points_below(observed)))
 
 
 def misfit_mm(boundary: TriangleMesh, surface: TriangleMesh) -> tuple[float, float]:
     """Return the mean distance of a boundary and a surface, and the larger quantile at
     95 % of both ways."""
-    ways = ((boundary, surface), (surface, boundary))
-    return surface_distance(
-        (nearest_on(first.vertices, second)[0], vertex_areas(first))
-        for first, second in ways
-    )
+    ways = []
+    for first, second in ((boundary, surface), (surface, boundary)):
+        distance, _, _ = nearest_on(first.vertices, second)
+        ways.append((distance, vertex_areas(first)))
+    return surface_distance(ways)
 
 
 def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -> None:
@@ -352,12 +373,14 @@ def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -
         far,
     )
     if mean > MAX_MISFIT_MM:
-        text = (
-            "the shape at GW %g stays %.2f mm from the observed surface on average"
-            " (95 %% below %.2f mm): the body cannot reach all of it without inverted"
-            " elements or crossing folds"
+        log.warning(
+            "the shape at GW %g stays %.2f mm from the observed surface on average (95"
+            " %% below %.2f mm): the body cannot reach all of it without inverted"
+            " elements or crossing folds",
+            week,
+            mean,
+            far,
         )
-        log.warning(text, week, mean, far)
 
 
 def sizes_of(
@@ -365,8 +388,10 @@ def sizes_of(
 ) -> dict[str, Floats]:
     """Return area_cm2 and volume_ml (w,) of a mesh's boundary at w positions (n, 3)."""
     boundary, used = boundary_surface(mesh)
-    surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
-    return {
-        "area_cm2": np.array(list(map(area_cm2, surfaces))),
-        "volume_ml": np.array(list(map(volume_ml, surfaces))),
-    }
+    areas = []
+    volumes = []
+    for places in positions:
+        surface = TriangleMesh(places[used], boundary.faces)
+        areas.append(area_cm2(surface))
+        volumes.append(volume_ml(surface))
+    return {"area_cm2": np.array(areas), "volume_ml": np.array(volumes)}
