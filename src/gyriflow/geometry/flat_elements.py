@@ -33,9 +33,9 @@ def open_flat_elements(
     their volume, where possible; `positions` itself if no vertex can be moved.
 
     `tets` are (m, 4) linear elements, of which a few may be inverted, `start_volumes`
-    (m,) in mm³ those of which this is a fraction. A vertex moves by at most `longest_mm` (n,) along
-    each axis. No element below this fraction loses volume unless a flatter one at the
-    same vertex gains.
+    (m,) in mm³ those of which this is a fraction. A vertex moves by at most
+    `longest_mm` (n,) along each axis. No element below this fraction loses volume
+    unless a flatter one at the same vertex gains.
     """
     places = positions
     left_mm = longest_mm.copy()
@@ -87,11 +87,20 @@ def _best_move(
     stay_open /= start_volumes[:, None]
     sides = np.vstack([np.eye(3), -np.eye(3)])
     bound_move = np.column_stack([sides, np.zeros(6), -np.ones(6)])
+    ratios = volumes / start_volumes
+    rows = [stay_open, bound_move]
+    limits = [ratios, np.zeros(6)]
+    if ratios.min() <= 0:
+        # the others are not as flat as the inverted one becomes
+        stay_positive = stay_open.copy()
+        stay_positive[:, 3] = 0.0
+        rows.append(stay_positive)
+        limits.append(np.maximum(ratios - KEPT_RATIO, 0.0))
     unbounded = (None, None)
     found = linprog(
         [0.0, 0.0, 0.0, -1.0, COST_PER_MM],
-        A_ub=np.vstack([stay_open, bound_move]),
-        b_ub=np.concatenate([volumes / start_volumes, np.zeros(6)]),
+        A_ub=np.vstack(rows),
+        b_ub=np.concatenate(limits),
         bounds=[unbounded, unbounded, unbounded, (None, least), (0.0, longest_mm)],
     )
     # without a solution, by round-off, the vertex stays
