@@ -18,8 +18,8 @@ from ..settings.root import Config
 
 @dataclass(frozen=True)
 class AtlasFile:
-    """A file of an atlas: its series, week and key, its path, the address for its
-    download, and its size and checksum.
+    """A file of an atlas: its series, week and key, the id of its brain, its path, the
+    address for its download, and its size and checksum.
 
     `copies` are the files of that name in the folder: none if it is missing, several if
     it is ambiguous.
@@ -28,6 +28,7 @@ class AtlasFile:
     series: str
     week: float
     key: FileKey
+    brain: str
     path: Path
     url: str | None
     record: AtlasFileRecord
@@ -92,7 +93,10 @@ class UsedAtlas:
                 url = f"{root}/{path}" if root and week in series.weeks else None
                 record = series.weeks.get(week, {}).get(key, AtlasFileRecord())
                 place = copies[0] if copies else self.folder / path
-                yield AtlasFile(name, week, key, place, url, record, tuple(copies))
+                brain = self.atlas.brain_id(name, week)
+                yield AtlasFile(
+                    name, week, key, brain, place, url, record, tuple(copies)
+                )
 
     def known_weeks(self, name: str) -> set[float]:
         """Return the weeks of a series that are published, or whose required files are
