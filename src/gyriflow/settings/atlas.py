@@ -2,7 +2,7 @@
 one."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from string import Formatter
 from typing import Annotated, Any, Literal
@@ -10,8 +10,15 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ConfigDict, Field, field_validator
 
 from ..shipped import ATLASES, shipped_atlases
-from .base import KeyProblem, Settings, did_you_mean, located, not_a_path, refused
-from .terms import AffineSource, Coordinates
+from .base import (
+    KeyProblem,
+    Problems,
+    Settings,
+    did_you_mean,
+    located,
+    not_a_path,
+    refused,
+)
 from .weeks import AnyWeek
 
 DOWNLOADS = Path("resources", "atlases")
@@ -95,10 +102,6 @@ class AtlasSeries(Settings):
     """Name of these brains in figures and tables."""
     scheme: str | None = None
     """Meaning of the labels, as for `brains`; required with `labels`."""
-    affine_from: AffineSource = "auto"
-    """As for `brains`, with `labels`."""
-    coordinates: Coordinates = "auto"
-    """As for `brains`, with surfaces."""
     matched: bool = False
     """Whether surfaces of all weeks have the same vertices; believed until the files
     are there."""
@@ -149,7 +152,7 @@ class AtlasSeries(Settings):
                 )
         return files
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         if ("labels" in self.files) != (self.scheme is not None):
             yield KeyProblem(
                 "is needed with labels, whose meaning it is, and with nothing else",

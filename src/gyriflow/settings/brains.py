@@ -1,13 +1,12 @@
 """Settings of brains: the data that their pial surfaces are made from, regions given on
 them, and tables of brains."""
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import ConfigDict, Field
 
 from ..formats import is_volume
-from .base import InputFile, KeyProblem, Settings
+from .base import InputFile, KeyProblem, Problems, Settings
 from .schemes import Label
 from .terms import MAX_NAME_LENGTH, SIDES, AffineSource, Coordinates, Side
 from .varying import FileOrPair, files_of
@@ -56,7 +55,7 @@ class ShapeSettings(Settings):
     def kind(self) -> str:
         return "sphere" if len(set(self.semi_axes_mm)) == 1 else "ellipsoid"
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         shortest, longest = min(self.semi_axes_mm), max(self.semi_axes_mm)
         if longest > MAX_AXIS_RATIO * shortest:
             text = (
@@ -182,7 +181,7 @@ class BrainConfig(Settings):
             HEMISPHERE_LABELS if is_volume(self.hemisphere.file) else HEMISPHERE_SURFACE
         )
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         sources = [key for key in SOURCES if self.is_set(key)]
         if not sources and self.image is not None:
             yield KeyProblem(
@@ -250,7 +249,7 @@ class GivenRegions(Settings):
     with the same name are one region; labels without a name are ignored. Required with
     a volume; by default the label files' own names are used."""
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         sides = [side for side in SIDES if self.is_set(side)]
         if (self.volume is not None) == bool(sides):
             yield KeyProblem(

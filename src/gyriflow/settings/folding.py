@@ -2,7 +2,7 @@
 parameters of a run."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,8 +16,7 @@ from pydantic import (
 )
 
 from ..errors import InputError
-from .base import KeyProblem, Settings, line, validated
-from .ensemble import Ensemble
+from .base import KeyProblem, Problems, Settings, validated
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import (
@@ -150,8 +149,11 @@ class FoldingSettings(Settings):
     """Fields for ParaView at each output week."""
     solver: Solver = Solver()
     """Solvers."""
-    ensemble: Ensemble | None = None
-    """With growth by `shapes`, an ensemble that gives prediction intervals."""
+    ensemble: int | None = Field(None, ge=3, le=64)
+    """With growth by `shapes`, the number of further runs with perturbed inputs, which
+    give prediction intervals. They differ in registrations (smoothing; label
+    boundaries), and in predictions also in the age of the start brain, the atlas, if
+    several atlases cover the run, and the individual differences that persist."""
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
 
@@ -165,7 +167,7 @@ class FoldingSettings(Settings):
         """Whether only the elastic change of volume is kept between steps."""
         return self.relaxation == "shape" and self.stress_memory_gw == 0
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         for key in GROWTH_RATES:
             if key not in self.growth.definition.rates and self.is_set(key):
                 yield KeyProblem(
@@ -231,7 +233,7 @@ class FoldingParameters(FoldingSettings):
             f"{name}_{axis}" for name in self.targets.values() for axis in AXES
         }
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
             yield KeyProblem(
@@ -248,7 +250,7 @@ class FoldingParameters(FoldingSettings):
 
 def value_problems(
     p: FoldingSettings, start_week: float, maps: Maps, start: str = ""
-) -> Iterator[KeyProblem]:
+) -> Problems:
     """Yield the inconsistencies between the settings of a run, over all its weeks and
     vertices.
 
@@ -335,8 +337,6 @@ def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
                 f"the map {name} has NaN or infinity",
                 found=f"{bad} of {vertices} values",
             )
-    if problems := [
-        line(problem.key, problem.text)
-        for problem in value_problems(p, p.start_week, maps)
-    ]:
-        raise InputError("folding parameters: " + "; ".join(problems))
+    problems = list(value_problems(p, p.start_week, maps))
+    if problems:
+        raise InputError(f"folding parameters: {'; '.join(map(str, problems))}")

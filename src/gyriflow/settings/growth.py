@@ -1,13 +1,13 @@
 """The section `folding.growth`, and the registry of growth models for all parts of
 gyriflow but the solver."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from .base import FirstIf, KeyProblem, Settings
+from .base import FirstIf, KeyProblem, Problems, Settings
 from .weeks import AnyWeek
 
 SizeCurve = Annotated[
@@ -178,7 +178,7 @@ class Growth(Settings):
             include={"model", *self.definition.keys, *self.definition.resolved},
         )
 
-    def unused_keys(self, used: Collection[str]) -> Iterator[KeyProblem]:
+    def unused_keys(self, used: Collection[str]) -> Problems:
         """Yield the problems of keys that are given but not among those used."""
         for key, field in type(self).model_fields.items():
             if key not in ("model", *used) and getattr(self, key) != field.default:
@@ -190,7 +190,7 @@ class Growth(Settings):
                     f"is not used by the growth model {self.model}; {remedy}", (key,)
                 )
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         yield from self.unused_keys((*self.definition.keys, *self.definition.resolved))
         if self.of == "atlas" and self.thickness_mm == "measured":
             yield KeyProblem(

@@ -4,13 +4,12 @@ right and other tissues.
 The shipped schemes are the files of the folder `schemes`, read by `io.yaml_files`.
 """
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import Field
 
 from ..shipped import SHIPPED
-from .base import KeyProblem, Settings
+from .base import KeyProblem, Problems, Settings
 
 SCHEME_FILES = {
     path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))
@@ -60,7 +59,7 @@ class SchemeSettings(Settings):
             named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
         return dict(sorted((named | self.known).items()))
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         if not self.cerebrum:
             yield KeyProblem(
                 "found no labels; it should have one or more", ("cerebrum",)

@@ -76,7 +76,9 @@ def _first_and_last_brain(study: Study) -> Drawings:
     brains = study.brains.values()
     first = min(brains, key=lambda brain: brain.week)
     last = max(brains, key=lambda brain: brain.week)
-    observed = {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in (first, last)}
+    observed = {}
+    for brain in (first, last):
+        observed[f"{brain.id}\n{brain.week:g} GW"] = brain.pial
     yield Drawing(inputs={"runs": {}, "observed": observed})
 
 
@@ -275,16 +277,18 @@ def _groups(study: Study) -> dict[str, str]:
     That is the first covariate with 2 to `MAX_COLOURS` values and fewer values than
     subjects.
     """
-    values: dict[str, dict[str, str]] = {}
-    subjects: dict[str, set[str]] = {}
+    brains: dict[str, list[Brain]] = {}
     for brain in study.brains.values():
-        for name, value in brain.config.covariates.items():
-            values.setdefault(name, {})[brain.id] = value
-            subjects.setdefault(name, set()).add(brain.subject)
-    for name, by_brain in values.items():
-        count = len(set(by_brain.values()))
-        if 1 < count <= MAX_COLOURS and count < len(subjects[name]):
-            return {brain: f"{name}: {value}" for brain, value in by_brain.items()}
+        for name in brain.config.covariates:
+            brains.setdefault(name, []).append(brain)
+    for name, with_value in brains.items():
+        groups = {}
+        for brain in with_value:
+            groups[brain.id] = f"{name}: {brain.config.covariates[name]}"
+        n_groups = len(set(groups.values()))
+        n_subjects = len({brain.subject for brain in with_value})
+        if 1 < n_groups <= MAX_COLOURS and n_groups < n_subjects:
+            return groups
     return {}
 
 

@@ -658,8 +658,13 @@ def _entry(
 
 
 def _file_keys(files: list[str], side: str | None) -> dict[str, str]:
+    first = files[0]
     if side is not None:
-        return {"hemisphere.file": files[0], "hemisphere.side": side}
+        return {"hemisphere.file": first, "hemisphere.side": side}
     if len(files) == 2:
-        return {"hemispheres.left": files[0], "hemispheres.right": files[1]}
-    return {"labels" if is_volume(files[0]) else "pial": files[0]}
+        return {
+            "hemispheres.left": first,
+            "hemispheres.right": files[1],
+        }
+    key = "labels" if is_volume(first) else "pial"
+    return {key: first}

@@ -102,9 +102,17 @@ class Figure(Drawing):
     @property
     def described(self) -> dict[str, Any]:
         """The text of the report, with the path."""
-        keys = ("name", "section", "title", "caption", "technical", "first")
-        texts = {key: getattr(self.kind, key) for key in keys}
-        return texts | {"path": self.path, "names": dict(self.names)}
+        kind = self.kind
+        return {
+            "name": kind.name,
+            "section": kind.section,
+            "title": kind.title,
+            "caption": kind.caption,
+            "technical": kind.technical,
+            "first": kind.first,
+            "path": self.path,
+            "names": dict(self.names),
+        }
 
 
 @cache

@@ -284,13 +284,16 @@ class Study:
     def scans(self) -> dict[str, list[str]]:
         """The ids of the scans of each subject that was scanned several times, in the
         order of weeks."""
-        scans: dict[str, list[str]] = {}
-        by_week = sorted(self.brains.values(), key=lambda brain: brain.week)
-        for brain in by_week:
+        scans: dict[str, list[Brain]] = {}
+        for brain in self.brains.values():
             if brain.config.subject is not None:
-                scans.setdefault(brain.subject, []).append(brain.id)
-        several = [subject for subject, ids in scans.items() if len(ids) > 1]
-        return {subject: scans[subject] for subject in sorted(several)}
+                scans.setdefault(brain.subject, []).append(brain)
+        several = {}
+        for subject in sorted(scans):
+            if len(scans[subject]) > 1:
+                by_week = sorted(scans[subject], key=lambda brain: brain.week)
+                several[subject] = [brain.id for brain in by_week]
+        return several
 
     def similar_in_thickness(self, brain: Brain) -> Brain | None:
         """Return the brain whose measured thickness fills another one's pial surface;

@@ -440,7 +440,7 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
     ]
     brains, run = (
         [*of_two(22, 24), *third],
-        {"preset": "expected", "ensemble": {"members": 4, "seed": 1}},
+        {"preset": "expected", "ensemble": 4},
     )
     found = study(brains, runs={"a": run}, growth={"series": "atlas"})
     simulation, members = (
@@ -525,7 +525,7 @@ def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
     taken = {"a": {"growth": "shapes", "ensemble": 3}, "a-member-2": {}}
     assert refusal(real, runs=taken) == Facts("runs.a-member-2", "ensemble of a")
     assert refusal(real, runs={"a": {"growth": "shapes", "ensemble": 2}}) == Facts(
-        "runs.a.ensemble.members", 2, 3
+        "runs.a.ensemble", 2, 3
     )
 
 
