@@ -391,8 +391,9 @@ def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, A
     """Yield the name and the varied values of each run of a sweep, the last key varying
     fastest."""
     for values in product(*study.vary.values()):
-        run = "-".join([name, *map(_short, values)])
-        yield run, dict(zip(study.vary, values, strict=True))
+        texts = map(_short, values)
+        varied = zip(study.vary, values, strict=True)
+        yield "-".join([name, *texts]), dict(varied)
 
 
 def _short(value: str | float) -> str:

@@ -1,6 +1,7 @@
 """The registry of figures: what each is drawn by takes what it gives, and the report
 has words on it."""
 
+import inspect
 from importlib import import_module
 
 import h5py
