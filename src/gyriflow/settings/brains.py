@@ -156,17 +156,12 @@ class BrainConfig(Settings):
 
     @property
     def files(self) -> list[str]:
-        sides = (
-            []
-            if self.hemispheres is None
-            else [self.hemispheres.left, self.hemispheres.right]
-        )
-        single = None if self.hemisphere is None else self.hemisphere.file
-        return [
-            path
-            for path in (self.labels, self.pial, *sides, single)
-            if path is not None
-        ]
+        paths = [self.labels, self.pial]
+        if self.hemispheres is not None:
+            paths += [self.hemispheres.left, self.hemispheres.right]
+        if self.hemisphere is not None:
+            paths.append(self.hemisphere.file)
+        return [path for path in paths if path is not None]
 
     @property
     def white_files(self) -> dict[str, str]:
@@ -177,9 +172,9 @@ class BrainConfig(Settings):
     def _kind(self) -> str:
         if self.hemisphere is None:
             return self.source
-        return (
-            HEMISPHERE_LABELS if is_volume(self.hemisphere.file) else HEMISPHERE_SURFACE
-        )
+        if is_volume(self.hemisphere.file):
+            return HEMISPHERE_LABELS
+        return HEMISPHERE_SURFACE
 
     def problems(self) -> Problems:
         sources = [key for key in SOURCES if self.is_set(key)]
@@ -202,12 +197,9 @@ class BrainConfig(Settings):
                         f" {' or '.join(kinds)}; remove it",
                         (key,),
                     )
-            pair = self._kind == "hemispheres"
-            if (
-                self.white is not None
-                and self._kind in SURFACE_SOURCES
-                and ("left" in self.white_files) != pair
-            ):
+            has_white = self.white is not None and self._kind in SURFACE_SOURCES
+            has_pair = "left" in self.white_files
+            if has_white and has_pair != (self._kind == "hemispheres"):
                 yield KeyProblem(
                     "should have one file for each pial surface", ("white",)
                 )
@@ -268,13 +260,12 @@ class GivenRegions(Settings):
     def files(self) -> dict[str, str]:
         if self.volume is not None:
             return {"volume": self.volume}
-        pairs = {"left": self.left, "right": self.right}
-        return {
-            f"{side}_{kind}": getattr(pair, kind)
-            for side, pair in pairs.items()
-            if pair is not None
-            for kind in ("labels", "surface")
-        }
+        files = {}
+        for side, given in (("left", self.left), ("right", self.right)):
+            if given is not None:
+                files[f"{side}_labels"] = given.labels
+                files[f"{side}_surface"] = given.surface
+        return files
 
 
 # tables of brains

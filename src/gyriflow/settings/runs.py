@@ -387,13 +387,14 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
     return type(run).model_validate(raw)
 
 
-def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Any]]]:
+def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Value]]]:
     """Yield the name and the varied values of each run of a sweep, the last key varying
     fastest."""
     for values in product(*study.vary.values()):
         texts = map(_short, values)
+        run = "-".join([name, *texts])
         varied = zip(study.vary, values, strict=True)
-        yield "-".join([name, *texts]), dict(varied)
+        yield run, dict(varied)
 
 
 def _short(value: str | float) -> str:

@@ -73,9 +73,11 @@ class SchemeSettings(Settings):
             "ventricles",
         ):
             labels = getattr(self, key)
-            if twice := sorted({label for label in labels if labels.count(label) > 1}):
+            twice = sorted({label for label in labels if labels.count(label) > 1})
+            outside = sorted(set(labels) - set(self.cerebrum))
+            if twice:
                 yield KeyProblem(f"found {_as_text(twice)} more than once", (key,))
-            if outside := sorted(set(labels) - set(self.cerebrum)):
+            if outside:
                 yield KeyProblem(
                     f"found {_as_text(outside)}; it should have labels of the cerebrum"
                     " only",
@@ -86,7 +88,8 @@ class SchemeSettings(Settings):
                 "found all of the cerebrum; the tissue inside the cortex is missing",
                 ("cortex",),
             )
-        if both := sorted(set(self.left) & set(self.right)):
+        both = sorted(set(self.left) & set(self.right))
+        if both:
             yield KeyProblem(
                 f"found {_as_text(both)}, which are also in left", ("right",)
             )

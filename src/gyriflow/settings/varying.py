@@ -92,12 +92,11 @@ operators."""
 def varying(default: float, **bounds: float) -> Any:
     """Return a field for a parameter that may vary; `bounds` (gt, ge, le) apply to each
     number in it."""
-    return Field(
-        default,
-        json_schema_extra={
-            BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()
-        },
-    )
+    extra: dict[str, Any] = {}
+    for name, bound in bounds.items():
+        key, *_ = BOUND_TEXTS[name]
+        extra[key] = bound
+    return Field(default, json_schema_extra=extra)
 
 
 def bounds_of(field: FieldInfo) -> dict[str, float]:
@@ -110,10 +109,12 @@ def bounds_of(field: FieldInfo) -> dict[str, float]:
 def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
     """Raise ValueError if a number, or one of a curve without a map, is out of
     bounds."""
-    if isinstance(value, Varying):
-        numbers = [] if value.map is not None else list((value.weeks or {}).values())
-    else:
+    if not isinstance(value, Varying):
         numbers = [value]
+    elif value.map is None:
+        numbers = list(weeks_of(value).values())
+    else:
+        numbers = []
     for name, bound in bounds.items():
         _, text, holds = BOUND_TEXTS[name]
         if not all(holds(number, bound) for number in numbers):

@@ -80,7 +80,7 @@ class Row:
     def subject(self) -> str:
         return self.name.removeprefix("sub-")
 
-    def applies_to(self, file: Path | None) -> bool:
+    def _applies_to(self, file: Path | None) -> bool:
         """Return whether a row is about a file; None: any file."""
         return file is None or file.is_relative_to(self.scope)
 
@@ -101,7 +101,7 @@ class Table:
     ages: Sequence[AgeColumn] = ()
     problem: str = ""
 
-    def may_have(self, subject: str, file: Path | None) -> bool:
+    def _may_have(self, subject: str, file: Path | None) -> bool:
         """Return whether a table may have a row about a file of a subject."""
         is_in_scope = file is None or file.is_relative_to(self.scope)
         return is_in_scope and self.subject in (None, subject)
@@ -125,7 +125,7 @@ class Table:
         )
 
 
-def read_table_of_scans(path: Path) -> Table:
+def _read_table(path: Path) -> Table:
     """Return a table of participants or sessions; InputError if it cannot be read or
     has no ids.
 
@@ -261,7 +261,7 @@ class ScanTables:
         self.notation = notation
         for path in paths:
             try:
-                self.tables.append(read_table_of_scans(path))
+                self.tables.append(_read_table(path))
             except InputError as error:
                 self.tables.append(replace(_empty_table(path), problem=str(error)))
 
@@ -280,7 +280,7 @@ class ScanTables:
         return ambiguity_of(texts) if self.notation is None else ""
 
     @cached_property
-    def ages_at_scans(self) -> list[TableAge]:
+    def _ages_at_scans(self) -> list[TableAge]:
         """The ages that are named as at a scan."""
         return [
             age
@@ -330,11 +330,11 @@ class ScanTables:
         A row without a session is of a subject's only scan.
         """
         own = [
-            row for row in self._by_subject.get(subject, ()) if row.applies_to(place)
+            row for row in self._by_subject.get(subject, ()) if row._applies_to(place)
         ]
         unread = []
         for table in self.tables:
-            if table.problem and table.may_have(subject, place):
+            if table.problem and table._may_have(subject, place):
                 unread.append(table)
         if not own and not unread:
             return None
@@ -361,7 +361,7 @@ class ScanTables:
             for row in rows_of_scan:
                 values |= row.values
                 ages += [replace(age, is_shared=is_shared) for age in row.ages]
-        age = choose_age(ages, self.notation, self.ages_at_scans[:1])
+        age = choose_age(ages, self.notation, self._ages_at_scans[:1])
         # a table that cannot be read may have the age of exactly this scan
         is_certain = age.week is not None and any(age.has_session for age in ages)
         for table in unread:
@@ -468,7 +468,7 @@ def participants_brains(
     column that every row needs.
     """
     path = located(folder, settings.file)
-    table = read_table_of_scans(path)
+    table = _read_table(path)
     tables = ScanTables([path, *_session_tables(table)], settings.ages)
     _require_valid(table, tables)
     entries: list[dict[str, Any]] = []

@@ -86,8 +86,8 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     folded = [one for one in folded if one.start.id not in unreachable]
     chains = {key: chain for key, chain in chains.items() if key[0] not in unreachable}
     planned = _Simulations(config, series, chains, accepted)
-    planned.add_runs(folded)
-    names = planned.add_variants(folded, swept)
+    planned._add_runs(folded)
+    names = planned._add_variants(folded, swept)
     simulations = planned.simulations.values()
     return Study(
         config=config,
@@ -209,7 +209,7 @@ class _Simulations:
     brains: Sequence[Brain]
     simulations: dict[tuple[str, str], Simulation] = field(default_factory=dict)
 
-    def add_runs(self, folded: Iterable[_Folded]) -> None:
+    def _add_runs(self, folded: Iterable[_Folded]) -> None:
         """Add the simulations of `runs`, and the members of their ensembles."""
         own = [one for one in folded if one.run in self.config.runs]
         predicted = {one.start for one in own if one.settings.growth.shapes == "atlas"}
@@ -233,7 +233,7 @@ class _Simulations:
                         self.brains,
                     )
 
-    def add_variants(
+    def _add_variants(
         self, folded: Iterable[_Folded], variants: Sequence[_Variant]
     ) -> dict[str, str]:
         """Add the simulations of sweeps and of the calibration; return the simulated
