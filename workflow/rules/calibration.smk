@@ -25,7 +25,6 @@ rule calibration_design:
         round=r"\d+",
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
-        seed=lambda w: CONFIG.calibrate.seed,
         score=lambda w: list(CONFIG.calibrate.score),
         runs=lambda w: [run for run, number in CALIBRATED.rounds.items() if number == int(w.round)],
     script:

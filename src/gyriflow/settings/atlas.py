@@ -2,7 +2,7 @@
 one."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from string import Formatter
 from typing import Annotated, Any, Literal
@@ -10,8 +10,15 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ConfigDict, Field, field_validator
 
 from ..shipped import ATLASES, shipped_atlases
-from .base import KeyProblem, Settings, did_you_mean, located, not_a_path, refused
-from .terms import AffineSource, Coordinates
+from .base import (
+    KeyProblem,
+    Problems,
+    Settings,
+    did_you_mean,
+    located,
+    not_a_path,
+    refused,
+)
 from .weeks import AnyWeek
 
 DOWNLOADS = Path("resources", "atlases")
@@ -35,17 +42,16 @@ NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 
 def _names_weeks(pattern: str) -> bool:
     try:
-        fields = [
-            (name, kind, flag)
-            for _, name, kind, flag in Formatter().parse(pattern)
-            if name is not None
-        ]
+        parts = list(Formatter().parse(pattern))
     except ValueError:
         return False
-    return bool(fields) and all(
-        name == "week" and flag is None and re.fullmatch(WEEK_FORMAT, kind or "")
-        for name, kind, flag in fields
-    )
+    fields = [part[1:] for part in parts if part[1] is not None]
+    for name, kind, flag in fields:
+        if name != "week" or flag is not None:
+            return False
+        if not re.fullmatch(WEEK_FORMAT, kind or ""):
+            return False
+    return bool(fields)
 
 
 def _require_weeks_once[Weeks: Iterable[Any]](weeks: Weeks) -> Weeks:
@@ -95,10 +101,6 @@ class AtlasSeries(Settings):
     """Name of these brains in figures and tables."""
     scheme: str | None = None
     """Meaning of the labels, as for `brains`; required with `labels`."""
-    affine_from: AffineSource = "auto"
-    """As for `brains`, with `labels`."""
-    coordinates: Coordinates = "auto"
-    """As for `brains`, with surfaces."""
     matched: bool = False
     """Whether surfaces of all weeks have the same vertices; believed until the files
     are there."""
@@ -118,30 +120,24 @@ class AtlasSeries(Settings):
             _require_weeks_once(value)
         if isinstance(value, list):
             return {week: {} for week in value}
-        return (
-            {week: records or {} for week, records in value.items()}
-            if isinstance(value, dict)
-            else value
-        )
+        if isinstance(value, dict):
+            return {week: records or {} for week, records in value.items()}
+        return value
 
     @field_validator("files")
     @classmethod
     def _paths_with_week(cls, files: dict[FileKey, str]) -> dict[FileKey, str]:
-        if not any(
-            set(files) in (needed, needed | optional)
-            for needed, optional in SOURCES_OF_SERIES
-        ):
-            with_white = (
-                "left and right (and perhaps white_left and white_right), or pial (and"
-                " perhaps white)"
+        allowed = []
+        for needed, optional in SOURCES_OF_SERIES:
+            allowed += [needed, needed | optional]
+        if set(files) not in allowed:
+            raise ValueError(
+                "should have labels (and perhaps image), or left and right (and perhaps"
+                " white_left and white_right), or pial (and perhaps white)"
             )
-            raise ValueError(f"should have labels (and perhaps image), or {with_white}")
         for pattern in files.values():
-            if (
-                Path(pattern).is_absolute()
-                or ".." in Path(pattern).parts
-                or "\\" in pattern
-            ):
+            path = Path(pattern)
+            if path.is_absolute() or ".." in path.parts or "\\" in pattern:
                 raise ValueError("should be paths below the folder of the atlas")
             if not _names_weeks(pattern):
                 raise ValueError(
@@ -149,7 +145,7 @@ class AtlasSeries(Settings):
                 )
         return files
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         if ("labels" in self.files) != (self.scheme is not None):
             yield KeyProblem(
                 "is needed with labels, whose meaning it is, and with nothing else",
@@ -187,9 +183,11 @@ class Atlas(Settings):
     def brain_id(self, series: str, week: float) -> str:
         """Return the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas
         has one series."""
-        return "-".join(
-            [self.name, *([series] if len(self.series) > 1 else []), f"{week:g}"]
-        )
+        parts = [self.name]
+        if len(self.series) > 1:
+            parts.append(series)
+        parts.append(f"{week:g}")
+        return "-".join(parts)
 
 
 # in a study
@@ -227,9 +225,8 @@ class AtlasSettings(Settings):
     @field_validator("name")
     @classmethod
     def _known_name(cls, name: str) -> str:
-        if not name.endswith((".yaml", ".yml")) and name not in (
-            shipped := shipped_atlases()
-        ):
+        shipped = shipped_atlases()
+        if not _is_file(name) and name not in shipped:
             raise refused(
                 f"found {name!r}; {did_you_mean(name, shipped)} An atlas of your own is"
                 " an atlas.yaml"
@@ -247,19 +244,19 @@ class AtlasSettings(Settings):
 
     @property
     def description(self) -> Path:
-        return (
-            Path(self.name)
-            if self.name.endswith((".yaml", ".yml"))
-            else ATLASES / self.name / "atlas.yaml"
-        )
+        if _is_file(self.name):
+            return Path(self.name)
+        return ATLASES / self.name / "atlas.yaml"
 
     def located(self, base_dir: Path) -> "AtlasSettings":
         """Return the section with absolute paths."""
-        paths = (
-            {}
-            if self.folder is None
-            else {"folder": str(located(base_dir, self.folder))}
-        )
-        if self.description == Path(self.name):
+        paths = {}
+        if self.folder is not None:
+            paths["folder"] = str(located(base_dir, self.folder))
+        if _is_file(self.name):
             paths["name"] = str(located(base_dir, self.name))
         return self.model_copy(update=paths)
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith((".yaml", ".yml"))

@@ -8,7 +8,7 @@ each is valid.
 import difflib
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
@@ -40,12 +40,30 @@ PROBLEM = "problem"
 """Type of the errors whose message already contains the value found."""
 
 
+Key = tuple[str | int, ...]
+"""The path of a key: names of keys, and numbers of entries in lists."""
+
+
 @dataclass(frozen=True)
 class KeyProblem:
     """A mistake and the path of its key, relative to the settings that are checked."""
 
     text: str
-    key: tuple[str | int, ...] = ()
+    key: Key = ()
+
+    def inside(self, *outer: str | int) -> "KeyProblem":
+        """Return the problem with the path of its key in outer settings."""
+        return KeyProblem(self.text, (*outer, *self.key))
+
+    def __str__(self) -> str:
+        # such as `brains[0].week: Field required`
+        parts = [
+            f"[{part}]" if isinstance(part, int) else f".{part}" for part in self.key
+        ]
+        return f"{''.join(parts).removeprefix('.')}: {self.text}"
+
+
+Problems = Iterator[KeyProblem]
 
 
 @dataclass(frozen=True)
@@ -97,15 +115,14 @@ class Settings(BaseModel):
         if isinstance(value, bool) and bool not in (kind, *get_args(kind)):
             raise ValueError("should be a number or text, not true or false")
         # which ends a path or an argument for the system
-        inner = (
-            value.values()
-            if isinstance(value, dict)
-            else value
-            if isinstance(value, list)
-            else [value]
-        )
-        if any(isinstance(text, str) and "\0" in text for text in inner):
-            raise ValueError("should have no NUL characters")
+        inner = [value]
+        if isinstance(value, dict):
+            inner = list(value.values())
+        elif isinstance(value, list):
+            inner = value
+        for text in inner:
+            if isinstance(text, str) and "\0" in text:
+                raise ValueError("should have no NUL characters")
         return value
 
     @model_validator(mode="wrap")
@@ -135,13 +152,10 @@ class Settings(BaseModel):
 
 # messages: path of the key, allowed values, value found
 
-Key = tuple[str | int, ...]
 
-
-def messages(error: ValidationError, kind: type[BaseModel]) -> list[tuple[Key, str]]:
-    """Return the path and the text of each problem of settings of a kind, in the order
-    of the keys."""
-    return [_message(details, kind) for details in error.errors()]
+def problems_in(error: ValidationError, kind: type[BaseModel]) -> list[KeyProblem]:
+    """Return the problems of settings of a kind, in the order of the keys."""
+    return [_problem(details, kind) for details in error.errors()]
 
 
 def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
@@ -150,31 +164,23 @@ def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
-        raise InputError(
-            f"{where}: {'; '.join(line(*problem) for problem in messages(error, kind))}"
-        ) from None
-
-
-def line(path: Key, text: str) -> str:
-    """Return a problem as a line, such as `brains[0].week: Field required`."""
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
-    return f"{key.removeprefix('.')}: {text}"
+        problems = "; ".join(map(str, problems_in(error, kind)))
+        raise InputError(f"{where}: {problems}") from None
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return a hint for an unknown name: the valid names that end with it, the most
     similar one, or all of them."""
     names = list(names)
-    longer = [candidate for candidate in names if candidate.endswith(f"_{name}")]
-    near = longer or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    return (
-        f"did you mean {' or '.join(near)}?"
-        if near
-        else f"valid names are {', '.join(names)}"
-    )
+    near = [longer for longer in names if longer.endswith(f"_{name}")]
+    if not near:
+        near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    if not near:
+        return f"valid names are {', '.join(names)}"
+    return f"did you mean {' or '.join(near)}?"
 
 
-def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
+def _problem(details: ErrorDetails, kind: type[BaseModel]) -> KeyProblem:
     # pydantic puts tags into the path: of a union's member, here in parentheses, and
     # `[key]` for a wrong key
     path = tuple(
@@ -184,43 +190,36 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
     )
     text = details["msg"].removeprefix("Value error, ")
     if details["type"] == "extra_forbidden":
-        text = unknown_key(kind, path) or "unknown key"
+        text = _unknown_key(kind, path)
     elif details["type"] not in (PROBLEM, "missing"):
         text += f"; found {details['input']!r}"
     # YAML reads 021 as the number 17
     if details["type"] == "string_type" and isinstance(details["input"], int | float):
         text += "; write it in quotes"
-    return path, text
+    return KeyProblem(text, path)
 
 
-def unknown_key(kind: Any, path: Key) -> str:
-    """Return the message for a key that settings of a kind do not have, with the
-    nearest keys.
-
-    It is empty where there is such a key, or where no settings are.
-    """
-    settings, key = settings_at(kind, path[:-1]), str(path[-1])
-    if settings is None or key in settings.model_fields:
-        return ""
-    return f"unknown key; {did_you_mean(key, settings.model_fields)}"
+def _unknown_key(kind: type[BaseModel], path: Key) -> str:
+    settings = _settings_at(kind, path[:-1])
+    if settings is None:
+        return "unknown key"
+    return f"unknown key; {did_you_mean(str(path[-1]), settings.model_fields)}"
 
 
-def settings_at(kind: Any, path: Key) -> type[Settings] | None:
+def _settings_at(kind: Any, path: Key) -> type[Settings] | None:
     """Return the class of the settings at `path` inside the type `kind`, or None if
     there are none."""
     if isinstance(kind, type) and issubclass(kind, Settings):
-        field = kind.model_fields.get(str(path[0])) if path else None
-        return (
-            kind
-            if not path
-            else settings_at(field.annotation, path[1:])
-            if field
-            else None
-        )
+        if not path:
+            return kind
+        field = kind.model_fields.get(str(path[0]))
+        return _settings_at(field.annotation, path[1:]) if field else None
     inner = path[1:] if get_origin(kind) in (dict, tuple) else path
-    return next(
-        (found for part in get_args(kind) if (found := settings_at(part, inner))), None
-    )
+    for part in get_args(kind):
+        settings = _settings_at(part, inner)
+        if settings is not None:
+            return settings
+    return None
 
 
 # paths of input files
@@ -241,13 +240,11 @@ def path_in(folder: Path, path: str) -> Path:
 def located(folder: Path | str, path: str) -> Path:
     """Return the absolute path of a file in a folder or, if it only exists there, in
     the working directory."""
-    places = [path_in(Path(folder), path), Path.cwd() / path]
-    return own_name(
-        next(
-            (place for place in places if place.exists() or absent_content(place)),
-            places[0],
-        )
-    )
+    in_folder = path_in(Path(folder), path)
+    for place in (in_folder, Path.cwd() / path):
+        if place.exists() or absent_content(place):
+            return own_name(place)
+    return own_name(in_folder)
 
 
 def own_name(path: Path) -> Path:
@@ -271,12 +268,9 @@ def absent_content(path: Path, start: bytes = b"") -> str:
             "its content is not here (Git LFS). Get it with"
             f" `git lfs pull --include {path}`"
         )
-    is_broken = (
-        path.is_symlink()
-        and not path.exists()
-        and "annex/objects" in path.readlink().as_posix()
-    )
-    if is_broken or start.startswith(b"/annex/objects/"):
+    is_broken = path.is_symlink() and not path.exists()
+    is_of_annex = is_broken and "annex/objects" in path.readlink().as_posix()
+    if is_of_annex or start.startswith(b"/annex/objects/"):
         return (
             "its content is not here (git-annex). Get it with"
             f" `datalad get {path}` or `git annex get {path}`"
@@ -308,7 +302,8 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     if not WILDCARD.search(str(place)):
         return str(place)
     # a relative path avoids the braces of the working directory
-    if WILDCARD.search(inside := os.path.relpath(place)) or not place.is_file():
+    inside = os.path.relpath(place)
+    if WILDCARD.search(inside) or not place.is_file():
         raise refused(
             f"found {place}; Snakemake takes braces in a path for wildcards: rename the"
             " file or its folder"
@@ -339,7 +334,10 @@ MAX_NAMES = 3
 
 def not_a_path(text: str) -> str:
     """Return a hint if a text has what paths of files do not have, or ""."""
-    return next((hint for pattern, hint in NO_PATH if pattern.search(text)), "")
+    for pattern, hint in NO_PATH:
+        if pattern.search(text):
+            return hint
+    return ""
 
 
 def hint_for_missing(path: Path) -> str:
@@ -367,7 +365,9 @@ def _named_alike(path: Path) -> list[Path]:
     files = sorted(path.parent.iterdir())
     stem = _stem(path.name)
     same = [file for file in files if _stem(file.name) == stem]
-    return same or [
+    if same:
+        return same
+    return [
         file
         for file in files
         if _without_numbers(_stem(file.name)) == _without_numbers(stem)
@@ -377,7 +377,8 @@ def _named_alike(path: Path) -> list[Path]:
 def _stem(name: str) -> str:
     name = name.strip().lower()
     endings = [ending for ending in ALL_SUFFIXES if name.endswith(ending)]
-    return name.removesuffix(max(endings, key=len, default=""))
+    longest = max(endings, key=len, default="")
+    return name.removesuffix(longest)
 
 
 def _without_numbers(stem: str) -> str:
@@ -386,9 +387,12 @@ def _without_numbers(stem: str) -> str:
 
 
 def _listed(words: str, files: Sequence[Path]) -> str:
-    names = [
-        repr(file.name) if file.name != file.name.strip() else file.name
-        for file in files[:MAX_NAMES]
-    ]
-    names += ["…"] if len(files) > MAX_NAMES else []
-    return f"{words} {', '.join(names)}" if names else ""
+    if not files:
+        return ""
+    names = []
+    for file in files[:MAX_NAMES]:
+        has_spaces = file.name != file.name.strip()
+        names.append(repr(file.name) if has_spaces else file.name)
+    if len(files) > MAX_NAMES:
+        names.append("…")
+    return f"{words} {', '.join(names)}"

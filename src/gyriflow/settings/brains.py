@@ -1,13 +1,12 @@
 """Settings of brains: the data that their pial surfaces are made from, regions given on
 them, and tables of brains."""
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import ConfigDict, Field
 
 from ..formats import is_volume
-from .base import InputFile, KeyProblem, Settings
+from .base import InputFile, KeyProblem, Problems, Settings
 from .schemes import Label
 from .terms import MAX_NAME_LENGTH, SIDES, AffineSource, Coordinates, Side
 from .varying import FileOrPair, files_of
@@ -54,7 +53,7 @@ class ShapeSettings(Settings):
     def kind(self) -> str:
         return "sphere" if len(set(self.semi_axes_mm)) == 1 else "ellipsoid"
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         shortest, longest = min(self.semi_axes_mm), max(self.semi_axes_mm)
         if longest > MAX_AXIS_RATIO * shortest:
             text = (
@@ -155,17 +154,12 @@ class BrainConfig(Settings):
 
     @property
     def files(self) -> list[str]:
-        sides = (
-            []
-            if self.hemispheres is None
-            else [self.hemispheres.left, self.hemispheres.right]
-        )
-        single = None if self.hemisphere is None else self.hemisphere.file
-        return [
-            path
-            for path in (self.labels, self.pial, *sides, single)
-            if path is not None
-        ]
+        paths = [self.labels, self.pial]
+        if self.hemispheres is not None:
+            paths += [self.hemispheres.left, self.hemispheres.right]
+        if self.hemisphere is not None:
+            paths.append(self.hemisphere.file)
+        return [path for path in paths if path is not None]
 
     @property
     def white_files(self) -> dict[str, str]:
@@ -176,11 +170,11 @@ class BrainConfig(Settings):
     def _kind(self) -> str:
         if self.hemisphere is None:
             return self.source
-        return (
-            HEMISPHERE_LABELS if is_volume(self.hemisphere.file) else HEMISPHERE_SURFACE
-        )
+        if is_volume(self.hemisphere.file):
+            return HEMISPHERE_LABELS
+        return HEMISPHERE_SURFACE
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         sources = [key for key in SOURCES if self.is_set(key)]
         if not sources and self.image is not None:
             yield KeyProblem(
@@ -201,12 +195,9 @@ class BrainConfig(Settings):
                         f" {' or '.join(kinds)}; remove it",
                         (key,),
                     )
-            pair = self._kind == "hemispheres"
-            if (
-                self.white is not None
-                and self._kind in SURFACE_SOURCES
-                and ("left" in self.white_files) != pair
-            ):
+            has_white = self.white is not None and self._kind in SURFACE_SOURCES
+            has_pair = "left" in self.white_files
+            if has_white and has_pair != (self._kind == "hemispheres"):
                 yield KeyProblem(
                     "should have one file for each pial surface", ("white",)
                 )
@@ -248,7 +239,7 @@ class GivenRegions(Settings):
     with the same name are one region; labels without a name are ignored. Required with
     a volume; by default the label files' own names are used."""
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         sides = [side for side in SIDES if self.is_set(side)]
         if (self.volume is not None) == bool(sides):
             yield KeyProblem(
@@ -267,13 +258,12 @@ class GivenRegions(Settings):
     def files(self) -> dict[str, str]:
         if self.volume is not None:
             return {"volume": self.volume}
-        pairs = {"left": self.left, "right": self.right}
-        return {
-            f"{side}_{kind}": getattr(pair, kind)
-            for side, pair in pairs.items()
-            if pair is not None
-            for kind in ("labels", "surface")
-        }
+        files = {}
+        for side, given in (("left", self.left), ("right", self.right)):
+            if given is not None:
+                files[f"{side}_labels"] = given.labels
+                files[f"{side}_surface"] = given.surface
+        return files
 
 
 # tables of brains

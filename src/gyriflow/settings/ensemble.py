@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
-from pydantic import ConfigDict, Field
-
-from .base import Settings
+from numpy.typing import NDArray
 
 SMOOTHING_RANGE = (0.7, 1.5)
 """Factors of the smoothing in registrations."""
@@ -40,49 +38,31 @@ class Variation:
     fading_gw: float
 
 
-class Ensemble(Settings):
-    """Repeat a run with perturbed inputs to get prediction intervals. `ensemble: 8` is
-    short for `{members: 8}`.
+def variations(members: int) -> list[Variation]:
+    """Return the variation of each member of an ensemble, by a Latin hypercube: one
+    sample per stratum."""
+    random = np.random.default_rng(0)
 
-    Members differ in registrations (smoothing; label boundaries), and in predictions
-    also in the age of the start brain, the atlas, if several atlases cover the run, and
-    the individual differences that persist.
-    """
+    def quantiles() -> NDArray[np.float64]:
+        strata = random.permutation(members)
+        return (strata + random.uniform(size=members)) / members
 
-    model_config = ConfigDict(json_schema_extra={"type": ["object", "integer", "null"]})
-    short_key = ("members", int)
+    def between(low: float, high: float) -> NDArray[np.float64]:
+        log_low, log_high = np.log((low, high))
+        return np.exp(log_low + quantiles() * (log_high - log_low))
 
-    members: int = Field(8, ge=3, le=64)
-    """Number of members."""
-    seed: int = Field(0, ge=0)
-    """Seed of the variations."""
-
-    @property
-    def variations(self) -> list[Variation]:
-        """The variation of each member, by a Latin hypercube: one sample per
-        stratum."""
-        random, n = np.random.default_rng(self.seed), self.members
-        quantiles = [
-            (random.permutation(n) + random.uniform(size=n)) / n for _ in range(4)
-        ]
-        log_ranges = [
-            np.log(ends)
-            for ends in (SMOOTHING_RANGE, DIFFERENCE_RANGE_MM, FADING_RANGE_GW)
-        ]
-        scaled = [
-            np.exp(low + q * (high - low))
-            for q, (low, high) in zip(quantiles[1:], log_ranges, strict=True)
-        ]
-        return [
-            Variation(
-                number=number,
-                seed=self.seed * n + number + 1,
-                registration_smoothing=round(float(smoothing), 2),
-                age_shift_gw=round(AGE_SD_GW * NormalDist().inv_cdf(float(age)), 2),
-                difference_smoothing_mm=float(difference),
-                fading_gw=float(fading),
-            )
-            for number, (age, smoothing, difference, fading) in enumerate(
-                zip(quantiles[0], *scaled, strict=True)
-            )
-        ]
+    age_shift_gw = [AGE_SD_GW * NormalDist().inv_cdf(age) for age in quantiles()]
+    smoothing = between(*SMOOTHING_RANGE)
+    difference_mm = between(*DIFFERENCE_RANGE_MM)
+    fading_gw = between(*FADING_RANGE_GW)
+    return [
+        Variation(
+            number=number,
+            seed=number + 1,
+            registration_smoothing=round(float(smoothing[number]), 2),
+            age_shift_gw=round(age_shift_gw[number], 2),
+            difference_smoothing_mm=float(difference_mm[number]),
+            fading_gw=float(fading_gw[number]),
+        )
+        for number in range(members)
+    ]

@@ -2,7 +2,7 @@
 parameters of a run."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,8 +16,7 @@ from pydantic import (
 )
 
 from ..errors import InputError
-from .base import KeyProblem, Settings, line, validated
-from .ensemble import Ensemble
+from .base import KeyProblem, Problems, Settings, validated
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import (
@@ -150,8 +149,11 @@ class FoldingSettings(Settings):
     """Fields for ParaView at each output week."""
     solver: Solver = Solver()
     """Solvers."""
-    ensemble: Ensemble | None = None
-    """With growth by `shapes`, an ensemble that gives prediction intervals."""
+    ensemble: int | None = Field(None, ge=3, le=64)
+    """With growth by `shapes`, the number of further runs with perturbed inputs, which
+    give prediction intervals. They differ in registrations (smoothing; label
+    boundaries), and in predictions also in the age of the start brain, the atlas, if
+    several atlases cover the run, and the individual differences that persist."""
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
 
@@ -165,7 +167,7 @@ class FoldingSettings(Settings):
         """Whether only the elastic change of volume is kept between steps."""
         return self.relaxation == "shape" and self.stress_memory_gw == 0
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         for key in GROWTH_RATES:
             if key not in self.growth.definition.rates and self.is_set(key):
                 yield KeyProblem(
@@ -191,9 +193,10 @@ def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[fl
     """Return the output weeks of a run, to two decimals: the start, then every
     `every_gw` weeks, and the end."""
     steps = int((end_week - start_week) / every_gw + 1e-9)
-    return sorted(
-        {*(round(start_week + n * every_gw, 2) for n in range(steps + 1)), end_week}
-    )
+    weeks = {end_week}
+    for step in range(steps + 1):
+        weeks.add(round(start_week + step * every_gw, 2))
+    return sorted(weeks)
 
 
 class FoldingParameters(FoldingSettings):
@@ -220,19 +223,20 @@ class FoldingParameters(FoldingSettings):
     @property
     def varying_maps(self) -> set[str]:
         """The names of the maps of parameters that vary over the brain."""
-        return {
-            name for key in VARYING if (name := map_of(getattr(self, key))) is not None
-        }
+        names = {map_of(getattr(self, key)) for key in VARYING}
+        return {name for name in names if name is not None}
 
     @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
-        return self.varying_maps | {
-            f"{name}_{axis}" for name in self.targets.values() for axis in AXES
-        }
+        maps = self.varying_maps
+        for name in self.targets.values():
+            maps |= {f"{name}_{axis}" for axis in AXES}
+        return maps
 
-    def problems(self) -> Iterator[KeyProblem]:
-        weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
+    def problems(self) -> Problems:
+        weeks = list(self.output_weeks)
+        ends = [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
             yield KeyProblem(
                 f"found {weeks}; they should ascend from start_week to end_week",
@@ -248,7 +252,7 @@ class FoldingParameters(FoldingSettings):
 
 def value_problems(
     p: FoldingSettings, start_week: float, maps: Maps, start: str = ""
-) -> Iterator[KeyProblem]:
+) -> Problems:
     """Yield the inconsistencies between the settings of a run, over all its weeks and
     vertices.
 
@@ -259,31 +263,32 @@ def value_problems(
     if end <= start_week:
         called = f"{start_week:g}, {start}" if start else f"start_week, {start_week:g}"
         yield KeyProblem(f"found {end:g}; it should be above {called}", ("end_week",))
-    values = {
-        key: value
-        for key in VARYING
-        if not (
-            isinstance(value := getattr(p, key), Varying)
-            and value.map not in (None, *maps)
-        )
+    ranges = {}
+    for key in VARYING:
+        value = getattr(p, key)
+        has_map = isinstance(value, Varying) and value.map is not None
+        if not has_map or value.map in maps:
+            ranges[key] = value_range(value, maps, start_week, end)
+    units = {
+        "thickness_mm": "mm",
+        "shear_modulus_cortex_pa": "Pa",
+        "shear_modulus_core_pa": "Pa",
     }
-    ranges = {
-        key: value_range(value, maps, start_week, end) for key, value in values.items()
-    }
-    for key, unit in (
-        ("thickness_mm", "mm"),
-        ("shear_modulus_cortex_pa", "Pa"),
-        ("shear_modulus_core_pa", "Pa"),
-    ):
-        if key in ranges and (least := ranges[key][0]) <= 0:
+    for key, unit in units.items():
+        if key in ranges and ranges[key][0] <= 0:
+            least = ranges[key][0]
             yield KeyProblem(
                 f"reaches {least:g} {unit}; it should stay above 0", (key,)
             )
-    rates = {key: ranges[key] for key in GROWTH_RATES if key in ranges}
-    for key, (least, _) in rates.items():
-        if least < 0:
-            yield KeyProblem(f"found {least:g}; it should be 0 or more", (key,))
-    if (growth := p.step_s * sum(most for _, most in rates.values())) >= 1:
+    fastest = 0.0
+    for key in GROWTH_RATES:
+        if key in ranges:
+            least, most = ranges[key]
+            fastest += most
+            if least < 0:
+                yield KeyProblem(f"found {least:g}; it should be 0 or more", (key,))
+    growth = p.step_s * fastest
+    if growth >= 1:
         yield KeyProblem(
             f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step,"
             " beyond 1",
@@ -302,11 +307,11 @@ def target_maps(
 ) -> dict[str, NDArray[np.float64]]:
     """Return the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at
     w weeks."""
-    return {
-        f"{target_map(week)}_{axis}": values
-        for week, places in zip(weeks, positions, strict=True)
-        for axis, values in zip(AXES, places.T, strict=True)
-    }
+    maps = {}
+    for week, places in zip(weeks, positions, strict=True):
+        for axis, values in zip(AXES, places.T, strict=True):
+            maps[f"{target_map(week)}_{axis}"] = values
+    return maps
 
 
 def parameters_from(values: Any) -> FoldingParameters:
@@ -324,19 +329,18 @@ def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
                 f"the map {name} is missing",
                 expected="a file with it, given with --maps",
             )
-        if (shape := maps[name].shape) != (vertices,):
+        if maps[name].shape != (vertices,):
             raise InputError(
                 f"the map {name} does not fit the mesh",
-                found=shape,
+                found=maps[name].shape,
                 expected=f"{vertices} values",
             )
-        if bad := np.count_nonzero(~np.isfinite(maps[name])):
+        n_bad = np.count_nonzero(~np.isfinite(maps[name]))
+        if n_bad:
             raise InputError(
                 f"the map {name} has NaN or infinity",
-                found=f"{bad} of {vertices} values",
+                found=f"{n_bad} of {vertices} values",
             )
-    if problems := [
-        line(problem.key, problem.text)
-        for problem in value_problems(p, p.start_week, maps)
-    ]:
-        raise InputError("folding parameters: " + "; ".join(problems))
+    problems = list(value_problems(p, p.start_week, maps))
+    if problems:
+        raise InputError(f"folding parameters: {'; '.join(map(str, problems))}")

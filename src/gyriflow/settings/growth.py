@@ -1,13 +1,13 @@
 """The section `folding.growth`, and the registry of growth models for all parts of
 gyriflow but the solver."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from .base import FirstIf, KeyProblem, Settings
+from .base import FirstIf, KeyProblem, Problems, Settings
 from .weeks import AnyWeek
 
 SizeCurve = Annotated[
@@ -55,18 +55,16 @@ class GrowthModel:
 
 
 def _rates_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
-    cortex, core = (
-        number(run["parameters"][f"{name}growth_rate_per_s"]) for name in ("", "core_")
-    )
+    parameters = run["parameters"]
+    cortex = number(parameters["growth_rate_per_s"])
+    core = number(parameters["core_growth_rate_per_s"])
     return f"The cortex grew tangentially at {cortex} per second, the core at {core}."
 
 
 def _sizes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
-    source = (
-        f" through brains of several subjects ({run['growth_of']}), {NOT_OWN}"
-        if _of_population(run)
-        else ""
-    )
+    source = ""
+    if _of_population(run):
+        source = f" through brains of several subjects ({run['growth_of']}), {NOT_OWN}"
     return (
         "Growth rates of cortex and core were set in each step so that area and volume"
         f" followed curves{source}."
@@ -178,19 +176,20 @@ class Growth(Settings):
             include={"model", *self.definition.keys, *self.definition.resolved},
         )
 
-    def unused_keys(self, used: Collection[str]) -> Iterator[KeyProblem]:
+    def unused_keys(self, used: Collection[str]) -> Problems:
         """Yield the problems of keys that are given but not among those used."""
         for key, field in type(self).model_fields.items():
-            if key not in ("model", *used) and getattr(self, key) != field.default:
-                users = [
-                    name for name, model in GROWTH_MODELS.items() if key in model.keys
-                ]
-                remedy = f"remove it, or use the model {' or '.join(users)}"
-                yield KeyProblem(
-                    f"is not used by the growth model {self.model}; {remedy}", (key,)
-                )
+            if key in ("model", *used) or getattr(self, key) == field.default:
+                continue
+            models = GROWTH_MODELS.items()
+            users = [name for name, model in models if key in model.keys]
+            yield KeyProblem(
+                f"is not used by the growth model {self.model}; remove it, or use the"
+                f" model {' or '.join(users)}",
+                (key,),
+            )
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         yield from self.unused_keys((*self.definition.keys, *self.definition.resolved))
         if self.of == "atlas" and self.thickness_mm == "measured":
             yield KeyProblem(

@@ -66,10 +66,12 @@ class Config(Settings):
     @model_validator(mode="before")
     @classmethod
     def _fill_in_presets(cls, raw: Any) -> Any:
-        is_folded = isinstance(raw, dict) and any(
-            raw.get(section) is not None for section in FOLDING_SECTIONS
-        )
-        return complete_runs(raw) if is_folded else raw
+        if not isinstance(raw, dict):
+            return raw
+        sections = [raw.get(section) for section in FOLDING_SECTIONS]
+        if all(section is None for section in sections):
+            return raw
+        return complete_runs(raw)
 
     @field_validator(
         "atlas",
@@ -101,9 +103,6 @@ class Config(Settings):
     @property
     def measured_only(self) -> "Config":
         """This configuration without simulations."""
-        return self.model_copy(
-            update={
-                name: type(self).model_fields[name].get_default()
-                for name in FOLDING_SECTIONS
-            }
-        )
+        fields = type(self).model_fields
+        absent = {name: fields[name].get_default() for name in FOLDING_SECTIONS}
+        return self.model_copy(update=absent)

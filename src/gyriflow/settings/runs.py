@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field
 
-from .base import FirstIf, KeyProblem, Settings
+from .base import FirstIf, KeyProblem, Problems, Settings
 from .brains import BrainConfig
-from .ensemble import Variation
+from .ensemble import Variation, variations
 from .folding import VARYING, FoldingSettings
 from .growth import SIZES
 from .stages import MeshSettings
@@ -84,9 +84,9 @@ class Run(FoldingSettings):
     study's `start`."""
 
     # unlike `folding`, a run may have rates that its growth model does not use
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         for problem in self.growth.unused_keys(self.growth.definition.keys):
-            yield KeyProblem(problem.text, ("growth", *problem.key))
+            yield problem.inside("growth")
         if self.ensemble is not None and self.growth.definition.measured != "shapes":
             yield KeyProblem(
                 f"is not used by the growth model {self.growth.model}, only by shapes",
@@ -101,55 +101,69 @@ def complete_runs(raw: dict[str, Any]) -> dict[str, Any]:
     Keys of `folding` override the preset of `folding`. Values that are not sections are
     left for validation. Without `runs` there is one, `reference`.
     """
-    folding, runs = raw.get("folding", {}), raw.get("runs") or {"reference": {}}
+    folding = raw.get("folding", {})
+    runs = raw.get("runs") or {"reference": {}}
     if not isinstance(folding, dict) or not isinstance(runs, dict):
         return raw | {"folding": folding, "runs": runs}
-    base = _merged(PRESETS.get(str(folding.get("preset")), {}), folding)
+    base = _merged(_preset(folding), folding)
     complete = {}
     for name, run in runs.items():
         own = run or {}
-        is_preset = isinstance(own, dict) and "preset" in own
-        inherited = (
-            _merged(folding, PRESETS.get(str(own["preset"]), {})) if is_preset else base
-        )
+        inherited = base
+        if isinstance(own, dict) and "preset" in own:
+            inherited = _merged(folding, _preset(own))
         complete[name] = _merged(inherited, own)
     return raw | {"folding": base, "runs": complete}
+
+
+def _preset(section: dict[str, Any]) -> dict[str, Any]:
+    return PRESETS.get(str(section.get("preset")), {})
 
 
 def _merged(base: Any, over: Any, key: str = "") -> Any:
     """Return a section with the keys of another on top; inner sections are merged, but
     not values that vary."""
     if key == "growth":
-        base, over = (
-            {"model": growth} if isinstance(growth, str) else growth
-            for growth in (base, over)
-        )
+        base = _growth_section(base)
+        over = _growth_section(over)
     if not isinstance(base, dict) or not isinstance(over, dict) or key in VARYING:
         return over
-    # another growth model has other keys
-    if key == "growth" and over.get("model", base.get("model")) != base.get("model"):
-        return over
-    return base | {
-        name: _merged(base.get(name), value, name) for name, value in over.items()
-    }
+    if key == "growth":
+        model = base.get("model")
+        # another growth model has other keys
+        if over.get("model", model) != model:
+            return over
+    merged = dict(base)
+    for name, value in over.items():
+        merged[name] = _merged(base.get(name), value, name)
+    return merged
+
+
+def _growth_section(growth: Any) -> Any:
+    return {"model": growth} if isinstance(growth, str) else growth
 
 
 def members_of(name: str, run: Run) -> dict[str, Variation]:
     """Return the variations of a run's ensemble by the name of the member; empty if it
     has none."""
-    variations = run.ensemble.variations if run.ensemble else []
-    return {
-        f"{name}-member-{variation.number + 1}": variation for variation in variations
-    }
+    members = {}
+    for variation in variations(run.ensemble or 0):
+        members[f"{name}-member-{variation.number + 1}"] = variation
+    return members
 
 
 def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:
     """Return the ids of the brains that a run folds, in the order of `ids`."""
     start = study_start if run.start is None else run.start
+    if start is None:
+        return []
+    if start == ALL:
+        return list(ids)
     if start == FIRST:
         return list(ids[:1])
-    starts = ids if start == ALL else [start] if isinstance(start, str) else start or ()
-    return [brain for brain in ids if brain in starts]
+    if isinstance(start, str):
+        start = (start,)
+    return [brain for brain in ids if brain in start]
 
 
 # growth
@@ -190,22 +204,6 @@ class GrowthSettings(Settings):
         )
 
 
-def growth_series(
-    brains: Sequence[BrainConfig],
-    given: Sequence[str] | Mapping[str, Sequence[str]] | None,
-) -> dict[str, list[str]]:
-    """Return the ids of the brains of each growth series that has two weeks or more, by
-    its name.
-
-    The names in a checked configuration are those of one series each (see
-    `growing_groups`).
-    """
-    return {
-        name: [brain.id for brain in members]
-        for name, members in growing_groups(brains, given)
-    }
-
-
 def growing_groups(
     brains: Sequence[BrainConfig],
     given: Sequence[str] | Mapping[str, Sequence[str]] | None,
@@ -219,46 +217,41 @@ def growing_groups(
     series: list[tuple[str, Sequence[BrainConfig]]] = []
     if isinstance(given, Mapping):
         for name, ids in given.items():
-            series.append(
-                (name, [brain for brain in brains if brain.id in ids or ALL in ids])
-            )
+            members = [brain for brain in brains if brain.id in ids or ALL in ids]
+            series.append((name, members))
     else:
-        groups: dict[tuple[str | None, str | None, str], list[BrainConfig]] = {}
+        groups: dict[tuple[str, str, str], list[BrainConfig]] = {}
         for brain in brains:
             if given is None or brain.id in given:
-                side = f"{brain.sides[0]} hemisphere" if len(brain.sides) == 1 else ""
-                group = brain.subject, brain.population, side
-                groups.setdefault(group, []).append(brain)
-        for (subject, population, side), members in groups.items():
-            by_kind = _series_by_kind(members)
+                side = f"{brain.sides[0]} hemisphere" if brain.hemisphere else ""
+                owner = (brain.subject or "", brain.population or "", side)
+                groups.setdefault(owner, []).append(brain)
+        for owner, same_owner in groups.items():
+            by_kind = _series_by_kind(same_owner)
+            has_owner = any(owner[:2])
             for kind, same_kind in by_kind.items():
-                parts = [subject or "", population or "", side]
-                parts += (
-                    [kind] if len(by_kind) > 1 or not (subject or population) else []
-                )
-                name = (
-                    ", ".join(part for part in parts if part)
-                    if len(groups) > 1
-                    else kind
-                )
+                parts = [part for part in owner if part]
+                if len(by_kind) > 1 or not has_owner:
+                    parts.append(kind)
+                name = ", ".join(parts) if len(groups) > 1 else kind
                 series.append((name, same_kind))
-    return [(name, members) for name, members in series if _ages(members) > 1]
+    return [(name, members) for name, members in series if _n_weeks(members) > 1]
 
 
 def _series_by_kind(brains: Sequence[BrainConfig]) -> dict[str, Sequence[BrainConfig]]:
-    volumes = [brain for brain in brains if brain.has_labels]
     surfaces = [brain for brain in brains if not brain.has_labels]
-    by_kind: dict[str, Sequence[BrainConfig]] = {"surface": surfaces, "volume": volumes}
-    present = {kind: members for kind, members in by_kind.items() if members}
+    volumes = [brain for brain in brains if brain.has_labels]
+    if not volumes:
+        return {"surface": surfaces}
+    if not surfaces:
+        return {"volume": volumes}
     # a kind with a single week can only be compared across kinds
-    return (
-        present
-        if len(present) == 1 or all(_ages(members) > 1 for members in present.values())
-        else {"all": brains}
-    )
+    if min(_n_weeks(surfaces), _n_weeks(volumes)) < 2:
+        return {"all": brains}
+    return {"surface": surfaces, "volume": volumes}
 
 
-def _ages(brains: Sequence[BrainConfig]) -> int:
+def _n_weeks(brains: Sequence[BrainConfig]) -> int:
     return len({brain.week for brain in brains})
 
 
@@ -338,10 +331,8 @@ class CalibrationSettings(ComparisonSettings):
     """What is minimised: the weights of one or more measures (docs/metrics.md)."""
     rounds: tuple[Annotated[int, Field(ge=1, le=MAX_RUNS)], ...] = (12, 4, 4, 4)
     """Number of runs in each round: at least 3 in the first, at most 40 in all."""
-    seed: int = Field(0, ge=0)
-    """Seed of the sequence and of the estimator."""
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         if not 1 <= len(self.parameters) <= MAX_PARAMETERS:
             yield KeyProblem(
                 f"found {len(self.parameters)}; expected 1 to {MAX_PARAMETERS}",
@@ -372,12 +363,11 @@ class CalibrationSettings(ComparisonSettings):
     @property
     def runs(self) -> dict[str, int]:
         # the round of each run, by name
-        rounds = [
-            number for number, size in enumerate(self.rounds) for _ in range(size)
-        ]
-        return {
-            f"calibration-{index:02d}": number for index, number in enumerate(rounds)
-        }
+        rounds: dict[str, int] = {}
+        for number, size in enumerate(self.rounds):
+            for _ in range(size):
+                rounds[f"calibration-{len(rounds):02d}"] = number
+        return rounds
 
 
 def changed(run: Run, changes: Mapping[str, Any]) -> Run:
@@ -397,18 +387,20 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
     return type(run).model_validate(raw)
 
 
-def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Any]]]:
+def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Value]]]:
     """Yield the name and the varied values of each run of a sweep, the last key varying
     fastest."""
     for values in product(*study.vary.values()):
-        texts = [
-            _short(value) if isinstance(value, float) else value for value in values
-        ]
-        yield "-".join([name, *texts]), dict(zip(study.vary, values, strict=True))
+        texts = map(_short, values)
+        run = "-".join([name, *texts])
+        varied = zip(study.vary, values, strict=True)
+        yield run, dict(varied)
 
 
-def _short(number: float) -> str:
-    """Return a number in six digits, or in as many as it takes to tell it from all
-    others."""
-    short = f"{number:g}"
-    return short if float(short) == number else repr(number)
+def _short(value: str | float) -> str:
+    """Return a value as text: a number in six digits, or in as many as it takes to tell
+    it from all others."""
+    if isinstance(value, str):
+        return value
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)

@@ -4,13 +4,12 @@ right and other tissues.
 The shipped schemes are the files of the folder `schemes`, read by `io.yaml_files`.
 """
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import Field
 
 from ..shipped import SHIPPED
-from .base import KeyProblem, Settings
+from .base import KeyProblem, Problems, Settings
 
 SCHEME_FILES = {
     path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))
@@ -60,7 +59,7 @@ class SchemeSettings(Settings):
             named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
         return dict(sorted((named | self.known).items()))
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         if not self.cerebrum:
             yield KeyProblem(
                 "found no labels; it should have one or more", ("cerebrum",)
@@ -74,9 +73,11 @@ class SchemeSettings(Settings):
             "ventricles",
         ):
             labels = getattr(self, key)
-            if twice := sorted({label for label in labels if labels.count(label) > 1}):
+            twice = sorted({label for label in labels if labels.count(label) > 1})
+            outside = sorted(set(labels) - set(self.cerebrum))
+            if twice:
                 yield KeyProblem(f"found {_as_text(twice)} more than once", (key,))
-            if outside := sorted(set(labels) - set(self.cerebrum)):
+            if outside:
                 yield KeyProblem(
                     f"found {_as_text(outside)}; it should have labels of the cerebrum"
                     " only",
@@ -87,7 +88,8 @@ class SchemeSettings(Settings):
                 "found all of the cerebrum; the tissue inside the cortex is missing",
                 ("cortex",),
             )
-        if both := sorted(set(self.left) & set(self.right)):
+        both = sorted(set(self.left) & set(self.right))
+        if both:
             yield KeyProblem(
                 f"found {_as_text(both)}, which are also in left", ("right",)
             )

@@ -198,36 +198,29 @@ def is_too_coarse(order: int, elements: float) -> bool:
 def element_error(order: int, elements: float) -> tuple[float, str]:
     """Return the error of the fastest wave in % for a number of elements through the
     cortex, and text with both."""
-    errors = ELEMENT_ERRORS[order]
-    error = float(
-        np.exp(
-            np.interp(
-                np.log(max(0.1, elements)),
-                np.log(list(errors)),
-                np.log(list(errors.values())),
-            )
-        )
-    )
+    counts = np.log(list(ELEMENT_ERRORS[order]))
+    errors = np.log(list(ELEMENT_ERRORS[order].values()))
+    error = float(np.exp(np.interp(np.log(max(0.1, elements)), counts, errors)))
     bound = "more than" if is_too_coarse(order, elements) else "up to"
+    kind = "linear" if order == 1 else "quadratic"
     text = (
-        f"the fastest wave of folding grows {bound} {error:.0f} % too slowly (at"
-        " Poisson's ratio 0.45)"
+        f"{rounded_elements(elements):g} {kind} elements through the cortex: the"
+        f" fastest wave of folding grows {bound} {error:.0f} % too slowly (at Poisson's"
+        " ratio 0.45)"
     )
     if order == 1 and error > LARGE_ELEMENT_ERROR:
-        text += (
-            " (quadratic elements on as many nodes: up to"
-            f" {element_error(2, max(elements / 2, 1.0))[0]:.0f} %)"
-        )
-    kind = "linear" if order == 1 else "quadratic"
-    return (
-        error,
-        f"{rounded_elements(elements):g} {kind} elements through the cortex: {text}",
-    )
+        quadratic, _ = element_error(2, max(elements / 2, 1.0))
+        text += f" (quadratic elements on as many nodes: up to {quadratic:.0f} %)"
+    return error, text
 
 
 def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
     """Return names of (run, brain) pairs for figures: the run, with the brain if the
     run has several."""
-    pairs = [(run, brain) for run, brain in folded]
+    pairs = list(folded)
     counts = Counter(run for run, _ in pairs)
-    return [f"{run} · {brain}" if counts[run] > 1 else run for run, brain in pairs]
+    names = []
+    for run, brain in pairs:
+        has_several = counts[run] > 1
+        names.append(f"{run} · {brain}" if has_several else run)
+    return names

@@ -2,7 +2,7 @@
 the brain, or both."""
 
 import operator
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from pydantic import Field, field_validator
 from pydantic.fields import FieldInfo
 
 from ..formats import format_of, is_volume
-from .base import FirstIf, InputFile, KeyProblem, Settings
+from .base import FirstIf, InputFile, KeyProblem, Problems, Settings
 from .weeks import AnyWeek, week_of
 
 Maps = Mapping[str, NDArray[np.float64]]
@@ -50,7 +50,7 @@ class Varying(Settings):
     def _by_week(cls, value: dict[float, float] | None) -> dict[float, float] | None:
         return None if value is None else dict(sorted(value.items()))
 
-    def problems(self) -> Iterator[KeyProblem]:
+    def problems(self) -> Problems:
         if not self.weeks and self.map is None:
             yield KeyProblem("found no values; expected a number, `weeks` or a `map`")
         maps, surfaces = files_of(self.map), files_of(self.surface)
@@ -92,12 +92,11 @@ operators."""
 def varying(default: float, **bounds: float) -> Any:
     """Return a field for a parameter that may vary; `bounds` (gt, ge, le) apply to each
     number in it."""
-    return Field(
-        default,
-        json_schema_extra={
-            BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()
-        },
-    )
+    extra: dict[str, Any] = {}
+    for name, bound in bounds.items():
+        key, *_ = BOUND_TEXTS[name]
+        extra[key] = bound
+    return Field(default, json_schema_extra=extra)
 
 
 def bounds_of(field: FieldInfo) -> dict[str, float]:
@@ -110,10 +109,12 @@ def bounds_of(field: FieldInfo) -> dict[str, float]:
 def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
     """Raise ValueError if a number, or one of a curve without a map, is out of
     bounds."""
-    if isinstance(value, Varying):
-        numbers = [] if value.map is not None else list((value.weeks or {}).values())
-    else:
+    if not isinstance(value, Varying):
         numbers = [value]
+    elif value.map is None:
+        numbers = list(weeks_of(value).values())
+    else:
+        numbers = []
     for name, bound in bounds.items():
         _, text, holds = BOUND_TEXTS[name]
         if not all(holds(number, bound) for number in numbers):
@@ -122,9 +123,9 @@ def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
 
 def map_of(value: float | Varying) -> str | None:
     """Return the name of the map of a parameter in a run's parameters, or None."""
-    return (
-        value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
-    )
+    if isinstance(value, Varying) and isinstance(value.map, str):
+        return value.map
+    return None
 
 
 def weeks_of(value: float | Varying) -> dict[float, float]:
@@ -139,14 +140,18 @@ def curve_at(value: float | Varying, week: float) -> float:
     if not isinstance(value, Varying):
         return value
     curve = weeks_of(value)
-    return float(np.interp(week, list(curve), list(curve.values()))) if curve else 1.0
+    if not curve:
+        return 1.0
+    return float(np.interp(week, list(curve), list(curve.values())))
 
 
 def mean_of_curve(value: float | Varying) -> float:
     """Return the mean of a parameter's curve over its weeks, 1 without a curve: about
     what its map is multiplied by."""
     curve = weeks_of(value)
-    return float(np.mean([*curve.values()])) if curve else 1.0
+    if not curve:
+        return 1.0
+    return float(np.mean([*curve.values()]))
 
 
 def value_at(
@@ -154,8 +159,9 @@ def value_at(
 ) -> float | NDArray[np.float64]:
     """Return a parameter's value at a week: a number, or (n,) values if it has a
     map."""
+    factor = curve_at(value, week)
     name = map_of(value)
-    return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
+    return factor if name is None else factor * maps[name]
 
 
 def value_range(
@@ -166,7 +172,11 @@ def value_range(
     name = map_of(value)
     places = np.ones(1) if name is None else maps[name]
     # the extremes of a curve lie at its weeks, or at the ends
-    weeks = [start, *(week for week in weeks_of(value) if start < week < end), end]
+    weeks = [start, end]
+    for week in weeks_of(value):
+        if start < week < end:
+            weeks.append(week)
     curve = [curve_at(value, week) for week in weeks]
-    products = np.outer(curve, [places.min(), places.max()])
+    extremes = [places.min(), places.max()]
+    products = np.outer(curve, extremes)
     return float(products.min()), float(products.max())

@@ -175,11 +175,9 @@ def _kind(words: Sequence[str]) -> Kind | None:
         return "scan"
     if distinct == {"age"}:
         return "age"
-    return (
-        "gestational"
-        if distinct <= AGE_WORDS | UNIT_WORDS and distinct - {"d", "w", "y", "mo"}
-        else None
-    )
+    if distinct <= AGE_WORDS | UNIT_WORDS and distinct - {"d", "w", "y", "mo"}:
+        return "gestational"
+    return None
 
 
 def age_columns(
@@ -195,19 +193,19 @@ def age_columns(
     described = {column_key(str(key)): value for key, value in keys}
     columns = []
     for name in names:
-        words = column_key(name).split("_")
-        if kind := _kind(words):
-            facts = described.get("_".join(words), {})
-            facts = facts if isinstance(facts, dict) else {"Description": facts}
-            ending = (
-                words[-1]
-                if (len(words) > 1 and words[-1] in UNIT_WORDS)
-                or words[-1].startswith("day")
-                else ""
-            )
-            columns.append(
-                AgeColumn(name, kind, *_unit(kind, ending, facts, sidecar_name))
-            )
+        key = column_key(name)
+        words = key.split("_")
+        kind = _kind(words)
+        if kind is None:
+            continue
+        facts = described.get(key, {})
+        if not isinstance(facts, dict):
+            facts = {"Description": facts}
+        last = words[-1]
+        has_unit = last.startswith("day") or (len(words) > 1 and last in UNIT_WORDS)
+        ending = last if has_unit else ""
+        unit, problem, is_other = _unit(kind, ending, facts, sidecar_name)
+        columns.append(AgeColumn(name, kind, unit, problem, is_other))
     return columns
 
 
@@ -255,13 +253,9 @@ def _unit(
 def unit_of(name: str) -> str | None:
     """Return the unit with a name, weeks or days, or None."""
     name = name.lower().strip(" .")
-    return (
-        "weeks"
-        if WEEKS_UNIT.fullmatch(name)
-        else "days"
-        if DAYS_UNIT.fullmatch(name)
-        else None
-    )
+    if WEEKS_UNIT.fullmatch(name):
+        return "weeks"
+    return "days" if DAYS_UNIT.fullmatch(name) else None
 
 
 def choose_age(
@@ -347,15 +341,19 @@ def _shows_birth(age: TableAge) -> bool:
 def may_be_days(texts: Iterable[str]) -> list[str]:
     """Return examples if the decimals of all ages in weeks may be days: tenths from 0
     to 6, not only halves."""
-    decimals = [
-        (text, TENTHS.fullmatch(text)) for text in texts if re.search("[.,]", text)
-    ]
-    tenths = [
-        (text, match[1]) for text, match in decimals if match and match[1] in "0123456"
-    ]
-    are_halves = {digit for _, digit in tenths} <= {"0", "5"}
-    is_ambiguous = len(decimals) == len(tenths) >= MIN_AMBIGUOUS_AGES and not are_halves
-    return [text for text, _ in tenths[:3]] if is_ambiguous else []
+    examples = []
+    digits = set()
+    for text in texts:
+        if not re.search("[.,]", text):
+            continue
+        match = TENTHS.fullmatch(text)
+        if match is None or match[1] not in "0123456":
+            return []
+        examples.append(text)
+        digits.add(match[1])
+    if len(examples) < MIN_AMBIGUOUS_AGES or digits <= {"0", "5"}:
+        return []
+    return examples[:3]
 
 
 def week_in_name(parts: Sequence[str], notation: WeekNotation | None = None) -> ScanAge:

@@ -12,14 +12,14 @@ from typing import Any
 from ..io.files import files_below
 from ..io.yaml_files import read_keys
 from ..settings.atlas import DOWNLOADS, Atlas, AtlasFileRecord, AtlasSettings, FileKey
-from ..settings.base import KeyProblem, own_name
+from ..settings.base import KeyProblem, Problems, own_name
 from ..settings.root import Config
 
 
 @dataclass(frozen=True)
 class AtlasFile:
-    """A file of an atlas: its series, week and key, its path, the address for its
-    download, and its size and checksum.
+    """A file of an atlas: its series, week and key, the id of its brain, its path, the
+    address for its download, and its size and checksum.
 
     `copies` are the files of that name in the folder: none if it is missing, several if
     it is ambiguous.
@@ -28,6 +28,7 @@ class AtlasFile:
     series: str
     week: float
     key: FileKey
+    brain: str
     path: Path
     url: str | None
     record: AtlasFileRecord
@@ -45,13 +46,9 @@ class UsedAtlas:
     def series(self) -> list[str]:
         """The names of the series that are used."""
         series = self.settings.series
-        return (
-            list(self.atlas.series)
-            if series is None
-            else [series]
-            if isinstance(series, str)
-            else list(series)
-        )
+        if series is None:
+            return list(self.atlas.series)
+        return [series] if isinstance(series, str) else list(series)
 
     @property
     def folder(self) -> Path:
@@ -61,12 +58,11 @@ class UsedAtlas:
     @cached_property
     def files(self) -> list[AtlasFile]:
         """The files that the study uses, by series and week."""
-        return [
-            file
-            for name in self.series
-            if name in self.atlas.series
-            for file in self._files_of(name)
-        ]
+        files: list[AtlasFile] = []
+        for name in self.series:
+            if name in self.atlas.series:
+                files += self._files_of(name)
+        return files
 
     @property
     def missing(self) -> list[AtlasFile]:
@@ -75,61 +71,69 @@ class UsedAtlas:
 
     def _files_of(self, name: str) -> Iterator[AtlasFile]:
         series = self.atlas.series[name]
-        root, weeks = (self.atlas.url or "").rstrip("/"), self.settings.weeks
-        for week in sorted(
-            series.weeks
-            if weeks is None
-            else self.known_weeks(name).intersection(weeks)
-        ):
-            for key in series.files if self.settings.images else series.needed:
-                path = series.files[key].format(
-                    week=int(week) if week == int(week) else week
+        weeks = set(series.weeks)
+        if self.settings.weeks is not None:
+            weeks = self.known_weeks(name).intersection(self.settings.weeks)
+        keys = series.files if self.settings.images else series.needed
+        root = (self.atlas.url or "").rstrip("/")
+        for week in sorted(weeks):
+            brain = self.atlas.brain_id(name, week)
+            records = series.weeks.get(week, {})
+            for key in keys:
+                pattern = series.files[key]
+                # `{week}` has no decimals where there are none
+                path = pattern.format(week=int(week) if week == int(week) else week)
+                copies = self._in_folder[pattern].get(week) or self._shipped(path)
+                yield AtlasFile(
+                    series=name,
+                    week=week,
+                    key=key,
+                    brain=brain,
+                    path=copies[0] if copies else self.folder / path,
+                    # unpublished files have no address
+                    url=f"{root}/{path}" if root and week in series.weeks else None,
+                    record=records.get(key, AtlasFileRecord()),
+                    copies=tuple(copies),
                 )
-                in_folder = self._in_folder[series.files[key]].get(week)
-                copies = in_folder or self._shipped(path)
-                # unpublished files have no address
-                url = f"{root}/{path}" if root and week in series.weeks else None
-                record = series.weeks.get(week, {}).get(key, AtlasFileRecord())
-                place = copies[0] if copies else self.folder / path
-                yield AtlasFile(name, week, key, place, url, record, tuple(copies))
 
     def known_weeks(self, name: str) -> set[float]:
         """Return the weeks of a series that are published, or whose required files are
         in the folder."""
         series = self.atlas.series[name]
-        present = [set(self._in_folder[series.files[key]]) for key in series.needed]
-        return set(series.weeks) | set.intersection(*present)
+        weeks = [set(self._in_folder[series.files[key]]) for key in series.needed]
+        complete = set.intersection(*weeks)
+        return complete | set(series.weeks)
 
     @cached_property
     def _in_folder(self) -> dict[str, dict[float, list[Path]]]:
-        patterns = {
-            pattern
-            for series in self.atlas.series.values()
-            for pattern in series.files.values()
-        }
         files = files_below(self.folder)
-        return {pattern: _copies(pattern, files) for pattern in patterns}
+        copies = {}
+        for series in self.atlas.series.values():
+            for pattern in series.files.values():
+                copies[pattern] = _copies(pattern, files)
+        return copies
 
     def _shipped(self, path: str) -> list[Path]:
         if self.atlas.folder is None:
             return []
-        place = own_name(self.settings.description.parent / self.atlas.folder / path)
+        folder = self.settings.description.parent / self.atlas.folder
+        place = own_name(folder / path)
         return [place] if place.is_file() else []
 
 
 def _copies(pattern: str, files: Iterable[Path]) -> dict[float, list[Path]]:
-    parts = pattern.split("/")
-    tail = "/".join(
-        parts[max(number for number, part in enumerate(parts) if "{week" in part) :]
-    )
-    pieces = list(Formatter().parse(tail))
-    name = "".join(
-        re.escape(text) + (r"(\d+(?:\.\d+)?)" if field else "")
-        for text, field, *_ in pieces
-    )
+    """Return files by week: those whose path ends as a pattern does, from the last part
+    with the week on."""
+    start = pattern.rfind("/", 0, pattern.rindex("{week")) + 1
+    name = ""
+    for text, field, *_ in Formatter().parse(pattern[start:]):
+        name += re.escape(text)
+        if field:
+            name += r"(\d+(?:\.\d+)?)"
     copies: dict[float, list[Path]] = {}
     for path in files:
-        if match := re.fullmatch(f"(?:.*/)?{name}", path.as_posix()):
+        match = re.fullmatch(f"(?:.*/)?{name}", path.as_posix())
+        if match:
             copies.setdefault(float(match[1]), []).append(path)
     return copies
 
@@ -140,30 +144,28 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
     entries: dict[str, dict[str, Any]] = {}
     for file in used.files:
         series = used.atlas.series[file.series]
-        name = used.atlas.brain_id(file.series, file.week)
-        entry = entries.setdefault(
-            name, {"id": name, "week": file.week, "population": series.population}
-        )
+        new = {"id": file.brain, "week": file.week, "population": series.population}
+        entry = entries.setdefault(file.brain, new)
         if file.key in ("left", "right"):
             entry.setdefault("hemispheres", {})[file.key] = str(file.path)
         elif file.key in ("white_left", "white_right"):
-            entry.setdefault("white", ["", ""])[file.key == "white_right"] = str(
-                file.path
-            )
+            sides = entry.setdefault("white", ["", ""])
+            sides[file.key == "white_right"] = str(file.path)
         else:
             entry[file.key] = str(file.path)
-        if "labels" in series.files:
-            entry |= {"scheme": series.scheme, "affine_from": series.affine_from}
-        else:
-            entry["coordinates"] = series.coordinates
+        if series.scheme is not None:
+            entry["scheme"] = series.scheme
     return list(entries.values())
 
 
-def atlas_problems(used: UsedAtlas) -> Iterator[KeyProblem]:
+def atlas_problems(used: UsedAtlas) -> Problems:
     """Yield the problems of a section `atlas` with respect to its atlas and its
     folder."""
-    atlas, settings, licence = used.atlas, used.settings, used.atlas.licence
-    if unknown := [name for name in used.series if name not in atlas.series]:
+    atlas = used.atlas
+    settings = used.settings
+    licence = atlas.licence
+    unknown = [name for name in used.series if name not in atlas.series]
+    if unknown:
         yield KeyProblem(
             f"found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}",
             ("series",),
@@ -174,24 +176,22 @@ def atlas_problems(used: UsedAtlas) -> Iterator[KeyProblem]:
         return
     if licence.accept and not settings.accept_licence:
         name = ", ".join(filter(None, (licence.name, licence.url)))
-        text = (
+        yield KeyProblem(
             f"found false; true accepts the licence of {atlas.name} ({name}):"
-            f" {licence.terms}"
+            f" {licence.terms}",
+            ("accept_licence",),
         )
-        yield KeyProblem(text, ("accept_licence",))
     available = set.union(*map(used.known_weeks, used.series))
-    if unknown_weeks := set(settings.weeks or ()) - available:
-        source = (
-            atlas.name
-            if settings.series is None
-            else f"{atlas.name} ({', '.join(used.series)})"
+    unknown_weeks = set(settings.weeks or ()) - available
+    if unknown_weeks:
+        source = atlas.name
+        if settings.series is not None:
+            source += f" ({', '.join(used.series)})"
+        yield KeyProblem(
+            f"{source} has no files of {_listed(unknown_weeks)} GW; it has"
+            f" {_listed(available)} GW. Weeks are not rounded: write one of these",
+            ("weeks",),
         )
-        weeks = f"{_listed(unknown_weeks)} GW; it has {_listed(available)} GW"
-        text = (
-            f"{source} has no files of {weeks}. Weeks are not rounded: write one of"
-            " these"
-        )
-        yield KeyProblem(text, ("weeks",))
     for file in used.files:
         if len(file.copies) > 1:
             yield KeyProblem(
@@ -208,29 +208,28 @@ def atlas_problems(used: UsedAtlas) -> Iterator[KeyProblem]:
 def retrieval_note(used: UsedAtlas) -> str:
     """Return the note that is shown before missing files of an atlas are fetched: size,
     reference and licence."""
-    atlas, sizes = used.atlas, [file.record.bytes for file in used.missing]
-    size = f" ({sum(size or 0 for size in sizes) / 1e6:.1f} MB)" if all(sizes) else ""
-    checks = (
-        ""
-        if all(file.record.sha256 for file in used.missing)
-        else "; no checksums are known"
-    )
-    count = f"{len(sizes)} file{'s' if len(sizes) > 1 else ''}"
-    lines = [
-        f"{atlas.name}: {count}{size} to fetch into {used.folder} where a stage needs"
-        f" them{checks}"
-    ]
+    atlas = used.atlas
+    records = [file.record for file in used.missing]
+    files = "file" if len(records) == 1 else "files"
+    note = f"{atlas.name}: {len(records)} {files}"
+    if all(record.bytes for record in records):
+        size = sum(record.bytes or 0 for record in records)
+        note += f" ({size / 1e6:.1f} MB)"
+    note += f" to fetch into {used.folder} where a stage needs them"
+    if not all(record.sha256 for record in records):
+        note += "; no checksums are known"
     if atlas.reference is not None:
-        place = (
-            f"doi {atlas.reference.doi}" if atlas.reference.doi else atlas.reference.url
-        )
-        lines.append(
-            "cite: " + ", ".join(filter(None, (atlas.reference.citation, place)))
-        )
-    address = f" ({atlas.licence.url})" if atlas.licence.url else ""
-    return "\n  ".join(
-        [*lines, f"licence: {atlas.licence.name}{address}. {atlas.licence.terms}"]
-    )
+        reference = atlas.reference
+        note += f"\n  cite: {reference.citation}"
+        if reference.doi:
+            note += f", doi {reference.doi}"
+        elif reference.url:
+            note += f", {reference.url}"
+    licence = atlas.licence
+    note += f"\n  licence: {licence.name}"
+    if licence.url:
+        note += f" ({licence.url})"
+    return f"{note}. {licence.terms}"
 
 
 def _listed(weeks: Iterable[float]) -> str:
@@ -249,9 +248,9 @@ def used_atlases(config: Config) -> list[UsedAtlas]:
 def known_checksums(atlases: Iterable[UsedAtlas]) -> dict[str, tuple[str, str]]:
     """Return the atlas and the SHA-256 of each atlas file whose checksum is known, by
     the file's path."""
-    return {
-        str(file.path): (used.atlas.name, file.record.sha256)
-        for used in atlases
-        for file in used.files
-        if file.record.sha256 is not None
-    }
+    checksums = {}
+    for used in atlases:
+        for file in used.files:
+            if file.record.sha256 is not None:
+                checksums[str(file.path)] = (used.atlas.name, file.record.sha256)
+    return checksums

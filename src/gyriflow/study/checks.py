@@ -13,7 +13,7 @@ from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
 from ..names import column_part, folder_name, merged_names
 from ..quantities import METRICS
-from ..settings.base import Key, KeyProblem, did_you_mean, messages
+from ..settings.base import Key, KeyProblem, Problems, did_you_mean, problems_in
 from ..settings.folding import VARYING, value_problems
 from ..settings.root import Config
 from ..settings.runs import (
@@ -27,7 +27,6 @@ from ..settings.runs import (
     SweepSettings,
     changed,
     growing_groups,
-    growth_series,
     members_of,
     starts_of,
     variants,
@@ -67,11 +66,23 @@ NO_FOLDING_KEY = "is not a key of folding"
 
 def problems_between(config: Config) -> list[KeyProblem]:
     """Return the problems between the sections of a configuration, each once."""
-    checks = (names, run_names, starts, runs, growth, studies, calibration, metrics)
-    return list(dict.fromkeys(problem for check in checks for problem in check(config)))
+    checks = (
+        _names,
+        _run_names,
+        _starts,
+        _runs,
+        _growth,
+        _studies,
+        _calibration,
+        _metrics,
+    )
+    problems: list[KeyProblem] = []
+    for check in checks:
+        problems += check(config)
+    return list(dict.fromkeys(problems))
 
 
-def names(config: Config) -> Iterator[KeyProblem]:
+def _names(config: Config) -> Problems:
     """Yield problems with the names of brains, runs, studies and schemes. Folders have
     the names of brains and runs."""
     if not config.brains and not config.atlas:
@@ -94,30 +105,23 @@ def names(config: Config) -> Iterator[KeyProblem]:
             ("brains",),
         )
     for first, second in merged_names(config.studies, folder_name):
-        text = (
+        yield KeyProblem(
             f"differs from the study {first} only in case, so some disks mix up their"
-            " folders; rename one"
+            " folders; rename one",
+            ("studies", second),
         )
-        yield KeyProblem(text, ("studies", second))
-    reserved = {"runs": (MEASURED,), "schemes": tuple(SCHEMES)}
-    for section, taken in reserved.items():
-        for name in sorted(set(getattr(config, section)) & set(taken)):
-            yield KeyProblem("the name is taken; choose another", (section, name))
+    taken: list[Key] = []
+    if MEASURED in config.runs:
+        taken.append(("runs", MEASURED))
+    for name in sorted(config.schemes):
+        if name in SCHEMES:
+            taken.append(("schemes", name))
     for name in config.studies:
         if folder_name(name) in RESERVED_STUDIES:
-            yield KeyProblem("the name is taken; choose another", ("studies", name))
-    covariates = {
-        name: number
-        for number, brain in reversed([*enumerate(config.brains)])
-        for name in brain.covariates
-    }
-    for name, number in covariates.items():
-        if RESULT_COLUMNS.fullmatch(name):
-            text = (
-                "is the name of a column of the results (metrics_wide.csv); rename the"
-                " covariate"
-            )
-            yield KeyProblem(text, ("brains", number, "covariates", name))
+            taken.append(("studies", name))
+    for key in taken:
+        yield KeyProblem("the name is taken; choose another", key)
+    yield from _covariates(config)
     schemes = dict.fromkeys([*SCHEMES, *config.schemes])
     for number, brain in enumerate(config.brains):
         if brain.scheme not in (None, *schemes):
@@ -127,7 +131,21 @@ def names(config: Config) -> Iterator[KeyProblem]:
             )
 
 
-def starts(config: Config) -> Iterator[KeyProblem]:
+def _covariates(config: Config) -> Problems:
+    """Yield the first brain with each covariate that has the name of a column."""
+    found = set()
+    for number, brain in enumerate(config.brains):
+        for name in brain.covariates:
+            if name not in found and RESULT_COLUMNS.fullmatch(name):
+                found.add(name)
+                yield KeyProblem(
+                    "is the name of a column of the results (metrics_wide.csv); rename"
+                    " the covariate",
+                    ("brains", number, "covariates", name),
+                )
+
+
+def _starts(config: Config) -> Problems:
     """Yield problems of the start brains of the study and of its runs."""
     yield from _start_problems(config.start, config, ("start",))
     for name, run in config.runs.items():
@@ -140,63 +158,72 @@ def starts(config: Config) -> Iterator[KeyProblem]:
         )
 
 
-def _start_problems(
-    start: Start | None, config: Config, key: Key
-) -> Iterator[KeyProblem]:
-    if start is None or start in (ALL, FIRST) or not config.brains:
+def _start_problems(start: Start | None, config: Config, key: Key) -> Problems:
+    if start in (None, ALL, FIRST) or not config.brains:
         return
-    ids = [start] if isinstance(start, str) else list(start)
+    ids = [start] if isinstance(start, str) else list(start or ())
     if not ids:
         yield KeyProblem("found no ids; expected one or more", key)
-    if twice := [name for name, count in Counter(ids).items() if count > 1]:
+    twice = [name for name, count in Counter(ids).items() if count > 1]
+    if twice:
         yield KeyProblem(f"found {', '.join(twice)} more than once", key)
     yield from _unknown(ids, config, key)
 
 
-def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[KeyProblem]:
+def _unknown(ids: Iterable[str], config: Config, key: Key) -> Problems:
     brains = [brain.id for brain in config.brains]
     for name in dict.fromkeys(ids):
         if name not in brains:
-            yield KeyProblem(
-                f"found {name!r}, which is not a brain; {did_you_mean(name, brains)}",
-                key,
-            )
+            hint = did_you_mean(name, brains)
+            yield KeyProblem(f"found {name!r}, which is not a brain; {hint}", key)
 
 
-def runs(config: Config) -> Iterator[KeyProblem]:
+def _runs(config: Config) -> Problems:
     """Yield problems between the settings of each run and its start brains."""
-    by_id = {brain.id: brain for brain in config.brains}
+    weeks = {brain.id: brain.week for brain in config.brains}
     for name, run in config.runs.items():
-        brains = [by_id[brain] for brain in starts_of(config.start, run, list(by_id))]
-        weeks = [
-            (brain.week, f"the week of the start brain {brain.id}") for brain in brains
-        ]
-        # without a start brain, check the values at the end
-        for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
-            for problem in value_problems(run, week, {}, called):
-                yield KeyProblem(problem.text, _place(name, problem.key, config))
-        for key in VARYING if len(brains) > 1 else ():
+        problems: list[KeyProblem] = []
+        starts = starts_of(config.start, run, list(weeks))
+        for start in starts:
+            called = f"the week of the start brain {start}"
+            problems += value_problems(run, weeks[start], {}, called)
+        if not starts:
+            # check the values at the end
+            problems += value_problems(run, run.end_week - 1e-9, {}, "the start")
+        for key in VARYING:
             value = getattr(run, key)
-            if isinstance(value, Varying) and value.surface is not None:
-                ids = ", ".join(brain.id for brain in brains)
+            has_surface = isinstance(value, Varying) and value.surface is not None
+            if has_surface and len(starts) > 1:
                 text = (
                     "has a map on a surface, which belongs to one brain; the run"
-                    f" starts from {ids}"
+                    f" starts from {', '.join(starts)}"
                 )
-                yield KeyProblem(text, _place(name, (key,), config))
+                problems.append(KeyProblem(text, (key,)))
+        for problem in problems:
+            yield problem.inside(*_section(name, str(problem.key[0]), config))
 
 
-def run_names(config: Config) -> Iterator[KeyProblem]:
+def _section(run: str, key: str, config: Config) -> Key:
+    """Return the section to change a key of a run in: `folding` if all runs have the
+    same value."""
+    own = getattr(config.runs[run], key)
+    for settings in config.runs.values():
+        if getattr(settings, key) != own:
+            return ("runs", run)
+    return ("folding",)
+
+
+def _run_names(config: Config) -> Problems:
     """Yield runs with the name of another one. Runs of all sections have folders next
     to each other."""
-    earlier: dict[str, tuple[str, str]] = {}
+    earlier: dict[str, str] = {}
     for name, owner, key in _named_runs(config):
-        first, of = earlier.setdefault(folder_name(name), (name, owner))
-        if (first, of) != (name, owner):
-            pair = f"the run {name} of {owner} and the run {first} of {of}"
+        run = f"the run {name} of {owner}"
+        first = earlier.setdefault(folder_name(name), run)
+        if first != run:
             yield KeyProblem(
-                f"{pair} would share a folder; choose names that differ, not only in"
-                " case",
+                f"{run} and {first} would share a folder; choose names that differ, not"
+                " only in case",
                 key,
             )
 
@@ -204,8 +231,9 @@ def run_names(config: Config) -> Iterator[KeyProblem]:
 def _named_runs(config: Config) -> Iterator[tuple[str, str, Key]]:
     """Yield each run's name, what it is of, and the key with which its name is
     changed."""
-    for name in config.calibrate.runs if config.calibrate else ():
-        yield name, "the calibration", ("calibrate",)
+    if config.calibrate is not None:
+        for name in config.calibrate.runs:
+            yield name, "the calibration", ("calibrate",)
     for run, settings in config.runs.items():
         for name in members_of(run, settings):
             yield name, f"the ensemble of {run}", ("runs", run)
@@ -216,62 +244,51 @@ def _named_runs(config: Config) -> Iterator[tuple[str, str, Key]]:
             yield name, f"the study {study} ({values})", ("studies", study)
 
 
-def _place(run: str, key: Key, config: Config) -> Key:
-    values = [getattr(settings, str(key[0])) for settings in config.runs.values()]
-    return (
-        ("folding", *key)
-        if all(value == values[0] for value in values)
-        else ("runs", run, *key)
-    )
-
-
-def growth(config: Config) -> Iterator[KeyProblem]:
+def _growth(config: Config) -> Problems:
     """Yield problems between brains and growth series."""
-    growth_brains = config.growth.brains
-    named = dict(growth_brains) if isinstance(growth_brains, Mapping) else {}
-    lists: dict[Key, Sequence[str]] = {
-        ("growth", "brains", name): ids for name, ids in named.items()
-    }
-    if growth_brains is not None and not named:
-        lists = {("growth", "brains"): list(growth_brains)}
-    all_ids = [brain.id for brain in config.brains]
-    lists = {
-        key: all_ids if named and ALL in ids else ids for key, ids in lists.items()
-    }
-    unknown = [
-        problem for key, ids in lists.items() for problem in _unknown(ids, config, key)
-    ]
+    settings = config.growth
+    lists: dict[Key, Sequence[str]] = {}
+    if settings.brains and isinstance(settings.brains, Mapping):
+        all_brains = [brain.id for brain in config.brains]
+        for name, ids in settings.brains.items():
+            lists["growth", "brains", name] = all_brains if ALL in ids else ids
+    elif settings.brains is not None:
+        lists["growth", "brains"] = list(settings.brains)
+    unknown: list[KeyProblem] = []
+    for key, names in lists.items():
+        unknown += _unknown(names, config, key)
     yield from unknown
     if unknown:
         return
-    for key, ids in lists.items():
-        brains = [config.brain(brain) for brain in ids]
-        if (weeks := len({brain.week for brain in brains})) < 2:
+    for key, names in lists.items():
+        members = [config.brain(brain) for brain in names]
+        weeks = {brain.week for brain in members}
+        if len(weeks) < 2:
             yield KeyProblem(
-                f"found brains of {weeks} week(s); growth needs two or more", key
+                f"found brains of {len(weeks)} week(s); growth needs two or more", key
             )
-        mixed = sorted(
-            {brain.population or "of no known population" for brain in brains}
-        )
-        if named and len(mixed) > 1:
+        populations = {
+            brain.population or "of no known population" for brain in members
+        }
+        is_named = len(key) > 2
+        if is_named and len(populations) > 1:
             yield KeyProblem(
-                f"found brains {' and '.join(mixed)}; a growth curve is of one"
-                " population",
+                f"found brains {' and '.join(sorted(populations))}; a growth curve is"
+                " of one population",
                 key,
             )
-    names = [name for name, _ in growing_groups(config.brains, config.growth.brains)]
-    for name, count in Counter(names).items():
+    groups = growing_groups(config.brains, settings.brains)
+    series = Counter(name for name, _ in groups)
+    for name, count in series.items():
         if count > 1:
-            text = (
+            yield KeyProblem(
                 f"{count} growth series would have the name {name}; rename a subject or"
-                " a population"
+                " a population",
+                ("growth", "brains"),
             )
-            yield KeyProblem(text, ("growth", "brains"))
-    series = growth_series(config.brains, config.growth.brains)
-    preferred = config.growth.series
-    if preferred is not None and series and preferred not in series:
+    if settings.series is not None and series and settings.series not in series:
         yield KeyProblem(
-            f"found {preferred!r}; the series are {', '.join(series)}",
+            f"found {settings.series!r}; the series are {', '.join(series)}",
             ("growth", "series"),
         )
 
@@ -284,9 +301,9 @@ def norm_settings(config: Config) -> dict[str, Any]:
         "norms": 2,
         "open_sulci": config.surface.open_sulci,
         "edge_length_mm": config.surface.edge_length_mm,
-        **config.metrics.model_dump(
-            mode="json", include={"curvature_radius_mm", "spangy_modes", "spangy_mass"}
-        ),
+        "curvature_radius_mm": config.metrics.curvature_radius_mm,
+        "spangy_modes": config.metrics.spangy_modes,
+        "spangy_mass": config.metrics.spangy_mass,
         "spectra": "mean_curvature",
         "schemes": sorted({brain.scheme for brain in config.brains if brain.scheme}),
     }
@@ -300,65 +317,61 @@ def _norms_problems(path: str, expected: Mapping[str, Any]) -> Iterator[str]:
     except InputError as error:
         yield str(error)
         return
-    found = content.get("made_with") if isinstance(content, dict) else None
-    if (
-        not isinstance(found, dict)
-        or not isinstance(content.get("norms"), list)
-        or not content["norms"]
-    ):
+    content = content if isinstance(content, dict) else {}
+    made_with = content.get("made_with")
+    norms = content.get("norms")
+    if not isinstance(made_with, dict) or not isinstance(norms, list) or not norms:
         yield f"{path}: expected the results/study/norms.json of a study"
         return
     for name, value in expected.items():
+        found = made_with.get(name)
         # a study may have fewer label schemes than the cohort
-        if found.get(name) != value and not (
-            name == "schemes" and set(value) <= set(found.get(name, ()))
-        ):
+        has_fewer_schemes = name == "schemes" and set(value) <= set(found or ())
+        if found != value and not has_fewer_schemes:
             yield (
-                f"{path}: made with other settings; found {name}: {found.get(name)};"
+                f"{path}: made with other settings; found {name}: {found};"
                 f" expected {value}, as here"
             )
 
 
-def metrics(config: Config) -> Iterator[KeyProblem]:
+def _metrics(config: Config) -> Problems:
     """Yield unknown brains in the settings of metrics, and scans of a subject in the
     same week."""
     settings = config.metrics
     atlases = {used.atlas.name for used in used_atlases(config)}
-    norm = [name for name in settings.norm_reference or () if name not in atlases]
-    yield from _unknown(norm, config, ("metrics", "norm_reference"))
+    reference = settings.norm_reference or ()
+    named = {
+        "norm_reference": [name for name in reference if name not in atlases],
+        "regions": list(settings.regions),
+        "template": [settings.template] if settings.template else [],
+    }
+    for key, ids in named.items():
+        yield from _unknown(ids, config, ("metrics", key))
     if settings.norms is not None:
         for problem in _norms_problems(settings.norms, norm_settings(config)):
             yield KeyProblem(problem, ("metrics", "norms"))
-    yield from _unknown(settings.regions, config, ("metrics", "regions"))
-    names = [
-        name for given in settings.regions.values() for name in given.names.values()
-    ]
+    names: list[str] = []
+    for regions in settings.regions.values():
+        names += regions.names.values()
     for first, second in merged_names(names, column_part):
-        text = (
-            f"found {first!r} and {second!r}, which are one column of metrics_wide.csv;"
-            " rename one"
-        )
-        yield KeyProblem(text, ("metrics", "regions"))
-    yield from _unknown(
-        [settings.template] if settings.template else (),
-        config,
-        ("metrics", "template"),
-    )
-    # regions are carried, and their asymmetry measured, on both hemispheres together
-    if wrong := [
-        brain.id
-        for brain in config.brains
-        if brain.id in settings.regions and brain.hemisphere is not None
-    ]:
         yield KeyProblem(
-            f"found {', '.join(wrong)} with one hemisphere; expected brains with both",
+            f"found {first!r} and {second!r}, which are one column of metrics_wide.csv;"
+            " rename one",
             ("metrics", "regions"),
         )
-    scans = Counter(
-        (brain.subject, brain.week)
-        for brain in config.brains
-        if brain.subject is not None
-    )
+    # regions are carried, and their asymmetry measured, on both hemispheres together
+    single = []
+    scans: Counter[tuple[str, float]] = Counter()
+    for brain in config.brains:
+        if brain.id in settings.regions and brain.hemisphere is not None:
+            single.append(brain.id)
+        if brain.subject is not None:
+            scans[brain.subject, brain.week] += 1
+    if single:
+        yield KeyProblem(
+            f"found {', '.join(single)} with one hemisphere; expected brains with both",
+            ("metrics", "regions"),
+        )
     for (subject, week), count in scans.items():
         if count > 1:
             yield KeyProblem(
@@ -368,103 +381,91 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
             )
 
 
-def studies(config: Config) -> Iterator[KeyProblem]:
+def _studies(config: Config) -> Problems:
     """Yield problems between the studies, the runs and the brains."""
     for name, study in config.studies.items():
-        key = ("studies", name)
-        yield from _comparison_problems(study, config, key)
+        problems = [*_comparison_problems(study, config)]
         if study.base in config.runs:
-            yield from _member_problems(study, config.runs[study.base], key)
+            problems += _member_problems(study, config.runs[study.base])
+        for problem in problems:
+            yield problem.inside("studies", name)
 
 
-def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyProblem]:
+def _member_problems(study: SweepSettings, base: Run) -> Problems:
     if not study.vary:
         yield KeyProblem(
-            "found nothing; expected keys of folding with lists of values",
-            (*key, "vary"),
+            "found nothing; expected keys of folding with lists of values", ("vary",)
         )
+    first_values = next(iter(study.vary.values()), ())
     for value in study.fixed_at:
-        if value not in next(iter(study.vary.values()), ()):
+        if value not in first_values:
             yield KeyProblem(
                 f"found {value:g}; expected a value of the first varied key",
-                (*key, "fixed_at"),
+                ("fixed_at",),
             )
     for varied, values in study.vary.items():
         if not values or len(set(values)) < len(values):
             yield KeyProblem(
                 f"found {list(values)}; expected one or more values, each once",
-                (*key, "vary", varied),
+                ("vary", varied),
             )
-    fixed_at = {
-        name: value
-        for settings in study.fixed_at.values()
-        for name, value in settings.items()
-    }
-    sections: dict[str, Mapping[str, object]] = {
-        "vary": study.vary,
-        "fixed": study.fixed,
-        "fixed_at": fixed_at,
-    }
-    places = {
-        name: (*key, section, name)
-        for section, names in sections.items()
-        for name in names
-    }
-    if wrong := [name for name in places if name in NOT_VARIED]:
-        yield KeyProblem(
-            "cannot differ within a study; choose another base", places[wrong[0]]
-        )
-        return
+    sections = dict.fromkeys(study.vary, "vary")
+    sections |= dict.fromkeys(study.fixed, "fixed")
+    for settings in study.fixed_at.values():
+        sections |= dict.fromkeys(settings, "fixed_at")
+    for name, section in sections.items():
+        if name in NOT_VARIED:
+            yield KeyProblem(
+                "cannot differ within a study; choose another base", (section, name)
+            )
+            return
     for _, combination in variants("", study):
         try:
-            settings = changed(base, study.changes(combination))
+            run = changed(base, study.changes(combination))
         except KeyError as error:
-            yield KeyProblem(NO_FOLDING_KEY, places[error.args[0]])
+            name = error.args[0]
+            yield KeyProblem(NO_FOLDING_KEY, (sections[name], name))
             return
         except ValidationError as error:
-            for path, text in messages(error, Run):
-                name = ".".join(map(str, path))
-                yield KeyProblem(text, places.get(name, (*key, "fixed", name)))
+            for problem in problems_in(error, Run):
+                name = ".".join(map(str, problem.key))
+                yield KeyProblem(problem.text, (sections.get(name, "fixed"), name))
         else:
-            for problem in value_problems(settings, settings.end_week - 1e-9, {}):
-                yield KeyProblem(problem.text, (*key, "vary", *problem.key))
+            for problem in value_problems(run, run.end_week - 1e-9, {}):
+                yield problem.inside("vary")
 
 
-def _comparison_problems(
-    settings: ComparisonSettings, config: Config, key: Key
-) -> Iterator[KeyProblem]:
+def _comparison_problems(settings: ComparisonSettings, config: Config) -> Problems:
     weeks = {brain.id: brain.week for brain in config.brains}
     week = settings.compare_week
     if settings.base not in config.runs:
         yield KeyProblem(
             f"found {settings.base!r}; expected a run: {', '.join(config.runs)}",
-            (*key, "base"),
+            ("base",),
         )
     for brain in settings.compare_with or ():
         if weeks.get(brain) != week:
-            what = (
-                f"of {weeks[brain]:g} GW" if brain in weeks else "which is not a brain"
-            )
+            found = f"{brain}, which is not a brain"
+            if brain in weeks:
+                found = f"{brain}, of {weeks[brain]:g} GW"
             yield KeyProblem(
-                f"found {brain}, {what}; expected brains of {week:g} GW",
-                (*key, "compare_with"),
+                f"found {found}; expected brains of {week:g} GW", ("compare_with",)
             )
     if settings.compare_with is None and week not in weeks.values():
-        available = ", ".join(
-            f"{other_week:g}" for other_week in sorted(set(weeks.values()))
-        )
+        available = ", ".join(f"{other:g}" for other in sorted(set(weeks.values())))
         yield KeyProblem(
             f"found {week:g}; there are brains of {available} GW to compare with",
-            (*key, "compare_week"),
+            ("compare_week",),
         )
 
 
-def calibration(config: Config) -> Iterator[KeyProblem]:
+def _calibration(config: Config) -> Problems:
     """Yield problems between the calibration, the runs and the brains."""
     calibrate = config.calibrate
     if calibrate is None:
         return
-    yield from _comparison_problems(calibrate, config, ("calibrate",))
+    for problem in _comparison_problems(calibrate, config):
+        yield problem.inside("calibrate")
     if calibrate.base in config.runs:
         for key, bounds in calibrate.parameters.items():
             for text in _parameter_problems(key, bounds, config.runs[calibrate.base]):
@@ -472,13 +473,16 @@ def calibration(config: Config) -> Iterator[KeyProblem]:
 
 
 def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterator[str]:
-    curve = key.removesuffix(AMPLITUDE)
-    if key == STIFFNESS_RATIO or curve != key:
-        if min(bounds) <= 0:
-            yield f"found {min(bounds):g}; expected bounds above 0"
-        if key == STIFFNESS_RATIO and isinstance(base.shear_modulus_core_pa, Varying):
+    is_ratio = key == STIFFNESS_RATIO
+    is_amplitude = key.endswith(AMPLITUDE)
+    if (is_ratio or is_amplitude) and min(bounds) <= 0:
+        yield f"found {min(bounds):g}; expected bounds above 0"
+    if is_ratio:
+        if isinstance(base.shear_modulus_core_pa, Varying):
             yield "the core's shear modulus varies in the base run; expected a number"
-        if curve != key and not _is_curve(curve, base):
+    elif is_amplitude:
+        curve = key.removesuffix(AMPLITUDE)
+        if not _is_curve(curve, base):
             yield f"{curve} is not a curve in the base run"
     elif key in NOT_VARIED:
         yield "cannot be calibrated"
@@ -490,11 +494,12 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
                 yield NO_FOLDING_KEY
                 return
             except ValidationError as error:
-                yield from dict.fromkeys(text for _, text in messages(error, Run))
+                problems = problems_in(error, Run)
+                yield from dict.fromkeys(problem.text for problem in problems)
 
 
 def _is_curve(key: str, base: Run) -> bool:
-    value = getattr(base, key) if key in VARYING else None
     if key in CURVE_KEYS:
         return key.removeprefix("growth.") in base.growth.definition.keys
+    value = getattr(base, key) if key in VARYING else None
     return isinstance(value, Varying) and bool(value.weeks)

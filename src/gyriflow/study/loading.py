@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..grouping import grouped
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
-from ..settings.base import PROBLEM, Key, line, messages
+from ..settings.base import PROBLEM, Key, KeyProblem, problems_in
 from ..settings.brains import ParticipantsSettings
 from ..settings.root import Config
 from .atlases import UsedAtlas, atlas_brains, atlas_problems
@@ -40,61 +40,53 @@ def load(
     entries, left_out, sources = _participants(
         plain.get("participants"), folder, problems
     )
-    if further := [
-        *(entry for used in atlases for entry in atlas_brains(used)),
-        *entries,
-    ]:
+    further: list[Any] = []
+    for used in atlases:
+        further += atlas_brains(used)
+    further += entries
+    if further:
         plain["brains"] = [*(plain.get("brains") or ()), *further]
-    unusable = (
-        []
-        if keep_going and plain.get("brains")
-        else [(scan, row["cause"]) for scan, row in left_out.items()]
-    )
-    awaited = [str(file.path) for used in atlases for file in used.files]
+    causes = [(scan, row["cause"]) for scan, row in left_out.items()]
+    if keep_going and plain.get("brains"):
+        causes = []
+    awaited = []
+    for used in atlases:
+        awaited += [str(file.path) for file in used.files]
+    context = {"folder": str(folder), "awaited": awaited}
     hints = ["config/README.md lists the descriptions of all keys"]
     try:
-        config = Config.model_validate(
-            plain, context={"folder": str(folder), "awaited": awaited}
-        )
+        config = Config.model_validate(plain, context=context)
     except ValidationError as error:
-        problems += _lines(messages(error, Config))
+        problems += _lines(problems_in(error, Config))
         if any(details["type"] != PROBLEM for details in error.errors()):
             hints.append("once each key is valid, they are checked against each other")
     else:
-        problems += _lines(
-            [(problem.key, problem.text) for problem in problems_between(config)]
-        )
-    if not problems and not unusable:
+        problems += _lines(problems_between(config))
+    if not problems and not causes:
         config.left_out.update(left_out)
         config.age_sources.update(sources)
         return config
     if left_out and not keep_going:
         hints.append("use --keep-going to leave out rows that cannot be used")
-    count = len(problems) + len(unusable)
-    counted = f"{count} problem{'s' if count > 1 else ''}"
-    lines = [
-        text
-        for text, _ in grouped([*(("", problem) for problem in problems), *unusable])
-    ]
-    raise InputError(
-        "\n  ".join([f"the configuration has {counted}:", *lines])
-        + "\n"
-        + "; ".join(hints)
-    )
+    count = len(problems) + len(causes)
+    lines = [f"the configuration has {count} problem{'s' if count > 1 else ''}:"]
+    texts = [*(("", problem) for problem in problems), *causes]
+    lines += [text for text, _ in grouped(texts)]
+    raise InputError("\n  ".join(lines) + "\n" + "; ".join(hints))
 
 
 def _participants(
     section: Any, folder: Path, problems: list[str]
 ) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], dict[str, str]]:
+    if section is None:
+        return [], {}, {}
     # an invalid section is reported with all other keys
     with suppress(ValidationError):
-        if section is not None:
-            try:
-                return participants_brains(
-                    ParticipantsSettings.model_validate(section), folder
-                )
-            except InputError as error:
-                problems.append(f"participants.file: {error}")
+        settings = ParticipantsSettings.model_validate(section)
+        try:
+            return participants_brains(settings, folder)
+        except InputError as error:
+            problems.append(f"participants.file: {error}")
     return [], {}, {}
 
 
@@ -107,50 +99,52 @@ def _plain(value: Any) -> Any:
 
 
 def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:
-    several = isinstance(raw, list)
-    sections = raw if several else [] if raw is None else [raw]
+    if raw is None:
+        return [], []
+    if not isinstance(raw, list):
+        return _atlas(raw, folder, ("atlas",))
     atlases: list[UsedAtlas] = []
     problems: list[str] = []
-    for number, section in enumerate(sections):
-        path: Key = ("atlas", number) if several else ("atlas",)
-        try:
-            settings = AtlasSettings.model_validate(section).located(folder)
-        except ValidationError as error:
-            problems += [
-                line((*path, *place), text)
-                for place, text in messages(error, AtlasSettings)
-            ]
-            continue
-        try:
-            used = UsedAtlas(
-                settings, Atlas.model_validate(read_keys(settings.description))
-            )
-        except InputError as error:
-            problems.append(line((*path, "name"), str(error)))
-        except ValidationError as error:
-            problems += [
-                f"{settings.description}: {line(place, text)}"
-                for place, text in messages(error, Atlas)
-            ]
-        else:
-            wrong = [
-                line((*path, *problem.key), problem.text)
-                for problem in atlas_problems(used)
-            ]
-            problems += wrong
-            atlases += [] if wrong else [used]
+    for number, section in enumerate(raw):
+        used, wrong = _atlas(section, folder, ("atlas", number))
+        atlases += used
+        problems += wrong
     return atlases, problems
 
 
-def _lines(problems: list[tuple[Key, str]]) -> list[str]:
-    unique = [
-        (path, text) for path, text in dict.fromkeys(problems) if path[0] != "atlas"
-    ]
-    folding_problems = {
-        (path[1:], text) for path, text in unique if path[0] == "folding"
-    }
-    return [
-        line(path, text)
-        for path, text in unique
-        if path[0] != "runs" or (path[2:], text) not in folding_problems
-    ]
+def _atlas(section: Any, folder: Path, place: Key) -> tuple[list[UsedAtlas], list[str]]:
+    """Return the atlas of a section, or none and its problems."""
+    try:
+        settings = AtlasSettings.model_validate(section).located(folder)
+    except ValidationError as error:
+        problems = problems_in(error, AtlasSettings)
+        return [], [str(problem.inside(*place)) for problem in problems]
+    try:
+        atlas = Atlas.model_validate(read_keys(settings.description))
+    except InputError as error:
+        return [], [str(KeyProblem(str(error), (*place, "name")))]
+    except ValidationError as error:
+        problems = problems_in(error, Atlas)
+        return [], [f"{settings.description}: {problem}" for problem in problems]
+    used = UsedAtlas(settings, atlas)
+    problems = list(atlas_problems(used))
+    if problems:
+        return [], [str(problem.inside(*place)) for problem in problems]
+    return [used], []
+
+
+def _lines(problems: list[KeyProblem]) -> list[str]:
+    """Return the lines of problems, each once; those of the atlas are reported
+    already."""
+    of_folding = {problem for problem in problems if problem.key[0] == "folding"}
+    lines = []
+    for problem in dict.fromkeys(problems):
+        section, *inner = problem.key
+        # runs repeat the problems of folding
+        is_repeated = (
+            section == "runs"
+            and KeyProblem(problem.text, ("folding", *inner[1:])) in of_folding
+        )
+        if section != "atlas" and not is_repeated:
+            lines.append(str(problem))
+    return lines

@@ -62,17 +62,27 @@ AGE_UNITS = ("age_unit", "age_units", "unit_of_age")
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table: its place for messages, subject and session without `sub-` and
-    `ses-`, and texts by column."""
+    """A row of a table for the files in the folder `scope`.
 
+    It has its place for messages, subject and session without `sub-` and `ses-`, the
+    texts of other columns, and its ages.
+    """
+
+    path: Path
+    scope: Path
     place: str
     name: str
     session: str | None
     values: Mapping[str, str]
+    ages: Sequence[TableAge]
 
     @property
     def subject(self) -> str:
         return self.name.removeprefix("sub-")
+
+    def _applies_to(self, file: Path | None) -> bool:
+        """Return whether a row is about a file; None: any file."""
+        return file is None or file.is_relative_to(self.scope)
 
 
 @dataclass(frozen=True)
@@ -91,29 +101,10 @@ class Table:
     ages: Sequence[AgeColumn] = ()
     problem: str = ""
 
-    def ages_in(self, row: Row) -> Iterator[TableAge]:
-        """Yield the ages in one of its rows."""
-        kinds, units = (
-            [
-                row.values[name]
-                for name in self.columns
-                if column_key(name) in names and name in row.values
-            ]
-            for names in (AGE_TYPES, AGE_UNITS)
-        )
-        for column in self.ages:
-            if kinds and OTHER_TYPE.search(kinds[0]):
-                problem = f"is not a gestational age: its type (age_type) is {kinds[0]}"
-                column = replace(column, problem=problem, is_other=True)
-            elif units and column_key(column.name) == "age":
-                unit = unit_of(units[0])
-                problem = (
-                    "" if unit else f"found the unit {units[0]}; expected weeks or days"
-                )
-                column = replace(column, unit=unit or "weeks", problem=problem)
-            yield TableAge(
-                row.place, column, row.values[column.name], row.session is not None
-            )
+    def _may_have(self, subject: str, file: Path | None) -> bool:
+        """Return whether a table may have a row about a file of a subject."""
+        is_in_scope = file is None or file.is_relative_to(self.scope)
+        return is_in_scope and self.subject in (None, subject)
 
     @property
     def age_problem(self) -> str:
@@ -124,17 +115,17 @@ class Table:
                 f"has no column of gestational ages; found {', '.join(self.columns)};"
                 f" expected {expected}"
             )
-        problems = [
-            f"{column.name}: {column.problem}" for column in self.ages if column.problem
-        ]
-        columns = (
-            f"found the columns {', '.join(self.columns)}; instead, name the age"
-            " gestational_age or scan_age"
+        if any(not column.problem for column in self.ages):
+            return ""
+        first = self.ages[0]
+        return (
+            f"{first.name}: {first.problem}; found the columns"
+            f" {', '.join(self.columns)}; instead, name the age gestational_age or"
+            " scan_age"
         )
-        return f"{problems[0]}; {columns}" if len(problems) == len(self.ages) else ""
 
 
-def read_table_of_scans(path: Path) -> Table:
+def _read_table(path: Path) -> Table:
     """Return a table of participants or sessions; InputError if it cannot be read or
     has no ids.
 
@@ -157,32 +148,17 @@ def read_table_of_scans(path: Path) -> Table:
     names = {column_key(name): name for name in columns}
     ids = next((names[key] for key in IDS if key in names), None)
     if ids is None and empty.subject is None:
-        expected = " or ".join(IDS)
         raise InputError(
             "has no column of ids",
             path=path,
             found=", ".join(columns),
-            expected=expected,
+            expected=" or ".join(IDS),
         )
     session = next((names[key] for key in SESSIONS if key in names), None)
-    common = path.stem.rpartition("_")[2].lower() + ".json"
-    folders = [
-        folder for folder in path.parents[:3] if folder.is_relative_to(empty.scope)
-    ]
-    beside = (
-        file for folder in folders for file in sorted(folder.glob("*.[jJ][sS][oO][nN]"))
-    )
-    sidecar: Any = next(
-        (
-            read_json(file)
-            for file in beside
-            if file.name.lower() in (f"{path.stem.lower()}.json", common)
-        ),
-        {},
-    )
-    ages = age_columns(columns, sidecar, f"{path.stem}.json")
+    ages = age_columns(columns, _sidecar(empty), f"{path.stem}.json")
     name_parts = TABLE_NAME.fullmatch(path.name)
-    is_of_scans = bool(name_parts and name_parts[3])
+    session_of_file = name_parts[2] if name_parts else None
+    is_of_scans = name_parts is not None and name_parts[3] is not None
     rows = []
     for number, values in enumerate(texts, start=2):
         name = values[ids] if ids is not None else empty.subject or ""
@@ -193,20 +169,59 @@ def read_table_of_scans(path: Path) -> Table:
                 found=name,
                 expected=f"sub-{empty.subject}",
             )
-        label = (
-            values[session]
-            if session is not None
-            else (name_parts and name_parts[2]) or ""
-        )
+        label = values[session] if session is not None else session_of_file or ""
         own_session = None if is_missing(label) else label.removeprefix("ses-")
-        further = {
-            key: text for key, text in values.items() if key not in (ids, session)
-        }
         if is_of_scans:
             # other columns are those of files
             further = {column.name: values[column.name] for column in ages}
-        rows.append(Row(f"{path.name} row {number}", name, own_session, further))
+        else:
+            further = {
+                key: text for key, text in values.items() if key not in (ids, session)
+            }
+        place = f"{path.name} row {number}"
+        row = Row(path, empty.scope, place, name, own_session, further, ())
+        rows.append(replace(row, ages=[*_ages_in(row, ages)]))
     return replace(empty, rows=rows, columns=columns, ages=ages)
+
+
+def _sidecar(table: Table) -> Any:
+    """Return the content of the JSON file of a table: beside it, or further up for all
+    tables of its kind."""
+    stem = table.path.stem.lower()
+    names = (f"{stem}.json", f"{stem.rpartition('_')[2]}.json")
+    for folder in table.path.parents[:3]:
+        if not folder.is_relative_to(table.scope):
+            continue
+        for file in sorted(folder.glob("*.[jJ][sS][oO][nN]")):
+            if file.name.lower() in names:
+                return read_json(file)
+    return {}
+
+
+def _ages_in(row: Row, columns: Iterable[AgeColumn]) -> Iterator[TableAge]:
+    """Yield the ages in a row; further columns may have their type or unit."""
+    kind = _first_text(row, AGE_TYPES)
+    unit_name = _first_text(row, AGE_UNITS)
+    for column in columns:
+        if kind is not None and OTHER_TYPE.search(kind):
+            problem = f"is not a gestational age: its type (age_type) is {kind}"
+            column = replace(column, problem=problem, is_other=True)
+        elif unit_name is not None and column_key(column.name) == "age":
+            unit = unit_of(unit_name)
+            problem = ""
+            if unit is None:
+                problem = f"found the unit {unit_name}; expected weeks or days"
+            column = replace(column, unit=unit or "weeks", problem=problem)
+        text = row.values[column.name]
+        yield TableAge(row.place, column, text, row.session is not None)
+
+
+def _first_text(row: Row, names: Sequence[str]) -> str | None:
+    """Return the text in the first column of a row with one of some names, or None."""
+    for column, text in row.values.items():
+        if column_key(column) in names:
+            return text
+    return None
 
 
 def _empty_table(path: Path) -> Table:
@@ -246,7 +261,7 @@ class ScanTables:
         self.notation = notation
         for path in paths:
             try:
-                self.tables.append(read_table_of_scans(path))
+                self.tables.append(_read_table(path))
             except InputError as error:
                 self.tables.append(replace(_empty_table(path), problem=str(error)))
 
@@ -265,7 +280,7 @@ class ScanTables:
         return ambiguity_of(texts) if self.notation is None else ""
 
     @cached_property
-    def ages_at_scans(self) -> list[TableAge]:
+    def _ages_at_scans(self) -> list[TableAge]:
         """The ages that are named as at a scan."""
         return [
             age
@@ -276,37 +291,31 @@ class ScanTables:
     @cached_property
     def ids(self) -> dict[str, str]:
         """The last row of each subject, for messages."""
-        return {
-            subject: rows[-1][1].place for subject, rows in self._by_subject.items()
-        }
+        return {subject: rows[-1].place for subject, rows in self._by_subject.items()}
+
+    def sessions_of(self, subject: str) -> list[str]:
+        """Return the sessions of a subject that any row names."""
+        sessions: dict[str, None] = {}
+        for row in self._by_subject.get(subject, ()):
+            if row.session is not None:
+                sessions[row.session] = None
+        return list(sessions)
 
     @cached_property
     def _ages(self) -> list[TableAge]:
-        return [
-            age
-            for table in self.tables
-            for row in table.rows
-            for age in table.ages_in(row)
-        ]
-
-    @cached_property
-    def _by_subject(self) -> dict[str, list[tuple[Table, Row]]]:
-        rows: dict[str, list[tuple[Table, Row]]] = {}
+        ages: list[TableAge] = []
         for table in self.tables:
             for row in table.rows:
-                rows.setdefault(row.subject, []).append((table, row))
-        return rows
+                ages += row.ages
+        return ages
 
-    def rows_of(
-        self, subject: str, place: Path | None = None
-    ) -> list[tuple[Table, Row]]:
-        """Return the rows of a subject, with their tables, in the tables that apply to
-        a file (default: in all)."""
-        return [
-            (table, row)
-            for table, row in self._by_subject.get(subject, ())
-            if _applies(table, place)
-        ]
+    @cached_property
+    def _by_subject(self) -> dict[str, list[Row]]:
+        rows: dict[str, list[Row]] = {}
+        for table in self.tables:
+            for row in table.rows:
+                rows.setdefault(row.subject, []).append(row)
+        return rows
 
     def facts(
         self,
@@ -320,26 +329,21 @@ class ScanTables:
 
         A row without a session is of a subject's only scan.
         """
-        own = self.rows_of(subject, place)
-        unread = [
-            table
-            for table in self.tables
-            if table.problem and table.subject in (None, subject)
+        own = [
+            row for row in self._by_subject.get(subject, ()) if row._applies_to(place)
         ]
-        unread = [table for table in unread if _applies(table, place)]
+        unread = []
+        for table in self.tables:
+            if table.problem and table._may_have(subject, place):
+                unread.append(table)
         if not own and not unread:
             return None
-        sessions = list(
-            dict.fromkeys(row.session for _, row in own if row.session is not None)
-        )
+        with_session = [row for row in own if row.session is not None]
+        sessions = list(dict.fromkeys(row.session for row in with_session))
         if session is None and len(sessions) == 1 and is_only_scan:
             (session,) = sessions
         elif session is None and sessions:
-            rows = ", ".join(
-                f"{row.place} ({row.session})"
-                for _, row in own
-                if row.session is not None
-            )
+            rows = ", ".join(f"{row.place} ({row.session})" for row in with_session)
             cause = (
                 f"its name has no session; found {rows}; expected ses-… in the name, as"
                 " in session_id"
@@ -349,38 +353,30 @@ class ScanTables:
         ages: list[TableAge] = []
         values: dict[str, str] = {}
         for label in dict.fromkeys((None, session)):
-            rows_of_scan = [(table, row) for table, row in own if row.session == label]
-            for table in self.tables:
-                if difference := _difference(
-                    [row for owner, row in rows_of_scan if owner is table]
-                ):
-                    return ScanAge(None, cause=difference)
+            rows_of_scan = [row for row in own if row.session == label]
+            difference = _difference(rows_of_scan)
+            if difference:
+                return ScanAge(None, cause=difference)
             is_shared = label != session and not is_only_scan
-            ages += [
-                replace(age, is_shared=is_shared)
-                for table, row in rows_of_scan
-                for age in table.ages_in(row)
-            ]
-            values |= {
-                key: text for _, row in rows_of_scan for key, text in row.values.items()
-            }
-        age = choose_age(ages, self.notation, self.ages_at_scans[:1])
+            for row in rows_of_scan:
+                values |= row.values
+                ages += [replace(age, is_shared=is_shared) for age in row.ages]
+        age = choose_age(ages, self.notation, self._ages_at_scans[:1])
         # a table that cannot be read may have the age of exactly this scan
         is_certain = age.week is not None and any(age.has_session for age in ages)
-        if unread := [table for table in unread if table.subject or not is_certain]:
-            return ScanAge(None, cause=unread[0].problem)
+        for table in unread:
+            if table.subject or not is_certain:
+                return ScanAge(None, cause=table.problem)
         if age.week is None and not age.cause:
-            return ScanAge(None, cause=_missing_age(own, ages, session, sessions))
-        return replace(
-            age,
-            values={
-                key: text for key, text in values.items() if key not in age.columns
-            },
-        )
-
-
-def _applies(table: Table, place: Path | None) -> bool:
-    return place is None or place.is_relative_to(table.scope)
+            cause = _missing_age(with_session, ages, session)
+            if not cause:
+                table = next(
+                    table for table in self.tables if table.path == own[0].path
+                )
+                cause = f"{table.path}: {table.age_problem}"
+            return ScanAge(None, cause=cause)
+        further = {key: text for key, text in values.items() if key not in age.columns}
+        return replace(age, values=further)
 
 
 def ambiguity_of(texts: Iterable[str]) -> str:
@@ -399,32 +395,27 @@ def ambiguity_of(texts: Iterable[str]) -> str:
 
 
 def _missing_age(
-    own: Sequence[tuple[Table, Row]],
-    ages: Sequence[TableAge],
-    session: str | None,
-    sessions: Sequence[str],
+    with_session: Sequence[Row], ages: Sequence[TableAge], session: str | None
 ) -> str:
+    """Return why none of the ages in tables is that of a scan; "" if there are none."""
+    sessions = {row.session for row in with_session}
     if session is not None and sessions and session not in sessions:
-        found = ", ".join(
-            f"{row.session} ({row.place})" for _, row in own if row.session is not None
-        )
+        found = ", ".join(f"{row.session} ({row.place})" for row in with_session)
         return f"no row of its session; found {found}; expected {session}"
-    for age in (age for age in ages if not is_missing(age.text)):
-        found = f"{age.column.name} {age.text} ({age.place})"
-        expected = (
-            f"a row with session_id {session}"
-            if session is not None
-            else "a row for each, with session_id"
-        )
+    for age in ages:
+        if is_missing(age.text):
+            continue
+        expected = "a row for each, with session_id"
+        if session is not None:
+            expected = f"a row with session_id {session}"
         return (
-            f"one age is given for several sessions; found {found}; expected {expected}"
+            f"one age is given for several sessions; found {age.column.name}"
+            f" {age.text} ({age.place}); expected {expected}"
         )
-    if ages:
-        return (
-            f"{ages[0].column.name}: found n/a; expected {EXPECTED_AGE}"
-            f" ({ages[0].place})"
-        )
-    return f"{own[0][0].path}: {own[0][0].age_problem}"
+    if not ages:
+        return ""
+    first = ages[0]
+    return f"{first.column.name}: found n/a; expected {EXPECTED_AGE} ({first.place})"
 
 
 # brains of a configuration
@@ -477,45 +468,15 @@ def participants_brains(
     column that every row needs.
     """
     path = located(folder, settings.file)
-    table = read_table_of_scans(path)
-    for column in table.columns:
-        near = difflib.get_close_matches(
-            column, KNOWN_COLUMNS, n=1, cutoff=MIN_SIMILARITY
-        )
-        if (
-            near
-            and column_key(column) not in KNOWN_COLUMNS
-            and column not in {age.name for age in table.ages}
-        ):
-            raise InputError(
-                "has a column whose name seems mistyped",
-                path=path,
-                found=column,
-                expected=near[0],
-            )
+    table = _read_table(path)
     tables = ScanTables([path, *_session_tables(table)], settings.ages)
-    if all(each.age_problem for each in tables.tables):
-        raise InputError(table.age_problem, path=path)
-    if tables.ambiguity:
-        raise InputError(tables.ambiguity, path=path)
-    for first, second in merged_names(
-        (row.name for row in table.rows), lambda name: name.removeprefix("sub-")
-    ):
-        expected = "one of them, since sub- is not part of the label"
-        raise InputError(
-            "has two names of one participant",
-            path=path,
-            found=f"{first} and {second}",
-            expected=expected,
-        )
+    _require_valid(table, tables)
     entries: list[dict[str, Any]] = []
     left_out: dict[str, dict[str, Any]] = {}
     sources: dict[str, str] = {}
     for name in dict.fromkeys(row.name for row in table.rows):
         subject = name.removeprefix("sub-")
-        sessions = dict.fromkeys(
-            row.session for _, row in tables.rows_of(subject) if row.session is not None
-        )
+        sessions: list[str | None] = [*tables.sessions_of(subject)]
         for session in sessions or [None]:
             scan = name if session is None else f"{name}_ses-{session}"
             facts = tables.facts(subject, session, len(sessions) < 2)
@@ -523,20 +484,20 @@ def participants_brains(
             entry, problem = _entry(
                 scan, name, session, facts, settings.columns, path.parent
             )
-            if problem := facts.cause or problem:
-                left_out[scan] = {
-                    "week": facts.week,
-                    "cause": f"{path}: {scan}: {problem}",
-                }
+            problem = facts.cause or problem
+            if problem:
+                cause = f"{path}: {scan}: {problem}"
+                left_out[scan] = {"week": facts.week, "cause": cause}
             else:
                 entries.append(entry)
                 sources[scan] = facts.source
     by_files: dict[str, list[dict[str, Any]]] = {}
     for entry in entries:
-        by_files.setdefault(
-            repr([entry["subject"], *(entry.get(key) for key in SOURCES)]), []
-        ).append(entry)
-    for same in (group for group in by_files.values() if len(group) > 1):
+        files = [entry["subject"], *(entry.get(key) for key in SOURCES)]
+        by_files.setdefault(repr(files), []).append(entry)
+    for same in by_files.values():
+        if len(same) == 1:
+            continue
         found = " and ".join(entry["id"] for entry in same)
         for entry in same:
             cause = (
@@ -548,33 +509,61 @@ def participants_brains(
     return entries, left_out, sources
 
 
+def _require_valid(table: Table, tables: ScanTables) -> None:
+    """Raise InputError if a table of brains has a mistyped column, no usable ages or
+    two names of one participant."""
+    ages = {age.name for age in table.ages}
+    for column in table.columns:
+        if column in ages or column_key(column) in KNOWN_COLUMNS:
+            continue
+        near = difflib.get_close_matches(
+            column, KNOWN_COLUMNS, n=1, cutoff=MIN_SIMILARITY
+        )
+        if near:
+            raise InputError(
+                "has a column whose name seems mistyped",
+                path=table.path,
+                found=column,
+                expected=near[0],
+            )
+    if all(each.age_problem for each in tables.tables):
+        raise InputError(table.age_problem, path=table.path)
+    if tables.ambiguity:
+        raise InputError(tables.ambiguity, path=table.path)
+    names = [row.name for row in table.rows]
+    for first, second in merged_names(names, lambda name: name.removeprefix("sub-")):
+        raise InputError(
+            "has two names of one participant",
+            path=table.path,
+            found=f"{first} and {second}",
+            expected="one of them, since sub- is not part of the label",
+        )
+
+
 def _session_tables(table: Table) -> Iterator[Path]:
     folder = table.path.parent
-    names = (
-        f"{name}/{name}_sessions.tsv"
-        for name in dict.fromkeys(row.name for row in table.rows)
-    )
-    # other names could be paths out of the folder
-    for name in (
-        "sessions.tsv",
-        *(name for name in names if SUBJECT_FOLDER.match(name)),
-    ):
-        if os.path.lexists(folder / name):
-            yield folder / name
+    files = ["sessions.tsv"]
+    for name in dict.fromkeys(row.name for row in table.rows):
+        # other names could be paths out of the folder
+        if SUBJECT_FOLDER.match(name):
+            files.append(f"{name}/{name}_sessions.tsv")
+    for file in files:
+        if os.path.lexists(folder / file):
+            yield folder / file
 
 
-def _difference(rows: Sequence[Row]) -> str:
-    """Return how several rows of one scan differ, or ""."""
-    for row in rows[1:]:
+def _difference(rows: Iterable[Row]) -> str:
+    """Return how several rows of one scan in a table differ, or ""."""
+    first_rows: dict[Path, Row] = {}
+    for row in rows:
+        first = first_rows.setdefault(row.path, row)
         for column, text in row.values.items():
-            if text != rows[0].values[column]:
-                values = (
-                    f"{column} {rows[0].values[column]} ({rows[0].place}) and {text}"
-                    f" ({row.place})"
-                )
+            known = first.values[column]
+            if text != known:
                 return (
-                    f"several rows have this id; found {values}; expected one row for"
-                    " each scan, with its session_id"
+                    f"several rows have this id; found {column} {known} ({first.place})"
+                    f" and {text} ({row.place}); expected one row for each scan, with"
+                    " its session_id"
                 )
     return ""
 
@@ -582,12 +571,10 @@ def _difference(rows: Sequence[Row]) -> str:
 def covariates(values: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the values of its tables without
     another meaning."""
-    keys = {FILES, SIDE, *BRAIN_KEYS}
-    further = {
-        key: text
-        for key, text in values.items()
-        if key not in keys and not is_missing(text)
-    }
+    further = {}
+    for key, text in values.items():
+        if key not in (FILES, SIDE, *BRAIN_KEYS) and not is_missing(text):
+            further[key] = text
     return {"covariates": further} if further else {}
 
 
@@ -599,17 +586,19 @@ def _entry(
     columns: Mapping[str, str],
     folder: Path,
 ) -> tuple[dict[str, Any], str]:
+    """Return the entry of a scan, or the problem of its row."""
     names = {
         "id": scan,
         "subject": name,
         "session": f"ses-{session}" if session else "n/a",
     }
-    added = {
-        key: re.sub(r"\{(id|subject|session)\}", lambda match: names[match[1]], text)
-        for key, text in columns.items()
-    }
     # after the table's columns, and without replacing them
-    texts = {**facts.values, **added, **facts.values}
+    texts = dict(facts.values)
+    for key, text in columns.items():
+        filled = re.sub(
+            r"\{(id|subject|session)\}", lambda match: names[match[1]], text
+        )
+        texts.setdefault(key, filled)
     values = {key: text for key, text in texts.items() if not is_missing(text)}
     entry: dict[str, Any] = {
         "id": scan,
@@ -620,46 +609,46 @@ def _entry(
     if FILES in values:
         files = [part.strip() for part in values[FILES].split(";")]
         side = values.get(SIDE)
-        limit, expected = (
-            (2, "at most a left and a right hemisphere")
-            if side is None
-            else (1, "the file of this side")
-        )
+        limit, expected = 2, "at most a left and a right hemisphere"
+        if side is not None:
+            limit, expected = 1, "the file of this side"
         if len(files) > limit:
-            return (
-                {},
-                f"files: found {len(files)}, {'; '.join(files)}; expected {expected}",
-            )
+            found = f"{len(files)}, {'; '.join(files)}"
+            return {}, f"files: found {found}; expected {expected}"
         values |= _file_keys(files, side)
-    for column in values:
+    for column, text in values.items():
         if column not in BRAIN_KEYS:
             continue
-        value: Any = values[column]
+        value: str | list[str] = text
         if column in PATHS:
-            parts = value.split(";") if column == "white" else [value]
-            places = [own_name(path_in(folder, part.strip())) for part in parts]
-            if lost := [place for place in places if not place.is_file()]:
-                missing = (
-                    absent_content(lost[0])
-                    or f"no such file{hint_for_missing(lost[0])}"
-                )
-                return {}, f"{column}: {lost[0]}: {missing}"
-            value = str(places[0]) if len(places) == 1 else list(map(str, places))
+            parts = text.split(";") if column == "white" else [text]
+            files = []
+            for part in parts:
+                place = own_name(path_in(folder, part.strip()))
+                if not place.is_file():
+                    missing = absent_content(place)
+                    missing = missing or f"no such file{hint_for_missing(place)}"
+                    return {}, f"{column}: {place}: {missing}"
+                files.append(str(place))
+            value = files[0] if len(files) == 1 else files
         *outer, last = column.split(".")
         section = entry
         for key in outer:
             section = section.setdefault(key, {})
         section[last] = value
-    return entry, (
-        ""
-        if set(SOURCES) & set(entry)
-        else f"found no data; expected files, or one of {', '.join(PATHS)}"
-    )
+    if not set(SOURCES) & set(entry):
+        return entry, f"found no data; expected files, or one of {', '.join(PATHS)}"
+    return entry, ""
 
 
 def _file_keys(files: list[str], side: str | None) -> dict[str, str]:
+    first = files[0]
     if side is not None:
-        return {"hemisphere.file": files[0], "hemisphere.side": side}
+        return {"hemisphere.file": first, "hemisphere.side": side}
     if len(files) == 2:
-        return {"hemispheres.left": files[0], "hemispheres.right": files[1]}
-    return {"labels" if is_volume(files[0]) else "pial": files[0]}
+        return {
+            "hemispheres.left": first,
+            "hemispheres.right": files[1],
+        }
+    key = "labels" if is_volume(first) else "pial"
+    return {key: first}

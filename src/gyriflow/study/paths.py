@@ -25,21 +25,19 @@ PREDICTION_TESTS = str(SHIPPED / "norms" / "predictions.yaml")
 
 def file_of(pattern: str, **names: str | float) -> str:
     """Return the file of a pattern; weeks have two decimals, such as "21.50"."""
-    return pattern.format(
-        **{
-            key: name if isinstance(name, str) else week_tag(name)
-            for key, name in names.items()
-        }
-    )
+    texts = {}
+    for key, name in names.items():
+        texts[key] = name if isinstance(name, str) else week_tag(name)
+    return pattern.format(**texts)
 
 
 def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:
     """Return the surface files of a brain in a folder, by part: the whole and its
     hemispheres."""
-    return {
-        "whole": f"{folder}/pial.surf.gii",
-        **{side: f"{folder}/{side}.pial.surf.gii" for side in sides},
-    }
+    files = {"whole": f"{folder}/pial.surf.gii"}
+    for side in sides:
+        files[side] = f"{folder}/{side}.pial.surf.gii"
+    return files
 
 
 def pial_of(*sides: Side) -> dict[str, str]:
@@ -62,13 +60,12 @@ def folded_of(*sides: Side) -> dict[str, str]:
 def measures_in(folder: str, *sides: Side) -> dict[str, str]:
     """Return the tables of a measured or simulated brain in a folder, and the maps on
     its hemispheres."""
-    tables = {
-        name: f"{folder}/{name}.csv" for name in ("metrics", "spectra", "coefficients")
-    }
-    return {
-        **tables,
-        **{f"{side}_maps": f"{folder}/{side}.shape.gii" for side in sides},
-    }
+    files = {}
+    for name in ("metrics", "spectra", "coefficients"):
+        files[name] = f"{folder}/{name}.csv"
+    for side in sides:
+        files[f"{side}_maps"] = f"{folder}/{side}.shape.gii"
+    return files
 
 
 TEMPLATE_MAPS = f"{PLACE}/{{side}}.template.shape.gii"
@@ -78,11 +75,12 @@ TEMPLATE_MAPS = f"{PLACE}/{{side}}.template.shape.gii"
 def white_of(*sides: Side) -> dict[str, str]:
     """Return the files of white surfaces of hemispheres, of the maps on them, and of
     their metrics."""
-    surfaces = {
-        f"{side}_surface": f"{BRAIN}/surface/{side}.white.surf.gii" for side in sides
-    }
-    maps = {f"{side}_maps": f"{BRAIN}/metrics/{side}.white.shape.gii" for side in sides}
-    return {**surfaces, **maps, "metrics": f"{BRAIN}/metrics/white.csv"}
+    files = {}
+    for side in sides:
+        files[f"{side}_surface"] = f"{BRAIN}/surface/{side}.white.surf.gii"
+    for side in sides:
+        files[f"{side}_maps"] = f"{BRAIN}/metrics/{side}.white.shape.gii"
+    return files | {"metrics": f"{BRAIN}/metrics/white.csv"}
 
 
 def region_files(folder: str) -> dict[str, str]:
@@ -175,10 +173,9 @@ def log_of(rule: str, pattern: str) -> str:
     """
     folders = (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT, PLACE)
     folder = next(place for place in folders if pattern.startswith(f"{place}/"))
-    wildcards = [
-        f"{{{name}}}"
-        for name in re.findall(r"{(\w+)}", pattern)
-        if f"{{{name}}}" not in folder
-    ]
+    wildcards = []
+    for name in re.findall(r"{\w+}", pattern):
+        if name not in folder:
+            wildcards.append(name)
     name = f"{rule}.{','.join(wildcards)}" if wildcards else rule
     return f"{folder}/logs/{name}.log"

@@ -42,6 +42,10 @@ class Measurement:
         return f"results/{self.where}"
 
     @property
+    def spectra(self) -> str:
+        return f"{self.folder}/spectra.csv"
+
+    @property
     def labels(self) -> dict[str, Any]:
         """The first columns of its tables, with values."""
         return {"subject": self.subject, "run": self.run, "week": self.week}
@@ -63,15 +67,17 @@ class Measurement:
     @property
     def halves(self) -> list[list[str]]:
         """Its hemispheres, each with its maps."""
-        return [list(pair) for pair in zip(self.hemispheres, self.maps, strict=True)]
+        return _pairs(self.hemispheres, self.maps)
 
     @property
     def halves_with_regions(self) -> list[list[str]]:
         """Its hemispheres, each with its regions."""
-        return [
-            list(pair)
-            for pair in zip(self.hemispheres, self.regions.values(), strict=True)
-        ]
+        return _pairs(self.hemispheres, self.regions.values())
+
+
+def _pairs(surfaces: Iterable[str], files: Iterable[str]) -> list[list[str]]:
+    pairs = zip(surfaces, files, strict=True)
+    return [list(pair) for pair in pairs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +103,11 @@ class Brain:
         return self.config.id
 
     @property
+    def names(self) -> dict[str, str]:
+        """The values of its wildcards."""
+        return {"brain": self.id}
+
+    @property
     def week(self) -> float:
         return self.config.week
 
@@ -116,9 +127,9 @@ class Brain:
     @property
     def population(self) -> str:
         """Its population in tables; "synthetic" or "unknown" if none is named."""
-        return self.config.population or (
-            "synthetic" if self.config.synthetic else "unknown"
-        )
+        if self.config.population is not None:
+            return self.config.population
+        return "synthetic" if self.config.synthetic else "unknown"
 
     def comparable(self, brains: Iterable["Brain"]) -> list["Brain"]:
         """Return the brains with the same hemispheres, population and subject.
@@ -126,25 +137,24 @@ class Brain:
         A brain without a population or subject, as of an atlas, may be compared with
         any.
         """
-        population, subject = self.config.population, self.config.subject
-        return [
-            brain
-            for brain in brains
-            if brain.sides == self.sides
-            and population in (None, brain.config.population)
-            and (
-                None in (subject, brain.config.subject)
-                or brain.config.subject == subject
-            )
-        ]
+        population = self.config.population
+        subject = self.config.subject
+        comparable = []
+        for brain in brains:
+            is_of_population = population in (None, brain.config.population)
+            is_of_subject = subject is None or brain.config.subject in (None, subject)
+            if brain.sides == self.sides and is_of_population and is_of_subject:
+                comparable.append(brain)
+        return comparable
 
     @property
     def registered(self) -> LabelSource:
         """The volume for its registration: its labels, or those that its surfaces are
         filled with."""
-        return self.labels or LabelSource(
-            paths.FILLED_LABELS.format(brain=self.id), "auto", FILLED
-        )
+        if self.labels is not None:
+            return self.labels
+        filled = paths.FILLED_LABELS.format(brain=self.id)
+        return LabelSource(filled, "auto", FILLED)
 
     @property
     def pial(self) -> str:
@@ -162,14 +172,15 @@ class Brain:
 
     @property
     def regions(self) -> Mapping[str, str]:
-        return (
-            paths.region_files(f"results/brains/{self.id}/metrics")
-            if self.has_regions
-            else {}
-        )
+        if not self.has_regions:
+            return {}
+        return paths.region_files(f"results/brains/{self.id}/metrics")
 
     @cached_property
     def measurement(self) -> Measurement:
+        thickness: str | list[str] = []
+        if self.has_thickness:
+            thickness = paths.THICKNESS["measured"].format(brain=self.id)
         return Measurement(
             where=f"brains/{self.id}/metrics",
             subject=self.id,
@@ -177,11 +188,7 @@ class Brain:
             week=self.week,
             sides=self.sides,
             surfaces=f"results/brains/{self.id}/surface",
-            thickness=(
-                paths.THICKNESS["measured"].format(brain=self.id)
-                if self.has_thickness
-                else []
-            ),
+            thickness=thickness,
             report=self.report,
             regions=self.regions,
         )
@@ -223,14 +230,17 @@ class Simulation:
         return self.settings.growth.shapes
 
     @property
+    def has_growth_rate(self) -> bool:
+        """Whether its cortex grows at a rate of the settings."""
+        return "growth_rate_per_s" in self.settings.growth.definition.rates
+
+    @property
     def curves(self) -> str | list[str]:
         """The table of the curves of measured sizes, if it follows one."""
         growth = self.settings.growth
-        return (
-            paths.CURVES["curves"]
-            if growth.follows_sizes or growth.thickness_mm == "measured"
-            else []
-        )
+        if growth.follows_sizes or growth.thickness_mm == "measured":
+            return paths.CURVES["curves"]
+        return []
 
     @property
     def ensemble(self) -> tuple[str, ...]:
@@ -241,11 +251,9 @@ class Simulation:
     def chain(self) -> str | None:
         """The name of the brains that its growth is measured on, or None (see
         `Study.chains`)."""
-        return (
-            f"{self.shapes}.{self.run}"
-            if self.shapes and self.member_of
-            else self.shapes
-        )
+        if self.shapes and self.member_of:
+            return f"{self.shapes}.{self.run}"
+        return self.shapes
 
     @property
     def names(self) -> dict[str, str]:
@@ -260,10 +268,8 @@ class Simulation:
     def observed_with_start(self) -> dict[float, Brain]:
         """The first observed brain of each week, with the start brain at its own
         week."""
-        return {
-            self.weeks[0]: self.start,
-            **{week: brains[0] for week, brains in self.observed_brains.items()},
-        }
+        observed = {week: brains[0] for week, brains in self.observed_brains.items()}
+        return {self.weeks[0]: self.start} | observed
 
     @property
     def followed_series(self) -> str | None:
@@ -274,11 +280,9 @@ class Simulation:
     def targets(self) -> str | list[str]:
         """The file with the shapes that the run grows towards; empty if there are
         none."""
-        return (
-            paths.TARGETS.format(brain=self.start.id, origin=self.chain)
-            if self.chain
-            else []
-        )
+        if self.chain is None:
+            return []
+        return paths.TARGETS.format(brain=self.start.id, origin=self.chain)
 
     @property
     def atlas_surface(self) -> str:
@@ -293,22 +297,20 @@ class Simulation:
     @property
     def mapped(self) -> dict[str, Varying]:
         """Its parameters that have a map."""
-        values = {name: getattr(self.settings, name) for name in VARYING}
-        return {
-            name: value
-            for name, value in values.items()
-            if isinstance(value, Varying) and value.map is not None
-        }
+        mapped = {}
+        for name in VARYING:
+            value = getattr(self.settings, name)
+            if isinstance(value, Varying) and value.map is not None:
+                mapped[name] = value
+        return mapped
 
     @property
     def maps(self) -> str | list[str]:
         """The file with the maps of its parameters and its target shapes; empty if it
         has neither."""
-        return (
-            paths.MAPS.format(run=self.base, brain=self.start.id)
-            if self.shapes or self.mapped
-            else []
-        )
+        if self.shapes or self.mapped:
+            return paths.MAPS.format(run=self.base, brain=self.start.id)
+        return []
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -321,11 +323,11 @@ class Simulation:
         )
         settings["growth"] = self.settings.growth.own_keys()
         for name in VARYING:
-            if isinstance(value := getattr(self.settings, name), Varying):
-                curve = {"weeks": value.weeks} if value.weeks else {}
-                settings[name] = curve | (
-                    {"map": name} if value.map is not None else {}
-                )
+            value = getattr(self.settings, name)
+            if isinstance(value, Varying):
+                settings[name] = {"weeks": value.weeks} if value.weeks else {}
+            if name in self.mapped:
+                settings[name]["map"] = name
         return settings
 
     def at(self, week: float) -> Measurement:
@@ -333,6 +335,8 @@ class Simulation:
         metrics = f"runs/{self.run}/{self.start.id}/metrics"
         week_folder = paths.file_of(paths.WEEK, week=week)
         surfaces = f"{self.file(paths.RUN)}/surfaces/{week_folder}"
+        # the regions of a run are the same at all its weeks
+        regions = paths.region_files(f"results/{metrics}") if self.has_regions else {}
         return Measurement(
             where=f"{metrics}/{week_folder}",
             subject=self.start.id,
@@ -342,10 +346,7 @@ class Simulation:
             surfaces=surfaces,
             thickness=f"{surfaces}/thickness.shape.gii",
             report=[],
-            # the regions of a run are the same at all its weeks
-            regions=(
-                paths.region_files(f"results/{metrics}") if self.has_regions else {}
-            ),
+            regions=regions,
         )
 
     @property
@@ -373,6 +374,21 @@ class Sweep:
     members: tuple[tuple[Simulation, Mapping[str, Any]], ...]
     observed: Mapping[str, tuple[Brain, ...]]
 
+    @property
+    def names(self) -> dict[str, str]:
+        return {"study": self.name, "week": f"{self.week:g}"}
+
+    @property
+    def first_start(self) -> Brain:
+        """The start brain of the first run."""
+        simulation, _ = self.members[0]
+        return simulation.start
+
+    @property
+    def first_observed(self) -> tuple[Brain, ...]:
+        """The first brain that runs from this start are compared with, if any."""
+        return self.observed[self.first_start.id][:1]
+
 
 @dataclass(frozen=True)
 class CalibrationRuns:
@@ -389,11 +405,8 @@ class CalibrationRuns:
 
     def scores_before(self, number: int) -> list[str]:
         """Return the score files of all runs in earlier rounds."""
-        return [
-            f"{paths.CALIBRATION}/scores/{run}.csv"
-            for run, run_round in self.rounds.items()
-            if run_round < number
-        ]
+        earlier = [run for run, of_run in self.rounds.items() if of_run < number]
+        return [f"{paths.CALIBRATION}/scores/{run}.csv" for run in earlier]
 
     def design(self, run: str) -> str:
         """Return the table with the parameters of all runs in the round of a run."""

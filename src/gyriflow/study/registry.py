@@ -39,39 +39,37 @@ class Kind:
     @property
     def outputs(self) -> list[str]:
         """The files that are written, with wildcards."""
-        stem, dot, _ = self.file.rpartition(".png")
-        return [self.file, f"{stem}.pdf"] if dot else [self.file]
+        if self.file.endswith(".png"):
+            return [self.file, f"{self.file.removesuffix('.png')}.pdf"]
+        return [self.file]
 
 
-@dataclass(frozen=True, eq=False)
-class Figure:
-    """A figure or a table of a study.
+@dataclass(frozen=True)
+class Drawing:
+    """What a figure or a table has besides its kind.
 
     Attributes
     ----------
     names : values of the wildcards, and other names in the title and the caption
     inputs
         Files by parameter of the function: a file, or lists and dictionaries of files.
-        Those of the kind are added.
-    options : the other arguments of the function. Those of the kind are added.
+    options : the other arguments of the function
     may_end
         Start and week of runs that may end before that week. Their files are in
         `inputs["members"]` by run.
     """
 
-    kind: Kind
     names: Mapping[str, str] = field(default_factory=dict)
     inputs: Arguments = field(default_factory=dict)
     options: Arguments = field(default_factory=dict)
     may_end: tuple[str, float] | None = None
 
-    def __post_init__(self) -> None:
-        files = {
-            key: file.format(**self.names, published=PUBLISHED)
-            for key, file in self.kind.inputs.items()
-        }
-        object.__setattr__(self, "inputs", {**files, **self.inputs})
-        object.__setattr__(self, "options", {**self.kind.options, **self.options})
+
+@dataclass(frozen=True, eq=False)
+class Figure(Drawing):
+    """A figure or a table of a study, with the inputs and the options of its kind."""
+
+    kind: Kind = field(kw_only=True)
 
     @property
     def path(self) -> str:
@@ -104,9 +102,14 @@ class Figure:
     @property
     def described(self) -> dict[str, Any]:
         """The text of the report, with the path."""
-        keys = ("name", "section", "title", "caption", "technical", "first")
+        kind = self.kind
         return {
-            **{key: getattr(self.kind, key) for key in keys},
+            "name": kind.name,
+            "section": kind.section,
+            "title": kind.title,
+            "caption": kind.caption,
+            "technical": kind.technical,
+            "first": kind.first,
             "path": self.path,
             "names": dict(self.names),
         }
@@ -121,35 +124,55 @@ def kinds() -> dict[str, Kind]:
     }
 
 
+def figure_of(kind: Kind, drawing: Drawing) -> Figure:
+    """Return a figure of a kind, with the inputs and the options of both."""
+    inputs = {}
+    for key, file in kind.inputs.items():
+        inputs[key] = file.format(**drawing.names, published=PUBLISHED)
+    return Figure(
+        kind=kind,
+        names=drawing.names,
+        inputs=inputs | dict(drawing.inputs),
+        options={**kind.options, **drawing.options},
+        may_end=drawing.may_end,
+    )
+
+
 def files_in(inputs: Any) -> list[str]:
     """Return all files in nested lists and dictionaries, each once."""
     if isinstance(inputs, str):
         return [inputs]
-    if not isinstance(inputs, Mapping | list):
+    if isinstance(inputs, Mapping):
+        inputs = inputs.values()
+    elif not isinstance(inputs, list):
         return []
-    items = inputs.values() if isinstance(inputs, Mapping) else inputs
-    return list(dict.fromkeys(file for item in items for file in files_in(item)))
+    files: list[str] = []
+    for item in inputs:
+        files += files_in(item)
+    return list(dict.fromkeys(files))
 
 
 def target_files(figures: Iterable[Figure], *targets: str) -> list[str]:
     """Return the files that targets include."""
-    return [
-        file
-        for figure in figures
-        if not set(targets).isdisjoint(figure.kind.targets)
-        for file in figure.files
-    ]
+    files: list[str] = []
+    for figure in figures:
+        if set(targets) & set(figure.kind.targets):
+            files += figure.files
+    return files
 
 
 def by_rule(figures: Iterable[Figure]) -> dict[str, list[list[Figure]]]:
     """Return the figures by rule and job; figures of one job have the same
     wildcards."""
-    rules: dict[str, dict[tuple[tuple[str, str], ...], list[Figure]]] = {}
+    jobs: dict[tuple[str, str], list[Figure]] = {}
     for figure in figures:
         if figure.kind.draw:
-            jobs = rules.setdefault(figure.kind.rule, {})
-            jobs.setdefault(tuple(figure.wildcards.items()), []).append(figure)
-    return {rule: list(jobs.values()) for rule, jobs in rules.items()}
+            job = (figure.kind.rule, repr(figure.wildcards))
+            jobs.setdefault(job, []).append(figure)
+    rules: dict[str, list[list[Figure]]] = {}
+    for (rule, _), same_job in jobs.items():
+        rules.setdefault(rule, []).append(same_job)
+    return rules
 
 
 def observed_name(brains: Iterable[Brain]) -> str:
@@ -159,24 +182,22 @@ def observed_name(brains: Iterable[Brain]) -> str:
     Several populations are listed with their weeks. Brains of unknown population are
     called "observed brain"; shapes are called by their kind if they share one.
     """
-    populations: dict[str, set[float]] = {}
-    kinds = set()
+    weeks: dict[str, list[float]] = {}
+    shapes = set()
     for brain in brains:
         if brain.config.shape is not None:
-            kinds.add(brain.config.shape.kind)
+            shapes.add(brain.config.shape.kind)
         else:
-            populations.setdefault(
-                brain.config.population or OBSERVED_BRAIN, set()
-            ).add(brain.week)
-    names = list(populations)
+            name = brain.config.population or OBSERVED_BRAIN
+            weeks.setdefault(name, []).append(brain.week)
+    names = list(weeks)
     if len(names) > 1:
-        ranges = (
-            "-".join(f"{week:g}" for week in sorted({min(ws), max(ws)}))
-            for ws in populations.values()
-        )
-        names = [
-            f"{name} ({weeks} GW)" for name, weeks in zip(names, ranges, strict=True)
-        ]
-    if kinds:
-        names.append(kinds.pop() if len(kinds) == 1 else "simple shape")
+        names = []
+        for name, of_name in weeks.items():
+            ends = sorted({min(of_name), max(of_name)})
+            names.append(f"{name} ({'-'.join(f'{week:g}' for week in ends)} GW)")
+    if len(shapes) == 1:
+        names.append(shapes.pop())
+    elif shapes:
+        names.append("simple shape")
     return " or ".join(names) or OBSERVED_BRAIN

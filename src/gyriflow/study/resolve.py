@@ -2,6 +2,7 @@
 sweep."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from ..errors import InputError
@@ -35,9 +36,25 @@ from .series import (
 from .study import Study
 
 Chains = dict[tuple[str, str], Chain]
-Variant = tuple[str, str, Mapping[str, Any], Run]
-"""A run of a sweep: the names of the sweep and of the run, its varied values by key,
-and its settings."""
+
+
+@dataclass(frozen=True)
+class _Variant:
+    """A run of a sweep, with its varied values by key."""
+
+    sweep: str
+    run: str
+    values: Mapping[str, Any]
+    settings: Run
+
+
+@dataclass(frozen=True)
+class _Folded:
+    """A run with one of its start brains."""
+
+    run: str
+    start: Brain
+    settings: Run
 
 
 def resolve(config: Config, refused: Collection[str] = ()) -> Study:
@@ -50,77 +67,48 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     # their descriptions and folders are read once
     atlases = used_atlases(config)
     checksums = known_checksums(atlases)
-    brains = {
-        brain.id: _brain(brain, config, refused, checksums)
-        for brain in config.brains
-        if brain.id not in refused
-    }
-    accepted, series = list(brains.values()), series_of(config, brains, atlases)
-    swept = [
-        (
-            name,
-            member,
-            values,
-            changed(
-                config.runs[sweep.base], {**sweep.changes(values), "ensemble": None}
-            ),
-        )
-        for name, sweep in config.studies.items()
-        for member, values in variants(name, sweep)
-    ]
+    brains = {}
+    for settings in config.brains:
+        if settings.id not in refused:
+            brains[settings.id] = _brain(settings, config, refused, checksums)
+    accepted = list(brains.values())
+    series = series_of(config, brains, atlases)
+    swept = _variants(config)
     folded = list(_folded(config, brains, series, swept))
-    ends: dict[Brain, float] = {}
-    for _, start, run in folded:
-        ends[start] = max(run.end_week, ends.get(start, 0.0))
-    chains: Chains = {}
-    for start, end in ends.items():
-        chains |= chains_of(start, end, series, accepted)
+    chains = _chains(folded, series, accepted)
     unreachable: dict[str, InputError] = {}
-    for name, start, run in folded:
-        if run.growth.shapes and (
-            error := _missing_brains(name, start, run, series, chains)
-        ):
-            unreachable.setdefault(start.id, error)
+    for one in folded:
+        error = _missing_brains(one, series, chains)
+        if error is not None:
+            unreachable.setdefault(one.start.id, error)
     if unreachable and not refused:
         raise next(iter(unreachable.values()))
-    folded = [
-        (name, start, run) for name, start, run in folded if start.id not in unreachable
-    ]
-    simulations, names = _simulations(config, folded, swept, series, chains, accepted)
-    calibration = None
-    if (settings := config.calibrate) is not None:
-        base = tuple(
-            simulation
-            for simulation in simulations.values()
-            if simulation.run == settings.base
-        )
-        observed = {
-            simulation.start.id: _compared_with(settings, simulation.start, accepted)
-            for simulation in base
-        }
-        calibration = CalibrationRuns(base, settings.runs, observed) if base else None
+    folded = [one for one in folded if one.start.id not in unreachable]
+    chains = {key: chain for key, chain in chains.items() if key[0] not in unreachable}
+    planned = _Simulations(config, series, chains, accepted)
+    planned._add_runs(folded)
+    names = planned._add_variants(folded, swept)
+    simulations = planned.simulations.values()
     return Study(
         config=config,
         used_atlases=atlases,
         checksums=checksums,
         brains=brains,
         series=series,
-        simulations=simulations,
-        chains={
-            key: chain for key, chain in chains.items() if key[0] not in unreachable
-        },
-        sweeps=_sweeps(config, swept, names, simulations.values(), accepted),
-        calibration=calibration,
+        simulations=planned.simulations,
+        chains=chains,
+        sweeps=_sweeps(config, swept, names, simulations, accepted),
+        calibration=_calibration(config, simulations, accepted),
         unreachable=unreachable,
     )
 
 
 def label_scheme(config: Config, brain: BrainConfig) -> LabelScheme:
     """Return the scheme of a brain's labels; KeyError if it has none."""
-    settings = config.schemes.get(str(brain.scheme))
-    if settings is None:
-        return SCHEMES[str(brain.scheme)]
-    return LabelScheme(name=str(brain.scheme), **settings.model_dump())
+    name = str(brain.scheme)
+    if name not in config.schemes:
+        return SCHEMES[name]
+    return LabelScheme(name=name, **config.schemes[name].model_dump())
 
 
 def _brain(
@@ -130,26 +118,25 @@ def _brain(
     checksums: Mapping[str, tuple[str, str]],
 ) -> Brain:
     labels = None
-    if (volume := settings.label_volume) is not None:
-        labels = LabelSource(
-            volume, settings.affine_from, label_scheme(config, settings)
-        )
-    has_thickness = bool(settings.white_files) or (
-        labels is not None and bool(labels.scheme.cortex)
-    )
-    is_whole = len(settings.sides) == len(SIDES)
-    with_regions = [name for name in config.metrics.regions if name not in refused]
+    if settings.label_volume is not None:
+        scheme = label_scheme(config, settings)
+        labels = LabelSource(settings.label_volume, settings.affine_from, scheme)
+    has_cortex = labels is not None and bool(labels.scheme.cortex)
+    has_white_files = bool(settings.white_files)
+    has_thickness = has_white_files or has_cortex
+    measures_all_white = config.metrics.white_surfaces == "all"
+    with_regions = set(config.metrics.regions) - set(refused)
     regions_from: Literal["given", "carried"] | None = None
-    if is_whole and settings.id in with_regions:
-        regions_from = "given"
-    elif is_whole and with_regions and settings.source != "shape":
-        regions_from = "carried"
+    if len(settings.sides) == len(SIDES):
+        if settings.id in with_regions:
+            regions_from = "given"
+        elif with_regions and not settings.synthetic:
+            regions_from = "carried"
     return Brain(
         config=settings,
         labels=labels,
         has_thickness=has_thickness,
-        has_white=bool(settings.white_files)
-        or (has_thickness and config.metrics.white_surfaces == "all"),
+        has_white=has_white_files or (has_thickness and measures_all_white),
         regions_from=regions_from,
         checksums={
             path: checksums[path] for path in settings.files if path in checksums
@@ -160,156 +147,167 @@ def _brain(
 # simulations
 
 
+def _variants(config: Config) -> list[_Variant]:
+    """Return the runs of all sweeps. They have no ensembles."""
+    found = []
+    for name, sweep in config.studies.items():
+        base = config.runs[sweep.base]
+        for run, values in variants(name, sweep):
+            changes = {**sweep.changes(values), "ensemble": None}
+            found.append(_Variant(name, run, values, changed(base, changes)))
+    return found
+
+
 def _folded(
     config: Config,
     brains: Mapping[str, Brain],
     series: Series,
-    swept: Iterable[Variant],
-) -> Iterator[tuple[str, Brain, Run]]:
+    variants: Iterable[_Variant],
+) -> Iterator[_Folded]:
     """Yield each run with each start brain that is not refused: those of `runs`, of
     sweeps and of the calibration."""
     ids = [brain.id for brain in config.brains]
-    starts = {
-        name: [brains[id] for id in starts_of(config.start, run, ids) if id in brains]
-        for name, run in config.runs.items()
-    }
+    starts = {}
     for name, run in config.runs.items():
-        yield from (
-            (name, start, _up_to_last_scan(run, start, series))
-            for start in starts[name]
-        )
-    for sweep, name, _, run in swept:
-        yield from ((name, start, run) for start in starts[config.studies[sweep].base])
-    if (calibrate := config.calibrate) is not None:
-        run = config.runs[calibrate.base]
-        run = run.model_copy(
-            update={"end_week": calibrate.compare_week, "ensemble": None}
-        )
-        yield from (
-            (name, start, run)
-            for name in calibrate.runs
-            for start in starts[calibrate.base]
-        )
+        names = starts_of(config.start, run, ids)
+        starts[name] = [brains[brain] for brain in names if brain in brains]
+    for name, run in config.runs.items():
+        for start in starts[name]:
+            yield _Folded(name, start, _up_to_last_scan(run, start, series))
+    for variant in variants:
+        for start in starts[config.studies[variant.sweep].base]:
+            yield _Folded(variant.run, start, variant.settings)
+    calibrate = config.calibrate
+    if calibrate is not None:
+        changes = {"end_week": calibrate.compare_week, "ensemble": None}
+        settings = config.runs[calibrate.base].model_copy(update=changes)
+        for name in calibrate.runs:
+            for start in starts[calibrate.base]:
+                yield _Folded(name, start, settings)
 
 
-def _simulations(
-    config: Config,
-    folded: Sequence[tuple[str, Brain, Run]],
-    swept: Sequence[Variant],
-    series: Series,
-    chains: Chains,
-    brains: Sequence[Brain],
-) -> tuple[dict[tuple[str, str], Simulation], dict[str, str]]:
-    """Return the simulations by run and start brain, and the simulated run of each run
-    of a sweep, by its name.
+def _chains(
+    folded: Iterable[_Folded], series: Series, brains: Sequence[Brain]
+) -> Chains:
+    ends: dict[Brain, float] = {}
+    for one in folded:
+        ends[one.start] = max(one.settings.end_week, ends.get(one.start, 0.0))
+    chains: Chains = {}
+    for start, end in ends.items():
+        chains |= chains_of(start, end, series, brains)
+    return chains
 
-    The chains of members of ensembles are added to `chains`.
-    """
-    simulations: dict[tuple[str, str], Simulation] = {}
 
-    def add(
-        run: str,
-        start: Brain,
-        settings: Run,
-        weeks: Sequence[float],
-        member_of: str | None = None,
+@dataclass
+class _Simulations:
+    """The simulations of a study by run and start brain. The chains of members of
+    ensembles are added to `chains`."""
+
+    config: Config
+    series: Series
+    chains: Chains
+    brains: Sequence[Brain]
+    simulations: dict[tuple[str, str], Simulation] = field(default_factory=dict)
+
+    def _add_runs(self, folded: Iterable[_Folded]) -> None:
+        """Add the simulations of `runs`, and the members of their ensembles."""
+        own = [one for one in folded if one.run in self.config.runs]
+        predicted = {one.start for one in own if one.settings.growth.shapes == "atlas"}
+        for one in own:
+            start = one.start
+            further: list[float] = []
+            if start in predicted:
+                further = later_observed_weeks(start, self.brains)
+            weeks = _weeks(one.settings, start, further)
+            self._add(one, weeks)
+            alone = one.settings.model_copy(update={"ensemble": None})
+            for name, variation in members_of(one.run, one.settings).items():
+                member = self._add(_Folded(name, start, alone), weeks, one.run)
+                if member.chain is not None:
+                    self.chains[start.id, member.chain] = member_chain(
+                        one.run,
+                        start,
+                        one.settings,
+                        variation,
+                        self.series,
+                        self.brains,
+                    )
+
+    def _add_variants(
+        self, folded: Iterable[_Folded], variants: Sequence[_Variant]
+    ) -> dict[str, str]:
+        """Add the simulations of sweeps and of the calibration; return the simulated
+        run of each run of a sweep, by its name."""
+        names, compared = _shared_runs(self.config, variants, self.simulations.values())
+        calibrate = self.config.calibrate
+        for one in folded:
+            if one.run in compared and one.run not in self.config.runs:
+                weeks = compared[one.run]
+                settings = one.settings.model_copy(update={"end_week": max(weeks)})
+                complete = _Folded(one.run, one.start, settings)
+                self._add(complete, _weeks(settings, one.start, weeks))
+            elif calibrate is not None and one.run in calibrate.runs:
+                self._add(one, [one.start.week, one.settings.end_week])
+        return names
+
+    def _add(
+        self, folded: _Folded, weeks: Sequence[float], member_of: str | None = None
     ) -> Simulation:
         """Add a simulation, unless there is one of that name, with the brains that it
         is compared with."""
+        start = folded.start
+        growth = folded.settings.growth
         # the run is also compared with brains of other subjects if it grows towards
         # them
-        targets = [
-            brain
-            for brain in chains[start.id, "self"].later
-            if brain.sides == start.sides
-        ]
-        candidates = list(dict.fromkeys([*start.comparable(brains), *targets]))
+        candidates = start.comparable(self.brains)
+        for brain in self.chains[start.id, "self"].later:
+            if brain.sides == start.sides and brain not in candidates:
+                candidates.append(brain)
         candidates.sort(key=lambda brain: brain.subject != start.subject)
-        by_week = {
-            week: tuple(brain for brain in candidates if brain.week == week)
-            for week in weeks[1:]
-        }
-        measured = {
-            week: [brain for brain in same_week if not brain.config.synthetic]
-            for week, same_week in by_week.items()
-        }
-        scans = [
-            brain
-            for brain in brains
-            if start.config.subject is not None and brain.subject == start.subject
-        ]
-        later = {brain for brain in (*candidates, *scans) if brain.week > start.week}
-        growth = settings.growth
-        is_atlas_prediction = growth.shapes == "atlas" and later.isdisjoint(
-            chains[start.id, "atlas"].later
-        )
-        simulation = Simulation(
-            run=run,
-            start=start,
-            settings=settings,
-            weeks=tuple(weeks),
-            series=series.for_sizes(start),
-            base=(
-                config.calibrate.base
-                if config.calibrate and run in config.calibrate.runs
-                else run
-            ),
-            member_of=member_of,
-            observed_brains={
-                week: same_week for week, same_week in by_week.items() if same_week
-            },
-            observed={
-                week: found[0]
-                for week, found in measured.items()
-                if found and not start.config.synthetic
-            },
-            kind=(
-                "explained"
-                if not is_atlas_prediction and (growth.shapes or growth.follows_sizes)
-                else "predicted"
-            ),
-            is_atlas_prediction=is_atlas_prediction,
-            has_regions=start.has_regions and run in config.runs,
-        )
-        return simulations.setdefault((run, start.id), simulation)
-
-    predicted = {
-        start
-        for name, start, run in folded
-        if name in config.runs and run.growth.shapes == "atlas"
-    }
-    for name, start, run in folded:
-        if name in config.runs:
-            weeks = _weeks(
-                run,
-                start,
-                later_observed_weeks(start, brains) if start in predicted else (),
+        observed_brains = {}
+        observed = {}
+        for week in weeks[1:]:
+            same_week = [brain for brain in candidates if brain.week == week]
+            if same_week:
+                observed_brains[week] = tuple(same_week)
+            real = [brain for brain in same_week if not brain.config.synthetic]
+            if real and not start.config.synthetic:
+                observed[week] = real[0]
+        later = set()
+        for brain in self.brains:
+            is_scan = (
+                start.config.subject is not None and brain.subject == start.subject
             )
-            add(name, start, run, weeks)
-            for member, variation in members_of(name, run).items():
-                simulation = add(
-                    member,
-                    start,
-                    run.model_copy(update={"ensemble": None}),
-                    weeks,
-                    name,
-                )
-                if simulation.chain:
-                    chains[start.id, simulation.chain] = member_chain(
-                        name, start, run, variation, series, brains
-                    )
-    names, compared = _shared_runs(config, swept, simulations.values())
-    for name, start, run in folded:
-        if name in compared and name not in config.runs:
-            complete = run.model_copy(update={"end_week": max(compared[name])})
-            add(name, start, complete, _weeks(complete, start, compared[name]))
-        elif config.calibrate is not None and name in config.calibrate.runs:
-            add(name, start, run, [start.week, run.end_week])
-    return simulations, names
+            if brain.week > start.week and (is_scan or brain in candidates):
+                later.add(brain)
+        atlas_brains = self.chains[start.id, "atlas"].later
+        is_atlas_prediction = growth.shapes == "atlas" and later.isdisjoint(
+            atlas_brains
+        )
+        follows_observed = bool(growth.shapes) or growth.follows_sizes
+        is_explained = follows_observed and not is_atlas_prediction
+        base = folded.run
+        if self.config.calibrate and folded.run in self.config.calibrate.runs:
+            base = self.config.calibrate.base
+        simulation = Simulation(
+            run=folded.run,
+            start=start,
+            settings=folded.settings,
+            weeks=tuple(weeks),
+            series=self.series.for_sizes(start),
+            base=base,
+            member_of=member_of,
+            observed_brains=observed_brains,
+            observed=observed,
+            kind="explained" if is_explained else "predicted",
+            is_atlas_prediction=is_atlas_prediction,
+            has_regions=start.has_regions and folded.run in self.config.runs,
+        )
+        return self.simulations.setdefault((folded.run, start.id), simulation)
 
 
 def _shared_runs(
-    config: Config, swept: Sequence[Variant], simulations: Iterable[Simulation]
+    config: Config, variants: Sequence[_Variant], simulations: Iterable[Simulation]
 ) -> tuple[dict[str, str], dict[str, set[float]]]:
     """Return the run that each run of a sweep is simulated by, and the weeks of
     comparison of these runs, by name.
@@ -318,22 +316,22 @@ def _shared_runs(
     equal too, and its simulations have all their weeks, they share that one.
     """
     compared: dict[str, set[float]] = {}
-    for _, _, _, run in swept:
-        compared.setdefault(_equality_key(run), set()).add(run.end_week)
-    lacking = {
-        simulation.run
-        for simulation in simulations
-        if compared.get(_equality_key(simulation.settings), set())
-        - set(simulation.weeks)
-    }
-    shared = {
-        _equality_key(run): name
-        for name, run in reversed(list(config.runs.items()))
-        if name not in lacking
-    }
-    names = {
-        name: shared.setdefault(_equality_key(run), name) for _, name, _, run in swept
-    }
+    for variant in variants:
+        weeks = compared.setdefault(_equality_key(variant.settings), set())
+        weeks.add(variant.settings.end_week)
+    lacking = set()
+    for simulation in simulations:
+        weeks = compared.get(_equality_key(simulation.settings), set())
+        if not weeks <= set(simulation.weeks):
+            lacking.add(simulation.run)
+    shared: dict[str, str] = {}
+    for name, run in config.runs.items():
+        if name not in lacking:
+            shared.setdefault(_equality_key(run), name)
+    names = {}
+    for variant in variants:
+        key = _equality_key(variant.settings)
+        names[variant.run] = shared.setdefault(key, variant.run)
     return names, {shared[key]: weeks for key, weeks in compared.items()}
 
 
@@ -346,39 +344,45 @@ def _equality_key(run: Run) -> str:
 
 
 def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]:
-    weeks = output_weeks(start.week, settings.end_week, settings.output_every_gw)
-    return sorted({*weeks, *(week for week in further if week < weeks[-1])})
+    weeks = set(
+        output_weeks(start.week, settings.end_week, settings.output_every_gw),
+    )
+    for week in further:
+        if week < settings.end_week:
+            weeks.add(week)
+    return sorted(weeks)
 
 
 def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
     """Return a run that ends with the last scan if it follows the scans of one
     subject."""
+    if run.growth.shapes != "self" or start.config.subject is None:
+        return run
     scans = series.brains.get(series.with_brain(start), ())
     last = max((brain.week for brain in scans), default=start.week)
-    if (
-        run.growth.shapes != "self"
-        or start.config.subject is None
-        or several_subjects(scans)
-        or last <= start.week
-    ):
+    if several_subjects(scans) or last <= start.week:
         return run
     return run.model_copy(update={"end_week": min(run.end_week, last)})
 
 
 def _missing_brains(
-    name: str, start: Brain, run: Run, series: Series, chains: Chains
+    folded: _Folded, series: Series, chains: Chains
 ) -> InputError | None:
     """Return the error of a run that lacks brains to grow a start brain towards, or
     None."""
-    end, origin = run.end_week, str(run.growth.shapes)
+    start = folded.start
+    end = folded.settings.end_week
+    origin = folded.settings.growth.shapes
+    if origin is None:
+        return None
     chain = chains[start.id, origin]
     available = ", ".join(f"{brain.id} ({brain.week:g} GW)" for brain in chain.brains)
     if origin == "self":
-        names = [own] if (own := series.with_brain(start)) else []
+        own = series.with_brain(start)
+        names = [own] if own else []
         is_complete = len(chain.brains) > 1
-        available += "".join(
-            f"; {series.unmatched[own]}" for own in names if own in series.unmatched
-        )
+        if own in series.unmatched:
+            available += f"; {series.unmatched[own]}"
         expected = (
             "the start's own growth series with label volumes or matched surfaces"
         )
@@ -401,11 +405,13 @@ def _missing_brains(
         available = f"none; the growth series are {', '.join(series.brains)}"
     elif len(names) > 1:
         available = f"several series: {', '.join(names)}"
-    text = (
-        f"run {name} needs later brains to grow {start.id} towards, and there are none"
+    return InputError(
+        f"run {folded.run} needs later brains to grow {start.id} towards, and there are"
+        " none",
+        found=available,
+        expected=f"brains of {expected}, from {start.week:g} to {end:g} GW",
+        remedy=remedy,
     )
-    expected = f"brains of {expected}, from {start.week:g} to {end:g} GW"
-    return InputError(text, found=available, expected=expected, remedy=remedy)
 
 
 def _compared_with(
@@ -414,36 +420,46 @@ def _compared_with(
     if settings.compare_with is not None:
         return tuple(brain for brain in brains if brain.id in settings.compare_with)
     same_week = [brain for brain in brains if brain.week == settings.compare_week]
-    same_population = [
-        brain
-        for brain in same_week
-        if brain.config.population == start.config.population
-    ]
-    return tuple(same_population or same_week)
+    population = start.config.population
+    own = [brain for brain in same_week if brain.config.population == population]
+    return tuple(own or same_week)
 
 
 def _sweeps(
     config: Config,
-    swept: Sequence[Variant],
+    variants: Iterable[_Variant],
     names: Mapping[str, str],
     simulations: Collection[Simulation],
     brains: Sequence[Brain],
 ) -> dict[str, Sweep]:
+    members: dict[str, list[tuple[Simulation, Mapping[str, Any]]]] = {}
+    for variant in variants:
+        for simulation in simulations:
+            if simulation.run == names[variant.run]:
+                member = (simulation, variant.values)
+                members.setdefault(variant.sweep, []).append(member)
     sweeps = {}
-    for name, settings in config.studies.items():
-        runs = [
-            (names[run], values) for sweep, run, values, _ in swept if sweep == name
-        ]
-        members = [
-            (simulation, values)
-            for run, values in runs
-            for simulation in simulations
-            if simulation.run == run
-        ]
+    for name, of_sweep in members.items():
+        settings = config.studies[name]
         observed = {
-            member.start.id: _compared_with(settings, member.start, brains)
-            for member, _ in members
+            simulation.start.id: _compared_with(settings, simulation.start, brains)
+            for simulation, _ in of_sweep
         }
-        if members:
-            sweeps[name] = Sweep(name, settings.compare_week, tuple(members), observed)
+        sweeps[name] = Sweep(name, settings.compare_week, tuple(of_sweep), observed)
     return sweeps
+
+
+def _calibration(
+    config: Config, simulations: Iterable[Simulation], brains: Sequence[Brain]
+) -> CalibrationRuns | None:
+    settings = config.calibrate
+    if settings is None:
+        return None
+    base = [simulation for simulation in simulations if simulation.run == settings.base]
+    if not base:
+        return None
+    observed = {}
+    for simulation in base:
+        start = simulation.start
+        observed[start.id] = _compared_with(settings, start, brains)
+    return CalibrationRuns(tuple(base), settings.runs, observed)

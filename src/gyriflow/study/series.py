@@ -11,7 +11,7 @@ from ..settings.brains import BrainConfig
 from ..settings.ensemble import Variation
 from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
-from ..settings.runs import Run, growth_series
+from ..settings.runs import Run, growing_groups
 from .atlases import UsedAtlas
 from .paths import MATCHED, REGISTERED, VARIED_REGISTRATION
 from .records import Brain
@@ -38,8 +38,11 @@ class Series:
     def with_brain(self, brain: Brain) -> str:
         """Return the series that contains a brain (the preferred one of several), or
         ""."""
-        names = [name for name, brains in self.brains.items() if brain in brains]
+        names = self._names_with(brain)
         return min(names, key=lambda name: name != self.preferred, default="")
+
+    def _names_with(self, brain: Brain) -> list[str]:
+        return [name for name, brains in self.brains.items() if brain in brains]
 
     def for_sizes(self, brain: Brain) -> str | None:
         """Return the series whose curves a start brain follows: the preferred one, its
@@ -49,11 +52,11 @@ class Series:
         """
         if self.preferred is not None:
             return self.preferred if self.preferred in self.brains else None
-        own = [name for name, brains in self.brains.items() if brain in brains]
-        populations = [
-            name for name in self.brains if not self._is_single_subject(name)
-        ]
-        return next(iter(own or (populations if len(populations) == 1 else [])), None)
+        own = self._names_with(brain)
+        if own:
+            return own[0]
+        others = [name for name in self.brains if not self._is_single_subject(name)]
+        return others[0] if len(others) == 1 else None
 
     def from_other_populations(
         self, start: Brain, *, all_atlases: bool = False
@@ -64,20 +67,18 @@ class Series:
         A series of scans of another subject is returned only if it is preferred. With
         `all_atlases`, all others are returned as well, the preferred one first.
         """
-        population = start.config.population
-        names = [
-            name
-            for name, brains in self.brains.items()
-            if start not in brains
-            and (name == self.preferred or not self._is_single_subject(name))
-            and all(brain.sides == start.sides for brain in brains)
-            and all(
-                population is None or brain.config.population != population
-                for brain in brains
-            )
-        ]
+        names = []
+        for name, brains in self.brains.items():
+            if name != self.preferred and self._is_single_subject(name):
+                continue
+            populations = {brain.config.population for brain in brains} - {None}
+            is_own = start in brains or start.config.population in populations
+            if not is_own and all(brain.sides == start.sides for brain in brains):
+                names.append(name)
         names.sort(key=lambda name: name != self.preferred)
-        return names[:1] if self.preferred in names and not all_atlases else names
+        if self.preferred in names and not all_atlases:
+            return names[:1]
+        return names
 
     def _is_single_subject(self, name: str) -> bool:
         brains = self.brains[name]
@@ -85,9 +86,8 @@ class Series:
 
     def are_matched(self, *brains: Brain) -> bool:
         """Return whether brains have surfaces with the same vertices."""
-        return any(
-            {brain.id for brain in brains} <= ids for ids in self.matched.values()
-        )
+        ids = {brain.id for brain in brains}
+        return any(ids <= matched for matched in self.matched.values())
 
     def correspondence(
         self, earlier: Brain, later: Brain, variation: tuple[float, int] = UNVARIED
@@ -103,9 +103,8 @@ class Series:
         else:
             file = REGISTERED if variation == UNVARIED else VARIED_REGISTRATION
         smoothing, seed = variation
-        return file.format(
-            earlier=earlier.id, later=later.id, smoothing=smoothing, seed=seed
-        )
+        names = {"earlier": earlier.id, "later": later.id}
+        return file.format(**names, smoothing=smoothing, seed=seed)
 
     def posed(self, *pair: Brain) -> list[bool]:
         """Return for each of two brains whether their correspondence refers to the pose
@@ -114,10 +113,9 @@ class Series:
         This is the case for masks made from surfaces. Otherwise it refers to the world
         coordinates of its files.
         """
-        return [
-            not brain.config.has_labels and not self.are_matched(*pair)
-            for brain in pair
-        ]
+        if self.are_matched(*pair):
+            return [False, False]
+        return [not brain.config.has_labels for brain in pair]
 
 
 def several_subjects(brains: Iterable[Brain]) -> bool:
@@ -134,31 +132,26 @@ def series_of(
     Surfaces are read to find out whether their vertices are matched. For atlas files
     that have yet to be downloaded, the description of the atlas decides.
     """
-    names = growth_series(
-        [brain.config for brain in brains.values()], config.growth.brains
-    )
-    assumed = {
-        str(file.path)
-        for used in atlases
-        for file in used.missing
-        if used.atlas.series[file.series].matched
-    }
-    matched, unmatched = {}, {}
-    for name, ids in names.items():
-        members = sorted(
-            (brains[brain].config for brain in ids), key=lambda brain: brain.week
-        )
-        if not any(brain.has_labels or brain.synthetic for brain in members):
-            cause: str | None = "growth.matched_surfaces is false"
-            if config.growth.matched_surfaces:
-                cause = unmatched_reason(members, assumed)
-            if cause is None:
-                matched[name] = frozenset(ids)
-            else:
-                unmatched[name] = cause
-    series = {
-        name: tuple(brains[brain] for brain in ids) for name, ids in names.items()
-    }
+    assumed: set[str] = set()
+    for used in atlases:
+        for file in used.missing:
+            if used.atlas.series[file.series].matched:
+                assumed.add(str(file.path))
+    series, matched, unmatched = {}, {}, {}
+    configs = [brain.config for brain in brains.values()]
+    for name, members in growing_groups(configs, config.growth.brains):
+        ids = [brain.id for brain in members]
+        series[name] = tuple(brains[brain] for brain in ids)
+        if any(brain.has_labels or brain.synthetic for brain in members):
+            continue
+        cause: str | None = "growth.matched_surfaces is false"
+        if config.growth.matched_surfaces:
+            by_week = sorted(members, key=lambda brain: brain.week)
+            cause = unmatched_reason(by_week, assumed)
+        if cause is None:
+            matched[name] = frozenset(ids)
+        else:
+            unmatched[name] = cause
     return Series(series, config.growth.series, matched, unmatched)
 
 
@@ -180,22 +173,21 @@ def unmatched_reason(
             return (
                 f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
             )
-    read = [
-        brain
-        for brain in brains
-        if not assumed or not all(path in assumed for path in brain.files)
-    ]
+    read = [brain for brain in brains if not set(brain.files) <= set(assumed)]
+    sides = {}
     try:
-        sides = [[connectivity(Path(path)) for path in brain.files] for brain in read]
+        for brain in read:
+            sides[brain.id] = [connectivity(Path(path)) for path in brain.files]
     except InputError as error:
         return str(error)
-    for brain, brain_sides in zip(read, sides, strict=True):
-        for expected, found in zip(sides[0], brain_sides, strict=True):
+    for brain in read:
+        first = read[0]
+        for expected, found in zip(sides[first.id], sides[brain.id], strict=True):
             if expected[:2] != found[:2]:
                 text = f"{brain.id} has {found[0]} vertices and {found[1]} triangles"
-                return f"{text}, but {read[0].id} has {expected[0]} and {expected[1]}"
+                return f"{text}, but {first.id} has {expected[0]} and {expected[1]}"
             if expected != found:
-                return f"{brain.id} has other triangles than {read[0].id}"
+                return f"{brain.id} has other triangles than {first.id}"
     return None
 
 
@@ -241,17 +233,20 @@ class Chain:
     def pairs(self) -> list[tuple[tuple[Brain, Brain], list[bool]]]:
         """The pairs of brains that correspond, those of its path included, and whether
         each map is posed."""
-        own = list(zip(pairwise(self.brains), self.posed, strict=False))
-        return own + (self.path.pairs if self.path else [])
+        pairs = list(zip(pairwise(self.brains), self.posed, strict=False))
+        if self.path is not None:
+            pairs += self.path.pairs
+        return pairs
 
 
 def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
     """Return the weeks of brains, not shapes, that simulations from a start brain are
     compared with."""
-    observed = [
-        brain for brain in start.comparable(brains) if not brain.config.synthetic
-    ]
-    return sorted({brain.week for brain in observed if brain.week > start.week})
+    weeks = set()
+    for brain in start.comparable(brains):
+        if brain.week > start.week and not brain.config.synthetic:
+            weeks.add(brain.week)
+    return sorted(weeks)
 
 
 def chains_of(
@@ -259,16 +254,19 @@ def chains_of(
 ) -> dict[tuple[str, str], Chain]:
     """Return the brains on which growth for a start brain is measured up to a week, by
     its id and their origin."""
+    own = _chain("self", _own_chain(start, end, series), series)
     atlases = series.from_other_populations(start)
-    name = atlases[0] if len(atlases) == 1 else None
-    atlas = _along_path(start, start.week, end, name, series)
-    observed = later_observed_weeks(start, brains)
-    further = tuple(
-        week for week in observed if week <= end and week not in atlas.weeks[1:]
-    )
+    if len(atlases) == 1:
+        atlas = _along_path(start, start.week, end, atlases[0], series)
+    else:
+        atlas = _chain("atlas", [start], series)
+    further = []
+    for week in later_observed_weeks(start, brains):
+        if week <= end and week not in atlas.weeks[1:]:
+            further.append(week)
     return {
-        (start.id, "self"): _chain("self", _own_chain(start, end, series), series),
-        (start.id, "atlas"): replace(atlas, further_weeks=further),
+        (start.id, "self"): own,
+        (start.id, "atlas"): replace(atlas, further_weeks=tuple(further)),
     }
 
 
@@ -282,7 +280,8 @@ def member_chain(
 ) -> Chain:
     """Return the chain of a member of a run's ensemble. InputError if it is that of the
     run."""
-    end, varied = settings.end_week, (variation.registration_smoothing, variation.seed)
+    end = settings.end_week
+    varied = (variation.registration_smoothing, variation.seed)
     if settings.growth.shapes == "self":
         chain = _chain("self", _own_chain(start, end, series), series, varied)
         if chain.later and chain == _chain("self", chain.brains, series):
@@ -305,12 +304,11 @@ def member_chain(
     low = min(atlas_weeks) - BEFORE_GW - start.week
     high = max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
     shift = round(min(max(variation.age_shift_gw, low), high), 2)
-    further = sorted(
-        {*(week for week in later_observed_weeks(start, brains) if week <= end), end}
-    )
+    observed = later_observed_weeks(start, brains)
+    further = {end, *(week for week in observed if week <= end)}
     return replace(
         _along_path(start, start.week + shift, end + shift, name, series, varied),
-        further_weeks=tuple(further),
+        further_weeks=tuple(sorted(further)),
         variation=replace(variation, age_shift_gw=shift),
     )
 
@@ -322,14 +320,12 @@ def _chain(
     variation: tuple[float, int] = UNVARIED,
 ) -> Chain:
     """Return a chain, with smoothing and seed of its registrations."""
-    pairs = list(pairwise(brains))
-    correspondences = tuple(series.correspondence(*pair, variation) for pair in pairs)
-    return Chain(
-        origin,
-        tuple(brains),
-        correspondences,
-        tuple(series.posed(*pair) for pair in pairs),
-    )
+    correspondences = []
+    posed = []
+    for earlier, later in pairwise(brains):
+        correspondences.append(series.correspondence(earlier, later, variation))
+        posed.append(series.posed(earlier, later))
+    return Chain(origin, tuple(brains), tuple(correspondences), tuple(posed))
 
 
 def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
@@ -354,41 +350,35 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     by_week = {start.week: start}
     for brain in members:
         have_labels = start.config.has_labels and brain.config.has_labels
-        if start.week < brain.week <= last and (
-            have_labels or series.are_matched(start, brain)
-        ):
+        if not have_labels and not series.are_matched(start, brain):
+            continue
+        if start.week < brain.week <= last:
             by_week.setdefault(brain.week, brain)
-    return sorted(by_week.values(), key=lambda brain: brain.week)
+    return [by_week[week] for week in sorted(by_week)]
 
 
 def _along_path(
     start: Brain,
     week: float,
     end: float,
-    name: str | None,
+    name: str,
     series: Series,
     variation: tuple[float, int] = UNVARIED,
 ) -> Chain:
     """Return the chain of a start brain of a week by the growth of a series of another
-    population, if there is one.
+    population.
 
     Its brains, one for each week, begin with the last week up to that of the start
     (else with the first week), and end with the first week at or past an end week.
     There are at least two weeks, if available.
     """
-    members = series.brains[name] if name else ()
-    weekly = sorted(
-        {brain.week: brain for brain in members}.values(), key=lambda brain: brain.week
-    )
-    if not weekly:
-        return _chain("atlas", [start], series)
-    first = max(
-        (brain.week for brain in weekly if brain.week <= week), default=weekly[0].week
-    )
-    last = min(
-        (brain.week for brain in weekly if brain.week >= end and brain.week > first),
-        default=end,
-    )
-    brains = (start, *(brain for brain in weekly if first <= brain.week <= last))
+    by_week = {brain.week: brain for brain in series.brains[name]}
+    weeks = sorted(by_week)
+    first = max((known for known in weeks if known <= week), default=weeks[0])
+    ends = [known for known in weeks if known >= end and known > first]
+    last = min(ends, default=end)
+    used = [by_week[known] for known in weeks if first <= known <= last]
+    brains = (start, *used)
+    path = _chain("self", [by_week[known] for known in weeks], series)
     to_atlas = _chain("atlas", brains[:2], series, variation)
-    return replace(to_atlas, brains=brains, path=_chain("self", weekly, series))
+    return replace(to_atlas, brains=brains, path=path)

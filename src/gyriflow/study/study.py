@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..io.exports import ExportedBrain, labels_file
 from ..settings.atlas import Atlas
 from ..settings.root import Config
-from ..settings.terms import MEASURED, SIDES, Side
+from ..settings.terms import MEASURED, SIDES
 from . import paths
 from .atlases import UsedAtlas
 from .records import Brain, CalibrationRuns, Measurement, Simulation, Sweep
@@ -55,11 +55,8 @@ class Study:
     def may_diverge(self) -> list[str]:
         """The runs of sweeps, calibration and ensembles, which may diverge without
         stopping the study."""
-        return list(
-            dict.fromkeys(
-                run for run, _ in self.simulations if run not in self.config.runs
-            )
-        )
+        runs = dict.fromkeys(run for run, _ in self.simulations)
+        return [run for run in runs if run not in self.config.runs]
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
@@ -69,11 +66,10 @@ class Study:
 
     def files(self, *patterns: str) -> list[str]:
         """Return the files of patterns for each of `run_simulations`."""
-        return [
-            simulation.file(pattern)
-            for simulation in self.run_simulations
-            for pattern in patterns
-        ]
+        files = []
+        for simulation in self.run_simulations:
+            files += [simulation.file(pattern) for pattern in patterns]
+        return files
 
     @cached_property
     def starts(self) -> list[Brain]:
@@ -85,51 +81,47 @@ class Study:
     def growth_brains(self) -> list[tuple[str, Brain]]:
         """All brains that growth is measured on, each with its series, in the order of
         weeks within a series."""
-        series = self.series.brains
-        return [
-            (name, brain)
-            for name in series
-            for brain in sorted(series[name], key=lambda brain: brain.week)
-        ]
+        growth_brains = []
+        for name, brains in self.series.brains.items():
+            by_week = sorted(brains, key=lambda brain: brain.week)
+            growth_brains += [(name, brain) for brain in by_week]
+        return growth_brains
 
     @cached_property
     def series_with_rates(self) -> list[str]:
         """The series whose differences between weeks are growth: of a subject, of an
         atlas, or used by a run."""
-        simulations = self.simulations.values()
-        starts = {simulation.start for simulation in simulations}
-        grown = [
-            self.chains[simulation.start.id, simulation.shapes]
-            for simulation in simulations
-            if simulation.shapes
-        ]
-        used = {simulation.followed_series for simulation in simulations}
-        used |= {
-            self.series.with_brain(brain) for chain in grown for brain in chain.later
-        }
+        starts = set()
+        used = set()
+        for simulation in self.simulations.values():
+            starts.add(simulation.start)
+            used.add(simulation.followed_series)
+            if simulation.shapes:
+                chain = self.chains[simulation.start.id, simulation.shapes]
+                used |= {self.series.with_brain(brain) for brain in chain.later}
         for name, brains in self.series.brains.items():
+            if several_subjects(brains):
+                continue
             is_of_atlas = all(brain.id in self.atlases for brain in brains)
             # brains without a subject may be different fetuses
-            if not several_subjects(brains) and (
-                brains[0].config.subject or is_of_atlas or starts & {*brains}
-            ):
+            if brains[0].config.subject or is_of_atlas or starts & {*brains}:
                 used.add(name)
         return [name for name in self.series.brains if name in used]
 
     def growth_source(self, simulation: Simulation) -> str:
         """Describe whose measured growth a simulation follows, or return ""."""
         if simulation.shapes:
-            brains = self.chains[simulation.start.id, simulation.shapes].brains
-            brains = brains[1:] if simulation.shapes == "atlas" else brains
+            chain = self.chains[simulation.start.id, simulation.shapes]
+            brains = chain.later if simulation.shapes == "atlas" else chain.brains
             name = self.series.with_brain(brains[0])
         else:
             name = simulation.followed_series or ""
             brains = self.series.brains.get(name, ())
         if several_subjects(brains):
             return f"population {name}"
-        return (
-            "own" if simulation.start in brains else f"series {name}" if brains else ""
-        )
+        if simulation.start in brains:
+            return "own"
+        return f"series {name}" if brains else ""
 
     @cached_property
     def with_ensemble(self) -> list[Simulation]:
@@ -159,14 +151,13 @@ class Study:
         start brain and week."""
         references = {}
         for simulation in self.validated:
-            comparable = simulation.start.comparable(self.brains.values())
+            start = simulation.start
+            comparable = start.comparable(self.brains.values())
             candidates = [brain for brain in comparable if not brain.config.synthetic]
             for week, observed in simulation.observed.items():
                 earlier = [brain for brain in candidates if brain.week < week]
-                references[simulation.start.id, week] = (
-                    observed,
-                    max(earlier, key=lambda brain: brain.week),
-                )
+                latest = max(earlier, key=lambda brain: brain.week)
+                references[start.id, week] = (observed, latest)
         return references
 
     @cached_property
@@ -182,21 +173,17 @@ class Study:
     def prediction(self) -> Simulation | None:
         """The only simulation of the study if it is a prediction by an atlas' growth,
         else None."""
-        simulations = self.run_simulations
-        return (
-            simulations[0]
-            if len(simulations) == 1 and simulations[0].is_atlas_prediction
-            else None
-        )
+        if len(self.run_simulations) == 1:
+            (simulation,) = self.run_simulations
+            if simulation.is_atlas_prediction:
+                return simulation
+        return None
 
     def atlas_brain(self, simulation: Simulation) -> Brain:
         """Return the brain of a prediction's atlas that is closest in week to its
         end."""
-        end = simulation.weeks[-1]
-        return min(
-            self.chains[simulation.start.id, "atlas"].later,
-            key=lambda brain: abs(brain.week - end),
-        )
+        chain = self.chains[simulation.start.id, "atlas"]
+        return _closest(chain.later, simulation.weeks[-1])
 
     @cached_property
     def predictions(self) -> list[Simulation]:
@@ -215,48 +202,38 @@ class Study:
         """The measurements in the tables of the study, of observed and simulated
         brains, by folder."""
         rows = [brain.measurement for brain in self.brains.values()]
-        return {
-            row.where: row
-            for row in (
-                *rows,
-                *(
-                    row
-                    for simulation in self.run_simulations
-                    for row in simulation.measurements
-                ),
-            )
-        }
+        for simulation in self.run_simulations:
+            rows += simulation.measurements
+        return {row.where: row for row in rows}
 
     @cached_property
     def all_measurements(self) -> dict[str, Measurement]:
         """All measurements by folder, including those of sweeps at their week of
         comparison."""
-        rows = [
-            simulation.at(sweep.week)
-            for sweep in self.sweeps.values()
-            for simulation, _ in sweep.members
-        ]
-        return {**{row.where: row for row in rows}, **self.measurements}
+        rows = {}
+        for sweep in self.sweeps.values():
+            for simulation, _ in sweep.members:
+                row = simulation.at(sweep.week)
+                rows[row.where] = row
+        return rows | self.measurements
 
     @property
     def surfaces(self) -> list[str]:
-        return [
-            file.format(brain=brain.id)
-            for brain in self.brains.values()
-            for file in (
-                *paths.pial_of(*brain.sides).values(),
-                *(paths.THICKNESS.values() if brain.has_thickness else ()),
-            )
-        ]
+        files = []
+        for brain in self.brains.values():
+            patterns = [*paths.pial_of(*brain.sides).values()]
+            if brain.has_thickness:
+                patterns += paths.THICKNESS.values()
+            files += [pattern.format(**brain.names) for pattern in patterns]
+        return files
 
     @cached_property
     def atlases(self) -> dict[str, Atlas]:
         """The atlas of each brain of an atlas, by the id of the brain."""
-        return {
-            used.atlas.brain_id(file.series, file.week): used.atlas
-            for used in self.used_atlases
-            for file in used.files
-        }
+        atlases: dict[str, Atlas] = {}
+        for used in self.used_atlases:
+            atlases |= {file.brain: used.atlas for file in used.files}
+        return atlases
 
     def are_individuals(self, ids: Iterable[str]) -> bool:
         """Return whether brains are individuals, not averages of an atlas.
@@ -265,12 +242,11 @@ class Study:
         averages of an unknown atlas.
         """
         brains = [self.brains[brain].config for brain in ids]
+        if any(brain.id in self.atlases for brain in brains):
+            return False
         weeks = sorted(brain.week for brain in brains)
-        has_subjects = all(brain.subject for brain in brains)
         is_dense = any(late - early < 0.5 for early, late in pairwise(weeks))
-        return (has_subjects or is_dense) and not any(
-            brain.id in self.atlases for brain in brains
-        )
+        return is_dense or all(brain.subject for brain in brains)
 
     @cached_property
     def norm_reference(self) -> list[str]:
@@ -280,42 +256,44 @@ class Study:
         They have the hemispheres of the first start brain. By default, if there are
         several populations, only the start brain's is used.
         """
-        # without runs, the first brain takes the place of the start brain
-        first = self.starts or ([] if self.config.runs else list(self.brains.values()))
-        if not first:
+        starts = self.starts
+        if not self.config.runs:
+            # without runs, the first brain takes the place of the start brain
+            starts = list(self.brains.values())
+        if not starts:
             return []
-        start, reference = first[0], self.config.metrics.norm_reference
-        candidates = [
-            brain for brain in self.brains.values() if brain.sides == start.sides
-        ]
+        start = starts[0]
+        brains = [brain for brain in self.brains.values() if brain.sides == start.sides]
+        reference = self.config.metrics.norm_reference
         if reference is not None:
-            atlas_names = {brain: atlas.name for brain, atlas in self.atlases.items()}
-            return [
-                brain.id
-                for brain in candidates
-                if {brain.id, atlas_names.get(brain.id)} & set(reference)
+            return [brain.id for brain in brains if self._is_named(brain, reference)]
+        brains = [brain for brain in brains if not brain.config.synthetic]
+        if len({brain.config.population for brain in brains}) > 1:
+            population = start.config.population
+            brains = [
+                brain for brain in brains if brain.config.population == population
             ]
-        observed = [brain for brain in candidates if not brain.config.synthetic]
-        if len({brain.config.population for brain in observed}) > 1:
-            observed = [
-                brain
-                for brain in observed
-                if brain.config.population == start.config.population
-            ]
-        return [brain.id for brain in observed]
+        return [brain.id for brain in brains]
+
+    def _is_named(self, brain: Brain, names: Iterable[str]) -> bool:
+        """Return whether a brain or its atlas is among names."""
+        atlas = self.atlases.get(brain.id)
+        return brain.id in names or (atlas is not None and atlas.name in names)
 
     @property
     def scans(self) -> dict[str, list[str]]:
         """The ids of the scans of each subject that was scanned several times, in the
         order of weeks."""
-        scans: dict[str, list[str]] = {}
-        for brain in sorted(
-            self.brains.values(),
-            key=lambda brain: (brain.config.subject or "", brain.week),
-        ):
+        scans: dict[str, list[Brain]] = {}
+        for brain in self.brains.values():
             if brain.config.subject is not None:
-                scans.setdefault(brain.config.subject, []).append(brain.id)
-        return {subject: ids for subject, ids in scans.items() if len(ids) > 1}
+                scans.setdefault(brain.subject, []).append(brain)
+        several = {}
+        for subject in sorted(scans):
+            if len(scans[subject]) > 1:
+                by_week = sorted(scans[subject], key=lambda brain: brain.week)
+                several[subject] = [brain.id for brain in by_week]
+        return several
 
     def similar_in_thickness(self, brain: Brain) -> Brain | None:
         """Return the brain whose measured thickness fills another one's pial surface;
@@ -324,16 +302,14 @@ class Study:
         It is the brain with labels, or else with white surfaces, that is closest in
         week.
         """
-        others = [
-            other
-            for other in self.brains.values()
-            if other.has_thickness and other is not brain
-        ]
-        return min(
-            others,
-            key=lambda other: (other.labels is None, abs(other.week - brain.week)),
-            default=None,
-        )
+        measured = []
+        labelled = []
+        for other in self.brains.values():
+            if other.has_thickness and other is not brain:
+                measured.append(other)
+                if other.labels is not None:
+                    labelled.append(other)
+        return _closest(labelled or measured, brain.week) if measured else None
 
     @property
     def filled(self) -> list[dict[str, Any]]:
@@ -342,51 +318,38 @@ class Study:
 
         The source is "white", "measured" (on a similar brain) or "typical".
         """
+        chains = {}
+        for simulation in self.run_simulations:
+            if simulation.shapes:
+                key = (simulation.start.id, simulation.shapes)
+                chains[key] = self.chains[key]
         groups: dict[tuple[str, bool], dict[str, None]] = {}
-        followed = [
-            (simulation.start.id, simulation.shapes)
-            for simulation in self.run_simulations
-            if simulation.shapes
-        ]
-        for chain in (self.chains[key] for key in dict.fromkeys(followed)):
+        for chain in chains.values():
             for pair, posed in chain.pairs:
-                has_cortex = all(brain.registered.scheme.cortex for brain in pair)
-                for brain in (
-                    brain
-                    for brain, is_posed in zip(pair, posed, strict=True)
-                    if is_posed
-                ):
-                    similar = (
-                        "measured" if self.similar_in_thickness(brain) else "typical"
-                    )
-                    source = "white" if brain.config.white_files else similar
-                    groups.setdefault((source, has_cortex), {})[brain.id] = None
+                by_cortex = all(brain.registered.scheme.cortex for brain in pair)
+                for brain, is_posed in zip(pair, posed, strict=True):
+                    if is_posed:
+                        group = (self._cortex_source(brain), by_cortex)
+                        groups.setdefault(group, {})[brain.id] = None
         return [
-            {"ids": list(ids), "cortex": cortex, "by_cortex": used}
-            for (cortex, used), ids in groups.items()
+            {"ids": list(ids), "cortex": cortex, "by_cortex": by_cortex}
+            for (cortex, by_cortex), ids in groups.items()
         ]
+
+    def _cortex_source(self, brain: Brain) -> str:
+        if brain.config.white_files:
+            return "white"
+        return "measured" if self.similar_in_thickness(brain) else "typical"
 
     # regions, and maps at the vertices of the template
 
     def region_source(self, name: str) -> Brain:
         """Return the brain with regions of its own that is closest in week to a
         brain."""
-        week = self.brains[name].week
         sources = [
             brain for brain in self.brains.values() if brain.regions_from == "given"
         ]
-        return min(sources, key=lambda brain: abs(brain.week - week))
-
-    def template_sides(self, row: Measurement) -> list[Side]:
-        """Return the hemispheres of a brain that have maps at the template's
-        vertices."""
-        # the template may have been refused
-        template = self.brains.get(self.config.metrics.template or "")
-        return [
-            side
-            for side in row.sides
-            if template is not None and side in template.sides
-        ]
+        return _closest(sources, self.brains[name].week)
 
     @cached_property
     def exported(self) -> list[ExportedBrain]:
@@ -398,20 +361,26 @@ class Study:
 
     def _exported(self, row: Measurement, brain: Brain) -> ExportedBrain:
         is_observed = row.run == MEASURED
-        white_sides = row.sides if is_observed and brain.has_white else ()
-        white = {
-            name: file.format(brain=brain.id)
-            for name, file in paths.white_of(*white_sides).items()
-        }
-        template = {
-            side: paths.TEMPLATE_MAPS.format(where=row.where, side=side)
-            for side in self.template_sides(row)
-        }
-        volume = {
-            "labels": brain.labels,
-            "surface": row.parts["whole"],
-            "thickness": row.thickness,
-        }
+        volume: dict[str, Any] = {}
+        if brain.labels and not is_observed:
+            volume = {
+                "labels": brain.labels,
+                "surface": row.parts["whole"],
+                "thickness": row.thickness,
+            }
+        white = {}
+        white_maps = {}
+        template_maps = {}
+        files = paths.white_of(*row.sides)
+        template = self.brains.get(self.config.metrics.template or "")
+        for side in row.sides:
+            if brain.has_white and is_observed:
+                white[side] = files[f"{side}_surface"].format(**brain.names)
+                white_maps[side] = files[f"{side}_maps"].format(**brain.names)
+            # the template may have been refused
+            if template is not None and side in template.sides:
+                place = {"where": row.where, "side": side}
+                template_maps[side] = paths.TEMPLATE_MAPS.format(**place)
         return ExportedBrain(
             brain=row.subject,
             run=row.run,
@@ -422,11 +391,11 @@ class Study:
             regions=dict(zip(SIDES, row.regions.values(), strict=False)),
             report=brain.report,
             covariates=brain.config.covariates,
-            white={side: white[f"{side}_surface"] for side in white_sides},
-            white_maps={side: white[f"{side}_maps"] for side in white_sides},
+            white=white,
+            white_maps=white_maps,
             template=self.config.metrics.template,
-            template_maps=template,
-            volume=volume if brain.labels and not is_observed else {},
+            template_maps=template_maps,
+            volume=volume,
         )
 
     # contents of the report and the quality table, other than figures
@@ -435,15 +404,17 @@ class Study:
     def prediction_facts(self) -> dict[str, Any] | None:
         """The names, weeks, growth and files of the one prediction, for its report;
         None if there is none."""
-        if (simulation := self.prediction) is None:
+        simulation = self.prediction
+        if simulation is None:
             return None
-        last, atlas_brain = simulation.measurements[-1], self.atlas_brain(simulation)
-        brain = next(
-            brain
-            for brain in self.exported
-            if (brain.run, brain.week) == (simulation.run, last.week)
-        )
+        last = simulation.measurements[-1]
+        atlas_brain = self.atlas_brain(simulation)
+        exported = self._exported(last, simulation.start)
+        labels = None
+        if exported.volume:
+            labels = labels_file("results/export", exported, self.exported)
         atlas = self.atlases.get(atlas_brain.id)
+        atlas_keys = {"name", "title", "licence", "reference"}
         return {
             **simulation.names,
             "start_week": simulation.start.week,
@@ -452,15 +423,13 @@ class Study:
             "atlas_week": atlas_brain.week,
             # the population whose growth was used
             "population": atlas_brain.population,
-            "atlas": (
-                atlas
-                and atlas.model_dump(include={"name", "title", "licence", "reference"})
-            ),
+            "atlas": atlas and atlas.model_dump(include=atlas_keys),
             "surfaces": [*last.parts.values()],
             "atlas_surface": simulation.atlas_surface,
-            "labels": (
-                labels_file("results/export", brain, self.exported)
-                if brain.volume
-                else None
-            ),
+            "labels": labels,
         }
+
+
+def _closest(brains: Iterable[Brain], week: float) -> Brain:
+    """Return the first of the brains that are closest to a week."""
+    return min(brains, key=lambda brain: abs(brain.week - week))

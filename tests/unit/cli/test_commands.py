@@ -187,7 +187,7 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(
     run = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs[
         "predicted"
     ]
-    assert run.ensemble.members == 5
+    assert run.ensemble == 5
 
 
 def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(

@@ -438,8 +438,10 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
         labels(week, population="third", id=f"third{week}")
         for week in (21, 22, 23, 24, 25)
     ]
-    brains = [*of_two(22, 24), *third]
-    run = {"preset": "expected", "ensemble": {"members": 4, "seed": 1}}
+    brains, run = (
+        [*of_two(22, 24), *third],
+        {"preset": "expected", "ensemble": 4},
+    )
     found = study(brains, runs={"a": run}, growth={"series": "atlas"})
     simulation = found.simulations["a", "own22"]
     members = found.members(found.simulations["a", "own22"])
@@ -521,7 +523,7 @@ def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
     taken = {"a": {"growth": "shapes", "ensemble": 3}, "a-member-2": {}}
     assert refusal(real, runs=taken) == Facts("runs.a-member-2", "ensemble of a")
     assert refusal(real, runs={"a": {"growth": "shapes", "ensemble": 2}}) == Facts(
-        "runs.a.ensemble.members", 2, 3
+        "runs.a.ensemble", 2, 3
     )
 
 

@@ -268,7 +268,9 @@ def test_a_second_hemisphere_is_of_another_series_norm_and_template(side):
         f"results/brains/{side}22/metrics/{side}.shape.gii"
     ]
     sides = {
-        one.id: found.template_sides(one.measurement) for one in found.brains.values()
+        brain.brain: list(brain.template_maps)
+        for brain in found.exported
+        if brain.run == "real"
     }
     assert [name for name, found_sides in sides.items() if found_sides == ["left"]] == [
         "left22",
