@@ -271,9 +271,9 @@ class ElasticFit:
             problem = self._step(
                 (self.positions_mm + displacement)[self._used], lengths, strain
             )
-        if not self._straighten():
+        if not self._make_valid(start):
             problem = FOLDS_OVER
-            self._return_to_valid(start, n_passed)
+            del self._passed[n_passed:]
         misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
         if problem and misfit_mm > MAX_LEFT_MM:
             raise SolverError(
@@ -307,9 +307,8 @@ class ElasticFit:
             lengths = np.full(len(goals), length_mm)
             lengths[self._near_flat_elements()] = FREED_SPRING_LENGTH_MM
             self._step(boundary.vertices + pull, lengths, None)
-            if self._straighten():
+            if self._make_valid(start):
                 return self._move(np.linalg.inv(motion))
-            self.positions_mm = start
             del self._passed[n_passed:]
         log.warning("the body is not drawn to a surface: %s", FOLDS_OVER)
         return start
@@ -476,27 +475,33 @@ class ElasticFit:
         )
         return gradients[:, 0]
 
-    def _straighten(self) -> bool:
-        """Straighten the sides of curved elements that fold over; return whether all
-        are valid then, and leave the body as it is if not."""
+    def _make_valid(self, start: Floats) -> bool:
+        """Straighten the sides of curved elements that fold over, and return the body
+        around those that still do towards a valid `start`; return whether all are valid
+        then, or else leave the body there.
+        """
         if self._tets is self._pieces:
             return True
-        places = straighten_sides(self.positions_mm, self._tets)
-        is_valid = not may_fold_over(places, self._tets).any()
-        if is_valid:
-            self.positions_mm = places
-        return is_valid
-
-    def _return_to_valid(self, start: Floats, n_passed: int) -> None:
-        """Move the body to the last state that its curved elements can have, of those
-        that it has passed through from a valid `start`."""
-        log.info("the body follows a shape as far as it can: %s", FOLDS_OVER)
-        while len(self._passed) > n_passed:
-            self.positions_mm = self._passed.pop()
-            if self._straighten():
-                self._passed.append(self.positions_mm)
-                return
+        moved = self.positions_mm
+        held = np.empty((0, 3))
+        for length_mm in (0.0, *UNTANGLING_MM):
+            places = moved
+            if len(held):
+                distance, _ = cKDTree(held).query(moved)
+                near = np.exp(-((distance / (UNTANGLING_REACH * length_mm)) ** 2))
+                places = moved + near[:, None] * (start - moved)
+            places = straighten_sides(places, self._tets)
+            is_bad = may_fold_over(places, self._tets)
+            surface = TriangleMesh(places[self._used], self._surface.faces)
+            crossing = faces_that_cross(surface)
+            if not is_bad.any() and not len(crossing):
+                self.positions_mm = places
+                return True
+            bad_places = moved[self._tets[is_bad]].mean(axis=1)
+            crossing_places = moved[self._used[surface.faces[crossing]]].mean(axis=1)
+            held = np.concatenate([held, bad_places, crossing_places])
         self.positions_mm = start
+        return False
 
     def _move(self, motion: NDArray) -> Floats:
         self.positions_mm = transform_points(self.positions_mm, motion)
