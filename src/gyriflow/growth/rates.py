@@ -69,7 +69,8 @@ def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
     tables = [growth_rates([], [], []).assign(series=[])]
     chosen = areas[areas["series"].isin(names)]
     for name, brains in chosen.groupby("series", sort=False):
-        weekly = brains.groupby("week").mean(numeric_only=True)
+        sizes = brains.filter(regex="^week$|_cm2$|_ml$").astype(float)
+        weekly = sizes.groupby("week").mean()
         rates = growth_rates(
             weekly.index.tolist(),
             (weekly["area_cm2"] / CM2_PER_MM2).tolist(),
