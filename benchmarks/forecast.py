@@ -71,7 +71,8 @@ def finished_steps(study: Study) -> Iterator[Step]:
 def pair_in(names: str, study: Study) -> dict[str, str]:
     """Return the two brains that the record of a registration names."""
     for earlier, later in permutations(study.brains, 2):
-        if names == f"{earlier}.{later}" or names.startswith(f"{earlier}.{later}."):
+        pair = f"{earlier},{later}"
+        if names == pair or names.startswith(f"{pair}."):
             return {"earlier": earlier, "later": later}
     return {}
 
