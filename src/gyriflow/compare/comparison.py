@@ -390,7 +390,10 @@ def model_columns(
     )
     columns: dict[str, dict[str, float]] = {}
     for model, drawn in samples.items():
-        columns[model] = with_interval("skill", 1 - drawn["distance_mm"] / best)
+        # no skill is known against a baseline that is the observed brain itself
+        ratio = np.full(len(best), np.nan)
+        np.divide(drawn["distance_mm"], best, out=ratio, where=best > 0)
+        columns[model] = with_interval("skill", 1 - ratio)
         if atlas := samples.get("atlas"):
             for name, key in (
                 ("r_less_atlas", "r_shape_index"),

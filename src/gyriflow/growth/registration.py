@@ -310,7 +310,8 @@ def register(
     matrix = start @ LPS_TO_RAS @ np.asarray(greedy["found"], dtype=float) @ LPS_TO_RAS
     # SimpleITK's arrays have reversed axes
     warp = SimpleITK.GetArrayFromImage(greedy["warp"]).transpose(2, 1, 0, 3)
-    displacement = np.ascontiguousarray(warp.astype(np.float32))
+    warp = warp.astype(np.float32)
+    displacement = np.ascontiguousarray(warp)
     seconds = time.perf_counter() - began
     log.info("registered by %s in %.0f s", ", ".join(names), seconds)
     deformation = Deformation(matrix, displacement, earlier.affine)
@@ -494,11 +495,10 @@ def require_good(
 
 
 def _dice(earlier: Channels, later: Channels, bit: int, places: Floats) -> float:
-    first = earlier.tissue & bit > 0
-    first = first.ravel()
+    first = (earlier.tissue & bit > 0).ravel()
     mask = later.tissue & bit > 0
     carried = map_coordinates(mask.astype(np.float32), places, order=1)
     second = carried > 0.5
-    both = np.count_nonzero(first & second)
-    total = np.count_nonzero(first) + np.count_nonzero(second)
-    return float(2 * both / max(total, 1))
+    both = int(np.count_nonzero(first & second))
+    total = int(np.count_nonzero(first)) + int(np.count_nonzero(second))
+    return 2 * both / max(total, 1)

@@ -19,6 +19,7 @@ from .base import (
     not_a_path,
     refused,
 )
+from .terms import AffineSource, Coordinates
 from .weeks import AnyWeek
 
 DOWNLOADS = Path("resources", "atlases")
@@ -101,6 +102,10 @@ class AtlasSeries(Settings):
     """Name of these brains in figures and tables."""
     scheme: str | None = None
     """Meaning of the labels, as for `brains`; required with `labels`."""
+    affine_from: AffineSource = "auto"
+    """As for `brains`, with `labels`."""
+    coordinates: Coordinates = "auto"
+    """As for `brains`, with surfaces."""
     matched: bool = False
     """Whether surfaces of all weeks have the same vertices; believed until the files
     are there."""

@@ -153,8 +153,10 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
             sides[file.key == "white_right"] = str(file.path)
         else:
             entry[file.key] = str(file.path)
-        if series.scheme is not None:
-            entry["scheme"] = series.scheme
+        if "labels" in series.files:
+            entry |= {"scheme": series.scheme, "affine_from": series.affine_from}
+        else:
+            entry["coordinates"] = series.coordinates
     return list(entries.values())
 
 
