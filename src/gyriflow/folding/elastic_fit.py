@@ -83,6 +83,9 @@ UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the
 first two where the shape is that of an observed brain), and the distance from these, as
 a multiple of them."""
+HOLDING_MM = (1.0, 1.0, 2.0, 2.0, 4.0, 4.0, 8.0, 16.0, 32.0)
+"""Lengths around curved elements that fold over at which the body is held, round by
+round, with the same reach: others may fold over in its turn."""
 MIN_VOLUME_ON_WAY = 0.2
 """Fraction of an element's volume that it should keep on the way from one shape to the
 next."""
@@ -326,7 +329,10 @@ class ElasticFit:
             self.positions_mm, transform_points(shape, motion), UNTANGLING_MM
         )
         if not len(faults):
-            self.positions_mm = self._opened_after(self.positions_mm, untangled)
+            start = self.positions_mm
+            self.positions_mm = self._opened_after(start, untangled)
+            # linear pieces of valid elements may be inverted
+            self._make_valid(start)
             self._moved_straight = True
             return self._move(np.linalg.inv(motion))
         log.info(
@@ -484,7 +490,7 @@ class ElasticFit:
             return True
         moved = self.positions_mm
         held = np.empty((0, 3))
-        for length_mm in (0.0, *UNTANGLING_MM):
+        for length_mm in (0.0, *HOLDING_MM):
             places = moved
             if len(held):
                 distance, _ = cKDTree(held).query(moved)

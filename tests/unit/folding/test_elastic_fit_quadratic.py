@@ -15,7 +15,14 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.jacobians import inverted_on_the_way, lower_bounds
 from gyriflow.geometry.paths import path_through
-from gyriflow.geometry.tetrahedra import boundary_surface, linear_pieces, quadratic
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    has_volume,
+    linear_pieces,
+    quadratic,
+    volumes_between,
+)
 
 BODY = quadratic(ellipsoid_mesh(6, (12.0, 14.0, 11.0)))
 USED = boundary_surface(BODY)[1]
@@ -94,6 +101,27 @@ def test_a_body_is_held_only_around_the_elements_that_fold_over(monkeypatch):
     # a Gaussian of 2 mm: all of the displacement is taken back there, none far away
     assert difference[distance < 0.5] == pytest.approx(moved[distance < 0.5], rel=0.2)
     assert difference[distance > 7.0].max() < 0.05
+
+
+def test_a_straight_move_leaves_no_linear_piece_inverted():
+    corners = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10.0]])
+    element = quadratic(TetrahedralMesh(corners, np.array([[0, 1, 2, 3]])))
+    # its sides bow so far that two pieces turn over, while the element stays valid
+    shape = element.vertices.copy()
+    shape[4:] = [
+        (5.0, 1.5, -1.9),
+        (-1.9, 5.5, 2.6),
+        (3.1, 2.6, 3.0),
+        (7.9, 3.0, 0.8),
+        (7.0, -1.5, 6.5),
+        (0.1, 6.1, 6.7),
+    ]
+    pieces = linear_pieces(element)
+    assert has_volume(shape, element.tets).all()
+    assert (volumes_between(shape, pieces) < 0).sum() == 2
+    found = ElasticFit(element).move_to(shape)
+    assert has_volume(found, element.tets).all()
+    assert (volumes_between(found, pieces) > 0).all()
 
 
 def bar(order):
