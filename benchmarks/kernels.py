@@ -5,7 +5,7 @@ OpenBLAS for two processors, and compare all metrics with the noise of measuring
 
 Each kernel has a working directory in FOLDER; finished results are not computed again.
 For measured and simulated brains and each metric the table has the largest difference
-of a hemisphere, a whole brain or a region at any week, relative to the value but for
+of a hemisphere or a whole brain at any week, relative to the value but for
 metrics that may be negative, and the largest ratio of a difference to its noise: one
 standard deviation of the difference between two measurements of one brain
 (`norms/repeatability.yaml`). The last line is one JSON object.
@@ -60,7 +60,7 @@ def main() -> None:
     rows = []
     for (brains, metric), values in table.groupby(["brains", "metric"], sort=False):
         difference = values["difference"]
-        is_signed = metric in METRICS and METRICS[metric].is_signed
+        is_signed = METRICS[metric].is_signed
         shown = difference if is_signed else difference / values["value"].abs()
         ratios = []
         for _, row in values.iterrows():

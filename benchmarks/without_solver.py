@@ -31,6 +31,7 @@ from common import ROOT, print_rows
 from same_results import IGNORED, compare
 
 from gyriflow.io.yaml_files import write_yaml
+from gyriflow.settings.terms import SIDES
 
 MAX_DIFFERENCE = 1e-6
 OWN_VARIABLES = ("PYTHONPATH", "VIRTUAL_ENV", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -48,22 +49,16 @@ def studies(data: Path, out: Path) -> dict[str, dict[str, Any]]:
             "scheme": "spina-bifida-atlas",
         }
     given = data / "hemispheres"
-    brains["surfaces-21"] = {
-        "week": 21,
-        "hemispheres": {
-            "left": str(given / "fetal.week21.left.pial.surf.gii"),
-            "right": str(given / "fetal.week21.right.pial.surf.gii"),
-        },
-    }
     extracted = out / "labels-34/without/study/results/brains/brain/surface"
-    brains["surfaces-34"] = {
-        "week": 34,
-        "hemispheres": {
-            "left": str(extracted / "left.pial.surf.gii"),
-            "right": str(extracted / "right.pial.surf.gii"),
-        },
-    }
+    brains["surfaces-21"] = surfaces(21, f"{given}/fetal.week21.{{}}.pial.surf.gii")
+    brains["surfaces-34"] = surfaces(34, f"{extracted}/{{}}.pial.surf.gii")
     return brains
+
+
+def surfaces(week: int, pattern: str) -> dict[str, Any]:
+    """Return the entry of a pair of hemispheres, given a pattern of their files."""
+    hemispheres = {side: pattern.format(side) for side in SIDES}
+    return {"week": week, "hemispheres": hemispheres}
 
 
 def measure(

@@ -94,6 +94,17 @@ class Metric:
 
 
 POSITIVE_COLOURS, SIGNED_COLOURS = "YlGnBu", "RdBu_r"
+DISTINCT_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#8C6D31",
+    "#F0E442",
+)
+"""Okabe and Ito's colour-blind-safe colours, without black."""
 
 _BRAIN_MAPS = (
     VertexMap(

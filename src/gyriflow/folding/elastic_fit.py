@@ -179,7 +179,7 @@ class ElasticFit:
     """
 
     def __init__(self, mesh: TetrahedralMesh) -> None:
-        pieces, self._tets = linear_pieces(mesh), mesh.tets
+        pieces, corners, self._tets = linear_pieces(mesh), mesh.corners, mesh.tets
         self._passed: list[Floats] = []
         self._moved_straight = False
         mesh = TetrahedralMesh(mesh.vertices, pieces)
@@ -188,7 +188,6 @@ class ElasticFit:
         self._pieces = pieces
         # with the corners of curved elements: straight sides need these to have volume
         is_curved = self._tets is not pieces
-        corners = self._tets[:, :4]
         self._kept_open = np.concatenate([pieces, corners]) if is_curved else pieces
         self._start_volumes = volumes_between(mesh.vertices, self._kept_open)
         is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
@@ -276,6 +275,7 @@ class ElasticFit:
             )
         if not self._make_valid(start):
             problem = FOLDS_OVER
+            log.warning("the body does not follow a shape: %s", FOLDS_OVER)
             del self._passed[n_passed:]
         misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
         if problem and misfit_mm > MAX_LEFT_MM:
@@ -332,9 +332,9 @@ class ElasticFit:
             start = self.positions_mm
             self.positions_mm = self._opened_after(start, untangled)
             # linear pieces of valid elements may be inverted
-            self._make_valid(start)
-            self._moved_straight = True
-            return self._move(np.linalg.inv(motion))
+            if self._make_valid(start):
+                self._moved_straight = True
+                return self._move(np.linalg.inv(motion))
         log.info(
             "%d faults remain on the way to a shape: the body follows it", len(faults)
         )
@@ -356,8 +356,7 @@ class ElasticFit:
             faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
                 break
-            distance, _ = cKDTree(faults).query(before)
-            near = np.exp(-((distance / (UNTANGLING_REACH * length)) ** 2))[:, None]
+            near = nearness(before, faults, length)[:, None]
             smooth = smooth_integrals(
                 before, self._pieces, sizes[:, None] * displacement, length
             )
@@ -493,9 +492,8 @@ class ElasticFit:
         for length_mm in (0.0, *HOLDING_MM):
             places = moved
             if len(held):
-                distance, _ = cKDTree(held).query(moved)
-                near = np.exp(-((distance / (UNTANGLING_REACH * length_mm)) ** 2))
-                places = moved + near[:, None] * (start - moved)
+                near = nearness(moved, held, length_mm)[:, None]
+                places = moved + near * (start - moved)
             places = straighten_sides(places, self._tets)
             is_bad = may_fold_over(places, self._tets)
             surface = TriangleMesh(places[self._used], self._surface.faces)
@@ -620,6 +618,13 @@ class ElasticFit:
             weight[:, None, None] * excess[flat], MAX_OPENING
         )
         return stretches
+
+
+def nearness(places: Floats, faults: Floats, length_mm: float) -> Floats:
+    """Return how near (n, 3) places are to (k, 3) faults: 1 there, and falling off as a
+    Gaussian with `UNTANGLING_REACH` lengths."""
+    distance, _ = cKDTree(faults).query(places)
+    return np.asarray(np.exp(-((distance / (UNTANGLING_REACH * length_mm)) ** 2)))
 
 
 def exponential(logs: Floats, limit: float) -> Floats:

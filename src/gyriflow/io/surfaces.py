@@ -32,6 +32,7 @@ from ..errors import InputError
 from ..formats import START_BYTES, SURFACE_SUFFIXES, format_of, side_in_name
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
+from ..quantities import DISTINCT_COLOURS
 from ..settings.terms import NO_REGION, SIDES, STRUCTURES, Side
 from .files import AnyPath, atomic_write, read_json, reading, require_finite
 from .vtk_files import read_vtk
@@ -455,17 +456,6 @@ def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]
 UNNAMED = ("", "???", "unknown", "Unknown", "none")
 """Names in label tables for vertices without a region."""
 
-COLOURS = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#56B4E9",
-    "#8C6D31",
-    "#F0E442",
-)
-
 
 def read_vertex_labels(
     path: AnyPath, side: str | None = None
@@ -512,7 +502,9 @@ def write_vertex_labels(
     table = GiftiLabelTable()
     for number, name in {NO_REGION: "???", **names}.items():
         colour = (
-            "#FFFFFF" if number == NO_REGION else COLOURS[(number - 1) % len(COLOURS)]
+            "#FFFFFF"
+            if number == NO_REGION
+            else DISTINCT_COLOURS[(number - 1) % len(DISTINCT_COLOURS)]
         )
         red, green, blue = (
             int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)

@@ -239,19 +239,8 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         axes.set_title(
             f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2
         )
-        for x, end in zip(
-            (0.03, 0.97), "PA" if plane == "sagittal" else "LR", strict=True
-        ):
-            axes.text(
-                x,
-                0.5,
-                end,
-                transform=axes.transAxes,
-                ha="center",
-                va="center",
-                fontsize=6.5,
-                color=colour,
-            )
+        names = "PA" if plane == "sagittal" else "LR"
+        _write_ends(axes, names, 0.03, 0.5, va="center", fontsize=6.5, color=colour)
     coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
     coronal.plot([left, left + SCALE_BAR_MM], [bottom] * 2, color=colour, linewidth=1.2)
     coronal.text(left, bottom + 1, f"{SCALE_BAR_MM:g} mm", fontsize=6, color=colour)
@@ -293,18 +282,18 @@ def _draw_views(
             continue
         axes.imshow(render(mesh, painted, view, (wide, tall), pixels_per_mm))
         axes.set_title(view.name, fontsize=6.5, pad=1)
-        for x, end in zip((0.05, 0.95), view.ends, strict=True):
-            axes.text(
-                x,
-                0.97,
-                end,
-                transform=axes.transAxes,
-                ha="center",
-                va="top",
-                fontsize=6,
-                color=MUTED_COLOUR,
-            )
+        style = {"va": "top", "fontsize": 6, "color": MUTED_COLOUR}
+        _write_ends(axes, view.ends, 0.05, 0.97, **style)
     return panels
+
+
+def _write_ends(
+    axes: Axes, ends: Sequence[str], margin: float, height: float, **style: Any
+) -> None:
+    """Name the left and the right end of a panel, at a fraction of its width from its
+    sides and of its height."""
+    for x, end in zip((margin, 1 - margin), ends, strict=True):
+        axes.text(x, height, end, transform=axes.transAxes, ha="center", **style)
 
 
 def _facts(row: Mapping[str, Any]) -> dict[str, str]:

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ..quantities import DISTINCT_COLOURS
 from ..settings.terms import MEASURED, run_names
 
 SINGLE_COLUMN_IN = 3.5
@@ -22,17 +23,8 @@ SINGLE_COLUMN_IN = 3.5
 FULL_WIDTH_IN = 7.2
 """Width of a journal page, in inches."""
 
-RUN_COLOURS = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#56B4E9",
-    "#8C6D31",
-)
-"""Okabe and Ito's colour-blind-safe colours, without black (observed brains) and yellow
-(too pale on white)."""
+RUN_COLOURS = DISTINCT_COLOURS[:-1]
+"""Without yellow, which is too pale on white; black is for observed brains."""
 OBSERVED_COLOUR = "#000000"
 MUTED_COLOUR = "#767676"
 RIGHT_COLOUR = "#E0B400"

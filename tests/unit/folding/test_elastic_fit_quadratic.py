@@ -66,15 +66,20 @@ def test_waves_leave_no_curved_element_that_folds_over(height_mm):
     assert drawn < (0.6 if height_mm < 1 else 1.01) * followed
 
 
-def test_a_body_stays_where_its_curved_elements_cannot_follow(monkeypatch):
+@pytest.mark.parametrize(("way", "height_mm"), [("follow", 0.5), ("move_to", 0.1)])
+def test_a_body_stays_where_its_curved_elements_cannot_follow_and_says_so(
+    monkeypatch, caplog, way, height_mm
+):
     def fold_over(positions, tets):
         return np.ones(len(tets), dtype=bool)
 
     monkeypatch.setattr(elastic_fit, "may_fold_over", fold_over)
     body = ElasticFit(BODY)
-    found = body.follow(waves(0.5))
+    with caplog.at_level(logging.WARNING):
+        found = getattr(body, way)(waves(height_mm))
     np.testing.assert_allclose(found, BODY.vertices, atol=1e-9)
     assert body.way_from(BODY.vertices) == []
+    assert "does not follow" in caplog.text
 
 
 def test_a_body_is_held_only_around_the_elements_that_fold_over(monkeypatch):
