@@ -189,7 +189,7 @@ def write_prediction(
         QUICK_GW if quick else 0.0,
     )
     section = settings.model_dump(exclude_defaults=True) | series
-    more = read_keys(TEMPLATES / "quick.yaml") if quick else {"folding": {}}
+    more = read_keys(TEMPLATES / ("quick.yaml" if quick else "predict.yaml"))
     folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
     config = {
         "brains": [entry],
