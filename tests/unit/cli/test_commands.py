@@ -19,6 +19,7 @@ from gyriflow.cli.check import coarse_cortices
 from gyriflow.cli.commands import main
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
+from gyriflow.io.yaml_files import read_keys
 from gyriflow.running import launch
 from gyriflow.running.machine import available_cores
 from gyriflow.settings.runs import GrowthSettings
@@ -188,6 +189,18 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(
         "predicted"
     ]
     assert run.ensemble == 5
+
+
+def test_a_prediction_has_the_mesh_that_its_errors_were_measured_with(
+    predicted, tmp_path
+):
+    assert predicted("--week", "22.4", "--until", "24").exit_code == 0
+    mesh = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).mesh
+    tested = read_keys(SHIPPED / "norms" / "predictions.yaml")["mesh"]
+    assert (mesh.order, mesh.surface_edge_mm) == (
+        tested["order"],
+        tested["surface_edge_mm"],
+    )
 
 
 def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(
