@@ -27,9 +27,10 @@ SECONDS_PER_ELEMENT_AND_STEP = {1: 4.3e-6, 2: 14e-6}
 """By element order; fitted to runs of 130 k to 500 k linear and 27 k to 45 k quadratic
 elements and 28 to 126 steps, within a factor of 1.6. A quadratic element counts as the
 eight linear elements with the same nodes."""
-SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 11e-6, 2: 18e-6}
-"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599
-k, quadratic ones a guess."""
+SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 16e-6, 2: 18e-6}
+"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599 k
+(11e-6), and of 200 k to the deep folds of 36 GW on a busy machine (28e-6), quadratic
+ones a guess."""
 SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.2e-4
 """For a mesh to follow the brains of its series: targets, or an atlas' path; by 107 k
 to 130 k elements to 32 GW."""
@@ -39,7 +40,7 @@ many times as long."""
 FUSED_SHARE = {"pial": 0.53, "series": 0.5}
 """What surfaces, and bodies that follow them, take with `open_sulci: false`, over that
 with opened sulci."""
-PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
+PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 8e-5
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
 """By mesher; of elements of the mesh, linear or quadratic."""
@@ -58,6 +59,7 @@ OPENED_FROM_GW, OPENED_PER_GW = 25.0, 0.11
 add vertices, and how many."""
 SECONDS_PER_STAGE = {
     "brain_figures": 6.5,
+    "export": 20.0,
     "folding_figures": 13.0,
     "growth_found_figures": 5.0,
     "prepare": 2.0,
