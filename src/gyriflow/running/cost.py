@@ -37,9 +37,9 @@ to 130 k elements to 32 GW."""
 DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
 """Week from which opened sulci are so deep that to follow a brain for a week takes so
 many times as long."""
-FUSED_SHARE = {"pial": 0.53, "series": 0.5}
-"""What surfaces, and bodies that follow them, take with `open_sulci: false`, over that
-with opened sulci."""
+FUSED_SHARE = {"pial": 0.53, "series": 0.5, "prediction": 0.2}
+"""What surfaces, and bodies that follow them or predicted shapes, take with
+`open_sulci: false`, over that with opened sulci."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 8e-5
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
@@ -236,9 +236,10 @@ def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
     # it ends two weeks of the atlas after the end
     weeks = max(later[: bisect_left(later, end) + 2], default=start) - start
     elements = linear_elements(start, study.config.mesh)
-    return (
-        PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
-    )
+    following_s = PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
+    if not study.config.surface.open_sulci:
+        following_s *= FUSED_SHARE["prediction"]
+    return PREDICTION_SECONDS + following_s
 
 
 def _series_seconds(study: Study, weeks: Sequence[float], mesh: MeshSettings) -> float:
