@@ -1,6 +1,7 @@
 """Predict a brain's later shapes: carry its mesh along an atlas' path and keep its
 individual differences."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -27,14 +28,18 @@ from .atlas_path import (
     resample_by_size,
 )
 from .series_shapes import (
+    MAX_MISFIT_MM,
     FittedBody,
     SeriesShapes,
     WeekShape,
     fit_body,
     fit_onto_surface,
+    rms_mm,
     tissue_below,
     with_stops,
 )
+
+log = logging.getLogger(__name__)
 
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do
@@ -196,8 +201,17 @@ def predict_shapes(
     )
     body = make_body(mesh)
     shapes = [WeekShape(start_week, mesh.vertices)]
+    _, used = boundary_surface(mesh)
     for week, shape in zip(later, expected[1:], strict=True):
-        body.move_to(shape)
+        places = body.move_to(shape)
+        left_mm = rms_mm((places - shape)[used])
+        if left_mm > MAX_MISFIT_MM:
+            log.warning(
+                "at GW %g the brain stays %.2f mm (root mean square) from its expected"
+                " shape, which inverts elements or moves folds through each other",
+                week,
+                left_mm,
+            )
         shapes += with_stops(shapes[-1], week, body)
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
@@ -215,7 +229,6 @@ def predict_shapes(
         smoothing_mm=0,
         fading_gw=fading_gw,
     )
-    _, used = boundary_surface(mesh)
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
     atlas = [positions_at(week, carried, path.shapes.weeks, sizes) for week in weeks]
     baselines = {

@@ -216,7 +216,7 @@ def fit_body(
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
-        left_mm = _rms_mm(body.boundary.vertices - shape[used])
+        left_mm = rms_mm(body.boundary.vertices - shape[used])
         if left_mm > MAX_MISFIT_MM:
             log.warning(
                 "a body stays %.2f mm (root mean square) from a shape that it cannot"
@@ -229,14 +229,14 @@ def fit_body(
     for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
         last_mm = gap_mm
-        gap_mm = _rms_mm(goals - body.boundary.vertices)
+        gap_mm = rms_mm(goals - body.boundary.vertices)
         if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
 
 
-def _rms_mm(misfit: Floats) -> float:
+def rms_mm(misfit: Floats) -> float:
     """Return the root mean square length of (n, 3) vectors in mm."""
     return float(np.sqrt(3 * np.mean(misfit**2)))
 

@@ -37,6 +37,8 @@ from gyriflow.running.cost import (
     MIN_SURFACE_MIB,
     SECONDS_PER_ELEMENT_AND_STEP,
     SECONDS_PER_ML,
+    PREDICTION_SECONDS,
+    PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK,
     SERIES_SECONDS_PER_ELEMENT_AND_WEEK,
     SHAPES_SECONDS_PER_ELEMENT_AND_STEP,
     START_SECONDS,
@@ -611,7 +613,10 @@ def test_a_prediction_takes_the_time_of_its_atlas_path_its_shapes_and_its_foldin
         22, study.config.growth.path_mesh
     )
     path_s = START_SECONDS + per_week_s * (10 + 2 * DEEP_FOLDS_FACTOR)
-    targets_s = START_SECONDS + 10 + 4e-5 * linear_elements(23, mesh) * (27 - 23)
+    following_s = (
+        PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(23, mesh) * (27 - 23)
+    )
+    targets_s = START_SECONDS + PREDICTION_SECONDS + following_s
     for jobs, cores, seconds in (
         ([path, targets, folding], 1, path_s + targets_s + folding_s),
         ([path, targets, folding], 2, path_s + targets_s + folding_s / 2),

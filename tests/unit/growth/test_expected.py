@@ -447,6 +447,16 @@ def test_a_prediction_at_a_week_does_not_depend_on_the_end_week_or_further_weeks
     assert first.between == [23.4]
 
 
+def test_a_brain_that_stays_away_from_its_expected_shape_is_warned_of(
+    prediction, monkeypatch, caplog
+):
+    prediction(23.5)
+    assert "stays" not in caplog.text
+    monkeypatch.setattr(ElasticFit, "move_to", lambda body, shape: body.positions_mm)
+    prediction(23.5)
+    assert "at GW 24 the brain stays" in caplog.text
+
+
 def test_a_brain_that_is_older_than_stated_grows_as_one_of_that_age(prediction):
     _, shifted = prediction(24.0, age_shift_gw=0.5)
     _, older = prediction(24.5, start_week=22.8)
