@@ -278,11 +278,12 @@ class ElasticFit:
             log.warning("the body does not follow a shape: %s", FOLDS_OVER)
             del self._passed[n_passed:]
         misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
-        if problem and misfit_mm > MAX_LEFT_MM:
+        if misfit_mm > MAX_LEFT_MM:
+            found = f"{misfit_mm:.1f} mm from it (root mean square)"
             raise SolverError(
                 "a shape cannot be reached without turning elements inside out or folds"
                 " into each other",
-                found=f"{misfit_mm:.1f} mm from it (root mean square): {problem}",
+                found=f"{found}: {problem}" if problem else found,
                 expected=f"at most {MAX_LEFT_MM:g} mm",
                 remedy=(
                     "Look at the labels or surfaces of this week and the one before at"
@@ -333,11 +334,14 @@ class ElasticFit:
             self.positions_mm = self._opened_after(start, untangled)
             # linear pieces of valid elements may be inverted
             if self._make_valid(start):
-                self._moved_straight = True
+                # straightened sides may have brought faults onto the way
+                faults = self._faults_between(start, self.positions_mm)
+                self._moved_straight = not len(faults)
                 return self._move(np.linalg.inv(motion))
-        log.info(
-            "%d faults remain on the way to a shape: the body follows it", len(faults)
-        )
+            log.info("curved elements fold over at a shape: the body follows it")
+        else:
+            text = "%d faults remain on the way to a shape: the body follows it"
+            log.info(text, len(faults))
         self.follow(shape)
         return self.draw(shape[self._used])
 
@@ -383,9 +387,9 @@ class ElasticFit:
         )
         # changes around faults flatten elements
         places = self._opened_after(stops[-1] if stops else before, places)
-        self.positions_mm = transform_points(
-            places, self._fit(places, self.positions_mm)
-        )
+        valid = self.positions_mm
+        self.positions_mm = transform_points(places, self._fit(places, valid))
+        self._make_valid(valid)
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
         parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)

@@ -252,7 +252,7 @@ def quality_note(
     text = (
         f"at GW {week:g} {flat} of {len(ratios)} elements are flatter than a mesh may"
         f" be at the start (radius ratio {ratios.min():.3f} of {MIN_RADIUS_RATIO:g}):"
-        " stress and curvature are less accurate there"
+        " results are less accurate there"
     )
     return text, flat > MAX_FLAT_SHARE * len(ratios)
 
