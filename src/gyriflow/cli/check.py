@@ -29,6 +29,7 @@ from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
 from ..running.cost import (
+    DEEP_FOLDS_GW,
     ERROR_FACTOR,
     FOLDINGS,
     MIN_SURFACE_MIB,
@@ -135,6 +136,7 @@ def check_study(
     yield from grouped(refusals)
     yield from ((f"  {line}", False) for line in facts)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
+    yield from ((f"  warning: {line}", False) for line in deep_curved_folds(study))
     yield from (
         (f"  warning: no export: {line}", False) for line in export_problems(study)
     )
@@ -339,6 +341,20 @@ def coarse_cortices(study: Study) -> Iterator[str]:
                 f"run {simulation.run} from {simulation.start.id}"
             )
     yield from (f"{', '.join(names)}: {text}" for text, names in coarse.items())
+
+
+def deep_curved_folds(study: Study) -> Iterator[str]:
+    """Yield a warning for each simulation in which quadratic elements grow towards
+    shapes with deep folds, on the way to which they fold over."""
+    if study.config.mesh.order == 1:
+        return
+    for simulation in study.run_simulations:
+        if simulation.shapes and simulation.settings.end_week > DEEP_FOLDS_GW:
+            yield (
+                f"run {simulation.run} from {simulation.start.id}: quadratic elements"
+                f" fold over on the way to shapes later than {DEEP_FOLDS_GW:g} GW; use"
+                " mesh.order: 1"
+            )
 
 
 def export_problems(study: Study) -> Iterator[str]:

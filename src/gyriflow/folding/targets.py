@@ -164,8 +164,8 @@ def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:
         )
     if held := max(row["held_elements"] for row in rows):
         warnings.append(
-            f"up to GW {last['week']:g} at most {held} elements in a step grow less than"
-            " their path asks for, which would bend or invert them"
+            f"up to GW {last['week']:g} at most {held} elements in a step grow less"
+            " than their path asks for, which would bend or invert them"
         )
     return warnings
 

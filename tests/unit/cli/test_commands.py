@@ -15,7 +15,7 @@ from scan_trees import make_tree
 from shapes import sphere
 
 from gyriflow.cli import check as checking
-from gyriflow.cli.check import coarse_cortices
+from gyriflow.cli.check import coarse_cortices, deep_curved_folds
 from gyriflow.cli.commands import main
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
@@ -201,6 +201,18 @@ def test_a_prediction_has_the_mesh_that_its_errors_were_measured_with(
         tested["order"],
         tested["surface_edge_mm"],
     )
+
+
+def test_quadratic_elements_are_warned_of_on_the_way_to_deep_folds(predicted, tmp_path):
+    asked = ("--week", "25", "--until", "34", "--atlas", "spina-bifida")
+    assert predicted(*asked).exit_code == 0
+    section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
+    assert list(deep_curved_folds(resolve(load(section)))) == []
+    section["mesh"] = {"order": 2}
+    (line,) = deep_curved_folds(resolve(load(section)))
+    assert line == Facts("run predicted", "mesh.order: 1")
+    section["folding"]["end_week"] = 30
+    assert list(deep_curved_folds(resolve(load(section)))) == []
 
 
 def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(
