@@ -324,11 +324,15 @@ def test_conda_environment_sets_what_run_sets():
     }
 
 
-@pytest.mark.parametrize("recipe", ["Dockerfile", "gyriflow.def"])
-def test_images_are_made_from_the_same_lists(recipe):
-    text = (ROOT / "envs" / recipe).read_text()
-    assert "envs/debian.txt" in text
-    assert "envs/requirements.txt" in text
+def test_images_are_made_by_one_script_from_the_lists():
+    for recipe in ("Dockerfile", "gyriflow.def"):
+        image = (ROOT / "envs" / recipe).read_text()
+        assert "/opt/gyriflow/envs/install_image.sh" in image
+        assert "apt-get" not in image
+        assert "pip" not in image
+    text = (ROOT / "envs" / "install_image.sh").read_text()
+    assert "$envs/debian.txt" in text
+    assert "$envs/requirements.txt" in text
     own = re.findall(r"install (?:-\S+ )*([\w.=-]+)", text)
     assert set(own) <= {"-r", "--no-deps", "--no-install-recommends"}
     packages = {
@@ -336,6 +340,16 @@ def test_images_are_made_from_the_same_lists(recipe):
         for line in (ROOT / "envs" / "debian.txt").read_text().splitlines()
     }
     assert packages & set(text.split()) == set()
+
+
+def test_both_images_copy_the_same_files():
+    lines = (ROOT / ".dockerignore").read_text().splitlines()
+    copied = [line.removeprefix("!") for line in lines if line.startswith("!")]
+    assert lines[0] == "*"
+    definition = (ROOT / "envs" / "gyriflow.def").read_text()
+    files = re.search(r"^%files\n((?:    .*\n)*)", definition, re.MULTILINE)[1]
+    pairs = [line.split() for line in files.splitlines()]
+    assert pairs == [[name, f"/opt/gyriflow/{name}"] for name in copied]
 
 
 def test_libraries_that_jobs_need_are_in_the_list_that_is_installed():
@@ -363,7 +377,7 @@ def test_citation_has_the_version_of_the_package():
     ]
     labels = [
         *re.findall(r"ARG VERSION=(.*)", images[0]),
-        *re.findall(r"(?:Version |VERSION=)(\S+)", images[1]),
+        *re.findall(r"(?:Version |install_image.sh )(\S+)", images[1]),
     ]
     assert len(labels) == 3
     assert {citation["version"], zenodo["version"], fallback, *labels} == {RELEASE}
