@@ -51,7 +51,9 @@ def brain_entries(data: Path, out: Path) -> dict[str, dict[str, Any]]:
         }
     given = data / "hemispheres"
     extracted = out / "labels-34/without/study/results/brains/brain/surface"
-    brains["surfaces-21"] = surface_entry(21, f"{given}/fetal.week21.{{}}.pial.surf.gii")
+    brains["surfaces-21"] = surface_entry(
+        21, f"{given}/fetal.week21.{{}}.pial.surf.gii"
+    )
     brains["surfaces-34"] = surface_entry(34, f"{extracted}/{{}}.pial.surf.gii")
     return brains
 

@@ -5,6 +5,7 @@ import ast
 import importlib.util
 import json
 import re
+import sys
 import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 import yaml
 
 from gyriflow.code_hash import imported_modules, room_of
-from gyriflow.running.requirements import LIBRARIES
+from gyriflow.running.requirements import EXTRAS, LIBRARIES
 from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
@@ -310,6 +311,59 @@ def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():
     names = [re.split(r"[<>=]", entry)[0] for entry in entries]
     needed = [name for name in names if name not in from_conda]
     assert pip == [f"{name}=={versions[name.lower()]}" for name in needed]
+
+
+IMPORT_NAMES = {
+    "dolfinx-solver-real": "dolfinx",
+    "picsl-greedy": "picsl_greedy",
+    "scikit-image": "skimage",
+    "libigl": "igl",
+    "PyYAML": "yaml",
+    "pillow": "PIL",
+    "Jinja2": "jinja2",
+    "MarkupSafe": "markupsafe",
+}
+"""Names by which packages are imported, where it is another."""
+INDIRECT = {
+    *("ufl", "basix", "ffcx", "mpi4py", "petsc4py", "dolfinx_solver", "cffi"),
+    "pydantic_core",
+    "snakemake_interface_logger_plugins",
+    "vtkmodules",
+}
+"""Packages that come with the solver of the extra `fold`, pydantic, Snakemake and
+pyvista."""
+
+
+def import_names(requirements: list[str]) -> set[str]:
+    """Return the names by which required packages are imported."""
+    packages = [re.split(r"[<>=!;]", entry)[0] for entry in requirements]
+    return {IMPORT_NAMES.get(package, package) for package in packages}
+
+
+def test_extras_that_messages_name_are_those_of_the_package():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = {
+        name: extra
+        for extra, requirements in project["optional-dependencies"].items()
+        for name in import_names(requirements)
+    }
+    assert extras == EXTRAS
+
+
+def test_imported_packages_are_dependencies():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    listed = import_names(project["dependencies"]) | INDIRECT
+    for requirements in project["optional-dependencies"].values():
+        listed |= import_names(requirements)
+    imported = set()
+    for path in [*(ROOT / "src").rglob("*.py"), *SCRIPTS]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                imported.add(str(node.module).split(".")[0])
+    own = {path.name for path in (ROOT / "src").iterdir()}
+    assert imported - sys.stdlib_module_names - own - listed == set()
 
 
 def test_conda_environment_sets_what_run_sets():

@@ -364,6 +364,7 @@ def test_a_venv_whose_python_is_gone_is_made_again(outside, tmp_path):
 def test_the_set_up_uses_neither_the_users_python_home_nor_the_working_directory(
     outside, tmp_path
 ):
+    write_program(tmp_path / "programs", "id", "#!/bin/sh\necho 1000\n")
     env = outside | {"PYTHONHOME": str(tmp_path)}
     assert run("tool", "1", env=env).stdout == "from the environment: 1\n"
     for arguments in (tmp_path / "record").read_text().splitlines():
