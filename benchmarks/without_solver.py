@@ -11,7 +11,8 @@ SLEPc.
 
 DATA holds `spina_bifida_atlas/week{21,34}_labels.nii.gz` and
 `hemispheres/fetal.week21.{left,right}.pial.surf.gii`; the surfaces of 34 GW are those
-that gyriflow extracts from the labels of 34 GW. Each brain is a study of its own,
+that gyriflow extracts from the labels of 34 GW, which have to be measured before or
+in the same call. Each brain is a study of its own,
 measured on one core to the report. The last line is one JSON object: for each brain the
 CPU seconds of all processes, the memory of the largest one, and the largest relative
 difference of the results, as `same_results.py` compares them; `coefficients.csv` is
@@ -38,7 +39,7 @@ OWN_VARIABLES = ("PYTHONPATH", "VIRTUAL_ENV", "OMP_NUM_THREADS", "OPENBLAS_NUM_T
 """Variables of ./run that a shell does not have."""
 
 
-def studies(data: Path, out: Path) -> dict[str, dict[str, Any]]:
+def brain_entries(data: Path, out: Path) -> dict[str, dict[str, Any]]:
     """Return the entry of the configuration for each brain."""
     brains: dict[str, dict[str, Any]] = {}
     for week in (21, 34):
@@ -50,12 +51,14 @@ def studies(data: Path, out: Path) -> dict[str, dict[str, Any]]:
         }
     given = data / "hemispheres"
     extracted = out / "labels-34/without/study/results/brains/brain/surface"
-    brains["surfaces-21"] = surfaces(21, f"{given}/fetal.week21.{{}}.pial.surf.gii")
-    brains["surfaces-34"] = surfaces(34, f"{extracted}/{{}}.pial.surf.gii")
+    brains["surfaces-21"] = surface_entry(
+        21, f"{given}/fetal.week21.{{}}.pial.surf.gii"
+    )
+    brains["surfaces-34"] = surface_entry(34, f"{extracted}/{{}}.pial.surf.gii")
     return brains
 
 
-def surfaces(week: int, pattern: str) -> dict[str, Any]:
+def surface_entry(week: int, pattern: str) -> dict[str, Any]:
     """Return the entry of a pair of hemispheres, given a pattern of their files."""
     hemispheres = {side: pattern.format(side) for side in SIDES}
     return {"week": week, "hemispheres": hemispheres}
@@ -97,8 +100,12 @@ def main() -> None:
     rows = []
     is_equal = True
     out = arguments.out.resolve()
-    brains = studies(arguments.data.resolve(), out)
-    for name in arguments.only or brains:
+    brains = brain_entries(arguments.data.resolve(), out)
+    names = arguments.only or list(brains)
+    extracted = Path(brains["surfaces-34"]["hemispheres"]["left"])
+    if "surfaces-34" in names and "labels-34" not in names and not extracted.is_file():
+        parser.error("surfaces-34 needs labels-34 in the same --out: add it to --only")
+    for name in names:
         brain = brains[name]
         without = out / name / "without"
         with_solver = out / name / "with"

@@ -1,15 +1,12 @@
 """The licences that the packages of the environment state: PyPI packages with all they
-need, and Debian's libraries.
+need, and the libraries inside the wheel of the solver.
 
-    ./run python docs/licences.py [--doc FOLDER]
+    ./run python docs/licences.py
 
 prints two tables and, as its last line, a JSON object with the number of packages by
-kind of licence. Debian packages are those of FOLDER, in which each has its `copyright`
-file (default /usr/share/doc, which images have; the tree that `./run` makes has none:
-unpack the packages with `dpkg-deb -x PACKAGE.deb ROOT` and name ROOT/usr/share/doc).
+kind of licence and the number of libraries.
 """
 
-import argparse
 import json
 import re
 from collections import Counter
@@ -17,23 +14,9 @@ from importlib import metadata
 from pathlib import Path
 
 ENVIRONMENT = Path(__file__).resolve().parents[1] / "envs"
-DEBIAN = (
-    *(
-        "dolfinx",
-        "petsc",
-        "slepc",
-        "mumps",
-        "scotch",
-        "hypre",
-        "superlu",
-        "umfpack",
-        "cholmod",
-        "fftw3",
-        "metis",
-    ),
-    *("scalapack", "openblas", "openmpi", "hdf5", "adios2", "combblas", "gmp"),
-)
-"""Libraries that the solver is linked with, by a part of their packages' names."""
+SOLVER = "dolfinx-solver-real"
+LIBRARY = re.compile(r"^=+\n(.+) — (.+)$", re.MULTILINE)
+"""Heading of a library in the solver's THIRD-PARTY-NOTICES: its name and licence."""
 KINDS = {
     "AGPL": r"AGPL|Affero",
     "LGPL": r"LGPL|Lesser|LESSER|CeCILL-C|CeCill-C",
@@ -99,26 +82,12 @@ def stated(distribution: metadata.Distribution) -> str:
     return text or "not stated"
 
 
-def in_copyright(folder: Path) -> list[tuple[str, str]]:
-    """Return Debian packages with the licences in their `copyright` files, the most
-    frequent first."""
-    rows = []
-    for file in sorted(folder.glob("*/copyright")):
-        if file.parent.name.startswith("lib") and any(
-            part in file.parent.name for part in DEBIAN
-        ):
-            names = re.findall(
-                r"^License: *(\S.*)$",
-                file.read_text(encoding="utf-8", errors="replace"),
-                re.MULTILINE,
-            )
-            rows.append(
-                (
-                    file.parent.name,
-                    "; ".join(name for name, _ in Counter(names).most_common()),
-                )
-            )
-    return rows
+def vendored() -> list[tuple[str, str]]:
+    """Return the libraries in the wheel of the solver, each with its licence."""
+    for file in metadata.files(SOLVER) or []:
+        if file.name == "THIRD-PARTY-NOTICES":
+            return LIBRARY.findall(file.read_text(encoding="utf-8"))
+    return []
 
 
 def kind(licence: str) -> str:
@@ -130,11 +99,6 @@ def kind(licence: str) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--doc", type=Path, default=Path("/usr/share/doc"))
-    folder = parser.parse_args().doc
     text = (ENVIRONMENT / "requirements.txt").read_text()
     direct = re.findall(r"^([\w.-]+)", text, re.MULTILINE)
     found: dict[str, metadata.Distribution] = {}
@@ -144,18 +108,15 @@ def main() -> None:
         (found[name].name, found[name].version, stated(found[name]))
         for name in sorted(found)
     ]
-    debian = in_copyright(folder)
+    libraries = vendored()
     print("| Python package | version | licence as stated |\n| --- | --- | --- |")
     for row in python:
         print("| " + " | ".join(row) + " |")
-    print(
-        "\n| Debian package | licences in its files, the most frequent first |\n| --- |"
-        " --- |"
-    )
-    for package in debian:
-        print("| " + " | ".join(package) + " |")
+    print(f"\n| library in {SOLVER} | licence as stated |\n| --- | --- |")
+    for library in libraries:
+        print("| " + " | ".join(library) + " |")
     counts = Counter(kind(licence) for _, _, licence in python)
-    print(json.dumps({"python": dict(counts), "debian_packages": len(debian)}))
+    print(json.dumps({"python": dict(counts), "libraries": len(libraries)}))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ import ast
 import importlib.util
 import json
 import re
+import sys
 import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 import yaml
 
 from gyriflow.code_hash import imported_modules, room_of
-from gyriflow.running.requirements import LIBRARIES
+from gyriflow.running.requirements import EXTRAS, LIBRARIES
 from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
@@ -312,6 +313,59 @@ def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():
     assert pip == [f"{name}=={versions[name.lower()]}" for name in needed]
 
 
+IMPORT_NAMES = {
+    "dolfinx-solver-real": "dolfinx",
+    "picsl-greedy": "picsl_greedy",
+    "scikit-image": "skimage",
+    "libigl": "igl",
+    "PyYAML": "yaml",
+    "pillow": "PIL",
+    "Jinja2": "jinja2",
+    "MarkupSafe": "markupsafe",
+}
+"""Names by which packages are imported, where it is another."""
+INDIRECT = {
+    *("ufl", "basix", "ffcx", "mpi4py", "petsc4py", "dolfinx_solver", "cffi"),
+    "pydantic_core",
+    "snakemake_interface_logger_plugins",
+    "vtkmodules",
+}
+"""Packages that come with the solver of the extra `fold`, pydantic, Snakemake and
+pyvista."""
+
+
+def import_names(requirements: list[str]) -> set[str]:
+    """Return the names by which required packages are imported."""
+    packages = [re.split(r"[<>=!;]", entry)[0] for entry in requirements]
+    return {IMPORT_NAMES.get(package, package) for package in packages}
+
+
+def test_extras_that_messages_name_are_those_of_the_package():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = {
+        name: extra
+        for extra, requirements in project["optional-dependencies"].items()
+        for name in import_names(requirements)
+    }
+    assert extras == EXTRAS
+
+
+def test_imported_packages_are_dependencies():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    listed = import_names(project["dependencies"]) | INDIRECT
+    for requirements in project["optional-dependencies"].values():
+        listed |= import_names(requirements)
+    imported = set()
+    for path in [*(ROOT / "src").rglob("*.py"), *SCRIPTS]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                imported.add(str(node.module).split(".")[0])
+    own = {path.name for path in (ROOT / "src").iterdir()}
+    assert imported - sys.stdlib_module_names - own - listed == set()
+
+
 def test_conda_environment_sets_what_run_sets():
     lines = (ROOT / "run").read_text().splitlines()
     settings = [line for line in lines if line.startswith("export") and ":-" in line]
@@ -324,11 +378,15 @@ def test_conda_environment_sets_what_run_sets():
     }
 
 
-@pytest.mark.parametrize("recipe", ["Dockerfile", "gyriflow.def"])
-def test_images_are_made_from_the_same_lists(recipe):
-    text = (ROOT / "envs" / recipe).read_text()
-    assert "envs/debian.txt" in text
-    assert "envs/requirements.txt" in text
+def test_images_are_made_by_one_script_from_the_lists():
+    for recipe in ("Dockerfile", "gyriflow.def"):
+        image = (ROOT / "envs" / recipe).read_text()
+        assert "/opt/gyriflow/envs/install_image.sh" in image
+        assert "apt-get" not in image
+        assert "pip" not in image
+    text = (ROOT / "envs" / "install_image.sh").read_text()
+    assert "$envs/debian.txt" in text
+    assert "$envs/requirements.txt" in text
     own = re.findall(r"install (?:-\S+ )*([\w.=-]+)", text)
     assert set(own) <= {"-r", "--no-deps", "--no-install-recommends"}
     packages = {
@@ -336,6 +394,16 @@ def test_images_are_made_from_the_same_lists(recipe):
         for line in (ROOT / "envs" / "debian.txt").read_text().splitlines()
     }
     assert packages & set(text.split()) == set()
+
+
+def test_both_images_copy_the_same_files():
+    lines = (ROOT / ".dockerignore").read_text().splitlines()
+    copied = [line.removeprefix("!") for line in lines if line.startswith("!")]
+    assert lines[0] == "*"
+    definition = (ROOT / "envs" / "gyriflow.def").read_text()
+    files = re.search(r"^%files\n((?:    .*\n)*)", definition, re.MULTILINE)[1]
+    pairs = [line.split() for line in files.splitlines()]
+    assert pairs == [[name, f"/opt/gyriflow/{name}"] for name in copied]
 
 
 def test_libraries_that_jobs_need_are_in_the_list_that_is_installed():
@@ -363,7 +431,7 @@ def test_citation_has_the_version_of_the_package():
     ]
     labels = [
         *re.findall(r"ARG VERSION=(.*)", images[0]),
-        *re.findall(r"(?:Version |VERSION=)(\S+)", images[1]),
+        *re.findall(r"(?:Version |install_image.sh )(\S+)", images[1]),
     ]
     assert len(labels) == 3
     assert {citation["version"], zenodo["version"], fallback, *labels} == {RELEASE}

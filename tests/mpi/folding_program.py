@@ -64,6 +64,5 @@ def failing_after(steps):
 
 
 def kill(process):
-    """Kill a program with its ranks, which Open MPI's daemon puts into groups of their
-    own."""
+    """Kill a program with its ranks, which mpiexec puts into groups of their own."""
     processes.kill([process.pid, *processes.below(process.pid)])

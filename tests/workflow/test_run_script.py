@@ -3,10 +3,13 @@ interrupted. No environment is made."""
 
 import hashlib
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -19,16 +22,23 @@ ROOT = Path(__file__).parents[2]
 RUN = ROOT / "run"
 
 PYTHON = r"""#!/bin/bash
-# stands in for Python: notes its arguments, makes a venv that holds itself and one
-# program
+# stands in for Python 3.13: notes its arguments, makes a venv that holds itself and
+# one program
 echo "$*" >> "$RECORD"
+# a real one finds no modules there
+if [ -n "${PYTHONHOME:-}" ]; then exit 1; fi
 case "$*" in
-    "-m venv "*)
-        if [ -e "$3" ]; then echo "something was left behind"; exit 1; fi
-        mkdir -p "$3/bin"
-        cp "$0" "$3/bin/python"
-        printf '#!/bin/sh\necho "from the environment: $*"\n' > "$3/bin/tool"
-        chmod +x "$3/bin/tool" ;;
+    *version_info*) echo 3.13 ;;
+    *ensurepip*)
+        if [ -e "$RECORD.no-ensurepip" ]; then exit 1; fi ;;
+    "-I -m venv "*)
+        if [ -e "$4" ]; then echo "something was left behind"; exit 1; fi
+        mkdir -p "$4/bin"
+        cp "$0" "$4/bin/python"
+        printf '#!/bin/sh\necho "from the environment: $*"\n' > "$4/bin/tool"
+        chmod +x "$4/bin/tool" ;;
+    *gyriflow.running.requirements*)
+        if [ -e "$RECORD.missing" ]; then cat "$RECORD.missing"; fi ;;
     *"pip install"*)
         if [ -e "$RECORD.fails" ]; then
             echo "ConnectionError: no such thing"
@@ -58,6 +68,20 @@ esac
 SHIM = """#!/bin/sh
 echo "pyenv: $(basename "$0"): command not found" >&2
 exit 127
+"""
+APT_GET = r"""#!/bin/sh
+# stands in for apt-get of Debian: notes its arguments, knows two sources of packages
+echo "apt-get $*" >> "$RECORD"
+case "$*" in
+    *indextargets*)
+        format=$(echo "$3" | sed 's/\$(ORIGIN)/Debian/')
+        echo "$format" | sed 's/\$(LABEL)/Debian-Security/; s/\$(REPO_URI)/security/'
+        echo "$format" | sed 's/\$(LABEL)/Debian/; s/\$(REPO_URI)/mirror/' ;;
+    *install*)
+        rm -f "$RECORD.no-ensurepip"
+        sleep "${SECONDS_TO_INSTALL:-0}"
+        echo "installed" >> "$RECORD" ;;
+esac
 """
 OLD_GLIBC = "#!/bin/sh\necho glibc 2.34\n"
 
@@ -97,6 +121,19 @@ def with_conda(outside, tmp_path):
     return outside
 
 
+@pytest.fixture
+def root_on_debian(outside, tmp_path):
+    """Return such variables for root on a Debian machine."""
+    programs = tmp_path / "programs"
+    write_program(programs, "id", "#!/bin/sh\necho 0\n")
+    write_program(programs, "dpkg", "#!/bin/sh\n")
+    write_program(programs, "apt-get", APT_GET)
+    return outside | {
+        "PATH": f"{programs}:/usr/bin:/bin",
+        "PYENV_ROOT": str(tmp_path / "pyenv"),
+    }
+
+
 OWN = f"9{os.getpid()}.25"
 """Seconds to sleep by which the processes of these tests are told from all others."""
 
@@ -105,7 +142,7 @@ def run(*command, env=None):
     return ran(RUN, *command, env=env, timeout_s=60)
 
 
-def start(*command, env):
+def start(*command, env, process_group=None):
     """Start ./run with signals as a shell starts it, whatever they are here."""
     return subprocess.Popen(
         [RUN, *command],
@@ -114,6 +151,7 @@ def start(*command, env):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        process_group=process_group,
         preexec_fn=lambda: [
             signal.signal(s, signal.SIG_DFL) for s in (signal.SIGINT, signal.SIGTERM)
         ],
@@ -183,6 +221,16 @@ def write_solver(folder, petsc, dolfinx="0.11.0"):
         module.write_text(code + "\n")
 
 
+def write_metadata(folder):
+    """Write the metadata of the packages that pyproject.toml lists."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    for requirement in project["dependencies"]:
+        name = re.split(r"[<>=]", requirement)[0]
+        metadata = folder / f"{name.replace('-', '_')}-1.dist-info" / "METADATA"
+        metadata.parent.mkdir()
+        metadata.write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1\n")
+
+
 @pytest.fixture
 def active(outside, tmp_path):
     """Return variables of an active venv with stand-ins for the solver."""
@@ -199,6 +247,7 @@ def active(outside, tmp_path):
         folder / "bin", "tool", "#!/bin/sh\necho from the active environment\n"
     )
     write_solver(packages_of(folder), PETSC.format(scalar="float"))
+    write_metadata(packages_of(folder))
     return outside | {
         "VIRTUAL_ENV": str(folder),
         "PATH": f"{folder / 'bin'}:{outside['PATH']}",
@@ -238,6 +287,15 @@ def test_an_active_environment_with_another_solver_is_not_taken(
     assert run("tool", "1", env=active).stdout == "from the environment: 1\n"
 
 
+def test_an_active_environment_without_a_package_of_measuring_is_not_taken(
+    active, tmp_path
+):
+    (nibabel,) = packages_of(tmp_path / "active").glob("nibabel-*")
+    shutil.rmtree(nibabel)
+    (tmp_path / "active" / "bin" / "tool").unlink()
+    assert run("tool", "1", env=active).stdout == "from the environment: 1\n"
+
+
 def test_with_conda_and_a_venv_active_the_first_python_on_path_decides(
     active, tmp_path
 ):
@@ -268,7 +326,7 @@ def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp
     assert first.stderr == Facts(venv.parent)
     assert second.stderr == ""
     calls = (tmp_path / "record").read_text().splitlines()
-    assert f"-m venv {venv}" in calls
+    assert f"-I -m venv {venv}" in calls
     (installation,) = [line for line in calls if "pip install" in line]
     assert "--require-hashes" in installation
     assert installation.endswith(
@@ -292,6 +350,65 @@ def test_a_python_with_wheels_goes_before_3_14(outside, tmp_path):
             PYTHON.replace("from the environment", "from 3.14"),
         )
     assert run("tool", "1", env=outside).stdout == "from the environment: 1\n"
+
+
+def test_a_venv_whose_python_is_gone_is_made_again(outside, tmp_path):
+    assert run("tool", "1", env=outside).returncode == 0
+    (python,) = (tmp_path / "cache").glob("venv-*/venv/bin/python")
+    python.unlink()
+    python.symlink_to(tmp_path / "python of a pyenv version that was removed")
+    assert run("tool", "2", env=outside).stdout == "from the environment: 2\n"
+    assert os.access(python, os.X_OK)
+
+
+def test_the_set_up_uses_neither_the_users_python_home_nor_the_working_directory(
+    outside, tmp_path
+):
+    write_program(tmp_path / "programs", "id", "#!/bin/sh\necho 1000\n")
+    env = outside | {"PYTHONHOME": str(tmp_path)}
+    assert run("tool", "1", env=env).stdout == "from the environment: 1\n"
+    for arguments in (tmp_path / "record").read_text().splitlines():
+        assert arguments.startswith(("-I ", "-P "))
+
+
+def test_debians_package_for_venv_is_named(outside, tmp_path):
+    (tmp_path / "record.no-ensurepip").touch()
+    write_program(tmp_path / "programs", "id", "#!/bin/sh\necho 1000\n")
+    path = f"{tmp_path / 'programs'}:/usr/bin:/bin"
+    env = {"PATH": path, "PYENV_ROOT": str(tmp_path / "pyenv")}
+    done = run("tool", env=outside | env)
+    assert done.returncode == 2
+    assert done.stderr == Facts("apt-get install python3.13-venv")
+    assert not (tmp_path / "cache").exists()
+
+
+def test_debians_package_for_venv_is_installed_as_root(root_on_debian, tmp_path):
+    (tmp_path / "record.no-ensurepip").touch()
+    assert run("tool", "1", env=root_on_debian).stdout == "from the environment: 1\n"
+    installation = "apt-get install -y --no-install-recommends python3.13-venv"
+    assert installation in (tmp_path / "record").read_text().splitlines()
+
+
+def test_ctrl_c_lets_an_installation_of_debian_packages_end(root_on_debian, tmp_path):
+    record = tmp_path / "record"
+    (tmp_path / "record.missing").write_text("libgl1\n")
+    env = root_on_debian | {"SECONDS_TO_INSTALL": "1"}
+    process = start("tool", env=env, process_group=0)
+    assert wait_until(lambda: record.exists() and "libgl1" in record.read_text())
+    # as a terminal does: to every process of the group
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(20) == 130
+    assert record.read_text().splitlines()[-1] == "installed"
+
+
+def test_the_tree_comes_from_the_mirror_of_debian_itself(root_on_debian, tmp_path):
+    programs = tmp_path / "programs"
+    write_program(programs, "python3.13", SHIM)
+    write_program(programs, "unshare", '#!/bin/sh\necho "$*" >> "$RECORD"\nexit 1\n')
+    write_program(programs, "mmdebstrap", "#!/bin/sh\n")
+    done = run("tool", env=root_on_debian)
+    assert done.stderr == Facts("create_tree")
+    assert (tmp_path / "record").read_text().splitlines()[-1].endswith(" mirror")
 
 
 def test_without_any_way_it_says_what_is_needed(outside, tmp_path):
@@ -331,6 +448,25 @@ def test_a_full_disk_is_named_before_anything_is_loaded(outside, tmp_path):
     assert done.returncode == 2
     assert done.stderr == Facts(tmp_path / "cache", "1 MB", "3000", "GYRIFLOW_CACHE")
     assert "pip install" not in (tmp_path / "record").read_text()
+
+
+def test_an_environment_of_somebody_else_that_is_not_ready_is_named(outside, tmp_path):
+    cache = tmp_path / "cache"
+    cache.mkdir()
+    assert run("tool", env=outside).returncode == 0
+    (environment,) = (path for path in cache.glob("venv-*") if path.is_dir())
+    shutil.rmtree(cache)
+    # read-only for root too
+    setup = (
+        f"mount -t tmpfs tmpfs '{cache}' && mkdir '{environment}'"
+        f" && mount -o remount,ro '{cache}' && '{RUN}' tool"
+    )
+    cache.mkdir()
+    done = ran("unshare", "--map-root-user", "--mount", "sh", "-c", setup, env=outside)
+    if "unshare" in done.stderr:
+        pytest.skip("this machine allows no mounts")
+    assert done.returncode == 2
+    assert done.stderr == Facts(environment, "cannot be written", "GYRIFLOW_CACHE")
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,7 @@ def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> f
     not in one piece."""
     shift, size = -_spacing(mass), stiffness.shape[0]
     inverse = LinearOperator(
-        (size, size), _factorised(stiffness, mass, shift).solve, dtype=np.float64
+        (size, size), _factorise(stiffness, mass, shift).solve, dtype=np.float64
     )
     start = np.random.default_rng(1).standard_normal(size)
     values = eigsh(
@@ -110,9 +110,9 @@ def lowest_modes(
             )
         )
     needed, top = count + 2, (count + 6) * _spacing(mass)
-    while (most := count_below(stiffness, mass, top)) < count:
-        top *= 1.01 * needed / max(most, needed // 4)
-    modes = modes_below(stiffness, mass, top, most)
+    while (n_below := count_below(stiffness, mass, top)) < count:
+        top *= 1.01 * needed / max(n_below, needed // 4)
+    modes = modes_below(stiffness, mass, top, n_below)
     return Modes(modes.eigenvalues[:count], modes.functions[:, :count])
 
 
@@ -171,14 +171,14 @@ def _modes_between(
     SolverError where not all are found.
     """
     shift = 0.5 * (low + high)
-    solve = _factorised(stiffness, mass, shift).solve
+    solve = _factorise(stiffness, mass, shift).solve
     size = stiffness.shape[0]
     max_vectors = min(5 * count + 20 * BLOCK, size - size % BLOCK)
     basis = np.empty((size, max_vectors), order="F")
     # the operator in the basis: its upper triangle
     projected = np.zeros((max_vectors, max_vectors))
 
-    block, _ = _orthonormalised(
+    block, _ = _orthonormalise(
         np.random.default_rng(1).standard_normal((size, BLOCK)), mass
     )
     next_check = 2 * count + 4 * BLOCK
@@ -192,7 +192,7 @@ def _modes_between(
         block -= basis[:, recent] @ projected[recent, last]
         # in exact arithmetic the block is orthogonal to the earlier ones by now
         block -= basis[:, :used] @ (basis[:, :used].T @ (mass @ block))
-        block, coupling = _orthonormalised(block, mass)
+        block, coupling = _orthonormalise(block, mass)
         if used < next_check and used < max_vectors:
             continue
 
@@ -213,7 +213,7 @@ def _modes_between(
     raise SolverError(problem, found=found, expected=count, remedy=SLIVERS)
 
 
-def _orthonormalised(block: Floats, mass: sparse.csc_matrix) -> tuple[Floats, Floats]:
+def _orthonormalise(block: Floats, mass: sparse.csc_matrix) -> tuple[Floats, Floats]:
     """Return M-orthonormal vectors Q (n, b) and R (b, b) with block = Q R."""
     vectors, first = linalg.qr(block, mode="economic")
     second = linalg.cholesky(vectors.T @ (mass @ vectors))
@@ -224,7 +224,7 @@ def _spacing(mass: sparse.csc_matrix) -> float:
     return float(4.0 * np.pi / mass.sum())
 
 
-def _factorised(
+def _factorise(
     stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: float
 ) -> SuperLU:
     # this order of columns is not SuperLU's own: its larger panels and relaxed
@@ -248,7 +248,7 @@ def count_below(
     With pivots on the diagonal, P(K − value·M)Pᵀ = L U with U = D Lᵀ, so D has the
     signs of the eigenvalues.
     """
-    factors = _factorised(stiffness, mass, value)
+    factors = _factorise(stiffness, mass, value)
     if not np.array_equal(factors.perm_r, factors.perm_c):
         raise SolverError(
             "no inertia: a pivot off the diagonal was taken",

@@ -88,7 +88,7 @@ def require_for(programs: Mapping[str, Path]) -> None:
     if compiles and not has_python_headers():
         raise InputError(
             "simulations need Python.h, and there is none",
-            remedy=_install(["python3-dev"]),
+            remedy=_install([_headers_package()]),
         )
 
 
@@ -143,8 +143,13 @@ def missing_debian_packages() -> list[str]:
     if not has_compiler():
         packages += ["gcc", "libc6-dev"]
     if not has_python_headers():
-        packages.append("python3-dev")
+        packages.append(_headers_package())
     return packages
+
+
+def _headers_package() -> str:
+    # python3-dev is of the system's default Python, which may be another
+    return f"python3.{sys.version_info.minor}-dev"
 
 
 def _install(packages: Iterable[str]) -> str:

@@ -114,11 +114,11 @@ def test_without_pythons_headers_only_simulations_are_refused(monkeypatch, tmp_p
     monkeypatch.setattr(requirements, "is_installed", lambda name: True)
     monkeypatch.setattr(requirements, "LIBRARIES", {})
     require_for({"measure": SCRIPTS / "measure.py"})
-    with pytest.raises(
-        InputError, check=Facts("Python.h", "apt-get install python3-dev")
-    ):
+    # of this Python, which may not be the system's default
+    package = f"python3.{sys.version_info.minor}-dev"
+    with pytest.raises(InputError, check=Facts("Python.h", f"install {package}")):
         require_for({"simulate": requirements.SOLVER})
-    assert requirements.missing_debian_packages() == ["python3-dev"]
+    assert requirements.missing_debian_packages() == [package]
 
 
 def test_ziglang_serves_where_there_is_no_compiler(monkeypatch, tmp_path):
