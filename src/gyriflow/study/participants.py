@@ -61,13 +61,14 @@ SHARED_FOLDERS = ("rawdata", "sourcedata", "derivatives", "phenotype")
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table in a file.
+    """A row of the table in a file, about the files in the folder `scope`.
 
     It has its place for messages, subject and session without `sub-` and `ses-`, the
     texts of other columns, and its ages.
     """
 
     path: Path
+    scope: Path
     place: str
     name: str
     session: str | None
@@ -95,20 +96,6 @@ class Table:
     ages: Sequence[AgeColumn] = ()
     problem: str = ""
 
-    def applies_to(self, subject: str, file: Path | None) -> bool:
-        """Return whether it is about a file of a subject; None: any file."""
-        if self.subject not in (None, subject):
-            return False
-        return file is None or file.is_relative_to(self.scope)
-
-    @cached_property
-    def by_subject(self) -> dict[str, list[Row]]:
-        """The rows of each subject."""
-        rows: dict[str, list[Row]] = {}
-        for row in self.rows:
-            rows.setdefault(row.subject, []).append(row)
-        return rows
-
 
 def _read_table(path: Path) -> Table:
     """Return a table of participants or sessions; InputError if it cannot be read or
@@ -121,8 +108,7 @@ def _read_table(path: Path) -> Table:
     texts = read_text_table(path)
     columns = list(texts[0])
     for first, second in merged_names(columns, column_key):
-        is_id = column_key(first) in (*IDS, *SESSIONS)
-        if is_id and any(row[first] != row[second] for row in texts):
+        if column_key(first) in (*IDS, *SESSIONS):
             raise InputError(
                 "has two columns of one name",
                 path=path,
@@ -161,7 +147,8 @@ def _read_table(path: Path) -> Table:
         place = f"{path.name} row {number}"
         cells = [TableAge(place, column, values[column.name]) for column in ages]
         other_values = {key: text for key, text in values.items() if key in further}
-        rows.append(Row(path, place, name, own_session, other_values, cells))
+        row = Row(path, empty.scope, place, name, own_session, other_values, cells)
+        rows.append(row)
     return replace(empty, rows=rows, columns=columns, ages=ages)
 
 
@@ -237,18 +224,19 @@ class ScanTables:
                 self.tables.append(_read_table(path))
             except InputError as error:
                 self.tables.append(replace(_empty_table(path), problem=str(error)))
-        self._ages: list[TableAge] = []
-        kinds = set()
+        self.rows: dict[str, list[Row]] = {}
+        self.cells: list[TableAge] = []
         for table in self.tables:
-            kinds |= {column.kind for column in table.ages}
             for row in table.rows:
-                self._ages += row.ages
+                self.rows.setdefault(row.subject, []).append(row)
+                self.cells += row.ages
+        kinds = {cell.column.kind for cell in self.cells}
         self.kind = "scan" if "scan" in kinds else "gestational"
 
     @property
     def age_problem(self) -> str:
         """The reason why no table gives ages, or ""."""
-        if not self.tables or any(age.column.kind == self.kind for age in self._ages):
+        if not self.tables or self._cells_of(self.kind):
             return ""
         first = self.tables[0]
         return (
@@ -258,28 +246,22 @@ class ScanTables:
 
     def require_clear_decimals(self, path: Path) -> None:
         """Raise InputError if all ages may be either decimals or weeks and days."""
-        texts = []
-        for age in self._ages:
-            if age.column.kind == self.kind and age.column.unit == "weeks":
-                texts.append(age.text)
+        cells = self._cells_of(self.kind)
+        texts = [cell.text for cell in cells if cell.column.unit == "weeks"]
         require_clear_decimals(texts, self.notation, path)
+
+    def _cells_of(self, kind: str) -> list[TableAge]:
+        return [cell for cell in self.cells if cell.column.kind == kind]
 
     @cached_property
     def ids(self) -> dict[str, str]:
         """The last row of each subject, for messages."""
-        places: dict[str, str] = {}
-        for table in self.tables:
-            places |= {row.subject: row.place for row in table.rows}
-        return places
+        return {subject: rows[-1].place for subject, rows in self.rows.items()}
 
     def sessions_of(self, subject: str) -> list[str]:
         """Return the sessions of a subject that any row names."""
-        sessions: dict[str, None] = {}
-        for table in self.tables:
-            for row in table.by_subject.get(subject, ()):
-                if row.session is not None:
-                    sessions[row.session] = None
-        return list(sessions)
+        sessions = dict.fromkeys(row.session for row in self.rows.get(subject, ()))
+        return [session for session in sessions if session is not None]
 
     def facts(
         self,
@@ -294,13 +276,11 @@ class ScanTables:
         A row without a session is of a subject's only scan. Without any age, there is
         no cause.
         """
-        own: list[Row] = []
         for table in self.tables:
-            if not table.applies_to(subject, place):
-                continue
-            if table.problem:
+            is_of_subject = table.subject in (None, subject)
+            if table.problem and is_of_subject and _is_in(place, table.scope):
                 return ScanAge(None, cause=table.problem)
-            own += table.by_subject.get(subject, ())
+        own = [row for row in self.rows.get(subject, ()) if _is_in(place, row.scope)]
         if not own:
             return None
         with_session = [row for row in own if row.session is not None]
@@ -345,17 +325,19 @@ class ScanTables:
     def _age(self, ages: Sequence[TableAge]) -> ScanAge | None:
         """Return the age that the cells of a scan give, or None if it has no cells."""
         used = [age for age in ages if age.column.kind == self.kind]
-        others = [age for age in ages if age.column.kind != self.kind]
         present = [age for age in used if not age.is_missing]
-        others = [age for age in others if not age.is_missing]
-        contradicting = others
+        others = []
+        for age in ages:
+            if age.column.kind != self.kind and not age.is_missing:
+                others.append(age)
+        doubtful = others
         if self.kind == "scan" and used:
             # such as the type of an age
-            contradicting = [age for age in others if OTHER_AGE.search(age.text)]
+            doubtful = [age for age in others if OTHER_AGE.search(age.text)]
         elif present and not others:
-            contradicting = self._other_ages[:1]
-        if contradicting:
-            found = " and ".join(map(str, (*present, *contradicting)))
+            doubtful = self._other_ages[:1]
+        if doubtful:
+            found = " and ".join(map(str, (*present, *doubtful)))
             cause = (
                 f"found {found}: which is the gestational age at the scan is unclear;"
                 " expected it in a column named scan_age"
@@ -363,17 +345,21 @@ class ScanTables:
             return ScanAge(None, cause=cause)
         if not used:
             return None
-        age = read_ages(present or used[:1], self.notation)
-        if others:
-            ignored = ", ".join(f"{cell.column.name} {cell.text}" for cell in others)
-            age = replace(age, source=f"{age.source} (not {ignored})")
-        return age
+        age_of_scan = read_ages(present or used[:1], self.notation)
+        if age_of_scan.week is None or not others:
+            return age_of_scan
+        ignored = ", ".join(f"{age.column.name} {age.text}" for age in others)
+        return replace(age_of_scan, source=f"{age_of_scan.source} (not {ignored})")
 
     @cached_property
     def _other_ages(self) -> list[TableAge]:
         """The ages in columns that are not named as of gestational ages."""
-        ages = [age for age in self._ages if age.column.kind == "other"]
-        return [age for age in ages if not age.is_missing]
+        return [cell for cell in self._cells_of("other") if not cell.is_missing]
+
+
+def _is_in(file: Path | None, folder: Path) -> bool:
+    """Return whether a file is in a folder; None: any file."""
+    return file is None or file.is_relative_to(folder)
 
 
 # brains of a configuration
@@ -527,9 +513,10 @@ def _difference(rows: Iterable[Row]) -> str:
 def covariates(values: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the values of its tables without
     another meaning."""
+    own_keys = (FILES, SIDE, *BRAIN_KEYS)
     further = {}
     for key, text in values.items():
-        if key not in (FILES, SIDE, *BRAIN_KEYS) and not is_missing(text):
+        if key not in own_keys and not is_missing(text):
             further[key] = text
     return {"covariates": further} if further else {}
 
