@@ -29,14 +29,13 @@ from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean, own_name
 from ..settings.terms import SIDES, Side
 from ..settings.weeks import WeekNotation
-from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
-from ..study.participants import (
-    TABLE_NAME,
-    ScanTables,
-    ambiguity_of,
-    covariates,
-    data_set_of,
+from ..study.ages import (
+    MAX_DIFFERENCE_WEEKS,
+    ScanAge,
+    require_clear_decimals,
+    week_in_name,
 )
+from ..study.participants import TABLE_NAME, ScanTables, covariates, data_set_of
 
 LABEL_NAME = re.compile(
     r"(?!.*probseg).*(label|seg|parcellation|tissue)", re.IGNORECASE
@@ -258,13 +257,8 @@ def recognise(
         raise InputError(
             "has no scan of these participants in these sessions", path=folder
         )
-    by_name = (
-        ""
-        if notation
-        else ambiguity_of(brain.named_age for brain in brains if brain.named_age)
-    )
-    if ambiguity := tables.ambiguity or by_name:
-        raise InputError(ambiguity, path=folder)
+    tables.require_clear_decimals(folder)
+    require_clear_decimals([brain.named_age for brain in brains], notation, folder)
     _refuse_equal_weeks(brains)
     choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
     brains.sort(
@@ -564,50 +558,22 @@ def _complete(
 ) -> None:
     """Add the age, the subject and its other values to a scan, read its files, and add
     why it cannot be used."""
-    scan = _scan_of(brain.file)
     subject = _label(brain.file, "sub")
-    session = _label(brain.file, "ses")
     owners = _owners(brain.file, tables) if subject is None else [subject]
-    facts, cause = None, ""
-    if len(owners) > 1:
-        cause = (
-            f"several rows may be of this scan: found {', '.join(owners)}; expected one"
-            " id in its path"
-        )
-    elif owners:
-        is_only_scan = subject is None or len(sessions_of[subject]) < 2
-        facts = tables.facts(owners[0], session, is_only_scan, folder / brain.file)
-        cause = "" if facts or subject is None else _similar_ids(subject, tables)
-    else:
-        cause = _similar_ids(scan, tables, only_similar=True)
-    age = facts or ScanAge(None, cause=cause)
-    named = week_in_name(brain.file.parts, tables.notation)
-    if (
-        age.week is not None
-        and named.week is not None
-        and not _agree(age.week, named.week)
-    ):
-        age = ScanAge(
-            None,
-            cause=(
-                f"found two ages, {age.week:g} ({age.source}) and {named.source};"
-                " expected one"
-            ),
-        )
-    elif age.week is None and not age.cause:
-        age = named
-    entry: dict[str, Any] = {
-        "id": scan,
-        "week": UNSET if age.week is None else age.week,
-    }
-    entry |= {"subject": f"sub-{subject}" if subject else owners[0]} if owners else {}
-    brain.entry = entry | (covariates(facts.values) if facts else {}) | brain.entry
-    brain.age_source, brain.named_age = age.source, age.named
-    if age.week is None:
+    facts = _facts(brain.file, owners, folder, tables, sessions_of)
+    age = _age(facts, week_in_name(brain.file.parts, tables.notation))
+    entry: dict[str, Any] = {"id": _scan_of(brain.file), "week": UNSET}
+    if age.week is not None:
+        entry["week"] = age.week
+    elif age.cause:
         brain.contradiction = age.cause
-        brain.notes += (
-            [] if age.cause else ["week: neither its name nor a table gives the week"]
-        )
+    else:
+        note = "week: neither its name nor a table gives the week"
+        brain.notes.append("; ".join(filter(None, (note, tables.age_problem))))
+    if owners:
+        entry["subject"] = f"sub-{subject}" if subject else owners[0]
+    brain.entry = entry | covariates(facts.values) | brain.entry
+    brain.age_source, brain.named_age = age.source, age.named
     labels = {entity: _labels(brain.file, entity) for entity in ("ses", "sub")}
     if names := [
         f"{entity}-{label}"
@@ -686,47 +652,82 @@ def _require_brain(path: Path, *, whole: bool = False) -> None:
         )
 
 
+def _facts(
+    file: Path,
+    owners: Sequence[str],
+    folder: Path,
+    tables: ScanTables,
+    sessions_of: Mapping[str | None, set[str | None]],
+) -> ScanAge:
+    """Return the age and the values that tables give a file, which may be of the
+    subjects `owners`."""
+    if len(owners) > 1:
+        cause = (
+            f"several rows may be of this scan: found {', '.join(owners)}; expected one"
+            " id in its path"
+        )
+        return ScanAge(None, cause=cause)
+    subject = _label(file, "sub")
+    if not owners:
+        return ScanAge(None, cause=_similar_ids(_scan_of(file), tables))
+    is_only_scan = subject is None or len(sessions_of[subject]) < 2
+    session = _label(file, "ses")
+    facts = tables.facts(owners[0], session, is_only_scan, folder / file)
+    if facts is None:
+        return ScanAge(None, cause=_similar_ids(owners[0], tables, or_first=True))
+    return facts
+
+
+def _age(facts: ScanAge, named: ScanAge) -> ScanAge:
+    """Return the age that tables give, or else a name; None, with the cause, if they
+    differ."""
+    if facts.week is None:
+        return facts if facts.cause else named
+    if named.week is None or _agree(facts.week, named.week):
+        return facts
+    found = f"{facts.week:g} ({facts.source}) and {named.source}"
+    return ScanAge(None, cause=f"found two ages, {found}; expected one")
+
+
 def _agree(week: float, named: float) -> bool:
+    difference = week - named
     # names may give whole weeks, completed or rounded
-    return abs(week - named) <= MAX_DIFFERENCE_WEEKS or (
-        named.is_integer() and -0.5 <= week - named < 1.0
-    )
+    is_rounded = named.is_integer() and -0.5 <= difference < 1.0
+    return is_rounded or abs(difference) <= MAX_DIFFERENCE_WEEKS
 
 
 def _owners(file: Path, tables: ScanTables) -> list[str]:
     """Return the subjects of tables whose ids are whole parts of a path without `sub-`:
     of the name or of a folder."""
     parts = re.split(r"[._]", file.name)
-    beginnings = {"_".join(parts[:number]) for number in range(1, len(parts) + 1)} | {
-        _scan_of(file)
-    }
+    beginnings = {_scan_of(file)}
+    for number in range(1, len(parts) + 1):
+        beginnings.add("_".join(parts[:number]))
     in_name = [subject for subject in tables.ids if subject in beginnings]
-    in_folders = [subject for subject in tables.ids if subject in file.parts[:-1]]
-    return [max(in_name, key=len)] if in_name else in_folders
+    if in_name:
+        return [max(in_name, key=len)]
+    return [subject for subject in tables.ids if subject in file.parts[:-1]]
 
 
-def _similar_ids(
-    subject: str, tables: ScanTables, *, only_similar: bool = False
-) -> str:
-    """Return which ids tables have instead of a subject's: those that differ in zeros
-    or case, else the first five."""
-    plain, *plain_ids = (
-        re.sub(r"(?<!\d)0+(?=\d)", "", name.lower()) for name in (subject, *tables.ids)
-    )
-    named = zip(tables.ids.items(), plain_ids, strict=True)
-    similar = [
-        f"{name} ({table})" for (name, table), plain_id in named if plain_id == plain
-    ]
-    found = ", ".join(
-        similar
-        or ([] if only_similar or not tables.ids else [*list(tables.ids)[:5], "…"])
-    )
+def _similar_ids(subject: str, tables: ScanTables, *, or_first: bool = False) -> str:
+    """Return which ids tables have instead of a subject's, or "": those that differ in
+    zeros or case, otherwise, if asked, the first five."""
+    found = []
+    for name, place in tables.ids.items():
+        if _plain_id(name) == _plain_id(subject):
+            found.append(f"{name} ({place})")
+    if not found and or_first and tables.ids:
+        found = [*list(tables.ids)[:5], "…"]
+    if not found:
+        return ""
     return (
-        f"no table has its id; found {found}; expected {subject}, with the same zeros"
-        " and case"
-        if found
-        else ""
+        f"no table has its id; found {', '.join(found)}; expected {subject}, with the"
+        " same zeros and case"
     )
+
+
+def _plain_id(name: str) -> str:
+    return re.sub(r"(?<!\d)0+(?=\d)", "", name.lower())
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:

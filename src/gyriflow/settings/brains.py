@@ -273,12 +273,12 @@ class ParticipantsSettings(Settings):
     """A table with a brain in each row. `participants: FILE` is short for a section.
 
     Columns are `participant_id` (or `id`); `session_id` (or `session`, `visit`) where a
-    subject has several scans; the age of the scan, `scan_age`, `pma`, `gestational_age`
-    or `week`, as `24.3`, `24+2` or `24w2d` (in days with `age_days`; `age` has its unit
-    in the sidecar); and keys of brains, inner ones with a dot (`hemispheres.left`), two
-    `white` surfaces with a semicolon between. Instead of keys, `files` may name labels,
-    a pial surface, or left and right surfaces with a semicolon between; with `side`,
-    one hemisphere. `n/a` is an empty value. Other columns are covariates. Each
+    subject has several scans; the age at the scan, `scan_age`, or else
+    `gestational_age` or `week`, as `24.3`, `24+2` or `24w2d` (in days with
+    `scan_age_days`); and keys of brains, inner ones with a dot (`hemispheres.left`),
+    two `white` surfaces with a semicolon between. Instead of keys, `files` may name
+    labels, a pial surface, or left and right surfaces with a semicolon between; with
+    `side`, one hemisphere. `n/a` is an empty value. Other columns are covariates. Each
     participant is a subject. One with a `sub-01/sub-01_sessions.tsv` next to the table
     has a brain for each session, with its age.
     """

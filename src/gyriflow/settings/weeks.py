@@ -43,8 +43,8 @@ def read_week(
         return (
             None,
             (
-                f"found {text}; expected gestational weeks, {WEEK_RANGE[0]:g} to"
-                f" {WEEK_RANGE[1]:g}"
+                f"found {text} in {unit}; expected gestational weeks,"
+                f" {WEEK_RANGE[0]:g} to {WEEK_RANGE[1]:g}"
             ),
         )
     return round(week, 2), ""

@@ -16,19 +16,17 @@ from ..io.files import read_json, read_text_table
 from ..names import merged_names
 from ..settings.base import absent_content, hint_for_missing, located, own_name, path_in
 from ..settings.brains import SOURCES, ParticipantsSettings
-from ..settings.weeks import EXPECTED_AGE, WeekNotation
+from ..settings.weeks import WeekNotation
 from .ages import (
-    EXPECTED_COLUMNS,
-    OTHER_TYPE,
+    OTHER_AGE,
     AgeColumn,
     ScanAge,
     TableAge,
-    age_columns,
-    choose_age,
+    age_column,
     column_key,
     is_missing,
-    may_be_days,
-    unit_of,
+    read_ages,
+    require_clear_decimals,
 )
 
 IDS = ("participant_id", "id")
@@ -54,15 +52,16 @@ TABLE_NAME = re.compile(
     r"participants\.(?:tsv|csv)|(?:(sub-[^_/.]+)_)?(?:(ses-[^_/.]+)_)?(?:sessions|(scans))\.(?:tsv|csv)",
     re.IGNORECASE,
 )
+EXPECTED_COLUMNS = (
+    "scan_age or gestational_age, in weeks, or with its unit in its name or JSON file"
+)
 SHARED_FOLDERS = ("rawdata", "sourcedata", "derivatives", "phenotype")
 """Folders of a data set whose tables apply to all of it."""
-AGE_TYPES = ("age_type", "age_reference", "type_of_age", "age_ref")
-AGE_UNITS = ("age_unit", "age_units", "unit_of_age")
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table for the files in the folder `scope`.
+    """A row of the table in a file, about the files in the folder `scope`.
 
     It has its place for messages, subject and session without `sub-` and `ses-`, the
     texts of other columns, and its ages.
@@ -79,10 +78,6 @@ class Row:
     @property
     def subject(self) -> str:
         return self.name.removeprefix("sub-")
-
-    def _applies_to(self, file: Path | None) -> bool:
-        """Return whether a row is about a file; None: any file."""
-        return file is None or file.is_relative_to(self.scope)
 
 
 @dataclass(frozen=True)
@@ -101,29 +96,6 @@ class Table:
     ages: Sequence[AgeColumn] = ()
     problem: str = ""
 
-    def _may_have(self, subject: str, file: Path | None) -> bool:
-        """Return whether a table may have a row about a file of a subject."""
-        is_in_scope = file is None or file.is_relative_to(self.scope)
-        return is_in_scope and self.subject in (None, subject)
-
-    @property
-    def age_problem(self) -> str:
-        """The reason why none of its columns gives ages, or ""."""
-        if not self.ages:
-            expected = f"{EXPECTED_COLUMNS} {self.path.stem}.json"
-            return (
-                f"has no column of gestational ages; found {', '.join(self.columns)};"
-                f" expected {expected}"
-            )
-        if any(not column.problem for column in self.ages):
-            return ""
-        first = self.ages[0]
-        return (
-            f"{first.name}: {first.problem}; found the columns"
-            f" {', '.join(self.columns)}; instead, name the age gestational_age or"
-            " scan_age"
-        )
-
 
 def _read_table(path: Path) -> Table:
     """Return a table of participants or sessions; InputError if it cannot be read or
@@ -136,9 +108,7 @@ def _read_table(path: Path) -> Table:
     texts = read_text_table(path)
     columns = list(texts[0])
     for first, second in merged_names(columns, column_key):
-        if column_key(first) in (*IDS, *SESSIONS) and any(
-            row[first] != row[second] for row in texts
-        ):
+        if column_key(first) in (*IDS, *SESSIONS):
             raise InputError(
                 "has two columns of one name",
                 path=path,
@@ -155,10 +125,13 @@ def _read_table(path: Path) -> Table:
             expected=" or ".join(IDS),
         )
     session = next((names[key] for key in SESSIONS if key in names), None)
-    ages = age_columns(columns, _sidecar(empty), f"{path.stem}.json")
+    ages = _age_columns(columns, empty)
     name_parts = TABLE_NAME.fullmatch(path.name)
     session_of_file = name_parts[2] if name_parts else None
-    is_of_scans = name_parts is not None and name_parts[3] is not None
+    further = set(columns) - {ids, session}
+    if name_parts is not None and name_parts[3] is not None:
+        # other columns are those of files
+        further = {column.name for column in ages}
     rows = []
     for number, values in enumerate(texts, start=2):
         name = values[ids] if ids is not None else empty.subject or ""
@@ -171,17 +144,27 @@ def _read_table(path: Path) -> Table:
             )
         label = values[session] if session is not None else session_of_file or ""
         own_session = None if is_missing(label) else label.removeprefix("ses-")
-        if is_of_scans:
-            # other columns are those of files
-            further = {column.name: values[column.name] for column in ages}
-        else:
-            further = {
-                key: text for key, text in values.items() if key not in (ids, session)
-            }
         place = f"{path.name} row {number}"
-        row = Row(path, empty.scope, place, name, own_session, further, ())
-        rows.append(replace(row, ages=[*_ages_in(row, ages)]))
+        cells = [TableAge(place, column, values[column.name]) for column in ages]
+        other_values = {key: text for key, text in values.items() if key in further}
+        row = Row(path, empty.scope, place, name, own_session, other_values, cells)
+        rows.append(row)
     return replace(empty, rows=rows, columns=columns, ages=ages)
+
+
+def _age_columns(names: Iterable[str], table: Table) -> list[AgeColumn]:
+    """Return the columns of ages of a table, as its JSON file describes them."""
+    sidecar = _sidecar(table)
+    facts = {}
+    if isinstance(sidecar, dict):
+        facts = {column_key(str(name)): text for name, text in sidecar.items()}
+    columns = []
+    for name in names:
+        described = facts.get(column_key(name), {})
+        column = age_column(name, described, f"{table.path.stem}.json")
+        if column is not None:
+            columns.append(column)
+    return columns
 
 
 def _sidecar(table: Table) -> Any:
@@ -196,32 +179,6 @@ def _sidecar(table: Table) -> Any:
             if file.name.lower() in names:
                 return read_json(file)
     return {}
-
-
-def _ages_in(row: Row, columns: Iterable[AgeColumn]) -> Iterator[TableAge]:
-    """Yield the ages in a row; further columns may have their type or unit."""
-    kind = _first_text(row, AGE_TYPES)
-    unit_name = _first_text(row, AGE_UNITS)
-    for column in columns:
-        if kind is not None and OTHER_TYPE.search(kind):
-            problem = f"is not a gestational age: its type (age_type) is {kind}"
-            column = replace(column, problem=problem, is_other=True)
-        elif unit_name is not None and column_key(column.name) == "age":
-            unit = unit_of(unit_name)
-            problem = ""
-            if unit is None:
-                problem = f"found the unit {unit_name}; expected weeks or days"
-            column = replace(column, unit=unit or "weeks", problem=problem)
-        text = row.values[column.name]
-        yield TableAge(row.place, column, text, row.session is not None)
-
-
-def _first_text(row: Row, names: Sequence[str]) -> str | None:
-    """Return the text in the first column of a row with one of some names, or None."""
-    for column, text in row.values.items():
-        if column_key(column) in names:
-            return text
-    return None
 
 
 def _empty_table(path: Path) -> Table:
@@ -242,17 +199,20 @@ def _empty_table(path: Path) -> Table:
 def data_set_of(folder: Path) -> Path:
     """Return the data set that a folder is of: the one around its raw data or
     derivatives."""
-    shared = [
-        number
-        for number, part in enumerate(folder.parts)
-        if part.lower() in SHARED_FOLDERS
-    ]
-    return Path(*folder.parts[: shared[0]]) if shared else folder
+    for number, part in enumerate(folder.parts):
+        if part.lower() in SHARED_FOLDERS:
+            return Path(*folder.parts[:number])
+    return folder
 
 
 class ScanTables:
     """The tables of participants and sessions of a data set; `notation` is that of ages
-    such as 24.3, if known."""
+    such as 24.3, if known.
+
+    If any table has a column named as of the age at the scan, only such columns give
+    ages, since a gestational age beside them is at birth. Otherwise gestational ages
+    do, unless a column of another age has values.
+    """
 
     def __init__(
         self, paths: Iterable[Path], notation: WeekNotation | None = None
@@ -264,58 +224,44 @@ class ScanTables:
                 self.tables.append(_read_table(path))
             except InputError as error:
                 self.tables.append(replace(_empty_table(path), problem=str(error)))
+        self.rows: dict[str, list[Row]] = {}
+        self.cells: list[TableAge] = []
+        for table in self.tables:
+            for row in table.rows:
+                self.rows.setdefault(row.subject, []).append(row)
+                self.cells += row.ages
+        kinds = {cell.column.kind for cell in self.cells}
+        self.kind = "scan" if "scan" in kinds else "gestational"
 
-    @cached_property
-    def ambiguity(self) -> str:
-        """The problem that all ages may be either decimals or weeks and days, or ""."""
-        kinds = [
-            age.column.kind for age in self._ages if age.column.kind != "postnatal"
-        ]
-        first = min(kinds, key=["scan", "gestational", "age"].index, default="age")
-        texts = [
-            age.text
-            for age in self._ages
-            if age.column.kind == first and age.column.unit == "weeks"
-        ]
-        return ambiguity_of(texts) if self.notation is None else ""
+    @property
+    def age_problem(self) -> str:
+        """The reason why no table gives ages, or ""."""
+        if not self.tables or self._cells_of(self.kind):
+            return ""
+        first = self.tables[0]
+        return (
+            f"{first.path}: has no column of gestational ages; found"
+            f" {', '.join(first.columns)}; expected {EXPECTED_COLUMNS}"
+        )
 
-    @cached_property
-    def _ages_at_scans(self) -> list[TableAge]:
-        """The ages that are named as at a scan."""
-        return [
-            age
-            for age in self._ages
-            if age.column.kind == "scan" and not is_missing(age.text)
-        ]
+    def require_clear_decimals(self, path: Path) -> None:
+        """Raise InputError if all ages may be either decimals or weeks and days."""
+        cells = self._cells_of(self.kind)
+        texts = [cell.text for cell in cells if cell.column.unit == "weeks"]
+        require_clear_decimals(texts, self.notation, path)
+
+    def _cells_of(self, kind: str) -> list[TableAge]:
+        return [cell for cell in self.cells if cell.column.kind == kind]
 
     @cached_property
     def ids(self) -> dict[str, str]:
         """The last row of each subject, for messages."""
-        return {subject: rows[-1].place for subject, rows in self._by_subject.items()}
+        return {subject: rows[-1].place for subject, rows in self.rows.items()}
 
     def sessions_of(self, subject: str) -> list[str]:
         """Return the sessions of a subject that any row names."""
-        sessions: dict[str, None] = {}
-        for row in self._by_subject.get(subject, ()):
-            if row.session is not None:
-                sessions[row.session] = None
-        return list(sessions)
-
-    @cached_property
-    def _ages(self) -> list[TableAge]:
-        ages: list[TableAge] = []
-        for table in self.tables:
-            for row in table.rows:
-                ages += row.ages
-        return ages
-
-    @cached_property
-    def _by_subject(self) -> dict[str, list[Row]]:
-        rows: dict[str, list[Row]] = {}
-        for table in self.tables:
-            for row in table.rows:
-                rows.setdefault(row.subject, []).append(row)
-        return rows
+        sessions = dict.fromkeys(row.session for row in self.rows.get(subject, ()))
+        return [session for session in sessions if session is not None]
 
     def facts(
         self,
@@ -327,30 +273,30 @@ class ScanTables:
         """Return a scan's age and values in the tables for a file, or None if they have
         no row of its subject.
 
-        A row without a session is of a subject's only scan.
+        A row without a session is of a subject's only scan. Without any age, there is
+        no cause.
         """
-        own = [
-            row for row in self._by_subject.get(subject, ()) if row._applies_to(place)
-        ]
-        unread = []
         for table in self.tables:
-            if table.problem and table._may_have(subject, place):
-                unread.append(table)
-        if not own and not unread:
+            is_of_subject = table.subject in (None, subject)
+            if table.problem and is_of_subject and _is_in(place, table.scope):
+                return ScanAge(None, cause=table.problem)
+        own = [row for row in self.rows.get(subject, ()) if _is_in(place, row.scope)]
+        if not own:
             return None
         with_session = [row for row in own if row.session is not None]
-        sessions = list(dict.fromkeys(row.session for row in with_session))
+        found = ", ".join(f"{row.session} ({row.place})" for row in with_session)
+        sessions = {row.session for row in with_session}
         if session is None and len(sessions) == 1 and is_only_scan:
             (session,) = sessions
         elif session is None and sessions:
-            rows = ", ".join(f"{row.place} ({row.session})" for row in with_session)
             cause = (
-                f"its name has no session; found {rows}; expected ses-… in the name, as"
-                " in session_id"
+                f"its name has no session; found {found}; expected ses-… in the name,"
+                " as in session_id"
             )
             return ScanAge(None, cause=cause)
         is_only_scan &= len({*sessions, session} - {None}) < 2
         ages: list[TableAge] = []
+        shared: list[TableAge] = []
         values: dict[str, str] = {}
         for label in dict.fromkeys((None, session)):
             rows_of_scan = [row for row in own if row.session == label]
@@ -360,62 +306,60 @@ class ScanTables:
             is_shared = label != session and not is_only_scan
             for row in rows_of_scan:
                 values |= row.values
-                ages += [replace(age, is_shared=is_shared) for age in row.ages]
-        age = choose_age(ages, self.notation, self._ages_at_scans[:1])
-        # a table that cannot be read may have the age of exactly this scan
-        is_certain = age.week is not None and any(age.has_session for age in ages)
-        for table in unread:
-            if table.subject or not is_certain:
-                return ScanAge(None, cause=table.problem)
-        if age.week is None and not age.cause:
-            cause = _missing_age(with_session, ages, session)
-            if not cause:
-                table = next(
-                    table for table in self.tables if table.path == own[0].path
-                )
-                cause = f"{table.path}: {table.age_problem}"
+                (shared if is_shared else ages).extend(row.ages)
+        age = self._age(ages)
+        if age is None and sessions and session not in sessions:
+            cause = f"no row of its session; found {found}; expected {session}"
+            age = ScanAge(None, cause=cause)
+        shared = [cell for cell in shared if not cell.is_missing]
+        if age is None and shared:
+            cause = (
+                f"one age is given for several sessions; found {shared[0]}; expected a"
+                f" row with session_id {session}"
+            )
+            age = ScanAge(None, cause=cause)
+        used = {cell.column.name for cell in ages if cell.column.kind == self.kind}
+        further = {key: text for key, text in values.items() if key not in used}
+        return replace(age or ScanAge(None), values=further)
+
+    def _age(self, ages: Sequence[TableAge]) -> ScanAge | None:
+        """Return the age that the cells of a scan give, or None if it has no cells."""
+        used = [age for age in ages if age.column.kind == self.kind]
+        present = [age for age in used if not age.is_missing]
+        others = []
+        for age in ages:
+            if age.column.kind != self.kind and not age.is_missing:
+                others.append(age)
+        doubtful = others
+        if self.kind == "scan" and used:
+            # such as the type of an age
+            doubtful = [age for age in others if OTHER_AGE.search(age.text)]
+        elif present and not others:
+            doubtful = self._other_ages[:1]
+        if doubtful:
+            found = " and ".join(map(str, (*present, *doubtful)))
+            cause = (
+                f"found {found}: which is the gestational age at the scan is unclear;"
+                " expected it in a column named scan_age"
+            )
             return ScanAge(None, cause=cause)
-        further = {key: text for key, text in values.items() if key not in age.columns}
-        return replace(age, values=further)
+        if not used:
+            return None
+        age_of_scan = read_ages(present or used[:1], self.notation)
+        if age_of_scan.week is None or not others:
+            return age_of_scan
+        ignored = ", ".join(f"{age.column.name} {age.text}" for age in others)
+        return replace(age_of_scan, source=f"{age_of_scan.source} (not {ignored})")
+
+    @cached_property
+    def _other_ages(self) -> list[TableAge]:
+        """The ages in columns that are not named as of gestational ages."""
+        return [cell for cell in self._cells_of("other") if not cell.is_missing]
 
 
-def ambiguity_of(texts: Iterable[str]) -> str:
-    """Return the problem that all of several ages may be either decimals or weeks and
-    days, or ""."""
-    if examples := may_be_days(texts):
-        choice = (
-            "--decimal-weeks or --weeks-days (in a configuration, participants.ages:"
-            " decimal or days)"
-        )
-        return (
-            f"ages such as {', '.join(examples)} may be decimals, or weeks and days;"
-            f" choose {choice}"
-        )
-    return ""
-
-
-def _missing_age(
-    with_session: Sequence[Row], ages: Sequence[TableAge], session: str | None
-) -> str:
-    """Return why none of the ages in tables is that of a scan; "" if there are none."""
-    sessions = {row.session for row in with_session}
-    if session is not None and sessions and session not in sessions:
-        found = ", ".join(f"{row.session} ({row.place})" for row in with_session)
-        return f"no row of its session; found {found}; expected {session}"
-    for age in ages:
-        if is_missing(age.text):
-            continue
-        expected = "a row for each, with session_id"
-        if session is not None:
-            expected = f"a row with session_id {session}"
-        return (
-            f"one age is given for several sessions; found {age.column.name}"
-            f" {age.text} ({age.place}); expected {expected}"
-        )
-    if not ages:
-        return ""
-    first = ages[0]
-    return f"{first.column.name}: found n/a; expected {EXPECTED_AGE} ({first.place})"
+def _is_in(file: Path | None, folder: Path) -> bool:
+    """Return whether a file is in a folder; None: any file."""
+    return file is None or file.is_relative_to(folder)
 
 
 # brains of a configuration
@@ -448,7 +392,6 @@ KNOWN_COLUMNS = (
     "gestational_age",
     "scan_age",
     "week",
-    "age",
     FILES,
     SIDE,
     *BRAIN_KEYS,
@@ -526,10 +469,9 @@ def _require_valid(table: Table, tables: ScanTables) -> None:
                 found=column,
                 expected=near[0],
             )
-    if all(each.age_problem for each in tables.tables):
-        raise InputError(table.age_problem, path=table.path)
-    if tables.ambiguity:
-        raise InputError(tables.ambiguity, path=table.path)
+    if tables.age_problem:
+        raise InputError(tables.age_problem)
+    tables.require_clear_decimals(table.path)
     names = [row.name for row in table.rows]
     for first, second in merged_names(names, lambda name: name.removeprefix("sub-")):
         raise InputError(
@@ -571,9 +513,10 @@ def _difference(rows: Iterable[Row]) -> str:
 def covariates(values: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the values of its tables without
     another meaning."""
+    own_keys = (FILES, SIDE, *BRAIN_KEYS)
     further = {}
     for key, text in values.items():
-        if key not in (FILES, SIDE, *BRAIN_KEYS) and not is_missing(text):
+        if key not in own_keys and not is_missing(text):
             further[key] = text
     return {"covariates": further} if further else {}
 

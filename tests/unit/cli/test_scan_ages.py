@@ -1,5 +1,5 @@
-"""Ages of scans: from the one place that names exactly this scan, or refused with all
-that was found."""
+"""Ages of scans: of a named column, or else of the file's name; all others are
+refused, with what was found."""
 
 import pytest
 from facts import Facts
@@ -7,203 +7,161 @@ from scan_trees import make_tree
 
 from gyriflow.cli.recognition import UNSET, recognise
 from gyriflow.errors import InputError
+from gyriflow.study.ages import AT_SCAN
 
-FIRST, SECOND = (
-    f"sub-01/ses-{session}/anat/sub-01_ses-{session}_dseg.nii.gz" for session in (1, 2)
-)
+LONE = "sub-01/lh.pial"
+FIRST, SECOND = (f"sub-01/ses-{session}/lh.pial" for session in (1, 2))
+BOTH = [FIRST, SECOND]
+TWO = {"sub-01_ses-1": 22.0, "sub-01_ses-2": 28.0}
 TABLE = "participants.tsv"
 SESSIONS = "sub-01/sub-01_sessions.tsv"
 SIDECAR = "participants.json"
-LONE = "sub-01/anat/sub-01_dseg.nii.gz"
 
 
 def ages(folder, **options):
     """Return for each scan its age, or why it has none, by id."""
-    found = recognise(folder, **options).brains
-    return {
-        brain.entry["id"]: (
-            brain.contradiction if brain.entry["week"] == UNSET else brain.entry["week"]
-        )
-        for brain in found
-    }
+    found = {}
+    for brain in recognise(folder, **options).brains:
+        week = brain.entry["week"]
+        found[brain.entry["id"]] = " ".join(brain.causes) if week == UNSET else week
+    return found
 
 
-TWO = {"sub-01_ses-1": 22.0, "sub-01_ses-2": 28.0}
-BOTH = [FIRST, SECOND]
-
-
-def tree(folder, labels, tables, sidecar=None):
+def tree(folder, files, tables, sidecar=None):
     """Write a data set with tables of rows, separated by |, and the description of
     columns, by name."""
     rows = {path: text.split(" | ") for path, text in tables.items()}
-    return make_tree(
-        folder, labels=labels, tables=rows, json={SIDECAR: sidecar} if sidecar else {}
-    )
+    described = {SIDECAR: sidecar} if sidecar else {}
+    return make_tree(folder, surfaces=files, tables=rows, json=described)
+
+
+@pytest.mark.parametrize("column", [*sorted(AT_SCAN), "PMA", "AgeAtScan"])
+def test_an_age_at_the_scan_comes_before_others_which_are_said(tmp_path, column):
+    rows = f"participant_id gestational_age age {column} | sub-01 33.1 31 29.4"
+    (brain,) = recognise(tree(tmp_path, [LONE], {TABLE: rows})).brains
+    assert brain.entry["week"] == 29.4
+    assert brain.age_source == Facts(TABLE, column, "gestational_age 33.1", "age 31")
 
 
 @pytest.mark.parametrize(
-    ("rows", "sidecar", "age"),
+    ("column", "text", "units", "week"),
     [
-        # a file without a session, of a subject with several
-        (
-            "participant_id visit ga | sub-01 1 22 | sub-01 2 28",
-            {},
-            Facts("row 2", "row 3", "session_id"),
-        ),
-        # at the scan comes before at birth
-        *(
-            (f"participant_id gestational_age {column} | sub-01 33.1 29.4", {}, 29.4)
-            for column in (
-                "scan_age",
-                "pma",
-                "ga_at_scan",
-                "age_at_mri",
-                "PMA",
-                "postmenstrual_age_at_scan",
-                "scan_ga_weeks",
-                "week_at_scan",
-                "AgeAtScan",
-                "age_at_fetal_mri",
-                "ga_first_scan",
-            )
-        ),
-        (
-            "participant_id birth_age scan_age | sub-01 33.1 n/a",
-            {},
-            Facts("scan_age", "n/a"),
-        ),
-        # postnatal ages
-        (
-            "participant_id age | sub-01 24",
-            {"age": {"Units": "weeks", "AgeReference": "birth"}},
-            Facts("age", "birth", SIDECAR),
-        ),
-        (
-            "participant_id age age_type | sub-01 24 postnatal",
-            {"age": {"Units": "weeks"}},
-            Facts("age", "age_type", "postnatal"),
-        ),
-        (
-            "participant_id gestational_age | sub-01 39.4",
-            {
-                "gestational_age": {
-                    "Units": "weeks",
-                    "Description": "gestational age at birth",
-                }
-            },
-            Facts("at birth"),
-        ),
-        (
-            "participant_id postnatal_age_weeks | sub-01 24",
-            {},
-            Facts("postnatal_age_weeks", "scan_age"),
-        ),
-        *(
-            (
-                f"participant_id gestational_age {column} | sub-01 33.1 4",
-                {},
-                Facts("gestational_age 33.1", f"{column} 4"),
-            )
-            for column in ("postnatal_age", "chronological_age_days", "pna")
-        ),
-        ("participant_id week age_reference | sub-01 24 DOB", {}, Facts("week", "DOB")),
-        ("participant_id week age_type | sub-01 24 prenatal", {}, 24.0),
-        (
-            "participant_id ga | sub-01 39.4",
-            {"ga": {"Description": "GA at birth, see scan_age for that at the scan"}},
-            Facts("at birth"),
-        ),
-        (
-            "participant_id pma | sub-01 39.4",
-            {"pma": {"Description": "age at birth plus chronological age"}},
-            39.4,
-        ),
-        (
-            "participant_id ga | sub-01 24.4",
-            {"ga": {"Description": "antenatal age, corrected by ultrasound"}},
-            24.4,
-        ),
-        # units
-        *(
-            ("participant_id ga | sub-01 24", {"ga": facts}, Facts("ga", "months"))
-            for facts in ({"units": "months"}, {"LongName": "GA (months)"}, "in months")
-        ),
-        ("participant_id ga | sub-01 24", {"ga": {"Units": "completed weeks"}}, 24.0),
-        ("participant_id age age_unit | sub-01 170 days", {}, 24.29),
-        ("participant_id ga days | sub-01 24 3", {}, 24.43),
-        ("participant_id ga | sub-01 22wks1day", {}, 22.14),
-        *(
-            (f"participant_id ga | sub-01 {text}", {}, week)
-            for text, week in (
-                ("24w", 24.0),
-                ("24.3GW", 24.3),
-                ("24+3weeks", 24.43),
-                ("24+3/7", 24.43),
-                ("NaN", Facts("n/a")),
-            )
-        ),
-        ("participant_id Gestational-Weeks | sub-01 24", {}, 24.0),
-        ("participant_id timepoint ga | sub-01 2 24", {}, 24.0),
-        (
-            "participant_id gestational_age | sub-01 24",
-            {"gestational_age": {"Units": "months"}},
-            Facts("gestational_age", "months", SIDECAR),
-        ),
-        ("participant_id age | sub-01 170", {"age": {"Units": "day"}}, 24.29),
-        ("participant_id age_months | sub-01 6", {}, Facts("age_months", "months")),
-        (
-            "participant_id ga_days | sub-01 170",
-            {"ga_days": {"Units": "weeks"}},
-            Facts("days", "weeks"),
-        ),
-        # whole ids only
-        ("participant_id ga | SUB-01 22", {}, Facts("SUB-01")),
-        # given twice
-        (
-            "participant_id ga | sub-01 22 | sub-01 28",
-            {},
-            Facts(22, "row 2", 28, "row 3", "session_id"),
-        ),
-        ("participant_id ga week | sub-01 22 28", {}, Facts("ga", 22, "week", 28)),
-        ("participant_id ga ga | sub-01 22 28", {}, Facts("ga", 22, 28)),
-        ("participant_id ga GA | sub-01 22 22", {}, 22.0),
-        (
-            "participant_id sex ga | sub-01 F 22 | sub-01 M 22",
-            {},
-            Facts("sex", "F", "M"),
-        ),
+        ("Gestational-Weeks", "24", None, 24.0),
+        ("week", "24w", None, 24.0),
+        ("ga", "22wks1day", None, 22.14),
+        ("ga", "24.3GW", None, 24.3),
+        ("ga", "24+3weeks", None, 24.43),
+        ("ga", "24+3/7", None, 24.43),
+        ("ga", "24", "completed weeks", 24.0),
+        ("ga", "170", "day", 24.29),
+        ("scan_age_days", "170", None, 24.29),
+        ("ga_days", "170", "weeks", Facts("ga_days", "days and weeks", SIDECAR)),
+        ("ga", "24", "months", Facts("ga", "months", SIDECAR, "row 2")),
+        ("ga_days", "24", None, Facts("ga_days", "24 in days", "row 2")),
+        ("ga", "NaN", None, Facts("ga", "NaN", f"{TABLE} row 2")),
+        ("ga", "n/a", None, Facts("ga", "n/a", f"{TABLE} row 2")),
     ],
 )
-def test_the_age_of_a_lone_scan_is_read_from_the_table_or_refused(
-    tmp_path, rows, sidecar, age
+def test_ages_have_their_unit_from_the_name_or_the_sidecar(
+    tmp_path, column, text, units, week
 ):
-    assert ages(tree(tmp_path, [LONE], {TABLE: rows}, sidecar)) == {"sub-01": age}
+    rows = f"participant_id {column} | sub-01 {text}"
+    sidecar = {column: {"Units": units}} if units else None
+    assert ages(tree(tmp_path, [LONE], {TABLE: rows}, sidecar)) == {"sub-01": week}
 
 
 @pytest.mark.parametrize(
-    ("labels", "tables", "expected"),
+    "description",
+    [
+        "gestational age at birth",
+        "GA (months)",
+        "corrected age",
+        "weeks since conception",
+        "chronological age",
+        "of the mother",
+    ],
+)
+@pytest.mark.parametrize("key", ["Description", "AgeReference"])
+def test_a_column_that_is_described_as_another_age_is_refused(
+    tmp_path, description, key
+):
+    tree(
+        tmp_path,
+        [LONE],
+        {TABLE: "participant_id scan_age | sub-01 24"},
+        {"scan_age": {key: description}},
+    )
+    facts = Facts("scan_age", description, SIDECAR, f"{TABLE} row 2")
+    assert ages(tmp_path) == {"sub-01": facts}
+
+
+@pytest.mark.parametrize(
+    ("columns", "cells", "found"),
+    [
+        # not named as a gestational age at the scan
+        ("age", "24", ["age 24"]),
+        ("age age_unit", "170 days", ["age 170"]),
+        ("age_months", "6", ["age_months 6"]),
+        ("postnatal_age_weeks", "24", ["postnatal_age_weeks 24"]),
+        # beside one that may be at birth
+        ("ga age", "33.1 29.4", ["ga 33.1", "age 29.4"]),
+        ("ga age_at_fetal_mri", "33.1 29.4", ["ga 33.1", "age_at_fetal_mri 29.4"]),
+        ("ga pna", "33.1 4", ["ga 33.1", "pna 4"]),
+        ("ga age_since_birth", "33.1 4", ["ga 33.1", "age_since_birth 4"]),
+        ("week age_reference", "24 DOB", ["week 24", "age_reference DOB"]),
+        ("scan_age age_type", "24 postnatal", ["scan_age 24", "age_type postnatal"]),
+        # two that differ
+        ("ga week", "22 28", ["ga 22", "week 28"]),
+        ("scan_age pma", "22 28", ["scan_age 22", "pma 28"]),
+        # days of a week in a column of their own
+        ("ga days", "24 3", ["days", "3 in days"]),
+    ],
+)
+def test_other_ages_are_refused_by_cell(tmp_path, columns, cells, found):
+    tree(tmp_path, [LONE], {TABLE: f"participant_id {columns} | sub-01 {cells}"})
+    assert ages(tmp_path) == {"sub-01": Facts(*found, f"{TABLE} row 2")}
+
+
+def test_an_age_of_the_mother_or_at_birth_is_not_one_of_the_scan(tmp_path):
+    columns = "participant_id maternal_age ga_at_birth birth_age ga GA"
+    tree(tmp_path, [LONE], {TABLE: f"{columns} | sub-01 31 39.1 39.1 24 24"})
+    assert ages(tmp_path) == {"sub-01": 24.0}
+
+
+@pytest.mark.parametrize(
+    ("files", "tables", "expected"),
     [
         # a row for each session, under several names of the column
         *(
             (
                 BOTH,
-                {
-                    TABLE: (
-                        f"participant_id {column} gestational_age | sub-01 1 22 |"
-                        " sub-01 ses-2 28"
-                    )
-                },
+                {TABLE: f"participant_id {column} ga | sub-01 1 22 | 01 ses-2 28"},
                 TWO,
             )
-            for column in ("session_id", "session", "ses", "visit", "Visit")
+            for column in ("session_id", "session", "ses", "Visit")
         ),
-        # one age of a subject with two scans is of neither
+        (
+            BOTH,
+            {"sessions.tsv": "participant_id session_id ga | 01 1 22 | 01 2 28"},
+            TWO,
+        ),
+        (
+            [LONE],
+            {TABLE: "participant_id visit ga | sub-01 1 22 | sub-01 2 28"},
+            {"sub-01": Facts("row 2", "row 3", "session_id")},
+        ),
+        ([LONE], {TABLE: "participant_id timepoint ga | sub-01 2 24"}, {"sub-01": 24}),
+        (
+            [FIRST],
+            {SESSIONS: "session_id ga | 2 24"},
+            {"sub-01_ses-1": Facts("2 (sub-01_sessions.tsv row 2)")},
+        ),
+        # one age of a subject with two sessions is of neither
         (
             BOTH,
             {TABLE: "participant_id ga | sub-01 22"},
-            dict.fromkeys(TWO, Facts("ga 22", "row 2", "session_id")),
+            dict.fromkeys(TWO, Facts("ga 22", f"{TABLE} row 2", "session_id")),
         ),
-        # also where only one of two sessions that have no ages is on disk
         (
             [FIRST],
             {
@@ -212,102 +170,57 @@ def test_the_age_of_a_lone_scan_is_read_from_the_table_or_refused(
             },
             {"sub-01_ses-1": Facts("ga 24", "row 2", "session_id 1")},
         ),
-        # at the scan comes before at birth, in two tables
-        (
-            [FIRST],
-            {
-                TABLE: "participant_id gestational_age | sub-01 33.1",
-                SESSIONS: "session_id scan_age | ses-1 29.4",
-            },
-            {"sub-01_ses-1": 29.4},
-        ),
         # whole ids only
+        ([LONE], {TABLE: "participant_id ga | SUB-01 22"}, {"sub-01": Facts("SUB-01")}),
         (
-            [f"sub-0{n}/ses-1/sub-0{n}_ses-1_dseg.nii.gz" for n in (1, 2)],
-            {TABLE: "participant_id ga | 1 22 | 2 28"},
-            {f"sub-0{n}_ses-1": Facts(f"0{n}", str(n), "row") for n in (1, 2)},
+            [LONE],
+            {TABLE: "participant_id ga | 1 22"},
+            {"sub-01": Facts("01", "1 (participants.tsv row 2)")},
         ),
         (
-            ["a/case7_dseg.nii.gz", "a/case7_b_dseg.nii.gz", "a/x/case8_dseg.nii.gz"],
+            ["case01.lh.pial"],
+            {TABLE: "participant_id ga | case1 22"},
+            {"case01": Facts("case1", "row 2")},
+        ),
+        (
+            ["a/case7.lh.pial", "a/case7_b.lh.pial", "a/x/case8.lh.pial"],
             {TABLE: "participant_id ga | case7 22 | case7_b 23 | a 24 | x 25"},
             {"case7": 22.0, "case7_b": 23.0, "case8": Facts("a, x")},
         ),
-        # given twice
         (
-            [FIRST],
-            {SESSIONS: "session_id ga | ses-1 22 | 1 28"},
-            {"sub-01_ses-1": Facts(22, 28, "row 2", "row 3")},
-        ),
-        # tables of sessions
-        (
-            [FIRST],
-            {
-                TABLE: "participant_id ga | sub-01 22",
-                SESSIONS: "session_id age | ses-1 24",
-            },
-            {"sub-01_ses-1": Facts("age", "no unit", "sub-01_sessions.json")},
-        ),
-        (
-            ["derivatives/seg/" + FIRST],
-            {
-                TABLE: "participant_id ga | sub-01 22",
-                "derivatives/seg/" + SESSIONS: "session_id ga | 1 24",
-            },
-            {"sub-01_ses-1": 24.0},
-        ),
-        (
-            BOTH,
-            {
-                "sessions.tsv": (
-                    "participant_id session_id ga | 01 1 22 | sub-01 ses-2 28"
-                )
-            },
-            TWO,
-        ),
-        (
-            [FIRST],
-            {
-                SESSIONS: "session_id scan_age | 1 22",
-                "sessions.tsv": "participant_id session_id scan_age | 01 1 28",
-            },
-            {"sub-01_ses-1": Facts(22, 28, "sub-01_sessions.tsv", "sessions.tsv")},
-        ),
-        # formats
-        (
-            [LONE],
-            {"participants.csv": "participant_id;Sex;Age | sub-01;F;24"},
-            {"sub-01": Facts("Age", "no unit")},
-        ),
-        # a data set that has ages at the scan has others at birth
-        (
-            ["sub-01_dseg.nii.gz", "sub-02_dseg.nii.gz"],
-            {TABLE: "participant_id ga scan_age | sub-01 33.1 29.4 | sub-02 35 n/a"},
-            {"sub-01": 29.4, "sub-02": Facts("ga 35", "scan_age")},
-        ),
-        (
-            ["sub-01/ses-1/sub-01_ses-1_dseg.nii.gz", "sub-02/sub-02_dseg.nii.gz"],
-            {
-                TABLE: "participant_id ga | sub-01 33.1 | sub-02 39",
-                SESSIONS: "session_id scan_age | 1 29.4",
-            },
-            {"sub-01_ses-1": 29.4, "sub-02": Facts("ga 39", "scan_age")},
-        ),
-        # ids end where the next part begins
-        (
-            ["sub-01-A_dseg.nii.gz"],
+            ["sub-01-A/lh.pial"],
             {TABLE: "participant_id ga | sub-01 22 | sub-01-A 28"},
             {"sub-01-A": 28.0},
         ),
         (
-            ["case01_dseg.nii.gz"],
-            {TABLE: "participant_id ga | case1 22"},
-            {"case01": Facts("case1", "row 2")},
+            [FIRST],
+            {SESSIONS: "participant_id session_id ga | sub-02 1 22"},
+            {"sub-01_ses-1": Facts("sub-02", "sub-01")},
         ),
-        # tables of the same data set, wherever they lie
+        # given twice
+        (
+            [LONE],
+            {TABLE: "participant_id ga | sub-01 22 | sub-01 28"},
+            {"sub-01": Facts(22, "row 2", 28, "row 3", "session_id")},
+        ),
+        (
+            [LONE],
+            {TABLE: "participant_id sex ga | sub-01 F 22 | sub-01 M 22"},
+            {"sub-01": Facts("sex", "F", "M")},
+        ),
+        (
+            [FIRST],
+            {
+                TABLE: "participant_id ga | sub-01 33",
+                SESSIONS: "session_id ga | 1 22",
+            },
+            {"sub-01_ses-1": Facts("ga 33", TABLE, "ga 22", "sub-01_sessions.tsv")},
+        ),
+        # tables of one data set, wherever they lie
         (
             ["derivatives/seg/" + FIRST],
             {
-                TABLE: "participant_id ga | sub-01 33",
+                TABLE: "participant_id sex | sub-01 F",
                 "rawdata/" + SESSIONS: "session_id ga | 1 22",
             },
             {"sub-01_ses-1": 22.0},
@@ -317,34 +230,53 @@ def test_the_age_of_a_lone_scan_is_read_from_the_table_or_refused(
             {
                 TABLE: "participant_id ga | sub-01 33",
                 "sub-01/ses-1/sub-01_ses-1_scans.tsv": (
-                    "filename scan_age | anat/a.nii.gz 24 | anat/b.nii.gz 24"
+                    "filename scan_age | a.nii.gz 24 | b.nii.gz 24"
                 ),
             },
             {"sub-01_ses-1": 24.0},
         ),
+        # a data set that has ages at scans has others at birth
         (
-            [FIRST],
-            {
-                TABLE: "participant_id ga | sub-01 33",
-                SESSIONS: "participant_id session_id ga | sub-02 1 22",
-            },
-            {"sub-01_ses-1": Facts("sub-02", "sub-01")},
+            ["sub-01/lh.pial", "sub-02/lh.pial"],
+            {TABLE: "participant_id ga scan_age | sub-01 33.1 29.4 | sub-02 35 n/a"},
+            {"sub-01": 29.4, "sub-02": Facts("scan_age", "n/a", "row 3")},
         ),
-        # the name of the file and the table
         (
-            ["sub-01_GA-26_dseg.nii.gz"],
+            [FIRST, "sub-02/lh.pial"],
+            {
+                TABLE: "participant_id ga | sub-01 33.1 | sub-02 39",
+                SESSIONS: "session_id scan_age | 1 29.4",
+            },
+            {"sub-01_ses-1": 29.4, "sub-02": Facts("ga 39", "row 3", "scan_age")},
+        ),
+        (
+            ["sub-01/lh.pial", "sub-02/lh.pial"],
+            {TABLE: "participant_id ga pna | sub-01 33.1 4 | sub-02 35 n/a"},
+            {
+                "sub-01": Facts("ga 33.1", "pna 4"),
+                "sub-02": Facts("ga 35", "row 3", "pna 4", "row 2"),
+            },
+        ),
+        # the name of the file beside a table
+        (
+            ["sub-01_GA-26.lh.pial"],
             {TABLE: "participant_id ga | sub-01 26.4"},
             {"sub-01": 26.4},
         ),
         (
-            ["sub-01_GA-26_dseg.nii.gz"],
+            ["sub-01_GA-26.lh.pial"],
             {TABLE: "participant_id ga | sub-01 28"},
-            {"sub-01": Facts(28, "26", "participants.tsv")},
+            {"sub-01": Facts(28, "26", TABLE)},
+        ),
+        (
+            ["sub-01_GA-26.lh.pial", "sub-02/lh.pial"],
+            {TABLE: "participant_id sex | sub-01 F | sub-02 F"},
+            {"sub-01": 26.0, "sub-02": Facts(TABLE, "sex", "scan_age")},
         ),
     ],
 )
-def test_an_age_is_that_of_exactly_this_scan(tmp_path, labels, tables, expected):
-    assert ages(tree(tmp_path, labels, tables)) == expected
+def test_an_age_is_that_of_exactly_this_scan(tmp_path, files, tables, expected):
+    assert ages(tree(tmp_path, files, tables)) == expected
 
 
 @pytest.mark.parametrize(
@@ -368,8 +300,8 @@ def test_an_age_is_that_of_exactly_this_scan(tmp_path, labels, tables, expected)
     ],
 )
 def test_names_give_ages_or_are_refused_as_ambiguous(tmp_path, name, age):
-    (found,) = ages(make_tree(tmp_path, labels=[f"a/{name}_dseg.nii.gz"])).values()
-    assert found == age
+    make_tree(tmp_path, surfaces=[f"a/{name}_hemi-L_pial.surf.gii"])
+    assert list(ages(tmp_path).values()) == [age]
 
 
 @pytest.mark.parametrize(
@@ -378,60 +310,48 @@ def test_names_give_ages_or_are_refused_as_ambiguous(tmp_path, name, age):
         ("Participant ID;Gestational age (weeks)\nsub-01;24,5", 24.5),
         ('"participant_id","GA"\n"sub-01","24.5"', 24.5),
         ("participant_id, GA \r\nsub-01 , 24+3\r\n", 24.43),
+        ("participant_id,ga,ga\nsub-01,22,28", Facts("ga", 22, 28, "row 2")),
         ("participant_id,ga\nsub-01,24,5", Facts("row 2", 3, 2)),
         ("name,ga\nsub-01,24", Facts("participants.csv", "participant_id")),
     ],
 )
 def test_tables_are_read_with_their_separators(tmp_path, text, age):
-    assert ages(
-        make_tree(tmp_path, labels=[LONE], text={"participants.csv": text})
-    ) == {"sub-01": age}
+    make_tree(tmp_path, surfaces=[LONE], text={"participants.csv": text})
+    assert ages(tmp_path) == {"sub-01": age}
 
 
 def test_tables_whose_content_is_not_here_are_not_passed_over(tmp_path):
-    make_tree(
-        tmp_path,
-        labels=[FIRST],
-        tables={TABLE: ["participant_id ga", "sub-01 22"]},
-        lost=[SESSIONS],
-    )
+    tree(tmp_path, [FIRST], {TABLE: "participant_id ga | sub-01 22"})
+    make_tree(tmp_path, lost=[SESSIONS])
     assert ages(tmp_path) == {"sub-01_ses-1": Facts(tmp_path / SESSIONS)}
 
 
 @pytest.mark.parametrize("place", ["table", "names"])
 def test_decimals_that_may_be_days_are_asked_for_once(tmp_path, place):
     texts = ("24.3", "25.1", "26.6")
-    names = [
-        f"sub-0{number}" if place == "table" else f"week{text}"
-        for number, text in enumerate(texts)
-    ]
-    rows = [f"{name} {text}" for name, text in zip(names, texts, strict=True)]
-    tables = {TABLE: ["participant_id ga", *rows]} if place == "table" else {}
-    make_tree(tmp_path, labels=[f"{name}_dseg.nii.gz" for name in names], tables=tables)
+    if place == "table":
+        names = ["sub-00", "sub-01", "sub-02"]
+        rows = [f"{name} {text}" for name, text in zip(names, texts, strict=True)]
+        make_tree(tmp_path, tables={TABLE: ["participant_id ga", *rows]})
+    else:
+        names = [f"week{text}" for text in texts]
+    make_tree(tmp_path, surfaces=[f"{name}_hemi-L_pial.surf.gii" for name in names])
     with pytest.raises(
         InputError, check=Facts("24.3", "--decimal-weeks", "--weeks-days")
     ):
         ages(tmp_path)
     assert list(ages(tmp_path, notation="decimal").values()) == [24.3, 25.1, 26.6]
     assert list(ages(tmp_path, notation="days").values()) == [24.43, 25.14, 26.86]
-    if place == "table":
-        (tmp_path / TABLE).write_text(
-            "participant_id\tga\nsub-00\t24.5\nsub-01\t25.0\nsub-02\t26.5\n"
-        )
-        assert list(ages(tmp_path).values()) == [24.5, 25.0, 26.5]
 
 
-def test_the_age_at_birth_is_said_beside_that_of_the_scan(tmp_path):
-    make_tree(
-        tmp_path,
-        labels=[LONE],
-        tables={TABLE: ["participant_id ga scan_age", "sub-01 33.1 29.4"]},
-    )
-    (brain,) = recognise(tmp_path).brains
-    assert brain.age_source == Facts(TABLE, "scan_age", "ga", 33.1, "birth")
+@pytest.mark.parametrize("texts", [("24.5", "25.0", "26.5"), ("24.3", "25.1", "26.9")])
+def test_halves_and_tenths_above_6_are_decimals(tmp_path, texts):
+    names = [f"week{text}_hemi-L_pial.surf.gii" for text in texts]
+    make_tree(tmp_path, surfaces=names)
+    assert list(ages(tmp_path).values()) == [float(text) for text in texts]
 
 
 def test_a_participant_that_is_not_there_is_refused(tmp_path):
-    make_tree(tmp_path, labels=[LONE])
+    make_tree(tmp_path, surfaces=[LONE])
     with pytest.raises(InputError, check=Facts("sub-1", "sub-01")):
         recognise(tmp_path, participants=["1"])
