@@ -673,9 +673,9 @@ def _facts(
     is_only_scan = subject is None or len(sessions_of[subject]) < 2
     session = _label(file, "ses")
     facts = tables.facts(owners[0], session, is_only_scan, folder / file)
-    if facts is None:
-        return ScanAge(None, cause=_similar_ids(owners[0], tables, or_first=True))
-    return facts
+    if facts is None and subject is not None:
+        return ScanAge(None, cause=_similar_ids(subject, tables, or_first=True))
+    return facts or ScanAge(None)
 
 
 def _age(facts: ScanAge, named: ScanAge) -> ScanAge:

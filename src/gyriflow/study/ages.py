@@ -60,6 +60,8 @@ AGE_WORDS = frozenset(
     )
 )
 """Words in names of columns that may be of another age."""
+SCAN_WORDS = re.compile(r"scan|mri?(_|$)|imaging|acq|session|visit|exam|menstrual|pma")
+"""Further words in those that may be of the age at the scan."""
 NOT_AT_SCAN = re.compile(
     r"mother|maternal|father|paternal|parent|at_birth|at_delivery|^birth|^delivery"
 )
@@ -152,9 +154,12 @@ def age_column(name: str, facts: Any, sidecar_name: str) -> AgeColumn | None:
         return AgeColumn(name, "scan", unit, problem)
     if base in GESTATIONAL:
         return AgeColumn(name, "gestational", unit, problem)
-    if AGE_WORDS & set(key.split("_")) and not NOT_AT_SCAN.search(key):
-        return AgeColumn(name, "other", unit, problem)
-    return None
+    if not AGE_WORDS & set(key.split("_")) or NOT_AT_SCAN.search(key):
+        return None
+    if SCAN_WORDS.search(key):
+        problem = "its name is not one for the age at the scan; expected scan_age"
+        return AgeColumn(name, "scan", unit, problem)
+    return AgeColumn(name, "other", unit, problem)
 
 
 def _unit(key: str, facts: Any, sidecar_name: str) -> tuple[str, str]:

@@ -311,11 +311,11 @@ class ScanTables:
         if age is None and sessions and session not in sessions:
             cause = f"no row of its session; found {found}; expected {session}"
             age = ScanAge(None, cause=cause)
-        shared = [cell for cell in shared if not cell.is_missing]
         if age is None and shared:
+            cells = [cell for cell in shared if not cell.is_missing]
             cause = (
-                f"one age is given for several sessions; found {shared[0]}; expected a"
-                f" row with session_id {session}"
+                f"one age is given for several sessions; found {(cells or shared)[0]};"
+                f" expected a row with session_id {session}"
             )
             age = ScanAge(None, cause=cause)
         used = {cell.column.name for cell in ages if cell.column.kind == self.kind}
@@ -343,9 +343,9 @@ class ScanTables:
                 " expected it in a column named scan_age"
             )
             return ScanAge(None, cause=cause)
-        if not used:
+        if not ages:
             return None
-        age_of_scan = read_ages(present or used[:1], self.notation)
+        age_of_scan = read_ages(present or used[:1] or ages[:1], self.notation)
         if age_of_scan.week is None or not others:
             return age_of_scan
         ignored = ", ".join(f"{age.column.name} {age.text}" for age in others)

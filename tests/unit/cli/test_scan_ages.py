@@ -105,7 +105,7 @@ def test_a_column_that_is_described_as_another_age_is_refused(
         ("postnatal_age_weeks", "24", ["postnatal_age_weeks 24"]),
         # beside one that may be at birth
         ("ga age", "33.1 29.4", ["ga 33.1", "age 29.4"]),
-        ("ga age_at_fetal_mri", "33.1 29.4", ["ga 33.1", "age_at_fetal_mri 29.4"]),
+        ("ga age_at_fetal_mri", "33.1 29.4", ["age_at_fetal_mri", "scan_age"]),
         ("ga pna", "33.1 4", ["ga 33.1", "pna 4"]),
         ("ga age_since_birth", "33.1 4", ["ga 33.1", "age_since_birth 4"]),
         ("week age_reference", "24 DOB", ["week 24", "age_reference DOB"]),
@@ -113,6 +113,7 @@ def test_a_column_that_is_described_as_another_age_is_refused(
         # two that differ
         ("ga week", "22 28", ["ga 22", "week 28"]),
         ("scan_age pma", "22 28", ["scan_age 22", "pma 28"]),
+        ("pma weeks_at_scan", "22 28", ["weeks_at_scan", "scan_age"]),
         # days of a week in a column of their own
         ("ga days", "24 3", ["days", "3 in days"]),
     ],
@@ -267,6 +268,22 @@ def test_an_age_of_the_mother_or_at_birth_is_not_one_of_the_scan(tmp_path):
             ["sub-01_GA-26.lh.pial"],
             {TABLE: "participant_id ga | sub-01 28"},
             {"sub-01": Facts(28, "26", TABLE)},
+        ),
+        (
+            ["sub-01_ses-1_GA24.lh.pial", "sub-01_ses-2_GA26.lh.pial"],
+            {TABLE: "participant_id ga | sub-01 n/a"},
+            dict.fromkeys(TWO, Facts("ga", "n/a", f"{TABLE} row 2")),
+        ),
+        (
+            ["sub-01_GA-26.lh.pial"],
+            {TABLE: "participant_id age | sub-01 n/a"},
+            {"sub-01": Facts("age", "n/a", f"{TABLE} row 2")},
+        ),
+        # a table of another data set is not of this file
+        (
+            ["a/case7_week24.lh.pial"],
+            {"b/participants.tsv": "participant_id ga | case7 28"},
+            {"case7_week24": 24.0},
         ),
         (
             ["sub-01_GA-26.lh.pial", "sub-02/lh.pial"],
