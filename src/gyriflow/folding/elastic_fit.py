@@ -42,6 +42,7 @@ from ..geometry.triangles import (
     Ints,
     Mask,
     TriangleMesh,
+    rms_length,
     signed_volume,
     vertex_areas,
 )
@@ -277,7 +278,7 @@ class ElasticFit:
             problem = FOLDS_OVER
             log.warning("the body does not follow a shape: %s", FOLDS_OVER)
             del self._passed[n_passed:]
-        misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
+        misfit_mm = rms_length((goal - self.positions_mm)[self._used])
         if misfit_mm > MAX_LEFT_MM:
             found = f"{misfit_mm:.1f} mm from it (root mean square)"
             raise SolverError(
@@ -331,11 +332,13 @@ class ElasticFit:
         )
         if not len(faults):
             start = self.positions_mm
-            self.positions_mm = self._opened_after(start, untangled)
+            opened = self._opened_after(start, untangled)
+            self.positions_mm = opened
             # linear pieces of valid elements may be inverted
             if self._make_valid(start):
-                # straightened sides may have brought faults onto the way
-                faults = self._faults_between(start, self.positions_mm)
+                if self.positions_mm is not opened:
+                    # straightened sides may have brought faults onto the way
+                    faults = self._faults_between(start, self.positions_mm)
                 self._moved_straight = not len(faults)
                 return self._move(np.linalg.inv(motion))
             log.info("curved elements fold over at a shape: the body follows it")

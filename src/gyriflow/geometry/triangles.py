@@ -158,6 +158,11 @@ def edge_lengths(vertices: Floats, pairs: Indices) -> Floats:
     return np.linalg.norm(vertices[second] - vertices[first], axis=1)
 
 
+def rms_length(vectors: Floats) -> float:
+    """Return the root mean square length of (n, 3) vectors."""
+    return float(np.sqrt(3 * np.mean(vectors**2)))
+
+
 def mean_length(vertices: Floats, pairs: Indices) -> float:
     """Return the mean length of edges given as (e, 2) vertex indices, in the vertices'
     unit."""

@@ -1,7 +1,6 @@
 """Predict a brain's later shapes: carry its mesh along an atlas' path and keep its
 individual differences."""
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -28,18 +27,15 @@ from .atlas_path import (
     resample_by_size,
 )
 from .series_shapes import (
-    MAX_MISFIT_MM,
     FittedBody,
     SeriesShapes,
     WeekShape,
     fit_body,
     fit_onto_surface,
-    rms_mm,
     tissue_below,
+    warn_of_distance,
     with_stops,
 )
-
-log = logging.getLogger(__name__)
 
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do
@@ -204,14 +200,7 @@ def predict_shapes(
     _, used = boundary_surface(mesh)
     for week, shape in zip(later, expected[1:], strict=True):
         places = body.move_to(shape)
-        left_mm = rms_mm((places - shape)[used])
-        if left_mm > MAX_MISFIT_MM:
-            log.warning(
-                "at GW %g the brain stays %.2f mm (root mean square) from its expected"
-                " shape, which inverts elements or moves folds through each other",
-                week,
-                left_mm,
-            )
+        warn_of_distance(f"at GW {week:g} the brain", (places - shape)[used])
         shapes += with_stops(shapes[-1], week, body)
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)

@@ -25,6 +25,7 @@ from ..geometry.triangles import (
     Mask,
     TriangleMesh,
     area_cm2,
+    rms_length,
     vertex_areas,
     vertex_normals,
     volume_ml,
@@ -216,29 +217,31 @@ def fit_body(
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
-        left_mm = rms_mm(body.boundary.vertices - shape[used])
-        if left_mm > MAX_MISFIT_MM:
-            log.warning(
-                "a body stays %.2f mm (root mean square) from a shape that it cannot"
-                " reach",
-                left_mm,
-            )
+        warn_of_distance("a body", body.boundary.vertices - shape[used])
         return
     surface, inner = target
     gap_mm = np.inf
     for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
         last_mm = gap_mm
-        gap_mm = rms_mm(goals - body.boundary.vertices)
+        gap_mm = rms_length(goals - body.boundary.vertices)
         if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
 
 
-def rms_mm(misfit: Floats) -> float:
-    """Return the root mean square length of (n, 3) vectors in mm."""
-    return float(np.sqrt(3 * np.mean(misfit**2)))
+def warn_of_distance(body: str, misfit: Floats) -> None:
+    """Log a warning that names a body if its vertices are far from those of the shape
+    that it is fitted to, by (n, 3) vectors in mm."""
+    left_mm = rms_length(misfit)
+    if left_mm > MAX_MISFIT_MM:
+        log.warning(
+            "%s stays %.2f mm (root mean square) from its shape, which inverts elements"
+            " or moves folds through each other",
+            body,
+            left_mm,
+        )
 
 
 def follow_series(
