@@ -10,7 +10,7 @@ trap 'rm -rf --one-file-system "$work"' EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-packages=python3-dev,python3-venv,ca-certificates,procps,$(sed 's/#.*//' "$here/envs/debian.txt" | xargs | tr ' ' ,)
+packages=python3-dev,python3-venv,procps,$(sed 's/#.*//' "$here/envs/debian.txt" | xargs | tr ' ' ,)
 mirror=$(apt-get indextargets --format '$(REPO_URI) $(LABEL)' 'Created-By: Packages' | awk '$2 == "Debian" {print $1; exit}')
 mmdebstrap --quiet --variant=minbase --include="$packages" trixie "$work/tree" \
     "deb ${mirror:-http://deb.debian.org/debian} trixie main"

@@ -135,8 +135,8 @@ def check_study(
     refusals += [(owner, f"  {owner}: {text}") for owner, text, _ in further]
     yield from grouped(refusals)
     yield from ((f"  {line}", False) for line in facts)
-    yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
-    yield from ((f"  warning: {line}", False) for line in deep_curved_folds(study))
+    for line in (*coarse_cortices(study), *deep_curved_folds(study)):
+        yield f"  warning: {line}", False
     yield from (
         (f"  warning: no export: {line}", False) for line in export_problems(study)
     )

@@ -190,7 +190,7 @@ def write_prediction(
     )
     section = settings.model_dump(exclude_defaults=True) | series
     more = read_keys(TEMPLATES / ("quick.yaml" if quick else "predict.yaml"))
-    folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
+    folding = {"preset": "expected", "end_week": weeks[1]} | more.get("folding", {})
     config = {
         "brains": [entry],
         "atlas": section,
