@@ -84,6 +84,9 @@ UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the
 first two where the shape is that of an observed brain), and the distance from these, as
 a multiple of them."""
+MAX_CHANGE_MM = 0.25
+"""Largest change of a shape by smoothing around faults, as a root mean square on the
+boundary: shapes that would change more are followed."""
 HOLDING_MM = (1.0, 1.0, 2.0, 2.0, 4.0, 4.0, 8.0, 16.0, 32.0)
 """Lengths around curved elements that fold over at which the body is held, round by
 round, with the same reach: others may fold over in its turn."""
@@ -323,14 +326,15 @@ class ElasticFit:
         3) positions in mm.
 
         Where elements would be inverted or faces cross on the straight way, the
-        displacement is smoothed around them, over lengths that increase; the body
-        follows the shape, and is drawn to it, if faults remain.
+        displacement is smoothed around them, over lengths that increase. The body
+        follows the shape, and is drawn to it, if faults remain or this changes the
+        shape too much.
         """
         motion = self._fit(shape, self.positions_mm)
-        untangled, faults = self._untangled(
-            self.positions_mm, transform_points(shape, motion), UNTANGLING_MM
-        )
-        if not len(faults):
+        goal = transform_points(shape, motion)
+        untangled, faults = self._untangled(self.positions_mm, goal, UNTANGLING_MM)
+        changed_mm = rms_length((untangled - goal)[self._used])
+        if not len(faults) and changed_mm <= MAX_CHANGE_MM:
             start = self.positions_mm
             opened = self._opened_after(start, untangled)
             self.positions_mm = opened
@@ -343,8 +347,8 @@ class ElasticFit:
                 return self._move(np.linalg.inv(motion))
             log.info("curved elements fold over at a shape: the body follows it")
         else:
-            text = "%d faults remain on the way to a shape: the body follows it"
-            log.info(text, len(faults))
+            text = "the straight way has %d faults and ends %.2f mm away from the shape"
+            log.info(text + ": the body follows it", len(faults), changed_mm)
         self.follow(shape)
         return self.draw(shape[self._used])
 

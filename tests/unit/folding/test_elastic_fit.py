@@ -20,7 +20,7 @@ from gyriflow.geometry.tetrahedra import (
     linear_pieces,
     volumes_between,
 )
-from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.geometry.triangles import TriangleMesh, rms_length
 
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
 PIECES = linear_pieces(BODY)
@@ -224,6 +224,19 @@ def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypa
     body.positions_mm, body._moved_straight = BODY.vertices, False
     assert body.way_from(BODY.vertices) == []
     assert ratios(body.positions_mm).min() == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_shape_that_would_change_much_around_faults_is_followed():
+    shape = waves(1.0, 12.0)
+    assert (ratios(shape) < 0).any()
+    body = ElasticFit(BODY)
+    # smoothing removes all faults, and changes the shape by 0.4 mm
+    untangled, faults = body._untangled(BODY.vertices, shape, (1.0, 2.0, 4.0, 8.0))
+    assert len(faults) == 0
+    assert rms_length((untangled - shape)[USED]) == pytest.approx(0.42, abs=0.02)
+    found = body.move_to(shape)
+    assert rms_length((found - shape)[USED]) < 0.2
+    assert ratios(found).min() > 0.1
 
 
 def test_springs_around_flat_elements_hardly_draw(monkeypatch):
