@@ -54,7 +54,13 @@ from .domain import Domain
 from .linear_solver import NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, residual_floor
 from .problem import NonlinearProblem
-from .stretches import deformation_gradients, log_stretch, packed, unpacked
+from .stretches import (
+    deformation_gradients,
+    from_principal,
+    log_stretch,
+    packed,
+    unpacked,
+)
 from .tissue import Elements
 from .zones import Zones
 
@@ -148,9 +154,11 @@ class Springs:
     def draw_to(self, goals_mm: Floats, areas_mm2: Floats, lengths_mm: Floats) -> None:
         """Set the (b, 3) goals in mm, for a step from the present positions, and (b,)
         areas and lengths of springs."""
-        weights = MODULUS_PA / (lengths_mm * M_PER_MM) * areas_mm2 * M_PER_MM**2
+        stiffness = MODULUS_PA / (lengths_mm * M_PER_MM)
+        weights = stiffness * areas_mm2 * M_PER_MM**2
         self._weights = weights[self._rows, None]
-        gaps = self._domain.positions[self._vertices] - goals_mm * M_PER_MM
+        positions = self._domain.positions[self._vertices]
+        gaps = positions - goals_mm * M_PER_MM
         self._gaps = gaps[self._rows]
 
     def energy(self, u: Floats) -> float:
@@ -165,10 +173,15 @@ class Springs:
         diagonal = np.zeros((domain.n_owned, 3))
         diagonal[self._local] = self._weights
         rows = np.arange(diagonal.size + 1, dtype=PETSc.IntType)
-        columns = rows[:-1] + 3 * domain.space.dofmap.index_map.local_range[0]
-        size = diagonal.size, 3 * len(domain.positions)
-        csr = rows, columns.astype(PETSc.IntType), diagonal.ravel()
-        return PETSc.Mat().createAIJ((size, size), bsize=3, csr=csr, comm=domain.comm)
+        first_node, _ = domain.space.dofmap.index_map.local_range
+        columns = (rows[:-1] + 3 * first_node).astype(PETSc.IntType)
+        size = (diagonal.size, 3 * len(domain.positions))
+        return PETSc.Mat().createAIJ(
+            (size, size),
+            bsize=3,
+            csr=(rows, columns, diagonal.ravel()),
+            comm=domain.comm,
+        )
 
     def max_step(self, u: Floats, direction: Floats) -> float:
         return 1.0
@@ -642,8 +655,7 @@ def exponential(logs: Floats, limit: float) -> Floats:
     """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the
     limit count as this."""
     values, axes = np.linalg.eigh(logs)
-    values = np.exp(np.clip(values, -limit, limit))
-    return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
+    return from_principal(np.exp(np.clip(values, -limit, limit)), axes)
 
 
 def inverse_exponential(logs: Floats) -> Floats:

@@ -137,12 +137,16 @@ def growth_components(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
     The main direction is the tangential one of largest growth; the length of its vector
     is the difference to the growth across it.
     """
-    tensors, radial = unpacked(log_growth), normals[:, :, None] * normals[:, None, :]
+    tensors = unpacked(log_growth)
+    radial = normals[:, :, None] * normals[:, None, :]
     tangential = np.eye(3) - radial
     # the first eigenvector is the normal, with −1
     values, axes = np.linalg.eigh(tangential @ tensors @ tangential - radial)
+    least = values[:, 1]
+    largest = values[:, 2]
+    direction = axes[:, :, 2] * (largest - least)[:, None]
     return {
         "tangential_growth_per_step": values[:, 1:].mean(axis=1),
         "radial_growth_per_step": (tensors * radial).sum(axis=(1, 2)),
-        "growth_direction_per_step": axes[:, :, 2] * (values[:, 2:] - values[:, 1:2]),
+        "growth_direction_per_step": direction,
     }

@@ -311,14 +311,18 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
     `distance` (k,) is from the local nodes to the pial surface, in m like the
     thickness.
     """
-    inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
+    depth = distance[domain.corners].mean(axis=1)
+    inside = domain.corners[depth <= thickness]
     nodes = domain.local(domain.positions)
-    lengths = sum(
-        float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum())
-        for i, j in EDGES
-    )
-    total, count = domain.comm.allreduce(np.array([lengths, len(EDGES) * len(inside)]))
-    return float(thickness * count / total) if count else math.nan
+    own_total = 0.0
+    for i, j in EDGES:
+        edges = nodes[inside[:, i]] - nodes[inside[:, j]]
+        own_total += np.linalg.norm(edges, axis=1).sum()
+    own_count = len(EDGES) * len(inside)
+    total, count = domain.comm.allreduce(np.array([own_total, own_count]))
+    if not count:
+        return math.nan
+    return float(thickness * count / total)
 
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:

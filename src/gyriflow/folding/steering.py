@@ -143,9 +143,9 @@ def free_growth(
 
     def volume_rate(tangential: float, radial: float | Floats, core: float) -> float:
         dg, dr = increments(weight, zones.growth, tangential, radial, core, 1.0)
-        return float(
-            (2 * dg + dr)[inputs.pieces].mean(axis=1) @ volumes / volumes.sum()
-        )
+        rates = 2 * dg + dr
+        rates_of_pieces = rates[inputs.pieces].mean(axis=1)
+        return float(rates_of_pieces @ volumes / volumes.sum())
 
     faces = zones.measured_facets
     areas = np.linalg.norm(area_vectors(TriangleMesh(positions_mm, faces)), axis=1)
@@ -191,8 +191,9 @@ def blended(curve: Any, at_start: float, start_week: float, week: float) -> floa
     The logarithm is linear between the weeks; the difference at the start decreases
     linearly to 0 in `JOINING_GW`.
     """
-    difference = max(0.0, 1.0 - (week - start_week) / JOINING_GW)
-    value, first = np.interp(
-        [week, start_week], list(curve), np.log(list(curve.values()))
-    )
-    return float(np.exp(value + difference * (np.log(at_start) - first)))
+    weeks = list(curve)
+    logs = np.log(list(curve.values()))
+    value = np.interp(week, weeks, logs)
+    difference = np.log(at_start) - np.interp(start_week, weeks, logs)
+    part_left = max(0.0, 1.0 - (week - start_week) / JOINING_GW)
+    return float(np.exp(value + part_left * difference))

@@ -58,9 +58,16 @@ def inverse_stretch(
     """
     squares, axes = np.linalg.eigh(F.swapaxes(-1, -2) @ F)
     logs = 0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH))
-    scale = np.exp(-np.asarray(power)[..., None] * np.clip(logs, -limit, limit))
-    inverse = (axes * scale[..., None, :]) @ axes.swapaxes(-1, -2)
-    return np.asarray(inverse), np.abs(logs).max(axis=-1) > limit
+    is_limited = np.abs(logs).max(axis=-1) > limit
+    limited = np.clip(logs, -limit, limit)
+    powers = np.asarray(power)[..., None]
+    return from_principal(np.exp(-powers * limited), axes), is_limited
+
+
+def from_principal(values: Floats, axes: Floats) -> Floats:
+    """Return the symmetric (..., 3, 3) matrices with eigenvalues (..., 3) and
+    eigenvectors (..., 3, 3) in columns."""
+    return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
 def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floats:
@@ -70,11 +77,10 @@ def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floa
     Principal values beyond the `limit` count as this.
     """
     turned = F.swapaxes(-1, -2)
-    squares, axes = np.linalg.eigh(F @ turned if left else turned @ F)
-    logs = np.clip(
-        0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH)), -limit, limit
-    )
-    return np.asarray((axes * logs[..., None, :]) @ axes.swapaxes(-1, -2))
+    squared = F @ turned if left else turned @ F
+    squares, axes = np.linalg.eigh(squared)
+    logs = 0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH))
+    return from_principal(np.clip(logs, -limit, limit), axes)
 
 
 def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:

@@ -112,15 +112,17 @@ class Tissue:
 
         A linear element has one normal, that of the pial vertex nearest to its centre.
         """
-        cells, points = self.elements.cells, self.elements.points
+        cells = self.elements.cells
+        points = self.elements.points
         if points.order == 1:
             mask = np.asarray(needed[cells].any(axis=1))
-            normals = self.pial.normals_from(
-                self.nodes[cells[mask]].mean(axis=1), self.nearest[cells[mask]]
-            )
+            nodes = cells[mask]
+            centres = self.nodes[nodes].mean(axis=1)
+            normals = self.pial.normals_from(centres, self.nearest[nodes])
             return mask, np.repeat(normals[:, None], len(points.weights), axis=1)
         mask = np.asarray(needed.any(axis=1))
-        return mask, interpolated_normals(self.nearest[cells[mask]], points)
+        nodes = cells[mask]
+        return mask, interpolated_normals(self.nearest[nodes], points)
 
 
 def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
@@ -131,8 +133,9 @@ def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
     ones: all are turned to the side of the first before they are interpolated. If the
     result nearly vanishes, the nearest node's normal is taken.
     """
-    is_opposite = np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0
-    turned = normals * np.where(is_opposite, -1.0, 1.0)[:, :, None]
+    cosines = np.einsum("cki,ci->ck", normals, normals[:, 0])
+    signs = np.where(cosines < 0, -1.0, 1.0)
+    turned = normals * signs[:, :, None]
     mean = np.matmul(points.interpolation, turned)
     length = np.linalg.norm(mean, axis=2, keepdims=True)
     nearest = turned[:, points.piecewise_linear.argmax(axis=1)]

@@ -383,8 +383,11 @@ def _read_with_trimesh(path: Path) -> RawSurface:
     import trimesh
 
     # process=True joins equal vertices: STL stores each corner of each face
-    body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
-    return np.asarray(body.vertices, dtype=float), np.asarray(body.faces), None, None
+    is_stl = path.suffix.lower() == ".stl"
+    body = trimesh.load_mesh(path, process=is_stl)
+    vertices = np.asarray(body.vertices, dtype=float)
+    faces = np.asarray(body.faces)
+    return vertices, faces, None, None
 
 
 MNI_OBJ = re.compile(rb"\s*P\s+[\d.]")

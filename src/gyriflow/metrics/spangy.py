@@ -268,9 +268,11 @@ class _Profile:
         longer than 2^end."""
         edges = self.longest - np.arange(len(self.powers) + 1) / PARTS
         sums = np.append(0.0, np.cumsum(self.powers))
-        return np.interp(octaves, edges[::-1], sums[::-1]) / np.interp(
-            end, edges[::-1], sums[::-1]
-        )
+        ascending = edges[::-1]
+        sums_to_edges = sums[::-1]
+        power = np.interp(octaves, ascending, sums_to_edges)
+        whole = np.interp(end, ascending, sums_to_edges)
+        return power / whole
 
 
 def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:

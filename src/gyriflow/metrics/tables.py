@@ -26,9 +26,13 @@ def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     Columns subject, run, week, hemisphere, region ("" for whole hemispheres), metric,
     value, unit.
     """
-    both = pd.concat([table.assign(region=table.get("region", "")) for table in tables])
+    with_region = []
+    for table in tables:
+        region = table.get("region", "")
+        with_region.append(table.assign(region=region))
+    rows = pd.concat(with_region, ignore_index=True)
     columns = [*BRAIN, "hemisphere", "region", "metric", "value", "unit"]
-    return both[columns].reset_index(drop=True)
+    return rows[columns]
 
 
 def wide_names(table: pd.DataFrame) -> list[str]:
