@@ -55,6 +55,15 @@ BY_CORNERS, BY_FACES = (
         lambda offset: np.abs(offset).sum(),
     )
 )
+ENDS = (slice(None, -1), slice(1, None))
+"""Along an axis: all voxels that are the first of two neighbours, and the second."""
+SQUARE = (
+    (ENDS[0], ENDS[0]),
+    (ENDS[1], ENDS[0]),
+    (ENDS[1], ENDS[1]),
+    (ENDS[0], ENDS[1]),
+)
+"""The corners of a square of 2 × 2 voxels, one after the other around it."""
 # bytes 0 and 1 as the digits of a binary number
 DIGITS = bytes.maketrans(b"\0\1", b"01")
 # radii in voxels of the openings and closings that find bridges and tunnels
@@ -274,27 +283,25 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     for first, second in ((0, 1), (0, 2), (1, 2)):
         inside = np.moveaxis(mask, (first, second), (0, 1))
         flags = np.moveaxis(ambiguous, (first, second), (0, 1))
-        a = inside[:-1, :-1]
-        b = inside[1:, :-1]
-        c = inside[1:, 1:]
-        d = inside[:-1, 1:]
+        # around each square in turn
+        a, b, c, d = (inside[place] for place in SQUARE)
         alternating = (a == c) & (b == d) & (a != b)
-        flags[:-1, :-1] |= alternating
-        flags[1:, :-1] |= alternating
-        flags[1:, 1:] |= alternating
-        flags[:-1, 1:] |= alternating
-    # by the corner of a cube of 2 × 2 × 2 voxels: all voxels that are this corner
-    ends = (slice(None, -1), slice(1, None))
-    corners = list(product(ends, repeat=3))
+        for place in SQUARE:
+            flags[place] |= alternating
+    corners = list(product(ENDS, repeat=3))
     count = np.zeros(mask[corners[0]].shape, dtype=np.int8)
     for corner in corners:
         count += mask[corner]
     for corner, opposite in zip(corners[:4], reversed(corners[4:]), strict=True):
-        only_inside = mask[corner] & mask[opposite] & (count == 2)
-        only_outside = ~mask[corner] & ~mask[opposite] & (count == 6)
-        for place in corners:
-            ambiguous[place] |= only_inside | only_outside
-    separated = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
+        one = mask[corner]
+        other = mask[opposite]
+        only_inside = one & other & (count == 2)
+        only_outside = ~one & ~other & (count == 6)
+        both_differ = only_inside | only_outside
+        for cube_corner in corners:
+            ambiguous[cube_corner] |= both_differ
+    limit = np.where(mask, 0.55, 0.05)
+    separated = np.minimum(field, limit)
     return np.where(ambiguous, separated, field).astype(np.float32)
 
 
@@ -393,10 +400,11 @@ def _euler_cells(mask: Mask) -> NDArray[np.int8]:
 
 def _pairs(mask: Mask, axis: int) -> Mask:
     """Return which voxels of a mask have a next one along an axis in it, too."""
-    voxels = np.moveaxis(mask, axis, -1)
+    voxels = np.moveaxis(mask, axis, 0)
+    is_first, is_second = ENDS
     both = np.zeros_like(voxels)
-    both[..., :-1] = voxels[..., :-1] & voxels[..., 1:]
-    return np.moveaxis(both, -1, axis)
+    both[is_first] = voxels[is_first] & voxels[is_second]
+    return np.moveaxis(both, 0, axis)
 
 
 def _euler_number(mask: Mask) -> int:

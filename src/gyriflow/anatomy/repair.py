@@ -618,14 +618,17 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
     margin_mm = voxel_mm * MARGIN_VOXELS
     lowest = mesh.vertices.min(axis=0) - margin_mm
     highest = mesh.vertices.max(axis=0) + margin_mm
-    labels, affine = surface_mask(mesh, voxel_mm, np.array([lowest, highest]))
+    box = np.array([lowest, highest])
+    labels, affine = surface_mask(mesh, voxel_mm, box)
     inside = labels > 0
     # beyond two voxels from the surface, the field is 0 or 1
     near = dilated(inside, 2.0) & dilated(~inside, 2.0)
     places = transform_points(np.argwhere(near), affine)
     distance, _, _ = nearest_on(places, mesh)
-    signed = np.where(inside, np.inf, -np.inf)
-    signed[near] = np.where(inside[near], distance, -distance)
-    share_inside = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0)
+    sign = np.where(inside, 1.0, -1.0)
+    depth_mm = sign * np.inf
+    depth_mm[near] = sign[near] * distance
+    slope = EDGE_SLOPE / voxel_mm
+    share_inside = np.clip(0.5 + slope * depth_mm, 0.0, 1.0)
     field, report = make_simple(share_inside.astype(np.float32))
     return isosurface(field, affine), report

@@ -74,8 +74,9 @@ def _pattern(points: Floats, seed: int) -> Floats:
     waves = random.normal(size=(WAVES, 3))
     shortest, longest = np.log(WAVELENGTHS_MM)
     lengths = np.exp(random.uniform(shortest, longest, WAVES))
-    wavenumbers = 2.0 * np.pi / lengths
-    waves *= (wavenumbers / np.linalg.norm(waves, axis=1))[:, None]
+    factors = 2.0 * np.pi / lengths / np.linalg.norm(waves, axis=1)
+    waves *= factors[:, None]
     phases = random.uniform(0.0, 2.0 * np.pi, WAVES)
-    heights = np.cos(points @ waves.T + phases)
-    return np.sqrt(2.0 / WAVES) * heights.sum(axis=1)
+    angles = points @ waves.T + phases
+    heights = np.cos(angles).sum(axis=1)
+    return np.sqrt(2.0 / WAVES) * heights

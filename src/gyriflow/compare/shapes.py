@@ -127,8 +127,10 @@ def cortex_dice(surface: TriangleMesh, observed: TriangleMesh) -> float:
 def _ribbon(mesh: TriangleMesh) -> Ints:
     """Return the voxels of the outermost `CORTEX_MM` as (k,) numbers, the same for all
     surfaces."""
-    corner = np.floor(mesh.vertices.min(axis=0) / VOXEL_MM)
-    box = np.stack([corner * VOXEL_MM, mesh.vertices.max(axis=0)])
+    lowest = mesh.vertices.min(axis=0)
+    highest = mesh.vertices.max(axis=0)
+    corner = np.floor(lowest / VOXEL_MM) * VOXEL_MM
+    box = np.stack([corner, highest])
     mask, affine = surface_mask(mesh, VOXEL_MM, box)
     # distances are to the centres of voxels outside, half a voxel beyond the surface
     depth = distance_transform_edt(mask, sampling=VOXEL_MM) - VOXEL_MM / 2

@@ -102,7 +102,8 @@ class PialSearch:
         return distance, normals
 
     def _within(self, to_vertex: Floats, reach: float) -> NDArray[np.bool_]:
-        corners = self.surface.vertices[self.surface.faces]
+        surface = self.surface
+        corners = surface.vertices[surface.faces]
         edges = np.diff(corners, axis=1)
         longest = np.linalg.norm(edges, axis=2).max()
         # a point of a triangle is at most edge/√3 from its nearest vertex

@@ -148,11 +148,14 @@ def inverse_blocks(blocks: Floats) -> Floats:
     """Return the inverses of (n, 3, 3) symmetric blocks, as `positive_inverses` if they
     are indefinite."""
     a, b, c = blocks.swapaxes(0, 1)
-    rows = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
-    cofactors = np.stack(rows, axis=1)
-    determinants = np.einsum("ni,ni->n", a, cofactors[:, 0])
+    of_a = np.cross(b, c)
+    of_b = np.cross(c, a)
+    of_c = np.cross(a, b)
+    cofactors = np.stack([of_a, of_b, of_c], axis=1)
+    determinants = np.einsum("ni,ni->n", a, of_a)
     # Sylvester's criterion
-    definite = (blocks[:, 0, 0] > 0) & (cofactors[:, 2, 2] > 0) & (determinants > 0)
+    leading_minors = [a[:, 0], of_c[:, 2], determinants]
+    definite = np.min(leading_minors, axis=0) > 0
     divisors = np.where(definite, determinants, 1.0)
     inverses = cofactors / divisors[:, None, None]
     inverses[~definite] = positive_inverses(blocks[~definite])

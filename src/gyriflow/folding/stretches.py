@@ -56,12 +56,19 @@ def inverse_stretch(
 
     Principal values of ln U beyond the `limit` count as this.
     """
-    squares, axes = np.linalg.eigh(F.swapaxes(-1, -2) @ F)
-    logs = 0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH))
+    logs, axes = _principal_logs(F.swapaxes(-1, -2) @ F)
     is_limited = np.abs(logs).max(axis=-1) > limit
     limited = np.clip(logs, -limit, limit)
     powers = np.asarray(power)[..., None]
-    return from_principal(np.exp(-powers * limited), axes), is_limited
+    inverses = np.exp(-powers * limited)
+    return from_principal(inverses, axes), is_limited
+
+
+def _principal_logs(squared: Floats) -> tuple[Floats, Floats]:
+    """Return the logarithms (..., 3) of the principal stretches, and their axes, from
+    FᵀF or F·Fᵀ."""
+    squares, axes = np.linalg.eigh(squared)
+    return 0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH)), axes
 
 
 def from_principal(values: Floats, axes: Floats) -> Floats:
@@ -78,9 +85,9 @@ def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floa
     """
     turned = F.swapaxes(-1, -2)
     squared = F @ turned if left else turned @ F
-    squares, axes = np.linalg.eigh(squared)
-    logs = 0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH))
-    return from_principal(np.clip(logs, -limit, limit), axes)
+    logs, axes = _principal_logs(squared)
+    limited = np.clip(logs, -limit, limit)
+    return from_principal(limited, axes)
 
 
 def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:

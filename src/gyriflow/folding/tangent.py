@@ -138,11 +138,13 @@ class ElasticMatrix:
         """Return the owned rows of a matrix that adds up to this one with its
         transpose."""
         stored = self._stored
-        n_ends = len(self.row_ends)
-        ends = np.searchsorted(self.nodes[stored], np.arange(n_ends))
+        n_rows = len(self.row_ends) - 1
+        rows = self.nodes[stored]
+        columns = self.columns[stored]
+        ends = np.searchsorted(rows, np.arange(n_rows + 1))
         blocks = self.values[stored] * self._half_weights[:, None, None]
-        shape = (3 * (n_ends - 1), 3 * len(self.fixed))
-        return sparse.bsr_matrix((blocks, self.columns[stored], ends), shape=shape)
+        shape = (3 * n_rows, 3 * len(self.fixed))
+        return sparse.bsr_matrix((blocks, columns, ends), shape=shape)
 
     @property
     def values(self) -> Floats:

@@ -138,5 +138,8 @@ def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
     turned = normals * signs[:, :, None]
     mean = np.matmul(points.interpolation, turned)
     length = np.linalg.norm(mean, axis=2, keepdims=True)
-    nearest = turned[:, points.piecewise_linear.argmax(axis=1)]
-    return np.where(length > 0.1, mean / np.maximum(length, 0.1), nearest)
+    nearest_node = points.piecewise_linear.argmax(axis=1)
+    nearest = turned[:, nearest_node]
+    has_length = length > 0.1
+    unit_mean = mean / np.maximum(length, 0.1)
+    return np.where(has_length, unit_mean, nearest)

@@ -169,9 +169,12 @@ def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:
     x, y, z."""
     neighbours = range(1, min(NEIGHBOURS, len(vertices)) + 1)
     gaps, candidates = cKDTree(vertices).query(points, k=neighbours)
-    rank = np.empty(len(vertices), dtype=np.int64)
-    rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
-    is_nearest = gaps <= gaps[:, :1] * (1 + TIE)
+    x, y, z = vertices.T
+    order = np.lexsort((z, y, x))
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(vertices))
+    least = gaps[:, :1]
+    is_nearest = gaps <= least * (1 + TIE)
     ranks = np.where(is_nearest, rank[candidates], len(vertices))
     first = ranks.argmin(axis=1)
     return candidates[np.arange(len(points)), first]

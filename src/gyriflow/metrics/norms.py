@@ -201,10 +201,11 @@ class CohortNorms:
         if ("whole", "volume") not in self.norms:
             return np.full(len(weeks), np.nan)
         _, norm = self.norms["whole", "volume"]
-        at = np.asarray(weeks, dtype=float)
-        is_inside = (at >= norm.first) & (at <= norm.last)
-        medians = norm.values(at.clip(norm.first, norm.last), 0.0)
-        return np.where(is_inside, medians, np.nan)
+        wanted = np.asarray(weeks, dtype=float)
+        known = wanted.clip(norm.first, norm.last)
+        medians = norm.values(known, 0.0)
+        medians[known != wanted] = np.nan
+        return medians
 
     @property
     def plain(self) -> dict[str, Any]:

@@ -149,13 +149,19 @@ def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, A
     same colour in all figures.
     """
     present = list(present)
-    names = [name for name in dict.fromkeys([*runs, *present]) if name != MEASURED]
-    colours: Sequence[Any] = RUN_COLOURS
-    if len(names) > len(RUN_COLOURS):
-        scale = mpl.colormaps["viridis"]
-        colours = [scale(0.92 * i / (len(names) - 1)) for i in range(len(names))]
-    by_name = dict(zip(names, colours, strict=False))
-    return {name: by_name[name] for name in names if name in present}
+    names = list(dict.fromkeys([*runs, *present]))
+    if MEASURED in names:
+        names.remove(MEASURED)
+    colours: dict[str, Any] = {}
+    for i, name in enumerate(names):
+        if name not in present:
+            continue
+        if len(names) <= len(RUN_COLOURS):
+            colours[name] = RUN_COLOURS[i]
+        else:
+            place = 0.92 * i / (len(names) - 1)
+            colours[name] = mpl.colormaps["viridis"](place)
+    return colours
 
 
 def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
