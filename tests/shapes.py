@@ -243,10 +243,10 @@ def box_mesh(
 
 
 def ellipsoid_mesh(
-    cells: int, semi_axes: tuple[float, float, float]
+    cells: int, semi_axes: tuple[float, float, float], centre=(0.0, 0.0, 0.0)
 ) -> TetrahedralMesh:
-    """Return an ellipsoid around the origin, in mm: a cube's grid with its shells drawn
-    out to ellipsoids."""
+    """Return an ellipsoid in mm: a cube's grid with its shells drawn out to
+    ellipsoids."""
     cube = box_mesh((cells,) * 3, (2.0, 2.0, 2.0))
     x = cube.vertices
     shell = np.abs(x).max(axis=1, keepdims=True)
@@ -254,7 +254,8 @@ def ellipsoid_mesh(
     # halfway between cube and ball inside, the ball itself at the surface
     round_ = np.where(length > 0, x / np.where(length > 0, length, 1) * shell, 0.0)
     points = shell * round_ + (1 - shell) * x
-    return TetrahedralMesh(points * np.array(semi_axes), cube.tets)
+    vertices = points * np.array(semi_axes) + np.asarray(centre)
+    return TetrahedralMesh(vertices, cube.tets)
 
 
 def hemisphere(side: int) -> TriangleMesh:

@@ -16,6 +16,7 @@ from gyriflow.anatomy.extraction import (
     isosurface,
     main_parts,
     make_simple,
+    parts_in_boxes,
     refine,
     remove_bridges,
     smooth_mask,
@@ -88,6 +89,17 @@ def test_structure_thinner_than_the_smoothing_is_refused():
     field = smooth_mask(thin, 2.0)
     with pytest.raises(MeshError):
         make_simple(field)
+
+
+def test_parts_that_meet_at_a_corner_are_one_in_its_box_and_a_voxel_around():
+    mask = np.zeros((9, 9, 9), dtype=bool)
+    # the first voxel, where there is none around, and two that share a corner
+    mask[0, 0, 0] = mask[4, 4, 4] = mask[5, 5, 5] = True
+    (first, alone), (second, pair) = parts_in_boxes(mask)
+    assert first == (slice(0, 2),) * 3
+    assert np.argwhere(alone).tolist() == [[0, 0, 0]]
+    assert second == (slice(3, 7),) * 3
+    assert np.argwhere(pair).tolist() == [[1, 1, 1], [2, 2, 2]]
 
 
 def test_slit_one_voxel_wide_stays_open_at_its_width():

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ellipsoid import GAP_MM, RUN, SEMI_AXES
+from ellipsoid import GAP_MM, RUN, brain_mesh
 from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.folding.growth import GrowthByRates, StepStart
@@ -36,7 +36,7 @@ def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
 
 
 def test_the_cortex_has_its_own_thickness_at_the_start_and_grows_from_there():
-    mesh = ellipsoid_mesh(8, SEMI_AXES)
+    mesh = brain_mesh(8)
     p = parameters_from(RUN | {"thickness_mm": {"weeks": {21: 2.0, 23: 3.0}}})
     zones = zones_of_run(mesh, p, GAP_MM)
     for week, thickness in ((21.0, 2.0), (23.0, 3.0)):

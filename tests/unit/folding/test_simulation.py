@@ -91,6 +91,11 @@ def test_a_failing_step_is_halved_and_grows_back():
     assert lengths[first + STEPS_BEFORE_DOUBLING] == 43_200
 
 
+def test_the_last_step_to_an_output_week_takes_what_is_left():
+    lengths = steps_to(Stepper(lambda time_s: 1e9), 100_000.0)
+    assert lengths == pytest.approx([43_200.0, 43_200.0, 13_600.0])
+
+
 def test_where_the_smallest_step_fails_the_place_is_named():
     stepper = Stepper(lambda time_s: 1.0, solver={"max_halvings": 2})
     stepper.solver = SimpleNamespace(worst_places=lambda: "at [1.0, 2.0, 3.0] mm")

@@ -176,6 +176,9 @@ def test_tables_go_through_their_values_and_are_written_out():
         "rate_per_week",
     ]
     assert table["value"].tolist() == pytest.approx([50, 60, 90])
+    # a table is as it was given, without an error
+    for bound in ("low", "high"):
+        assert table[bound].tolist() == pytest.approx([50, 60, 90])
     again = tabulated(table["week"], table["value"])
     assert value(again, 23.3) == pytest.approx(value(curve, 23.3))
 
