@@ -17,7 +17,7 @@ from gyriflow.anatomy.extraction import (
     shifted_affine,
     smooth_mask,
 )
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     face_normals,
@@ -256,6 +256,21 @@ def ellipsoid_mesh(
     points = shell * round_ + (1 - shell) * x
     vertices = points * np.array(semi_axes) + np.asarray(centre)
     return TetrahedralMesh(vertices, cube.tets)
+
+
+def inner_edges_of_the_surface(mesh: TetrahedralMesh) -> set[tuple[int, int]]:
+    """Return the edges of a linear mesh that join two vertices of its surface, but are
+    on none of its faces."""
+    faces = boundary_faces(mesh)[0].tolist()
+    outer = {vertex for face in faces for vertex in face}
+    on_surface = {frozenset((a, b)) for face in faces for a in face for b in face}
+    found = set()
+    for corners in mesh.tets.tolist():
+        for a in corners:
+            for b in corners:
+                if a < b and {a, b} <= outer and {a, b} not in on_surface:
+                    found.add((a, b))
+    return found
 
 
 def hemisphere(side: int) -> TriangleMesh:

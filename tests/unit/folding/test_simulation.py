@@ -16,7 +16,7 @@ from gyriflow.folding.contact import MAX_STIFFENING, stiffening
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.predicted_memory import predicted_memory_mib
-from gyriflow.folding.run import shortened_step_note
+from gyriflow.folding.run import quality_note, shortened_step_note
 from gyriflow.folding.simulation import (
     STEPS_BEFORE_DOUBLING,
     advance,
@@ -187,6 +187,22 @@ def test_a_step_above_its_tolerance_gives_a_warning():
     row = {"step": 7, "residual": 3e-6, "converged": True}
     assert unconverged_warning(row) == ""
     assert unconverged_warning(row | {"converged": False}) == Facts(7, "3.0e-06")
+
+
+@pytest.mark.parametrize(("n_flat", "is_warning"), [(0, False), (2, False), (3, True)])
+def test_more_than_a_thousandth_of_flat_elements_give_a_warning(n_flat, is_warning):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    apart = 2.0 * np.arange(2000)[:, None, None] * [1.0, 0.0, 0.0]
+    tets = np.arange(8000).reshape(-1, 4)
+    mesh = TetrahedralMesh((corners + apart).reshape(-1, 3), tets)
+    positions = mesh.vertices.copy()
+    positions[tets[:n_flat, 3], 2] = 0.001
+    note, is_bad = quality_note(mesh, positions, 23.5)
+    assert is_bad == is_warning
+    assert note == (Facts("GW 23.5", f"{n_flat} of 2000") if n_flat else "")
+    # elements that were as flat at the start are no news
+    flat = TetrahedralMesh(positions, tets)
+    assert quality_note(flat, positions, 23.5) == ("", False)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 import shapes
 from facts import Facts
 from scripts import run_script
-from shapes import box_mesh, moved, sphere
+from shapes import box, box_mesh, inner_edges_of_the_surface, moved, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.matching import crossing_faces, nearest_on
@@ -397,6 +397,23 @@ def test_quadratic_elements_follow_the_surface_on_as_many_nodes(mesher):
         < 1.2 * linear["surface_distance_mm"]["hausdorff99"]
     )
     assert abs(bent["volume_change"]) < 0.002
+
+
+def test_no_side_of_a_quadratic_element_joins_two_corners_on_the_surface():
+    surface = box((8.0, 6.0, 2.0), subdivisions=3)
+    linear, bent = (
+        tetrahedralise(
+            surface,
+            mesher="tetgen",
+            order=order,
+            **(SIZES | {"surface_edge_mm": 2.0 / order}),
+        )
+        for order in (1, 2)
+    )
+    # elements of the same size have such sides until these are split
+    assert inner_edges_of_the_surface(linear)
+    corners = TetrahedralMesh(bent.vertices, bent.corners)
+    assert not inner_edges_of_the_surface(corners)
 
 
 def test_a_node_that_would_fold_its_element_over_stays_back():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import ellipsoid_mesh
+from shapes import ellipsoid_mesh, inner_edges_of_the_surface
 
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
@@ -13,21 +13,6 @@ from gyriflow.geometry.tetrahedra import (
     signed_volumes,
 )
 from gyriflow.mesh.splitting import split_inner_edges
-
-
-def inner_edges_of_the_surface(mesh):
-    """Return the edges that join two vertices of the surface, but are on none of its
-    faces."""
-    faces = boundary_faces(mesh)[0].tolist()
-    outer = {vertex for face in faces for vertex in face}
-    on_surface = {frozenset((a, b)) for face in faces for a in face for b in face}
-    found = set()
-    for corners in mesh.tets.tolist():
-        for a in corners:
-            for b in corners:
-                if a < b and {a, b} <= outer and {a, b} not in on_surface:
-                    found.add((a, b))
-    return found
 
 
 @pytest.mark.parametrize(
