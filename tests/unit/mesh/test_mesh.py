@@ -9,7 +9,7 @@ import pytest
 import shapes
 from facts import Facts
 from scripts import run_script
-from shapes import box, box_mesh, inner_edges_of_the_surface, moved, sphere
+from shapes import box_mesh, inner_edges_of_the_surface, moved, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.matching import crossing_faces, nearest_on
@@ -400,7 +400,7 @@ def test_quadratic_elements_follow_the_surface_on_as_many_nodes(mesher):
 
 
 def test_no_side_of_a_quadratic_element_joins_two_corners_on_the_surface():
-    surface = box((8.0, 6.0, 2.0), subdivisions=3)
+    surface = box((8.0, 6.0, 2.0))
     linear, bent = (
         tetrahedralise(
             surface,
