@@ -1,5 +1,5 @@
-"""What the script that scores a run of the calibration writes, from the files of its
-simulations and of the observed brains."""
+"""What the scripts of a calibration write: the runs of a round, their scores, and the
+optimum."""
 
 from types import SimpleNamespace
 
@@ -18,8 +18,10 @@ from gyriflow.io.files import read_table, write_json, write_table
 from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_regions
+from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics import measure
 from gyriflow.settings.folding import parameters_from
+from gyriflow.shipped import SHIPPED
 
 from .made_spectra import folded
 
@@ -144,3 +146,48 @@ def test_a_run_has_no_score_if_one_of_its_simulations_has_diverged(folder):
     assert np.isnan(row["score"])
     assert (row["outcome"], row["thickness_mm"]) == ("diverged", 1.5)
     assert row["cause"] == Facts("too large a step")
+
+
+BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
+
+
+def designed(folder, runs, scores):
+    params = {"bounds": BOUNDS, "score": ["size"], "runs": runs}
+    inputs = {"spectra": [], "scores": scores}
+    run_script("calibration_design.py", folder, inputs, {0: "design.csv"}, params)
+    return read_table(folder / "design.csv")
+
+
+def test_rounds_are_designed_by_all_scores_before_and_end_in_the_best_run(tmp_path):
+    first = designed(tmp_path, ["r1", "r2", "r3", "r4"], [])
+    assert first["run"].tolist() == ["r1", "r2", "r3", "r4"]
+    for name, (low, high) in BOUNDS.items():
+        assert first[name].between(low, high).all()
+        # both halves of the bounds have as many
+        assert (first[name] > (low + high) / 2).sum() == 2
+    files = []
+    for number, (run, score) in enumerate(
+        zip(first["run"], [0.4, 0.1, 0.3, np.nan], strict=True)
+    ):
+        row = first[first["run"] == run].assign(score=score, cause="", round=1)
+        files.append(f"score-{number}.csv")
+        write_table(tmp_path / files[-1], row)
+    second = designed(tmp_path, ["r5", "r6"], files)
+    assert second["run"].tolist() == ["r5", "r6"]
+    assert not second["thickness_mm"].isin(first["thickness_mm"]).any()
+    run_script(
+        "calibration_tables.py",
+        tmp_path,
+        {"scores": files, "noise": SHIPPED / "norms" / "repeatability.yaml"},
+        {"runs": "runs.csv", "optimum": "optimum.csv"},
+        {"bounds": BOUNDS, "weights": {"size": 2.0}},
+    )
+    assert read_table(tmp_path / "runs.csv")["run"].tolist() == first["run"].tolist()
+    optimum = read_table(tmp_path / "optimum.csv").set_index("parameter")
+    assert set(optimum["run"]) == {"r2"}
+    for name, (low, high) in BOUNDS.items():
+        row = optimum.loc[name]
+        assert (row["lowest"], row["highest"], row["score"]) == (low, high, 0.1)
+        assert row["value"] == first.set_index("run").loc["r2", name]
+    noise = read_yaml(SHIPPED / "norms" / "repeatability.yaml")["scores"]["size"]
+    assert optimum["score_noise"].tolist() == pytest.approx([2 * noise] * 2)
