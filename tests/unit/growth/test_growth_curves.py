@@ -112,6 +112,20 @@ def test_noise_is_smoothed_and_covered_by_the_interval():
     assert np.mean(gain) < 0.8
 
 
+def test_a_straight_line_has_the_error_of_a_regression():
+    """With two degrees of freedom the logarithm is a line; its error is smallest in the
+    middle of the weeks."""
+    fit = fitted(WEEKS, SCATTERED, degrees_of_freedom=2)
+    logs = np.log(SCATTERED)
+    line = np.polynomial.Polynomial.fit(WEEKS, logs, 1)
+    assert value(fit.curve, WEEKS) == pytest.approx(np.exp(line(WEEKS)), rel=0.005)
+    scatter = np.sqrt(((logs - line(WEEKS)) ** 2).sum() / (len(WEEKS) - 2))
+    from_mean = WEEKS - WEEKS.mean()
+    share = 1 / len(WEEKS) + from_mean**2 / (from_mean**2).sum()
+    found = np.interp(WEEKS, fit.curve.weeks, fit.curve.sd)
+    assert found == pytest.approx(scatter * np.sqrt(share), rel=0.1)
+
+
 def test_several_brains_of_a_week_and_two_weeks_alone():
     fit = fitted([21, 21, 23, 23], [49.0, 51.0, 98.0, 102.0])
     assert value(fit.curve, [21, 22, 23]) == pytest.approx(

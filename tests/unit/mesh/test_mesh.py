@@ -447,6 +447,13 @@ def test_concentric_spheres_are_as_far_apart_as_their_radii():
     assert distance["hausdorff"] == pytest.approx(0.5, abs=0.01)
 
 
+def test_the_distance_within_which_most_lies_is_no_mean():
+    # a ball shifted by 0.5 mm: distances are evenly distributed from 0 to 0.5
+    distance = fidelity(sphere(10.0, 5), moved(sphere(10.0, 5), 0.5))
+    assert distance["hausdorff99"] == pytest.approx(0.495, abs=0.01)
+    assert distance["hausdorff"] == pytest.approx(0.5, abs=0.01)
+
+
 def test_both_directions_count():
     small = box((4.0, 4.0, 4.0))
     both = merged(small, box((4.0, 4.0, 4.0), (7.0, 0.0, 0.0)))
