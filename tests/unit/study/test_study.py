@@ -607,6 +607,15 @@ def test_brains_correspond_by_masks_in_their_poses_and_else_in_coordinates_of_fi
     assert found.brains["b21"].registered.path == str(files / "labels.nii.gz")
 
 
+def test_the_surfaces_of_a_study_are_those_of_all_its_brains(of_two):
+    found = study(of_two(22, 23), **EXPECTED)
+    for name in found.brains:
+        folder = f"results/brains/{name}/surface"
+        files = {file for file in found.surfaces if file.startswith(folder)}
+        expected = {"pial.surf.gii", "left.pial.surf.gii", "thickness.shape.gii"}
+        assert {f"{folder}/{file}" for file in expected} <= files
+
+
 def test_a_population_that_a_run_is_carried_along_has_rates_of_growth(of_two):
     # its brains have no subject and belong to no known atlas
     found = study(of_two(22), **EXPECTED)
