@@ -239,6 +239,20 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     assert not (wide[20, 20, 17:24] > 0.5).any()
 
 
+def test_a_hidden_fissure_is_opened_where_no_tissue_joins_the_hemispheres():
+    brain, core, affine = block(0)
+    core[18:23] = False
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    side_mm = side_distance(
+        brain, core, affine, fissure_between(walls, mid_plane(walls))
+    )
+    hidden = hidden_fissure(side_mm, brain, core, affine)
+    # from one end of the brain to the other, in layers beside the middle
+    assert hidden[20, 8:32, 8:22].all()
+    assert not hidden[:18].any()
+    assert not hidden[23:].any()
+
+
 @pytest.mark.parametrize("gap_voxels", [0, 1])
 @pytest.mark.parametrize("shift_mm", [-0.05, 0.05])
 def test_noise_of_the_mid_plane_does_not_give_the_middle_to_one_side(
