@@ -201,6 +201,8 @@ def test_a_prediction_has_the_mesh_that_its_errors_were_measured_with(
         tested["order"],
         tested["surface_edge_mm"],
     )
+    # the mesher of benchmarks/horizon.py, with which they were measured
+    assert mesh.mesher == "tetgen"
 
 
 def test_quadratic_elements_are_warned_of_on_the_way_to_deep_folds(predicted, tmp_path):
