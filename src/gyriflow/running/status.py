@@ -11,12 +11,12 @@ from tabulate import tabulate
 from ..errors import InputError, StorageError
 from ..io.files import read_json
 from ..io.yaml_files import read_keys
+from ..messages import read_progress
 from ..settings.base import folder_of
 from ..shipped import CONFIG
 from ..study import resolve
 from ..study.loading import load
 from ..units import week_tag
-from .jobs import events_in, read_log
 from .launch import hold_lock
 from .provenance import STUDY_RECORD
 
@@ -174,7 +174,7 @@ def _simulation_progress(folder: Path) -> str:
         return f"done, GW {week_tag(summary['weeks'][-1])}"
     steps = [
         event
-        for event in events_in(read_log(folder / "logs" / "simulate.jsonl"))
+        for event in read_progress(folder / "logs" / "simulate.log")
         if event["event"] == "step"
     ]
     return format_progress(steps[-1]) if steps else MISSING

@@ -17,8 +17,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from ..errors import StorageError
 from ..grouping import Kinds
 from ..io.files import write_json
-from ..step import KILLED, record_exit_code
-from .jobs import OUT_OF_MEMORY, cause, events_in, messages_in, read_log
+from ..messages import (
+    KILLED,
+    STOPPED,
+    Message,
+    messages_file,
+    read_messages,
+    read_progress,
+    write_message,
+)
 from .launch import full_disk, received_signals
 from .status import REPORT, STATE, format_duration, format_progress
 
@@ -40,10 +47,11 @@ SLURM = re.compile(
     r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL
 )
 SIGNAL = re.compile(r"died with <Signals\.(\w+)")
-SIGNAL_CAUSES = {
-    "SIGKILL": OUT_OF_MEMORY,
-    **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), "it was stopped"),
-}
+STOP_SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP")
+OUT_OF_MEMORY = (
+    "it was killed, most probably because memory ran out: its log ends without a"
+    " message"
+)
 INTERRUPTED_PREFIXES = (
     "Terminating processes on user request",
     "Cancelling snakemake on user request",
@@ -61,8 +69,7 @@ cause."""
 
 @dataclass
 class Job:
-    """A running job and its log; a simulation writes its progress in the same
-    folder."""
+    """A running job and its log, beside which are its messages."""
 
     rule: str
     name: str
@@ -141,13 +148,16 @@ class RunDisplay:
                 self.bar.start()
             case "job_info":
                 wildcards = " ".join((event["wildcards"] or {}).values())
-                log = Path(event["log"][0]).absolute() if event["log"] else None
+                log = Path(event["log"][0]) if event["log"] else None
+                if log:
+                    # those of an earlier try
+                    messages_file(log).unlink(missing_ok=True)
                 name = f"{event['rule_name']} {wildcards}".strip()
                 self.running[event["jobid"]] = Job(
                     event["rule_name"], name, self.clock(), log
                 )
             case "job_finished" if job := self.running.pop(event["job_id"], None):
-                self._show_warnings(job)
+                self._follow(job)
                 self.work_done += WEIGHTS.get(job.rule, 1.0)
             case "job_error":
                 # a signal to all processes may have ended a job before it is noticed
@@ -173,30 +183,8 @@ class RunDisplay:
     def _show_failure(self, event: Mapping[str, Any]) -> None:
         job = self.running.pop(event["jobid"], None)
         if job is not None:
-            self._show_warnings(job)
-        message = str(event["rule_msg"] or "\n".join(self.failure_messages))
-        self.failure_messages.clear()
-        slurm, signal = SLURM.search(message), SIGNAL.search(message)
-        # Snakemake's text shows the shell command
-        message = "" if "CalledProcessError" in message else message
-        if slurm:
-            reason = f"Slurm ended job {slurm[1]}: {slurm[2]}"
-        elif signal:
-            reason = SIGNAL_CAUSES.get(
-                signal[1], f"it crashed ({signal[1]}): please report this with its log"
-            )
-        else:
-            reason = (
-                cause("".join(map(read_log, event["log"])))
-                or message
-                or full_disk(Path())
-            )
-            reason = (
-                reason
-                or f"it left no message in its log; see the end of {self.details}"
-            )
-        if reason == OUT_OF_MEMORY:
-            record_exit_code(KILLED)
+            self._follow(job)
+        reason = self._cause(event).text
         name = job.name if job else event["rule_name"]
         self.failed.append(
             {
@@ -210,6 +198,51 @@ class RunDisplay:
             self.console.print(
                 "\n        ".join([line, *(f"log: {log}" for log in event["log"])])
             )
+
+    def _cause(self, event: Mapping[str, Any]) -> Message:
+        """Return the error of a failed job: its own, or else what Snakemake says of its
+        end, which is then added to its messages."""
+        text = str(event["rule_msg"] or "\n".join(self.failure_messages))
+        self.failure_messages.clear()
+        errors, has_begun = [], False
+        if event["log"]:
+            log = event["log"][0]
+            errors = [row for row in read_messages(log) if row.level == "error"]
+            has_begun = messages_file(log).exists()
+        ended = self._end_from_outside(text)
+        if errors and not ended:
+            return errors[0]
+        # Snakemake's text of it shows the shell command
+        if not ended and "CalledProcessError" not in text:
+            ended = text
+        if not ended:
+            ended = full_disk(Path())
+        if not ended and has_begun:
+            ended = OUT_OF_MEMORY
+        if not ended:
+            ended = f"it left no message in its log; see the end of {self.details}"
+        code = KILLED if ended == OUT_OF_MEMORY else None
+        message = Message("error", ended, exit_code=code)
+        if event["log"]:
+            # a disk may be full
+            with suppress(OSError):
+                write_message(event["log"][0], message)
+        return message
+
+    @staticmethod
+    def _end_from_outside(text: str) -> str:
+        """Return which signal or scheduler has ended a job, by Snakemake's text, or
+        ""."""
+        if slurm := SLURM.search(text):
+            return f"Slurm ended job {slurm[1]}: {slurm[2]}"
+        signal = SIGNAL.search(text)
+        if signal is None:
+            return ""
+        if signal[1] == "SIGKILL":
+            return OUT_OF_MEMORY
+        if signal[1] in STOP_SIGNALS:
+            return STOPPED
+        return f"it crashed ({signal[1]}): please report this with its log"
 
     def tick(self) -> None:
         """Read the progress of running jobs; update the bar and the recorded state."""
@@ -282,12 +315,14 @@ class RunDisplay:
             self.console.print(f"gyriflow: done in {took}{steps}{report}")
 
     def _follow(self, job: Job) -> None:
-        for event in (
-            events_in(read_log(job.log.with_suffix(".jsonl"))) if job.log else ()
-        ):
+        """Show what a job has written to its messages since."""
+        if job.log is None:
+            return
+        for message in read_messages(job.log):
+            if message.level == "warning" and not message.library:
+                self._show_warning(job, message.first_line)
+        for event in read_progress(job.log):
             match event:
-                case {"event": "warning", "message": str(text)}:
-                    self._show_warning(job, text)
                 case {
                     "event": "size",
                     "elements": elements,
@@ -303,12 +338,6 @@ class RunDisplay:
                         self.console.print(size)
                 case {"event": "step"}:
                     job.step = event
-
-    def _show_warnings(self, job: Job) -> None:
-        self._follow(job)
-        for message in messages_in(read_log(job.log)) if job.log else ():
-            if message.by_gyriflow and message.level == "warning":
-                self._show_warning(job, message.first_line)
 
     def _show_warning(self, job: Job, text: str) -> None:
         line = f"warning {job.name}: {text}"

@@ -263,6 +263,10 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
         == Facts("23 GW", "a step died.")
         != Facts("holes closed")
     )
+    # a warning about one element is not the worst of several
+    doubts = pd.DataFrame({"level": "warning", "message": ["one element", "coarse"]})
+    assert verdict(RUNS, VALIDATION, doubts) == Facts(2) != Facts("one element")
+    assert verdict(RUNS, VALIDATION, doubts[:1]) == Facts("one element")
     alone = verdict(
         RUNS.assign(elements_through_cortex=8.5, unresolved_from_week=np.nan),
         None,
