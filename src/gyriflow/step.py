@@ -8,7 +8,6 @@ if the program has not, and exits with it, or with 5 for a bus error.
 import logging
 import sys
 import time
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -17,7 +16,7 @@ from typing import NamedTuple
 
 import psutil
 
-from .errors import GyriflowError, StorageError
+from .errors import StorageError
 from .messages import (
     INTERRUPTED,
     KILLED,
@@ -39,6 +38,12 @@ KILLED_MESSAGE = (
     "the program was killed, most probably because memory ran out; see the memory"
     " predicted above"
 )
+ENDINGS = {
+    KILLED: KILLED_MESSAGE,
+    INTERRUPTED: STOPPED,
+    **dict.fromkeys(BUS_ERROR_CODES, SHARED_MEMORY_MESSAGE),
+}
+"""Messages of programs that could leave none, by exit code."""
 N_LAST_LINES = 5
 """Lines at the end of a log that stand for the message of a program that has none."""
 
@@ -96,15 +101,11 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     its messages.
 
     An error ends the program with its exit code and one message, on the terminal and in
-    the log; an unexpected one with a traceback, too. The message of an error that names
-    no file begins with the step's `inputs`.
+    the log, where an unexpected one has its traceback. The message of an error that
+    names no file begins with the step's `inputs`.
     """
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
-    try:
-        handlers = [logging.FileHandler(log, mode="w"), MessageHandler(log)]
-    except OSError as error:
-        print(f"gyriflow: {log}: cannot be written: {error.strerror}", file=sys.stderr)
-        sys.exit(StorageError.exit_code)
+    handlers = [logging.FileHandler(log, mode="w"), MessageHandler(log)]
     logging.basicConfig(level=logging.INFO, format=form, handlers=handlers, force=True)
     logging.captureWarnings(True)
     try:
@@ -112,15 +113,12 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     except (Exception, KeyboardInterrupt) as error:
         message = error_message(error)
         is_unexpected = message.exit_code == 1
-        is_of_inputs = isinstance(error, GyriflowError | MemoryError)
-        if inputs and is_of_inputs and not message.file:
+        if inputs and not (message.file or is_unexpected):
             file = ", ".join(inputs)
             message = replace(message, text=f"{file}: {message.text}", file=file)
         logging.error(
             "%s", message.text, exc_info=is_unexpected, extra={"data": message}
         )
-        if is_unexpected:
-            traceback.print_exc()
         print(f"gyriflow: {message.text}", file=sys.stderr)
         sys.exit(message.exit_code)
     record_usage(log, usage())
@@ -129,23 +127,17 @@ def step(log: str, *inputs: str) -> Iterator[None]:
 def end_shell_step(code: int, log: str) -> int:
     """Write the message of a failed program that has written none, and return the exit
     code of its step."""
-    text = ""
-    if code == KILLED:
-        text = KILLED_MESSAGE
-    elif code in BUS_ERROR_CODES:
-        text = SHARED_MEMORY_MESSAGE
-        code = StorageError.exit_code
+    text = ENDINGS.get(code)
     if text:
-        print(f"gyriflow: {text}", file=sys.stderr)
         with Path(log).open("a") as file:
-            file.write(f"gyriflow: {text}\n")
-    elif code == INTERRUPTED:
-        text = STOPPED
+            print(f"gyriflow: {text}", file=file)
     elif any(message.level == "error" for message in read_messages(log)):
         return code
     else:
         lines = [line for line in Path(log).read_text().splitlines() if line.strip()]
         text = "\n".join(lines[-N_LAST_LINES:]) or f"it ended with exit code {code}"
+    if code in BUS_ERROR_CODES:
+        code = StorageError.exit_code
     write_message(log, Message("error", text, exit_code=code))
     return code
 

@@ -11,9 +11,9 @@ from gyriflow.messages import (
     Message,
     error_message,
     messages_file,
-    read_failures,
     read_messages,
-    read_progress,
+    read_rows,
+    study_messages,
     write_message,
 )
 
@@ -57,16 +57,17 @@ def test_messages_are_distinct_and_apart_from_progress(study):
     with path.open("a") as file:
         file.write('{"event": "step", "week": 21.5}\n')
         file.write('{"level": "warning", "text": "three", "of_later_versions": 1}\n')
+        file.write('{"level": "warning", "text": "four"}\n')
         # a full disk
         file.write('{"level": "warn')
     texts = [message.text for message in read_messages("x.log")]
-    assert texts == ["µ\n\u2028 \udcff", "two", "three"]
+    assert texts == ["µ\n\u2028 \udcff", "two", "four"]
     assert read_messages("x.log")[0].first_line == "µ"
-    assert read_progress("x.log") == [{"event": "step", "week": 21.5}]
-    assert read_messages("none.log") == read_progress("none.log") == []
+    assert {"event": "step", "week": 21.5} in read_rows("x.log")
+    assert read_messages("none.log") == read_rows("none.log") == []
 
 
-def test_failures_come_in_the_order_of_their_times(study):
+def test_messages_of_a_study_come_in_the_order_of_their_times(study):
     error = Message("error", "holes", exit_code=3)
     times_s = {
         "brains/b/logs/one": 20.0,
@@ -75,11 +76,12 @@ def test_failures_come_in_the_order_of_their_times(study):
     }
     for name, time_s in times_s.items():
         log = f"results/{name}.log"
-        write(log, Message("warning", "thin"), error)
+        write(log, error)
         os.utime(messages_file(log), (time_s, time_s))
-    failures = read_failures(study, 10.0)
-    assert [(row.brain, row.step) for row in failures] == [("b", "one"), ("a", "two")]
-    assert {row.exit_code for row in failures} == {3}
+    later = study_messages(study, 10.0)
+    assert [(row.brain, row.step) for row in later] == [("b", "one"), ("a", "two")]
+    assert {row.exit_code for row in later} == {3}
+    assert [row.run for row in study_messages(study)] == ["r", "", ""]
 
 
 def test_the_message_of_an_error_has_what_the_error_knows():

@@ -50,7 +50,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         type=Path,
         help=(
             "log of the run, beside which its messages and progress are written, one"
-            " JSON object per line (.jsonl)"
+            " JSON object per line (.jsonl); default: folding.log in the folder of the"
+            " results"
         ),
     )
     parser.add_argument(
@@ -61,7 +62,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
             " the summary gives the reason"
         ),
     )
-    return parser.parse_args(arguments)
+    parsed = parser.parse_args(arguments)
+    parsed.log = parsed.log or parsed.out / "folding.log"
+    return parsed
 
 
 @contextmanager
@@ -129,13 +132,12 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
             f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size}"
             " ranks"
         )
-        facts = {
-            "elements": len(mesh.tets),
-            "unknowns": 3 * len(mesh.vertices),
-            "ranks": comm.size,
-        }
         print_line(
-            f"{size}, about {memory:.0f} MiB", "size", **facts, memory_mib=round(memory)
+            f"{size}, about {memory:.0f} MiB",
+            "size",
+            elements=len(mesh.tets),
+            ranks=comm.size,
+            memory_mib=round(memory),
         )
         for name in ZONE_NAMES:
             zone = report["zones"][name]
@@ -174,19 +176,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     # by all ranks
     cpu_s = comm.allreduce(own.cpu_s)
     memory_mib = comm.allreduce(own.memory_mib)
-    if comm.rank == 0 and arguments.log:
+    if comm.rank == 0:
         record_usage(arguments.log, Usage(own.wall_s, cpu_s, memory_mib))
-
-
-def handle_messages(path: Path | None) -> None:
-    """Print warnings, and write them and the progress beside a log, if there is one."""
-    printer = logging.StreamHandler(sys.stdout)
-    printer.setLevel(logging.WARNING)
-    handlers: list[logging.Handler] = [printer]
-    if path:
-        handlers.append(MessageHandler(path))
-    form = "warning: %(message)s"
-    logging.basicConfig(level=logging.INFO, format=form, handlers=handlers)
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
@@ -195,7 +186,13 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     try:
         if comm.rank == 0:
             with locked(arguments.out):
-                handle_messages(arguments.log)
+                printer = logging.StreamHandler(sys.stdout)
+                printer.setLevel(logging.WARNING)
+                logging.basicConfig(
+                    level=logging.INFO,
+                    format="warning: %(message)s",
+                    handlers=[printer, MessageHandler(arguments.log)],
+                )
                 main(comm, arguments)
         else:
             main(comm, arguments)
@@ -206,8 +203,7 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         print(f"gyriflow: {message.text}", file=sys.stderr, flush=True)
         # whatever happens, the other ranks are ended, too
         with suppress(OSError):
-            if arguments.log:
-                write_message(arguments.log, message)
+            write_message(arguments.log, message)
         sys.stdout.flush()
         if comm.size > 1:
             # they may be waiting in a collective call

@@ -512,14 +512,12 @@ def verdict(
     serious = list(warnings.loc[warnings["level"] == "error", "message"])
     for _, run in runs.iterrows():
         serious += run_doubts(run)
-    if serious:
-        return f"{sentence} Worst warning: {serious[0].rstrip('.')}."
-    texts = warnings["message"].unique()
-    if len(texts) == 1:
-        return f"{sentence} Warning: {texts[0].rstrip('.')}."
-    if len(texts):
-        return f"{sentence} There were {len(texts)} warnings, listed under Brains."
-    return f"{sentence} There were no warnings."
+    texts = serious or list(warnings["message"].unique())
+    if not texts:
+        return f"{sentence} There were no warnings."
+    if serious or len(texts) == 1:
+        return f"{sentence} Worst warning: {texts[0].rstrip('.')}."
+    return f"{sentence} There were {len(texts)} warnings, listed under Brains."
 
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:

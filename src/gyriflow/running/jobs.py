@@ -8,9 +8,11 @@ from pathlib import Path
 import pandas as pd
 
 from ..io.files import AnyPath
-from ..messages import read_messages
+from ..messages import study_messages
 from ..step import USAGE_COLUMNS
-from ..study.paths import REPORT
+
+REPORT_STEP = "html_report"
+"""The step whose messages are not in the table that it shows."""
 
 
 def gather_messages(
@@ -21,24 +23,17 @@ def gather_messages(
 
     Subject and run are empty if not applicable.
     """
-    folder = Path(folder)
     known = {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)}
     rows = []
-    for path in sorted(folder.glob("results/*/**/*.jsonl")):
-        for message in read_messages(path):
-            is_known = (message.run, message.brain) in known
-            if is_known and not path.is_relative_to(folder / REPORT):
-                rows.append(
-                    {
-                        "subject": message.brain,
-                        "run": message.run,
-                        "step": message.step,
-                        "level": message.level,
-                        "message": message.first_line,
-                    }
-                )
-    table = pd.DataFrame(rows, columns=["subject", "run", "step", "level", "message"])
-    return table.drop_duplicates(ignore_index=True)
+    for message in study_messages(Path(folder)):
+        place = (message.brain, message.run, message.step)
+        is_known = (message.run, message.brain) in known
+        if is_known and message.step != REPORT_STEP:
+            rows.append((*place, message.level, message.first_line))
+    columns = ["subject", "run", "step", "level", "message"]
+    table = pd.DataFrame(rows, columns=columns).drop_duplicates()
+    order = ["run", "subject", "step"]
+    return table.sort_values(order, kind="stable", ignore_index=True)
 
 
 def read_usage(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:

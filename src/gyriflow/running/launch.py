@@ -31,7 +31,7 @@ from ..errors import GyriflowError, InputError, StorageError
 from ..io.files import read_json, write_json
 from ..io.locks import UNLOCKABLE, lock_file
 from ..io.yaml_files import read_keys
-from ..messages import Message, read_failures
+from ..messages import Message, study_messages
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
 from .snakemake_internals import dates_before_copy, temporary_records
@@ -216,12 +216,12 @@ def refused_brains() -> dict[str, str]:
 def failed_brains(failures: Sequence[Message]) -> dict[str, str]:
     """Return the causes of the brains with a failed step, by id, from the errors of
     steps."""
-    causes: dict[str, str] = {}
-    for failure in failures:
-        # a failed simulation refuses no brain
-        if failure.brain and not failure.run:
-            causes.setdefault(failure.brain, failure.first_line)
-    return causes
+    # of several errors of a brain the first counts; a failed run refuses no brain
+    return {
+        failure.brain: failure.first_line
+        for failure in reversed(failures)
+        if failure.brain and not failure.run
+    }
 
 
 def stop_jobs() -> None:
@@ -283,8 +283,7 @@ def finish_without(
 def exit_code(code: int, failures: Sequence[Message], directory: Path) -> int:
     """Return the exit code of a run that failed with Snakemake's `code`: that of the
     first error of a step that has one; report a full disk."""
-    codes = [failure.exit_code for failure in failures if failure.exit_code]
-    code = next(iter(codes), code)
+    code = next(filter(None, (failure.exit_code for failure in failures)), code)
     if code == 1 and (full := full_disk(directory)):
         print(
             f"gyriflow: {directory.resolve()}: {full}, then run the same command again",
@@ -496,7 +495,8 @@ def main(arguments: Sequence[str]) -> int:
         return code
     if code == 0 or dry_run:
         return code
-    failures = read_failures(directory, began_s)
+    messages = study_messages(directory, began_s)
+    failures = [message for message in messages if message.level == "error"]
     if options.keep_going and not is_second_pass:
         brains = failed_brains(failures)
         if brains and (interrupted := finish_without(brains, arguments, directory)):

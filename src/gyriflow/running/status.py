@@ -11,7 +11,7 @@ from tabulate import tabulate
 from ..errors import InputError, StorageError
 from ..io.files import read_json
 from ..io.yaml_files import read_keys
-from ..messages import read_progress
+from ..messages import read_rows
 from ..settings.base import folder_of
 from ..shipped import CONFIG
 from ..study import resolve
@@ -173,9 +173,9 @@ def _simulation_progress(folder: Path) -> str:
         summary = read_json(folder / "folding" / "summary.json")
         return f"done, GW {week_tag(summary['weeks'][-1])}"
     steps = [
-        event
-        for event in read_progress(folder / "logs" / "simulate.log")
-        if event["event"] == "step"
+        row
+        for row in read_rows(folder / "logs" / "simulate.log")
+        if row.get("event") == "step"
     ]
     return format_progress(steps[-1]) if steps else MISSING
 

@@ -23,7 +23,7 @@ from ..messages import (
     Message,
     messages_file,
     read_messages,
-    read_progress,
+    read_rows,
     write_message,
 )
 from .launch import full_disk, received_signals
@@ -47,15 +47,14 @@ SLURM = re.compile(
     r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL
 )
 SIGNAL = re.compile(r"died with <Signals\.(\w+)")
-STOP_SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP")
 OUT_OF_MEMORY = (
     "it was killed, most probably because memory ran out: its log ends without a"
     " message"
 )
-INTERRUPTED_PREFIXES = (
-    "Terminating processes on user request",
-    "Cancelling snakemake on user request",
-)
+SIGNAL_CAUSES = {
+    "SIGKILL": OUT_OF_MEMORY,
+    **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), STOPPED),
+}
 FAILED_JOB_PREFIXES = (
     "Exiting because a job execution failed",
     "At least one job did not",
@@ -114,7 +113,7 @@ class RunDisplay:
         self.messages = Kinds()
         self.sizes: set[str] = set()
         self.failure_messages: list[str] = []
-        self.interrupted = self.has_errors = False
+        self.has_errors = False
 
     def watch(self, lock: AbstractContextManager) -> None:
         """Follow the jobs and record the state of the run for `gyriflow status`, until
@@ -164,13 +163,12 @@ class RunDisplay:
                 # here
                 time.sleep(SIGNAL_S)
                 # an interrupted job has not failed
-                if not (self.interrupted or received_signals):
+                if not received_signals:
                     self._show_failure(event)
             case "progress":
                 self.done, self.total = event["done"], event["total"]
             case _:
                 text = record.getMessage().strip()
-                self.interrupted |= text.startswith(INTERRUPTED_PREFIXES)
                 if text.startswith("Nothing to be done"):
                     self.console.print("gyriflow: everything is up to date")
                 elif record.levelno >= logging.WARNING and text.startswith(
@@ -184,7 +182,7 @@ class RunDisplay:
         job = self.running.pop(event["jobid"], None)
         if job is not None:
             self._follow(job)
-        reason = self._cause(event).text
+        reason = self._cause(event)
         name = job.name if job else event["rule_name"]
         self.failed.append(
             {
@@ -199,50 +197,35 @@ class RunDisplay:
                 "\n        ".join([line, *(f"log: {log}" for log in event["log"])])
             )
 
-    def _cause(self, event: Mapping[str, Any]) -> Message:
+    def _cause(self, event: Mapping[str, Any]) -> str:
         """Return the error of a failed job: its own, or else what Snakemake says of its
         end, which is then added to its messages."""
         text = str(event["rule_msg"] or "\n".join(self.failure_messages))
         self.failure_messages.clear()
-        errors, has_begun = [], False
-        if event["log"]:
-            log = event["log"][0]
-            errors = [row for row in read_messages(log) if row.level == "error"]
-            has_begun = messages_file(log).exists()
-        ended = self._end_from_outside(text)
-        if errors and not ended:
-            return errors[0]
+        # further ones are those of a cluster
+        log = event["log"][0]
+        errors = [row for row in read_messages(log) if row.level == "error"]
+        slurm, signal = SLURM.search(text), SIGNAL.search(text)
+        ended = ""
+        if slurm:
+            ended = f"Slurm ended job {slurm[1]}: {slurm[2]}"
+        elif signal:
+            crash = f"it crashed ({signal[1]}): please report this with its log"
+            ended = SIGNAL_CAUSES.get(signal[1], crash)
+        elif errors:
+            return errors[0].text
         # Snakemake's text of it shows the shell command
-        if not ended and "CalledProcessError" not in text:
+        elif "CalledProcessError" not in text:
             ended = text
-        if not ended:
-            ended = full_disk(Path())
-        if not ended and has_begun:
+        ended = ended or full_disk(Path())
+        if not ended and messages_file(log).exists():
             ended = OUT_OF_MEMORY
-        if not ended:
-            ended = f"it left no message in its log; see the end of {self.details}"
+        ended = ended or f"it left no message in its log; see the end of {self.details}"
         code = KILLED if ended == OUT_OF_MEMORY else None
-        message = Message("error", ended, exit_code=code)
-        if event["log"]:
-            # a disk may be full
-            with suppress(OSError):
-                write_message(event["log"][0], message)
-        return message
-
-    @staticmethod
-    def _end_from_outside(text: str) -> str:
-        """Return which signal or scheduler has ended a job, by Snakemake's text, or
-        ""."""
-        if slurm := SLURM.search(text):
-            return f"Slurm ended job {slurm[1]}: {slurm[2]}"
-        signal = SIGNAL.search(text)
-        if signal is None:
-            return ""
-        if signal[1] == "SIGKILL":
-            return OUT_OF_MEMORY
-        if signal[1] in STOP_SIGNALS:
-            return STOPPED
-        return f"it crashed ({signal[1]}): please report this with its log"
+        # a disk may be full
+        with suppress(OSError):
+            write_message(log, Message("error", ended, exit_code=code))
+        return ended
 
     def tick(self) -> None:
         """Read the progress of running jobs; update the bar and the recorded state."""
@@ -283,7 +266,7 @@ class RunDisplay:
                 "done": self.done,
                 "total": self.total,
                 "failed": self.failed,
-                "interrupted": self.interrupted,
+                "interrupted": bool(received_signals),
             }
             state["details"] = str(self.details)
             # the steps report a full disk
@@ -299,7 +282,7 @@ class RunDisplay:
             self.console.print(line)
         took = format_duration((self.ended - self.began).total_seconds())
         done = f"{self.done} of {self.total} steps done"
-        if self.interrupted:
+        if received_signals:
             self.console.print(f"gyriflow: interrupted after {took}, {done}")
         elif self.failed:
             failed = f"finished after {took} with {len(self.failed)} failed"
@@ -318,11 +301,8 @@ class RunDisplay:
         """Show what a job has written to its messages since."""
         if job.log is None:
             return
-        for message in read_messages(job.log):
-            if message.level == "warning" and not message.library:
-                self._show_warning(job, message.first_line)
-        for event in read_progress(job.log):
-            match event:
+        for row in read_rows(job.log):
+            match row:
                 case {
                     "event": "size",
                     "elements": elements,
@@ -337,9 +317,8 @@ class RunDisplay:
                         self.sizes.add(size)
                         self.console.print(size)
                 case {"event": "step"}:
-                    job.step = event
-
-    def _show_warning(self, job: Job, text: str) -> None:
-        line = f"warning {job.name}: {text}"
-        if self.messages.add(job.name, line):
-            self.console.print(line)
+                    job.step = row
+        for message in read_messages(job.log):
+            line = f"warning {job.name}: {message.first_line}"
+            if message.level == "warning" and self.messages.add(job.name, line):
+                self.console.print(line)

@@ -47,12 +47,12 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path, monkeypatch):
             write_message(log, Message("warning", f"{place}\nmore of it"))
     table = gather_messages(tmp_path, ["a"], [("r", "a")])
     assert table.to_numpy().tolist() == [
-        ["a", "", "pial", "warning", "brains/a/logs/pial"],
-        ["a", "", "measure", "warning", "brains/a/metrics/logs/measure"],
-        ["a", "r", "simulate", "warning", "runs/r/a/logs/simulate"],
-        ["a", "r", "measure", "warning", "runs/r/a/metrics/week-22.00/logs/measure"],
-        ["", "", "week21.nii.gz", "warning", "study/logs/atlas_file/x/week21.nii.gz"],
         ["", "", "poses", "warning", "study/logs/poses"],
+        ["", "", "week21.nii.gz", "warning", "study/logs/atlas_file/x/week21.nii.gz"],
+        ["a", "", "measure", "warning", "brains/a/metrics/logs/measure"],
+        ["a", "", "pial", "warning", "brains/a/logs/pial"],
+        ["a", "r", "measure", "warning", "runs/r/a/metrics/week-22.00/logs/measure"],
+        ["a", "r", "simulate", "warning", "runs/r/a/logs/simulate"],
     ]
     assert gather_messages(tmp_path / "empty", ["a"], []).empty
 

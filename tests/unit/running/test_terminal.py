@@ -3,6 +3,7 @@ is, and whose results."""
 
 import io
 import logging
+import signal
 
 import pytest
 from configurations import LABELLED, touched
@@ -11,6 +12,7 @@ from facts import Facts
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, write_json
 from gyriflow.messages import Message, read_messages, write_message
+from gyriflow.running import terminal
 from gyriflow.running.launch import hold_lock
 from gyriflow.running.provenance import check_results_belong_to, input_contents
 from gyriflow.running.status import STATE, status
@@ -101,7 +103,6 @@ def test_a_folding_tells_its_size_weeks_and_warnings(run):
     )
     log.with_suffix(".jsonl").write_text(size + STEP.format(week=21.5, left=75.0))
     write_message(log, Message("warning", "coarse"))
-    write_message(log, Message("warning", "not ours", library="trimesh"))
     run.now = 25.0
     run.display.tick()
     run.end()
@@ -176,7 +177,7 @@ def test_messages_of_an_earlier_try_are_not_shown(run):
     run.display.tick()
     run.fail("measure", "CalledProcessError in file x", [str(log)])
     run.display.end()
-    assert run.lines[0] == Facts("measure a:", run.display.details)
+    assert run.lines[1] == Facts("measure a:", run.display.details)
     assert "thin" not in "".join(run.lines)
 
 
@@ -201,7 +202,7 @@ def test_a_failed_step_without_a_message_names_its_log_and_not_the_shell_command
     run.fail(
         "measure",
         "CalledProcessError in file x:\nCommand 'set -e; python x.py' returned 1",
-        [],
+        [str(run.folder / "measure.log")],
     )
     assert run.lines[0] == Facts("measure", run.display.details)
     assert "python" not in run.lines[0]
@@ -235,13 +236,10 @@ def test_a_run_until_a_stage_says_when_it_is_done(run):
     assert run.lines[-1] == Facts("gyriflow: done in 5 s", "1 of 3 steps")
 
 
-def test_what_was_stopped_is_no_failure(run):
+def test_what_was_stopped_is_no_failure(run, monkeypatch):
     run.tell("run_info", stats={"simulate": 2})
     run.begin("simulate", run="r", brain="a")
-    run.tell(
-        text="Terminating processes on user request, this might take some time.",
-        level=logging.WARNING,
-    )
+    monkeypatch.setattr(terminal, "received_signals", [signal.SIGINT])
     run.fail("simulate")
     run.display.end()
     assert run.lines[-1] == Facts("gyriflow:", "5 s", 0, 2)
