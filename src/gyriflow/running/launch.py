@@ -216,12 +216,12 @@ def refused_brains() -> dict[str, str]:
 def failed_brains(failures: Sequence[Message]) -> dict[str, str]:
     """Return the causes of the brains with a failed step, by id, from the errors of
     steps."""
-    # of several errors of a brain the first counts; a failed run refuses no brain
-    return {
-        failure.brain: failure.first_line
-        for failure in reversed(failures)
-        if failure.brain and not failure.run
-    }
+    causes: dict[str, str] = {}
+    for failure in failures:
+        # a failed run refuses no brain
+        if failure.brain and not failure.run:
+            causes.setdefault(failure.brain, failure.first_line)
+    return causes
 
 
 def stop_jobs() -> None:
