@@ -28,22 +28,27 @@ from .messages import (
     write_message,
 )
 
-BUS_ERROR_CODES = (7, 135)
-"""Exit codes of mpiexec and of a shell for a program that a bus error stopped."""
-SHARED_MEMORY_MESSAGE = (
+BUS_ERROR = Message(
+    "error",
     "the program was stopped by a bus error, most probably because /dev/shm is full:"
-    " MPI needs 6 MB of it for each rank. In a container: --shm-size 1g"
+    " MPI needs 6 MB of it for each rank. In a container: --shm-size 1g",
+    exit_code=StorageError.exit_code,
 )
-KILLED_MESSAGE = (
+OUT_OF_MEMORY = Message(
+    "error",
     "the program was killed, most probably because memory ran out; see the memory"
-    " predicted above"
+    " predicted above",
+    exit_code=KILLED,
 )
 ENDINGS = {
-    KILLED: KILLED_MESSAGE,
-    INTERRUPTED: STOPPED,
-    **dict.fromkeys(BUS_ERROR_CODES, SHARED_MEMORY_MESSAGE),
+    # of mpiexec the numbers of signals, of a shell 128 more
+    7: BUS_ERROR,
+    9: OUT_OF_MEMORY,
+    128 + 7: BUS_ERROR,
+    KILLED: OUT_OF_MEMORY,
+    INTERRUPTED: Message("error", STOPPED, exit_code=INTERRUPTED),
 }
-"""Messages of programs that could leave none, by exit code."""
+"""Messages of programs that could leave none, by their exit codes."""
 N_LAST_LINES = 5
 """Lines at the end of a log that stand for the message of a program that has none."""
 
@@ -127,19 +132,18 @@ def step(log: str, *inputs: str) -> Iterator[None]:
 def end_shell_step(code: int, log: str) -> int:
     """Write the message of a failed program that has written none, and return the exit
     code of its step."""
-    text = ENDINGS.get(code)
-    if text:
+    message = ENDINGS.get(code)
+    if message:
         with Path(log).open("a") as file:
-            print(f"gyriflow: {text}", file=file)
-    elif any(message.level == "error" for message in read_messages(log)):
+            print(f"gyriflow: {message.text}", file=file)
+    elif any(row.level == "error" for row in read_messages(log)):
         return code
     else:
         lines = [line for line in Path(log).read_text().splitlines() if line.strip()]
         text = "\n".join(lines[-N_LAST_LINES:]) or f"it ended with exit code {code}"
-    if code in BUS_ERROR_CODES:
-        code = StorageError.exit_code
-    write_message(log, Message("error", text, exit_code=code))
-    return code
+        message = Message("error", text, exit_code=code)
+    write_message(log, message)
+    return message.exit_code or code
 
 
 if __name__ == "__main__":

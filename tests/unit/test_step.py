@@ -14,7 +14,7 @@ from processes import ran
 from gyriflow import step as step_module
 from gyriflow.errors import MeshError
 from gyriflow.messages import STOPPED, Message, read_messages, write_message
-from gyriflow.step import KILLED_MESSAGE, end_shell_step, step
+from gyriflow.step import OUT_OF_MEMORY, end_shell_step, step
 
 
 def test_a_known_error_is_one_message_and_its_code(tmp_path, capsys):
@@ -109,23 +109,25 @@ def test_a_killed_program_is_said_to_have_run_out_of_memory(tmp_path):
     assert end.returncode == 137
     assert log.read_text() == Facts("before", "gyriflow:", "memory")
     (message,) = read_messages(log)
-    assert (message.text, message.exit_code) == (KILLED_MESSAGE, 137)
+    assert (message.text, message.exit_code) == (OUT_OF_MEMORY.text, 137)
 
 
 @pytest.mark.parametrize(
-    ("code", "printed", "expected"),
+    ("code", "printed", "ended", "expected"),
     [
-        (7, "x", Facts("/dev/shm")),
-        (130, "step 3", STOPPED),
-        (9, "mpiexec: one\n\ntwo\n", "mpiexec: one\ntwo"),
-        (127, "", Facts(127)),
+        (7, "x", 5, Facts("/dev/shm")),
+        (9, "EXIT STRING: Killed", 137, OUT_OF_MEMORY.text),
+        (130, "step 3", 130, STOPPED),
+        (255, "mpiexec: one\n\ntwo\n", 255, "mpiexec: one\ntwo"),
+        (127, "", 127, Facts(127)),
     ],
 )
-def test_a_program_without_a_message_is_given_one(tmp_path, code, printed, expected):
+def test_a_program_without_a_message_is_given_one(
+    tmp_path, code, printed, ended, expected
+):
     log = tmp_path / "simulate.log"
     log.write_text(printed)
-    ended = end_shell_step(code, str(log))
-    assert ended == (5 if code == 7 else code)
+    assert end_shell_step(code, str(log)) == ended
     assert read_messages(log) == [
         Message("error", ANY, step="simulate", exit_code=ended)
     ]
