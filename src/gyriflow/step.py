@@ -118,7 +118,8 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     except (Exception, KeyboardInterrupt) as error:
         message = error_message(error)
         is_unexpected = message.exit_code == 1
-        if inputs and not (message.file or is_unexpected):
+        is_of_inputs = message.exit_code not in (1, INTERRUPTED)
+        if inputs and is_of_inputs and not message.file:
             file = ", ".join(inputs)
             message = replace(message, text=f"{file}: {message.text}", file=file)
         logging.error(

@@ -95,7 +95,7 @@ def test_memory_that_ran_out_is_said_with_the_input(tmp_path, capsys):
 
 
 def test_a_step_that_is_interrupted_is_not_taken_for_a_killed_one(tmp_path):
-    with pytest.raises(SystemExit) as end, step(str(tmp_path / "log")):
+    with pytest.raises(SystemExit) as end, step(str(tmp_path / "log"), "a.nii"):
         raise KeyboardInterrupt
     (message,) = read_messages(tmp_path / "log")
     assert end.value.code == message.exit_code == 130

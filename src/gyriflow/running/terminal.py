@@ -256,19 +256,17 @@ class RunDisplay:
             )
         if self.total:
             ended = f"{self.ended:%F %T}" if self.ended else None
-            state: dict[str, Any] = {
+            state = {
                 "began": f"{self.began:%F %T}",
                 "ended": ended,
                 "left_s": left,
                 "running": running,
-            }
-            state |= {
                 "done": self.done,
                 "total": self.total,
                 "failed": self.failed,
                 "interrupted": bool(received_signals),
+                "details": str(self.details),
             }
-            state["details"] = str(self.details)
             # the steps report a full disk
             with suppress(StorageError):
                 write_json(self.state_file, state)
