@@ -161,7 +161,7 @@ def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
     ("growth", "warnings"), [("rates", 1), ("sizes", 1), ("shapes", 0)]
 )
 def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(
-    growth, warnings, capsys
+    growth, warnings, caplog
 ):
     sizes = {"area_cm2": {21: 90, 22: 99}, "volume_ml": {21: 40, 22: 46}}
     settings = {"rates": {}, "sizes": sizes, "shapes": sizes | {"of": "self"}}[growth]
@@ -175,7 +175,7 @@ def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(
         ),
         604_800.0,
     )
-    assert capsys.readouterr().out.count("elements lie through the cortex") == warnings
+    assert caplog.text.count("elements lie through the cortex") == warnings
 
 
 def test_nearly_incompressible_tissue_gives_a_warning():
