@@ -411,3 +411,25 @@ def test_named_coordinates_are_kept_by_a_body_with_many_mirror_planes(centred):
         angle_to(mid_plane(transformed(centred, rotation), named=True), rotation[:3, 0])
         < 1.0
     )
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_a_mask_whose_fissure_is_shut_is_told(deep):
+    x, y, z = np.indices((56, 66, 56)) - np.array([28, 33, 28])[:, None, None, None]
+    mask = (x / 23) ** 2 + (y / 28) ** 2 + (z / 22) ** 2 < 1
+    # a gap between the hemispheres, but for what joins them
+    mask &= ~((abs(x) < 2) & (z > -14)) | (not deep)
+    surface = from_labels(
+        mask.astype(np.int32),
+        np.eye(4),
+        SCHEMES["binary"],
+        week=24.0,
+        edge_length_mm=2.0,
+    )
+    share = surface.report["cut_share"]
+    # all of the medial wall, or what lies below the gap
+    assert share == pytest.approx(0.13 if deep else 1.0, abs=0.03)
+    assert (
+        Facts("midline", f"{100 * share:.0f} %", "33 %", "week 24")
+        in surface.report["warnings"]
+    ) != deep
