@@ -142,7 +142,7 @@ def octasphere(radius: float, subdivisions: int = 5) -> TriangleMesh:
 def cut_ellipsoid() -> tuple[TriangleMesh, TriangleMesh, TriangleMesh]:
     """Return the open left and right half of an ellipsoid as large as a brain of week
     24, and the left one's wall."""
-    ball = octasphere(1.0)
+    ball = octasphere(1.0, 4)
     whole = TriangleMesh(ball.vertices * [22.0, 28.0, 24.0], ball.faces)
     is_left = whole.vertices[whole.faces][:, :, 0].mean(axis=1) < 0.0
     left, right = (submesh(whole, side)[0] for side in (is_left, ~is_left))

@@ -308,7 +308,7 @@ def test_it_does_not_depend_on_where_the_brain_lies():
     assert 0.0 < farthest < VOXEL_MM + 1e-6
 
 
-@pytest.mark.parametrize(("n_arcs", "noise"), [(0, 0.2), (20, 0.0), (20, 0.1)])
+@pytest.mark.parametrize(("n_arcs", "noise"), [(0, 0.2), (20, 0.1)])
 def test_branching_sulci_have_their_area_and_crowns_stay_whole(n_arcs, noise):
     shape = {"radius_mm": 14.0, "depth_mm": 5.0, "thickness_mm": 1.8, "n_arcs": n_arcs}
     found = try_branching(0.8, (20, 30, 10), noise, **shape)

@@ -76,8 +76,9 @@ def grown_by_sizes(area_ratio, volume_ratio, correction=None, **changes):
     return growth_model(p, inputs)(first), growth_model(plain, inputs)(first), plain
 
 
-@pytest.mark.parametrize("radial_rate_per_s", [0.0, 2e-8])
-@pytest.mark.parametrize("missing", [(0.0, 0.0), (-0.02, 0.01)])
+@pytest.mark.parametrize(
+    ("radial_rate_per_s", "missing"), [(0.0, (-0.02, 0.01)), (2e-8, (0.0, 0.0))]
+)
 def test_a_run_begins_with_the_rates_that_lead_to_its_curves(
     radial_rate_per_s, missing
 ):
