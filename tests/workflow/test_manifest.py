@@ -8,13 +8,19 @@ import shutil
 import pytest
 import yaml
 
+from gyriflow.settings.terms import SIDES
+
 from .conftest import SMALL_STUDY, Workflow, labelled
 
 pytestmark = pytest.mark.slow
 
+REGIONS = {
+    side: {"labels": f"{side}.label.gii", "surface": f"{side}.surf.gii"}
+    for side in SIDES
+}
 STUDY = {
     "brains": [{"id": "a", "week": 21, **labelled(21)}],
-    "metrics": {"regions": {"a": {"left": "l.label.gii", "right": "r.label.gii"}}},
+    "metrics": {"regions": {"a": REGIONS}},
 }
 """A brain with regions of the cortex, which is measured only."""
 CONFIGURED = ("--configfile", "study.yaml")
@@ -27,8 +33,9 @@ def made(checkout_copy, tmp_path_factory):
     """The brain's study, which counts as made."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("manifest") / "study")
     workflow.directory.mkdir()
-    for side in "lr":
-        (workflow.directory / f"{side}.label.gii").write_text(f"regions of {side}")
+    for side, files in REGIONS.items():
+        for kind, name in files.items():
+            (workflow.directory / name).write_text(f"{kind} of {side}")
     workflow.write("study.yaml", STUDY)
     workflow.lay_out(*CONFIGURED)
     workflow.count_as_made("--forceall", *CONFIGURED)
@@ -106,11 +113,12 @@ def test_exchanged_files_of_the_two_sides_run_again_what_reads_them(
 ):
     shutil.copytree(made.directory, tmp_path / "study")
     workflow = Workflow(made.checkout, tmp_path / "study")
-    names = ("l.label.gii", "r.label.gii")
+    left, right = REGIONS.values()
     if how == "files":
-        exchange(*(workflow.directory / name for name in names))
+        for kind in left:
+            exchange(workflow.directory / left[kind], workflow.directory / right[kind])
     else:
-        regions = {"a": dict(zip(("right", "left"), names, strict=True))}
+        regions = {"a": {"left": right, "right": left}}
         change(workflow, {"metrics": {"regions": regions}})
     assert steps(workflow, "given_regions", "measure") == {"given_regions": 1}
 

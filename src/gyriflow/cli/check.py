@@ -3,12 +3,11 @@ that will take."""
 
 import logging
 import math
-import re
 import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, chdir, contextmanager
+from contextlib import chdir, contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -39,6 +38,7 @@ from ..running.cost import (
 )
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
+from ..running.manifest import CHANGED_CODE
 from ..running.provenance import recorded_version
 from ..running.status import format_duration
 from ..settings.base import folder_of
@@ -70,12 +70,6 @@ THROUGH_CORTEX = {
 }
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as
 found on the shipped brains."""
-CODE_ONLY = re.compile(
-    r"before: ('code \w+',?|<nothing exclusive>)*"
-    r" now: ('code \w+',?|<nothing exclusive>)* $"
-)
-"""End of Snakemake's reason to run a job again whose code has changed and nothing else
-of its parameters."""
 
 
 class PlannedJob(NamedTuple):
@@ -244,21 +238,11 @@ def work_of(
 
 
 def _why(reason: str, directory: Path) -> str:
-    """Return Snakemake's reason to run a job in words, the first of several."""
-    changed, _, files = reason.partition("Updated input files: ")
-    if not changed and files.startswith("/"):
-        paths = files.partition(";")[0].split(", ")
-        names = [Path(path).name for path in paths]
-        return f"changed input {', '.join(names)}"
-    if reason.startswith("Params have changed"):
-        if not CODE_ONLY.search(reason):
-            return "changed settings"
+    """Return the reason to run a job in words, the first of several."""
+    if reason == CHANGED_CODE:
         made_by, this = recorded_version(directory), version()
-        return (
-            "changed code"
-            if made_by in (None, this)
-            else f"changed code (gyriflow {made_by}, now {this})"
-        )
+        if made_by not in (None, this):
+            return f"{reason} (gyriflow {made_by}, now {this})"
     return reason.partition(":")[0]
 
 
@@ -281,14 +265,10 @@ def plan(
             )
         return show or record.levelno >= logging.ERROR
 
-    logger = logging.getLogger("snakemake.logging")
-    logger.addFilter(take)
-    # Snakemake makes the working directory, even in a dry run, and changes to it
-    with ExitStack() as end, chdir(Path.cwd()), TemporaryDirectory() as empty:
-        end.callback(logger.removeFilter, take)
+    with TemporaryDirectory() as empty:
         place = directory.resolve() if directory.is_dir() else empty
         options = ["--configfile", str(config.absolute()), "--directory", str(place)]
-        code = launch([*options, "--dry-run", *further])
+        code = launch([*options, "--dry-run", *further], take)
     if code:
         sys.exit(code)
     return jobs

@@ -18,8 +18,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext, suppress
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from contextlib import chdir, nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
 from tempfile import gettempdir
@@ -35,7 +36,16 @@ from ..io.yaml_files import read_keys
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, recorded_exit_code
-from .snakemake_internals import dates_before_copy, temporary_records
+from .manifest import Contents, Job, write_manifest
+from .planning import (
+    Events,
+    Outdated,
+    find_outdated,
+    keep_contents,
+    known_contents,
+    remove_results,
+    view_of,
+)
 
 ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
 """The conda environment, whose variables of MPI and BLAS are defaults in any other one,
@@ -65,6 +75,9 @@ VERBOSE_OPTIONS = (
     "logger",
     "debug",
     "debug_dag",
+)
+"""Options that ask for Snakemake's own messages."""
+MANAGING_OPTIONS = (
     "unlock",
     "touch",
     "report",
@@ -77,13 +90,19 @@ VERBOSE_OPTIONS = (
     "list_params_changes",
     "generate_unit_tests",
 )
-"""Options that ask for Snakemake's own messages, or for something else than running
-steps."""
+"""Options that ask for something else than running steps."""
+PLANNING = (
+    *("--dry-run", "--debug-dag", "--quiet", "rules", "progress"),
+    *("--rerun-incomplete", "--rerun-triggers", "mtime"),
+)
+"""Options with which Snakemake only tells the jobs that it plans."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 """Environment variable: continue after a failed step, or after a row of a table that
 cannot be used."""
 DRY_RUN_VAR = "GYRIFLOW_DRY_RUN"
 """Environment variable: run nothing."""
+PLANNED_VAR = "GYRIFLOW_PLANNED"
+"""Environment variable: the study has been planned, and its messages were printed."""
 MEASURE_ONLY_VAR = "GYRIFLOW_MEASURE_ONLY"
 """Environment variable: fold nothing."""
 REFUSED_FILE_VAR = "GYRIFLOW_REFUSED_FILE"
@@ -308,20 +327,6 @@ def full_disk(directory: Path) -> str:
     return ""
 
 
-def restore_dates(dates: Mapping[Path, float]) -> bool:
-    """Give files and links a date each (s since the epoch); return whether all of
-    several have it now."""
-    try:
-        for path, date in dates.items():
-            os.utime(path, (date, date))
-            if path.is_symlink():
-                os.utime(path, (date, date), follow_symlinks=False)
-    except OSError:
-        # files of another user
-        return False
-    return bool(dates)
-
-
 def set_cache(directory: Path) -> None:
     """Let libraries keep their caches with a study if the home folder cannot be written
     or is unknown."""
@@ -367,9 +372,31 @@ def set_user_name() -> None:
         os.environ["LOGNAME"] = f"user-{os.getuid()}"
 
 
-def call_snakemake(arguments: Sequence[str]) -> int:
+def is_anything(record: logging.LogRecord) -> bool:
+    """Return that a record of Snakemake's log is shown."""
+    return True
+
+
+def is_message(record: logging.LogRecord) -> bool:
+    """Return whether a record of Snakemake's log is shown: no details."""
+    return record.levelno >= logging.INFO
+
+
+def is_error(record: logging.LogRecord) -> bool:
+    """Return whether a record of Snakemake's log is an error."""
+    return record.levelno >= logging.ERROR
+
+
+def call_snakemake(
+    arguments: Sequence[str],
+    events: Events,
+    is_wanted: Callable[[logging.LogRecord], bool] = is_message,
+) -> int:
     """Run Snakemake in this process; return its exit code, or 128 plus the number of
-    the signal that stopped it."""
+    the signal that stopped it.
+
+    `events` takes what its log says, of which `is_wanted` selects what is shown.
+    """
     from snakemake import cli
 
     unknown_targets: list[str] = []
@@ -378,9 +405,10 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         if getattr(record, "event", None) == "run_info":
             # Snakemake's own handler, set by now, waits for running jobs to end
             signal.signal(signal.SIGTERM, interrupt)
-        names = NO_RULE.findall(record.getMessage())
+        events.take(record)
+        names = NO_RULE.findall(record.getMessage()) if is_message(record) else []
         unknown_targets.extend(names)
-        return not names
+        return not names and is_wanted(record)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         received_signals.append(number)
@@ -400,7 +428,9 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(is_shown)
     try:
-        cli.main(arguments)
+        # Snakemake changes to its working directory
+        with chdir(Path.cwd()):
+            cli.main(arguments)
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
@@ -428,9 +458,99 @@ def end_scheduler_timers() -> None:
             thread.cancel()
 
 
-def main(arguments: Sequence[str]) -> int:
+def plan_and_run(
+    arguments: Sequence[str],
+    options: Namespace,
+    directory: Path,
+    place: Path,
+    is_wanted: Callable[[logging.LogRecord], bool],
+) -> int:
+    """Run Snakemake to plan, and again with the results that are outdated; return its
+    exit code.
+
+    `place` is the working directory or, if nothing runs, a view of it. `is_wanted`
+    selects what is shown of Snakemake's log.
+    """
+    if place != directory:
+        set_cache(place)
+        arguments = [*arguments, "--directory", str(place)]
+    manages = any(getattr(options, name, None) for name in MANAGING_OPTIONS)
+    is_plain = options.dryrun or place == directory
+    found = Contents({}, {})
+    outdated = Outdated({}, [], [])
+    planned: list[Job] = []
+    if is_plain and not manages:
+        events = Events()
+        # its settings are those of a run
+        profile = [] if options.workflow_profile else ["--workflow-profile", "none"]
+        code = call_snakemake([*PLANNING, *arguments, *profile], events, is_error)
+        if code:
+            return code
+        planned = list(events.jobs.values())
+        targets = options.targets or ["all"]
+        forced = [*(options.forcerun or []), *(targets if options.force else [])]
+        with chdir(directory if directory.is_dir() else place):
+            found = known_contents(planned)
+            outdated = find_outdated(events, targets, forced, found)
+        os.environ[PLANNED_VAR] = "1"
+    try:
+        if place != directory:
+            with chdir(place):
+                remove_results([*outdated.files, *outdated.late])
+            return call_snakemake(arguments, Events(outdated.reasons), is_wanted)
+        with chdir(directory):
+            keep_contents(planned, found)
+            remove_results(outdated.late)
+        return run_jobs(arguments, options, outdated, found, is_wanted)
+    finally:
+        os.environ.pop(PLANNED_VAR, None)
+
+
+def run_jobs(
+    arguments: Sequence[str],
+    options: Namespace,
+    outdated: Outdated,
+    found: Contents,
+    is_wanted: Callable[[logging.LogRecord], bool],
+) -> int:
+    """Run Snakemake in its working directory, the outdated results made again, and
+    write the manifest of each job that ends; return its exit code."""
+
+    def finish(job: Job) -> None:
+        # a result without a manifest is made again
+        with suppress(StorageError):
+            write_manifest(job, found)
+
+    events = Events(outdated.reasons, finish)
+    arguments = [*arguments, "--debug-dag"]
+    if options.quiet:
+        # it would not tell which jobs have finished
+        arguments += ["--quiet", "rules", "host", "reason"]
+        is_wanted = is_error
+    if outdated.files:
+        arguments = ["--forcerun", *outdated.files, *arguments]
+    asks = [getattr(options, name, None) for name in VERBOSE_OPTIONS + MANAGING_OPTIONS]
+    if not any(asks):
+        name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
+        directory = options.directory or Path()
+        details = directory.resolve() / ".snakemake" / "log" / name
+        arguments = [
+            *("--logger", "gyriflow", "--logger-gyriflow-details", str(details)),
+            *arguments,
+        ]
+        redirect_output(details)
+    return call_snakemake(arguments, events, is_wanted)
+
+
+def main(
+    arguments: Sequence[str],
+    is_wanted: Callable[[logging.LogRecord], bool] = is_message,
+) -> int:
     """Run Snakemake; return the exit code of the first failed step, or else Snakemake's
-    own."""
+    own.
+
+    `is_wanted` takes the records of its log, and selects what is shown.
+    """
     # the program name in Snakemake's usage messages
     sys.argv[0] = "snakemake"
     # takes a second to import; the Snakefile imports this module without needing it
@@ -449,12 +569,6 @@ def main(arguments: Sequence[str]) -> int:
     )
     if not dry_run:
         clear_stale_lock(directory)
-        if restore_dates(dates_before_copy(directory)):
-            text = (
-                "the results were copied, or stored by git-annex: they get the dates at"
-                " which they were made"
-            )
-            print(f"gyriflow: {text}", file=sys.stderr)
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)
@@ -475,27 +589,12 @@ def main(arguments: Sequence[str]) -> int:
         else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
     )
     complete += arguments
-    if not dry_run and not any(
-        getattr(options, name, None) for name in VERBOSE_OPTIONS
-    ):
-        details = (
-            directory.resolve()
-            / ".snakemake"
-            / "log"
-            / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
-        )
-        complete = [
-            "--logger",
-            "gyriflow",
-            "--logger-gyriflow-details",
-            str(details),
-            *complete,
-        ]
-        redirect_output(details)
+    if options.verbose or options.debug_dag:
+        is_wanted = is_anything
     began_s = time.time()
     try:
-        with temporary_records(directory) if runs_nothing else nullcontext():
-            code = call_snakemake(complete)
+        with view_of(directory) if runs_nothing else nullcontext(directory) as place:
+            code = plan_and_run(complete, options, directory, place, is_wanted)
     finally:
         recorded = recorded_exit_code(exit_file)
         exit_file.unlink(missing_ok=True)

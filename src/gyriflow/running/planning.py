@@ -1,0 +1,254 @@
+"""Which planned jobs run again: those whose results do not match their manifest, and
+those that depend on them.
+
+Snakemake tells its jobs as events of its log. It is then told the files to make.
+"""
+
+import logging
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ..errors import InputError, StorageError
+from ..io.files import files_below, read_json, write_json
+from .manifest import (
+    COPIES,
+    UNNAMED,
+    Contents,
+    Job,
+    difference,
+    manifest_of,
+    read_manifest,
+)
+from .provenance import recorded_inputs
+
+FORCED = "Forced execution"
+MISSING = "Missing output files"
+BY_ANOTHER_JOB = "Input files updated by another job"
+
+
+def job_from(job: Any) -> Job:
+    """Return a job of Snakemake's own."""
+    inputs = {}
+    named: list[str] = []
+    for name, files in job.input.items():
+        inputs[name] = [files] if isinstance(files, str) else list(files)
+        named += inputs[name]
+    unnamed = [file for file in job.input if file not in named]
+    if unnamed:
+        inputs[UNNAMED] = unnamed
+    roles = {role: [str(file) for file in files] for role, files in inputs.items()}
+    outputs = [str(file) for file in job.output]
+    # a fetched file of an atlas is an input
+    is_recorded = bool(job.log and outputs) and not Path(outputs[0]).is_absolute()
+    manifest = manifest_of(job.log[0]) if is_recorded else None
+    return Job(
+        job.rule.name, roles, outputs, manifest, lambda: dict(job.params.items())
+    )
+
+
+@dataclass
+class Events:
+    """Jobs that Snakemake plans and finishes, as its log tells them.
+
+    `reasons` replace Snakemake's own reasons to run a job, by the first of its results.
+    `finished` is called with each job that has finished.
+    """
+
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    finished: Callable[[Job], None] | None = None
+    jobs: dict[str, Job] = field(default_factory=dict)
+    first_jobs: dict[str, Job] = field(default_factory=dict)
+    """The jobs as they were planned before the end of checkpoints was known."""
+    _keys: dict[int, str] = field(default_factory=dict)
+
+    def take(self, record: logging.LogRecord) -> None:
+        """Take a record of Snakemake's log."""
+        event = vars(record)
+        match event.get("event"):
+            case "debug_dag" if event.get("status") == "selected":
+                job = job_from(event["job"])
+                self.first_jobs.setdefault(job.key, job)
+                self.jobs[job.key] = job
+            case "job_info" if event["output"]:
+                key = event["output"][0]
+                self._keys[event["jobid"]] = key
+                if key in self.reasons:
+                    record.reason = self.reasons[key]
+            case "job_finished" if self.finished:
+                key = self._keys.get(event["job_id"], "")
+                if key in self.jobs:
+                    self.finished(self.jobs[key])
+
+
+@dataclass(frozen=True)
+class Outdated:
+    """Results that do not match what they would be made from now.
+
+    `reasons` why their jobs run, by the first result. `files` are to be made again;
+    `late` are those of jobs that Snakemake plans only after a checkpoint.
+    """
+
+    reasons: Mapping[str, str]
+    files: list[str]
+    late: list[str]
+
+
+def find_outdated(
+    events: Events, targets: Collection[str], forced: Collection[str], found: Contents
+) -> Outdated:
+    """Return the outdated results of planned jobs, and those that depend on them.
+
+    `targets` and `forced` are rules and files that the call names.
+    """
+    jobs = events.jobs
+    reasons = {}
+    for key, job in jobs.items():
+        if not set(forced).isdisjoint([job.rule, *job.outputs]):
+            reasons[key] = FORCED
+        elif why := _outdated_by_itself(job, found):
+            reasons[key] = why
+    producers = _producers(jobs)
+    for file in _required(jobs.values(), targets):
+        if file in producers and not Path(file).exists():
+            reasons.setdefault(producers[file], f"{MISSING}: {file}")
+    _spread(reasons, jobs, producers)
+    planned_first = _reachable(events.first_jobs, targets)
+    files: list[str] = []
+    late: list[str] = []
+    for key in reasons:
+        existing = [file for file in jobs[key].outputs if Path(file).exists()]
+        if key in planned_first:
+            files += existing
+        else:
+            late += existing
+    return Outdated(reasons, files, late)
+
+
+def _outdated_by_itself(job: Job, found: Contents) -> str:
+    """Return why the results of a job do not match their manifest, or ''."""
+    if job.manifest is None or not any(Path(file).exists() for file in job.outputs):
+        return ""
+    return difference(job, read_manifest(job.manifest), found)
+
+
+def _producers(jobs: Mapping[str, Job]) -> dict[str, str]:
+    """Return the job that makes each file."""
+    producers: dict[str, str] = {}
+    for key, job in jobs.items():
+        producers |= dict.fromkeys(job.outputs, key)
+    return producers
+
+
+def _required(jobs: Iterable[Job], targets: Collection[str]) -> list[str]:
+    """Return the files that a call asks for."""
+    files = list(targets)
+    for job in jobs:
+        if not job.outputs:
+            files += job.files
+        elif job.rule in targets:
+            files += job.outputs
+    return files
+
+
+def _spread(
+    reasons: dict[str, str], jobs: Mapping[str, Job], producers: Mapping[str, str]
+) -> None:
+    """Add the jobs that run because of those with `reasons`: those that read their
+    results, and those that make what they miss."""
+    readers = defaultdict(set)
+    for key, job in jobs.items():
+        for file in job.files:
+            if file in producers and job.outputs:
+                readers[producers[file]].add(key)
+    waiting = list(reasons)
+    while waiting:
+        key = waiting.pop()
+        for file in jobs[key].files:
+            maker = producers.get(file)
+            if maker is not None and maker not in reasons and not Path(file).exists():
+                reasons[maker] = f"{MISSING}: {file}"
+                waiting.append(maker)
+        for reader in readers[key] - reasons.keys():
+            reasons[reader] = f"{BY_ANOTHER_JOB}: {jobs[key].rule}"
+            waiting.append(reader)
+
+
+def _reachable(jobs: Mapping[str, Job], targets: Collection[str]) -> set[str]:
+    """Return the jobs that a call leads to."""
+    producers = _producers(jobs)
+    waiting = [
+        producers[file]
+        for file in _required(jobs.values(), targets)
+        if file in producers
+    ]
+    reached = set()
+    while waiting:
+        key = waiting.pop()
+        if key not in reached:
+            reached.add(key)
+            files = jobs[key].files
+            waiting += [producers[file] for file in files if file in producers]
+    return reached
+
+
+def known_contents(jobs: Iterable[Job]) -> Contents:
+    """Return the contents of the files of planned jobs in the working directory."""
+    jobs = list(jobs)
+    known = recorded_inputs(Path())
+    awaited = {}
+    results = []
+    for job in jobs:
+        known |= read_manifest(job.manifest).get("results", {})
+        results += job.outputs
+        if job.manifest is None and job.outputs:
+            awaited[job.outputs[0]] = str(job.settings().get("sha256"))
+    with suppress(InputError):
+        known |= read_json(COPIES)
+    found = Contents(known, awaited)
+    found.read(results)
+    return found
+
+
+def keep_contents(jobs: Iterable[Job], found: Contents) -> None:
+    """Keep the contents of results that were copied, in the working directory, so that
+    the next call does not read them again."""
+    copied = {}
+    for job in jobs:
+        recorded = read_manifest(job.manifest).get("results", {})
+        for path in job.outputs:
+            facts = found.facts(path)
+            if facts and facts != recorded.get(path):
+                copied[path] = facts
+    if copied:
+        with suppress(StorageError):
+            write_json(COPIES, copied)
+
+
+def remove_results(files: Iterable[str]) -> None:
+    """Remove results that Snakemake would take for current."""
+    for file in files:
+        Path(file).unlink(missing_ok=True)
+
+
+@contextmanager
+def view_of(directory: Path) -> Iterator[Path]:
+    """Yield a folder with links to the results of a working directory and to what else
+    is in it, in which Snakemake may plan: it needs to write, and a study may be
+    read-only."""
+    directory = directory.absolute()
+    with TemporaryDirectory() as scratch:
+        view = Path(scratch)
+        others = directory.iterdir() if directory.is_dir() else []
+        for path in others:
+            if path.name not in (".snakemake", "results"):
+                (view / path.name).symlink_to(path)
+        for path in files_below(directory / "results"):
+            link = view / path.relative_to(directory)
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to(path)
+        yield view
