@@ -382,6 +382,12 @@ def is_message(record: logging.LogRecord) -> bool:
     return record.levelno >= logging.INFO
 
 
+def is_no_progress(record: logging.LogRecord) -> bool:
+    """Return whether a record of Snakemake's log is shown, but not its progress."""
+    is_progress = vars(record).get("event") in ("job_finished", "progress")
+    return is_message(record) and not is_progress
+
+
 def is_error(record: logging.LogRecord) -> bool:
     """Return whether a record of Snakemake's log is an error."""
     return record.levelno >= logging.ERROR
@@ -523,10 +529,12 @@ def run_jobs(
 
     events = Events(outdated.reasons, finish)
     arguments = [*arguments, "--debug-dag"]
-    if options.quiet:
-        # it would not tell which jobs have finished
-        arguments += ["--quiet", "rules", "host", "reason"]
-        is_wanted = is_error
+    quiet = [item.name.lower() for item in options.quiet or []]
+    if "progress" in quiet:
+        # Snakemake would not tell which jobs have finished
+        others = [name for name in quiet if name != "progress"]
+        arguments += ["--quiet", *(others or ["host"])]
+        is_wanted = is_no_progress
     if outdated.files:
         arguments = ["--forcerun", *outdated.files, *arguments]
     asks = [getattr(options, name, None) for name in VERBOSE_OPTIONS + MANAGING_OPTIONS]

@@ -239,8 +239,8 @@ def _changed_keys(name: str, now: str | None, before: str | None) -> list[str]:
     values = []
     for text in (now, before):
         # a long one is a hash
-        with suppress(ValueError, TypeError):
-            values.append(json.loads(text))
+        with suppress(ValueError):
+            values.append(json.loads(text or ""))
     if len(values) < 2:
         return [name]
     new, old = values

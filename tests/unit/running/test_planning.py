@@ -1,0 +1,141 @@
+"""Which jobs of a plan run again, and which files Snakemake is told to make."""
+
+import pytest
+
+from gyriflow.running.manifest import Contents, Job, manifest_of, write_manifest
+from gyriflow.running.planning import (
+    BY_ANOTHER_JOB,
+    FORCED,
+    MISSING,
+    Events,
+    find_outdated,
+    keep_contents,
+    known_contents,
+    view_of,
+)
+
+EDGE = {"edge_mm": 1.0}
+
+
+def planned_job(rule, inputs, output, settings=EDGE):
+    """Return a job with one result."""
+    manifest = manifest_of(f"results/logs/{rule}.log")
+    return Job(rule, {"given": inputs}, [output], manifest, lambda: settings)
+
+
+def plan(settings=EDGE):
+    """Return the jobs of a study: scan, surface, mesh and metrics of it, a table."""
+    jobs = [
+        planned_job("surface", ["scan"], "results/surface", settings),
+        planned_job("mesh", ["results/surface"], "results/mesh"),
+        planned_job("run", ["results/mesh"], "results/run"),
+        planned_job("metrics", ["results/surface"], "results/metrics"),
+        planned_job("other", ["scan"], "results/other"),
+        Job(
+            "all",
+            {"": ["results/run", "results/metrics", "results/other"]},
+            [],
+            None,
+            dict,
+        ),
+    ]
+    keyed = {job.key: job for job in jobs}
+    return Events(jobs=keyed, first_jobs=dict(keyed))
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """A finished study in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results").mkdir()
+    (tmp_path / "scan").write_text("a brain")
+    jobs = [job for job in plan().jobs.values() if job.outputs]
+    for job in jobs:
+        (tmp_path / job.outputs[0]).write_text(job.rule)
+    for job in jobs:
+        write_manifest(job, Contents({}, {}))
+    return tmp_path
+
+
+def reasons(events, targets=("all",), forced=()):
+    """Return why jobs run, by rule."""
+    found = known_contents(events.jobs.values())
+    outdated = find_outdated(events, targets, forced, found)
+    return {events.jobs[key].rule: why for key, why in outdated.reasons.items()}
+
+
+def test_what_matches_its_manifest_is_kept(study):
+    assert reasons(plan()) == {}
+
+
+def test_what_depends_on_an_outdated_result_runs_again_and_nothing_else(study):
+    again = reasons(plan({"edge_mm": 2.0}))
+    assert set(again) == {"surface", "mesh", "metrics", "run"}
+    assert "edge_mm" in again["surface"]
+    assert again["run"] == f"{BY_ANOTHER_JOB}: mesh"
+    (study / "results" / "mesh").write_text("edited")
+    assert set(reasons(plan())) == {"mesh", "run"}
+
+
+def test_a_removed_result_is_made_again_where_something_needs_it(study):
+    (study / "results" / "surface").unlink()
+    assert reasons(plan()) == {}
+    (study / "results" / "metrics").unlink()
+    again = reasons(plan())
+    # the surface is needed for the metrics, and may be another one then
+    assert set(again) == {"surface", "metrics", "mesh", "run"}
+    assert again["metrics"] == f"{MISSING}: results/metrics"
+
+
+def test_what_depends_on_a_forced_job_runs_again(study):
+    again = reasons(plan(), forced=["mesh"])
+    assert again == {"mesh": FORCED, "run": f"{BY_ANOTHER_JOB}: mesh"}
+    assert set(reasons(plan(), forced=["results/run"])) == {"run"}
+
+
+def test_an_asked_for_file_is_made(study):
+    (study / "results" / "surface").unlink()
+    assert "surface" in reasons(plan(), targets=["results/surface"])
+    assert "surface" in reasons(plan(), targets=["surface"])
+
+
+def test_results_behind_a_checkpoint_are_told_apart(study):
+    """Snakemake plans them once it is known what the checkpoint has made."""
+    events = plan({"edge_mm": 2.0})
+    table = events.first_jobs["results/metrics"]
+    events.first_jobs[table.key] = Job(
+        table.rule, {"": ["scan"]}, table.outputs, table.manifest, table.settings
+    )
+    del events.first_jobs["results/surface"]
+    events.first_jobs["results/mesh"] = planned_job("mesh", ["scan"], "results/mesh")
+    found = known_contents(events.jobs.values())
+    outdated = find_outdated(events, ["all"], [], found)
+    assert outdated.late == ["results/surface"]
+    assert set(outdated.files) == {"results/mesh", "results/metrics", "results/run"}
+
+
+def test_contents_of_copied_results_are_read_once(study):
+    for job in plan().jobs.values():
+        for path in job.outputs:
+            content = (study / path).read_text()
+            (study / path).unlink()
+            (study / path).write_text(content)
+    jobs = plan().jobs.values()
+    keep_contents(jobs, known_contents(jobs))
+    again = known_contents(jobs)
+    before = again.facts("results/mesh")
+    assert before == known_contents(jobs).facts("results/mesh")
+    assert (study / ".snakemake" / "gyriflow-contents.json").is_file()
+    assert reasons(plan()) == {}
+
+
+def test_a_view_has_all_but_snakemakes_records_and_can_be_written(study):
+    (study / ".snakemake").mkdir()
+    (study / "results").chmod(0o500)
+    with view_of(study) as view:
+        assert (view / "scan").read_text() == "a brain"
+        assert (view / "results" / "mesh").read_text() == "mesh"
+        assert not (view / ".snakemake").exists()
+        (view / "results" / "mesh").unlink()
+    (study / "results").chmod(0o700)
+    assert (study / "results" / "mesh").is_file()
