@@ -498,6 +498,12 @@ def plan_and_run(
         with chdir(directory if directory.is_dir() else place):
             found = known_contents(planned)
             outdated = find_outdated(events, targets, forced, found)
+        if events.nothing and not outdated.reasons:
+            if place == directory:
+                with chdir(directory):
+                    keep_contents(planned, found)
+            say_nothing_runs(events.nothing, options, is_wanted)
+            return 0
         os.environ[PLANNED_VAR] = "1"
     try:
         if place != directory:
@@ -510,6 +516,22 @@ def plan_and_run(
         return run_jobs(arguments, options, outdated, found, is_wanted)
     finally:
         os.environ.pop(PLANNED_VAR, None)
+
+
+def say_nothing_runs(
+    record: logging.LogRecord,
+    options: Namespace,
+    is_wanted: Callable[[logging.LogRecord], bool],
+) -> None:
+    """Print that everything is up to date, or Snakemake's `record` of it if its own
+    messages are asked for."""
+    if options.dryrun:
+        if is_wanted(record):
+            print(record.getMessage())
+    elif any(getattr(options, name, None) for name in VERBOSE_OPTIONS):
+        print(record.getMessage(), file=sys.stderr)
+    else:
+        print("gyriflow: everything is up to date", file=sys.stderr)
 
 
 def run_jobs(
@@ -537,8 +559,8 @@ def run_jobs(
         is_wanted = is_no_progress
     if outdated.files:
         arguments = ["--forcerun", *outdated.files, *arguments]
-    asks = [getattr(options, name, None) for name in VERBOSE_OPTIONS + MANAGING_OPTIONS]
-    if not any(asks):
+    others = READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS
+    if not any(getattr(options, name, None) for name in others):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         directory = options.directory or Path()
         details = directory.resolve() / ".snakemake" / "log" / name

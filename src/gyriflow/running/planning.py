@@ -56,14 +56,17 @@ class Events:
     """Jobs that Snakemake plans and finishes, as its log tells them.
 
     `reasons` replace Snakemake's own reasons to run a job, by the first of its results.
-    `finished` is called with each job that has finished.
+    `finished` is called with each job that has finished. `jobs` are the planned ones by
+    key, `first_jobs` the same before it was known what checkpoints have made. `nothing`
+    is the record that nothing has to be done.
     """
 
     reasons: Mapping[str, str] = field(default_factory=dict)
     finished: Callable[[Job], None] | None = None
     jobs: dict[str, Job] = field(default_factory=dict)
     first_jobs: dict[str, Job] = field(default_factory=dict)
-    """The jobs as they were planned before the end of checkpoints was known."""
+    nothing: logging.LogRecord | None = None
+    _selected: dict[int, Any] = field(default_factory=dict)
     _keys: dict[int, str] = field(default_factory=dict)
 
     def take(self, record: logging.LogRecord) -> None:
@@ -71,9 +74,7 @@ class Events:
         event = vars(record)
         match event.get("event"):
             case "debug_dag" if event.get("status") == "selected":
-                job = job_from(event["job"])
-                self.first_jobs.setdefault(job.key, job)
-                self.jobs[job.key] = job
+                self._add(event["job"])
             case "job_info" if event["output"]:
                 key = event["output"][0]
                 self._keys[event["jobid"]] = key
@@ -83,6 +84,16 @@ class Events:
                 key = self._keys.get(event["job_id"], "")
                 if key in self.jobs:
                     self.finished(self.jobs[key])
+            case None if record.getMessage().startswith("Nothing to be done"):
+                self.nothing = record
+
+    def _add(self, selected: Any) -> None:
+        # a job is selected for each of its results
+        if id(selected) not in self._selected:
+            self._selected[id(selected)] = selected
+            job = job_from(selected)
+            self.first_jobs.setdefault(job.key, job)
+            self.jobs[job.key] = job
 
 
 @dataclass(frozen=True)
