@@ -17,10 +17,11 @@ from gyriflow.running.snakemake_internals import (
     rerun_on_code_changes,
 )
 
+
 # Dates of files mean nothing: `gyriflow.running.launch` compares results with their manifests, and names the files that
 # Snakemake makes again.
 inputflags:
-    ancient
+    ancient,
 
 
 # a configuration from the command line replaces that of the demo; they are not merged

@@ -1,7 +1,7 @@
 # Shared by all rules: the validated configuration, names and paths of results.
 import os
 
-from gyriflow.errors import GyriflowError
+from gyriflow.errors import GyriflowError, InputError
 from gyriflow.grouping import grouped
 from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
@@ -9,10 +9,17 @@ from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
 from gyriflow.study.registry import target_files, by_rule, files_in, observed_name
 from gyriflow.study.paths import *
-from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, PLANNED_VAR, hold_lock, refused_brains
+from gyriflow.running.launch import (
+    KEEP_GOING_VAR,
+    DRY_RUN_VAR,
+    MEASURE_ONLY_VAR,
+    PLANNED_VAR,
+    hold_lock,
+    refused_brains,
+)
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.running.snakemake_internals import remove_stale
-from gyriflow.step import record_exit_code
+from gyriflow.step import EXIT_FILE, record_exit_code
 
 # scripts and programs find the package without an installation, also in conda environments of single rules, and import
 # nothing from the working directory
@@ -59,6 +66,11 @@ def end_with(error):
     record_exit_code(error.exit_code)
     sys.exit(error.exit_code)
 
+
+if workflow.is_main_process and EXIT_FILE not in os.environ:
+    problem = "Snakemake does not know what results were made from"
+    remedy = "Start it by ./run snakemake or python -m gyriflow.running.launch, with the same arguments."
+    end_with(InputError(problem, remedy=remedy))
 
 study, CONTENTS = validated_study()
 CONFIG = study.config

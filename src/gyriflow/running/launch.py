@@ -21,6 +21,7 @@ import time
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import chdir, nullcontext, suppress
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from tempfile import gettempdir
@@ -36,13 +37,13 @@ from ..io.yaml_files import read_keys
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, recorded_exit_code
-from .manifest import Contents, Job, write_manifest
+from .manifest import Job, write_manifest
 from .planning import (
     Events,
-    Outdated,
-    find_outdated,
+    Plan,
     keep_contents,
-    known_contents,
+    made_plan,
+    no_plan,
     remove_results,
     view_of,
 )
@@ -464,112 +465,115 @@ def end_scheduler_timers() -> None:
             thread.cancel()
 
 
-def plan_and_run(
-    arguments: Sequence[str],
-    options: Namespace,
-    directory: Path,
-    place: Path,
-    is_wanted: Callable[[logging.LogRecord], bool],
-) -> int:
-    """Run Snakemake to plan, and again with the results that are outdated; return its
-    exit code.
+@dataclass(frozen=True)
+class Call:
+    """A call of Snakemake with its arguments, and the options in them.
 
     `place` is the working directory or, if nothing runs, a view of it. `is_wanted`
     selects what is shown of Snakemake's log.
     """
-    if place != directory:
-        set_cache(place)
-        arguments = [*arguments, "--directory", str(place)]
-    manages = any(getattr(options, name, None) for name in MANAGING_OPTIONS)
-    is_plain = options.dryrun or place == directory
-    found = Contents({}, {})
-    outdated = Outdated({}, [], [])
-    planned: list[Job] = []
-    if is_plain and not manages:
-        events = Events()
-        # its settings are those of a run
-        profile = [] if options.workflow_profile else ["--workflow-profile", "none"]
-        code = call_snakemake([*PLANNING, *arguments, *profile], events, is_error)
-        if code:
-            return code
-        planned = list(events.jobs.values())
-        targets = options.targets or ["all"]
-        forced = [*(options.forcerun or []), *(targets if options.force else [])]
-        with chdir(directory if directory.is_dir() else place):
-            found = known_contents(planned)
-            outdated = find_outdated(events, targets, forced, found)
-        if events.nothing and not outdated.reasons:
-            if place == directory:
-                with chdir(directory):
-                    keep_contents(planned, found)
-            say_nothing_runs(events.nothing, options, is_wanted)
-            return 0
-        os.environ[PLANNED_VAR] = "1"
+
+    arguments: list[str]
+    options: Namespace
+    directory: Path
+    place: Path
+    is_wanted: Callable[[logging.LogRecord], bool]
+
+    def has_any(self, names: Sequence[str]) -> bool:
+        """Return whether any of some options is given."""
+        return any(getattr(self.options, name, None) for name in names)
+
+    @property
+    def runs(self) -> bool:
+        """Whether it may run jobs."""
+        return self.place == self.directory
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether it runs jobs or shows those that would run."""
+        is_plain = self.options.dryrun or self.runs
+        return is_plain and not self.has_any(MANAGING_OPTIONS)
+
+    @property
+    def targets(self) -> list[str]:
+        """The rules and files that it asks for."""
+        return self.options.targets or ["all"]
+
+    @property
+    def forced(self) -> list[str]:
+        """The rules and files that run again in any case."""
+        targets = self.targets if self.options.force else []
+        return [*(self.options.forcerun or []), *targets]
+
+
+def plan_and_run(call: Call) -> int:
+    """Have Snakemake plan, and call it again with the results that are outdated; return
+    its exit code."""
+    if not call.is_planned:
+        return run_jobs(call, no_plan())
+    events = Events()
+    # its settings are those of a run
+    profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
+    code = call_snakemake([*PLANNING, *call.arguments, *profile], events, is_error)
+    if code:
+        return code
+    with chdir(call.directory if call.directory.is_dir() else call.place):
+        plan = made_plan(events, call.targets, call.forced)
+        if call.runs:
+            keep_contents(plan)
+    if events.nothing and not plan.reasons:
+        say_nothing_runs(call, events.nothing)
+        return 0
+    with chdir(call.place):
+        # a view has no outdated result, and needs no permission to replace one
+        remove_results(plan.late if call.runs else [*plan.files, *plan.late])
+    os.environ[PLANNED_VAR] = "1"
     try:
-        if place != directory:
-            with chdir(place):
-                remove_results([*outdated.files, *outdated.late])
-            return call_snakemake(arguments, Events(outdated.reasons), is_wanted)
-        with chdir(directory):
-            keep_contents(planned, found)
-            remove_results(outdated.late)
-        return run_jobs(arguments, options, outdated, found, is_wanted)
+        return run_jobs(call, plan)
     finally:
-        os.environ.pop(PLANNED_VAR, None)
+        del os.environ[PLANNED_VAR]
 
 
-def say_nothing_runs(
-    record: logging.LogRecord,
-    options: Namespace,
-    is_wanted: Callable[[logging.LogRecord], bool],
-) -> None:
+def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
     """Print that everything is up to date, or Snakemake's `record` of it if its own
     messages are asked for."""
-    if options.dryrun:
-        if is_wanted(record):
+    if call.options.dryrun:
+        if call.is_wanted(record):
             print(record.getMessage())
-    elif any(getattr(options, name, None) for name in VERBOSE_OPTIONS):
+    elif call.has_any(VERBOSE_OPTIONS):
         print(record.getMessage(), file=sys.stderr)
     else:
         print("gyriflow: everything is up to date", file=sys.stderr)
 
 
-def run_jobs(
-    arguments: Sequence[str],
-    options: Namespace,
-    outdated: Outdated,
-    found: Contents,
-    is_wanted: Callable[[logging.LogRecord], bool],
-) -> int:
-    """Run Snakemake in its working directory, the outdated results made again, and
-    write the manifest of each job that ends; return its exit code."""
+def run_jobs(call: Call, plan: Plan) -> int:
+    """Run Snakemake with the outdated results of a plan made again, and write the
+    manifest of each job that ends; return its exit code."""
+    if not call.runs:
+        return call_snakemake(call.arguments, Events(plan.reasons), call.is_wanted)
 
     def finish(job: Job) -> None:
         # a result without a manifest is made again
         with suppress(StorageError):
-            write_manifest(job, found)
+            write_manifest(job, plan.found)
 
-    events = Events(outdated.reasons, finish)
-    arguments = [*arguments, "--debug-dag"]
-    quiet = [item.name.lower() for item in options.quiet or []]
+    arguments = [*call.arguments, "--debug-dag"]
+    is_wanted = call.is_wanted
+    quiet = [item.name.lower() for item in call.options.quiet or []]
     if "progress" in quiet:
         # Snakemake would not tell which jobs have finished
-        others = [name for name in quiet if name != "progress"]
-        arguments += ["--quiet", *(others or ["host"])]
+        quiet.remove("progress")
+        arguments += ["--quiet", *(quiet or ["host"])]
         is_wanted = is_no_progress
-    if outdated.files:
-        arguments = ["--forcerun", *outdated.files, *arguments]
-    others = READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS
-    if not any(getattr(options, name, None) for name in others):
+    if plan.files:
+        arguments = ["--forcerun", *plan.files, *arguments]
+    if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
-        directory = options.directory or Path()
-        details = directory.resolve() / ".snakemake" / "log" / name
-        arguments = [
-            *("--logger", "gyriflow", "--logger-gyriflow-details", str(details)),
-            *arguments,
-        ]
+        details = call.directory.resolve() / ".snakemake" / "log" / name
+        logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
+        arguments = [*logger, *arguments]
         redirect_output(details)
-    return call_snakemake(arguments, events, is_wanted)
+    return call_snakemake(arguments, Events(plan.reasons, finish), is_wanted)
 
 
 def main(
@@ -624,7 +628,10 @@ def main(
     began_s = time.time()
     try:
         with view_of(directory) if runs_nothing else nullcontext(directory) as place:
-            code = plan_and_run(complete, options, directory, place, is_wanted)
+            if runs_nothing:
+                set_cache(place)
+                complete += ["--directory", str(place)]
+            code = plan_and_run(Call(complete, options, directory, place, is_wanted))
     finally:
         recorded = recorded_exit_code(exit_file)
         exit_file.unlink(missing_ok=True)

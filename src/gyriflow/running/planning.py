@@ -97,26 +97,36 @@ class Events:
 
 
 @dataclass(frozen=True)
-class Outdated:
-    """Results that do not match what they would be made from now.
+class Plan:
+    """Planned jobs, and those whose results do not match what they would be made from
+    now.
 
-    `reasons` why their jobs run, by the first result. `files` are to be made again;
-    `late` are those of jobs that Snakemake plans only after a checkpoint.
+    `reasons` why jobs run are by their first result. The outdated `files` are to be
+    made again; `late` ones are of jobs that Snakemake plans only after a checkpoint.
+    `found` are the contents of files before the run.
     """
 
+    jobs: Collection[Job]
+    found: Contents
     reasons: Mapping[str, str]
     files: list[str]
     late: list[str]
 
 
-def find_outdated(
-    events: Events, targets: Collection[str], forced: Collection[str], found: Contents
-) -> Outdated:
-    """Return the outdated results of planned jobs, and those that depend on them.
+def no_plan() -> Plan:
+    """Return the plan of a call that does not plan."""
+    return Plan([], Contents({}, {}), {}, [], [])
+
+
+def made_plan(
+    events: Events, targets: Collection[str], forced: Collection[str]
+) -> Plan:
+    """Return the plan of the jobs that Snakemake has told, for the working directory.
 
     `targets` and `forced` are rules and files that the call names.
     """
     jobs = events.jobs
+    found = _present_contents(jobs.values())
     reasons = {}
     for key, job in jobs.items():
         if not set(forced).isdisjoint([job.rule, *job.outputs]):
@@ -137,7 +147,7 @@ def find_outdated(
             files += existing
         else:
             late += existing
-    return Outdated(reasons, files, late)
+    return Plan(jobs.values(), found, reasons, files, late)
 
 
 def _outdated_by_itself(job: Job, found: Contents) -> str:
@@ -207,9 +217,8 @@ def _reachable(jobs: Mapping[str, Job], targets: Collection[str]) -> set[str]:
     return reached
 
 
-def known_contents(jobs: Iterable[Job]) -> Contents:
-    """Return the contents of the files of planned jobs in the working directory."""
-    jobs = list(jobs)
+def _present_contents(jobs: Collection[Job]) -> Contents:
+    """Return the contents of the files of planned jobs."""
     known = recorded_inputs(Path())
     awaited = {}
     results = []
@@ -225,14 +234,16 @@ def known_contents(jobs: Iterable[Job]) -> Contents:
     return found
 
 
-def keep_contents(jobs: Iterable[Job], found: Contents) -> None:
-    """Keep the contents of results that were copied, in the working directory, so that
-    the next call does not read them again."""
+def keep_contents(plan: Plan) -> None:
+    """Find the contents of inputs before a run, and keep those of results that were
+    copied, in the working directory, so that the next call does not read them again."""
     copied = {}
-    for job in jobs:
+    for job in plan.jobs:
+        for path in job.files:
+            plan.found.get(path)
         recorded = read_manifest(job.manifest).get("results", {})
         for path in job.outputs:
-            facts = found.facts(path)
+            facts = plan.found.facts(path)
             if facts and facts != recorded.get(path):
                 copied[path] = facts
     if copied:
