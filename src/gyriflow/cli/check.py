@@ -39,6 +39,7 @@ from ..running.cost import (
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
 from ..running.manifest import CHANGED_CODE
+from ..running.planning import Plan
 from ..running.provenance import recorded_version
 from ..running.status import format_duration
 from ..settings.base import folder_of
@@ -73,7 +74,7 @@ found on the shipped brains."""
 
 
 class PlannedJob(NamedTuple):
-    """A job of a dry run, with Snakemake's reason to run it."""
+    """A job of a dry run, with the reason to run it."""
 
     rule: str
     wildcards: dict[str, str]
@@ -251,27 +252,21 @@ def plan(
 ) -> list[PlannedJob]:
     """Return the jobs that Snakemake would run, without targets, or exit with its code;
     `show` lists them, too."""
-    jobs = []
-
-    def take(record: logging.LogRecord) -> bool:
-        job = vars(record)
-        if job.get("event") == "job_info" and job["output"]:
-            files = job["input"] or (), job["output"]
-            names = dict(job["wildcards"] or {})
-            jobs.append(
-                PlannedJob(
-                    job["rule_name"], names, job["threads"], job["reason"], *files
-                )
-            )
-        return show or record.levelno >= logging.ERROR
-
+    plans: list[Plan] = []
     with TemporaryDirectory() as empty:
         place = directory.resolve() if directory.is_dir() else empty
         options = ["--configfile", str(config.absolute()), "--directory", str(place)]
-        code = launch([*options, "--dry-run", *further], take)
-    if code:
-        sys.exit(code)
-    return jobs
+        call = [*options, "--dry-run", *further]
+        code = launch(call) if show else 0
+        code = code or launch(call, plans.append)
+        if code:
+            sys.exit(code)
+        jobs = []
+        for job, why in plans[0].reasoned_jobs:
+            names = dict(job.wildcards)
+            files = job.files, job.outputs
+            jobs.append(PlannedJob(job.rule, names, job.threads(), why, *files))
+        return jobs
 
 
 def _contents(study: Study) -> str:

@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import chdir, nullcontext, suppress
 from dataclasses import dataclass
 from datetime import datetime
@@ -469,15 +469,15 @@ def end_scheduler_timers() -> None:
 class Call:
     """A call of Snakemake with its arguments, and the options in them.
 
-    `place` is the working directory or, if nothing runs, a view of it. `is_wanted`
-    selects what is shown of Snakemake's log.
+    `place` is the working directory or, if nothing runs, a view of it. With
+    `take_plan`, which gets the plan, nothing is run or shown.
     """
 
     arguments: list[str]
     options: Namespace
     directory: Path
     place: Path
-    is_wanted: Callable[[logging.LogRecord], bool]
+    take_plan: Callable[[Plan], None] | None
 
     def has_any(self, names: Sequence[str]) -> bool:
         """Return whether any of some options is given."""
@@ -499,9 +499,10 @@ class Call:
         """The rules and files that it asks for."""
         return self.options.targets or ["all"]
 
-    @property
-    def forced(self) -> list[str]:
-        """The rules and files that run again in any case."""
+    def forced(self, jobs: Iterable[Job]) -> list[str]:
+        """Return the rules and files of planned jobs that run again in any case."""
+        if self.options.forceall:
+            return [job.rule for job in jobs]
         targets = self.targets if self.options.force else []
         return [*(self.options.forcerun or []), *targets]
 
@@ -518,9 +519,13 @@ def plan_and_run(call: Call) -> int:
     if code:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
-        plan = made_plan(events, call.targets, call.forced)
+        forced = call.forced(events.jobs.values())
+        plan = made_plan(events, call.targets, forced)
         if call.runs:
             keep_contents(plan)
+    if call.take_plan:
+        call.take_plan(plan)
+        return 0
     if events.nothing and not plan.reasons:
         say_nothing_runs(call, events.nothing)
         return 0
@@ -538,8 +543,7 @@ def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
     """Print that everything is up to date, or Snakemake's `record` of it if its own
     messages are asked for."""
     if call.options.dryrun:
-        if call.is_wanted(record):
-            print(record.getMessage())
+        print(record.getMessage())
     elif call.has_any(VERBOSE_OPTIONS):
         print(record.getMessage(), file=sys.stderr)
     else:
@@ -549,8 +553,10 @@ def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
 def run_jobs(call: Call, plan: Plan) -> int:
     """Run Snakemake with the outdated results of a plan made again, and write the
     manifest of each job that ends; return its exit code."""
+    is_detailed = call.options.verbose or call.options.debug_dag
+    is_wanted = is_anything if is_detailed else is_message
     if not call.runs:
-        return call_snakemake(call.arguments, Events(plan.reasons), call.is_wanted)
+        return call_snakemake(call.arguments, Events(plan.reasons), is_wanted)
 
     def finish(job: Job) -> None:
         # a result without a manifest is made again
@@ -558,7 +564,6 @@ def run_jobs(call: Call, plan: Plan) -> int:
             write_manifest(job, plan.found)
 
     arguments = [*call.arguments, "--debug-dag"]
-    is_wanted = call.is_wanted
     quiet = [item.name.lower() for item in call.options.quiet or []]
     if "progress" in quiet:
         # Snakemake would not tell which jobs have finished
@@ -577,13 +582,12 @@ def run_jobs(call: Call, plan: Plan) -> int:
 
 
 def main(
-    arguments: Sequence[str],
-    is_wanted: Callable[[logging.LogRecord], bool] = is_message,
+    arguments: Sequence[str], take_plan: Callable[[Plan], None] | None = None
 ) -> int:
     """Run Snakemake; return the exit code of the first failed step, or else Snakemake's
     own.
 
-    `is_wanted` takes the records of its log, and selects what is shown.
+    With `take_plan`, a dry run shows nothing and calls it with the plan.
     """
     # the program name in Snakemake's usage messages
     sys.argv[0] = "snakemake"
@@ -623,15 +627,13 @@ def main(
         else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
     )
     complete += arguments
-    if options.verbose or options.debug_dag:
-        is_wanted = is_anything
     began_s = time.time()
     try:
         with view_of(directory) if runs_nothing else nullcontext(directory) as place:
             if runs_nothing:
                 set_cache(place)
                 complete += ["--directory", str(place)]
-            code = plan_and_run(Call(complete, options, directory, place, is_wanted))
+            code = plan_and_run(Call(complete, options, directory, place, take_plan))
     finally:
         recorded = recorded_exit_code(exit_file)
         exit_file.unlink(missing_ok=True)

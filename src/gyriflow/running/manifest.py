@@ -9,7 +9,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ that they are read once."""
 MAX_SETTING = 500
 """Longer settings (characters) are recorded by their hash."""
 NO_MANIFEST = "no manifest of what it was made from"
+CODE = ("code", "command")
+"""Settings that are hashes of the code behind a rule."""
 CHANGED_CODE = "changed code"
 UNNAMED = ""
 """The role of the inputs that have no name in their rule."""
@@ -38,7 +40,7 @@ class Job:
 
     `inputs` are its files by role, in their order. `manifest` is the path of its
     manifest; None if it has no results to record. `settings` returns the parameters by
-    name, which some rules compute.
+    name, `threads` their number, both of which some rules compute.
     """
 
     rule: str
@@ -46,6 +48,8 @@ class Job:
     outputs: list[str]
     manifest: Path | None
     settings: Callable[[], Mapping[str, Any]]
+    wildcards: Mapping[str, str] = field(default_factory=dict)
+    threads: Callable[[], int] = int
 
     @property
     def key(self) -> str:
@@ -136,7 +140,7 @@ def _described(value: Any, found: Contents) -> Any:
     if isinstance(value, Iterable):
         return [_described(item, found) for item in value]
     if is_dataclass(value):
-        named = {field.name: getattr(value, field.name) for field in fields(value)}
+        named = {item.name: getattr(value, item.name) for item in fields(value)}
         return _described(named, found)
     return type(value).__name__
 
@@ -225,10 +229,11 @@ def _changed_settings(now: Mapping[str, str], before: Mapping[str, str]) -> str:
     names = [name for name in {**now, **before} if now.get(name) != before.get(name)]
     if not names:
         return ""
-    if {"code", "command"}.issuperset(names):
+    others = [name for name in names if name not in CODE]
+    if not others:
         return CHANGED_CODE
     changes = []
-    for name in names:
+    for name in others:
         changes += _changed_keys(name, now.get(name), before.get(name))
     return f"changed settings {', '.join(dict.fromkeys(changes))}"
 

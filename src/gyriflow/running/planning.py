@@ -34,20 +34,26 @@ BY_ANOTHER_JOB = "Input files updated by another job"
 def job_from(job: Any) -> Job:
     """Return a job of Snakemake's own."""
     inputs = {}
-    named: list[str] = []
+    named: set[str] = set()
     for name, files in job.input.items():
-        inputs[name] = [files] if isinstance(files, str) else list(files)
-        named += inputs[name]
-    unnamed = [file for file in job.input if file not in named]
+        paths = [files] if isinstance(files, str) else files
+        inputs[name] = [str(path) for path in paths]
+        named.update(inputs[name])
+    unnamed = [str(path) for path in job.input if str(path) not in named]
     if unnamed:
         inputs[UNNAMED] = unnamed
-    roles = {role: [str(file) for file in files] for role, files in inputs.items()}
     outputs = [str(file) for file in job.output]
     # a fetched file of an atlas is an input
     is_recorded = bool(job.log and outputs) and not Path(outputs[0]).is_absolute()
     manifest = manifest_of(job.log[0]) if is_recorded else None
     return Job(
-        job.rule.name, roles, outputs, manifest, lambda: dict(job.params.items())
+        job.rule.name,
+        inputs,
+        outputs,
+        manifest,
+        settings=lambda: dict(job.params.items()),
+        wildcards=job.wildcards_dict,
+        threads=lambda: job.threads,
     )
 
 
@@ -111,6 +117,15 @@ class Plan:
     reasons: Mapping[str, str]
     files: list[str]
     late: list[str]
+
+    @property
+    def reasoned_jobs(self) -> list[tuple[Job, str]]:
+        """The jobs that run, each with its reason."""
+        return [
+            (job, self.reasons[job.key])
+            for job in self.jobs
+            if job.outputs and job.key in self.reasons
+        ]
 
 
 def no_plan() -> Plan:

@@ -126,7 +126,8 @@ def test_changed_code_is_told_only_where_nothing_else_has_changed(job):
     newer = dict(job.settings()) | {"code": "code 2"}
     assert how(replace(job, settings=lambda: newer)) == CHANGED_CODE
     coarser = newer | {"surface": {"edge_length_mm": 2.0, "open_sulci": True}}
-    assert how(replace(job, settings=lambda: coarser)) == Facts("edge_length_mm 2.0")
+    told = how(replace(job, settings=lambda: coarser))
+    assert told == "changed settings edge_length_mm 2.0 (was 1.0)"
 
 
 @pytest.mark.parametrize("text", [None, "{"])
