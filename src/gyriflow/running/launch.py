@@ -42,6 +42,7 @@ from .planning import (
     Events,
     Plan,
     keep_contents,
+    link_results,
     made_plan,
     no_plan,
     remove_results,
@@ -529,9 +530,10 @@ def plan_and_run(call: Call) -> int:
     if events.nothing and not plan.reasons:
         say_nothing_runs(call, events.nothing)
         return 0
-    with chdir(call.place):
-        # a view has no outdated result, and needs no permission to replace one
-        remove_results(plan.late if call.runs else [*plan.files, *plan.late])
+    if call.runs:
+        remove_results(call.directory, plan.late)
+    else:
+        link_results(call.directory, call.place, [*plan.files, *plan.late])
     os.environ[PLANNED_VAR] = "1"
     try:
         return run_jobs(call, plan)

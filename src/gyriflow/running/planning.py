@@ -5,6 +5,8 @@ Snakemake tells its jobs as events of its log. It is then told the files to make
 """
 
 import logging
+import os
+import shutil
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -266,26 +268,51 @@ def keep_contents(plan: Plan) -> None:
             write_json(COPIES, copied)
 
 
-def remove_results(files: Iterable[str]) -> None:
+def remove_results(directory: Path, files: Iterable[str]) -> None:
     """Remove results that Snakemake would take for current."""
     for file in files:
-        Path(file).unlink(missing_ok=True)
+        (directory / file).unlink(missing_ok=True)
 
 
 @contextmanager
 def view_of(directory: Path) -> Iterator[Path]:
-    """Yield a folder with links to the results of a working directory and to what else
-    is in it, in which Snakemake may plan: it needs to write, and a study may be
-    read-only."""
-    directory = directory.absolute()
+    """Yield a folder with links to what is in a working directory, in which Snakemake
+    may plan: it needs to write, and a study may be read-only."""
     with TemporaryDirectory() as scratch:
         view = Path(scratch)
-        others = directory.iterdir() if directory.is_dir() else []
+        others = directory.absolute().iterdir() if directory.is_dir() else []
         for path in others:
             if path.name not in (".snakemake", "results"):
                 (view / path.name).symlink_to(path)
-        for path in files_below(directory / "results"):
-            link = view / path.relative_to(directory)
-            link.parent.mkdir(parents=True, exist_ok=True)
-            link.symlink_to(path)
+        link_results(directory, view, [])
         yield view
+
+
+def link_results(directory: Path, view: Path, left_out: Iterable[str]) -> None:
+    """Link the results of a working directory into a view of it, without some files.
+
+    Folders are linked whole where that is possible. Files that cannot be written are
+    linked one by one: Snakemake refuses to plan their replacement, but that of links.
+    """
+    results, links = directory.absolute() / "results", view / "results"
+    if links.is_symlink():
+        links.unlink()
+    elif links.is_dir():
+        shutil.rmtree(links)
+    hidden = {directory.absolute() / file for file in left_out}
+    parted: set[Path] = set()
+    for path in files_below(results):
+        if path in hidden or not os.access(path, os.W_OK):
+            parted.update(path.parents)
+    if results.is_dir():
+        _link(results, links, hidden, parted)
+
+
+def _link(source: Path, link: Path, hidden: set[Path], parted: set[Path]) -> None:
+    if source not in parted:
+        link.symlink_to(source)
+        return
+    link.mkdir()
+    for path in source.iterdir():
+        if path not in hidden:
+            _link(path, link / path.name, hidden, parted)

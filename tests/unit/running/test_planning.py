@@ -11,6 +11,7 @@ from gyriflow.running.planning import (
     MISSING,
     Events,
     keep_contents,
+    link_results,
     made_plan,
     view_of,
 )
@@ -136,6 +137,9 @@ def test_a_view_has_all_but_snakemakes_records_and_can_be_written(study):
         assert (view / "scan").read_text() == "a brain"
         assert (view / "results" / "mesh").read_text() == "mesh"
         assert not (view / ".snakemake").exists()
-        (view / "results" / "mesh").unlink()
+        link_results(study, view, ["results/mesh"])
+        assert not (view / "results" / "mesh").exists()
+        assert (view / "results" / "run").read_text() == "run"
+        assert (view / "results" / "manifest").is_dir()
     (study / "results").chmod(0o700)
     assert (study / "results" / "mesh").is_file()
