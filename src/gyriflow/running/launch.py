@@ -41,11 +41,12 @@ from .manifest import Job, write_manifest
 from .planning import (
     Events,
     Plan,
+    hide_results,
     keep_contents,
     link_results,
     made_plan,
     no_plan,
-    remove_results,
+    restore_results,
     view_of,
 )
 
@@ -93,10 +94,10 @@ MANAGING_OPTIONS = (
     "generate_unit_tests",
 )
 """Options that ask for something else than running steps."""
-PLANNING = (
-    *("--dry-run", "--debug-dag", "--quiet", "rules", "progress"),
-    *("--rerun-incomplete", "--rerun-triggers", "mtime"),
-)
+BY_MANIFEST = ("--rerun-triggers", "mtime", "--debug-dag")
+"""Options with which Snakemake tells all jobs, and compares none with its own records.
+Dates do not count, either, as all inputs are `ancient`."""
+PLANNING = (*BY_MANIFEST, "--quiet", "rules", "progress", "--rerun-incomplete", "-n")
 """Options with which Snakemake only tells the jobs that it plans."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 """Environment variable: continue after a failed step, or after a row of a table that
@@ -509,8 +510,11 @@ class Call:
 
 
 def plan_and_run(call: Call) -> int:
-    """Have Snakemake plan, and call it again with the results that are outdated; return
-    its exit code."""
+    """Have Snakemake plan, and call it again without the results that are outdated;
+    return its exit code."""
+    if call.runs:
+        # of a run that was killed
+        restore_results(call.directory)
     if not call.is_planned:
         return run_jobs(call, no_plan())
     events = Events()
@@ -531,9 +535,9 @@ def plan_and_run(call: Call) -> int:
         say_nothing_runs(call, events.nothing)
         return 0
     if call.runs:
-        remove_results(call.directory, plan.late)
+        hide_results(call.directory, plan.outdated)
     else:
-        link_results(call.directory, call.place, [*plan.files, *plan.late])
+        link_results(call.directory, call.place, plan.outdated)
     os.environ[PLANNED_VAR] = "1"
     try:
         return run_jobs(call, plan)
@@ -553,34 +557,36 @@ def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
 
 
 def run_jobs(call: Call, plan: Plan) -> int:
-    """Run Snakemake with the outdated results of a plan made again, and write the
-    manifest of each job that ends; return its exit code."""
+    """Run Snakemake, whose outdated results are hidden, and write the manifest of each
+    job that ends; return its exit code."""
     is_detailed = call.options.verbose or call.options.debug_dag
     is_wanted = is_anything if is_detailed else is_message
+    arguments = [*BY_MANIFEST, *call.arguments]
     if not call.runs:
-        return call_snakemake(call.arguments, Events(plan.reasons), is_wanted)
+        return call_snakemake(arguments, Events(plan.reasons), is_wanted)
 
     def finish(job: Job) -> None:
         # a result without a manifest is made again
         with suppress(StorageError):
             write_manifest(job, plan.found)
 
-    arguments = [*call.arguments, "--debug-dag"]
     quiet = [item.name.lower() for item in call.options.quiet or []]
     if "progress" in quiet:
         # Snakemake would not tell which jobs have finished
         quiet.remove("progress")
         arguments += ["--quiet", *(quiet or ["host"])]
         is_wanted = is_no_progress
-    if plan.files:
-        arguments = ["--forcerun", *plan.files, *arguments]
     if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         details = call.directory.resolve() / ".snakemake" / "log" / name
         logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
         arguments = [*logger, *arguments]
         redirect_output(details)
-    return call_snakemake(arguments, Events(plan.reasons, finish), is_wanted)
+    events = Events(plan.reasons, finish)
+    try:
+        return call_snakemake(arguments, events, is_wanted)
+    finally:
+        restore_results(call.directory, events.started)
 
 
 def main(

@@ -30,6 +30,8 @@ from .provenance import recorded_inputs
 
 FORCED = "Forced execution"
 MISSING = "Missing output files"
+HIDDEN = ".outdated."
+"""Start of the names of outdated results during a run."""
 BY_ANOTHER_JOB = "Input files updated by another job"
 
 
@@ -65,14 +67,12 @@ class Events:
 
     `reasons` replace Snakemake's own reasons to run a job, by the first of its results.
     `finished` is called with each job that has finished. `jobs` are the planned ones by
-    key, `first_jobs` the same before it was known what checkpoints have made. `nothing`
-    is the record that nothing has to be done.
+    key. `nothing` is the record that nothing has to be done.
     """
 
     reasons: Mapping[str, str] = field(default_factory=dict)
     finished: Callable[[Job], None] | None = None
     jobs: dict[str, Job] = field(default_factory=dict)
-    first_jobs: dict[str, Job] = field(default_factory=dict)
     nothing: logging.LogRecord | None = None
     _selected: dict[int, Any] = field(default_factory=dict)
     _keys: dict[int, str] = field(default_factory=dict)
@@ -95,12 +95,21 @@ class Events:
             case None if record.getMessage().startswith("Nothing to be done"):
                 self.nothing = record
 
+    @property
+    def started(self) -> set[str]:
+        """The results of the jobs that have started."""
+        files: set[str] = set()
+        for key in self._keys.values():
+            if key in self.jobs:
+                files.update(self.jobs[key].outputs)
+        return files
+
     def _add(self, selected: Any) -> None:
         # a job is selected for each of its results
         if id(selected) not in self._selected:
             self._selected[id(selected)] = selected
+            # also again, once it is known what a checkpoint has made
             job = job_from(selected)
-            self.first_jobs.setdefault(job.key, job)
             self.jobs[job.key] = job
 
 
@@ -109,16 +118,14 @@ class Plan:
     """Planned jobs, and those whose results do not match what they would be made from
     now.
 
-    `reasons` why jobs run are by their first result. The outdated `files` are to be
-    made again; `late` ones are of jobs that Snakemake plans only after a checkpoint.
-    `found` are the contents of files before the run.
+    `reasons` why jobs run are by their first result. `outdated` are files to be made
+    again. `found` are the contents of files before the run.
     """
 
     jobs: Collection[Job]
     found: Contents
     reasons: Mapping[str, str]
-    files: list[str]
-    late: list[str]
+    outdated: list[str]
 
     @property
     def reasoned_jobs(self) -> list[tuple[Job, str]]:
@@ -132,7 +139,7 @@ class Plan:
 
 def no_plan() -> Plan:
     """Return the plan of a call that does not plan."""
-    return Plan([], Contents({}, {}), {}, [], [])
+    return Plan([], Contents({}, {}), {}, [])
 
 
 def made_plan(
@@ -155,16 +162,10 @@ def made_plan(
         if file in producers and not Path(file).exists():
             reasons.setdefault(producers[file], f"{MISSING}: {file}")
     _spread(reasons, jobs, producers)
-    planned_first = _reachable(events.first_jobs, targets)
-    files: list[str] = []
-    late: list[str] = []
+    outdated = []
     for key in reasons:
-        existing = [file for file in jobs[key].outputs if Path(file).exists()]
-        if key in planned_first:
-            files += existing
-        else:
-            late += existing
-    return Plan(jobs.values(), found, reasons, files, late)
+        outdated += [file for file in jobs[key].outputs if Path(file).exists()]
+    return Plan(jobs.values(), found, reasons, outdated)
 
 
 def _outdated_by_itself(job: Job, found: Contents) -> str:
@@ -216,24 +217,6 @@ def _spread(
             waiting.append(reader)
 
 
-def _reachable(jobs: Mapping[str, Job], targets: Collection[str]) -> set[str]:
-    """Return the jobs that a call leads to."""
-    producers = _producers(jobs)
-    waiting = [
-        producers[file]
-        for file in _required(jobs.values(), targets)
-        if file in producers
-    ]
-    reached = set()
-    while waiting:
-        key = waiting.pop()
-        if key not in reached:
-            reached.add(key)
-            files = jobs[key].files
-            waiting += [producers[file] for file in files if file in producers]
-    return reached
-
-
 def _present_contents(jobs: Collection[Job]) -> Contents:
     """Return the contents of the files of planned jobs."""
     known = recorded_inputs(Path())
@@ -268,10 +251,25 @@ def keep_contents(plan: Plan) -> None:
             write_json(COPIES, copied)
 
 
-def remove_results(directory: Path, files: Iterable[str]) -> None:
-    """Remove results that Snakemake would take for current."""
+def hide_results(directory: Path, files: Iterable[str]) -> None:
+    """Rename results that Snakemake would take for current."""
     for file in files:
-        (directory / file).unlink(missing_ok=True)
+        path = directory / file
+        path.rename(path.with_name(HIDDEN + path.name))
+
+
+def restore_results(directory: Path, replaced: Collection[str] = ()) -> None:
+    """Give hidden results their names again, unless they were made again or `replaced`
+    by a step that failed."""
+    for hidden in files_below(directory / "results"):
+        if not hidden.name.startswith(HIDDEN):
+            continue
+        path = hidden.with_name(hidden.name.removeprefix(HIDDEN))
+        is_replaced = path.relative_to(directory).as_posix() in replaced
+        if is_replaced or path.exists():
+            hidden.unlink()
+        else:
+            hidden.rename(path)
 
 
 @contextmanager

@@ -10,9 +10,11 @@ from gyriflow.running.planning import (
     FORCED,
     MISSING,
     Events,
+    hide_results,
     keep_contents,
     link_results,
     made_plan,
+    restore_results,
     view_of,
 )
 
@@ -42,7 +44,7 @@ def plan(settings=EDGE):
         ),
     ]
     keyed = {job.key: job for job in jobs}
-    return Events(jobs=keyed, first_jobs=dict(keyed))
+    return Events(jobs=keyed)
 
 
 @pytest.fixture
@@ -100,18 +102,18 @@ def test_an_asked_for_file_is_made(study):
     assert "surface" in reasons(plan(), targets=["surface"])
 
 
-def test_results_behind_a_checkpoint_are_told_apart(study):
-    """Snakemake plans them once it is known what the checkpoint has made."""
-    events = plan({"edge_mm": 2.0})
-    table = events.first_jobs["results/metrics"]
-    events.first_jobs[table.key] = Job(
-        table.rule, {"": ["scan"]}, table.outputs, table.manifest, table.settings
-    )
-    del events.first_jobs["results/surface"]
-    events.first_jobs["results/mesh"] = planned_job("mesh", ["scan"], "results/mesh")
-    outdated = made_plan(events, ["all"], [])
-    assert outdated.late == ["results/surface"]
-    assert set(outdated.files) == {"results/mesh", "results/metrics", "results/run"}
+def test_outdated_results_are_hidden_during_a_run_and_not_lost(study):
+    made = made_plan(plan({"edge_mm": 2.0}), ["all"], [])
+    names = {"results/surface", "results/mesh", "results/metrics", "results/run"}
+    assert set(made.outdated) == names
+    hide_results(study, made.outdated)
+    assert not any((study / name).exists() for name in names)
+    # one was made again, the job of another failed, the others have not begun
+    (study / "results" / "surface").write_text("new")
+    restore_results(study, ["results/metrics"])
+    left = {path.name: path.read_text() for path in study.glob("results/*[!t]")}
+    assert left == {"surface": "new", "mesh": "mesh", "run": "run", "other": "other"}
+    assert not list(study.rglob(".outdated*"))
 
 
 def test_contents_of_copied_results_are_read_once(study):
