@@ -1,5 +1,6 @@
 # Shared by all rules: the validated configuration, names and paths of results.
 import os
+from contextlib import chdir
 
 from gyriflow.errors import GyriflowError, InputError
 from gyriflow.grouping import grouped
@@ -11,6 +12,7 @@ from gyriflow.study.registry import target_files, by_rule, files_in, observed_na
 from gyriflow.study.paths import *
 from gyriflow.running.launch import (
     KEEP_GOING_VAR,
+    DIRECTORY_VAR,
     DRY_RUN_VAR,
     MEASURE_ONLY_VAR,
     PLANNED_VAR,
@@ -44,14 +46,17 @@ def validated_study():
     from gyriflow.io.yaml_files import read_keys
 
     try:
-        base = Path.cwd()
+        base = Path(os.environ.get(DIRECTORY_VAR, os.curdir)).absolute()
         for path in workflow.configfiles:
             # Snakemake itself keeps the last of two equal keys
             file = Path(workflow.workdir_init, path)
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = folder_of(file)
-        found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
-        study = resolve(found.measured_only if MEASURE_ONLY_VAR in os.environ else found, refused_brains())
+        # a dry run is in a view of the working directory
+        with chdir(os.environ.get(DIRECTORY_VAR, os.curdir)):
+            found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
+            used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
+            study = resolve(used, refused_brains())
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             check_results_belong_to(Path.cwd(), files, found, record=RUNS)

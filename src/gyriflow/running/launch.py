@@ -104,6 +104,8 @@ KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 cannot be used."""
 DRY_RUN_VAR = "GYRIFLOW_DRY_RUN"
 """Environment variable: run nothing."""
+DIRECTORY_VAR = "GYRIFLOW_DIRECTORY"
+"""Environment variable: the working directory that a dry run is a view of."""
 PLANNED_VAR = "GYRIFLOW_PLANNED"
 """Environment variable: the study has been planned, and its messages were printed."""
 MEASURE_ONLY_VAR = "GYRIFLOW_MEASURE_ONLY"
@@ -638,9 +640,12 @@ def main(
     began_s = time.time()
     try:
         with view_of(directory) if runs_nothing else nullcontext(directory) as place:
+            os.environ.pop(DIRECTORY_VAR, None)
             if runs_nothing:
                 set_cache(place)
                 complete += ["--directory", str(place)]
+                if directory.is_dir():
+                    os.environ[DIRECTORY_VAR] = str(directory.absolute())
             code = plan_and_run(Call(complete, options, directory, place, take_plan))
     finally:
         recorded = recorded_exit_code(exit_file)
