@@ -80,13 +80,13 @@ class Contents:
     """Contents of files by path: hashes that are computed once, and kept of files that
     have not changed.
 
-    `known` are `io.files.contents` of an earlier run, `awaited` the hashes of files
-    that jobs of this run fetch.
+    `known` are `io.files.contents` of an earlier run. `absent` are the hashes that
+    files would have which are not there: removed results, and files to be fetched.
     """
 
-    def __init__(self, known: Mapping[str, Any], awaited: Mapping[str, str]) -> None:
+    def __init__(self, known: Mapping[str, Any], absent: Mapping[str, str]) -> None:
         self._known = known
-        self._awaited = awaited
+        self._absent = absent
         self._facts: dict[str, list[Any]] = {}
         self._hashes: dict[str, str] = {}
 
@@ -98,10 +98,10 @@ class Contents:
 
     def get(self, path: str) -> str | None:
         """Return the hash of a file, with those of its companions; None if it is
-        missing."""
+        unknown."""
         if path not in self._hashes:
             self.read([path])
-        return self._hashes.get(path) or self._awaited.get(path)
+        return self._hashes.get(path) or self._absent.get(path)
 
     def facts(self, path: str) -> list[Any]:
         """Return the hash of a file that was read, its size and times; empty if it was
@@ -211,11 +211,8 @@ def _changed_inputs(
     for role, paths in job.inputs.items():
         before = [content for _, content in recorded.get(role, [])]
         for number, path in enumerate(paths):
-            content = found.get(path)
-            # a result that was removed to save space, and is not made again
-            is_removed = content is None
-            same = number < len(before) and before[number] == content
-            if not (same or is_removed):
+            is_same = number < len(before) and before[number] == found.get(path)
+            if not is_same:
                 changed.append(Path(path).name)
         fewer = recorded.get(role, [])[len(paths) :]
         changed += [Path(path).name for path, _ in fewer]

@@ -1,7 +1,8 @@
 """Which planned jobs run again: those whose results do not match their manifest, and
 those that depend on them.
 
-Snakemake tells its jobs as events of its log. It is then told the files to make.
+Snakemake tells its jobs as events of its log. It then makes the files that are missing,
+as outdated ones are hidden from it.
 """
 
 import logging
@@ -169,10 +170,13 @@ def made_plan(
 
 
 def _outdated_by_itself(job: Job, found: Contents) -> str:
-    """Return why the results of a job do not match their manifest, or ''."""
-    if job.manifest is None or not any(Path(file).exists() for file in job.outputs):
+    """Return why the results of a job do not match their manifest, or ''. Results that
+    were removed match as well, and those that were never made."""
+    if job.manifest is None:
         return ""
-    return difference(job, read_manifest(job.manifest), found)
+    manifest = read_manifest(job.manifest)
+    is_made = manifest or any(Path(file).exists() for file in job.outputs)
+    return difference(job, manifest, found) if is_made else ""
 
 
 def _producers(jobs: Mapping[str, Job]) -> dict[str, str]:
@@ -220,16 +224,18 @@ def _spread(
 def _present_contents(jobs: Collection[Job]) -> Contents:
     """Return the contents of the files of planned jobs."""
     known = recorded_inputs(Path())
-    awaited = {}
+    absent: dict[str, str] = {}
     results = []
     for job in jobs:
-        known |= read_manifest(job.manifest).get("results", {})
+        recorded = read_manifest(job.manifest).get("results", {})
+        known |= recorded
+        absent |= {path: facts[0] for path, facts in recorded.items()}
         results += job.outputs
         if job.manifest is None and job.outputs:
-            awaited[job.outputs[0]] = str(job.settings().get("sha256"))
+            absent[job.outputs[0]] = str(job.settings().get("sha256"))
     with suppress(InputError):
         known |= read_json(COPIES)
-    found = Contents(known, awaited)
+    found = Contents(known, absent)
     found.read(results)
     return found
 

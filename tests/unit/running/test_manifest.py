@@ -100,9 +100,14 @@ def test_fewer_or_more_inputs_are_a_difference(job, tables, tmp_path):
     assert how(replace(job, inputs=named)) == Facts("changed input", "left")
 
 
-def test_a_removed_intermediate_result_is_none(job, tmp_path):
+def test_a_removed_input_is_a_difference_unless_it_would_be_made_from_the_same(
+    job, tmp_path
+):
+    manifest = read_manifest(job.manifest)
+    content = Contents({}, {}).get("results/one.csv")
     (tmp_path / "results" / "one.csv").unlink()
-    assert how(job) == ""
+    assert how(job) == Facts("changed input", "one.csv")
+    assert difference(job, manifest, Contents({}, {"results/one.csv": content})) == ""
 
 
 def test_changed_settings_are_named_with_their_values(job):

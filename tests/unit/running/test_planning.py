@@ -90,6 +90,20 @@ def test_a_removed_result_is_made_again_where_something_needs_it(study):
     assert again["metrics"] == f"{MISSING}: results/metrics"
 
 
+def test_a_removed_result_that_would_be_another_is_made_again(study):
+    (study / "results" / "mesh").unlink()
+    assert set(reasons(plan({"edge_mm": 2.0}))) == {"surface", "mesh", "metrics", "run"}
+    # its step has failed after that of the surface
+    (study / "results" / "surface").write_text("of another edge")
+    write_manifest(plan().jobs["results/surface"], Contents({}, {}))
+    assert set(reasons(plan())) == {"mesh", "metrics", "run"}
+    # it is unknown what it was
+    (study / "results" / "surface").write_text("surface")
+    write_manifest(plan().jobs["results/surface"], Contents({}, {}))
+    (study / "results" / "manifest" / "mesh.json").unlink()
+    assert set(reasons(plan())) == {"mesh", "run"}
+
+
 def test_what_depends_on_a_forced_job_runs_again(study):
     again = reasons(plan(), forced=["mesh"])
     assert again == {"mesh": FORCED, "run": f"{BY_ANOTHER_JOB}: mesh"}
