@@ -39,7 +39,7 @@ from ..running.cost import (
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
 from ..running.manifest import CHANGED_CODE
-from ..running.planning import Plan
+from ..running.planning import BY_ANOTHER_JOB, MISSING, Plan
 from ..running.provenance import recorded_version
 from ..running.status import format_duration
 from ..settings.base import folder_of
@@ -239,12 +239,13 @@ def work_of(
 
 
 def _why(reason: str, directory: Path) -> str:
-    """Return the reason to run a job in words, the first of several."""
+    """Return the reason to run a job, without the files of a general one."""
     if reason == CHANGED_CODE:
         made_by, this = recorded_version(directory), version()
         if made_by not in (None, this):
             return f"{reason} (gyriflow {made_by}, now {this})"
-    return reason.partition(":")[0]
+    general = [words for words in (MISSING, BY_ANOTHER_JOB) if reason.startswith(words)]
+    return general[0] if general else reason
 
 
 def plan(
