@@ -40,7 +40,7 @@ many times as long."""
 FUSED_SHARE = {"pial": 0.53, "series": 0.5, "prediction": 0.2}
 """What surfaces, and bodies that follow them or predicted shapes, take with
 `open_sulci: false`, over that with opened sulci."""
-PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 8e-5
+PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 1.2e-4
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
 """By mesher; of elements of the mesh, linear or quadratic."""
