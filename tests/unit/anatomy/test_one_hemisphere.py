@@ -17,8 +17,9 @@ from gyriflow.geometry.triangles import transformed
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.terms import SIDES
 
-QUICK = {"week": 24.0, "edge_length_mm": 2.0}
+QUICK = {"week": 24.0, "edge_length_mm": 3.0}
 DHCP = SCHEMES["dhcp-19"]
+pytestmark = pytest.mark.usefixtures("few_starts", "shapes_once")
 
 
 @pytest.fixture(scope="module")
