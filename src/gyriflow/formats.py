@@ -142,7 +142,9 @@ FOREIGN_FORMATS = (
 def foreign_format(path: str | PathLike[str], start: bytes) -> ForeignFormat | None:
     """Return the format that a file's first `START_BYTES` show, None if its name has
     the same one or it is unknown."""
-    shown = (form for form in FOREIGN_FORMATS if re.match(form.start, start, re.DOTALL))
-    return next(
-        (form for form in shown if not str(path).lower().endswith(form.suffixes)), None
-    )
+    name = str(path).lower()
+    for form in FOREIGN_FORMATS:
+        is_shown = re.match(form.start, start, re.DOTALL)
+        if is_shown and not name.endswith(form.suffixes):
+            return form
+    return None

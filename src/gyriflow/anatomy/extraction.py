@@ -55,6 +55,15 @@ BY_CORNERS, BY_FACES = (
         lambda offset: np.abs(offset).sum(),
     )
 )
+ENDS = (slice(None, -1), slice(1, None))
+"""Along an axis: all voxels that are the first of two neighbours, and the second."""
+SQUARE = (
+    (ENDS[0], ENDS[0]),
+    (ENDS[1], ENDS[0]),
+    (ENDS[1], ENDS[1]),
+    (ENDS[0], ENDS[1]),
+)
+"""The corners of a square of 2 × 2 voxels, one after the other around it."""
 # bytes 0 and 1 as the digits of a binary number
 DIGITS = bytes.maketrans(b"\0\1", b"01")
 # radii in voxels of the openings and closings that find bridges and tunnels
@@ -97,13 +106,18 @@ def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
     """Yield for each connected part (faces, edges, corners) of a mask its box plus one
     voxel, and its mask there."""
     number, _ = ndimage.label(mask, OUTSIDE)
-    for index, tight in enumerate(ndimage.find_objects(number), start=1):
+    boxes = ndimage.find_objects(number)
+    for index, tight in enumerate(boxes, start=1):
         box = _wider(tight, 1)
         yield box, number[box] == index
 
 
 def _wider(box: tuple[slice, ...], margin: int) -> tuple[slice, ...]:
-    return tuple(slice(max(side.start - margin, 0), side.stop + margin) for side in box)
+    sides = []
+    for side in box:
+        start = max(side.start - margin, 0)
+        sides.append(slice(start, side.stop + margin))
+    return tuple(sides)
 
 
 def smooth_mask(
@@ -141,11 +155,14 @@ def remove_bridges(
 def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats]:
     """Interpolate an (i, j, k) field linearly to voxels `factor` times smaller; return
     it and its affine."""
+    axes = affine[:3, :3]
     fine = np.array(affine, dtype=float)
     fine[:3, :3] /= factor
     # the first fine voxel's centre lies nearer to the first coarse voxel's corner
-    fine[:3, 3] -= affine[:3, :3].sum(axis=1) * 0.5 * (1.0 - 1.0 / factor)
-    return ndimage.zoom(field, factor, order=1, grid_mode=True, mode="nearest"), fine
+    to_corner = 0.5 * (1.0 - 1.0 / factor)
+    fine[:3, 3] -= axes.sum(axis=1) * to_corner
+    zoomed = ndimage.zoom(field, factor, order=1, grid_mode=True, mode="nearest")
+    return zoomed, fine
 
 
 def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
@@ -266,19 +283,25 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     for first, second in ((0, 1), (0, 2), (1, 2)):
         inside = np.moveaxis(mask, (first, second), (0, 1))
         flags = np.moveaxis(ambiguous, (first, second), (0, 1))
-        a, b, c, d = inside[:-1, :-1], inside[1:, :-1], inside[1:, 1:], inside[:-1, 1:]
+        # around each square in turn
+        a, b, c, d = (inside[place] for place in SQUARE)
         alternating = (a == c) & (b == d) & (a != b)
-        for view in (flags[:-1, :-1], flags[1:, :-1], flags[1:, 1:], flags[:-1, 1:]):
-            view |= alternating
-    ends = (slice(None, -1), slice(1, None))
-    count = sum(mask[i, j, k].astype(np.int8) for i in ends for j in ends for k in ends)
-    for j, k in np.ndindex(2, 2):
-        low = mask[ends[0], ends[j], ends[k]]
-        high = mask[ends[1], ends[1 - j], ends[1 - k]]
-        opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
-        for corner in np.ndindex(2, 2, 2):
-            ambiguous[tuple(ends[side] for side in corner)] |= opposite
-    separated = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
+        for place in SQUARE:
+            flags[place] |= alternating
+    corners = list(product(ENDS, repeat=3))
+    count = np.zeros(mask[corners[0]].shape, dtype=np.int8)
+    for corner in corners:
+        count += mask[corner]
+    for corner, opposite in zip(corners[:4], reversed(corners[4:]), strict=True):
+        one = mask[corner]
+        other = mask[opposite]
+        only_inside = one & other & (count == 2)
+        only_outside = ~one & ~other & (count == 6)
+        both_differ = only_inside | only_outside
+        for cube_corner in corners:
+            ambiguous[cube_corner] |= both_differ
+    limit = np.where(mask, 0.55, 0.05)
+    separated = np.minimum(field, limit)
     return np.where(ambiguous, separated, field).astype(np.float32)
 
 
@@ -288,10 +311,12 @@ def dilated(mask: Mask, radius: float) -> Mask:
     squared = np.where(mask, 0, int(radius**2) + 1).astype(np.uint8)
     for axis in range(3):
         nearest = squared.copy()
-        new, old = np.moveaxis(nearest, axis, 0), np.moveaxis(squared, axis, 0)
+        new = np.moveaxis(nearest, axis, 0)
+        old = np.moveaxis(squared, axis, 0)
         for step in range(1, int(radius) + 1):
-            np.minimum(new[step:], old[:-step] + step**2, out=new[step:])
-            np.minimum(new[:-step], old[step:] + step**2, out=new[:-step])
+            further = old + step**2
+            np.minimum(new[step:], further[:-step], out=new[step:])
+            np.minimum(new[:-step], further[step:], out=new[:-step])
         squared = nearest
     return squared <= radius**2
 
@@ -357,15 +382,29 @@ def _pieces(mask: Mask) -> tuple[int, int]:
 def _euler_cells(mask: Mask) -> NDArray[np.int8]:
     """Return each 2 × 2 × 2 block's part of the Euler number, at its first voxel; faces
     connect voxels."""
-    x, y, z = (_pairs(mask, axis) for axis in range(3))
-    xy, xz, yz = _pairs(x, 1), _pairs(x, 2), _pairs(y, 2)
-    return mask.astype(np.int8) - x - y - z + xy + xz + yz - _pairs(xy, 2)
+    x = _pairs(mask, 0)
+    y = _pairs(mask, 1)
+    z = _pairs(mask, 2)
+    xy = _pairs(x, 1)
+    xz = _pairs(x, 2)
+    yz = _pairs(y, 2)
+    xyz = _pairs(xy, 2)
+    cells = mask.astype(np.int8)
+    for edges in (x, y, z):
+        cells -= edges
+    for squares in (xy, xz, yz):
+        cells += squares
+    cells -= xyz
+    return cells
 
 
 def _pairs(mask: Mask, axis: int) -> Mask:
-    ends = np.moveaxis(mask, axis, -1)
-    both = ends & np.concatenate([ends[..., 1:], np.zeros_like(ends[..., :1])], axis=-1)
-    return np.moveaxis(both, -1, axis)
+    """Return which voxels of a mask have a next one along an axis in it, too."""
+    voxels = np.moveaxis(mask, axis, 0)
+    is_first, is_second = ENDS
+    both = np.zeros_like(voxels)
+    both[is_first] = voxels[is_first] & voxels[is_second]
+    return np.moveaxis(both, 0, axis)
 
 
 def _euler_number(mask: Mask) -> int:
@@ -379,11 +418,15 @@ def _parts_with_gains(
     change of the Euler number."""
     number, count = ndimage.label(change, OUTSIDE)
     gain = _euler_cells(mask ^ change) - _euler_cells(mask)
-    places, last = np.argwhere(gain), np.array(mask.shape) - 1
+    places = np.argwhere(gain)
+    last = np.array(mask.shape) - 1
+    # a block's gain belongs to the part that has one of its voxels
     part = np.zeros(len(places), dtype=np.int64)
     for corner in np.ndindex(2, 2, 2):
-        part = np.maximum(part, number[tuple(np.minimum(places + corner, last).T)])
-    gains = np.bincount(part, weights=gain[tuple(places.T)], minlength=count + 1)
+        voxels = np.minimum(places + corner, last)
+        part = np.maximum(part, number[tuple(voxels.T)])
+    weights = gain[tuple(places.T)]
+    gains = np.bincount(part, weights=weights, minlength=count + 1)
     return number, gains.astype(np.int64)
 
 
@@ -495,7 +538,10 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
 def _contact_mm2(first: Mask, second: Mask, size_mm: Floats) -> float:
     total = 0.0
     for axis in range(3):
-        a, b = np.moveaxis(first, axis, 0), np.moveaxis(second, axis, 0)
-        faces = (a[:-1] & b[1:]).sum() + (b[:-1] & a[1:]).sum()
-        total += float(faces * np.prod(np.delete(size_mm, axis)))
+        a = np.moveaxis(first, axis, 0)
+        b = np.moveaxis(second, axis, 0)
+        b_after_a = a[:-1] & b[1:]
+        a_after_b = b[:-1] & a[1:]
+        face_mm2 = np.prod(np.delete(size_mm, axis))
+        total += float((b_after_a.sum() + a_after_b.sum()) * face_mm2)
     return total

@@ -1,6 +1,7 @@
 """Mid-sagittal plane, interhemispheric fissure (a curved surface, opened where labels
 touch), left and right sides."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -254,7 +255,9 @@ def _plane_near(
 def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]:
     distance = points @ normal - offset
     near = distance[np.abs(distance) < 3.0]
-    return len(near), float(np.sqrt(np.mean(near**2))) if len(near) else float("inf")
+    if not len(near):
+        return 0, math.inf
+    return len(near), math.sqrt(np.mean(near**2))
 
 
 def _mirror_distance(
@@ -423,7 +426,8 @@ def hidden_fissure(
         if there are none."""
         if not voxels.any():
             return np.full(voxels.shape, np.inf, dtype=np.float32)
-        return ndimage.distance_transform_edt(~voxels, sampling=size).astype(np.float32)
+        distance_mm = ndimage.distance_transform_edt(~voxels, sampling=size)
+        return distance_mm.astype(np.float32)
 
     shows = sheet & (distance(~brain) < reach)
     # small gaps between touching walls are not a fissure, and would leave tunnels when
@@ -611,7 +615,8 @@ def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> 
     """Return the (m,) mask of the faces of a surface that are nearer to a left
     hemisphere, as by `left_faces`."""
     centres = triangles.corners(mesh).mean(axis=1)
-    to_left, to_right = (nearest_on(centres, side)[0] for side in (left, right))
+    to_left, _, _ = nearest_on(centres, left)
+    to_right, _, _ = nearest_on(centres, right)
     return left_faces(mesh, to_left - to_right)
 
 
@@ -628,10 +633,14 @@ def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMes
     """Return the surfaces of the left faces, given as an (m,) mask, and of the others;
     InputError if one is empty."""
     if left.all() or not left.any():
-        problem = "the brain lies on one side of the interhemispheric fissure"
-        found = f"{int(left.sum())} of {len(left)} faces on the left"
-        raise InputError(problem, found=found, expected="two hemispheres")
-    return triangles.submesh(mesh, left)[0], triangles.submesh(mesh, ~left)[0]
+        raise InputError(
+            "the brain lies on one side of the interhemispheric fissure",
+            found=f"{int(left.sum())} of {len(left)} faces on the left",
+            expected="two hemispheres",
+        )
+    left_side, _ = triangles.submesh(mesh, left)
+    right_side, _ = triangles.submesh(mesh, ~left)
+    return left_side, right_side
 
 
 def cut_middle(left: TriangleMesh, right: TriangleMesh) -> float:
@@ -640,10 +649,14 @@ def cut_middle(left: TriangleMesh, right: TriangleMesh) -> float:
     borders = []
     for side in (left, right):
         pairs, counts = triangles.edges(side)
-        borders.append(side.vertices[np.unique(pairs[counts == 1]), 0])
-    if cut := [border for border in borders if len(border)]:
-        return float(np.mean(np.concatenate(cut)))
-    return float((left.vertices[:, 0].max() + right.vertices[:, 0].min()) / 2)
+        border = np.unique(pairs[counts == 1])
+        borders.append(side.vertices[border, 0])
+    cut = np.concatenate(borders)
+    if len(cut):
+        return float(cut.mean())
+    end_of_left = left.vertices[:, 0].max()
+    start_of_right = right.vertices[:, 0].min()
+    return float((end_of_left + start_of_right) / 2)
 
 
 def smallest_gap(left: TriangleMesh, right: TriangleMesh) -> float:

@@ -196,8 +196,10 @@ def narrowness(mesh: TriangleMesh) -> float:
     """Return the shortest over the longest extent of a surface, along the principal
     axes of its vertices."""
     points = mesh.vertices - mesh.vertices.mean(axis=0)
-    _, axes = np.linalg.eigh(np.cov(points.T))
-    extents = np.ptp(points @ axes, axis=0)
+    covariance = np.cov(points.T)
+    _, axes = np.linalg.eigh(covariance)
+    along_axes = points @ axes
+    extents = np.ptp(along_axes, axis=0)
     return float(extents.min() / extents.max())
 
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, RigidFit, angle_deg, motion
+from ..geometry.deformations import transform_points
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, TriangleMesh, transformed, unit
 from ..settings.schemes import LabelScheme
@@ -350,9 +351,10 @@ def _difference(
 ) -> tuple[float, Floats]:
     """Return the angle between two motions, and their shift (3,) in mm at the left
     hemisphere's centre."""
-    difference = to_right - to_left
-    shift = difference[:3, :3] @ MIRROR[:3, :3] @ left.shape.centre + difference[:3, 3]
-    return angle_deg(to_right[:3, :3].T @ to_left[:3, :3]), shift
+    turn = to_right[:3, :3].T @ to_left[:3, :3]
+    mirrored_centre = transform_points(left.shape.centre, MIRROR)
+    shift = transform_points(mirrored_centre, to_right - to_left)
+    return angle_deg(turn), shift
 
 
 def _share_coordinates(

@@ -615,16 +615,20 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Rebuild a surface through voxels by winding numbers, free of handles and
     crossings; return it and a report."""
-    ends = np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
-    labels, affine = surface_mask(
-        mesh, voxel_mm, ends + voxel_mm * np.array([[-MARGIN_VOXELS], [MARGIN_VOXELS]])
-    )
+    margin_mm = voxel_mm * MARGIN_VOXELS
+    lowest = mesh.vertices.min(axis=0) - margin_mm
+    highest = mesh.vertices.max(axis=0) + margin_mm
+    box = np.array([lowest, highest])
+    labels, affine = surface_mask(mesh, voxel_mm, box)
     inside = labels > 0
     # beyond two voxels from the surface, the field is 0 or 1
     near = dilated(inside, 2.0) & dilated(~inside, 2.0)
-    signed = np.where(inside, np.inf, -np.inf)
-    distance, _, _ = nearest_on(transform_points(np.argwhere(near), affine), mesh)
-    signed[near] = np.where(inside[near], distance, -distance)
-    field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)
-    field, report = make_simple(field)
+    places = transform_points(np.argwhere(near), affine)
+    distance, _, _ = nearest_on(places, mesh)
+    sign = np.where(inside, 1.0, -1.0)
+    depth_mm = sign * np.inf
+    depth_mm[near] = sign[near] * distance
+    slope = EDGE_SLOPE / voxel_mm
+    share_inside = np.clip(0.5 + slope * depth_mm, 0.0, 1.0)
+    field, report = make_simple(share_inside.astype(np.float32))
     return isosurface(field, affine), report

@@ -1,6 +1,8 @@
 """Spheres and ellipsoids as closed surfaces in mm, RAS+ around the origin, for tests of
 a folding model."""
 
+from itertools import product
+
 import numpy as np
 
 from ..errors import InputError
@@ -54,10 +56,17 @@ def shape_surface(
 
 
 def _directions(count: int) -> Floats:
-    i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
-    lattice = np.stack([i, j, count - i - j], axis=-1)[i + j <= count].astype(float)
-    signs = np.array([(x, y, z) for x in (1, -1) for y in (1, -1) for z in (1, -1)])
-    return unit(np.unique((lattice * signs[:, None]).reshape(-1, 3), axis=0))
+    """Return (n, 3) unit vectors through a lattice on an octahedron with `count`
+    intervals along each edge."""
+    i, j = np.indices((count + 1, count + 1))
+    on_face = i + j <= count
+    face = np.stack([i, j, count - i - j], axis=-1)[on_face]
+    octants = []
+    for signs in product((1, -1), repeat=3):
+        octants.append(face * signs)
+    # edges belong to two octants
+    lattice = np.unique(np.concatenate(octants), axis=0)
+    return unit(lattice.astype(float))
 
 
 def _pattern(points: Floats, seed: int) -> Floats:
@@ -65,8 +74,9 @@ def _pattern(points: Floats, seed: int) -> Floats:
     waves = random.normal(size=(WAVES, 3))
     shortest, longest = np.log(WAVELENGTHS_MM)
     lengths = np.exp(random.uniform(shortest, longest, WAVES))
-    waves *= (2.0 * np.pi / lengths / np.linalg.norm(waves, axis=1))[:, None]
+    factors = 2.0 * np.pi / lengths / np.linalg.norm(waves, axis=1)
+    waves *= factors[:, None]
     phases = random.uniform(0.0, 2.0 * np.pi, WAVES)
-    return np.asarray(
-        np.sqrt(2.0 / WAVES) * np.cos(points @ waves.T + phases).sum(axis=1)
-    )
+    angles = points @ waves.T + phases
+    heights = np.cos(angles).sum(axis=1)
+    return np.sqrt(2.0 / WAVES) * heights

@@ -174,13 +174,15 @@ def _descend(
     points, normals = shape.points[::every], shape.normals[::every]
 
     def planes(rotation: Floats, shift: Floats) -> Planes:
-        moved, facing = points @ rotation.T + shift, normals @ rotation.T
+        moved = points @ rotation.T + shift
+        facing = normals @ rotation.T
         _, nearest = target.tree.query(target.features(moved, facing))
         target_normals = target.normals[nearest]
         plane = unit(target_normals + facing)
         distances = np.einsum("ij,ij->i", target.points[nearest] - moved, plane)
         agrees = np.einsum("ij,ij->i", target_normals, facing) > 0.5
-        return moved, plane, distances, agrees / (1.0 + (distances / scale) ** 2) ** 2
+        weights = agrees / (1.0 + (distances / scale) ** 2) ** 2
+        return moved, plane, distances, weights
 
     def is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
         return bool(

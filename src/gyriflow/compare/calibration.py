@@ -1,6 +1,7 @@
 """Calibration: choose the parameters of the next runs, score the runs, and find the
 best."""
 
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from typing import Any
@@ -42,13 +43,14 @@ def first_round(bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
     The same seed gives the same rows.
     """
     # the sequence is balanced over powers of two
-    power = int(np.ceil(np.log2(max(count, 2))))
-    sequence = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed))
+    power = math.ceil(math.log2(max(count, 2)))
+    random = np.random.default_rng(seed)
+    sequence = qmc.Sobol(len(bounds), rng=random)
     points = sequence.random_base2(power)[:count]
-    low, high = np.transpose(list(bounds.values()))
-    return _rounded(
-        pd.DataFrame(low + points * (high - low), columns=list(bounds)), bounds
-    )
+    values = pd.DataFrame(points, columns=list(bounds))
+    for key, (low, high) in bounds.items():
+        values[key] = low + values[key] * (high - low)
+    return _rounded(values, bounds)
 
 
 def next_round(
@@ -96,9 +98,11 @@ def _trial(
 
 def _rounded(values: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
     """Round values to `DIGITS` significant digits within the bounds."""
-    low, high = np.transpose(list(bounds.values()))
-    rounded = values.map(lambda value: float(f"{value:.{DIGITS}g}"))
-    return rounded.clip(low, high, axis=1)
+    rounded = values.copy()
+    for key, (low, high) in bounds.items():
+        digits = values[key].map(f"{{:.{DIGITS}g}}".format)
+        rounded[key] = digits.astype(float).clip(low, high)
+    return rounded
 
 
 def require_finished(runs: pd.DataFrame) -> None:
@@ -170,8 +174,11 @@ def calibrated_parameters(
 
 
 def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
+    """Return a curve with all values times a factor."""
     if "weeks" in curve:
-        return dict(curve) | {"weeks": _scaled(curve["weeks"], factor)}
+        scaled = dict(curve)
+        scaled["weeks"] = _scaled(curve["weeks"], factor)
+        return scaled
     return {week: factor * value for week, value in curve.items()}
 
 

@@ -1,6 +1,7 @@
 """Comparison of predicted surfaces with observed brains: rows with all columns, and
 tables with simple predictions."""
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -307,9 +308,12 @@ def roughness_mm(mesh: TriangleMesh) -> float:
     triangle.
     """
     links = igl.adjacency_matrix(mesh.faces)
-    means = links @ mesh.vertices / np.asarray(links.sum(axis=1))
-    offsets: Floats = ((means - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
-    return float(np.sqrt(np.average(offsets**2, weights=vertex_areas(mesh))))
+    n_neighbours = np.asarray(links.sum(axis=1))
+    means = links @ mesh.vertices / n_neighbours
+    normals = vertex_normals(mesh)
+    offsets: Floats = ((means - mesh.vertices) * normals).sum(axis=1)
+    mean_square = np.average(offsets**2, weights=vertex_areas(mesh))
+    return math.sqrt(mean_square)
 
 
 def simple_predictions(

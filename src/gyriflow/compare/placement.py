@@ -125,13 +125,15 @@ class Resampling:
         r = correlation(truth, values, self.areas)
         if np.isnan(r):
             return np.full(1 + N_DRAWS, np.nan)
-        x, y = self.coordinates(truth), self.coordinates(values)
-        sums = np.stack(
-            [np.bincount(self.units, product) for product in (x * x, y * y, x * y)],
-            axis=1,
-        )
-        xx, yy, xy = (self.drawn @ sums).T
-        drawn, shares = xy / np.sqrt(xx * yy), sums[:, 0] / sums[:, 0].sum()
+        x = self.coordinates(truth)
+        y = self.coordinates(values)
+        sums = []
+        for product in (x * x, y * y, x * y):
+            sums.append(np.bincount(self.units, product))
+        xx, yy, xy = (self.drawn @ np.stack(sums, axis=1)).T
+        drawn = xy / np.sqrt(xx * yy)
+        power = sums[0]
+        shares = power / power.sum()
         freedom = max(1 / (shares**2).sum() - 2, 1.0)
         spread = t.ppf(INTERVAL[1], freedom) / norm.ppf(INTERVAL[1])
         # about r, since the sides of a symmetric brain are not exactly equal
@@ -249,14 +251,16 @@ def number_patches(points: Floats, areas: Floats, edge_mm: float) -> Ints:
     Patches are the Voronoi cells of seeds chosen by farthest-point sampling, which is
     deterministic.
     """
-    seeds, count = [0], max(2, round(float(areas.sum()) / edge_mm**2))
+    count = max(2, round(float(areas.sum()) / edge_mm**2))
+    seeds = [0]
     distances = np.linalg.norm(points - points[0], axis=1)
     for _ in range(count - 1):
-        seeds.append(int(distances.argmax()))
-        distances = np.minimum(
-            distances, np.linalg.norm(points - points[seeds[-1]], axis=1)
-        )
-    return np.asarray(cKDTree(points[seeds]).query(points)[1], dtype=np.int64)
+        farthest = int(distances.argmax())
+        seeds.append(farthest)
+        to_seed = np.linalg.norm(points - points[farthest], axis=1)
+        distances = np.minimum(distances, to_seed)
+    _, patches = cKDTree(points[seeds]).query(points)
+    return np.asarray(patches, dtype=np.int64)
 
 
 def draw_units(groups: Sequence[int]) -> Floats:

@@ -116,21 +116,26 @@ def curvature_differences(
 def cortex_dice(surface: TriangleMesh, observed: TriangleMesh) -> float:
     """Return the Dice overlap of the outermost `CORTEX_MM` of two aligned closed
     surfaces in mm."""
-    first, second = _ribbon(surface), _ribbon(observed)
+    first = _ribbon(surface)
+    second = _ribbon(observed)
     both = np.intersect1d(first, second, assume_unique=True)
-    return 2 * len(both) / (len(first) + len(second))
+    total = len(first) + len(second)
+    return 2 * len(both) / total
 
 
 @lru_cache(maxsize=2)
 def _ribbon(mesh: TriangleMesh) -> Ints:
     """Return the voxels of the outermost `CORTEX_MM` as (k,) numbers, the same for all
     surfaces."""
-    corner = np.floor(mesh.vertices.min(axis=0) / VOXEL_MM)
-    box = np.stack([corner * VOXEL_MM, mesh.vertices.max(axis=0)])
+    lowest = mesh.vertices.min(axis=0)
+    highest = mesh.vertices.max(axis=0)
+    corner = np.floor(lowest / VOXEL_MM) * VOXEL_MM
+    box = np.stack([corner, highest])
     mask, affine = surface_mask(mesh, VOXEL_MM, box)
     # distances are to the centres of voxels outside, half a voxel beyond the surface
     depth = distance_transform_edt(mask, sampling=VOXEL_MM) - VOXEL_MM / 2
-    voxels = np.argwhere((mask > 0) & (depth <= CORTEX_MM)) + np.rint(
-        affine[:3, 3] / VOXEL_MM
-    ).astype(np.int64)
-    return np.asarray(voxels @ (MAX_VOXELS ** np.arange(3)))
+    in_cortex = (mask > 0) & (depth <= CORTEX_MM)
+    first_voxel = np.rint(affine[:3, 3] / VOXEL_MM).astype(np.int64)
+    voxels = np.argwhere(in_cortex) + first_voxel
+    digits = MAX_VOXELS ** np.arange(3)
+    return np.asarray(voxels @ digits)

@@ -186,8 +186,14 @@ def _with_distance(bands: pd.DataFrame, resolved: pd.Series) -> pd.DataFrame:
     """Add the distance of shares of bands, the unit, and the flag: "ok", "cut off"
     (NaN) or `NOT_RESOLVED`."""
     distance = (bands["value"] - bands["observed_value"]).abs()
-    flag = np.select([~resolved, distance.isna()], [NOT_RESOLVED, "cut off"], "ok")
-    return bands.assign(distance=distance.where(resolved), unit="1", flag=flag)
+    flag = pd.Series("ok", index=bands.index)
+    flag[distance.isna()] = "cut off"
+    flag[~resolved] = NOT_RESOLVED
+    return bands.assign(
+        distance=distance.where(resolved),
+        unit="1",
+        flag=flag,
+    )
 
 
 def with_common_cut(

@@ -154,8 +154,13 @@ def write_checkpoint(path: Path, key: str, state: State) -> None:
     """Write the state of the run `key`; StorageError where the disk is full or the
     folder cannot be written."""
     values = dict(vars(state))
-    arrays = {name: array for name in ARRAYS if (array := values.pop(name)) is not None}
-    scalars = json.dumps({**values, "key": key}, sort_keys=True)
+    arrays = {}
+    for name in ARRAYS:
+        array = values.pop(name)
+        if array is not None:
+            arrays[name] = array
+    values["key"] = key
+    scalars = json.dumps(values, sort_keys=True)
     with new_hdf5(path) as file:
         for name, array in arrays.items():
             file[name] = array

@@ -178,15 +178,19 @@ class SelfContact:
         start of the step become one."""
         if part.max() == 0:
             return part
-        near = self.near_pairs(np.zeros((len(self.domain.vertex_of_node), 3)))
+        no_motion = np.zeros((len(self.domain.vertex_of_node), 3))
+        near = self.near_pairs(no_motion)
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
-        part_of_vertex = part[self.surface.nodes][nearest_node][near.part.vertices]
-        sides = [part_of_vertex[pair] for pair in near.vertices_of_pairs()]
-        own_links = {(int(pair.min()), int(pair.max())) for pair in sides}
-        links = np.array(
-            sorted(set().union(*self.domain.comm.allgather(own_links)))
-        ).reshape(-1, 2)
-        return connected(links, int(part.max()) + 1)[part].astype(np.int64)
+        part_of_node = part[self.surface.nodes]
+        part_of_vertex = part_of_node[nearest_node][near.part.vertices]
+        own_links = set()
+        for vertices in near.vertices_of_pairs():
+            parts = part_of_vertex[vertices]
+            own_links.add((int(parts.min()), int(parts.max())))
+        all_links = set().union(*self.domain.comm.allgather(own_links))
+        links = np.array(sorted(all_links)).reshape(-1, 2)
+        joined = connected(links, int(part.max()) + 1)
+        return joined[part].astype(np.int64)
 
     def energy(self, u: Floats) -> float:
         """Return the barrier's energy in J."""

@@ -302,13 +302,15 @@ def parallel_edges(
 def can_meet(first: Floats, last: Floats) -> bool:
     """Return whether two parallel edges may meet, from (4, 3) places of their ends
     before and after a motion."""
-    distances = [
-        ipctk.point_edge_distance(first[0], first[2], first[3]),
-        ipctk.point_edge_distance(first[1], first[2], first[3]),
-        ipctk.point_edge_distance(first[2], first[0], first[1]),
-        ipctk.point_edge_distance(first[3], first[0], first[1]),
+    a, b, c, d = first
+    squared_distances = [
+        ipctk.point_edge_distance(a, c, d),
+        ipctk.point_edge_distance(b, c, d),
+        ipctk.point_edge_distance(c, a, b),
+        ipctk.point_edge_distance(d, a, b),
     ]
+    distance = np.sqrt(min(squared_distances))
     displacement = last - first
-    motion = np.linalg.norm(displacement - displacement.mean(axis=0), axis=1).max()
-    # distances of ipctk are squared
-    return bool(2 * motion >= np.sqrt(min(distances)))
+    relative = displacement - displacement.mean(axis=0)
+    motion = np.linalg.norm(relative, axis=1).max()
+    return bool(2 * motion >= distance)

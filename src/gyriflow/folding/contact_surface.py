@@ -195,8 +195,11 @@ class ContactSurface:
     def _interpolate(self, part: SurfacePart) -> None:
         """Set the matrices between the nodes and a part, unless they are those of the
         last call."""
-        if self._part is not part:
-            self._part, self._part_weights = part, self.weights[part.vertices]
-            components = sparse.kron(self._part_weights, np.eye(3), format="csr")
-            # stored by columns like the stiffness, so that products need no conversion
-            self._nodes_to_part, self._part_to_nodes = components.tocsc(), components.T
+        if self._part is part:
+            return
+        self._part = part
+        self._part_weights = self.weights[part.vertices]
+        components = sparse.kron(self._part_weights, np.eye(3), format="csr")
+        # stored by columns like the stiffness, so that products need no conversion
+        self._nodes_to_part = components.tocsc()
+        self._part_to_nodes = components.T

@@ -54,7 +54,13 @@ from .domain import Domain
 from .linear_solver import NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, residual_floor
 from .problem import NonlinearProblem
-from .stretches import deformation_gradients, log_stretch, packed, unpacked
+from .stretches import (
+    deformation_gradients,
+    from_principal,
+    log_stretch,
+    packed,
+    unpacked,
+)
 from .tissue import Elements
 from .zones import Zones
 
@@ -84,6 +90,9 @@ UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the
 first two where the shape is that of an observed brain), and the distance from these, as
 a multiple of them."""
+MAX_CHANGE_MM = 0.25
+"""Largest change of a shape by smoothing around faults, as a root mean square on the
+boundary: shapes that would change more are followed."""
 HOLDING_MM = (1.0, 1.0, 2.0, 2.0, 4.0, 4.0, 8.0, 16.0, 32.0)
 """Lengths around curved elements that fold over at which the body is held, round by
 round, with the same reach: others may fold over in its turn."""
@@ -145,9 +154,11 @@ class Springs:
     def draw_to(self, goals_mm: Floats, areas_mm2: Floats, lengths_mm: Floats) -> None:
         """Set the (b, 3) goals in mm, for a step from the present positions, and (b,)
         areas and lengths of springs."""
-        weights = MODULUS_PA / (lengths_mm * M_PER_MM) * areas_mm2 * M_PER_MM**2
+        stiffness = MODULUS_PA / (lengths_mm * M_PER_MM)
+        weights = stiffness * areas_mm2 * M_PER_MM**2
         self._weights = weights[self._rows, None]
-        gaps = self._domain.positions[self._vertices] - goals_mm * M_PER_MM
+        positions = self._domain.positions[self._vertices]
+        gaps = positions - goals_mm * M_PER_MM
         self._gaps = gaps[self._rows]
 
     def energy(self, u: Floats) -> float:
@@ -162,10 +173,15 @@ class Springs:
         diagonal = np.zeros((domain.n_owned, 3))
         diagonal[self._local] = self._weights
         rows = np.arange(diagonal.size + 1, dtype=PETSc.IntType)
-        columns = rows[:-1] + 3 * domain.space.dofmap.index_map.local_range[0]
-        size = diagonal.size, 3 * len(domain.positions)
-        csr = rows, columns.astype(PETSc.IntType), diagonal.ravel()
-        return PETSc.Mat().createAIJ((size, size), bsize=3, csr=csr, comm=domain.comm)
+        first_node, _ = domain.space.dofmap.index_map.local_range
+        columns = (rows[:-1] + 3 * first_node).astype(PETSc.IntType)
+        size = (diagonal.size, 3 * len(domain.positions))
+        return PETSc.Mat().createAIJ(
+            (size, size),
+            bsize=3,
+            csr=(rows, columns, diagonal.ravel()),
+            comm=domain.comm,
+        )
 
     def max_step(self, u: Floats, direction: Floats) -> float:
         return 1.0
@@ -323,14 +339,15 @@ class ElasticFit:
         3) positions in mm.
 
         Where elements would be inverted or faces cross on the straight way, the
-        displacement is smoothed around them, over lengths that increase; the body
-        follows the shape, and is drawn to it, if faults remain.
+        displacement is smoothed around them, over lengths that increase. The body
+        follows the shape, and is drawn to it, if faults remain or this changes the
+        shape too much.
         """
         motion = self._fit(shape, self.positions_mm)
-        untangled, faults = self._untangled(
-            self.positions_mm, transform_points(shape, motion), UNTANGLING_MM
-        )
-        if not len(faults):
+        goal = transform_points(shape, motion)
+        untangled, faults = self._untangled(self.positions_mm, goal, UNTANGLING_MM)
+        changed_mm = rms_length((untangled - goal)[self._used])
+        if not len(faults) and changed_mm <= MAX_CHANGE_MM:
             start = self.positions_mm
             opened = self._opened_after(start, untangled)
             self.positions_mm = opened
@@ -343,8 +360,8 @@ class ElasticFit:
                 return self._move(np.linalg.inv(motion))
             log.info("curved elements fold over at a shape: the body follows it")
         else:
-            text = "%d faults remain on the way to a shape: the body follows it"
-            log.info(text, len(faults))
+            text = "the straight way has %d faults and ends %.2f mm away from the shape"
+            log.info(text + ": the body follows it", len(faults), changed_mm)
         self.follow(shape)
         return self.draw(shape[self._used])
 
@@ -638,8 +655,7 @@ def exponential(logs: Floats, limit: float) -> Floats:
     """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the
     limit count as this."""
     values, axes = np.linalg.eigh(logs)
-    values = np.exp(np.clip(values, -limit, limit))
-    return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
+    return from_principal(np.exp(np.clip(values, -limit, limit)), axes)
 
 
 def inverse_exponential(logs: Floats) -> Floats:

@@ -201,8 +201,10 @@ def layered_inverse(
     The elements of the mask `layered` (c,) have unit normals N (e, q, 3); others grow
     by dg in all directions.
     """
-    inverse = (1 / (1 + dg))[..., None, None] * np.eye(3)
+    along = (1 + dg)[..., None, None]
+    across = (1 + dr)[..., None, None]
     radial = normals[..., :, None] * normals[..., None, :]
-    inverse[layered] = (np.eye(3) - radial) / (1 + dg[layered])[..., None, None]
-    inverse[layered] += radial / (1 + dr[layered])[..., None, None]
+    tangential = np.eye(3) - radial
+    inverse = (1 / along) * np.eye(3)
+    inverse[layered] = tangential / along[layered] + radial / across[layered]
     return inverse

@@ -102,11 +102,13 @@ class PialSearch:
         return distance, normals
 
     def _within(self, to_vertex: Floats, reach: float) -> NDArray[np.bool_]:
+        surface = self.surface
+        corners = surface.vertices[surface.faces]
+        edges = np.diff(corners, axis=1)
+        longest = np.linalg.norm(edges, axis=2).max()
         # a point of a triangle is at most edge/√3 from its nearest vertex
-        longest = np.linalg.norm(
-            np.diff(self.surface.vertices[self.surface.faces], axis=1), axis=2
-        ).max()
-        return np.asarray(to_vertex <= np.hypot(reach, longest / np.sqrt(3)))
+        furthest = np.hypot(reach, longest / np.sqrt(3))
+        return np.asarray(to_vertex <= furthest)
 
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
         """Return for (k, 3) points the unit normals of the nearest of (k, c) candidate

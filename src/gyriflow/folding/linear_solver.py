@@ -148,10 +148,16 @@ def inverse_blocks(blocks: Floats) -> Floats:
     """Return the inverses of (n, 3, 3) symmetric blocks, as `positive_inverses` if they
     are indefinite."""
     a, b, c = blocks.swapaxes(0, 1)
-    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    determinants = np.einsum("ni,ni->n", a, cofactors[:, 0])
-    definite = (blocks[:, 0, 0] > 0) & (cofactors[:, 2, 2] > 0) & (determinants > 0)
-    inverses = cofactors / np.where(definite, determinants, 1.0)[:, None, None]
+    of_a = np.cross(b, c)
+    of_b = np.cross(c, a)
+    of_c = np.cross(a, b)
+    cofactors = np.stack([of_a, of_b, of_c], axis=1)
+    determinants = np.einsum("ni,ni->n", a, of_a)
+    # Sylvester's criterion
+    leading_minors = [a[:, 0], of_c[:, 2], determinants]
+    definite = np.min(leading_minors, axis=0) > 0
+    divisors = np.where(definite, determinants, 1.0)
+    inverses = cofactors / divisors[:, None, None]
     inverses[~definite] = positive_inverses(blocks[~definite])
     return np.asarray(inverses)
 
@@ -171,8 +177,10 @@ def positive_inverses(matrices: Floats) -> Floats:
     their eigenvalues."""
     values, directions = np.linalg.eigh(matrices)
     sizes = np.abs(values)
-    sizes = np.maximum(sizes, REGULARISATION * sizes.max(axis=-1, keepdims=True))
-    return np.asarray((directions / sizes[..., None, :]) @ directions.swapaxes(-1, -2))
+    smallest = REGULARISATION * sizes.max(axis=-1, keepdims=True)
+    divisors = np.maximum(sizes, smallest)[..., None, :]
+    inverses = (directions / divisors) @ directions.swapaxes(-1, -2)
+    return np.asarray(inverses)
 
 
 class LinearSolver:

@@ -33,9 +33,14 @@ class IntegrationPoints:
         """Return a symmetric rule: the centre of linear elements, or the `CUBIC` rule
         for quadratic ones."""
         if order == 1:
-            return cls(order, np.full((1, 4), 0.25), np.ones(1))
-        points = np.concatenate([a + (1 - 4 * a) * np.eye(4) for a, _ in CUBIC])
-        return cls(order, points, np.repeat([weight for _, weight in CUBIC], 4))
+            centre = np.full((1, 4), 0.25)
+            return cls(order, centre, np.ones(1))
+        points = []
+        weights = []
+        for a, weight in CUBIC:
+            points.append(a + (1 - 4 * a) * np.eye(4))
+            weights.append(np.full(4, weight))
+        return cls(order, np.concatenate(points), np.concatenate(weights))
 
     @property
     def interpolation(self) -> Floats:

@@ -307,10 +307,13 @@ class NonlinearProblem:
         return not self.contributions
 
     def _stiffness_parts(self, u: Floats, *, convex: bool) -> list[PETSc.Mat]:
-        parts = [part.stiffness(u, convex=convex) for part in self.contributions]
-        for part in filter(None, parts):
-            part.zeroRowsColumns(self._fixed_global, diag=0.0)
-        return [part for part in parts if part is not None]
+        parts = []
+        for contribution in self.contributions:
+            part = contribution.stiffness(u, convex=convex)
+            if part is not None:
+                part.zeroRowsColumns(self._fixed_global, diag=0.0)
+                parts.append(part)
+        return parts
 
     def max_step(self, u: Floats, direction: Floats) -> float:
         """Return the largest fraction, up to 1, of a direction (k, 3) in m that all

@@ -64,7 +64,8 @@ class SymmetricProducts:
     ) -> None:
         self._owned = column_map.size_local
         self._columns = columns.astype(np.int32)
-        self._ends = np.searchsorted(nodes, np.arange(self._owned + 1)).astype(np.int32)
+        ends = np.searchsorted(nodes, np.arange(self._owned + 1))
+        self._ends = ends.astype(np.int32)
         # the C code reads vectors of four numbers, also at the last row of the last
         # block
         self._blocks = np.zeros(9 * len(nodes) + 1, dtype=np.float32)

@@ -1,6 +1,7 @@
 """Time stepping: in each step growth, layers and a Newton solve; steps whose solve
 fails are halved."""
 
+import logging
 import math
 import time
 from collections.abc import Sequence
@@ -28,12 +29,13 @@ from .growth_models import growth_model
 from .layers import shear_modulus
 from .linear_solver import RUNGS, NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, Solution, residual_floor
-from .output import print_line, warn
+from .output import print_line
 from .problem import NonlinearProblem
 from .stretches import left_stretch, packed, relaxed, unpacked
 from .tissue import Elements, Tissue
 from .zones import Zones
 
+log = logging.getLogger(__name__)
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
 MIN_STRAIGHTNESS = 0.4
@@ -298,7 +300,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 else ""
             )
             for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
-                warn(warning)
+                log.warning(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
@@ -311,14 +313,18 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
     `distance` (k,) is from the local nodes to the pial surface, in m like the
     thickness.
     """
-    inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
+    depth = distance[domain.corners].mean(axis=1)
+    inside = domain.corners[depth <= thickness]
     nodes = domain.local(domain.positions)
-    lengths = sum(
-        float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum())
-        for i, j in EDGES
-    )
-    total, count = domain.comm.allreduce(np.array([lengths, len(EDGES) * len(inside)]))
-    return float(thickness * count / total) if count else math.nan
+    own_total = 0.0
+    for i, j in EDGES:
+        edges = nodes[inside[:, i]] - nodes[inside[:, j]]
+        own_total += np.linalg.norm(edges, axis=1).sum()
+    own_count = len(EDGES) * len(inside)
+    total, count = domain.comm.allreduce(np.array([own_total, own_count]))
+    if not count:
+        return math.nan
+    return float(thickness * count / total)
 
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:

@@ -6,6 +6,7 @@ zero. Only a part of tangential growth becomes pial area; the shortfall of a ste
 corrected in the next one (feedback control).
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -143,9 +144,10 @@ def free_growth(
 
     def volume_rate(tangential: float, radial: float | Floats, core: float) -> float:
         dg, dr = increments(weight, zones.growth, tangential, radial, core, 1.0)
-        return float(
-            (2 * dg + dr)[inputs.pieces].mean(axis=1) @ volumes / volumes.sum()
-        )
+        of_volume = 2 * dg + dr
+        of_pieces = of_volume[inputs.pieces].mean(axis=1)
+        mean = np.average(of_pieces, weights=volumes)
+        return float(mean)
 
     faces = zones.measured_facets
     areas = np.linalg.norm(area_vectors(TriangleMesh(positions_mm, faces)), axis=1)
@@ -191,8 +193,11 @@ def blended(curve: Any, at_start: float, start_week: float, week: float) -> floa
     The logarithm is linear between the weeks; the difference at the start decreases
     linearly to 0 in `JOINING_GW`.
     """
-    difference = max(0.0, 1.0 - (week - start_week) / JOINING_GW)
-    value, first = np.interp(
-        [week, start_week], list(curve), np.log(list(curve.values()))
-    )
-    return float(np.exp(value + difference * (np.log(at_start) - first)))
+    weeks = list(curve)
+    logs = np.log(list(curve.values()))
+    log_now = np.interp(week, weeks, logs)
+    log_first = np.interp(start_week, weeks, logs)
+    passed = (week - start_week) / JOINING_GW
+    part_left = max(0.0, 1.0 - passed)
+    difference = np.log(at_start) - log_first
+    return math.exp(log_now + part_left * difference)

@@ -56,11 +56,25 @@ def inverse_stretch(
 
     Principal values of ln U beyond the `limit` count as this.
     """
-    squares, axes = np.linalg.eigh(F.swapaxes(-1, -2) @ F)
-    logs = 0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH))
-    scale = np.exp(-np.asarray(power)[..., None] * np.clip(logs, -limit, limit))
-    inverse = (axes * scale[..., None, :]) @ axes.swapaxes(-1, -2)
-    return np.asarray(inverse), np.abs(logs).max(axis=-1) > limit
+    logs, axes = _principal_logs(F.swapaxes(-1, -2) @ F)
+    is_limited = np.abs(logs).max(axis=-1) > limit
+    limited = np.clip(logs, -limit, limit)
+    powers = np.asarray(power)[..., None]
+    inverses = np.exp(-powers * limited)
+    return from_principal(inverses, axes), is_limited
+
+
+def _principal_logs(squared: Floats) -> tuple[Floats, Floats]:
+    """Return the logarithms (..., 3) of the principal stretches, and their axes, from
+    FᵀF or F·Fᵀ."""
+    squares, axes = np.linalg.eigh(squared)
+    return 0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH)), axes
+
+
+def from_principal(values: Floats, axes: Floats) -> Floats:
+    """Return the symmetric (..., 3, 3) matrices with eigenvalues (..., 3) and
+    eigenvectors (..., 3, 3) in columns."""
+    return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
 def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floats:
@@ -70,11 +84,10 @@ def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floa
     Principal values beyond the `limit` count as this.
     """
     turned = F.swapaxes(-1, -2)
-    squares, axes = np.linalg.eigh(F @ turned if left else turned @ F)
-    logs = np.clip(
-        0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH)), -limit, limit
-    )
-    return np.asarray((axes * logs[..., None, :]) @ axes.swapaxes(-1, -2))
+    squared = F @ turned if left else turned @ F
+    logs, axes = _principal_logs(squared)
+    limited = np.clip(logs, -limit, limit)
+    return from_principal(limited, axes)
 
 
 def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:

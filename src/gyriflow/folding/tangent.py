@@ -39,9 +39,11 @@ def rigid_motions(arms: NDArray[np.float32]) -> Floats:
     from (n, 3) arms."""
     motions = np.zeros((len(arms), 3, 6))
     for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
+        j = (i + 1) % 3
+        k = (i + 2) % 3
         motions[:, i, i] = 1.0
-        motions[:, j, 3 + i], motions[:, k, 3 + i] = -arms[:, k], arms[:, j]
+        motions[:, j, 3 + i] = -arms[:, k]
+        motions[:, k, 3 + i] = arms[:, j]
     return motions
 
 
@@ -135,12 +137,14 @@ class ElasticMatrix:
     def half(self) -> sparse.bsr_matrix:
         """Return the owned rows of a matrix that adds up to this one with its
         transpose."""
-        ends = np.searchsorted(self.nodes[self._stored], np.arange(len(self.row_ends)))
-        blocks = self.values[self._stored] * self._half_weights[:, None, None]
-        shape = 3 * (len(self.row_ends) - 1), 3 * len(self.fixed)
-        return sparse.bsr_matrix(
-            (blocks, self.columns[self._stored], ends), shape=shape
-        )
+        stored = self._stored
+        n_rows = len(self.row_ends) - 1
+        rows = self.nodes[stored]
+        columns = self.columns[stored]
+        ends = np.searchsorted(rows, np.arange(n_rows + 1))
+        blocks = self.values[stored] * self._half_weights[:, None, None]
+        shape = (3 * n_rows, 3 * len(self.fixed))
+        return sparse.bsr_matrix((blocks, columns, ends), shape=shape)
 
     @property
     def values(self) -> Floats:

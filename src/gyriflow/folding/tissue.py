@@ -112,15 +112,17 @@ class Tissue:
 
         A linear element has one normal, that of the pial vertex nearest to its centre.
         """
-        cells, points = self.elements.cells, self.elements.points
+        cells = self.elements.cells
+        points = self.elements.points
         if points.order == 1:
             mask = np.asarray(needed[cells].any(axis=1))
-            normals = self.pial.normals_from(
-                self.nodes[cells[mask]].mean(axis=1), self.nearest[cells[mask]]
-            )
+            nodes = cells[mask]
+            centres = self.nodes[nodes].mean(axis=1)
+            normals = self.pial.normals_from(centres, self.nearest[nodes])
             return mask, np.repeat(normals[:, None], len(points.weights), axis=1)
         mask = np.asarray(needed.any(axis=1))
-        return mask, interpolated_normals(self.nearest[cells[mask]], points)
+        nodes = cells[mask]
+        return mask, interpolated_normals(self.nearest[nodes], points)
 
 
 def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
@@ -131,9 +133,13 @@ def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
     ones: all are turned to the side of the first before they are interpolated. If the
     result nearly vanishes, the nearest node's normal is taken.
     """
-    is_opposite = np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0
-    turned = normals * np.where(is_opposite, -1.0, 1.0)[:, :, None]
+    cosines = np.einsum("cki,ci->ck", normals, normals[:, 0])
+    signs = np.where(cosines < 0, -1.0, 1.0)
+    turned = normals * signs[:, :, None]
     mean = np.matmul(points.interpolation, turned)
     length = np.linalg.norm(mean, axis=2, keepdims=True)
-    nearest = turned[:, points.piecewise_linear.argmax(axis=1)]
-    return np.where(length > 0.1, mean / np.maximum(length, 0.1), nearest)
+    nearest_node = points.piecewise_linear.argmax(axis=1)
+    nearest = turned[:, nearest_node]
+    has_length = length > 0.1
+    unit_mean = mean / np.maximum(length, 0.1)
+    return np.where(has_length, unit_mean, nearest)

@@ -70,9 +70,12 @@ class Zones:
     def penetration_mm(self, positions: Floats) -> float:
         """Return the largest distance of the fissure's walls beyond their planes, for
         (n, 3) positions in mm."""
-        left = positions[self.vertices_of(terms.LEFT_CONTACT), 0] - self.planes_mm[0]
-        right = self.planes_mm[1] - positions[self.vertices_of(terms.RIGHT_CONTACT), 0]
-        return float(max(left.max(initial=0.0), right.max(initial=0.0)))
+        x = positions[:, 0]
+        left_plane, right_plane = self.planes_mm
+        beyond_left = x[self.vertices_of(terms.LEFT_CONTACT)] - left_plane
+        beyond_right = right_plane - x[self.vertices_of(terms.RIGHT_CONTACT)]
+        beyond = np.concatenate([beyond_left, beyond_right])
+        return float(beyond.max(initial=0.0))
 
     @property
     def cortex_facets(self) -> NDArray[np.int64]:
@@ -133,12 +136,13 @@ def _wall_anchors(
     vertices: Floats, wall: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     yz = vertices[wall][:, 1:]
-    central = int(((yz - yz.mean(axis=0)) ** 2).sum(axis=1).argmin())
-    farthest = int(np.abs(yz[:, 0] - yz[central, 0]).argmax())
+    from_centre = yz - yz.mean(axis=0)
+    central = (from_centre**2).sum(axis=1).argmin()
+    along_y = np.abs(yz[:, 0] - yz[central, 0])
+    farthest = along_y.argmax()
     # against translations along y and z, and the rotation about x
-    return wall[[central, farthest]], np.array(
-        [[False, True, True], [False, False, True]]
-    )
+    fixed = np.array([[False, True, True], [False, False, True]])
+    return wall[[central, farthest]], fixed
 
 
 def inside_ellipsoid(
@@ -258,8 +262,10 @@ def medial_vertices(
     does not let them grow.
     """
     x = mesh.vertices[mesh.tets, 0]
-    medial = np.where(x.mean(axis=1) > fissure_x_mm, x.min(axis=1), x.max(axis=1))
-    return np.unique(mesh.tets[(medial > left_plane) & (medial < right_plane)])
+    is_right = x.mean(axis=1) > fissure_x_mm
+    medial = np.where(is_right, x.min(axis=1), x.max(axis=1))
+    is_between = (medial > left_plane) & (medial < right_plane)
+    return np.unique(mesh.tets[is_between])
 
 
 def model_fields(

@@ -17,7 +17,7 @@ from ..geometry.diffusion import (
 )
 from ..geometry.paths import path_through
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
-from ..geometry.triangles import Floats, TriangleMesh
+from ..geometry.triangles import Floats, TriangleMesh, rms_length
 from ..settings.growth import BEFORE_GW
 from .atlas_path import (
     MIN_AGE_SPACING_GW,
@@ -198,10 +198,14 @@ def predict_shapes(
     body = make_body(mesh)
     shapes = [WeekShape(start_week, mesh.vertices)]
     _, used = boundary_surface(mesh)
+    misfits_mm = {}
     for week, shape in zip(later, expected[1:], strict=True):
         places = body.move_to(shape)
-        warn_of_distance(f"at GW {week:g} the brain", (places - shape)[used])
+        misfits_mm[week] = rms_length((places - shape)[used])
         shapes += with_stops(shapes[-1], week, body)
+    if misfits_mm:
+        worst = max(misfits_mm, key=misfits_mm.__getitem__)
+        warn_of_distance(f"the brain, most at GW {worst:g},", misfits_mm[worst])
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
     between = sorted({*further_weeks} - {*found.weeks})

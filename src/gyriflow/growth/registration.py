@@ -499,6 +499,6 @@ def _dice(earlier: Channels, later: Channels, bit: int, places: Floats) -> float
     mask = later.tissue & bit > 0
     carried = map_coordinates(mask.astype(np.float32), places, order=1)
     second = carried > 0.5
-    both = int(np.count_nonzero(first & second))
-    total = int(np.count_nonzero(first)) + int(np.count_nonzero(second))
-    return 2 * both / max(total, 1)
+    both = first & second
+    total = first.sum() + second.sum()
+    return float(2 * both.sum() / max(total, 1))

@@ -217,7 +217,8 @@ def fit_body(
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
-        warn_of_distance("a body", body.boundary.vertices - shape[used])
+        misfit_mm = rms_length(body.boundary.vertices - shape[used])
+        warn_of_distance("a body", misfit_mm)
         return
     surface, inner = target
     gap_mm = np.inf
@@ -231,16 +232,15 @@ def fit_body(
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
 
 
-def warn_of_distance(body: str, misfit: Floats) -> None:
-    """Log a warning that names a body if its vertices are far from those of the shape
-    that it is fitted to, by (n, 3) vectors in mm."""
-    left_mm = rms_length(misfit)
-    if left_mm > MAX_MISFIT_MM:
+def warn_of_distance(body: str, misfit_mm: float) -> None:
+    """Log a warning that names a body if it is far from the shape that it is fitted to
+    (root mean square over the vertices, in mm)."""
+    if misfit_mm > MAX_MISFIT_MM:
         log.warning(
             "%s stays %.2f mm (root mean square) from its shape, which inverts elements"
             " or moves folds through each other",
             body,
-            left_mm,
+            misfit_mm,
         )
 
 

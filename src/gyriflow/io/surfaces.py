@@ -383,8 +383,11 @@ def _read_with_trimesh(path: Path) -> RawSurface:
     import trimesh
 
     # process=True joins equal vertices: STL stores each corner of each face
-    body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
-    return np.asarray(body.vertices, dtype=float), np.asarray(body.faces), None, None
+    is_stl = path.suffix.lower() == ".stl"
+    body = trimesh.load_mesh(path, process=is_stl)
+    vertices = np.asarray(body.vertices, dtype=float)
+    faces = np.asarray(body.faces)
+    return vertices, faces, None, None
 
 
 MNI_OBJ = re.compile(rb"\s*P\s+[\d.]")
@@ -436,9 +439,11 @@ def read_pose(path: AnyPath) -> Pose:
 def connectivity(path: Path) -> tuple[int, int, str]:
     """Return a surface file's numbers of vertices and triangles, and a digest of the
     triangles in any order."""
-    return _connectivity(
-        path, (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None
-    )
+    written = None
+    if path.exists():
+        facts = path.stat()
+        written = (facts.st_mtime_ns, facts.st_size)
+    return _connectivity(path, written)
 
 
 @cache

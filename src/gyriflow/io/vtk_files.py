@@ -50,18 +50,25 @@ def read_vtk(path: Path) -> tuple[NDArray, NDArray]:
 def _little_endian_surface(content: bytes) -> tuple[NDArray, NDArray] | None:
     """Return the arrays of a legacy file in little-endian order, as MRtrix writes it
     against the rules, or None."""
-    if (head := LEGACY_SURFACE.match(content)) is None:
+    head = LEGACY_SURFACE.match(content)
+    if head is None:
         return None
-    kind = np.dtype("<f4" if head[2] == b"float" else "<f8")
-    end = head.end() + 3 * int(head[1]) * kind.itemsize
+    number = np.dtype("<f4" if head[2] == b"float" else "<f8")
+    n_coordinates = 3 * int(head[1])
+    end = head.end() + n_coordinates * number.itemsize
     polygons = LEGACY_POLYGONS.match(content, end)
-    if polygons is None or int(polygons[2]) != 4 * int(polygons[1]):
+    if polygons is None:
         return None
-    numbers = np.frombuffer(content, "<i4", int(polygons[2]), polygons.end())
+    n_faces = int(polygons[1])
+    n_numbers = int(polygons[2])
+    if n_numbers != 4 * n_faces:
+        return None
+    points = np.frombuffer(content, number, n_coordinates, head.end())
+    numbers = np.frombuffer(content, "<i4", n_numbers, polygons.end())
     cells = numbers.reshape(-1, 4)
     if (cells[:, 0] != 3).any():
         return None
-    return np.frombuffer(content[head.end() : end], kind).reshape(-1, 3), cells[:, 1:]
+    return points.reshape(-1, 3), cells[:, 1:]
 
 
 def _send_surface(path: str) -> None:

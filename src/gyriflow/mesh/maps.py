@@ -165,13 +165,16 @@ def _solid(surface: TriangleMesh) -> TriangleMesh:
 
 
 def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:
-    count = min(NEIGHBOURS, len(vertices))
-    gaps, candidates = (
-        values.reshape(len(points), count)
-        for values in cKDTree(vertices).query(points, k=count)
-    )
-    rank = np.empty(len(vertices), dtype=np.int64)
-    rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
-    tied = gaps <= gaps[:, :1] * (1 + TIE)
-    first = np.where(tied, rank[candidates], len(vertices)).argmin(axis=1)
-    return np.take_along_axis(candidates, first[:, None], axis=1)[:, 0]
+    """Return the (k,) nearest vertex of each point; of equally near ones the first by
+    x, y, z."""
+    neighbours = range(1, min(NEIGHBOURS, len(vertices)) + 1)
+    gaps, candidates = cKDTree(vertices).query(points, k=neighbours)
+    x, y, z = vertices.T
+    order = np.lexsort((z, y, x))
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(vertices))
+    least = gaps[:, :1]
+    is_nearest = gaps <= least * (1 + TIE)
+    ranks = np.where(is_nearest, rank[candidates], len(vertices))
+    first = ranks.argmin(axis=1)
+    return candidates[np.arange(len(points)), first]

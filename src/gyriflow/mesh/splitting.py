@@ -91,9 +91,11 @@ def _inner_edges(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     is_outer = np.zeros(n_vertices, dtype=bool)
     is_outer[faces] = True
     pairs = np.sort(mesh.tets[:, EDGES], axis=2)
-    on_surface, _ = edges(TriangleMesh(mesh.vertices, faces))
     numbers = pairs[..., 0] * n_vertices + pairs[..., 1]
-    outer_numbers = on_surface.min(axis=1) * n_vertices + on_surface.max(axis=1)
-    is_inner = is_outer[pairs].all(axis=2) & ~np.isin(numbers, outer_numbers)
+    on_surface, _ = edges(TriangleMesh(mesh.vertices, faces))
+    outer_pairs = np.sort(on_surface, axis=1)
+    outer_numbers = outer_pairs[:, 0] * n_vertices + outer_pairs[:, 1]
+    is_along_surface = np.isin(numbers, outer_numbers)
+    is_inner = is_outer[pairs].all(axis=2) & ~is_along_surface
     between = np.unique(pairs[is_inner], axis=0)
     return between, np.flatnonzero(is_inner.any(axis=1))

@@ -18,6 +18,7 @@ from ..geometry.triangles import (
     Floats,
     Ints,
     TriangleMesh,
+    edge_lengths,
     edges,
     mean_edge_length,
     unit,
@@ -185,14 +186,14 @@ def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, f
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
+    """Return the (n,) mean length in mm of the edges at each vertex, 0 without one."""
     pairs, _ = edges(mesh)
-    lengths = np.repeat(
-        np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2
-    )
+    ends = pairs.ravel()
+    lengths = np.repeat(edge_lengths(mesh.vertices, pairs), 2)
     size = len(mesh.vertices)
-    return np.bincount(pairs.ravel(), lengths, size) / np.maximum(
-        np.bincount(pairs.ravel(), minlength=size), 1
-    )
+    sums = np.bincount(ends, lengths, size)
+    counts = np.bincount(ends, minlength=size)
+    return sums / np.maximum(counts, 1)
 
 
 def _quadrics(
@@ -274,36 +275,39 @@ def _fit(
     centres: Ints,
     balls: sparse.csr_matrix,
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    near, starts, counts = balls.indices, balls.indptr[:-1], np.diff(balls.indptr)
+    near = balls.indices
+    starts = balls.indptr[:-1]
+    counts = np.diff(balls.indptr)
     scale = np.repeat(radii_mm[centres], counts)
-    offset = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[
-        :, None
-    ]
+    middle = np.repeat(vertices[centres], counts, axis=0)
+    offset = (vertices[near] - middle) / scale[:, None]
     facing = normals[near]
     share = areas[near] * (1.0 - np.einsum("ij,ij->i", offset, offset))
 
     upright = normals[centres]
     for _ in range(2):
-        weights = share * np.maximum(
-            np.einsum("ij,ij->i", facing, np.repeat(upright, counts, axis=0)), 0.0
-        )
+        repeated = np.repeat(upright, counts, axis=0)
+        cosines = np.einsum("ij,ij->i", facing, repeated)
+        weights = share * np.maximum(cosines, 0.0)
         upright = unit(np.add.reduceat(weights[:, None] * facing, starts))
-    tangent = unit(np.cross(upright, np.eye(3)[np.abs(upright).argmin(axis=1)]))
+    least_upright = np.eye(3)[np.abs(upright).argmin(axis=1)]
+    tangent = unit(np.cross(upright, least_upright))
     frames = np.stack([tangent, np.cross(upright, tangent), upright], axis=1)
-    x, y, z = np.einsum("ijk,ik->ji", np.repeat(frames, counts, axis=0), offset)
+    repeated_frames = np.repeat(frames, counts, axis=0)
+    x, y, z = np.einsum("ijk,ik->ji", repeated_frames, offset)
 
     powers = {(0, 0): weights, (1, 0): weights * x, (0, 1): weights * y}
     for a, b in _MONOMIALS:
         if (a, b) not in powers:
             powers[a, b] = powers[a - 1, b] * x if a else powers[a, b - 1] * y
-    columns = [
-        *(powers[key] for key in _MONOMIALS),
-        *(powers[key] * z for key in _POWERS),
-    ]
+    columns = [powers[key] for key in _MONOMIALS]
+    columns += [powers[key] * z for key in _POWERS]
     sums = np.stack([np.add.reduceat(column, starts) for column in columns], axis=1)
-    sums /= np.maximum(sums[:, [_MONOMIALS.index((0, 0))]], np.finfo(float).tiny)
+    total_weight = sums[:, [_MONOMIALS.index((0, 0))]]
+    sums /= np.maximum(total_weight, np.finfo(float).tiny)
 
-    matrices, right = sums[:, _NORMAL_EQUATIONS], sums[:, len(_MONOMIALS) :]
+    matrices = sums[:, _NORMAL_EQUATIONS]
+    right = sums[:, len(_MONOMIALS) :]
     values = np.linalg.eigvalsh(matrices)
     fitted = values[:, 0] > 1e-9 * np.abs(values[:, -1])
     coefficients = np.zeros((len(centres), 6))

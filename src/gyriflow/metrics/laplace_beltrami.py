@@ -216,8 +216,10 @@ def _modes_between(
 def _orthonormalise(block: Floats, mass: sparse.csc_matrix) -> tuple[Floats, Floats]:
     """Return M-orthonormal vectors Q (n, b) and R (b, b) with block = Q R."""
     vectors, first = linalg.qr(block, mode="economic")
-    second = linalg.cholesky(vectors.T @ (mass @ vectors))
-    return linalg.solve_triangular(second, vectors.T, trans="T").T, second @ first
+    products = vectors.T @ (mass @ vectors)
+    second = linalg.cholesky(products)
+    transposed = linalg.solve_triangular(second, vectors.T, trans="T")
+    return transposed.T, second @ first
 
 
 def _spacing(mass: sparse.csc_matrix) -> float:

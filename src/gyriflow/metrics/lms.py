@@ -91,19 +91,22 @@ class WeeklyNorm:
     def _errors(self, locations: Floats, scales: Floats) -> tuple[Floats, Floats]:
         """Return the variances of the location, in squared scales, and of ln S at
         weeks."""
-        size, end = len(self.location), len(self.location) + len(self.scale)
+        size = len(self.location)
+        end = size + len(self.scale)
         location = self.covariance[:size, :size]
         scale = self.covariance[size:end, size:end]
-        return _squares(locations, location) * np.exp(
-            -2 * (scales @ self.scale)
-        ), _squares(scales, scale)
+        squared_scales = np.exp(2 * (scales @ self.scale))
+        leverage = _squares(locations, location) / squared_scales
+        return leverage, _squares(scales, scale)
 
     def _student(self, locations: Floats, scales: Floats) -> tuple[Floats, Floats]:
         """Return the degrees of freedom and the spread of Student's distribution of new
         subjects, in scales."""
         leverage, log_scale = self._errors(locations, scales)
-        freedom = 1 / (2 * SHAPE_WEIGHT * log_scale + (1 - SHAPE_WEIGHT) / self.freedom)
-        return freedom, np.sqrt(1 + leverage)
+        by_shape = 2 * log_scale
+        by_count = 1 / self.freedom
+        inverse = SHAPE_WEIGHT * by_shape + (1 - SHAPE_WEIGHT) * by_count
+        return 1 / inverse, np.sqrt(1 + leverage)
 
     def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
         """Return z (n,) of new subjects with values at weeks, and its 90 % interval (2,

@@ -200,9 +200,12 @@ class CohortNorms:
         those of the norm."""
         if ("whole", "volume") not in self.norms:
             return np.full(len(weeks), np.nan)
-        norm, at = self.norms["whole", "volume"][1], np.asarray(weeks, dtype=float)
-        medians = norm.values(at.clip(norm.first, norm.last), 0.0)
-        return np.where((at >= norm.first) & (at <= norm.last), medians, np.nan)
+        _, norm = self.norms["whole", "volume"]
+        wanted = np.asarray(weeks, dtype=float)
+        known = wanted.clip(norm.first, norm.last)
+        medians = norm.values(known, 0.0)
+        medians[known != wanted] = np.nan
+        return medians
 
     @property
     def plain(self) -> dict[str, Any]:
@@ -382,9 +385,12 @@ def _score(
 def _with_norm(metrics: pd.DataFrame) -> pd.DataFrame:
     """Return the rows with a value of a metric that has norms, with the column
     person."""
-    has_norm = metrics["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)
-    rows = metrics[has_norm & metrics["value"].notna()]
-    return rows if "person" in rows else rows.assign(person=rows["subject"])
+    with_norm = [name for name, metric in METRICS.items() if metric.has_norm]
+    is_scored = metrics["metric"].isin(with_norm) & metrics["value"].notna()
+    rows = metrics[is_scored]
+    if "person" in rows:
+        return rows
+    return rows.assign(person=rows["subject"])
 
 
 def _by_metric(

@@ -165,13 +165,14 @@ def _folding_line(
     """Draw the simulated growth rate over bars of equal width, one per interval."""
     style: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
     if not isinstance(rate_per_s, Mapping):
-        axes.axhline(
-            rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **style
-        )
+        rate = rate_per_s * 1e7
+        axes.axhline(rate, label=f"folding: {rate:.3g}·10⁻⁷ s⁻¹", **style)
         return
     weeks = np.array(sorted(rate_per_s))
     values = 1e7 * np.array([rate_per_s[week] for week in weeks])
     ends = np.array([*rates["from_week"], rates["to_week"].iloc[-1]])
-    drawn = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
-    places = np.interp(drawn, ends, np.arange(len(ends)) - 0.5)
+    is_inside = (weeks > ends[0]) & (weeks < ends[-1])
+    drawn = np.union1d(ends, weeks[is_inside])
+    bar_edges = np.arange(len(ends)) - 0.5
+    places = np.interp(drawn, ends, bar_edges)
     axes.plot(places, np.interp(drawn, weeks, values), label="folding", **style)

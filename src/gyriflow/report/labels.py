@@ -91,9 +91,17 @@ def column_label(key: Hashable) -> str:
 def parameter_label(key: str) -> str:
     """Return the axis label of a parameter, with its unit, for example "cortical
     thickness (mm)"."""
-    ending = next((ending for ending in _ENDINGS if key.endswith(ending)), "")
-    name, unit = key.removesuffix(ending), _ENDINGS.get(ending)
-    return with_unit(PARAMETER_TITLES.get(name, plain(name.replace(".", " "))), unit)
+    name = key
+    unit = None
+    for ending, unit_of_ending in _ENDINGS.items():
+        if key.endswith(ending):
+            name = key.removesuffix(ending)
+            unit = unit_of_ending
+            break
+    title = PARAMETER_TITLES.get(name)
+    if title is None:
+        title = plain(name.replace(".", " "))
+    return with_unit(title, unit)
 
 
 def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -111,6 +119,11 @@ def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _value_label(key: str, value: Any, *, alone: bool) -> str:
-    name, _, unit = parameter_label(key).removesuffix(")").partition(" (")
-    text = f"{value:g}" if isinstance(value, float) else str(value)
-    return f"{text} {unit}" if alone and unit else f"{name} {text} {unit}".rstrip()
+    label = parameter_label(key)
+    name, _, unit = label.removesuffix(")").partition(" (")
+    words = [f"{value:g}" if isinstance(value, float) else str(value)]
+    if unit:
+        words.append(unit)
+    if not (alone and unit):
+        words.insert(0, name)
+    return " ".join(words)

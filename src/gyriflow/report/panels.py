@@ -243,14 +243,19 @@ def _columns(rows: Sequence[Row], room_in: float) -> tuple[Floats, list[slice], 
 
 def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
     """Return the heights of a row's pictures and captions."""
-    panels = [panel for panel in row.panels[block] if panel is not None]
-    tallest = max(
-        (half_extents(panel.mesh, panel.view)[1] for panel in panels), default=0.0
-    )
+    picture_mm = 0.0
+    caption_lines = 0
+    for panel in row.panels[block]:
+        if panel is None:
+            continue
+        _, half_height_mm = half_extents(panel.mesh, panel.view)
+        picture_mm = max(picture_mm, 2 * half_height_mm)
+        caption_lines = max(caption_lines, len(panel.caption.splitlines()))
     # the label is written along the height
-    label = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
-    lines = max((len(panel.caption.splitlines()) for panel in panels), default=0)
-    return max(2 * _MARGIN * tallest * inches_per_mm, label), 0.13 * lines
+    longest_line = max(len(line) for line in row.label.split("\n"))
+    label = 0.06 * longest_line + 0.1
+    picture = _MARGIN * picture_mm * inches_per_mm
+    return max(picture, label), 0.13 * caption_lines
 
 
 def _dots(inches: Any) -> Any:

@@ -258,10 +258,15 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     rounding = ROUNDING * np.abs(finite).max(initial=0.0)
     signed = record.is_signed or finite.min(initial=0.0) < -rounding
     sizes = np.abs(finite) if signed else finite
-    high = float(np.quantile(sizes, record.quantile)) if len(sizes) else 1.0
-    end = round_up(high) if high > 0 else 1.0
-    low, colours = (-end, SIGNED_COLOURS) if signed else (0.0, record.colours)
-    return colour_scale(colours, low, end, cut=bool((sizes > end).any()))
+    end = 1.0
+    if len(sizes):
+        high = float(np.quantile(sizes, record.quantile))
+        if high > 0:
+            end = round_up(high)
+    is_cut = bool((sizes > end).any())
+    if signed:
+        return colour_scale(SIGNED_COLOURS, -end, end, cut=is_cut)
+    return colour_scale(record.colours, 0.0, end, cut=is_cut)
 
 
 def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMaps:

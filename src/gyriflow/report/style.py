@@ -130,9 +130,15 @@ def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with columns run and subject, with simulations named by
     `run_names`."""
     pairs = list(zip(table["run"], table["subject"], strict=True))
-    simulated = [pair for pair in dict.fromkeys(pairs) if pair[0] != MEASURED]
+    simulated = []
+    for run, subject in dict.fromkeys(pairs):
+        if run != MEASURED:
+            simulated.append((run, subject))
     names = dict(zip(simulated, run_names(simulated), strict=True))
-    return table.assign(run=[names.get(pair, pair[0]) for pair in pairs])
+    named = []
+    for run, subject in pairs:
+        named.append(names.get((run, subject), run))
+    return table.assign(run=named)
 
 
 def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
@@ -142,15 +148,20 @@ def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, A
     Figures of a study pass all of its `runs` in the same order, so that a run has the
     same colour in all figures.
     """
-    drawn = set(present := list(present))
-    names = [name for name in dict.fromkeys([*runs, *present]) if name != MEASURED]
-    colours: dict[str, Any] = dict(zip(names, RUN_COLOURS, strict=False))
-    if len(names) > len(RUN_COLOURS):
-        scale = mpl.colormaps["viridis"]
-        colours = {
-            name: scale(0.92 * i / (len(names) - 1)) for i, name in enumerate(names)
-        }
-    return {run: colour for run, colour in colours.items() if run in drawn}
+    present = list(present)
+    names = list(dict.fromkeys([*runs, *present]))
+    if MEASURED in names:
+        names.remove(MEASURED)
+    colours: dict[str, Any] = {}
+    for i, name in enumerate(names):
+        if name not in present:
+            continue
+        if len(names) <= len(RUN_COLOURS):
+            colours[name] = RUN_COLOURS[i]
+        else:
+            place = 0.92 * i / (len(names) - 1)
+            colours[name] = mpl.colormaps["viridis"](place)
+    return colours
 
 
 def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
@@ -172,10 +183,13 @@ def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
 def from_zero(axes: Axes) -> None:
     """Start the vertical axis at zero and end it slightly above the data of all panels
     that share it."""
-    tops = [panel.dataLim.ymax for panel in axes.get_shared_y_axes().get_siblings(axes)]
-    # panels without data have an infinite top
-    top = max((top for top in tops if math.isfinite(top)), default=0.0)
-    axes.set_ylim(0, 1.07 * top if top > 0 else 1.0)
+    highest = 0.0
+    for panel in axes.get_shared_y_axes().get_siblings(axes):
+        top = panel.dataLim.ymax
+        # panels without data have an infinite top
+        if math.isfinite(top):
+            highest = max(highest, top)
+    axes.set_ylim(0, 1.07 * highest if highest > 0 else 1.0)
 
 
 def star(label: str, colour: str = OBSERVED_COLOUR, **style: Any) -> Line2D:

@@ -36,7 +36,7 @@ from gyriflow.anatomy.fissure import (
     side_distance,
     upright,
 )
-from gyriflow.anatomy.pial import from_labels
+from gyriflow.anatomy.pial import _with_fissure, from_labels
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
@@ -238,6 +238,40 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     taken = (field > 0.5) & (wide <= 0.5)
     assert bool(taken[18:23, 15:25, 17:24].any()) == bool(open_voxels)
     assert not (wide[20, 20, 17:24] > 0.5).any()
+
+
+def test_the_order_in_which_long_voxels_are_stored_does_not_change_the_fissure():
+    brain, core, _ = block(0)
+    affine = scaling((0.9, 0.7, 1.1))
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    side_mm = side_distance(
+        brain, core, affine, fissure_between(walls, mid_plane(walls))
+    )
+    field, _, removed_ml = _with_fissure(smooth_mask(brain), affine, side_mm, core)
+    order = [2, 0, 1]
+    found, _, found_ml = _with_fissure(
+        smooth_mask(brain).transpose(order),
+        affine[:, [*order, 3]],
+        side_mm.transpose(order),
+        core.transpose(order),
+    )
+    assert removed_ml == pytest.approx(found_ml, rel=1e-4)
+    assert removed_ml > 0.1
+    np.testing.assert_allclose(found.transpose(np.argsort(order)), field, atol=1e-4)
+
+
+def test_a_hidden_fissure_is_opened_where_no_tissue_joins_the_hemispheres():
+    brain, core, affine = block(0)
+    core[18:23] = False
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    side_mm = side_distance(
+        brain, core, affine, fissure_between(walls, mid_plane(walls))
+    )
+    hidden = hidden_fissure(side_mm, brain, core, affine)
+    # from one end of the brain to the other, in layers beside the middle
+    assert hidden[20, 8:32, 8:22].all()
+    assert not hidden[:18].any()
+    assert not hidden[23:].any()
 
 
 @pytest.mark.parametrize("gap_voxels", [0, 1])

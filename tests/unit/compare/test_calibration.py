@@ -22,6 +22,7 @@ from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.metrics.spangy import PART_POWERS
 
 from .bumpy import PREPARED, RADIUS, REAL, bumpy
+from .made_spectra import folded
 
 BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
 TRUTH = {"thickness_mm": 1.7, "growth_rate_per_s": 3.2e-7}
@@ -100,26 +101,6 @@ def test_an_optimum_near_a_bound_is_marked():
     )
     found = find_optimum(runs.assign(run=["a", "b"], cause=""), BOUNDS)
     assert found["at_bound"].tolist() == [True, False]
-
-
-def folded(thickness: float) -> pd.DataFrame:
-    """Return made spectra of folds whose wavelength is 6 thicknesses, in bands of a
-    brain with λ1 = (2π/128 mm)²."""
-    bands = np.arange(1, 7)
-    power = np.exp(-((np.log2(128 / (6 * thickness)) - bands + 0.5) ** 2))
-    table = pd.DataFrame(
-        {"band": bands, "power": power, "relative_power": power / power.sum()}
-    )
-    table = table.assign(
-        wavelength_min_mm=128 / 2.0**bands,
-        wavelength_max_mm=256 / 2.0**bands,
-        is_open=False,
-    )
-    octaves = np.arange(0.5, 16 * 6).reshape(6, 16) / 16
-    table[PART_POWERS] = np.exp(-((np.log2(128 / (6 * thickness)) - octaves) ** 2))
-    return table.assign(
-        hemisphere="left", proxy="mean_curvature", complete=True, resolved=True
-    )
 
 
 @pytest.mark.parametrize("name", ["relative_power_b5", "spectral_distance"])
