@@ -10,14 +10,19 @@ CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
 SOURCE = f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 sys.path.insert(0, SOURCE)
 from gyriflow.code_hash import code_hash
-from gyriflow.running.provenance import folders_in
 from gyriflow.running.requirements import SOLVER, require_for
 from gyriflow.running.snakemake_internals import (
     complete_rules,
-    know_inputs_by_content,
     remove_stale,
     rerun_on_code_changes,
 )
+
+
+# Dates of files mean nothing: `gyriflow.running.launch` compares results with their manifests, and names the files that
+# Snakemake makes again.
+inputflags:
+    ancient,
+
 
 # a configuration from the command line replaces that of the demo; they are not merged
 if not workflow.overwrite_configfiles:
@@ -63,9 +68,6 @@ rule all:
 complete_rules(workflow.rules, ENVIRONMENT)
 SCRIPTS = Path(workflow.basedir, "workflow", "scripts")
 rerun_on_code_changes(workflow.rules, SCRIPTS)
-if workflow.is_main_process:
-    AWAITED = [f"/{file}" for file in ATLAS_FILES if f"/{file}" not in CONTENTS]
-    know_inputs_by_content(CONTENTS, EARLIER_CONTENTS.values(), folders_in(CONFIG), AWAITED)
 if RUNS and (REFUSED or CONFIG.left_out):
     remove_stale(workflow.rules, STUDY, REPORT)
 

@@ -1,7 +1,8 @@
 # Shared by all rules: the validated configuration, names and paths of results.
 import os
+from contextlib import chdir
 
-from gyriflow.errors import GyriflowError
+from gyriflow.errors import GyriflowError, InputError
 from gyriflow.grouping import grouped
 from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
@@ -9,7 +10,16 @@ from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
 from gyriflow.study.registry import target_files, by_rule, files_in, observed_name
 from gyriflow.study.paths import *
-from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
+from gyriflow.running.launch import (
+    KEEP_GOING_VAR,
+    DIRECTORY_VAR,
+    DRY_RUN_VAR,
+    LAUNCHED_VAR,
+    MEASURE_ONLY_VAR,
+    PLANNED_VAR,
+    hold_lock,
+    refused_brains,
+)
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.running.snakemake_internals import remove_stale
 
@@ -23,10 +33,12 @@ shell.prefix(
 
 # whether this process runs the study; other processes run one job, or are dry runs
 RUNS = workflow.is_main_process and DRY_RUN_VAR not in os.environ
+# a call reads the rules once to plan, and again to run
+TELLS = workflow.is_main_process and PLANNED_VAR not in os.environ
 
 
 def validated_study():
-    """Return the study without refused brains, and the contents of the input files, now and in the last run.
+    """Return the study without refused brains, and the contents of the input files.
 
     Ends with a message and exit code 2 if the configuration is not valid.
     """
@@ -34,18 +46,21 @@ def validated_study():
     from gyriflow.io.yaml_files import read_keys
 
     try:
-        base = Path.cwd()
+        base = Path(os.environ.get(DIRECTORY_VAR, os.curdir)).absolute()
         for path in workflow.configfiles:
             # Snakemake itself keeps the last of two equal keys
             file = Path(workflow.workdir_init, path)
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = folder_of(file)
-        found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
-        study = resolve(found.measured_only if MEASURE_ONLY_VAR in os.environ else found, refused_brains())
+        # a dry run is in a view of the working directory
+        with chdir(os.environ.get(DIRECTORY_VAR, os.curdir)):
+            found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
+            used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
+            study = resolve(used, refused_brains())
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             check_results_belong_to(Path.cwd(), files, found, record=RUNS)
-        return study, *input_contents(Path.cwd(), found, study.checksums, record=RUNS)
+        return study, input_contents(Path.cwd(), found, study.checksums, record=RUNS)
     except GyriflowError as error:
         end_with(error)
 
@@ -56,12 +71,17 @@ def end_with(error):
     sys.exit(error.exit_code)
 
 
-study, CONTENTS, EARLIER_CONTENTS = validated_study()
+if workflow.is_main_process and LAUNCHED_VAR not in os.environ:
+    problem = "Snakemake does not know what results were made from"
+    remedy = "Start it by ./run snakemake or python -m gyriflow.running.launch, with the same arguments."
+    end_with(InputError(problem, remedy=remedy))
+
+study, CONTENTS = validated_study()
 CONFIG = study.config
 # brains refused in an earlier pass of this call, with the cause; the study is finished without them
 KNOWN = {brain.id for brain in CONFIG.brains}
 REFUSED = {brain: cause for brain, cause in refused_brains().items() if brain in KNOWN}
-if REFUSED and workflow.is_main_process:
+if REFUSED and TELLS:
     # the causes have been printed
     rest = "finishing the study without" if study.brains else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
@@ -69,7 +89,7 @@ if REFUSED and not study.brains:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
 FIGURES = figures_of(study)
-if workflow.is_main_process:
+if TELLS:
     messages = [(brain, f"not folded: {cause}") for brain, cause in study.unreachable.items()]
     if not REFUSED:
         messages += [(scan, f"left out: {row['cause']}") for scan, row in CONFIG.left_out.items()]

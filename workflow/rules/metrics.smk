@@ -59,7 +59,6 @@ rule white:
     params:
         columns=lambda w: brain_of(w).measurement.labels,
         labels=lambda w: brain_of(w).labels,
-        # also parameters, since swapped input files do not trigger a rerun
         white=lambda w: brain_of(w).config.white_files,
         surface=surface_settings("edge_length_mm", "max_hole_mm"),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,

@@ -3,7 +3,7 @@ from gyriflow.running.cost import targets_memory_mib
 from gyriflow.io.origins import origin_key
 from gyriflow.running.path_store import has_path, kept_path, path_origin, store_folder
 
-if workflow.is_main_process:
+if TELLS:
     for series, cause in study.series.unmatched.items():
         if set(study.starts) & set(study.series.brains[series]):
             print(

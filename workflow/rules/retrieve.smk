@@ -4,7 +4,7 @@ from gyriflow.study.atlases import retrieval_note
 
 ATLAS_FILES = {str(file.path).removeprefix("/"): file for atlas in study.used_atlases for file in atlas.missing}
 
-if workflow.is_main_process:
+if TELLS:
     for atlas in study.used_atlases:
         if atlas.missing:
             print(f"gyriflow: {retrieval_note(atlas)}", file=sys.stderr)

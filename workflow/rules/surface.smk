@@ -60,7 +60,6 @@ rule pial:
         side=lambda w: brain_of(w).sides[0] if len(brain_of(w).sides) == 1 else None,
         coordinates=lambda w: brain_of(w).config.coordinates,
         labels=lambda w: brain_of(w).labels,
-        # also parameters, since swapped input files do not trigger a rerun
         white=lambda w: brain_of(w).config.white_files,
         checksums=lambda w: brain_of(w).checksums,
         settings=lambda w: pial_source(w)[1],

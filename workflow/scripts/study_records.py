@@ -18,17 +18,18 @@ from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.report.page import methods_text
 from gyriflow.report.tables import html_table, resources
 from gyriflow.running.jobs import gather_messages, read_usage
-from gyriflow.running.provenance import software, texts_in
+from gyriflow.running.manifest import FOLDER, recorded_results
+from gyriflow.running.provenance import recorded_inputs, software, texts_in
 from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
-LEFT_OUT = ("logs", "benchmarks", "provenance.json")
+LEFT_OUT = ("logs", "benchmarks", FOLDER, "provenance.json")
 
 
 def results_in(folder):
     """Return the fingerprints of the results in a folder."""
-    return fingerprints(files_in(folder, *LEFT_OUT))
+    return fingerprints(files_in(folder, *LEFT_OUT), recorded_results(folder))
 
 
 with step(snakemake.log[0]):
@@ -49,7 +50,10 @@ with step(snakemake.log[0]):
     )
 
     used = software()
-    inputs = {brain["id"]: fingerprints(texts_in(brain)) for brain in params.brains}
+    known = recorded_inputs(Path())
+    inputs = {
+        brain["id"]: fingerprints(texts_in(brain), known) for brain in params.brains
+    }
     for path, brain in zip(output.brains, params.brains, strict=True):
         record = {
             "configuration": brain,
@@ -69,7 +73,8 @@ with step(snakemake.log[0]):
         folder = Path(path).parent
         settings = {"run": run, "start": brain, "parameters": read_yaml(parameters)}
         start = fingerprints(
-            [f"results/brains/{brain}/mesh/brain.h5", folder / "folding" / "maps.h5"]
+            [f"results/brains/{brain}/mesh/brain.h5", folder / "folding" / "maps.h5"],
+            {},
         )
         record = {
             "configuration": settings,

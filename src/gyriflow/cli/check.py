@@ -3,12 +3,11 @@ that will take."""
 
 import logging
 import math
-import re
 import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, chdir, contextmanager
+from contextlib import chdir, contextmanager
 from functools import cache
 from logging.handlers import BufferingHandler
 from pathlib import Path
@@ -40,6 +39,8 @@ from ..running.cost import (
 )
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
+from ..running.manifest import CHANGED_CODE
+from ..running.planning import BY_ANOTHER_JOB, MISSING, Plan
 from ..running.provenance import recorded_version
 from ..running.status import format_duration
 from ..settings.base import folder_of
@@ -71,16 +72,10 @@ THROUGH_CORTEX = {
 }
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as
 found on the shipped brains."""
-CODE_ONLY = re.compile(
-    r"before: ('code \w+',?|<nothing exclusive>)*"
-    r" now: ('code \w+',?|<nothing exclusive>)* $"
-)
-"""End of Snakemake's reason to run a job again whose code has changed and nothing else
-of its parameters."""
 
 
 class PlannedJob(NamedTuple):
-    """A job of a dry run, with Snakemake's reason to run it."""
+    """A job of a dry run, with the reason to run it."""
 
     rule: str
     wildcards: dict[str, str]
@@ -236,22 +231,13 @@ def work_of(
 
 
 def _why(reason: str, directory: Path) -> str:
-    """Return Snakemake's reason to run a job in words, the first of several."""
-    changed, _, files = reason.partition("Updated input files: ")
-    if not changed and files.startswith("/"):
-        paths = files.partition(";")[0].split(", ")
-        names = [Path(path).name for path in paths]
-        return f"changed input {', '.join(names)}"
-    if reason.startswith("Params have changed"):
-        if not CODE_ONLY.search(reason):
-            return "changed settings"
+    """Return the reason to run a job, without the files of a general one."""
+    if reason == CHANGED_CODE:
         made_by, this = recorded_version(directory), version()
-        return (
-            "changed code"
-            if made_by in (None, this)
-            else f"changed code (gyriflow {made_by}, now {this})"
-        )
-    return reason.partition(":")[0]
+        if made_by not in (None, this):
+            return f"{reason} (gyriflow {made_by}, now {this})"
+    general = [words for words in (MISSING, BY_ANOTHER_JOB) if reason.startswith(words)]
+    return general[0] if general else reason
 
 
 def plan(
@@ -259,31 +245,21 @@ def plan(
 ) -> list[PlannedJob]:
     """Return the jobs that Snakemake would run, without targets, or exit with its code;
     `show` lists them, too."""
-    jobs = []
-
-    def take(record: logging.LogRecord) -> bool:
-        job = vars(record)
-        if job.get("event") == "job_info" and job["output"]:
-            files = job["input"] or (), job["output"]
-            names = dict(job["wildcards"] or {})
-            jobs.append(
-                PlannedJob(
-                    job["rule_name"], names, job["threads"], job["reason"], *files
-                )
-            )
-        return show or record.levelno >= logging.ERROR
-
-    logger = logging.getLogger("snakemake.logging")
-    logger.addFilter(take)
-    # Snakemake makes the working directory, even in a dry run, and changes to it
-    with ExitStack() as end, chdir(Path.cwd()), TemporaryDirectory() as empty:
-        end.callback(logger.removeFilter, take)
+    plans: list[Plan] = []
+    with TemporaryDirectory() as empty:
         place = directory.resolve() if directory.is_dir() else empty
         options = ["--configfile", str(config.absolute()), "--directory", str(place)]
-        code = launch([*options, "--dry-run", *further])
-    if code:
-        sys.exit(code)
-    return jobs
+        call = [*options, "--dry-run", *further]
+        code = launch(call) if show else 0
+        code = code or launch(call, plans.append)
+        if code:
+            sys.exit(code)
+        jobs = []
+        for job, why in plans[0].reasoned_jobs:
+            names = dict(job.wildcards)
+            files = job.files, job.outputs
+            jobs.append(PlannedJob(job.rule, names, job.threads(), why, *files))
+        return jobs
 
 
 def _contents(study: Study) -> str:

@@ -100,7 +100,6 @@ class ExportedBrain(NamedTuple):
     used, and `surface` and `thickness` of the whole brain.
     """
 
-    # a tuple: Snakemake sees no change in parameters of other classes
     brain: str
     run: str
     week: float

@@ -15,6 +15,7 @@ from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -380,6 +381,12 @@ def sha256_of(path: AnyPath) -> str:
         ) from error
 
 
+@cache
+def _facts(path: str, size: int, written_ns: int, changed_ns: int) -> list[Any]:
+    """Return the contents of a file in one state, which is read once in a process."""
+    return [sha256_of(path), size, written_ns, changed_ns, companion_files(path)]
+
+
 def contents(
     files: Iterable[AnyPath], earlier: Mapping[str, Any]
 ) -> dict[str, list[Any]]:
@@ -398,22 +405,21 @@ def contents(
             # change
             current = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
             found = earlier.get(path, [])
-            by_path[path] = (
-                found
-                if found[1:-1] == current
-                else [sha256_of(path), *current, companion_files(path)]
-            )
+            by_path[path] = found if found[1:-1] == current else _facts(path, *current)
             paths += [
                 companion for companion in by_path[path][-1] if companion not in paths
             ]
     return by_path
 
 
-def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
+def fingerprints(
+    files: Iterable[AnyPath], earlier: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
     """Return for each file that is there its SHA-256, its size in bytes and when it was
-    last written (UTC)."""
+    last written (UTC); what has not changed since `earlier` is not read (see
+    `contents`)."""
     by_path = {}
-    for path, (sha256, size, written_ns, *_) in contents(files, {}).items():
+    for path, (sha256, size, written_ns, *_) in contents(files, earlier).items():
         written = datetime.fromtimestamp(written_ns // 10**9, UTC).isoformat(
             timespec="seconds"
         )

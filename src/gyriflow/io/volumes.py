@@ -76,7 +76,6 @@ class LabelSource(NamedTuple):
     """A file of tissue labels, which of NIfTI's two matrices counts, and what its
     labels mean."""
 
-    # a tuple: Snakemake sees no change in parameters of other classes
     path: str
     affine_from: AffineSource
     scheme: LabelScheme

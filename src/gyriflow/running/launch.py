@@ -18,8 +18,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext, suppress
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import chdir, nullcontext, suppress
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
@@ -34,7 +36,18 @@ from ..io.yaml_files import read_keys
 from ..messages import Message, study_messages
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
-from .snakemake_internals import dates_before_copy, temporary_records
+from .manifest import Job, write_manifest
+from .planning import (
+    Events,
+    Plan,
+    hide_results,
+    keep_contents,
+    link_results,
+    made_plan,
+    no_plan,
+    restore_results,
+    view_of,
+)
 
 ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
 """The conda environment, whose variables of MPI and BLAS are defaults in any other one,
@@ -64,6 +77,9 @@ VERBOSE_OPTIONS = (
     "logger",
     "debug",
     "debug_dag",
+)
+"""Options that ask for Snakemake's own messages."""
+MANAGING_OPTIONS = (
     "unlock",
     "touch",
     "report",
@@ -76,13 +92,23 @@ VERBOSE_OPTIONS = (
     "list_params_changes",
     "generate_unit_tests",
 )
-"""Options that ask for Snakemake's own messages, or for something else than running
-steps."""
+"""Options that ask for something else than running steps."""
+BY_MANIFEST = ("--rerun-triggers", "mtime", "--debug-dag")
+"""Options with which Snakemake tells all jobs, and compares none with its own records.
+Dates do not count, either, as all inputs are `ancient`."""
+PLANNING = (*BY_MANIFEST, "--quiet", "rules", "progress", "--rerun-incomplete", "-n")
+"""Options with which Snakemake only tells the jobs that it plans."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 """Environment variable: continue after a failed step, or after a row of a table that
 cannot be used."""
 DRY_RUN_VAR = "GYRIFLOW_DRY_RUN"
 """Environment variable: run nothing."""
+LAUNCHED_VAR = "GYRIFLOW_LAUNCHED"
+"""Environment variable: Snakemake was started by this module."""
+DIRECTORY_VAR = "GYRIFLOW_DIRECTORY"
+"""Environment variable: the working directory that a dry run is a view of."""
+PLANNED_VAR = "GYRIFLOW_PLANNED"
+"""Environment variable: the study has been planned, and its messages were printed."""
 MEASURE_ONLY_VAR = "GYRIFLOW_MEASURE_ONLY"
 """Environment variable: fold nothing."""
 REFUSED_FILE_VAR = "GYRIFLOW_REFUSED_FILE"
@@ -307,20 +333,6 @@ def full_disk(directory: Path) -> str:
     return ""
 
 
-def restore_dates(dates: Mapping[Path, float]) -> bool:
-    """Give files and links a date each (s since the epoch); return whether all of
-    several have it now."""
-    try:
-        for path, date in dates.items():
-            os.utime(path, (date, date))
-            if path.is_symlink():
-                os.utime(path, (date, date), follow_symlinks=False)
-    except OSError:
-        # files of another user
-        return False
-    return bool(dates)
-
-
 def set_cache(directory: Path) -> None:
     """Let libraries keep their caches with a study if the home folder cannot be written
     or is unknown."""
@@ -348,11 +360,11 @@ def set_environment(*, keep_going: bool, dry_run: bool) -> None:
     os.environ["PATH"] = os.pathsep.join(
         [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
     )
-    os.environ |= {
-        name: "1"
-        for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run))
-        if is_set
-    }
+    os.environ[LAUNCHED_VAR] = "1"
+    if keep_going:
+        os.environ[KEEP_GOING_VAR] = "1"
+    if dry_run:
+        os.environ[DRY_RUN_VAR] = "1"
     set_user_name()
 
 
@@ -365,9 +377,37 @@ def set_user_name() -> None:
         os.environ["LOGNAME"] = f"user-{os.getuid()}"
 
 
-def call_snakemake(arguments: Sequence[str]) -> int:
+def is_anything(record: logging.LogRecord) -> bool:
+    """Return that a record of Snakemake's log is shown."""
+    return True
+
+
+def is_message(record: logging.LogRecord) -> bool:
+    """Return whether a record of Snakemake's log is shown: no details."""
+    return record.levelno >= logging.INFO
+
+
+def is_no_progress(record: logging.LogRecord) -> bool:
+    """Return whether a record of Snakemake's log is shown, but not its progress."""
+    is_progress = vars(record).get("event") in ("job_finished", "progress")
+    return is_message(record) and not is_progress
+
+
+def is_error(record: logging.LogRecord) -> bool:
+    """Return whether a record of Snakemake's log is an error."""
+    return record.levelno >= logging.ERROR
+
+
+def call_snakemake(
+    arguments: Sequence[str],
+    events: Events,
+    is_wanted: Callable[[logging.LogRecord], bool] = is_message,
+) -> int:
     """Run Snakemake in this process; return its exit code, or 128 plus the number of
-    the signal that stopped it."""
+    the signal that stopped it.
+
+    `events` takes what its log says, of which `is_wanted` selects what is shown.
+    """
     from snakemake import cli
 
     unknown_targets: list[str] = []
@@ -376,9 +416,10 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         if getattr(record, "event", None) == "run_info":
             # Snakemake's own handler, set by now, waits for running jobs to end
             signal.signal(signal.SIGTERM, interrupt)
-        names = NO_RULE.findall(record.getMessage())
+        events.take(record)
+        names = NO_RULE.findall(record.getMessage()) if is_message(record) else []
         unknown_targets.extend(names)
-        return not names
+        return not names and is_wanted(record)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         received_signals.append(number)
@@ -398,7 +439,9 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(is_shown)
     try:
-        cli.main(arguments)
+        # Snakemake changes to its working directory
+        with chdir(Path.cwd()):
+            cli.main(arguments)
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
@@ -426,9 +469,136 @@ def end_scheduler_timers() -> None:
             thread.cancel()
 
 
-def main(arguments: Sequence[str]) -> int:
+@dataclass(frozen=True)
+class Call:
+    """A call of Snakemake with its arguments, and the options in them.
+
+    `place` is the working directory or, if nothing runs, a view of it. With
+    `take_plan`, which gets the plan, nothing is run or shown.
+    """
+
+    arguments: list[str]
+    options: Namespace
+    directory: Path
+    place: Path
+    take_plan: Callable[[Plan], None] | None
+
+    def has_any(self, names: Sequence[str]) -> bool:
+        """Return whether any of some options is given."""
+        return any(getattr(self.options, name, None) for name in names)
+
+    @property
+    def runs(self) -> bool:
+        """Whether it may run jobs."""
+        return self.place == self.directory
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether it runs jobs or shows those that would run."""
+        is_plain = self.options.dryrun or self.runs
+        return is_plain and not self.has_any(MANAGING_OPTIONS)
+
+    @property
+    def targets(self) -> list[str]:
+        """The rules and files that it asks for."""
+        return self.options.targets or ["all"]
+
+    def forced(self, jobs: Iterable[Job]) -> list[str]:
+        """Return the rules and files of planned jobs that run again in any case."""
+        if self.options.forceall:
+            return [job.rule for job in jobs]
+        targets = self.targets if self.options.force else []
+        return [*(self.options.forcerun or []), *targets]
+
+
+def plan_and_run(call: Call) -> int:
+    """Have Snakemake plan, and call it again without the results that are outdated;
+    return its exit code."""
+    if call.runs:
+        # of a run that was killed
+        restore_results(call.directory)
+    if not call.is_planned:
+        return run_jobs(call, no_plan())
+    events = Events()
+    # its settings are those of a run
+    profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
+    code = call_snakemake([*PLANNING, *call.arguments, *profile], events, is_error)
+    if code:
+        return code
+    with chdir(call.directory if call.directory.is_dir() else call.place):
+        forced = call.forced(events.jobs.values())
+        plan = made_plan(events, call.targets, forced)
+        if call.runs:
+            keep_contents(plan)
+    if call.take_plan:
+        call.take_plan(plan)
+        return 0
+    if events.nothing and not plan.reasons:
+        say_nothing_runs(call, events.nothing)
+        return 0
+    if call.runs:
+        hide_results(call.directory, plan.outdated)
+    else:
+        link_results(call.directory, call.place, plan.outdated)
+    os.environ[PLANNED_VAR] = "1"
+    try:
+        return run_jobs(call, plan)
+    finally:
+        del os.environ[PLANNED_VAR]
+
+
+def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
+    """Print that everything is up to date, or Snakemake's `record` of it if its own
+    messages are asked for."""
+    if call.options.dryrun:
+        print(record.getMessage())
+    elif call.has_any(VERBOSE_OPTIONS):
+        print(record.getMessage(), file=sys.stderr)
+    else:
+        print("gyriflow: everything is up to date", file=sys.stderr)
+
+
+def run_jobs(call: Call, plan: Plan) -> int:
+    """Run Snakemake, whose outdated results are hidden, and write the manifest of each
+    job that ends; return its exit code."""
+    is_detailed = call.options.verbose or call.options.debug_dag
+    is_wanted = is_anything if is_detailed else is_message
+    arguments = [*BY_MANIFEST, *call.arguments]
+    if not call.runs:
+        return call_snakemake(arguments, Events(plan.reasons), is_wanted)
+
+    def finish(job: Job) -> None:
+        # a result without a manifest is made again
+        with suppress(StorageError):
+            write_manifest(job, plan.found)
+
+    quiet = [item.name.lower() for item in call.options.quiet or []]
+    if "progress" in quiet:
+        # Snakemake would not tell which jobs have finished
+        quiet.remove("progress")
+        arguments += ["--quiet", *(quiet or ["host"])]
+        is_wanted = is_no_progress
+    if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
+        name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
+        details = call.directory.resolve() / ".snakemake" / "log" / name
+        logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
+        arguments = [*logger, *arguments]
+        redirect_output(details)
+    events = Events(plan.reasons, finish)
+    try:
+        return call_snakemake(arguments, events, is_wanted)
+    finally:
+        restore_results(call.directory, events.started)
+
+
+def main(
+    arguments: Sequence[str], take_plan: Callable[[Plan], None] | None = None
+) -> int:
     """Run Snakemake; return the exit code of the first failed step, or else Snakemake's
-    own."""
+    own.
+
+    With `take_plan`, a dry run shows nothing and calls it with the plan.
+    """
     # the program name in Snakemake's usage messages
     sys.argv[0] = "snakemake"
     # takes a second to import; the Snakefile imports this module without needing it
@@ -447,12 +617,6 @@ def main(arguments: Sequence[str]) -> int:
     )
     if not dry_run:
         clear_stale_lock(directory)
-        if restore_dates(dates_before_copy(directory)):
-            text = (
-                "the results were copied, or stored by git-annex: they get the dates at"
-                " which they were made"
-            )
-            print(f"gyriflow: {text}", file=sys.stderr)
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)
@@ -467,26 +631,15 @@ def main(arguments: Sequence[str]) -> int:
         else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
     )
     complete += arguments
-    if not dry_run and not any(
-        getattr(options, name, None) for name in VERBOSE_OPTIONS
-    ):
-        details = (
-            directory.resolve()
-            / ".snakemake"
-            / "log"
-            / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
-        )
-        complete = [
-            "--logger",
-            "gyriflow",
-            "--logger-gyriflow-details",
-            str(details),
-            *complete,
-        ]
-        redirect_output(details)
     began_s = time.time()
-    with temporary_records(directory) if runs_nothing else nullcontext():
-        code = call_snakemake(complete)
+    with view_of(directory) if runs_nothing else nullcontext(directory) as place:
+        os.environ.pop(DIRECTORY_VAR, None)
+        if runs_nothing:
+            set_cache(place)
+            complete += ["--directory", str(place)]
+            if directory.is_dir():
+                os.environ[DIRECTORY_VAR] = str(directory.absolute())
+        code = plan_and_run(Call(complete, options, directory, place, take_plan))
     if code > 128:
         print(
             "gyriflow: interrupted; run the same command again to resume",

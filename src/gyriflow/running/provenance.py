@@ -117,7 +117,7 @@ def check_results_belong_to(
             f" study/{path.name}, to keep both here)."
         )
         problem = "the results here belong to another study"
-        results = path.parents[1].resolve()
+        results = path.resolve().parents[1]
         raise InputError(
             problem, path=results, found=results_of, expected=expected, remedy=remedy
         )
@@ -128,13 +128,15 @@ def check_results_belong_to(
 def _have_recorded_content(directory: Path, config: Config) -> bool:
     """Return whether any file of a study's brains has the content of an input of the
     results in a directory."""
-    recorded = _recorded_inputs(directory)
+    recorded = recorded_inputs(directory)
     known = {sha256 for sha256, *_ in recorded.values()}
     files = [file for brain in config.brains for file in brain.files]
     return any(sha256 in known for sha256, *_ in contents(files, recorded).values())
 
 
-def _recorded_inputs(directory: Path) -> dict[str, Any]:
+def recorded_inputs(directory: Path) -> dict[str, Any]:
+    """Return the recorded contents of the input files of the results in a directory, by
+    path (see `io.files.contents`)."""
     with suppress(InputError):
         return read_json(directory / INPUTS_RECORD)
     return {}
@@ -162,15 +164,14 @@ def input_contents(
     config: Config,
     checksums: Mapping[str, tuple[str, str]],
     record: bool,
-) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the SHA-256 of each input file of a study and of its companions, by path;
-    and those of the last run.
+) -> dict[str, str]:
+    """Return the SHA-256 of each input file of a study and of its companions, by path.
 
     For a file of an atlas that is not downloaded yet, it is the one in `checksums`.
     With `record`, hashes are stored in the results with sizes and times, so that
     unchanged files are not read again.
     """
-    recorded = _recorded_inputs(directory)
+    recorded = recorded_inputs(directory)
     # a word of the configuration may be the name of a file, too
     named = [
         text for text in texts_in(config.model_dump()) if "/" in text or "." in text
@@ -179,13 +180,4 @@ def input_contents(
     if record and files != recorded:
         write_json(directory / INPUTS_RECORD, files)
     expected = {name: sha256 for name, (_, sha256) in checksums.items()}
-    return expected | joined_contents(files), joined_contents(recorded)
-
-
-def folders_in(config: Config) -> list[str]:
-    """Return the absolute paths of the folders that a configuration names."""
-    return [
-        text
-        for text in texts_in(config.model_dump())
-        if len(text) > 1 and text[0] == "/" and Path(text).is_dir()
-    ]
+    return expected | joined_contents(files)

@@ -50,9 +50,10 @@ class UsedAtlas:
             return list(self.atlas.series)
         return [series] if isinstance(series, str) else list(series)
 
-    @property
+    @cached_property
     def folder(self) -> Path:
-        """Folder for downloads."""
+        """Folder for downloads, in the working directory in which it is first asked
+        for."""
         return Path(self.settings.folder or Path.cwd() / DOWNLOADS / self.atlas.name)
 
     @cached_property

@@ -54,6 +54,7 @@ RESERVED_STUDIES = (
     "figures",
     "growth",
     "logs",
+    "manifest",
     "matched",
     "registration",
     "tables",

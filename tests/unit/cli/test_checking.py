@@ -446,12 +446,6 @@ def test_a_study_is_checked_from_its_working_directory(tmp_path):
         list(check_study(folder / "gyriflow.yaml", tmp_path, 1, ["surface"]))
 
 
-PARAMS = (
-    "Params have changed since last execution: Union of exclusive params before and now"
-    " across all output:"
-)
-
-
 @pytest.mark.parametrize(
     ("week", "mesher", "edge", "core", "elements"),
     [
@@ -743,20 +737,12 @@ def test_a_path_is_said_to_be_of_this_study_or_of_all_with_its_folder(
     [
         ("Missing output files: a.csv, b.csv", "Missing output files"),
         (
-            "Updated input files: /data/a b.nii.gz, /data/c.nii",
-            "changed input a b.nii.gz, c.nii",
+            "Input files updated by another job: pial",
+            "Input files updated by another job",
         ),
-        ("Updated input files: results/a.csv", "Updated input files"),
-        (
-            f"{PARAMS} before: 'code 0123456789ab' now: 'code 0123456789ac' ",
-            "changed code (gyriflow 0.1, now 0.2)",
-        ),
-        (
-            f"{PARAMS} before: 'code 01','code 02' now: 'code 03','code 02' ",
-            "changed code (gyriflow 0.1, now 0.2)",
-        ),
-        (f"{PARAMS} before: 'code 01',21.0 now: 'code 02',22.0 ", "changed settings"),
-        (f"{PARAMS} before: <nothing exclusive> now: 3 ", "changed settings"),
+        ("changed input a b.nii.gz, c.nii", "changed input a b.nii.gz, c.nii"),
+        ("changed code", "changed code (gyriflow 0.1, now 0.2)"),
+        ("changed settings weeks", "changed settings weeks"),
     ],
 )
 def test_why_a_step_runs_is_said_in_words(tmp_path, monkeypatch, reason, words):

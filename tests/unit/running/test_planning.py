@@ -1,0 +1,161 @@
+"""Which jobs of a plan run again, and which files Snakemake is told to make."""
+
+import json
+
+import pytest
+
+from gyriflow.running.manifest import COPIES, Contents, Job, manifest_of, write_manifest
+from gyriflow.running.planning import (
+    BY_ANOTHER_JOB,
+    FORCED,
+    MISSING,
+    Events,
+    hide_results,
+    keep_contents,
+    link_results,
+    made_plan,
+    restore_results,
+    view_of,
+)
+
+EDGE = {"edge_mm": 1.0}
+
+
+def planned_job(rule, inputs, output, settings=EDGE):
+    """Return a job with one result."""
+    manifest = manifest_of(f"results/logs/{rule}.log")
+    return Job(rule, {"given": inputs}, [output], manifest, lambda: settings)
+
+
+def plan(settings=EDGE):
+    """Return the jobs of a study: scan, surface, mesh and metrics of it, a table."""
+    jobs = [
+        planned_job("surface", ["scan"], "results/surface", settings),
+        planned_job("mesh", ["results/surface"], "results/mesh"),
+        planned_job("run", ["results/mesh"], "results/run"),
+        planned_job("metrics", ["results/surface"], "results/metrics"),
+        planned_job("other", ["scan"], "results/other"),
+        Job(
+            "all",
+            {"": ["results/run", "results/metrics", "results/other"]},
+            [],
+            None,
+            dict,
+        ),
+    ]
+    keyed = {job.key: job for job in jobs}
+    return Events(jobs=keyed)
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """A finished study in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "results").mkdir()
+    (tmp_path / "scan").write_text("a brain")
+    jobs = [job for job in plan().jobs.values() if job.outputs]
+    for job in jobs:
+        (tmp_path / job.outputs[0]).write_text(job.rule)
+    for job in jobs:
+        write_manifest(job, Contents({}, {}))
+    return tmp_path
+
+
+def reasons(events, targets=("all",), forced=()):
+    """Return why jobs run, by rule."""
+    made = made_plan(events, targets, forced)
+    return {events.jobs[key].rule: why for key, why in made.reasons.items()}
+
+
+def test_what_matches_its_manifest_is_kept(study):
+    assert reasons(plan()) == {}
+
+
+def test_what_depends_on_an_outdated_result_runs_again_and_nothing_else(study):
+    again = reasons(plan({"edge_mm": 2.0}))
+    assert set(again) == {"surface", "mesh", "metrics", "run"}
+    assert "edge_mm" in again["surface"]
+    assert again["run"] == f"{BY_ANOTHER_JOB}: mesh"
+    (study / "results" / "mesh").write_text("edited")
+    assert set(reasons(plan())) == {"mesh", "run"}
+
+
+def test_a_removed_result_is_made_again_where_something_needs_it(study):
+    (study / "results" / "surface").unlink()
+    assert reasons(plan()) == {}
+    (study / "results" / "metrics").unlink()
+    again = reasons(plan())
+    # the surface is needed for the metrics, and may be another one then
+    assert set(again) == {"surface", "metrics", "mesh", "run"}
+    assert again["metrics"] == f"{MISSING}: results/metrics"
+
+
+def test_a_removed_result_that_would_be_another_is_made_again(study):
+    (study / "results" / "mesh").unlink()
+    assert set(reasons(plan({"edge_mm": 2.0}))) == {"surface", "mesh", "metrics", "run"}
+    # its step has failed after that of the surface
+    (study / "results" / "surface").write_text("of another edge")
+    write_manifest(plan().jobs["results/surface"], Contents({}, {}))
+    assert set(reasons(plan())) == {"mesh", "metrics", "run"}
+    # it is unknown what it was
+    (study / "results" / "surface").write_text("surface")
+    write_manifest(plan().jobs["results/surface"], Contents({}, {}))
+    (study / "results" / "manifest" / "mesh.json").unlink()
+    assert set(reasons(plan())) == {"mesh", "run"}
+
+
+def test_what_depends_on_a_forced_job_runs_again(study):
+    again = reasons(plan(), forced=["mesh"])
+    assert again == {"mesh": FORCED, "run": f"{BY_ANOTHER_JOB}: mesh"}
+    assert set(reasons(plan(), forced=["results/run"])) == {"run"}
+
+
+def test_an_asked_for_file_is_made(study):
+    (study / "results" / "surface").unlink()
+    assert "surface" in reasons(plan(), targets=["results/surface"])
+    assert "surface" in reasons(plan(), targets=["surface"])
+
+
+def test_outdated_results_are_hidden_during_a_run_and_not_lost(study):
+    made = made_plan(plan({"edge_mm": 2.0}), ["all"], [])
+    names = {"results/surface", "results/mesh", "results/metrics", "results/run"}
+    assert set(made.outdated) == names
+    hide_results(study, made.outdated)
+    assert not any((study / name).exists() for name in names)
+    # one was made again, the job of another failed, the others have not begun
+    (study / "results" / "surface").write_text("new")
+    restore_results(study, ["results/metrics"])
+    left = {path.name: path.read_text() for path in study.glob("results/*[!t]")}
+    assert left == {"surface": "new", "mesh": "mesh", "run": "run", "other": "other"}
+    assert not list(study.rglob(".outdated*"))
+
+
+def test_contents_of_copied_results_are_read_once(study):
+    for job in plan().jobs.values():
+        for path in job.outputs:
+            content = (study / path).read_text()
+            (study / path).unlink()
+            (study / path).write_text(content)
+    keep_contents(made_plan(plan(), ["all"], []))
+    again = made_plan(plan(), ["all"], [])
+    assert again.reasons == {}
+    # a file is not opened if its size and times are those that are kept
+    kept = json.loads((study / COPIES).read_text())
+    kept["results/mesh"][0] = "of another file"
+    (study / COPIES).write_text(json.dumps(kept))
+    assert set(reasons(plan())) == {"mesh", "run"}
+
+
+def test_a_view_has_all_but_snakemakes_records_and_can_be_written(study):
+    (study / ".snakemake").mkdir()
+    (study / "results").chmod(0o500)
+    with view_of(study) as view:
+        assert (view / "scan").read_text() == "a brain"
+        assert (view / "results" / "mesh").read_text() == "mesh"
+        assert not (view / ".snakemake").exists()
+        link_results(study, view, ["results/mesh"])
+        assert not (view / "results" / "mesh").exists()
+        assert (view / "results" / "run").read_text() == "run"
+        assert (view / "results" / "manifest").is_dir()
+    (study / "results").chmod(0o700)
+    assert (study / "results" / "mesh").is_file()
