@@ -53,10 +53,8 @@ def shapes_once(monkeypatch):
     monkeypatch.setattr(posing, "hemisphere_by_shape", pose_found_once)
 
 
-@pytest.fixture(scope="module")
-def few_starts():
+@pytest.fixture
+def few_starts(monkeypatch):
     """Search planes of symmetry from few directions, for brains that lie upright."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fissure, "DIRECTIONS", 100)
-        patch.setattr(fissure, "STARTS", 1)
-        yield
+    monkeypatch.setattr(fissure, "DIRECTIONS", 100)
+    monkeypatch.setattr(fissure, "STARTS", 1)

@@ -17,6 +17,7 @@ from gyriflow.geometry.triangles import area, corners, face_areas, merged, signe
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.schemes import LabelScheme
 
+pytestmark = pytest.mark.usefixtures("few_starts")
 SIDED = LabelScheme(
     name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4)
 )
@@ -25,7 +26,7 @@ SIDED = LabelScheme(
 def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet():
     # at a surface bent by 4 mm, cortex on both sides of it and no gap between: the
     # phantom's own fissure is filled
-    labels, affine = phantom()
+    labels, affine = phantom(24.0, 1.6)
     x, y, _ = odd_brains.positions(labels, affine)
     gap = (np.abs(x) < 3.0) & (labels == 4)
     right, cortex = x > 4.0 * np.sin(y / 12.0), (labels == 5) | gap
@@ -33,7 +34,7 @@ def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet():
         np.isin(labels, odd_brains.CEREBRUM) | gap, np.where(cortex, 3, 1) + right, 0
     )
     sided[labels == 2] = 5
-    surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=1.5)
+    surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=2.0)
     inverse = surface.pose.world
     for name, sign in (("left", -1), ("right", 1)):
         part = getattr(surface, name)
@@ -103,10 +104,10 @@ def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
 def test_a_piece_beside_a_hemisphere_is_left_out_or_refused_with_its_place(
     radius_mm, refuses
 ):
-    labels, affine = phantom(28.0)
+    labels, affine = phantom(28.0, 2.0)
     labels = odd_brains.add_sides(odd_brains.apart(labels, affine), affine)
     place = np.array([-55.0, 0.0, 0.0])
-    room = 24
+    room = 15
     labels = np.pad(labels, room)
     affine = affine.copy()
     affine[:3, 3] -= affine[:3, :3] @ np.full(3, room)
@@ -120,7 +121,7 @@ def test_a_piece_beside_a_hemisphere_is_left_out_or_refused_with_its_place(
 
     def make():
         return from_labels(
-            labels, to_file @ affine, SCHEMES["dhcp-19"], week=28.0, edge_length_mm=1.5
+            labels, to_file @ affine, SCHEMES["dhcp-19"], week=28.0, edge_length_mm=2.5
         )
 
     (x, y, z) = transform_points((place + CENTRE_MM)[None], to_file)[0]

@@ -245,14 +245,17 @@ def surface(mask, affine):
 def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxels(
     size,
 ):
-    centres, affine = voxels(18.0, size)
-    mask = np.linalg.norm(centres, axis=-1) < 18.0
+    radius_mm = 12.0
+    centres, affine = voxels(radius_mm, size)
+    mask = np.linalg.norm(centres, axis=-1) < radius_mm
     with patch.object(repair, "without_terraces", lambda mesh, *_: mesh):
         before = surface(mask, affine).mesh
     found = surface(mask, affine)
     errors = [
         np.sqrt(
-            np.average((curvature(mesh).mean - 1 / 18) ** 2, weights=vertex_areas(mesh))
+            np.average(
+                (curvature(mesh).mean - 1 / radius_mm) ** 2, weights=vertex_areas(mesh)
+            )
         )
         for mesh in (before, found.mesh)
     ]
@@ -263,12 +266,12 @@ def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxe
 
 
 def test_folds_keep_their_height():
-    centres, affine = voxels(20.0)
-    mask = np.linalg.norm(centres, axis=-1) < 16.0 + np.cos(
+    centres, affine = voxels(15.0)
+    mask = np.linalg.norm(centres, axis=-1) < 12.0 + np.cos(
         2 * np.pi * centres[..., 2] / 10.0
     )
     points = surface(mask, affine).mesh.vertices
-    height = np.linalg.norm(points, axis=1) - 16.0
+    height = np.linalg.norm(points, axis=1) - 12.0
     wave = np.cos(2 * np.pi * points[:, 2] / 10.0)
     near = np.abs(points[:, 2]) < 8.0
     slope, _ = np.polyfit(wave[near], height[near], 1)
@@ -276,10 +279,10 @@ def test_folds_keep_their_height():
 
 
 def test_narrow_gaps_stay_open():
-    centres, affine = voxels(24.0)
+    centres, affine = voxels(14.0)
     mask = np.zeros(centres.shape[:3], dtype=bool)
     for side in (-1.0, 1.0):
-        away = (centres - [side * 11.0, 0.0, 0.0]) / [10.0, 20.0, 16.0]
+        away = (centres - [side * 6.0, 0.0, 0.0]) / [5.0, 10.0, 8.0]
         mask |= (np.abs(away) ** 4).sum(axis=-1) < 1.0
     found = surface(mask, affine)
     assert faults(found.mesh) == ""

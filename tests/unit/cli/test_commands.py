@@ -249,7 +249,7 @@ def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(
     )
     # growth towards shapes is not by layers
     assert list(coarse_cortices(study)) == []
-    assert study.run_simulations[0].settings.step_s == 2 * 86400
+    assert study.run_simulations[0].settings.step_s == 7 * 86400
     assert study.config.mesh.order == 1
     # a path of the atlas has a quarter as many nodes on the surface
     assert study.config.growth.path_edge_mm == 2 * GrowthSettings().path_edge_mm

@@ -29,11 +29,16 @@ from gyriflow.metrics.curvature import curvature
 from .bumpy import bumpy
 
 
+def smaller(mesh):
+    """Return a surface of 0.6 times the lengths, which has fewer even triangles."""
+    return TriangleMesh(0.6 * mesh.vertices, mesh.faces)
+
+
 def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
     """The run is the observed brain of each week; the start has the opposite folds, the
     brain before equal ones."""
     weeks = (22.0, 24.0)
-    observed = [bumpy(1), bumpy(2)]
+    observed = [smaller(bumpy(seed)) for seed in (1, 2)]
     inputs = {
         name: ["22.0.gii", "24.0.gii"]
         for name in ("whole", "simulated", "observed", "start", "adjacent")
@@ -78,7 +83,7 @@ def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
 
 def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
     """The brain grows by 10 % a week, along the path that the run follows."""
-    mesh = ellipsoid_mesh(8, (20.0, 24.0, 22.0))
+    mesh = ellipsoid_mesh(8, (12.0, 14.0, 13.0))
     boundary, used = boundary_surface(mesh)
     weeks = np.array([21.0, 22.0, 23.0])
     positions = [mesh.vertices * factor for factor in (1.0, 1.1, 1.21)]

@@ -17,11 +17,11 @@ from gyriflow.io.surfaces import read_vertex_maps, write_surface, write_vertex_m
 
 
 def test_an_interval_contains_a_further_value_as_often_as_it_says():
-    values = np.random.default_rng(0).normal(5, 2, size=(20_000, 7))
+    values = np.random.default_rng(0).normal(5, 2, size=(4000, 7))
     for level in (2 / 3, 0.9):
         half = np.array([spread_of_members(row[:6], level) for row in values])
         inside = np.abs(values[:, 6] - values[:, :6].mean(axis=1)) <= half
-        assert np.mean(inside) == pytest.approx(level, abs=0.01)
+        assert np.mean(inside) == pytest.approx(level, abs=0.015)
     # t of 5 degrees of freedom
     values = np.array([0.0, 0, 0, 1, 1, 1])
     assert spread_of_members(values, 0.9) == pytest.approx(

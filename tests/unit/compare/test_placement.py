@@ -172,7 +172,7 @@ def covered_gains(wavelengths_mm, count):
 
 def test_intervals_of_random_maps_hold():
     # benchmarks/intervals.py has larger surfaces and more maps
-    held, above = covered_gains((6, 20), 120)
+    held, above = covered_gains((6, 20), 60)
     assert held >= 0.89
     assert above <= 0.06
 

@@ -483,7 +483,7 @@ def test_open_rectangle_has_a_free_boundary() -> None:
 
 
 def test_slices_equal_a_single_call() -> None:
-    stiffness, mass = laplacian(ellipsoid(AXES))
+    stiffness, mass = laplacian(ellipsoid(AXES, 3))
     modes = lowest_modes(stiffness, mass, 250)
     single = eigsh(
         stiffness, k=250, M=mass, sigma=-1e-3, tol=1e-12, return_eigenvectors=False

@@ -12,9 +12,10 @@ from shapes import rigid, scaling, sphere
 from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
 from gyriflow.geometry.triangles import merged, transformed
-from gyriflow.io.files import read_json, write_json, write_text
+from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import write_surface, write_vertex_maps
 from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.messages import Message, write_message
 from gyriflow.report.quality import (
     QualityBrain,
     quality_page,
@@ -198,10 +199,8 @@ def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
     write_json(
         tmp_path / "thickness.json", {"mean_mm": 1.5, "measured_area_share": 0.9}
     )
-    write_text(
-        tmp_path / "surface.log",
-        "2026-01-01 10:00:00,000 WARNING root: it is crooked\n" * 2,
-    )
+    for _ in range(2):
+        write_message(tmp_path / "surface.log", Message("warning", "it is crooked"))
     inputs = {
         "surface": "whole.surf.gii",
         "report": "surface.json",
