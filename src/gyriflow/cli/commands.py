@@ -538,7 +538,7 @@ def measure(
 @click.option(
     "--quick",
     is_flag=True,
-    help="First look: coarse meshes, steps of a day, every other week of the atlas.",
+    help="First look: coarse meshes, steps of a week, every third week of the atlas.",
 )
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @directory_option

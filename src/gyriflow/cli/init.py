@@ -30,7 +30,7 @@ TEMPLATES = SHIPPED / "config" / "templates"
 BIDS_OPTIONS = "bids.json"
 BIDS_HEAD = "# Written by `gyriflow bids`, which replaces it.\n"
 SHIPPED_ATLAS = "spina-bifida"
-QUICK_GW = 2.0
+QUICK_GW = 3.0
 """Least time between the atlas' brains of a quick prediction."""
 
 
