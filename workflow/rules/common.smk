@@ -6,8 +6,6 @@ from gyriflow.grouping import grouped
 from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
-from gyriflow.study.figures import figures_of
-from gyriflow.study.registry import target_files, by_rule, files_in, observed_name
 from gyriflow.study.paths import *
 from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
 from gyriflow.running.provenance import input_contents, check_results_belong_to
@@ -70,7 +68,6 @@ if REFUSED and workflow.is_main_process:
 if REFUSED and not study.brains:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
-FIGURES = figures_of(study)
 if workflow.is_main_process:
     messages = [(brain, f"not folded: {cause}") for brain, cause in study.unreachable.items()]
     if not REFUSED:
