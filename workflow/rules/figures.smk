@@ -4,7 +4,7 @@
 # name of its figure. The function gets those of the rule's inputs and parameters that it has arguments for. Title and
 # caption are in `workflow/report/captions/`, the place in the report is in `SECTIONS`.
 from gyriflow.code_hash import code_hash
-from gyriflow.settings.terms import MAX_COLOURS, min_norm_subjects, run_names
+from gyriflow.settings.terms import run_names
 from gyriflow.study.records import observed_name
 
 # the figures and tables of the report by section, in its order
@@ -523,10 +523,8 @@ rule metrics_charts:
 show(rules.metrics_charts.output)
 
 NORM_BRAINS = [study.brains[brain] for brain in study.norm_reference]
-NORM_SUBJECTS = {brain.subject for brain in NORM_BRAINS}
-MIN_SUBJECTS = min_norm_subjects(individuals=study.are_individuals(study.norm_reference))
 
-if CONFIG.metrics.norms or len(NORM_SUBJECTS) >= MIN_SUBJECTS:
+if study.has_norm:
 
     rule norms_figure:
         input:

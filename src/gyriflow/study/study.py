@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..io.exports import ExportedBrain, labels_file
 from ..settings.atlas import Atlas
 from ..settings.root import Config
-from ..settings.terms import MAX_COLOURS, MEASURED, SIDES
+from ..settings.terms import MAX_COLOURS, MEASURED, SIDES, min_norm_subjects
 from . import paths
 from .atlases import UsedAtlas
 from .records import Brain, CalibrationRuns, Measurement, Simulation, Sweep
@@ -274,6 +274,16 @@ class Study:
                 brain for brain in brains if brain.config.population == population
             ]
         return [brain.id for brain in brains]
+
+    @property
+    def has_norm(self) -> bool:
+        """Whether metrics are compared with a norm: of another study, or of enough
+        subjects of this one."""
+        if self.config.metrics.norms is not None:
+            return True
+        subjects = {self.brains[brain].subject for brain in self.norm_reference}
+        are_individuals = self.are_individuals(self.norm_reference)
+        return len(subjects) >= min_norm_subjects(individuals=are_individuals)
 
     def _is_named(self, brain: Brain, names: Iterable[str]) -> bool:
         """Return whether a brain or its atlas is among names."""

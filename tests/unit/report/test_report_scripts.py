@@ -41,8 +41,6 @@ FOLDED = [("thin", "young"), ("thick", "old")]
 GROWTH = ["own", "population P"]
 FIGURE = {
     "section": "Surfaces",
-    "title": "Seen",
-    "caption": "a picture",
     "technical": False,
     "first": False,
     "names": {},
@@ -161,7 +159,9 @@ def pages(folder):
         "intervals": [],
         "provenance": "provenance.json",
         "methods": "methods.rst",
+        "captions": ["picture.rst"],
     }
+    write_text(folder / "picture.rst", "Seen\n====\na picture\n")
     pictures = {
         name: FIGURE | {"name": "picture", "path": str(folder / f"{name}.png")}
         for name in COLOURS
