@@ -272,15 +272,14 @@ def runs_from(brain):
 
 def weekly_grid(brain):
     simulations, observed = runs_from(brain)
+    grid = []
+    for simulation in simulations:
+        for week, surface in simulation.surfaces.items():
+            grid.append(placed(simulation.run, week, [surface], simulated=True))
     name = observed_name(observed.values())
-    return [
-        *(
-            placed(simulation.run, week, [surface], simulated=True)
-            for simulation in simulations
-            for week, surface in simulation.surfaces.items()
-        ),
-        *(placed(name, week, [brain.pial]) for week, brain in observed.items()),
-    ]
+    for week, brain in observed.items():
+        grid.append(placed(name, week, [brain.pial]))
+    return grid
 
 
 rule folding_figures:
@@ -387,11 +386,11 @@ show(rules.growth_found_figures.output, names_of(WITH_GROWTH))
 
 # the settings that determine the zones of a run; runs with equal ones share a figure
 ZONES = {"contact", "no_growth", "support"}
-ZONED = []
+BY_ZONES = {}
 for simulation in study.run_simulations:
-    zones = simulation.start, simulation.settings.model_dump(include=ZONES)
-    if zones not in [(shown.start, shown.settings.model_dump(include=ZONES)) for shown in ZONED]:
-        ZONED.append(simulation)
+    zones = repr(simulation.settings.model_dump(include=ZONES))
+    BY_ZONES.setdefault((simulation.start.id, zones), simulation)
+ZONED = list(BY_ZONES.values())
 
 
 rule zones_figure:
