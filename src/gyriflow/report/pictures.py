@@ -130,12 +130,12 @@ def brain_grid(
     scale with the `title` (default: that of the map). `absent` is the text where a row
     has no brain.
     """
-    values = [
-        brain.surface_map(quantity)[1] for brain in grid if quantity and brain.is_mapped
-    ]
+    # each brain once, in however many views it is
+    mapped = {id(brain.halves): brain for brain in grid if brain.is_mapped}
     scale = None
     colour_bar = None
-    if values:
+    if quantity and mapped:
+        values = [brain.surface_map(quantity)[1] for brain in mapped.values()]
         every = np.concatenate(values)
         scale = scale_of(quantity, every)
         colour_bar = (scale, title or map_title(quantity))
