@@ -17,7 +17,7 @@ from gyriflow.anatomy.extraction import (
     shifted_affine,
     smooth_mask,
 )
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     face_normals,
@@ -142,7 +142,7 @@ def octasphere(radius: float, subdivisions: int = 5) -> TriangleMesh:
 def cut_ellipsoid() -> tuple[TriangleMesh, TriangleMesh, TriangleMesh]:
     """Return the open left and right half of an ellipsoid as large as a brain of week
     24, and the left one's wall."""
-    ball = octasphere(1.0)
+    ball = octasphere(1.0, 4)
     whole = TriangleMesh(ball.vertices * [22.0, 28.0, 24.0], ball.faces)
     is_left = whole.vertices[whole.faces][:, :, 0].mean(axis=1) < 0.0
     left, right = (submesh(whole, side)[0] for side in (is_left, ~is_left))
@@ -243,10 +243,10 @@ def box_mesh(
 
 
 def ellipsoid_mesh(
-    cells: int, semi_axes: tuple[float, float, float]
+    cells: int, semi_axes: tuple[float, float, float], centre=(0.0, 0.0, 0.0)
 ) -> TetrahedralMesh:
-    """Return an ellipsoid around the origin, in mm: a cube's grid with its shells drawn
-    out to ellipsoids."""
+    """Return an ellipsoid in mm: a cube's grid with its shells drawn out to
+    ellipsoids."""
     cube = box_mesh((cells,) * 3, (2.0, 2.0, 2.0))
     x = cube.vertices
     shell = np.abs(x).max(axis=1, keepdims=True)
@@ -254,7 +254,23 @@ def ellipsoid_mesh(
     # halfway between cube and ball inside, the ball itself at the surface
     round_ = np.where(length > 0, x / np.where(length > 0, length, 1) * shell, 0.0)
     points = shell * round_ + (1 - shell) * x
-    return TetrahedralMesh(points * np.array(semi_axes), cube.tets)
+    vertices = points * np.array(semi_axes) + np.asarray(centre)
+    return TetrahedralMesh(vertices, cube.tets)
+
+
+def inner_edges_of_the_surface(mesh: TetrahedralMesh) -> set[tuple[int, int]]:
+    """Return the edges of a linear mesh that join two vertices of its surface, but are
+    on none of its faces."""
+    faces = boundary_faces(mesh)[0].tolist()
+    outer = {vertex for face in faces for vertex in face}
+    on_surface = {frozenset((a, b)) for face in faces for a in face for b in face}
+    found = set()
+    for corners in mesh.tets.tolist():
+        for a in corners:
+            for b in corners:
+                if a < b and {a, b} <= outer and {a, b} not in on_surface:
+                    found.add((a, b))
+    return found
 
 
 def hemisphere(side: int) -> TriangleMesh:

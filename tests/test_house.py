@@ -35,7 +35,8 @@ ARROWS = {
     "code_hash": set(),
     "shipped": set(),
     "version": {"shipped"},
-    "step": {"errors"},
+    "messages": {"errors"},
+    "step": {"errors", "messages"},
     # names of label schemes and atlases are names of shipped files
     "settings": GROUND | {"shipped"},
     "geometry": {"errors", "units"},
@@ -56,6 +57,7 @@ ARROWS = {
             "anatomy",
             "folding",
             "io",
+            "messages",
             "shipped",
             "step",
             "version",
@@ -65,7 +67,7 @@ ARROWS = {
 }
 """The rooms, and what each may import besides itself. Siblings meet in plain geometry,
 settings and files."""
-PROGRAM_ARROWS = {"io", "step"}
+PROGRAM_ARROWS = {"io", "messages", "step"}
 """What the program of a room (`__main__.py`) may import beyond that."""
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -77,7 +79,7 @@ PROGRAMS = [
 ]
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
-OPENING_ROOMS = {"code_hash", "io", "folding", "running", "cli", "step"}
+OPENING_ROOMS = {"code_hash", "io", "folding", "running", "cli", "messages", "step"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
     "open",

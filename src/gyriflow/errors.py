@@ -2,11 +2,16 @@
 it."""
 
 from os import PathLike
+from typing import Any
 
 
 class GyriflowError(Exception):
     """An error with a problem (a short clause), the file concerned, what was found and
-    expected, and a remedy."""
+    expected, and a remedy.
+
+    `facts` are the last four as text, as far as they are known, by the names of the
+    fields of `messages.Message`.
+    """
 
     exit_code = 1
 
@@ -23,11 +28,12 @@ class GyriflowError(Exception):
         message += f"; found {found}" if found is not None else ""
         message += f"; expected {expected}" if expected is not None else ""
         super().__init__(message + (f". {remedy}" if remedy is not None else ""))
-        self.names_file = path is not None
-
-    def __reduce__(self) -> tuple:
-        # keyword-only arguments are already part of the message
-        return (type(self), (str(self),))
+        facts = {"file": path, "found": found, "expected": expected, "remedy": remedy}
+        self.problem = problem
+        self.facts: dict[str, Any] = {}
+        for name, fact in facts.items():
+            if fact is not None:
+                self.facts[name] = str(fact)
 
 
 class InputError(GyriflowError):

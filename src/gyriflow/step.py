@@ -1,58 +1,56 @@
-"""Run a step of the workflow: its log, short error messages, its exit code, and the
-time and memory that it took.
+"""Run a step of the workflow: its log, its messages, its exit code, and the time and
+memory that it took.
 
 `python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the exit code
-and exits with it, or with 5 for a bus error.
+if the program has not, and exits with it, or with 5 for a bus error.
 """
 
 import logging
-import os
 import sys
 import time
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import psutil
 
-from .errors import GyriflowError, StorageError
-
-EXIT_FILE = "GYRIFLOW_EXIT_FILE"
-"""Environment variable with the path of the file for the first failed step's exit
-code."""
-INTERRUPTED = 130
-KILLED = 137
-KILLED_MESSAGE = (
-    "gyriflow: the program was killed, most probably because memory ran out; see the"
-    " memory predicted above"
+from .errors import StorageError
+from .messages import (
+    INTERRUPTED,
+    KILLED,
+    STOPPED,
+    Message,
+    MessageHandler,
+    error_message,
+    read_messages,
+    write_message,
 )
 
-BUS_ERROR_CODES = (7, 135)
-"""Exit codes of mpiexec and of a shell for a program that a bus error stopped."""
-SHARED_MEMORY_MESSAGE = (
-    "gyriflow: the program was stopped by a bus error, most probably because /dev/shm"
-    " is full: MPI needs 6 MB of it for each rank. In a container: --shm-size 1g"
+BUS_ERROR = Message(
+    "error",
+    "the program was stopped by a bus error, most probably because /dev/shm is full:"
+    " MPI needs 6 MB of it for each rank. In a container: --shm-size 1g",
+    exit_code=StorageError.exit_code,
 )
-
-
-def record_exit_code(code: int) -> None:
-    """Record an exit code for the launcher, if there is one. The first of several
-    failures counts."""
-    path = os.environ.get(EXIT_FILE)
-    if path:
-        # the file exists if another step failed before; without it, Snakemake's own
-        # code is used
-        with suppress(OSError), Path(path).open("x") as file:
-            file.write(str(code))
-
-
-def recorded_exit_code(path: Path) -> int | None:
-    """Return the exit code of the first failed step, or None if none was recorded."""
-    with suppress(OSError, ValueError):
-        return int(path.read_text())
-    return None
+OUT_OF_MEMORY = Message(
+    "error",
+    "the program was killed, most probably because memory ran out; see the memory"
+    " predicted above",
+    exit_code=KILLED,
+)
+ENDINGS = {
+    # of mpiexec the numbers of signals, of a shell 128 more
+    7: BUS_ERROR,
+    9: OUT_OF_MEMORY,
+    128 + 7: BUS_ERROR,
+    KILLED: OUT_OF_MEMORY,
+    INTERRUPTED: Message("error", STOPPED, exit_code=INTERRUPTED),
+}
+"""Messages of programs that could leave none, by their exit codes."""
+N_LAST_LINES = 5
+"""Lines at the end of a log that stand for the message of a program that has none."""
 
 
 class Usage(NamedTuple):
@@ -104,64 +102,50 @@ def record_usage(log: str | Path, used: Usage) -> None:
 
 @contextmanager
 def step(log: str, *inputs: str) -> Iterator[None]:
-    """Run a step and write its messages to the file `log`.
+    """Run a step; write what it logs to the file `log`, and its warnings and errors to
+    its messages.
 
-    A GyriflowError ends the program with its exit code and one message, on the terminal
-    and in the log. Any other error ends it with a traceback. The message begins with
-    the step's `inputs` if the error names no file.
+    An error ends the program with its exit code and one message, on the terminal and in
+    the log, where an unexpected one has its traceback. The message of an error that
+    names no file begins with the step's `inputs`.
     """
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
-    try:
-        logging.basicConfig(
-            level=logging.INFO, format=form, filename=log, filemode="w", force=True
-        )
-    except OSError as error:
-        print(f"gyriflow: {log}: cannot be written: {error.strerror}", file=sys.stderr)
-        record_exit_code(StorageError.exit_code)
-        sys.exit(StorageError.exit_code)
+    handlers = [logging.FileHandler(log, mode="w"), MessageHandler(log)]
+    logging.basicConfig(level=logging.INFO, format=form, handlers=handlers, force=True)
     logging.captureWarnings(True)
     try:
         yield
-    except (GyriflowError, MemoryError) as error:
-        if isinstance(error, GyriflowError):
-            message, code, named = str(error), error.exit_code, error.names_file
-        else:
-            message = (
-                f"memory ran out ({error}). Free memory, or run fewer jobs at once"
-            )
-            code = KILLED
-            named = False
-        if inputs and not named:
-            message = f"{', '.join(inputs)}: {message}"
-        logging.error("%s", message)
-        print(f"gyriflow: {message}", file=sys.stderr)
-    except KeyboardInterrupt:
-        code = INTERRUPTED
-    except Exception:
-        logging.exception("unexpected error")
-        traceback.print_exc()
-        code = 1
-    else:
-        record_usage(log, usage())
-        return
-    record_exit_code(code)
-    sys.exit(code)
+    except (Exception, KeyboardInterrupt) as error:
+        message = error_message(error)
+        is_unexpected = message.exit_code == 1
+        is_of_inputs = message.exit_code not in (1, INTERRUPTED)
+        if inputs and is_of_inputs and not message.file:
+            file = ", ".join(inputs)
+            message = replace(message, text=f"{file}: {message.text}", file=file)
+        logging.error(
+            "%s", message.text, exc_info=is_unexpected, extra={"data": message}
+        )
+        print(f"gyriflow: {message.text}", file=sys.stderr)
+        sys.exit(message.exit_code)
+    record_usage(log, usage())
 
 
-def _end_shell_step(code: int, log: str) -> int:
-    message = ""
-    if code == KILLED:
-        message = KILLED_MESSAGE
-    elif code in BUS_ERROR_CODES:
-        message = SHARED_MEMORY_MESSAGE
-        code = StorageError.exit_code
+def end_shell_step(code: int, log: str) -> int:
+    """Write the message of a failed program that has written none, and return the exit
+    code of its step."""
+    message = ENDINGS.get(code)
     if message:
-        print(message, file=sys.stderr)
         with Path(log).open("a") as file:
-            file.write(message + "\n")
-    record_exit_code(code)
-    return code
+            print(f"gyriflow: {message.text}", file=file)
+    elif any(row.level == "error" for row in read_messages(log)):
+        return code
+    else:
+        lines = [line for line in Path(log).read_text().splitlines() if line.strip()]
+        text = "\n".join(lines[-N_LAST_LINES:]) or f"it ended with exit code {code}"
+        message = Message("error", text, exit_code=code)
+    write_message(log, message)
+    return message.exit_code or code
 
 
 if __name__ == "__main__":
-    sys.exit(_end_shell_step(int(sys.argv[1]), sys.argv[2]))
+    sys.exit(end_shell_step(int(sys.argv[1]), sys.argv[2]))

@@ -11,6 +11,7 @@ from gyriflow.folding.growth import StepGrowth, layered_inverse
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.zones import Zones
+from gyriflow.geometry.jacobians import EDGES
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import NeoHookean
 from gyriflow.settings.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
@@ -137,3 +138,18 @@ def gathered(domain, u):
     """Return the displacement of all vertices: two domains of one mesh may be spread
     over the ranks differently."""
     return domain.gather(u[: domain.n_owned])
+
+
+def box_with_a_bowed_side():
+    """Return a box with an inner side of an element bowed by 0.15 of its length, and
+    the node in its middle."""
+    mesh = quadratic(box_mesh((3, 3, 3), (6.0, 5.0, 4.0)))
+    middles, sides = mesh.tets[:, 4:].ravel(), mesh.tets[:, EDGES].reshape(-1, 2)
+    inner = np.flatnonzero(~np.isin(middles, boundary_faces(mesh)[0]))[0]
+    positions = mesh.vertices.copy()
+    along = np.diff(positions[sides[inner]], axis=0)[0]
+    across = np.cross(along, [0.3, 0.5, 0.8])
+    positions[middles[inner]] += (
+        0.15 * np.linalg.norm(along) * across / np.linalg.norm(across)
+    )
+    return TetrahedralMesh(positions, mesh.tets), middles[inner]

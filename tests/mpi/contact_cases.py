@@ -20,9 +20,10 @@ from scipy.optimize import brentq
 from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.errors import MeshError
-from gyriflow.folding.contact import SelfContact
+from gyriflow.folding.contact import SelfContact, contact_distance_mm
 from gyriflow.folding.domain import Domain
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
+from gyriflow.geometry.triangles import TriangleMesh, edge_lengths, edges
 from gyriflow.units import M_PER_MM, MM_PER_M
 
 
@@ -156,6 +157,25 @@ def test_a_compressed_surface_does_not_repel_itself(order):
     facets, _ = boundary_faces(mesh)
     contact = SelfContact(Domain(COMM, mesh), facets, 1000.0)
     assert contact.pair_count(np.zeros((len(contact.domain.vertex_of_node), 3))) == 0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_short_edges_here_and_there_do_not_lower_the_contact_distance(order):
+    """Their ends are nearer to each other than the distance, as neighbours."""
+    mesh = box_mesh((10, 10, 2), (10.0, 10.0, 2.0))
+    x, y, z = mesh.vertices.T
+    moved = mesh.vertices.copy()
+    for i in (-4.0, -1.0, 2.0):
+        for j in (-4.0, -1.0, 2.0):
+            on_top = (y == j) & (z == 1.0)
+            moved[on_top & (x == i + 1.0), 0] = i + 0.02
+    mesh = TetrahedralMesh(moved, mesh.tets)
+    mesh = mesh if order == 1 else quadratic(mesh)
+    facets, _ = boundary_faces(mesh)
+    contact = SelfContact(Domain(COMM, mesh), facets, 1000.0)
+    start = contact.surface.reference_mm()
+    lengths = edge_lengths(start, edges(TriangleMesh(start, contact.surface.faces))[0])
+    assert contact.distance_mm == contact_distance_mm(lengths) > 0.021
 
 
 def test_no_pair_is_missed_where_the_distance_has_grown():

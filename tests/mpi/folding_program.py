@@ -43,7 +43,7 @@ def command(mesh, out, ranks=1, program=PROGRAM, **changes):
         "--out",
         str(out),
     ]
-    program += ["--progress", str(out.with_suffix(".jsonl"))]
+    program += ["--log", str(out.with_suffix(".log"))]
     return ["mpiexec", "-n", str(ranks), *program]
 
 

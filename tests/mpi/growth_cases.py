@@ -23,8 +23,9 @@ from verification_cases.boxes import box_zones
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
+from gyriflow.folding.layers import PialSearch, cortical_weight
 from gyriflow.folding.problem import NonlinearProblem
-from gyriflow.folding.simulation import Folding
+from gyriflow.folding.simulation import Folding, elements_through
 from gyriflow.folding.stretches import packed, unpacked
 from gyriflow.geometry.tetrahedra import signed_volumes, volumes_between
 from gyriflow.mechanics.materials import MATERIALS
@@ -172,14 +173,52 @@ def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(
     zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
     folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw, **EVEN)
     folding.model = EvenGrowth(folding.parameters, None, 0.01).growth
-    for _ in range(5):
-        state = folding.step(state, 43200.0)
-    kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
+    expected = 0.0
+    # steps of unequal length, as where one has failed or a week ends
+    for step_s in (43200.0, 21600.0, 10800.0, 43200.0, 30000.0):
+        state = folding.step(state, step_s)
+        expected *= np.exp(-step_s / SECONDS_PER_GW / memory_gw)
+        expected -= np.log(1.01)
     strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
     assert strain.shape == (len(mesh.tets), points, 3)
-    np.testing.assert_allclose(
-        strain, -np.log(1.01) * sum(kept**n for n in range(5)), rtol=1e-9
+    np.testing.assert_allclose(strain, expected, rtol=1e-9)
+    weeks = [row["week"] for row in state.rows]
+    ends_s = np.cumsum([row["dt_s"] for row in state.rows])
+    np.testing.assert_allclose(weeks, 21.0 + ends_s / SECONDS_PER_GW)
+
+
+@pytest.mark.parametrize(
+    "mesh", [distorted_box((3, 2, 2), by=0.4), curved_box((3, 2, 2))], ids=ORDERS
+)
+def test_thickness_and_stiffness_of_a_step_are_those_of_its_middle(mesh, monkeypatch):
+    by_week = {
+        "thickness_mm": {"weeks": {21.0: 0.2, 22.0: 3.0}},
+        "shear_modulus_cortex_pa": {"weeks": {21.0: 300.0, 22.0: 1000.0}},
+        "shear_modulus_core_pa": {"weeks": {21.0: 200.0, 22.0: 900.0}},
+    }
+    zones = zones_of(mesh)
+    folding, start = folding_of(mesh, zones, **by_week)
+    moduli_pa = []
+    monkeypatch.setattr(
+        folding.problem, "set_step", lambda mu, *others: moduli_pa.append(mu)
     )
+    # a step of a day, two days after the start: its middle is 2.5 / 7 of the first week
+    day_s = SECONDS_PER_GW / 7
+    tissue, _ = folding.begin(replace(start, time_s=2 * day_s), day_s)
+    part = 2.5 / 7
+    # to the triangles, however far a node is from the nearest vertex
+    search = PialSearch(mesh.vertices, zones.cortex_facets)
+    depth_mm = search.distance(mesh.vertices)[tissue.elements.vertices]
+    if mesh.order == 2:
+        points = folding.problem.points
+        depth_mm = depth_mm[tissue.elements.cells] @ points.interpolation.T
+        depth_mm = np.maximum(depth_mm, 0.0)
+    weight = cortical_weight(depth_mm, 0.2 + 2.8 * part)
+    np.testing.assert_allclose(tissue.weight, weight)
+    assert weight.min() < 0.1 < weight.max()
+    cortex_pa, core_pa = 300.0 + 700.0 * part, 200.0 + 700.0 * part
+    expected_pa = tissue.at_points(cortex_pa * weight + core_pa * (1 - weight))
+    np.testing.assert_allclose(moduli_pa, [expected_pa])
 
 
 def stretch_up(growth, volume):
@@ -228,6 +267,40 @@ def test_tissue_held_at_its_sides_keeps_the_volume_it_grew_by_if_only_its_shape_
     assert found == pytest.approx(height, rel=1e-6)
     kept = np.log(height) / (12 * np.log(1.02))
     assert (kept > 0.94) if relaxation == "shape" else (kept < 0.9)
+
+
+def test_the_table_of_steps_has_elements_through_the_cortex_in_the_middle_of_a_step():
+    mesh = distorted_box((8, 6, 6))
+    thickness = {"weeks": {21.0: 1.0, 22.0: 3.0}}
+    zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
+    folding, start = folding_of(mesh, zones, thickness_mm=thickness)
+    day_s = SECONDS_PER_GW / 7
+    start = replace(start, time_s=2 * day_s)
+    (row,) = folding.step(start, day_s).rows
+    tissue, _ = folding.begin(start, day_s)
+    thickness_m = (1.0 + 2.0 * 2.5 / 7) * M_PER_MM
+    expected = elements_through(folding.domain, tissue.depth, thickness_m)
+    assert row["elements_through_cortex"] == pytest.approx(expected)
+
+
+def test_displacements_of_the_pial_surface_are_those_of_its_vertices_alone():
+    mesh = distorted_box()
+    zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
+    folding, _ = folding_of(mesh, zones)
+    # vertices of the surface move by 1 or 2 mm, those inside and below by 5
+    displacement = np.tile([0.0, 3.0, 4.0], (len(mesh.vertices), 1))
+    is_pial = np.isin(np.arange(len(mesh.vertices)), zones.cortex_facets)
+    assert 0 < is_pial.sum() < len(is_pial)
+    displacement[is_pial] = [1.0, 0.0, 0.0]
+    displacement[np.flatnonzero(is_pial)[0]] = [0.0, 0.0, 2.0]
+    solution = folding.solver.solve(folding.problem.rest())
+    row = folding._solution_row(solution, displacement * M_PER_MM)
+    n_pial, n_other = is_pial.sum(), (~is_pial).sum()
+    assert row["max_u_mm"] == pytest.approx(5.0)
+    assert row["max_u_pial_mm"] == pytest.approx(2.0)
+    assert row["mean_u_pial_mm"] == pytest.approx((n_pial + 1) / n_pial)
+    expected = (n_pial + 1 + 5 * n_other) / (n_pial + n_other)
+    assert row["mean_u_mm"] == pytest.approx(expected)
 
 
 def test_an_elastic_state_stays_where_it_is_in_equilibrium():

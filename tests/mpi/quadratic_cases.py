@@ -6,6 +6,7 @@ import pytest
 from boxes import (
     COMM,
     at_the_bottom,
+    box_with_a_bowed_side,
     curved_box,
     gathered,
     problem_on,
@@ -29,10 +30,8 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.simulation import Folding
-from gyriflow.geometry.jacobians import EDGES
 from gyriflow.geometry.straightening import straightness
 from gyriflow.geometry.tetrahedra import (
-    TetrahedralMesh,
     boundary_faces,
     quadratic,
     signed_volumes,
@@ -154,21 +153,6 @@ def test_the_diagonal_has_the_blocks_of_contact():
             assert blocks[node - first, :, 1] == pytest.approx(
                 expected, rel=1e-6, abs=1e-6 * np.abs(blocks).max()
             )
-
-
-def box_with_a_bowed_side():
-    """Return a box with an inner side of an element bowed by 0.15 of its length, and
-    the node in its middle."""
-    mesh = quadratic(box_mesh((3, 3, 3), (6.0, 5.0, 4.0)))
-    middles, sides = mesh.tets[:, 4:].ravel(), mesh.tets[:, EDGES].reshape(-1, 2)
-    inner = np.flatnonzero(~np.isin(middles, boundary_faces(mesh)[0]))[0]
-    positions = mesh.vertices.copy()
-    along = np.diff(positions[sides[inner]], axis=0)[0]
-    across = np.cross(along, [0.3, 0.5, 0.8])
-    positions[middles[inner]] += (
-        0.15 * np.linalg.norm(along) * across / np.linalg.norm(across)
-    )
-    return TetrahedralMesh(positions, mesh.tets), middles[inner]
 
 
 @pytest.mark.parametrize("memory_gw", [0.0, 1.0])

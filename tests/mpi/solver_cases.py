@@ -1,6 +1,7 @@
 """Consistency of energy, residual and tangent, the patch test, and the rungs of the
 linear solver."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -130,6 +131,25 @@ def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monke
     assert not count.converged
     monkeypatch.undo()
     assert solver.solve().converged
+
+
+@pytest.mark.one_rank
+@pytest.mark.parametrize(("rise", "is_accepted"), [(1e-14, True), (1e-9, False)])
+def test_an_energy_may_rise_by_round_off_alone(rise, is_accepted, monkeypatch):
+    problem = growing_problem()
+    monkeypatch.setattr(type(problem), "convex", False)
+    # as if each energy were a little above the one before
+    at_rest = problem.energy(problem.rest())
+    number = itertools.count()
+    monkeypatch.setattr(
+        problem, "energy", lambda u: at_rest * (1 + rise) ** next(number)
+    )
+    solver = solver_of(problem)
+    if is_accepted:
+        assert solver.solve().converged
+    else:
+        with pytest.raises(NotConvergedError):
+            solver.solve()
 
 
 @pytest.mark.one_rank

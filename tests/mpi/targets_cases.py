@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from boxes import COMM
+from boxes import COMM, box_with_a_bowed_side
 from contact_bodies import after_steps, in_a_tube, problem_with_contact, two_blocks
 from facts import Facts
 from scipy.spatial.transform import Rotation
-from shapes import box_mesh, ellipsoid_mesh, rigid
+from shapes import box, box_mesh, ellipsoid_mesh, rigid
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.growth import GrowthInputs
@@ -29,6 +29,7 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import cell_sizes, vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.paths import path_through
+from gyriflow.geometry.straightening import straightness
 from gyriflow.geometry.tetrahedra import boundary_surface, linear_pieces, quadratic
 from gyriflow.geometry.triangles import TriangleMesh, area
 from gyriflow.settings.folding import parameters_from
@@ -177,7 +178,7 @@ def wavy_run(mesh, steps, **changes):
 @pytest.mark.one_rank
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_run_along_a_compatible_path_arrives_without_stress_on_any_mesh(order):
-    for cells in (6, 10):
+    for cells in (4, 8):
         mesh = sound(cells, order)
         folding, state, target = wavy_run(mesh, 7)
         places = state.positions * MM_PER_M
@@ -226,8 +227,19 @@ def test_elements_that_a_target_inverts_do_not_grow_and_the_run_goes_on(order):
 
 
 @pytest.mark.one_rank
+def test_sides_of_elements_that_follow_a_path_are_not_straightened():
+    """Growth is recorded by element, so tissue stays in its element."""
+    mesh, _ = box_with_a_bowed_side()
+    folding, start = towards({23.0: 1.02 * mesh.vertices}, mesh=mesh)
+    after = folding.step(start, DAY_S)
+    moved_by_solver = start.positions + after.last
+    np.testing.assert_array_equal(after.positions, moved_by_solver)
+    assert straightness(after.positions, mesh.tets).min() < 0.4
+
+
+@pytest.mark.one_rank
 def test_the_shape_of_a_continuous_path_is_met_the_better_the_finer_the_mesh():
-    errors, fine = [], sound(36)
+    errors, fine = [], box((30.0, 30.0, 30.0), subdivisions=5)
     for cells in (6, 12):
         mesh = sound(cells)
         _, state, _ = wavy_run(mesh, 7)
@@ -236,7 +248,7 @@ def test_the_shape_of_a_continuous_path_is_met_the_better_the_finer_the_mesh():
             for places, (used, faces) in (
                 (state.positions * MM_PER_M, boundary_of(mesh)),
                 (waves(mesh.vertices, 2), boundary_of(mesh)),
-                (waves(fine.vertices, 2), boundary_of(fine)),
+                (waves(fine.vertices, 2), (slice(None), fine.faces)),
             )
         )
         assert found == pytest.approx(exact[0], rel=1e-4)
@@ -252,7 +264,7 @@ def boundary_of(mesh):
 
 @pytest.mark.one_rank
 def test_growth_and_positions_hardly_depend_on_the_time_step():
-    found = [wavy_run(sound(8), steps)[1] for steps in (7, 14)]
+    found = [wavy_run(sound(6), steps)[1] for steps in (7, 14)]
     coarse, fine = (log_stretch(state.growth, left=True) for state in found)
     assert np.linalg.norm(coarse - fine) < 0.01 * np.linalg.norm(fine)
     assert np.abs(found[0].positions - found[1].positions).max() < 1e-3 * M_PER_MM
@@ -294,7 +306,7 @@ def test_elements_that_shrink_fast_are_counted_by_the_day():
 
 @pytest.mark.one_rank
 def test_known_growth_of_a_body_that_bends_and_twists_is_found_in_the_tissue_s_axes():
-    mesh = ellipsoid_mesh(16, (20.0, 24.0, 18.0))
+    mesh = ellipsoid_mesh(10, (20.0, 24.0, 18.0))
     pieces = linear_pieces(mesh)
 
     def grown(week):

@@ -22,6 +22,7 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
+from gyriflow.messages import read_messages, read_rows
 from gyriflow.settings.folding import parameters_from
 
 pytestmark = pytest.mark.slow
@@ -131,7 +132,8 @@ def test_too_little_shared_memory_is_named(mesh, tmp_path):
     log = tmp_path / "simulate.log"
     ended = ran(sys.executable, "-m", "gyriflow.step", str(done.returncode), log)
     assert ended.returncode == StorageError.exit_code
-    assert ended.stderr == log.read_text() == Facts("/dev/shm", "6 MB", "--shm-size")
+    assert log.read_text() == Facts("/dev/shm", "6 MB", "--shm-size")
+    assert read_messages(log)[0].text in log.read_text()
 
 
 def test_memory_and_a_shortened_step_are_reported_before_the_solve(default_run):
@@ -145,6 +147,20 @@ def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
     assert done.returncode == 0
     frames = tmp_path / "out" / "frames.h5"
     assert (read_field(frames, 21.5, "displacement_mm") == 0).all()
+
+
+def test_warnings_and_progress_are_printed_and_written_as_data(mesh, tmp_path):
+    # linear elements lock
+    done = fold(mesh, tmp_path / "out", 2, growth_rate_per_s=0.0, poisson_ratio=0.48)
+    messages = read_messages(tmp_path / "out.log")
+    assert {message.level for message in messages} == {"warning"}
+    assert "poisson_ratio is 0.48" in messages[0].text
+    printed = done.stdout.splitlines()
+    assert all(f"warning: {message.text}" in printed for message in messages)
+    progress = [row for row in read_rows(tmp_path / "out.log") if "event" in row]
+    assert [row["event"] for row in progress[:2]] == ["size", "step"]
+    assert (progress[0]["elements"], progress[0]["ranks"]) == (3072, 2)
+    assert progress[-1]["week"] == pytest.approx(progress[-1]["end_week"])
 
 
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_path):
@@ -176,6 +192,12 @@ def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     assert re.search(r"\b(86400|64800) s", done.stderr)
     assert re.search(r"element \d+ at \[.*\] mm.* vertex \d+", done.stderr)
     assert not (tmp_path / "out" / "frames.h5").exists()
+    # all ranks fail alike
+    (message,) = read_messages(tmp_path / "out.log")
+    assert f"gyriflow: {message.text}" in done.stderr.splitlines()
+    assert message.exit_code == 4
+    assert "element" in message.found
+    assert "max_halvings" in message.remedy
 
 
 def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_path):

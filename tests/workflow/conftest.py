@@ -19,7 +19,7 @@ from gyriflow.geometry.poses import Pose
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
-from gyriflow.running.jobs import cause
+from gyriflow.messages import read_messages
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -64,15 +64,16 @@ class Surfaces:
         """Return the report on a brain's surface."""
         return read_json(self.results / brain / "surface" / "surface.json")
 
-    def log(self, brain: str, rule: str = "pial") -> str:
-        """Return what the step that made a brain's surface, or refused to, has said."""
-        (log,) = (self.results / brain / "logs").glob(f"{rule}.log")
-        return log.read_text()
+    def messages(self, brain: str, level: str) -> list[str]:
+        """Return the messages of a level of the step that made a brain's surface, or
+        refused to."""
+        messages = read_messages(self.results / brain / "logs" / "pial.log")
+        return [message.text for message in messages if message.level == level]
 
     def require_refused(self, brain: str, *facts: object) -> None:
-        """Check that a brain was refused with facts, in its log and on the terminal,
-        and that nothing is left."""
-        message = cause(self.log(brain))
+        """Check that a brain was refused with facts, in its messages and on the
+        terminal, and that nothing is left."""
+        (message,) = self.messages(brain, "error")
         assert message == Facts(*facts)
         assert message in self.outcome.stderr
         assert not [

@@ -18,7 +18,6 @@ from gyriflow.anatomy.repair import pieces
 from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, write_surface
-from gyriflow.running.jobs import cause
 
 from .conftest import Workflow
 
@@ -266,7 +265,7 @@ def test_each_hemisphere_is_one_piece_on_its_side(study, name):
 @pytest.mark.parametrize("name", WARNINGS)
 def test_what_is_doubtful_is_told(study, name):
     assert WARNED[name] in study.report(name)["warnings"]
-    assert WARNED[name] in study.log(name).splitlines()
+    assert WARNED[name] in study.messages(name, "warning")
     assert WARNED[name] not in study.report("plain")["warnings"]
 
 
@@ -277,10 +276,9 @@ def test_a_brain_is_the_same_however_it_is_stored(study, name):
         for report in map(study.report, (name, "plain"))
     )
     np.testing.assert_allclose(sizes, expected, rtol=0.06 if name == "flat" else 0.005)
-    assert (study.log(name) == Facts("flat.nii.gz:", "2.4 x 0.8 x 0.8 mm")) == (
-        name == "flat"
-    )
-    assert "2 x 2 x 2" not in study.log("plain")
+    warned = "\n".join(study.messages(name, "warning"))
+    assert (warned == Facts("flat.nii.gz:", "2.4 x 0.8 x 0.8 mm")) == (name == "flat")
+    assert "2 x 2 x 2" not in "\n".join(study.messages("plain", "warning"))
 
 
 def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its_week(
@@ -348,7 +346,8 @@ def test_thickness_is_the_distance_to_white_surfaces(study):
 
 
 def test_white_surfaces_outside_the_pial_ones_are_refused(study):
-    assert cause(study.log("crossing")) == Facts("left", "1 %", "0.5 mm")
+    (cause,) = study.messages("crossing", "error")
+    assert cause == Facts("left", "1 %", "0.5 mm")
     assert not list((study.results / "crossing" / "surface").glob("*thickness*"))
 
 

@@ -10,7 +10,6 @@ from gyriflow.study.paths import *
 from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.running.snakemake_internals import remove_stale
-from gyriflow.step import record_exit_code
 
 # scripts and programs find the package without an installation, also in conda environments of single rules, and import
 # nothing from the working directory
@@ -52,7 +51,6 @@ def validated_study():
 def end_with(error):
     """End with the message and the exit code of an error, before any job."""
     print(f"gyriflow: {error}", file=sys.stderr)
-    record_exit_code(error.exit_code)
     sys.exit(error.exit_code)
 
 

@@ -73,13 +73,14 @@ SOLVED_FROM = {
 SOLVE = (
     # one BLAS thread per rank; Snakemake would give each rank all threads of the rule
     "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
-    'log={log:q}; progress=${{log%.log}}.jsonl; rm -f "$progress"; '
+    # messages of an earlier try
+    "log={log:q}; rm -f ${{log%.log}}.jsonl; "
     # no more ranks than cores on this machine; a cluster's profile sets no launcher for a single rank
     "launch='{resources.mpi}'; ranks={resources.tasks}; "
     '[ "$launch" != mpiexec ] || ranks={threads}; '
     "${{launch:+$launch -n $ranks}}"
     " python -m gyriflow.folding {input.mesh:q} --params {input.params:q}"
-    ' {params.options:q} --out {params.folder:q} --progress "$progress" 2>&1'
+    " {params.options:q} --out {params.folder:q} --log {log:q} 2>&1"
     " | tee -i {log:q} || python -m gyriflow.step ${{PIPESTATUS[0]}} {log:q}"
 )
 FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))

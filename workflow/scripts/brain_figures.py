@@ -8,6 +8,7 @@ from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_volume_map
+from gyriflow.messages import read_messages
 from gyriflow.report.pictures import brain_maps, small_pictures
 from gyriflow.report.quality import (
     QualityBrain,
@@ -15,7 +16,6 @@ from gyriflow.report.quality import (
     quality_row,
     tissue_groups,
 )
-from gyriflow.running.jobs import read_messages
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
@@ -39,9 +39,9 @@ with step(snakemake.log[0]):
     white = merged(*whites.values()) if whites else None
     warnings = list(
         dict.fromkeys(
-            message
-            for level, message in read_messages(params.log)
-            if level == "warning"
+            message.first_line
+            for message in read_messages(params.log)
+            if message.level == "warning"
         )
     )
     expected = expected_volume_ml(report["week"])

@@ -10,6 +10,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, chdir, contextmanager
 from functools import cache
+from logging.handlers import BufferingHandler
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -127,7 +128,8 @@ def check_study(
         if not bad
     ]
     told = {text for _, text, _ in problems}
-    warnings += [("", f"  warning: {text}") for text in logged if text not in told]
+    texts = [record.getMessage() for record in logged]
+    warnings += [("", f"  warning: {text}") for text in texts if text not in told]
     yield from ((line, False) for line, _ in grouped(warnings))
     refusals = [
         (brain, f"  brain {brain}: {text}") for brain, text, bad in problems if bad
@@ -165,27 +167,17 @@ def check_study(
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
 
 
-class _Collector(logging.Handler):
-    """A handler that keeps the texts of warnings."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.texts: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.texts.append(record.getMessage())
-
-
 @contextmanager
-def _collected_warnings() -> Iterator[list[str]]:
+def _collected_warnings() -> Iterator[list[logging.LogRecord]]:
     """Collect the warnings that readers log, which would be printed each time that a
     file is read."""
-    logger, collector = logging.getLogger("gyriflow"), _Collector()
+    logger, collector = logging.getLogger("gyriflow"), BufferingHandler(sys.maxsize)
+    collector.setLevel(logging.WARNING)
     propagate = logger.propagate
     logger.addHandler(collector)
     logger.propagate = False
     try:
-        yield collector.texts
+        yield collector.buffer
     finally:
         logger.removeHandler(collector)
         logger.propagate = propagate
@@ -384,9 +376,9 @@ def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
                 doubts.extend(_check_files(brain, config, checksums))
             except GyriflowError as error:
                 refusals.append(str(error))
-        yield from (
-            (brain.id, text, False) for text in dict.fromkeys([*logged, *doubts])
-        )
+        texts = [record.getMessage() for record in logged]
+        for text in dict.fromkeys([*texts, *doubts]):
+            yield brain.id, text, False
         yield from ((brain.id, text, True) for text in refusals)
 
 

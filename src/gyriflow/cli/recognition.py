@@ -741,7 +741,7 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
                 cerebrum_mask(labels, scheme)
                 causes[name] = next(scheme_contradictions(layout, scheme), "")
             except InputError as error:
-                causes[name] = str(error).partition(";")[0]
+                causes[name] = error.problem
     return causes
 
 

@@ -2,32 +2,36 @@
 params.yaml --out DIR`."""
 
 import argparse
+import logging
 import shutil
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import GyriflowError, StorageError
+from ..errors import StorageError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
 from ..io.locks import lock_file
 from ..io.tetmeshes import read_maps, read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
+from ..messages import MessageHandler, error_message, write_message
 from ..settings.folding import FoldingParameters, parameters_from, require_maps
 from ..settings.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..settings.varying import Maps, value_at
-from ..step import Usage, record_exit_code, record_usage, usage
+from ..step import Usage, record_usage, usage
 from .checks import refuse_impossible, stiffness_warning, zone_report
-from .output import log_event, print_line, warn, write_events
+from .output import print_line
 from .points import IntegrationPoints
 from .predicted_memory import predicted_memory_mib
 from .run import run
 from .zones import zones_of_run
+
+log = logging.getLogger(__name__)
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -42,9 +46,13 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument(
-        "--progress",
+        "--log",
         type=Path,
-        help="file of the run's events, one JSON object per line (.jsonl)",
+        help=(
+            "log of the run, beside which its messages and progress are written, one"
+            " JSON object per line (.jsonl); default: folding.log in the folder of the"
+            " results"
+        ),
     )
     parser.add_argument(
         "--may-diverge",
@@ -54,7 +62,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
             " the summary gives the reason"
         ),
     )
-    return parser.parse_args(arguments)
+    parsed = parser.parse_args(arguments)
+    parsed.log = parsed.log or parsed.out / "folding.log"
+    return parsed
 
 
 @contextmanager
@@ -122,13 +132,12 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
             f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size}"
             " ranks"
         )
-        facts = {
-            "elements": len(mesh.tets),
-            "unknowns": 3 * len(mesh.vertices),
-            "ranks": comm.size,
-        }
         print_line(
-            f"{size}, about {memory:.0f} MiB", "size", **facts, memory_mib=round(memory)
+            f"{size}, about {memory:.0f} MiB",
+            "size",
+            elements=len(mesh.tets),
+            ranks=comm.size,
+            memory_mib=round(memory),
         )
         for name in ZONE_NAMES:
             zone = report["zones"][name]
@@ -149,7 +158,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
                 " stress and elastic strain"
             )
         if locking:
-            warn(locking)
+            log.warning(locking)
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / "zones.json", report)
@@ -167,8 +176,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     # by all ranks
     cpu_s = comm.allreduce(own.cpu_s)
     memory_mib = comm.allreduce(own.memory_mib)
-    if comm.rank == 0 and arguments.progress:
-        record_usage(arguments.progress, Usage(own.wall_s, cpu_s, memory_mib))
+    if comm.rank == 0:
+        record_usage(arguments.log, Usage(own.wall_s, cpu_s, memory_mib))
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
@@ -177,25 +186,29 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     try:
         if comm.rank == 0:
             with locked(arguments.out):
-                if arguments.progress:
-                    write_events(arguments.progress)
+                printer = logging.StreamHandler(sys.stdout)
+                printer.setLevel(logging.WARNING)
+                logging.basicConfig(
+                    level=logging.INFO,
+                    format="warning: %(message)s",
+                    handlers=[printer, MessageHandler(arguments.log)],
+                )
                 main(comm, arguments)
         else:
             main(comm, arguments)
-    except GyriflowError as error:
-        print(f"gyriflow: {error}", file=sys.stderr, flush=True)
-        log_event("end", error=str(error))
-        code = error.exit_code
-    except Exception:
-        traceback.print_exc()
-        code = 1
-    else:
-        return
-    record_exit_code(code)
-    sys.stdout.flush()
-    if comm.size > 1:
-        comm.Abort(code)  # other ranks may be waiting in a collective call
-    sys.exit(code)
+    except Exception as error:
+        message = error_message(error)
+        if message.exit_code == 1:
+            traceback.print_exc()
+        print(f"gyriflow: {message.text}", file=sys.stderr, flush=True)
+        # whatever happens, the other ranks are ended, too
+        with suppress(OSError):
+            write_message(arguments.log, message)
+        sys.stdout.flush()
+        if comm.size > 1:
+            # they may be waiting in a collective call
+            comm.Abort(message.exit_code or 1)
+        sys.exit(message.exit_code)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,11 @@
-"""Output of a run: progress lines, events, and the fields of frames for ParaView."""
+"""Output of a run: progress lines, and the fields of frames for ParaView."""
 
-import json
 import logging
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import StorageError
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
@@ -27,33 +24,10 @@ not."""
 
 def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
     """Print a line without buffering, so that a log is always up to date, and log its
-    `event`, if any."""
+    `event`, if any, with its facts."""
     print(text, flush=True)
     if event:
-        log_event(event, **facts)
-
-
-def log_event(event: str, **facts: float | str | None) -> None:
-    """Write an event with its facts to the file of `write_events`, if there is one."""
-    log.info(json.dumps({"event": event, **facts}))
-
-
-def warn(text: str) -> None:
-    """Print a warning and log it as an event."""
-    print_line(f"warning: {text}", "warning", message=text)
-
-
-def write_events(path: Path) -> None:
-    """Write all events from now on to a file, one JSON object per line."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handler = logging.FileHandler(path, mode="w")
-    except OSError as error:
-        raise StorageError(
-            "cannot be written", path=path, found=error.strerror
-        ) from None
-    log.setLevel(logging.INFO)
-    log.addHandler(handler)
+        log.info(text, extra={"data": {"event": event, **facts}})
 
 
 def layer_fields(

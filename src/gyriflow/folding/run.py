@@ -1,6 +1,7 @@
 """A whole run: from the start or a checkpoint to the last output week, with frames,
 step table and summary."""
 
+import logging
 import math
 import resource
 import shutil
@@ -29,7 +30,6 @@ from .output import (
     layer_fields,
     log_growth_at_vertices,
     print_line,
-    warn,
 )
 from .simulation import Folding, advance
 from .steering import missed_curves
@@ -37,6 +37,7 @@ from .step_fields import step_fields
 from .targets import missed_targets, shrinkage_note
 from .zones import Zones
 
+log = logging.getLogger(__name__)
 FRAMES, STEPS, SUMMARY = "frames.h5", "steps.csv", "summary.json"
 MAX_FLAT_SHARE = 0.001
 """Share of flat elements at the end of a run above which their note is a warning."""
@@ -126,11 +127,11 @@ def run(
             (quality, is_bad),
         ):
             if note:
-                (warn if is_warning else print_line)(note)
+                (log.warning if is_warning else print_line)(note)
         if diverged is not None:
-            warn(f"the run diverges and ends at GW {reached:.3f}: {diverged}")
+            log.warning("the run diverges and ends at GW %.3f: %s", reached, diverged)
         ended = f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s"
-        print_line(ended, "end", week=reached, error=diverged)
+        print_line(ended)
 
 
 def simulate(
@@ -161,7 +162,7 @@ def simulate(
                     for warning in filter(
                         None, (missed_curves(state.rows[-1]), *missed_targets(since))
                     ):
-                        warn(warning)
+                        log.warning(warning)
                 write_checkpoint(folder / "state.h5", key, state)
                 report_step(
                     state,

@@ -1,6 +1,7 @@
 """Time stepping: in each step growth, layers and a Newton solve; steps whose solve
 fails are halved."""
 
+import logging
 import math
 import time
 from collections.abc import Sequence
@@ -28,12 +29,13 @@ from .growth_models import growth_model
 from .layers import shear_modulus
 from .linear_solver import RUNGS, NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, Solution, residual_floor
-from .output import print_line, warn
+from .output import print_line
 from .problem import NonlinearProblem
 from .stretches import left_stretch, packed, relaxed, unpacked
 from .tissue import Elements, Tissue
 from .zones import Zones
 
+log = logging.getLogger(__name__)
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
 MIN_STRAIGHTNESS = 0.4
@@ -298,7 +300,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 else ""
             )
             for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
-                warn(warning)
+                log.warning(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after

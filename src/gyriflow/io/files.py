@@ -84,21 +84,25 @@ like numbers, such as ids."""
 def companion_files(path: AnyPath) -> list[str]:
     """Return the further files that readers open with a file: the second of a pair, the
     external data of GIFTI."""
-    path, names = Path(path), set[bytes]()
-    if pair := PAIR.search(path.name):
-        return [
-            str(path.with_name(path.name[: pair.start()] + end + (pair[1] or "")))
-            for end in PAIR_ENDINGS
-        ]
-    if path.name.lower().endswith((".gii", ".gii.gz")):
-        opener: Any = gzip.open if path.name.lower().endswith(".gz") else Path.open
-        # damaged files are reported by their readers
-        with suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
-            names = set(EXTERNAL.findall(file.read()))
-    return [
-        str(path.parent / html.unescape(name.decode(errors="replace")))
-        for name in sorted(names)
-    ]
+    path = Path(path)
+    pair = PAIR.search(path.name)
+    if pair is not None:
+        stem = path.name[: pair.start()]
+        compression = pair[1] or ""
+        return [str(path.with_name(stem + end + compression)) for end in PAIR_ENDINGS]
+    ending = path.name.lower()
+    if not ending.endswith((".gii", ".gii.gz")):
+        return []
+    opener: Any = gzip.open if ending.endswith(".gz") else Path.open
+    names: set[bytes] = set()
+    # damaged files are reported by their readers
+    with suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
+        names.update(EXTERNAL.findall(file.read()))
+    companions = []
+    for name in sorted(names):
+        text = html.unescape(name.decode(errors="replace"))
+        companions.append(str(path.parent / text))
+    return companions
 
 
 def _start_of(path: AnyPath) -> bytes:

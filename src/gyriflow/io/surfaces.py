@@ -439,9 +439,11 @@ def read_pose(path: AnyPath) -> Pose:
 def connectivity(path: Path) -> tuple[int, int, str]:
     """Return a surface file's numbers of vertices and triangles, and a digest of the
     triangles in any order."""
-    return _connectivity(
-        path, (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None
-    )
+    written = None
+    if path.exists():
+        facts = path.stat()
+        written = (facts.st_mtime_ns, facts.st_size)
+    return _connectivity(path, written)
 
 
 @cache

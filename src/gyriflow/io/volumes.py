@@ -16,6 +16,7 @@ from nibabel.fileholders import FileHolder
 from nibabel.openers import ImageOpener
 from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ..errors import InputError
 from ..formats import VOLUME_SUFFIXES, format_of
@@ -104,15 +105,16 @@ def read_label_volume(
 def _without_empty_border(
     values: NDArray[np.number], affine: Floats
 ) -> tuple[NDArray[np.number], Floats]:
-    box = []
-    for axis, size in enumerate(values.shape):
-        filled = np.flatnonzero(values.any(axis=tuple({0, 1, 2} - {axis})))
-        if not len(filled):
-            return values, affine
-        box.append(slice(max(int(filled[0]) - 1, 0), min(int(filled[-1]) + 2, size)))
+    """Return a volume cut to its values other than zero and one voxel around them, and
+    its affine."""
+    filled = ndimage.find_objects((values != 0).astype(np.uint8))
+    if not filled:
+        return values, affine
+    first = [max(side.start - 1, 0) for side in filled[0]]
+    end = [side.stop + 1 for side in filled[0]]
     moved = affine.copy()
-    moved[:3, 3] += moved[:3, :3] @ [side.start for side in box]
-    return values[tuple(box)], moved
+    moved[:3, 3] += moved[:3, :3] @ first
+    return values[tuple(map(slice, first, end))], moved
 
 
 class VolumeHeader(NamedTuple):
@@ -128,17 +130,19 @@ class VolumeHeader(NamedTuple):
 def read_header(path: AnyPath) -> VolumeHeader:
     """Return the header of a volume without reading its values; InputError if it cannot
     be read."""
-    image, unit, space = _load(path), "mm", "scanner"
+    image = _load(path)
+    header: Any = image.header
+    unit = "mm"
+    space = "scanner"
     if isinstance(image, nib.Nifti1Pair):
-        unit = _length_unit(image.header, path)
-        names = [
-            image.header.get_value_label(f"{name}_code") for name in ("sform", "qform")
-        ]
-        space = next((name for name in names if name != "unknown"), "unknown")
-    size = MM_PER_NIFTI_UNIT[unit] * np.array(image.header.get_zooms()[:3], dtype=float)
-    return VolumeHeader(
-        tuple(map(int, image.shape[:3])), tuple(map(float, size)), unit, space
-    )
+        unit = _length_unit(header, path)
+        space = header.get_value_label("sform_code")
+        if space == "unknown":
+            space = header.get_value_label("qform_code")
+    shape = tuple(map(int, image.shape[:3]))
+    mm_per_unit = MM_PER_NIFTI_UNIT[unit]
+    voxel_mm = tuple(mm_per_unit * float(size) for size in header.get_zooms()[:3])
+    return VolumeHeader(shape, voxel_mm, unit, space)
 
 
 def read_values(
@@ -330,9 +334,9 @@ def _has_directions(path: AnyPath) -> bool:
     # nibabel takes FreeSurfer's usual ones where they are not valid, and sets the flag
     opener: Any = gzip.open if str(path).lower().endswith(GZIP_SUFFIXES) else open
     with opener(path, "rb") as file:
-        return (
-            int.from_bytes(file.read(GOOD_RAS_OFFSET + 2)[GOOD_RAS_OFFSET:], "big") == 1
-        )
+        start = file.read(GOOD_RAS_OFFSET + 2)
+    flag = int.from_bytes(start[GOOD_RAS_OFFSET:], "big")
+    return flag == 1
 
 
 def _nifti_affine(

@@ -68,33 +68,43 @@ def _best_move(
     """Return the gain of the least ratio around a vertex by its best move, the vertex
     and its place, None without."""
     star = tets[(tets == vertex).any(axis=1)]
-    others = vertices[tets[element][tets[element] != vertex]]
+    corners = tets[element]
+    start = vertices[vertex]
+    others = vertices[corners[corners != vertex]]
+    edges = start - others
+    longest = float(np.linalg.norm(edges, axis=1).max())
     normal = np.cross(others[1] - others[0], others[2] - others[0])
-    across = vertices[vertex] - others.mean(axis=0)
-    edge = float(np.linalg.norm(others - vertices[vertex], axis=1).max())
-    directions = [normal, across, *(vertices[vertex] - other for other in others)]
-    least = signed_ratios(vertices, star).min()
+    across = start - others.mean(axis=0)
+    largest_step = MAX_SURFACE_STEP if on_surface[vertex] else np.inf
+    least = _signed_ratios_of(vertices[star]).min()
     best = None
-    for direction in directions:
+    best_gain = 0.0
+    for direction in (normal, across, *edges):
         length = np.linalg.norm(direction)
-        for step in STEPS if length > 0 else ():
-            size = min(step, MAX_SURFACE_STEP) if on_surface[vertex] else step
+        if length == 0:
+            continue
+        for step in STEPS:
+            size = min(step, largest_step)
             for sign in (1.0, -1.0):
-                trial = vertices[star].copy()
-                place = vertices[vertex] + sign * size * edge / length * direction
+                place = start + sign * size * longest / length * direction
+                trial = vertices[star]
                 trial[star == vertex] = place
-                ratio = signed_ratios(
-                    trial.reshape(-1, 3), np.arange(star.size).reshape(-1, 4)
-                ).min()
-                if ratio > least and (best is None or ratio - least > best[0]):
-                    best = (float(ratio - least), int(vertex), place)
+                gain = float(_signed_ratios_of(trial).min() - least)
+                if gain > best_gain:
+                    best_gain = gain
+                    best = (gain, int(vertex), place)
     return best
 
 
 def signed_ratios(vertices: Floats, tets: Ints) -> Floats:
     """Return the (m,) radius ratios of linear elements, negative for inverted ones."""
-    corners = vertices[tets]
-    signs = np.sign(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-    return signs * radius_ratios(
-        TetrahedralMesh(corners.reshape(-1, 3), np.arange(tets.size).reshape(-1, 4))
-    )
+    return _signed_ratios_of(vertices[tets])
+
+
+def _signed_ratios_of(corners: Floats) -> Floats:
+    """Return the same from the corners (m, 4, 3)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    signs = np.sign(np.linalg.det(edges))
+    tets = np.arange(4 * len(corners)).reshape(-1, 4)
+    mesh = TetrahedralMesh(corners.reshape(-1, 3), tets)
+    return signs * radius_ratios(mesh)

@@ -18,6 +18,7 @@ from ..geometry.triangles import (
     Floats,
     Mask,
     TriangleMesh,
+    edge_lengths,
     edges,
     face_normals,
     vertex_normals,
@@ -75,22 +76,26 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
 
 
 def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask]:
+    """Return the vertices (n, 3) with those on the boundary moved onto a surface where
+    it is near, and whether each has been moved."""
     boundary, outer = tetrahedra.boundary_surface(mesh)
     distance, face, place = nearest_on(boundary.vertices, surface)
     ends, _ = edges(boundary)
-    length = np.linalg.norm(np.diff(boundary.vertices[ends], axis=1)[:, 0], axis=1)
+    lengths = edge_lengths(boundary.vertices, ends)
     shortest = np.full(len(outer), np.inf)
-    np.minimum.at(shortest, ends.ravel(), np.repeat(length, 2))
+    np.minimum.at(shortest, ends.ravel(), np.repeat(lengths, 2))
     # the wall of a sulcus may be nearer to a node than the place it comes from
-    agrees = (
-        np.einsum("ij,ij->i", vertex_normals(boundary), face_normals(surface)[face])
-        >= MIN_NORMAL_COSINE
-    )
-    near = agrees & (distance <= FARTHEST * shortest)
-    target, way = mesh.vertices.copy(), np.zeros(len(mesh.vertices), dtype=bool)
-    target[outer[near]] = place[near]
-    way[outer[near]] = True
-    return target, way
+    normals = vertex_normals(boundary)
+    normals_there = face_normals(surface)[face]
+    cosines = np.einsum("ij,ij->i", normals, normals_there)
+    agrees = cosines >= MIN_NORMAL_COSINE
+    is_near = agrees & (distance <= FARTHEST * shortest)
+    moved = outer[is_near]
+    target = mesh.vertices.copy()
+    target[moved] = place[is_near]
+    is_moved = np.zeros(len(target), dtype=bool)
+    is_moved[moved] = True
+    return target, is_moved
 
 
 def _move(

@@ -122,11 +122,10 @@ def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
     for sign in (1.0, -1.0):
         face, distance = _first_hits(mesh, walls.middle, sign * walls.normal)
         width += np.where(face >= 0, distance, GAP_MM)
-    outside = igl.fast_winding_number(mesh.vertices, mesh.faces, walls.middle) < 0.5
-    return float(
-        walls.area[outside & (width >= STILL_OPEN * walls.width)].sum()
-        / walls.area.sum()
-    )
+    winding = igl.fast_winding_number(mesh.vertices, mesh.faces, walls.middle)
+    is_open = (winding < 0.5) & (width >= STILL_OPEN * walls.width)
+    kept = walls.area[is_open].sum()
+    return float(kept / walls.area.sum())
 
 
 def _first_hits(
@@ -150,6 +149,8 @@ def _first_hits(
 
 
 def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats]:
+    """Return the distances in mm of the middles of the quarters of faces and of the
+    vertices from a surface, and their areas in mm², 0 for vertices."""
     a, b, c = triangles.corners(mesh).transpose(1, 0, 2)
     centroids = [
         (a + b + c) / 3,
@@ -157,10 +158,11 @@ def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats
         (a + 4 * b + c) / 6,
         (a + b + 4 * c) / 6,
     ]
-    distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), target)
-    return distance, np.concatenate(
-        [np.tile(triangles.face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))]
-    )
+    points = np.concatenate([*centroids, mesh.vertices])
+    distance, _, _ = nearest_on(points, target)
+    quarters = np.tile(triangles.face_areas(mesh) / 4, 4)
+    areas = np.concatenate([quarters, np.zeros(len(mesh.vertices))])
+    return distance, areas
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
@@ -178,15 +180,15 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     between corners."""
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
-    for i, ((a, b), (c, d)) in enumerate(
-        zip(SIDES_OF_ELEMENT, reversed(SIDES_OF_ELEMENT), strict=True)
-    ):
-        edge = corner[:, b] - corner[:, a]
-        first, second = (np.cross(edge, corner[:, k] - corner[:, a]) for k in (c, d))
+    opposite = reversed(SIDES_OF_ELEMENT)
+    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, opposite, strict=True)):
+        start = corner[:, a]
+        edge = corner[:, b] - start
+        first = np.cross(edge, corner[:, c] - start)
+        second = np.cross(edge, corner[:, d] - start)
         sine = np.linalg.norm(np.cross(first, second), axis=1)
-        angles[:, i] = np.degrees(
-            np.arctan2(sine, np.einsum("ij,ij->i", first, second))
-        )
+        cosine = np.einsum("ij,ij->i", first, second)
+        angles[:, i] = np.degrees(np.arctan2(sine, cosine))
     return angles
 
 

@@ -18,6 +18,7 @@ from ..geometry.triangles import (
     Floats,
     Ints,
     TriangleMesh,
+    edge_lengths,
     edges,
     mean_edge_length,
     unit,
@@ -185,14 +186,14 @@ def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, f
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
+    """Return the (n,) mean length in mm of the edges at each vertex, 0 without one."""
     pairs, _ = edges(mesh)
-    lengths = np.repeat(
-        np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2
-    )
+    ends = pairs.ravel()
+    lengths = np.repeat(edge_lengths(mesh.vertices, pairs), 2)
     size = len(mesh.vertices)
-    return np.bincount(pairs.ravel(), lengths, size) / np.maximum(
-        np.bincount(pairs.ravel(), minlength=size), 1
-    )
+    sums = np.bincount(ends, lengths, size)
+    counts = np.bincount(ends, minlength=size)
+    return sums / np.maximum(counts, 1)
 
 
 def _quadrics(

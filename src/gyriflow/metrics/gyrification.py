@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 import trimesh
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
@@ -17,6 +15,7 @@ from ..geometry.triangles import (
     Floats,
     TriangleMesh,
     area,
+    connected,
     corners,
     face_areas,
     face_normals,
@@ -47,33 +46,31 @@ def cap(mesh: TriangleMesh) -> TriangleMesh:
     boundary is not a closed line.
     """
     directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    start, end = directed.T
     size = len(mesh.vertices)
-    alone = ~np.isin(
-        directed[:, 0] * size + directed[:, 1], directed[:, 1] * size + directed[:, 0]
-    )
-    rim = directed[alone]
+    has_other_face = np.isin(start * size + end, end * size + start)
+    rim = directed[~has_other_face]
     if not len(rim):
         return mesh
-    if not np.array_equal(
-        np.bincount(rim[:, 0], minlength=size), np.bincount(rim[:, 1], minlength=size)
-    ):
+    starts = np.bincount(rim[:, 0], minlength=size)
+    ends = np.bincount(rim[:, 1], minlength=size)
+    if not np.array_equal(starts, ends):
         raise MeshError(
             "the boundary of the surface is not made of closed lines",
             remedy="Repair the surface",
         )
-    vertices, local = np.unique(rim, return_inverse=True)
+    on_rim, local = np.unique(rim, return_inverse=True)
     local = local.reshape(-1, 2)
-    links = sparse.coo_matrix(
-        (np.ones(len(rim)), (local[:, 0], local[:, 1])), shape=(len(vertices),) * 2
-    )
-    number, label = connected_components(links, directed=False)
-    centres = np.stack(
-        [mesh.vertices[vertices[label == k]].mean(axis=0) for k in range(number)]
-    )
-    fan = np.column_stack([rim[:, ::-1], size + label[local[:, 0]]])
-    return TriangleMesh(
-        np.concatenate([mesh.vertices, centres]), np.concatenate([mesh.faces, fan])
-    )
+    boundary = connected(local, len(on_rim))
+    centres = []
+    for number in range(boundary.max() + 1):
+        points = mesh.vertices[on_rim[boundary == number]]
+        centres.append(points.mean(axis=0))
+    centre = size + boundary[local[:, 0]]
+    fan = np.column_stack([rim[:, ::-1], centre])
+    vertices = np.concatenate([mesh.vertices, centres])
+    faces = np.concatenate([mesh.faces, fan])
+    return TriangleMesh(vertices, faces)
 
 
 def envelope(mesh: TriangleMesh) -> TriangleMesh:
@@ -171,11 +168,11 @@ def local_gyrification_index(mesh: TriangleMesh, around: Pieces) -> Floats:
     pial = np.bincount(home, face_areas(mesh), len(around.centres))
     _, nearest = tree.query(mesh.vertices)
     used, back = np.unique(nearest, return_inverse=True)
-    near = tree.sparse_distance_matrix(
-        cKDTree(around.centres[used]), LOCAL_RADIUS_MM, output_type="ndarray"
-    )
-    sums = [
-        np.bincount(near["j"], values[near["i"]], len(used))
-        for values in (pial, around.areas)
-    ]
-    return (sums[0] / sums[1])[back]
+    patches = cKDTree(around.centres[used])
+    near = tree.sparse_distance_matrix(patches, LOCAL_RADIUS_MM, output_type="ndarray")
+    piece = near["i"]
+    patch = near["j"]
+    pial_areas = np.bincount(patch, pial[piece], len(used))
+    patch_areas = np.bincount(patch, around.areas[piece], len(used))
+    ratio = pial_areas / patch_areas
+    return ratio[back]

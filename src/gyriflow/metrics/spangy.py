@@ -5,8 +5,8 @@ Germanaud et al. 2012, "Larger is twistier", NeuroImage 63, 1257-1272. Which mod
 spectrum is made of, its bands, and how far two spectra are from each other.
 """
 
+import math
 from dataclasses import dataclass
-from math import ceil
 
 import numpy as np
 import pandas as pd
@@ -161,7 +161,7 @@ def spectral_basis(
         else 4.0 * np.pi * int(choice) / area(mesh)
     )
     edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
-    needed = ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
+    needed = math.ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
         copy = decimate(mesh, needed)
         places = interpolation(match_surface(mesh, copy), len(copy.vertices))
@@ -191,65 +191,69 @@ def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
     proxy is positive the band with the largest part, elsewhere the one with the
     smallest, with a minus sign.
     """
-    functions, band = basis.functions, basis.band
-    coefficients = functions.T @ (basis.places.T @ (basis.energy @ proxy))
+    functions = basis.functions
+    band = basis.band
+    energy = basis.energy @ proxy
+    coefficients = functions.T @ (basis.places.T @ energy)
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
-    if len(
-        whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()
-    ):
-        parts = np.stack(
-            [functions[:, band == k] @ coefficients[band == k] for k in whole], axis=1
-        )
-        parts = basis.places @ parts
-        dominant = np.where(
-            proxy > 0, whole[parts.argmax(axis=1)], -whole[parts.argmin(axis=1)]
-        )
-    captured = (
-        float(np.sum(coefficients**2) / (proxy @ (basis.energy @ proxy)))
-        if proxy.any()
-        else 1.0
-    )
+    is_whole = bands["complete"] & (bands["band"] > 0)
+    whole = bands.loc[is_whole, "band"].to_numpy()
+    if len(whole):
+        parts = []
+        for number in whole:
+            in_band = band == number
+            parts.append(functions[:, in_band] @ coefficients[in_band])
+        at_vertices = basis.places @ np.stack(parts, axis=1)
+        largest = whole[at_vertices.argmax(axis=1)]
+        smallest = whole[at_vertices.argmin(axis=1)]
+        dominant = np.where(proxy > 0, largest, -smallest)
+    captured = 1.0
+    if proxy.any():
+        captured = float(np.sum(coefficients**2) / (proxy @ energy))
     return Spectrum(basis.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
 def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.DataFrame:
-    limits, powers = band_limits(basis.first), coefficients**2
-    numbers = np.array([np.count_nonzero(basis.band == k) for k in range(BANDS + 1)])
-    power = np.array(
-        [
-            np.sum(powers[basis.band == k]) if numbers[k] else np.nan
-            for k in range(BANDS + 1)
-        ]
-    )
+    limits = band_limits(basis.first)
+    powers = coefficients**2
+    bands = np.arange(BANDS + 1)
+    is_mean = bands == 0
+    # modes beyond the last band have −1
+    in_bands = basis.band[basis.band >= 0]
+    numbers = np.bincount(in_bands, minlength=BANDS + 1)
+    power = np.full(BANDS + 1, np.nan)
+    for band in np.flatnonzero(numbers):
+        power[band] = np.sum(powers[basis.band == band])
     total = np.nansum(power[1:])
-    wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
-    complete = np.concatenate([[True], limits[1:] <= basis.reach * (1.0 + ROUNDING)])
-    is_mean = np.arange(BANDS + 1) == 0
-    share = kept_curvature(np.sqrt(wavelengths[1:] * wavelengths[:-1]), radius_mm)
-    inside = basis.band > 0
-    octaves = np.maximum(np.log2(basis.eigenvalues[inside] / basis.first) / 2, 0.0)
-    parts = np.bincount(
-        (PARTS * octaves).astype(int), powers[inside], PARTS * BANDS
-    ).reshape(BANDS, PARTS)
+    relative_power = power / total if total > 0 else 0.0 * power
+    relative_power[is_mean] = np.nan
+    wavelengths = np.append(np.inf, 2.0 * np.pi / np.sqrt(limits))
+    longest = wavelengths[:-1]
+    shortest = wavelengths[1:]
+    complete = np.append(True, limits[1:] <= basis.reach * (1.0 + ROUNDING))
+    kept = kept_curvature(np.sqrt(shortest * longest), radius_mm)
     table = pd.DataFrame(
         {
-            "band": np.arange(BANDS + 1),
-            "wavelength_min_mm": np.where(is_mean, np.inf, wavelengths[1:]),
-            "wavelength_max_mm": wavelengths[:-1],
+            "band": bands,
+            "wavelength_min_mm": np.where(is_mean, np.inf, shortest),
+            "wavelength_max_mm": longest,
             "modes": numbers,
             "power": power,
-            "relative_power": np.append(
-                np.nan, power[1:] / total if total > 0 else 0 * power[1:]
-            ),
+            "relative_power": relative_power,
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
-            "kept_curvature": share,
-            "resolved": is_mean | (share >= MIN_KEPT_CURVATURE),
+            "kept_curvature": kept,
+            "resolved": is_mean | (kept >= MIN_KEPT_CURVATURE),
             "is_open": basis.is_open,
         }
     )
-    return table.join(pd.DataFrame(parts, range(1, BANDS + 1), PART_POWERS))
+    inside = basis.band > 0
+    octaves = np.log2(basis.eigenvalues[inside] / basis.first) / 2
+    part = (PARTS * np.maximum(octaves, 0.0)).astype(int)
+    parts = np.bincount(part, powers[inside], PARTS * BANDS)
+    of_bands = parts.reshape(BANDS, PARTS)
+    return table.join(pd.DataFrame(of_bands, bands[1:], PART_POWERS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,24 +336,32 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
 
 
 def _distances(a: _Profile, b: _Profile) -> list[tuple[str, float, str, str]]:
+    """Return rows of measure, value, unit and flag: the distance of the bands from B4
+    to each further one."""
     rows = []
+    longest = max(a.longest, b.longest)
     for last in FOLD_BANDS:
-        cut, coarse = (
-            " ".join(f"B{k + 1}" for k in np.flatnonzero(~(first & second)[:last]))
-            for first, second in ((a.complete, b.complete), (a.resolved, b.resolved))
-        )
-        flag = f"{cut} cut off" if cut else f"{coarse} not resolved" if coarse else ""
-        end, longest = max(a.longest, b.longest) - last, max(a.longest, b.longest)
-        octaves = np.linspace(end, longest, 4 * PARTS * last + 1, dtype=np.float64)
-        between = np.abs(a.cumulative(octaves, end) - b.cumulative(octaves, end))
-        value = np.nan if flag else float(np.trapezoid(between, octaves))
-        name = "spectral_distance_B4" + (f"_to_B{last}" if last > FOLD_BANDS[0] else "")
-        rows.append(
-            (
-                name,
-                value,
-                "octaves",
-                flag or (OPEN_AND_CLOSED if a.is_open != b.is_open else "ok"),
-            )
-        )
+        cut = _bands_without(a.complete & b.complete, last)
+        coarse = _bands_without(a.resolved & b.resolved, last)
+        value = math.nan
+        if cut:
+            flag = f"{cut} cut off"
+        elif coarse:
+            flag = f"{coarse} not resolved"
+        else:
+            flag = OPEN_AND_CLOSED if a.is_open != b.is_open else "ok"
+            end = longest - last
+            octaves = np.linspace(end, longest, 4 * PARTS * last + 1)
+            difference = a.cumulative(octaves, end) - b.cumulative(octaves, end)
+            value = float(np.trapezoid(np.abs(difference), octaves))
+        name = "spectral_distance_B4"
+        if last > FOLD_BANDS[0]:
+            name += f"_to_B{last}"
+        rows.append((name, value, "octaves", flag))
     return rows
+
+
+def _bands_without(has: NDArray[np.bool_], last: int) -> str:
+    """Return the names of the bands up to the last one that do not have something."""
+    numbers = np.flatnonzero(~has[:last]) + 1
+    return " ".join(f"B{number}" for number in numbers)

@@ -130,18 +130,18 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
     metric may be negative. Metrics have the columns hemisphere, metric, value, unit,
     and others that rows of both sides share, such as region; these are kept.
     """
-    keys = [name for name in metrics.columns if name not in {"hemisphere", "value"}]
+    keys = metrics.columns.drop(["hemisphere", "value"]).tolist()
     sides = metrics[metrics["hemisphere"].isin(SIDES)]
+    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first")
     # a single hemisphere has no asymmetry
-    wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(
-        columns=list(SIDES)
-    )
-    wide = wide.reindex(
-        pd.MultiIndex.from_frame(sides[keys].drop_duplicates())
-    ).reset_index()
-    difference, total = wide["left"] - wide["right"], wide["left"] + wide["right"]
-    is_signed = wide["metric"].map(lambda name: METRICS[name].is_signed).astype(bool)
-    index = 2.0 * difference / total.where((total > 0) & ~is_signed)
+    wide = wide.reindex(columns=list(SIDES))
+    in_order = sides[keys].drop_duplicates()
+    wide = wide.reindex(pd.MultiIndex.from_frame(in_order)).reset_index()
+    difference = wide["left"] - wide["right"]
+    total = wide["left"] + wide["right"]
+    signed = [name for name, metric in METRICS.items() if metric.is_signed]
+    has_index = (total > 0) & ~wide["metric"].isin(signed)
+    index = 2.0 * difference / total.where(has_index)
     return wide[keys].assign(difference=difference, asymmetry_index=index)
 
 
@@ -230,15 +230,13 @@ def weekly_norms(
     ("all" or "pial"), max_mm, mean_mm; two rows per pair of weeks.
     """
     rows = []
-    for weeks_of, (before, after) in zip(
-        pairwise(weeks), pairwise(positions), strict=True
-    ):
-        length = np.linalg.norm(np.asarray(after) - np.asarray(before), axis=1)
-        for nodes, of in (("all", length), ("pial", length[pial])):
-            rows.append((*weeks_of, nodes, of.max(), of.mean()))
-    return pd.DataFrame(
-        rows, columns=["from_week", "to_week", "nodes", "max_mm", "mean_mm"]
-    )
+    shapes = zip(weeks, positions, strict=True)
+    for (week, before), (next_week, after) in pairwise(shapes):
+        lengths = np.linalg.norm(np.asarray(after) - np.asarray(before), axis=1)
+        for nodes, of in (("all", lengths), ("pial", lengths[pial])):
+            rows.append((week, next_week, nodes, of.max(), of.mean()))
+    columns = ["from_week", "to_week", "nodes", "max_mm", "mean_mm"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def region_metrics(

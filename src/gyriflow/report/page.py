@@ -493,7 +493,8 @@ def verdict(
     sentence: str = NOT_COMPARED,
 ) -> str:
     """Return a sentence that compares the best run at the last week with the scaled
-    start, and the worst warning.
+    start, and the most serious message: an error, or else a limitation of a run. Plain
+    warnings are counted.
 
     `runs` and `validation` are as for `scores_table`, `warnings` has the columns level
     and message. The `sentence` is used if there is no observed brain.
@@ -508,17 +509,15 @@ def verdict(
             f" {best['r_start_shape_index']:.2f}), distance"
             f" {best['distance_mm']:.2f} mm."
         ).replace("-", "−")
-    doubts = [
-        text for _, run in runs.iterrows() for text in run_verdict(run).split("; ")[1:]
-    ]
-    worst = [
-        *warnings.loc[warnings["level"] == "error", "message"],
-        *doubts,
-        *warnings["message"],
-    ]
-    if not worst:
+    serious = list(warnings.loc[warnings["level"] == "error", "message"])
+    for _, run in runs.iterrows():
+        serious += run_doubts(run)
+    texts = serious or list(warnings["message"].unique())
+    if not texts:
         return f"{sentence} There were no warnings."
-    return f"{sentence} Worst warning: {worst[0].rstrip('.')}."
+    if serious or len(texts) == 1:
+        return f"{sentence} Worst warning: {texts[0].rstrip('.')}."
+    return f"{sentence} There were {len(texts)} warnings, listed under Brains."
 
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
@@ -526,16 +525,19 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     # the table has the list as JSON
     reached = max(json.loads(run["weeks"]))
     end = float(run["end_week"])
-    order = int(run["order"])
-    words = [
-        (
-            f"reached {week_label(reached)}"
-            if reached >= end
-            else f"ended at {week_label(reached)} of {end:g}"
-        )
-    ]
+    if reached >= end:
+        ending = f"reached {week_label(reached)}"
+    else:
+        ending = f"ended at {week_label(reached)} of {end:g}"
+    return "; ".join([ending, *run_doubts(run)])
+
+
+def run_doubts(run: Mapping[str, Any] | pd.Series) -> list[str]:
+    """Return the limitations of a run's folds."""
+    words = []
     if run["min_J"] <= 0:
         words.append("elements inverted")
+    order = int(run["order"])
     has_layers = GROWTH_MODELS[run["growth.model"]].has_layers
     if has_layers:
         words += _coarseness(run, order)
@@ -547,7 +549,7 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     if has_layers and run["elements_through_cortex"] > 0:
         error, text = element_error(order, run["elements_through_cortex"])
         words += [text] if error > LARGE_ELEMENT_ERROR else []
-    return "; ".join(words)
+    return words
 
 
 def _coarseness(run: Mapping[str, Any] | pd.Series, order: int) -> list[str]:

@@ -22,7 +22,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
-from tempfile import gettempdir
 from types import FrameType
 from typing import IO
 
@@ -32,9 +31,9 @@ from ..errors import GyriflowError, InputError, StorageError
 from ..io.files import read_json, write_json
 from ..io.locks import UNLOCKABLE, lock_file
 from ..io.yaml_files import read_keys
+from ..messages import Message, study_messages
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
-from ..step import EXIT_FILE, recorded_exit_code
 from .snakemake_internals import dates_before_copy, temporary_records
 
 ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
@@ -214,16 +213,15 @@ def refused_brains() -> dict[str, str]:
     return read_json(path) if path else {}
 
 
-def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
-    """Return the causes of the brains that had a failed step since a time (s since the
-    epoch), by id."""
-    # takes a second to import, and only failed runs need it
-    from .jobs import gather_messages
-
-    brains = [folder.name for folder in directory.glob("results/brains/*")]
-    messages = gather_messages(directory, brains, [], since_s=since_s)
-    errors = messages[(messages["level"] == "error") & (messages["subject"] != "")]
-    return dict(errors.drop_duplicates("subject")[["subject", "message"]].to_numpy())
+def failed_brains(failures: Sequence[Message]) -> dict[str, str]:
+    """Return the causes of the brains with a failed step, by id, from the errors of
+    steps."""
+    causes: dict[str, str] = {}
+    for failure in failures:
+        # a failed run refuses no brain
+        if failure.brain and not failure.run:
+            causes.setdefault(failure.brain, failure.first_line)
+    return causes
 
 
 def stop_jobs() -> None:
@@ -282,16 +280,17 @@ def finish_without(
     return 0
 
 
-def exit_code(code: int, recorded: int | None, directory: Path) -> int:
-    """Return the exit code of a run, given Snakemake's `code` and the one `recorded`;
-    report a full disk."""
-    if code and recorded in (None, 1) and (full := full_disk(directory)):
+def exit_code(code: int, failures: Sequence[Message], directory: Path) -> int:
+    """Return the exit code of a run that failed with Snakemake's `code`: that of the
+    first error of a step that has one; report a full disk."""
+    code = next(filter(None, (failure.exit_code for failure in failures)), code)
+    if code == 1 and (full := full_disk(directory)):
         print(
             f"gyriflow: {directory.resolve()}: {full}, then run the same command again",
             file=sys.stderr,
         )
         return StorageError.exit_code
-    return (recorded or code) if code else 0
+    return code
 
 
 def full_disk(directory: Path) -> str:
@@ -339,7 +338,7 @@ def set_cache(directory: Path) -> None:
         )
 
 
-def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
+def set_environment(*, keep_going: bool, dry_run: bool) -> None:
     """Set the environment variables that the Snakefile and the steps of the workflow
     read."""
     os.environ |= read_keys(ENVIRONMENT)["variables"] | os.environ
@@ -354,7 +353,6 @@ def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None
         for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run))
         if is_set
     }
-    os.environ[EXIT_FILE] = str(exit_file)
     set_user_name()
 
 
@@ -458,13 +456,7 @@ def main(arguments: Sequence[str]) -> int:
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)
-    # in the working directory, where jobs on other machines of a cluster find it too
-    folder = Path(gettempdir()) if runs_nothing else directory.absolute() / ".snakemake"
-    exit_file = folder / f"gyriflow-exit-{os.getpid()}"
-    # a killed run may have had the same process number, as in containers
-    with suppress(OSError):
-        exit_file.unlink()
-    set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
+    set_environment(keep_going=options.keep_going, dry_run=dry_run)
     complete = (
         ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
     )
@@ -493,23 +485,23 @@ def main(arguments: Sequence[str]) -> int:
         ]
         redirect_output(details)
     began_s = time.time()
-    try:
-        with temporary_records(directory) if runs_nothing else nullcontext():
-            code = call_snakemake(complete)
-    finally:
-        recorded = recorded_exit_code(exit_file)
-        exit_file.unlink(missing_ok=True)
+    with temporary_records(directory) if runs_nothing else nullcontext():
+        code = call_snakemake(complete)
     if code > 128:
         print(
             "gyriflow: interrupted; run the same command again to resume",
             file=sys.stderr,
         )
         return code
-    can_finish = options.keep_going and not dry_run and not is_second_pass
-    brains = failed_brains(directory, began_s) if code and can_finish else {}
-    if brains and (interrupted := finish_without(brains, arguments, directory)):
-        return interrupted
-    return (recorded or code) if runs_nothing else exit_code(code, recorded, directory)
+    if code == 0 or dry_run:
+        return code
+    messages = study_messages(directory, began_s)
+    failures = [message for message in messages if message.level == "error"]
+    if options.keep_going and not is_second_pass:
+        brains = failed_brains(failures)
+        if brains and (interrupted := finish_without(brains, arguments, directory)):
+            return interrupted
+    return exit_code(code, failures, directory)
 
 
 if __name__ == "__main__":

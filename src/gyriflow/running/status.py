@@ -11,12 +11,12 @@ from tabulate import tabulate
 from ..errors import InputError, StorageError
 from ..io.files import read_json
 from ..io.yaml_files import read_keys
+from ..messages import read_rows
 from ..settings.base import folder_of
 from ..shipped import CONFIG
 from ..study import resolve
 from ..study.loading import load
 from ..units import week_tag
-from .jobs import events_in, read_log
 from .launch import hold_lock
 from .provenance import STUDY_RECORD
 
@@ -173,9 +173,9 @@ def _simulation_progress(folder: Path) -> str:
         summary = read_json(folder / "folding" / "summary.json")
         return f"done, GW {week_tag(summary['weeks'][-1])}"
     steps = [
-        event
-        for event in events_in(read_log(folder / "logs" / "simulate.jsonl"))
-        if event["event"] == "step"
+        row
+        for row in read_rows(folder / "logs" / "simulate.log")
+        if row.get("event") == "step"
     ]
     return format_progress(steps[-1]) if steps else MISSING
 

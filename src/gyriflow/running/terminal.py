@@ -17,8 +17,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from ..errors import StorageError
 from ..grouping import Kinds
 from ..io.files import write_json
-from ..step import KILLED, record_exit_code
-from .jobs import OUT_OF_MEMORY, cause, events_in, messages_in, read_log
+from ..messages import (
+    KILLED,
+    STOPPED,
+    Message,
+    messages_file,
+    read_messages,
+    read_rows,
+    write_message,
+)
 from .launch import full_disk, received_signals
 from .status import REPORT, STATE, format_duration, format_progress
 
@@ -40,14 +47,14 @@ SLURM = re.compile(
     r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL
 )
 SIGNAL = re.compile(r"died with <Signals\.(\w+)")
+OUT_OF_MEMORY = (
+    "it was killed, most probably because memory ran out: its log ends without a"
+    " message"
+)
 SIGNAL_CAUSES = {
     "SIGKILL": OUT_OF_MEMORY,
-    **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), "it was stopped"),
+    **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), STOPPED),
 }
-INTERRUPTED_PREFIXES = (
-    "Terminating processes on user request",
-    "Cancelling snakemake on user request",
-)
 FAILED_JOB_PREFIXES = (
     "Exiting because a job execution failed",
     "At least one job did not",
@@ -61,8 +68,7 @@ cause."""
 
 @dataclass
 class Job:
-    """A running job and its log; a simulation writes its progress in the same
-    folder."""
+    """A running job and its log, beside which are its messages."""
 
     rule: str
     name: str
@@ -107,7 +113,7 @@ class RunDisplay:
         self.messages = Kinds()
         self.sizes: set[str] = set()
         self.failure_messages: list[str] = []
-        self.interrupted = self.has_errors = False
+        self.has_errors = False
 
     def watch(self, lock: AbstractContextManager) -> None:
         """Follow the jobs and record the state of the run for `gyriflow status`, until
@@ -141,26 +147,28 @@ class RunDisplay:
                 self.bar.start()
             case "job_info":
                 wildcards = " ".join((event["wildcards"] or {}).values())
-                log = Path(event["log"][0]).absolute() if event["log"] else None
+                log = Path(event["log"][0]) if event["log"] else None
+                if log:
+                    # those of an earlier try
+                    messages_file(log).unlink(missing_ok=True)
                 name = f"{event['rule_name']} {wildcards}".strip()
                 self.running[event["jobid"]] = Job(
                     event["rule_name"], name, self.clock(), log
                 )
             case "job_finished" if job := self.running.pop(event["job_id"], None):
-                self._show_warnings(job)
+                self._follow(job)
                 self.work_done += WEIGHTS.get(job.rule, 1.0)
             case "job_error":
                 # a signal to all processes may have ended a job before it is noticed
                 # here
                 time.sleep(SIGNAL_S)
                 # an interrupted job has not failed
-                if not (self.interrupted or received_signals):
+                if not received_signals:
                     self._show_failure(event)
             case "progress":
                 self.done, self.total = event["done"], event["total"]
             case _:
                 text = record.getMessage().strip()
-                self.interrupted |= text.startswith(INTERRUPTED_PREFIXES)
                 if text.startswith("Nothing to be done"):
                     self.console.print("gyriflow: everything is up to date")
                 elif record.levelno >= logging.WARNING and text.startswith(
@@ -173,30 +181,8 @@ class RunDisplay:
     def _show_failure(self, event: Mapping[str, Any]) -> None:
         job = self.running.pop(event["jobid"], None)
         if job is not None:
-            self._show_warnings(job)
-        message = str(event["rule_msg"] or "\n".join(self.failure_messages))
-        self.failure_messages.clear()
-        slurm, signal = SLURM.search(message), SIGNAL.search(message)
-        # Snakemake's text shows the shell command
-        message = "" if "CalledProcessError" in message else message
-        if slurm:
-            reason = f"Slurm ended job {slurm[1]}: {slurm[2]}"
-        elif signal:
-            reason = SIGNAL_CAUSES.get(
-                signal[1], f"it crashed ({signal[1]}): please report this with its log"
-            )
-        else:
-            reason = (
-                cause("".join(map(read_log, event["log"])))
-                or message
-                or full_disk(Path())
-            )
-            reason = (
-                reason
-                or f"it left no message in its log; see the end of {self.details}"
-            )
-        if reason == OUT_OF_MEMORY:
-            record_exit_code(KILLED)
+            self._follow(job)
+        reason = self._cause(event)
         name = job.name if job else event["rule_name"]
         self.failed.append(
             {
@@ -210,6 +196,36 @@ class RunDisplay:
             self.console.print(
                 "\n        ".join([line, *(f"log: {log}" for log in event["log"])])
             )
+
+    def _cause(self, event: Mapping[str, Any]) -> str:
+        """Return the error of a failed job: its own, or else what Snakemake says of its
+        end, which is then added to its messages."""
+        text = str(event["rule_msg"] or "\n".join(self.failure_messages))
+        self.failure_messages.clear()
+        # further ones are those of a cluster
+        log = event["log"][0]
+        errors = [row for row in read_messages(log) if row.level == "error"]
+        slurm, signal = SLURM.search(text), SIGNAL.search(text)
+        ended = ""
+        if slurm:
+            ended = f"Slurm ended job {slurm[1]}: {slurm[2]}"
+        elif signal:
+            crash = f"it crashed ({signal[1]}): please report this with its log"
+            ended = SIGNAL_CAUSES.get(signal[1], crash)
+        elif errors:
+            return errors[0].text
+        # Snakemake's text of it shows the shell command
+        elif "CalledProcessError" not in text:
+            ended = text
+        ended = ended or full_disk(Path())
+        if not ended and messages_file(log).exists():
+            ended = OUT_OF_MEMORY
+        ended = ended or f"it left no message in its log; see the end of {self.details}"
+        code = KILLED if ended == OUT_OF_MEMORY else None
+        # a disk may be full
+        with suppress(OSError):
+            write_message(log, Message("error", ended, exit_code=code))
+        return ended
 
     def tick(self) -> None:
         """Read the progress of running jobs; update the bar and the recorded state."""
@@ -240,19 +256,17 @@ class RunDisplay:
             )
         if self.total:
             ended = f"{self.ended:%F %T}" if self.ended else None
-            state: dict[str, Any] = {
+            state = {
                 "began": f"{self.began:%F %T}",
                 "ended": ended,
                 "left_s": left,
                 "running": running,
-            }
-            state |= {
                 "done": self.done,
                 "total": self.total,
                 "failed": self.failed,
-                "interrupted": self.interrupted,
+                "interrupted": bool(received_signals),
+                "details": str(self.details),
             }
-            state["details"] = str(self.details)
             # the steps report a full disk
             with suppress(StorageError):
                 write_json(self.state_file, state)
@@ -266,7 +280,7 @@ class RunDisplay:
             self.console.print(line)
         took = format_duration((self.ended - self.began).total_seconds())
         done = f"{self.done} of {self.total} steps done"
-        if self.interrupted:
+        if received_signals:
             self.console.print(f"gyriflow: interrupted after {took}, {done}")
         elif self.failed:
             failed = f"finished after {took} with {len(self.failed)} failed"
@@ -282,12 +296,11 @@ class RunDisplay:
             self.console.print(f"gyriflow: done in {took}{steps}{report}")
 
     def _follow(self, job: Job) -> None:
-        for event in (
-            events_in(read_log(job.log.with_suffix(".jsonl"))) if job.log else ()
-        ):
-            match event:
-                case {"event": "warning", "message": str(text)}:
-                    self._show_warning(job, text)
+        """Show what a job has written to its messages since."""
+        if job.log is None:
+            return
+        for row in read_rows(job.log):
+            match row:
                 case {
                     "event": "size",
                     "elements": elements,
@@ -302,15 +315,8 @@ class RunDisplay:
                         self.sizes.add(size)
                         self.console.print(size)
                 case {"event": "step"}:
-                    job.step = event
-
-    def _show_warnings(self, job: Job) -> None:
-        self._follow(job)
-        for message in messages_in(read_log(job.log)) if job.log else ():
-            if message.by_gyriflow and message.level == "warning":
-                self._show_warning(job, message.first_line)
-
-    def _show_warning(self, job: Job, text: str) -> None:
-        line = f"warning {job.name}: {text}"
-        if self.messages.add(job.name, line):
-            self.console.print(line)
+                    job.step = row
+        for message in read_messages(job.log):
+            line = f"warning {job.name}: {message.first_line}"
+            if message.level == "warning" and self.messages.add(job.name, line):
+                self.console.print(line)

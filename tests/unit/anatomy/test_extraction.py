@@ -16,6 +16,7 @@ from gyriflow.anatomy.extraction import (
     isosurface,
     main_parts,
     make_simple,
+    parts_in_boxes,
     refine,
     remove_bridges,
     smooth_mask,
@@ -67,8 +68,11 @@ def test_crumbs_are_dropped_but_never_a_hemisphere():
     mask = np.zeros((40, 20, 20), dtype=bool)
     mask[2:15, 2:18, 2:18], mask[25:36, 2:18, 2:18] = True, True
     mask[20, 10, 10:12] = True
+    # a voxel that meets the first block at a corner only
+    mask[15, 18, 18] = True
     kept, parts, voxels = main_parts(mask)
-    assert (parts, voxels) == (1, 2)
+    assert (parts, voxels) == (2, 3)
+    assert not kept[15, 18, 18]
     assert kept[10, 10, 10]
     assert kept[30, 10, 10]
     assert not kept[20].any()
@@ -88,6 +92,17 @@ def test_structure_thinner_than_the_smoothing_is_refused():
     field = smooth_mask(thin, 2.0)
     with pytest.raises(MeshError):
         make_simple(field)
+
+
+def test_parts_that_meet_at_a_corner_are_one_in_its_box_and_a_voxel_around():
+    mask = np.zeros((9, 9, 9), dtype=bool)
+    # the first voxel, where there is none around, and two that share a corner
+    mask[0, 0, 0] = mask[4, 4, 4] = mask[5, 5, 5] = True
+    (first, alone), (second, pair) = parts_in_boxes(mask)
+    assert first == (slice(0, 2),) * 3
+    assert np.argwhere(alone).tolist() == [[0, 0, 0]]
+    assert second == (slice(3, 7),) * 3
+    assert np.argwhere(pair).tolist() == [[1, 1, 1], [2, 2, 2]]
 
 
 def test_slit_one_voxel_wide_stays_open_at_its_width():
@@ -142,6 +157,19 @@ def test_ball_torus_and_hollow_ball_have_known_handles():
     assert handles(torus) == 1
     assert handles(ball & ~(x**2 + y**2 + z**2 < 9)) == 0
     assert handles(np.concatenate([torus, torus])) == 2
+
+
+def test_voxels_are_joined_by_faces_and_what_is_outside_by_corners():
+    blocks = np.zeros((8, 8, 8), dtype=bool)
+    blocks[1:4, 1:4, 1:4] = blocks[4:7, 4:7, 1:4] = True
+    # two parts that share an edge, and no ring
+    assert handles(blocks) == 0
+    block = np.ones((5, 5, 5), dtype=bool)
+    block[2, 2, 2] = block[1, 1, 2] = block[0, 0, 2] = False
+    # a way out over edges is a pit; a second one makes a tunnel
+    assert handles(block) == 0
+    block[3, 3, 2] = block[4, 4, 2] = False
+    assert handles(block) == 1
 
 
 def bridge(mask):

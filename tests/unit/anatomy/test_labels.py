@@ -4,7 +4,13 @@ ventricles that are no part of it."""
 import numpy as np
 import pytest
 from facts import Facts
-from odd_brains import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
+from odd_brains import (
+    CEREBRUM,
+    VENTRICLES,
+    add_sides,
+    positions,
+    with_fourth_ventricle,
+)
 from scipy import ndimage
 from shapes import phantom, rigid
 
@@ -383,6 +389,19 @@ def test_numbers_that_occur_in_a_scheme_of_sides_by_accident_contradict_it(left,
     volume = labels + (labels > 0) * np.where(is_left, left, right)
     found = list(scheme_contradictions(layout_of(volume), SCHEMES["multi-bounti-43"]))
     assert "left and right would be mixed" in " ".join(found)
+
+
+@pytest.mark.parametrize("missing", [(), (4, 6, 8, 17), (3,), (6,)])
+def test_a_hemisphere_may_be_missing_but_only_with_all_of_its_tissues(missing):
+    labels = add_sides(*phantom())
+    labels = np.where(np.isin(labels, missing), 0, labels)
+    found = list(scheme_contradictions(layout_of(labels), SCHEMES["dhcp-19"]))
+    unequal = [text for text in found if "voxels of cortex" in text]
+    if len(missing) == 1:
+        counts = [int((labels == number).sum()) for number in (3, 4, 5, 6)]
+        assert unequal == [Facts(*counts)]
+    else:
+        assert unequal == []
 
 
 def test_voids_between_labels_are_neither_inside_nor_outside():

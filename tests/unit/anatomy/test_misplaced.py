@@ -107,3 +107,13 @@ def test_strays_of_a_few_voxels_are_not_warned_of(brain):
     blob = ball(CENTRE + [0.0, 0.0, 25.0], 1.5)
     assert 0 < blob.sum() * 0.96e-3 < 0.05
     assert list(misplaced_cortex(relabelled(brain, blob), AFFINE, ATLAS)) == []
+
+
+def test_pieces_that_meet_at_a_corner_count_together(brain):
+    pieces = np.zeros(brain.shape, dtype=bool)
+    pieces[32:38, 24:28, 55:57] = pieces[38:44, 28:32, 57:59] = True
+    half_ml = pieces.sum() / 2 * 0.96e-3
+    assert half_ml < 0.05 < 2 * half_ml
+    assert list(misplaced_cortex(relabelled(brain, pieces), AFFINE, ATLAS)) == [
+        Facts(f"{2 * half_ml:.2f} mL", *place(pieces))
+    ]

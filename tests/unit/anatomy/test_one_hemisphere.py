@@ -34,10 +34,13 @@ def sides(brain):
     }
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize(
-    ("degrees", "by"),
-    [((0, 0, 0), "file"), ((0, 0, 180), "file"), ((100, 40, -70), "shape")],
+    ("side", "degrees", "by"),
+    [
+        ("left", (0, 0, 0), "file"),
+        ("right", (0, 0, 180), "file"),
+        ("left", (100, 40, -70), "shape"),
+    ],
 )
 def test_a_hemisphere_in_any_pose_is_posed(sides, side, degrees, by):
     turn = rigid(*degrees)

@@ -22,7 +22,6 @@ from gyriflow.anatomy.plausible import facing_warnings, require_left_and_right
 from gyriflow.anatomy.pose import (
     PosedShape,
     axes_of_file,
-    hemisphere_by_shape,
     pose_of_hemisphere,
     pose_of_labels,
     pose_of_pair,
@@ -97,6 +96,7 @@ def test_separately_moved_hemispheres_are_posed(halves):
     assert np.abs(right - left)[1:].max() < 1.0
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_hemispheres_of_one_pose_keep_their_distance(halves):
     turn = drawn(3)
     pose = pose_of_pair(*(transformed(half, turn) for half in halves))
@@ -105,6 +105,7 @@ def test_hemispheres_of_one_pose_keep_their_distance(halves):
     require_upright(pose, [turn, turn], pitch=5.0)
 
 
+@pytest.mark.usefixtures("shapes_once")
 @pytest.mark.parametrize(("frame", "axes"), [("ras", np.eye(4)), ("lps", LPS)])
 def test_axes_of_the_file_are_kept(halves, frame, axes):
     pose = pose_of_pair(*(transformed(half, axes) for half in halves))
@@ -112,6 +113,7 @@ def test_axes_of_the_file_are_kept(halves, frame, axes):
     np.testing.assert_array_equal(pose.of_file("left"), axes)
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_files_that_name_one_system_stay_together_however_they_lie(halves):
     lower = transformed(halves[0], motion(shift=[0.0, 0.0, -9.0]))
     apart = pose_of_pair(lower, halves[1])
@@ -142,6 +144,7 @@ def test_other_sizes_and_asymmetric_brains_are_posed(halves, change):
     require_upright(pose, moved, tilt=4.0)
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_swapped_hemispheres_are_refused(halves):
     left, right = (
         transformed(half, drawn(seed))
@@ -178,6 +181,7 @@ def test_the_axes_of_a_file_are_named():
     assert axes_of_file(slight) == "RAS"
 
 
+@pytest.mark.usefixtures("shapes_once")
 @pytest.mark.parametrize(
     ("axes", "is_exchanged", "facts"),
     [
@@ -202,6 +206,7 @@ def test_mirrored_hemispheres_are_told_from_exchanged_ones_or_both_are_named(
     )
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_of_unusual_axes_it_is_said_that_they_may_be_mirrored(halves):
     (doubt,) = pose_of_pair(*(linear(half, AXES["PIR"]) for half in halves)).warnings
     assert doubt == Facts("PIR", "left", "right")
@@ -225,6 +230,7 @@ def test_nobody_is_told_to_swap_sides_in_coordinates_that_do_not_fit(
     assert "Swap" not in str(caught.value)
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_a_hemisphere_of_the_other_shape_is_mirrored_or_of_the_other_side(halves):
     mirrored = linear(halves[0], AXES["LAS"])
     facts = Facts("right", "mirrored", "set side: right", "keep the side")
@@ -232,21 +238,6 @@ def test_a_hemisphere_of_the_other_shape_is_mirrored_or_of_the_other_side(halves
         pose_of_hemisphere(mirrored, "left", "auto")
     doubt, *_ = pose_of_hemisphere(mirrored, "left", "ras").warnings
     assert doubt == Facts("right", "left", "axis")
-
-
-@pytest.fixture
-def shapes_once(monkeypatch):
-    """Let the pose of a hemisphere that several pairs have be found once."""
-    found = {}
-
-    def once(mesh):
-        # without negative zeros
-        key = (mesh.vertices.round(6) + 0.0).tobytes()
-        if key not in found:
-            found[key] = hemisphere_by_shape(mesh)
-        return found[key]
-
-    monkeypatch.setattr(posing, "hemisphere_by_shape", once)
 
 
 # of the axes mirrored by these, some are those of exchanged files in RAS and some are
@@ -274,10 +265,9 @@ def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
             assert is_told == (exchanged not in ("RAS", "LPS"))
 
 
-@pytest.mark.parametrize("half_lengths", [(9, 24, 16), (12, 24, 12)])
-def test_shapes_without_a_pose_are_refused(half_lengths):
+def test_shapes_without_a_pose_are_refused():
     shape = transformed(
-        ellipsoid(half_lengths),
+        ellipsoid((9, 24, 16)),
         motion(Rotation.from_euler("xyz", (50, 40, 30), degrees=True).as_matrix()),
     )
     with pytest.raises(
@@ -304,7 +294,7 @@ def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
         for half, seed in zip(halves, (11, 12), strict=True)
     )
     surface = from_hemispheres(
-        left, right, week=24.0, coordinates="auto", edge_length_mm=1.6
+        left, right, week=24.0, coordinates="auto", edge_length_mm=2.5
     )
     assert is_closed(surface.whole)
     sides = pieces(surface.whole)
@@ -338,12 +328,14 @@ def test_real_hemispheres_are_upright(week):
     )
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_doubtful_shapes_are_taken_as_ras_or_refused(halves, monkeypatch):
     # as if another pose of every hemisphere fitted the template nearly as well
+    by_shape = posing.hemisphere_by_shape
     monkeypatch.setattr(
         posing,
         "hemisphere_by_shape",
-        lambda mesh: replace(hemisphere_by_shape(mesh), confidence=1.05),
+        lambda mesh: replace(by_shape(mesh), confidence=1.05),
     )
     turn = motion(Rotation.from_euler("xyz", (9, -14, 12), degrees=True).as_matrix())
     pose = pose_of_pair(*(transformed(half, turn) for half in halves))
@@ -434,7 +426,7 @@ def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(
             )
 
 
-@pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 0, 180), (90, 0, 0), (0, 180, 0)])
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (90, 0, 0)])
 def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
     mesh = transformed(atlas_brain(), rigid(*degrees))
     pose = pose_of_volume_by_shape(mesh, has_sides=False)
@@ -499,6 +491,7 @@ def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, path
     assert pose.warnings[0] == Facts("RAS+", "coordinates")
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted(halves):
     left, right = halves
     assert require_coordinates(left, right, "ras") == []
@@ -508,6 +501,7 @@ def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted(hal
     assert re.search(r"1[78]\d° .*\bras\b", doubt)
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_exchanged_files_are_refused_though_the_left_one_lies_on_the_left(halves):
     # back to front in the named coordinates; so are mirrored ones, RPS
     right, left = (transformed(half, LPS) for half in halves)

@@ -7,6 +7,7 @@ import pytest
 from facts import Facts
 from shapes import box, moved, sphere, torus
 
+from gyriflow.anatomy.extraction import smooth_mask
 from gyriflow.anatomy.repair import (
     clean,
     make_even,
@@ -254,3 +255,18 @@ def test_handle_of_a_torus_is_closed_when_remade():
     simple, report = rebuild(remesh(mesh, 1.0), 0.8)
     assert euler_number(simple) == 2
     assert report["tunnels_filled"] + report["bridges_cut"] == 1
+
+
+@pytest.mark.parametrize(("lacks", "is_warned"), [(0.03, False), (0.09, True)])
+def test_a_volume_that_smoothing_has_changed_much_is_told_in_percent(lacks, is_warned):
+    # a little is restored, more than 5 % is not
+    places = np.indices((30, 30, 30)).T - 14.5
+    mask = np.linalg.norm(places, axis=-1) < 10.0
+    plain = surface_of_mask(smooth_mask(mask), np.eye(4), mask.sum(), 1.5)
+    full = signed_volume(plain.mesh)
+    found = surface_of_mask(smooth_mask(mask), np.eye(4), full / (1 - lacks), 1.5)
+    changed = [text for text in found.warnings if "smoothing" in text]
+    left = lacks if is_warned else 0.0
+    change = found.report["smoothing"]["volume_change"]
+    assert change == pytest.approx(-left, abs=2e-3)
+    assert changed == [Facts(f"{100 * change:.1f} %")] * is_warned

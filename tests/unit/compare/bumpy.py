@@ -1,5 +1,7 @@
 """Spheres with bumps whose curvature is known where it is needed."""
 
+from functools import cache
+
 import numpy as np
 from shapes import sphere
 
@@ -23,6 +25,7 @@ def field(
     )
 
 
+@cache
 def bumpy(
     seed: int, height: float = 1.0, sharpness: float = 12.0, subdivisions: int = 4
 ) -> TriangleMesh:

@@ -5,13 +5,24 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scripts import run_script
-from shapes import ellipsoid_mesh
+from shapes import FAR, ellipsoid_mesh, rigid
 
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh, area
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    signed_volume,
+    transformed,
+)
 from gyriflow.io.files import read_table
 from gyriflow.io.registrations import WeeklyShapes, write_weekly_shapes
-from gyriflow.io.surfaces import write_surface, write_vertex_maps
+from gyriflow.io.surfaces import (
+    read_surface,
+    read_vertex_maps,
+    write_surface,
+    write_vertex_maps,
+)
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 from gyriflow.metrics.curvature import curvature
 
@@ -107,3 +118,65 @@ def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
     # all are scaled to the volume of the target of this week, of which they are copies
     assert table["distance_mm"].max() < 0.01
     assert table["area_difference"].abs().max() < 1e-4
+
+
+def test_surfaces_are_prepared_for_the_observed_brain_each_under_its_name(tmp_path):
+    surfaces = {
+        "observed": bumpy(1),
+        "start": bumpy(2, height=0.5),
+        "adjacent": bumpy(3, height=1.5),
+    }
+    pose = rigid(0.0, 20.0, 0.0, shift=(3.0, 8.0, -4.0))
+    for name, surface in surfaces.items():
+        # start and neighbour lie elsewhere and are smaller
+        given = surface
+        if name != "observed":
+            given = transformed(
+                TriangleMesh(0.9 * surface.vertices, surface.faces), pose
+            )
+        write_surface(tmp_path / f"{name}.gii", given)
+    inputs = {name: f"{name}.gii" for name in surfaces}
+    outputs = {name: f"prepared-{name}.gii" for name in surfaces}
+    outputs |= {f"{name}_maps": f"maps-{name}.gii" for name in surfaces}
+    params = {"curvature_radius_mm": 4.0}
+    run_script("prepared_surfaces.py", tmp_path, inputs, outputs, params)
+    for name, surface in surfaces.items():
+        mesh = read_surface(tmp_path / f"prepared-{name}.gii")
+        # of the size of the observed brain, and with the folds of its own
+        expected = signed_volume(surfaces["observed"])
+        assert signed_volume(mesh) == pytest.approx(expected, rel=0.01)
+        maps = read_vertex_maps(tmp_path / f"maps-{name}.gii")
+        bend = curvature(mesh, radius_mm=4.0)
+        assert maps["mean_curvature"] == pytest.approx(bend.mean, abs=2e-3)
+        assert maps["shape_index"] == pytest.approx(bend.shape_index, abs=0.05)
+        heights = [
+            np.linalg.norm(points - points.mean(axis=0), axis=1).std()
+            for points in (mesh.vertices, surface.vertices)
+        ]
+        assert heights[0] == pytest.approx(heights[1], rel=0.15)
+
+
+def test_the_atlas_own_brain_is_that_of_the_week_at_the_predicted_size(tmp_path):
+    mesh = ellipsoid_mesh(8, (20.0, 24.0, 22.0))
+    boundary, _ = boundary_surface(mesh)
+    weeks = np.array([21.0, 22.0, 23.0])
+    # longer from week to week
+    stretches = [np.array([1.0, 1.0 + 0.1 * number, 1.0]) for number in range(3)]
+    atlas = [
+        transform_points(boundary.vertices * stretch, FAR[0]) for stretch in stretches
+    ]
+    positions = np.stack([mesh.vertices] * 3)
+    shapes = WeeklyShapes(weeks, positions, surfaces={"atlas": atlas}, tets=mesh.tets)
+    write_weekly_shapes(tmp_path / "targets.h5", shapes)
+    write_tetrahedral_mesh(tmp_path / "mesh.xdmf", mesh)
+    predicted = TriangleMesh(1.2 * boundary.vertices * stretches[1], boundary.faces)
+    write_surface(tmp_path / "predicted.gii", predicted)
+    inputs = {
+        "mesh": "mesh.xdmf",
+        "targets": "targets.h5",
+        "predicted": "predicted.gii",
+    }
+    run_script("atlas_brain.py", tmp_path, inputs, {0: "found.gii"}, {"week": 22.0})
+    found = read_surface(tmp_path / "found.gii")
+    assert signed_volume(found) == pytest.approx(signed_volume(predicted), rel=1e-3)
+    assert found.vertices == pytest.approx(predicted.vertices, abs=0.2)

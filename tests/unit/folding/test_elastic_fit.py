@@ -239,6 +239,65 @@ def test_a_shape_that_would_change_much_around_faults_is_followed():
     assert ratios(found).min() > 0.1
 
 
+def two_boxes(shift_mm):
+    """Return two boxes, the right one shifted along x from where it is 0.5 mm away from
+    the left one."""
+    boxes = [box_mesh((4, 4, 4), (6.0, 6.0, 6.0)) for _ in range(2)]
+    right = boxes[1].vertices + [6.5 + shift_mm, 0.3, 0.2]
+    tets = [boxes[0].tets, boxes[1].tets + len(right)]
+    return TetrahedralMesh(
+        np.concatenate([boxes[0].vertices, right]), np.concatenate(tets)
+    )
+
+
+def test_a_body_is_not_moved_to_a_shape_whose_faces_cross():
+    shape = two_boxes(-0.8).vertices
+    body = ElasticFit(two_boxes(0.0))
+    # no element is inverted, only the two walls have passed through each other
+    assert crossing_faces(TriangleMesh(shape[body._used], body.boundary.faces)) > 0
+    found = body.move_to(shape)
+    assert crossing_faces(body.boundary) == 0
+    # the boxes have come nearer to each other than they were
+    left, right = np.split(found[:, 0], 2)
+    assert 5.7 < right.mean() - left.mean() < 6.3
+
+
+def test_stops_are_looked_for_in_halves_of_halves_of_halves(monkeypatch):
+    body = ElasticFit(BODY)
+    states = [(1 + 0.01 * number) * BODY.vertices for number in range(21)]
+    body._passed = states[1:-1]
+    body.positions_mm = states[-1]
+    fault = BODY.vertices[:1]
+    # as if each way inverted an element
+    monkeypatch.setattr(
+        body, "_untangled", lambda before, after, lengths: (after, fault)
+    )
+    way = body.way_from(BODY.vertices)
+    fractions = [fraction for fraction, _ in way]
+    assert fractions == pytest.approx(np.arange(1, 8) / 8, abs=0.06)
+
+
+def test_what_opens_a_shape_is_judged_on_the_way_from_the_last_stop(monkeypatch):
+    body = ElasticFit(BODY)
+    states = [(1 + 0.01 * number) * BODY.vertices for number in range(21)]
+    body._passed = states[1:-1]
+    body.positions_mm = states[-1]
+    fault = BODY.vertices[:1]
+    monkeypatch.setattr(
+        body, "_untangled", lambda before, after, lengths: (after, fault)
+    )
+    starts = []
+
+    def note_start(before, places):
+        starts.append(before)
+        return places
+
+    monkeypatch.setattr(body, "_opened_after", note_start)
+    way = body.way_from(BODY.vertices)
+    assert len(way) > 1
+    np.testing.assert_array_equal(starts, [way[-1][1]])
+
+
 def test_springs_around_flat_elements_hardly_draw(monkeypatch):
     body = ElasticFit(BODY)
     goals = BODY.vertices[USED]

@@ -48,7 +48,7 @@ def folded_over(positions, body=BODY):
 
 # the highest ones turn the corners of curved elements inside out, though the linear
 # pieces of these stay valid
-@pytest.mark.parametrize("height_mm", [0.5, 1.0, 2.5])
+@pytest.mark.parametrize("height_mm", [0.5, 2.5])
 def test_waves_leave_no_curved_element_that_folds_over(height_mm):
     shape = waves(height_mm)
     assert folded_over(shape) > 20

@@ -3,9 +3,9 @@ carried along by the scripts."""
 
 import numpy as np
 import pytest
-from ellipsoid import RUN, SEMI_AXES
+from ellipsoid import CENTRE_MM, RUN, SEMI_AXES, brain_mesh
 from scripts import run_script
-from shapes import ellipsoid, ellipsoid_mesh
+from shapes import ellipsoid
 
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.folding.start_regions import start_regions
@@ -22,13 +22,15 @@ from gyriflow.units import CM2_PER_MM2
 def beyond_fissure(points):
     """Return how far (n, 3) points are to the right of a fissure that swings by 4 mm to
     both sides."""
-    return points[:, 0] - 4.0 * np.sin(points[:, 1] / 8.0)
+    x, y, _ = (points - CENTRE_MM).T
+    return x - 4.0 * np.sin(y / 8.0)
 
 
 def folded(points):
     """Return points where a folded brain could have them: larger, and all to the right
     of the start's fissure."""
-    return 1.3 * points + [40.0, 0.0, 0.0] + [0.01, 0.0, 0.0] * points[:, 1:2] ** 2
+    x, y, z = 1.3 * (points - CENTRE_MM).T
+    return np.column_stack([x + 40.0 + 0.006 * y**2, y, z]) + CENTRE_MM
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +38,9 @@ def made(tmp_path_factory):
     """A folder with the regions of the brain's mesh, and with the surfaces of its
     second frame."""
     folder = tmp_path_factory.mktemp("folded")
-    brain = ellipsoid_mesh(16, SEMI_AXES)
+    brain = brain_mesh(16)
     # the measured brain, in triangles of its own
-    surface = ellipsoid(SEMI_AXES, 5)
+    surface = ellipsoid(SEMI_AXES, 5, CENTRE_MM)
     on_left = beyond_fissure(corners(surface).mean(axis=1)) < 0
     left, right = (submesh(surface, faces)[0] for faces in (on_left, ~on_left))
 
@@ -76,7 +78,7 @@ def test_facets_have_the_hemisphere_that_they_lie_on_though_the_fissure_is_bent(
     clear = np.abs(beyond) > 0.5
     np.testing.assert_array_equal(tag[clear], np.where(beyond[clear] < 0, LEFT, RIGHT))
     # a plane would give some to the other side
-    assert np.mean(tag != np.where(centres[:, 0] < 0, LEFT, RIGHT)) > 0.04
+    assert np.mean(tag != np.where(centres[:, 0] < CENTRE_MM[0], LEFT, RIGHT)) > 0.04
 
 
 def test_the_folded_hemispheres_are_the_facets_that_were_theirs_at_the_start(made):
@@ -106,3 +108,6 @@ def test_metrics_of_the_folded_brain_are_of_its_week_and_its_surfaces(made):
     # the cortex has grown with the rest
     thickness = read_vertex_maps(made / "thickness.gii")["thickness_mm"]
     assert np.nanmedian(thickness) == pytest.approx(1.3 * RUN["thickness_mm"], rel=0.1)
+    assert metrics.loc[("whole", "mean_thickness"), "value"] == pytest.approx(
+        np.nanmean(thickness), rel=0.05
+    )

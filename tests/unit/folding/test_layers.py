@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ellipsoid import GAP_MM, RUN, SEMI_AXES
+from ellipsoid import GAP_MM, RUN, brain_mesh
 from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.folding.growth import GrowthByRates, StepStart
@@ -35,18 +35,30 @@ def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
     )
 
 
-def test_the_cortex_has_its_own_thickness_at_the_start_and_grows_from_there():
-    mesh = ellipsoid_mesh(8, SEMI_AXES)
-    p = parameters_from(RUN | {"thickness_mm": {"weeks": {21: 2.0, 23: 3.0}}})
+def test_the_layers_of_a_week_have_its_thickness_stiffness_and_growth():
+    mesh = brain_mesh(8)
+    by_week = {
+        "thickness_mm": {"weeks": {21: 2.0, 23: 3.0}},
+        "shear_modulus_cortex_pa": {"weeks": {21: 300.0, 23: 900.0}},
+        "shear_modulus_core_pa": {"weeks": {21: 200.0, 23: 400.0}},
+        "growth_rate_per_s": {"weeks": {21: 1e-7, 23: 3e-7}},
+    }
+    p = parameters_from(RUN | by_week)
     zones = zones_of_run(mesh, p, GAP_MM)
-    for week, thickness in ((21.0, 2.0), (23.0, 3.0)):
-        fields = layer_fields(
-            mesh.vertices, zones, p, {}, week, ["distance", "cortex_weight"]
-        )
+    names = ["distance", "cortex_weight", "shear_modulus", "growth"]
+    for week, part in ((21.0, 0.0), (22.5, 0.75), (23.0, 1.0)):
+        fields = layer_fields(mesh.vertices, zones, p, {}, week, names)
+        weight = cortical_weight(fields["distance_to_pial_mm"], 2.0 + part)
+        np.testing.assert_allclose(fields["cortex_weight"], weight, rtol=1e-12)
+        core_pa, cortex_pa = 200.0 + 200.0 * part, 300.0 + 600.0 * part
         np.testing.assert_allclose(
-            fields["cortex_weight"],
-            cortical_weight(fields["distance_to_pial_mm"], thickness),
-            rtol=1e-12,
+            fields["shear_modulus_pa"], core_pa + (cortex_pa - core_pa) * weight
+        )
+        rate = (1 + 2 * part) * 1e-7
+        np.testing.assert_allclose(
+            fields["tangential_growth_per_step"],
+            rate * p.step_s * weight * zones.growth,
+            atol=1e-15,
         )
 
 

@@ -16,7 +16,7 @@ from gyriflow.folding.contact import MAX_STIFFENING, stiffening
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.predicted_memory import predicted_memory_mib
-from gyriflow.folding.run import shortened_step_note
+from gyriflow.folding.run import quality_note, shortened_step_note
 from gyriflow.folding.simulation import (
     STEPS_BEFORE_DOUBLING,
     advance,
@@ -91,6 +91,11 @@ def test_a_failing_step_is_halved_and_grows_back():
     assert lengths[first + STEPS_BEFORE_DOUBLING] == 43_200
 
 
+def test_the_last_step_to_an_output_week_takes_what_is_left():
+    lengths = steps_to(Stepper(lambda time_s: 1e9), 100_000.0)
+    assert lengths == pytest.approx([43_200.0, 43_200.0, 13_600.0])
+
+
 def test_where_the_smallest_step_fails_the_place_is_named():
     stepper = Stepper(lambda time_s: 1.0, solver={"max_halvings": 2})
     stepper.solver = SimpleNamespace(worst_places=lambda: "at [1.0, 2.0, 3.0] mm")
@@ -156,7 +161,7 @@ def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
     ("growth", "warnings"), [("rates", 1), ("sizes", 1), ("shapes", 0)]
 )
 def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(
-    growth, warnings, capsys
+    growth, warnings, caplog
 ):
     sizes = {"area_cm2": {21: 90, 22: 99}, "volume_ml": {21: 40, 22: 46}}
     settings = {"rates": {}, "sizes": sizes, "shapes": sizes | {"of": "self"}}[growth]
@@ -170,7 +175,7 @@ def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(
         ),
         604_800.0,
     )
-    assert capsys.readouterr().out.count("elements lie through the cortex") == warnings
+    assert caplog.text.count("elements lie through the cortex") == warnings
 
 
 def test_nearly_incompressible_tissue_gives_a_warning():
@@ -182,6 +187,22 @@ def test_a_step_above_its_tolerance_gives_a_warning():
     row = {"step": 7, "residual": 3e-6, "converged": True}
     assert unconverged_warning(row) == ""
     assert unconverged_warning(row | {"converged": False}) == Facts(7, "3.0e-06")
+
+
+@pytest.mark.parametrize(("n_flat", "is_warning"), [(0, False), (2, False), (3, True)])
+def test_more_than_a_thousandth_of_flat_elements_give_a_warning(n_flat, is_warning):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    apart = 2.0 * np.arange(2000)[:, None, None] * [1.0, 0.0, 0.0]
+    tets = np.arange(8000).reshape(-1, 4)
+    mesh = TetrahedralMesh((corners + apart).reshape(-1, 3), tets)
+    positions = mesh.vertices.copy()
+    positions[tets[:n_flat, 3], 2] = 0.001
+    note, is_bad = quality_note(mesh, positions, 23.5)
+    assert is_bad == is_warning
+    assert note == (Facts("GW 23.5", f"{n_flat} of 2000") if n_flat else "")
+    # elements that were as flat at the start are no news
+    flat = TetrahedralMesh(positions, tets)
+    assert quality_note(flat, positions, 23.5) == ("", False)
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,9 @@ symmetry."""
 
 import numpy as np
 import pytest
-from ellipsoid import GAP_MM, RUN, SEMI_AXES
+from ellipsoid import CENTRE_MM, GAP_MM, RUN, brain_mesh
 from facts import Facts
-from shapes import box_mesh, ellipsoid_mesh
+from shapes import box_mesh
 from verification_cases.boxes import box_zones
 
 from gyriflow.errors import InputError, MeshError
@@ -25,25 +25,24 @@ from gyriflow.settings.terms import (
     RIGHT_CONTACT,
 )
 
+MIDDLE_MM = CENTRE_MM[0]
 ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 
 
 def find_zones(mesh, gap_mm=2.5, contact="planes", no_growth=None, **given):
     """Return the zones of a run by the settings that decide them."""
     values = {"contact": {"kind": contact}, "no_growth": ELLIPSOID | (no_growth or {})}
-    return zones_of_run(
-        mesh, parameters_from(RUN | {"fissure_x_mm": 0.0} | values | given), gap_mm
-    )
+    return zones_of_run(mesh, parameters_from(RUN | values | given), gap_mm)
 
 
 @pytest.fixture(scope="module")
 def brain():
-    return ellipsoid_mesh(12, (20.0, 26.0, 18.0))
+    return brain_mesh(12)
 
 
 def test_the_ellipsoid_stands_where_the_model_puts_it():
-    box = np.array([[-10.0, -20.0, -30.0], [10.0, 20.0, 30.0]])
-    centre = np.array([0.0, 0.05 * 40, -0.15 * 60])
+    box = np.array([[-10.0, -20.0, -30.0], [10.0, 20.0, 30.0]]) + CENTRE_MM
+    centre = CENTRE_MM + np.array([0.0, 0.05 * 40, -0.15 * 60])
     tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])
     points = np.concatenate(
         [box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)]
@@ -54,7 +53,7 @@ def test_the_ellipsoid_stands_where_the_model_puts_it():
 
 def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
     zones = find_zones(brain)
-    x = brain.vertices[zones.facets, 0]
+    x = brain.vertices[zones.facets, 0] - MIDDLE_MM
     left = x[zones.facet_zone == LEFT_CONTACT]
     right = x[zones.facet_zone == RIGHT_CONTACT]
     assert len(left)
@@ -69,15 +68,18 @@ def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
     zones = find_zones(brain)
     clamped = zones.vertices_of(CLAMPED)
     assert len(clamped)
-    assert inside_ellipsoid(
+    inside = inside_ellipsoid(
         brain.vertices, NoGrowth(**ELLIPSOID), *brain_box(brain.vertices)
-    )[clamped].all()
-    assert (zones.growth[clamped] == 0).all()
+    )
+    assert inside[clamped].all()
+    # nothing inside grows, at the surface or below it
+    assert inside.sum() > 2 * len(clamped)
+    assert (zones.growth[inside] == 0).all()
 
 
 def test_tissue_that_bridges_the_planes_does_not_grow():
     # a vertex between the planes under the pial surface: its elements are the bridge
-    mesh = ellipsoid_mesh(6, (20.0, 26.0, 18.0))
+    mesh = brain_mesh(6)
     zones = find_zones(mesh, no_growth={"semi_axes": (0.01, 0.01, 0.01)})
     top = np.argmax(mesh.vertices[:, 2])
     assert zones.growth[top] == 0
@@ -90,15 +92,17 @@ def test_the_planes_follow_the_fissure(gap):
     stay within the paper's."""
     boxes = [box_mesh((4, 3, 3), (8.0, 6.0, 6.0)) for _ in range(2)]
     x = [
-        mesh.vertices + [shift, 0.0, 0.0]
+        mesh.vertices + CENTRE_MM + [shift, 0.0, 0.0]
         for mesh, shift in zip(boxes, (-4 - gap / 2, 4 + gap / 2), strict=True)
     ]
     tets = [boxes[0].tets, boxes[1].tets + len(x[0])]
     pair = TetrahedralMesh(np.concatenate(x), np.concatenate(tets))
     zones = find_zones(pair, no_growth={"semi_axes": (0.01, 0.01, 0.01)})
     planes = min(gap / 2, 0.625)
-    np.testing.assert_allclose(zones.planes_mm, [-planes, planes], atol=1e-9)
-    walls = np.abs(np.abs(pair.vertices[zones.facets, 0]).max(axis=1) - gap / 2) < 1e-9
+    expected = [MIDDLE_MM - planes, MIDDLE_MM + planes]
+    np.testing.assert_allclose(zones.planes_mm, expected, rtol=1e-12)
+    from_middle = np.abs(pair.vertices[zones.facets, 0] - MIDDLE_MM).max(axis=1)
+    walls = np.abs(from_middle - gap / 2) < 1e-9
     assert set(zones.facet_zone[walls]) == {LEFT_CONTACT, RIGHT_CONTACT}
     assert (zones.growth == 1).all()
 
@@ -106,8 +110,10 @@ def test_the_planes_follow_the_fissure(gap):
 def test_tissue_between_the_planes_does_not_grow_with_planes(brain):
     """As in the prototype of the paper: elements whose most medial vertex lies between
     the planes."""
-    between = np.abs(brain.vertices[:, 0]) < find_zones(brain).planes_mm[1]
-    assert (find_zones(brain).growth[between] == 0).all()
+    zones = find_zones(brain)
+    left, right = zones.planes_mm
+    x = brain.vertices[:, 0]
+    assert (zones.growth[(left < x) & (x < right)] == 0).all()
 
 
 def test_the_report_adds_up(brain):
@@ -153,7 +159,7 @@ def test_a_brain_without_clamped_facets_is_refused(brain):
 def test_a_floating_part_is_refused(brain):
     far = box_mesh((2, 2, 2), (2.0, 2.0, 2.0))
     both = TetrahedralMesh(
-        np.concatenate([brain.vertices, far.vertices + [0.0, 0.0, 24.0]]),
+        np.concatenate([brain.vertices, far.vertices + CENTRE_MM + [0.0, 0.0, 24.0]]),
         np.concatenate([brain.tets, far.tets + len(brain.vertices)]),
     )
     zones = find_zones(both)
@@ -162,17 +168,18 @@ def test_a_floating_part_is_refused(brain):
 
 
 def test_a_fissure_outside_the_brain_is_refused(brain):
-    with pytest.raises(InputError, check=Facts("fissure_x_mm", 50, -20, 20)):
+    with pytest.raises(InputError, check=Facts("fissure_x_mm", 50, 130, 170)):
         refuse_impossible(brain, find_zones(brain, fissure_x_mm=50.0))
 
 
 def half(side):
-    """Return the half of an ellipsoid on one side of x = 0, flat there."""
-    mesh = ellipsoid_mesh(12, (20.0, 26.0, 18.0))
+    """Return the half of an ellipsoid on one side of its middle, flat there."""
+    mesh = brain_mesh(12)
     sign = -1.0 if side == "left" else 1.0
     # pressed flat: the other half becomes a sheet, so only elements of one side are
     # kept
-    kept = (sign * mesh.vertices[mesh.tets, 0]).min(axis=1) > -1e-9
+    x = mesh.vertices[mesh.tets, 0] - MIDDLE_MM
+    kept = (sign * x).min(axis=1) > -1e-9
     used, tets = np.unique(mesh.tets[kept], return_inverse=True)
     return TetrahedralMesh(mesh.vertices[used], tets.reshape(-1, 4))
 
@@ -180,10 +187,10 @@ def half(side):
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_the_medial_wall_of_a_single_hemisphere_slides_in_its_plane(side):
     mesh = half(side)
-    fissure = 0.5 if side == "left" else -0.5
+    fissure = MIDDLE_MM + (0.5 if side == "left" else -0.5)
     zones = find_zones(mesh, fissure_x_mm=fissure, side=side)
     wall = zones.vertices_of(MEDIAL_WALL)
-    inner = np.flatnonzero(np.abs(mesh.vertices[:, 0]) < 1e-6)
+    inner = np.flatnonzero(np.abs(mesh.vertices[:, 0] - MIDDLE_MM) < 1e-6)
     assert np.isin(inner, wall).all()
     assert zones.fixed[wall, 0].all()
     free_in_plane = np.setdiff1d(wall, zones.vertices_of(CLAMPED))
@@ -202,7 +209,8 @@ def test_the_medial_wall_of_a_single_hemisphere_slides_in_its_plane(side):
 
 def test_a_sliding_wall_alone_leaves_no_rigid_motion():
     mesh = half("right")
-    zones = find_zones(mesh, fissure_x_mm=-0.5, side="right", support="free")
+    fissure = MIDDLE_MM - 0.5
+    zones = find_zones(mesh, fissure_x_mm=fissure, side="right", support="free")
     assert not zones.free
     x, y, z = mesh.vertices.T
     zero, one = np.zeros_like(x), np.ones_like(x)
@@ -217,15 +225,16 @@ def test_a_sliding_wall_alone_leaves_no_rigid_motion():
 
 
 def test_elements_are_left_right_or_between_the_planes():
-    mesh = ellipsoid_mesh(12, SEMI_AXES)
+    mesh = brain_mesh(12)
     tags = cell_tags(
         mesh,
         zones_of_run(mesh, parameters_from(RUN), GAP_MM),
-        (mesh.vertices[:, 1] > 0).astype(float),
+        (mesh.vertices[:, 1] > CENTRE_MM[1]).astype(float),
     )
-    assert set(tags["layer"][mesh.vertices[mesh.tets, 1].min(axis=1) > 0]) == {CORTEX}
-    assert set(tags["layer"][mesh.vertices[mesh.tets, 1].max(axis=1) <= 0]) == {CORE}
-    x = mesh.vertices[mesh.tets, 0].mean(axis=1)
+    y = mesh.vertices[mesh.tets, 1] - CENTRE_MM[1]
+    assert set(tags["layer"][y.min(axis=1) > 0]) == {CORTEX}
+    assert set(tags["layer"][y.max(axis=1) <= 0]) == {CORE}
+    x = mesh.vertices[mesh.tets, 0].mean(axis=1) - MIDDLE_MM
     # the planes stand a quarter of the gap to both sides
     np.testing.assert_array_equal(tags["hemisphere"] == LEFT, x <= -2.0)
     np.testing.assert_array_equal(tags["hemisphere"] == RIGHT, x >= 2.0)

@@ -20,7 +20,7 @@ from gyriflow.growth.curves import (
     value,
 )
 from gyriflow.growth.rates import growth_rates, rates_of_series
-from gyriflow.io.files import write_json
+from gyriflow.io.files import read_table, write_json, write_table
 from gyriflow.io.surfaces import write_surface
 
 WEEKS = np.arange(21.0, 31.0)
@@ -112,6 +112,20 @@ def test_noise_is_smoothed_and_covered_by_the_interval():
     assert np.mean(gain) < 0.8
 
 
+def test_a_straight_line_has_the_error_of_a_regression():
+    """With two degrees of freedom the logarithm is a line; its error is smallest in the
+    middle of the weeks."""
+    fit = fitted(WEEKS, SCATTERED, degrees_of_freedom=2)
+    logs = np.log(SCATTERED)
+    line = np.polynomial.Polynomial.fit(WEEKS, logs, 1)
+    assert value(fit.curve, WEEKS) == pytest.approx(np.exp(line(WEEKS)), rel=0.005)
+    scatter = np.sqrt(((logs - line(WEEKS)) ** 2).sum() / (len(WEEKS) - 2))
+    from_mean = WEEKS - WEEKS.mean()
+    share = 1 / len(WEEKS) + from_mean**2 / (from_mean**2).sum()
+    found = np.interp(WEEKS, fit.curve.weeks, fit.curve.sd)
+    assert found == pytest.approx(scatter * np.sqrt(share), rel=0.1)
+
+
 def test_several_brains_of_a_week_and_two_weeks_alone():
     fit = fitted([21, 21, 23, 23], [49.0, 51.0, 98.0, 102.0])
     assert value(fit.curve, [21, 22, 23]) == pytest.approx(
@@ -176,6 +190,9 @@ def test_tables_go_through_their_values_and_are_written_out():
         "rate_per_week",
     ]
     assert table["value"].tolist() == pytest.approx([50, 60, 90])
+    # a table is as it was given, without an error
+    for bound in ("low", "high"):
+        assert table[bound].tolist() == pytest.approx([50, 60, 90])
     again = tabulated(table["week"], table["value"])
     assert value(again, 23.3) == pytest.approx(value(curve, 23.3))
 
@@ -402,3 +419,29 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
     )
     assert np.isnan(rates.loc["atlas", "tissue_ratio"])
     assert rates["cortex_ratio"].isna().all()
+
+
+def test_curves_of_each_series_are_written_with_the_errors_of_its_own(tmp_path) -> None:
+    tables = []
+    for name, factor in (("mine", 1.0), ("atlas", 1.4)):
+        table = pd.DataFrame({"week": WEEKS, "area_cm2": 2 * factor * SCATTERED})
+        volumes = np.where(WEEKS == 25, 0.8, 1.0) * factor * SCATTERED
+        tables.append(table.assign(volume_ml=volumes, series=name))
+    write_table(tmp_path / "areas.csv", pd.concat(tables))
+    outputs = {"curves": "curves.csv", "errors": "errors.csv"}
+    run_script("growth_curves.py", tmp_path, {0: "areas.csv"}, outputs)
+    curves = read_table(tmp_path / "curves.csv").set_index(["series", "quantity"])
+    for name, factor in (("mine", 1.0), ("atlas", 1.4)):
+        for quantity, size in (("area_cm2", 2 * factor), ("volume_ml", factor)):
+            curve = curves.loc[(name, quantity)]
+            found = np.interp(WEEKS, curve["week"], curve["value"])
+            assert found == pytest.approx(size * VOLUMES, rel=0.02)
+            assert (curve["low"] < curve["value"]).all()
+            assert (curve["value"] < curve["high"]).all()
+    misfits = read_table(tmp_path / "errors.csv").set_index(
+        ["series", "quantity", "week"]
+    )
+    for name in ("mine", "atlas"):
+        leap = misfits.loc[(name, "volume_ml", 25.0), "error"]
+        assert leap == pytest.approx(0.25, abs=0.03)
+        assert abs(misfits.loc[(name, "area_cm2", 25.0), "error"]) < 0.02

@@ -4,7 +4,7 @@ surfaces are refused."""
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import box_mesh, ellipsoid_mesh, rigid, scaling, sphere
+from shapes import FAR, LONG_MM, box_mesh, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
@@ -172,15 +172,25 @@ def test_a_linear_field_comes_back_through_an_oblique_affine(ball):
 
 
 def test_the_outermost_voxels_are_covered_to_their_rim():
-    data = np.arange(4.0)[:, None, None] * np.ones((4, 4, 4))
-    corners = np.array([[-0.5, 1, 1], [0.25, 1, 1], [3.5, 3.5, 3.5]])
-    assert volume_map_on_mesh(corners, data, np.eye(4)) == pytest.approx(
-        [0.0, 0.25, 3.0]
-    )
-    with pytest.raises(InputError, check=Facts("a.nii", 1, "0.7 mm", 2)):
-        volume_map_on_mesh(
-            np.array([[0.0, 0, 0], [0, 0, -1.2]]), data, np.eye(4), "a.nii"
-        )
+    data = np.arange(4.0)[:, None, None] * np.ones((4, 5, 6))
+    affine = FAR[0] @ scaling(LONG_MM)
+    corners = np.array([[-0.5, 1, 1], [0.25, 1, 1], [3.5, 4.5, 5.5]])
+    assert volume_map_on_mesh(
+        transform_points(corners, affine), data, affine
+    ) == pytest.approx([0.0, 0.25, 3.0])
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_vertex_outside_a_volume_is_refused_at_each_of_its_ends(axis, is_first):
+    data = np.ones((4, 5, 6))
+    affine = FAR[0] @ scaling(LONG_MM)
+    indices = np.ones((2, 3))
+    # 0.7 voxels beyond the rim
+    indices[1, axis] = -1.2 if is_first else data.shape[axis] + 0.2
+    outside = f"{0.7 * LONG_MM[axis]:.1f} mm"
+    with pytest.raises(InputError, check=Facts("a.nii", 1, outside, 2)):
+        volume_map_on_mesh(transform_points(indices, affine), data, affine, "a.nii")
 
 
 @pytest.mark.parametrize("nothing", [np.nan, np.inf])

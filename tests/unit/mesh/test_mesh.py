@@ -9,7 +9,7 @@ import pytest
 import shapes
 from facts import Facts
 from scripts import run_script
-from shapes import box_mesh, moved, sphere
+from shapes import box_mesh, inner_edges_of_the_surface, moved, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.matching import crossing_faces, nearest_on
@@ -399,6 +399,23 @@ def test_quadratic_elements_follow_the_surface_on_as_many_nodes(mesher):
     assert abs(bent["volume_change"]) < 0.002
 
 
+def test_no_side_of_a_quadratic_element_joins_two_corners_on_the_surface():
+    surface = box((8.0, 6.0, 2.0))
+    linear, bent = (
+        tetrahedralise(
+            surface,
+            mesher="tetgen",
+            order=order,
+            **(SIZES | {"surface_edge_mm": 2.0 / order}),
+        )
+        for order in (1, 2)
+    )
+    # elements of the same size have such sides until these are split
+    assert inner_edges_of_the_surface(linear)
+    corners = TetrahedralMesh(bent.vertices, bent.corners)
+    assert not inner_edges_of_the_surface(corners)
+
+
 def test_a_node_that_would_fold_its_element_over_stays_back():
     # a flat corner of a box that is to become round: elements with two faces outside
     # cannot follow
@@ -427,6 +444,13 @@ def pair(gap):
 def test_concentric_spheres_are_as_far_apart_as_their_radii():
     distance = fidelity(sphere(10.0), sphere(10.5))
     assert distance["hausdorff99"] == pytest.approx(0.5, abs=0.01)
+    assert distance["hausdorff"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_distance_within_which_most_lies_is_no_mean():
+    # a ball shifted by 0.5 mm: distances are evenly distributed from 0 to 0.5
+    distance = fidelity(sphere(10.0, 5), moved(sphere(10.0, 5), 0.5))
+    assert distance["hausdorff99"] == pytest.approx(0.495, abs=0.01)
     assert distance["hausdorff"] == pytest.approx(0.5, abs=0.01)
 
 

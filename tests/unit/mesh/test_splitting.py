@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import ellipsoid_mesh
+from shapes import ellipsoid_mesh, inner_edges_of_the_surface
 
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
@@ -13,21 +13,6 @@ from gyriflow.geometry.tetrahedra import (
     signed_volumes,
 )
 from gyriflow.mesh.splitting import split_inner_edges
-
-
-def inner_edges_of_the_surface(mesh):
-    """Return the edges that join two vertices of the surface, but are on none of its
-    faces."""
-    faces = boundary_faces(mesh)[0].tolist()
-    outer = {vertex for face in faces for vertex in face}
-    on_surface = {frozenset((a, b)) for face in faces for a in face for b in face}
-    found = set()
-    for corners in mesh.tets.tolist():
-        for a in corners:
-            for b in corners:
-                if a < b and {a, b} <= outer and {a, b} not in on_surface:
-                    found.add((a, b))
-    return found
 
 
 @pytest.mark.parametrize(
@@ -41,6 +26,9 @@ def inner_edges_of_the_surface(mesh):
     ids=["slab", "one layer", "ellipsoid"],
 )
 def test_no_inner_edge_joins_two_vertices_of_the_surface(mesh):
+    # elements in an order without symmetry
+    order = np.random.default_rng(1).permutation(len(mesh.tets))
+    mesh = TetrahedralMesh(mesh.vertices, mesh.tets[order])
     between = inner_edges_of_the_surface(mesh)
     assert between
     split = split_inner_edges(mesh)
@@ -56,6 +44,12 @@ def test_no_inner_edge_joins_two_vertices_of_the_surface(mesh):
     before, after = boundary_surface(mesh)[0], boundary_surface(split)[0]
     assert len(before.faces) == len(after.faces)
     np.testing.assert_allclose(before.vertices, after.vertices)
+    # elements without such an edge stay where they are
+    given = [frozenset(corners) for corners in mesh.tets.tolist()]
+    found = [frozenset(corners) for corners in split.tets[: len(given)].tolist()]
+    for corners, same in zip(given, found, strict=True):
+        pairs = {(a, b) for a in corners for b in corners}
+        assert (corners == same) == pairs.isdisjoint(between)
 
 
 def test_a_mesh_without_such_edges_stays_as_it_is():

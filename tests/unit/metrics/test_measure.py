@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from facts import Facts
 from scipy.spatial import Delaunay
-from shapes import ellipsoid, octasphere, sphere
+from shapes import FAR, ellipsoid, octasphere, sphere
 
 from gyriflow.compare.accuracy import ensemble_maps
 from gyriflow.compare.deviation import deviation_maps
@@ -18,6 +18,7 @@ from gyriflow.geometry.triangles import (
     flipped,
     merged,
     submesh,
+    transformed,
     vertex_areas,
 )
 from gyriflow.growth.carrying import maps_on_template
@@ -55,9 +56,10 @@ def apart() -> BrainMetrics:
 
 @pytest.fixture(scope="module")
 def cut() -> BrainMetrics:
-    """A sphere of 25 mm cut in two, along its edges."""
+    """A sphere of 25 mm cut in two, along its edges, far from the origin."""
     whole = octasphere(25.0)
     on_right = whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0
+    whole = transformed(whole, FAR[0])
     left, right = submesh(whole, ~on_right)[0], submesh(whole, on_right)[0]
     return measure_brain(whole, left, right, spangy_modes=60)
 

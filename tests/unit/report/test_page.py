@@ -263,11 +263,13 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
         == Facts("23 GW", "a step died.")
         != Facts("holes closed")
     )
-    alone = verdict(
-        RUNS.assign(elements_through_cortex=8.5, unresolved_from_week=np.nan),
-        None,
-        none,
-    )
+    resolved = RUNS.assign(elements_through_cortex=8.5, unresolved_from_week=np.nan)
+    # a warning about one element is not the worst of several
+    doubts = pd.DataFrame({"level": "warning", "message": ["one element", "coarse"]})
+    assert verdict(RUNS, VALIDATION, doubts) == told
+    assert verdict(resolved, None, doubts) == Facts(2) != Facts("one element")
+    assert verdict(resolved, None, doubts[:1]) == Facts("one element")
+    alone = verdict(resolved, None, none)
     assert alone == Facts(NOT_COMPARED)
     assert not re.search(r"\d", alone)
     assert told in page(shown("growth_figure")).replace("&#39;", "'")

@@ -2,6 +2,7 @@
 own name."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -23,6 +24,7 @@ from gyriflow.io.files import (
 from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.surfaces import write_surface, write_vertex_maps
 from gyriflow.io.yaml_files import write_yaml
+from gyriflow.messages import Message, write_message
 
 from .test_page import (
     BRAINS,
@@ -120,10 +122,9 @@ def folder(tmp_path, monkeypatch):
             f"{at}/benchmarks/simulate.tsv",
             f"wall_s\tcpu_s\tmemory_MiB\n{3600 + 3600 * number}\t7200\t100\n",
         )
-        write_text(
-            f"{at}/logs/simulate.log",
-            f"2026-01-01 10:00:00,000 WARNING root: of {run}\n",
-        )
+        log = Path(at, "logs", "simulate.log")
+        log.parent.mkdir()
+        write_message(log, Message("warning", f"of {run}"))
     return tmp_path
 
 

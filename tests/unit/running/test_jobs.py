@@ -1,21 +1,15 @@
-"""What jobs leave is read, messages, causes and time and memory, and on which modules
-their programs depend."""
+"""What jobs leave is read, messages and time and memory, and on which modules their
+programs depend."""
 
-import os
+from pathlib import Path
 
 import numpy as np
 import pytest
-from facts import Facts
 
 from gyriflow import code_hash as sources
 from gyriflow.code_hash import code_hash, modules_behind
-from gyriflow.running.jobs import (
-    OUT_OF_MEMORY,
-    cause,
-    gather_messages,
-    read_messages,
-    read_usage,
-)
+from gyriflow.messages import Message, write_message
+from gyriflow.running.jobs import gather_messages, read_usage
 from gyriflow.step import USAGE_COLUMNS
 
 HEAD = "\t".join(USAGE_COLUMNS)
@@ -33,109 +27,34 @@ def write_lines(path, *lines):
     path.write_text("\n".join(lines) + "\n")
 
 
-def test_messages_of_steps_and_of_the_folding_are_told_apart(tmp_path):
-    log = tmp_path / "a.log"
-    write_lines(
-        log,
-        "2026-11-22 00:53:59,004 INFO gyriflow.anatomy: fine",
-        "2026-11-22 00:53:59,004 WARNING gyriflow.anatomy: it is crooked",
-        "2026-11-22 00:53:59,004 WARNING gyriflow.anatomy: it is crooked",
-        "2026-11-22 00:53:59,004 WARNING py.warnings: deprecated",
-        "warning: few elements",
-        "2026-11-22 00:54:00,004 ERROR root: a.nii: no brain",
-        "gyriflow: the solver gave up",
-    )
-    assert read_messages(log) == [
-        ("warning", "it is crooked"),
-        ("warning", "few elements"),
-        ("error", "a.nii: no brain"),
-        ("error", "the solver gave up"),
-    ]
-    assert read_messages(tmp_path / "none.log") == []
-
-
-def test_messages_are_gathered_by_brain_and_run(tmp_path):
-    warned = "2026-11-22 00:53:59,004 WARNING gyriflow.x: {}"
+def test_messages_are_gathered_by_brain_and_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     for place in (
-        "brains/a/logs/pial_from_labels",
-        "brains/old/logs/pial_from_labels",
+        "brains/a/logs/pial",
+        "brains/old/logs/pial",
         "brains/a/metrics/logs/measure",
         "runs/r/a/logs/simulate",
         "runs/r/a/metrics/week-22.00/logs/measure",
         "runs/old/a/logs/simulate",
         "study/logs/poses",
+        "study/logs/atlas_file/x/week21.nii.gz",
+        # of the report before this one
+        "report/logs/html_report",
     ):
-        write_lines(tmp_path / "results" / f"{place}.log", warned.format(place))
+        log = Path("results", f"{place}.log")
+        log.parent.mkdir(parents=True, exist_ok=True)
+        for _ in range(2):
+            write_message(log, Message("warning", f"{place}\nmore of it"))
     table = gather_messages(tmp_path, ["a"], [("r", "a")])
-    assert set(table["message"]) == {
-        "brains/a/logs/pial_from_labels",
-        "brains/a/metrics/logs/measure",
-        "runs/r/a/logs/simulate",
-        "runs/r/a/metrics/week-22.00/logs/measure",
-        "study/logs/poses",
-    }
-    row = table[table["message"] == "runs/r/a/metrics/week-22.00/logs/measure"].iloc[0]
-    assert (row["subject"], row["run"], row["step"], row["level"]) == (
-        "a",
-        "r",
-        "measure",
-        "warning",
-    )
-    os.utime(tmp_path / "results/brains/a/logs/pial_from_labels.log", (0, 0))
-    later = gather_messages(tmp_path, ["a"], [], since_s=1.0)
-    assert set(later["message"]) == {
-        "brains/a/metrics/logs/measure",
-        "study/logs/poses",
-    }
-
-
-@pytest.mark.parametrize(
-    ("log", "expected"),
-    [
-        (
-            (
-                "2026-11-22 00:54:57,955 INFO gyriflow.io: read\n"
-                "2026-11-22 00:54:58,001 ERROR root: a.nii: is no image;\n"
-                "  found text\n"
-                "2026-11-22 00:54:59,000 INFO gyriflow.io: end\n"
-            ),
-            "a.nii: is no image;\n  found text",
-        ),
-        (
-            (
-                "GW 21.071/23  step 1\n2026-11-22 00:54:58,001 INFO root: a\n"
-                "gyriflow: no step left. Use smaller steps\n"
-            ),
-            "no step left. Use smaller steps",
-        ),
-        (
-            (
-                "2026-11-22 00:54:58,001 ERROR root: unexpected error\n"
-                "Traceback (most recent call last):\n"
-                '  File "a.py", line 1, in <module>\n    1 / 0\n'
-                "ZeroDivisionError: division by zero\n"
-            ),
-            Facts("ZeroDivisionError: division by zero"),
-        ),
-        (
-            (
-                "ValueError: no such week\n"
-                "snakemake_interface_common.exceptions.WorkflowError:"
-                " At least one job did not complete successfully.\n"
-                "WorkflowError:\nAt least one job did not complete successfully.\n"
-            ),
-            Facts("ValueError: no such week"),
-        ),
-        ("mpiexec: one\n\ntwo\n", "mpiexec: one\ntwo"),
-        ("2026-11-22 00:54:57,955 INFO gyriflow.io: read\n", OUT_OF_MEMORY),
-        ("", ""),
-    ],
-)
-def test_the_cause_is_gyriflows_own_message_or_else_the_exception_or_the_end(
-    log, expected
-):
-    assert cause(log) == expected
-    assert not any(word in cause(log) for word in ("Traceback", "WorkflowError"))
+    assert table.to_numpy().tolist() == [
+        ["", "", "poses", "warning", "study/logs/poses"],
+        ["", "", "week21.nii.gz", "warning", "study/logs/atlas_file/x/week21.nii.gz"],
+        ["a", "", "measure", "warning", "brains/a/metrics/logs/measure"],
+        ["a", "", "pial", "warning", "brains/a/logs/pial"],
+        ["a", "r", "measure", "warning", "runs/r/a/metrics/week-22.00/logs/measure"],
+        ["a", "r", "simulate", "warning", "runs/r/a/logs/simulate"],
+    ]
+    assert gather_messages(tmp_path / "empty", ["a"], []).empty
 
 
 def write(folder, name, *lines, head=HEAD):

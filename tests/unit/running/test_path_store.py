@@ -2,6 +2,7 @@
 same for everything else."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -209,3 +210,16 @@ def test_a_path_has_another_key_after_a_change_of_the_code_behind_its_scripts(
         lambda script: changed.get(script.name) or code_hash(script),
     )
     assert keys() != before
+
+
+def test_a_path_is_made_from_every_brain_whose_thickness_fills_one_of_its(paths):
+    """Also where two of these are of one week."""
+    _, path = paths()
+    first, second, third = path.brains[:3]
+    same_week = third.config.model_copy(update={"week": first.week})
+    third = replace(third, config=same_week)
+    assert third.week == first.week
+    similar = {first.id: third, second.id: first}
+    study = SimpleNamespace(similar_in_thickness=lambda brain: similar[brain.id])
+    pairs = SimpleNamespace(pairs=[((first, second), (True, True))])
+    assert path_store._thickness_sources(study, pairs) == [third, first]

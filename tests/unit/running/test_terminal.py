@@ -3,6 +3,7 @@ is, and whose results."""
 
 import io
 import logging
+import signal
 
 import pytest
 from configurations import LABELLED, touched
@@ -10,12 +11,12 @@ from facts import Facts
 
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, write_json
-from gyriflow.running.jobs import OUT_OF_MEMORY
+from gyriflow.messages import Message, read_messages, write_message
+from gyriflow.running import terminal
 from gyriflow.running.launch import hold_lock
 from gyriflow.running.provenance import check_results_belong_to, input_contents
 from gyriflow.running.status import STATE, status
-from gyriflow.running.terminal import RunDisplay
-from gyriflow.step import EXIT_FILE, recorded_exit_code
+from gyriflow.running.terminal import OUT_OF_MEMORY, RunDisplay
 from gyriflow.study.loading import load
 
 STEP = '{{"event": "step", "week": {week}, "end_week": 23, "left_s": {left}}}\n'
@@ -100,13 +101,8 @@ def test_a_folding_tells_its_size_weeks_and_warnings(run):
         '{"event": "size", "elements": 12, "unknowns": 9, "ranks": 1,'
         ' "memory_mib": 70}\n'
     )
-    coarse = '{"event": "warning", "message": "coarse"}\n'
-    log.with_suffix(".jsonl").write_text(
-        size + coarse + STEP.format(week=21.5, left=75.0)
-    )
-    log.write_text(
-        "warning: coarse\n2026-11-22 00:54:57,955 WARNING trimesh: not ours\n"
-    )
+    log.with_suffix(".jsonl").write_text(size + STEP.format(week=21.5, left=75.0))
+    write_message(log, Message("warning", "coarse"))
     run.now = 25.0
     run.display.tick()
     run.end()
@@ -122,8 +118,8 @@ def test_a_folding_tells_its_size_weeks_and_warnings(run):
 def test_a_failure_begins_with_its_cause_after_the_warnings(run):
     run.tell("run_info", stats={"pial_from_labels": 1, "simulate": 1})
     log = run.begin("pial_from_labels", brain="a")
-    warned = "2026-11-22 00:54:57,001 WARNING gyriflow.io: thin cortex\n"
-    log.write_text(warned + "2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
+    write_message(log, Message("warning", "thin cortex"))
+    write_message(log, Message("error", "a.nii: is no image"))
     run.fail("pial_from_labels", log=[str(log)])
     run.tell(
         text="Exiting because a job execution failed. Look below", level=logging.ERROR
@@ -155,22 +151,49 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         (
             "SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x",
             ["a.nii: is no image"],
-            None,
+            2,
         ),
     ],
 )
-def test_what_has_ended_a_program_from_outside_is_told(
-    run, monkeypatch, message, facts, code
-):
-    monkeypatch.setenv(EXIT_FILE, str(run.folder / "code"))
+def test_what_has_ended_a_program_from_outside_is_told(run, message, facts, code):
     log = run.begin("measure", brain="a")
-    log.write_text("2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
+    write_message(log, Message("error", "a.nii: is no image", exit_code=2))
     run.fail(
         "measure", f"CalledProcessError in file x:\n'python x.py' {message}", [str(log)]
     )
     assert run.lines[0] == Facts("measure a:", *facts)
     assert ("a.nii" in run.lines[0]) == ("'FAILED'" in message)
-    assert recorded_exit_code(run.folder / "code") == code
+    # who reads the messages later finds it, too
+    last = read_messages(log)[-1]
+    assert run.lines[0].endswith(last.text)
+    assert (last.level, last.exit_code) == ("error", code)
+
+
+def test_messages_of_an_earlier_try_are_not_shown(run):
+    log = run.folder / "measure.log"
+    write_message(log, Message("warning", "thin cortex"))
+    write_message(log, Message("error", "a.nii: is no image"))
+    run.begin("measure", brain="a")
+    run.display.tick()
+    run.fail("measure", "CalledProcessError in file x", [str(log)])
+    run.display.end()
+    assert run.lines[1] == Facts("measure a:", run.display.details)
+    assert "thin" not in "".join(run.lines)
+
+
+def test_a_step_that_began_and_left_no_message_was_killed(run):
+    log = run.begin("measure", brain="a")
+    log.with_suffix(".jsonl").touch()
+    run.fail("measure", "CalledProcessError in file x", [str(log)])
+    assert run.lines[0] == Facts("measure a:", OUT_OF_MEMORY)
+    assert read_messages(log)[0].exit_code == 137
+
+
+def test_what_snakemake_says_of_a_failed_job_is_its_message(run):
+    log = run.begin("measure", brain="a")
+    log.with_suffix(".jsonl").touch()
+    run.fail("measure", "MissingOutputException: x.csv", [str(log)])
+    assert run.lines[0] == Facts("measure a:", "x.csv") != Facts("memory")
 
 
 def test_a_failed_step_without_a_message_names_its_log_and_not_the_shell_command(
@@ -179,7 +202,7 @@ def test_a_failed_step_without_a_message_names_its_log_and_not_the_shell_command
     run.fail(
         "measure",
         "CalledProcessError in file x:\nCommand 'set -e; python x.py' returned 1",
-        [],
+        [str(run.folder / "measure.log")],
     )
     assert run.lines[0] == Facts("measure", run.display.details)
     assert "python" not in run.lines[0]
@@ -190,14 +213,12 @@ def test_a_hundred_equal_warnings_and_failures_are_three_lines_each_and_a_number
 ):
     for number in range(100):
         log = run.begin("pial", number, brain=f"sub-{number:03}")
-        log.write_text(
-            f"2026-01-01 10:00:00 WARNING gyriflow.io.volumes: /a/{number}.nii: voxels"
-            f" of {number} mm\n"
-        )
+        text = f"/a/{number}.nii: voxels of {number} mm"
+        write_message(log, Message("warning", text))
         if number % 2:
             run.end(number)
         else:
-            log.write_text(log.read_text() + f"gyriflow: /a/{number}.nii: is empty\n")
+            write_message(log, Message("error", f"/a/{number}.nii: is empty"))
             run.fail("pial", log=[str(log)], number=number)
     run.display.end()
     assert sum(line.startswith("warning ") for line in run.lines) == 3
@@ -215,13 +236,10 @@ def test_a_run_until_a_stage_says_when_it_is_done(run):
     assert run.lines[-1] == Facts("gyriflow: done in 5 s", "1 of 3 steps")
 
 
-def test_what_was_stopped_is_no_failure(run):
+def test_what_was_stopped_is_no_failure(run, monkeypatch):
     run.tell("run_info", stats={"simulate": 2})
     run.begin("simulate", run="r", brain="a")
-    run.tell(
-        text="Terminating processes on user request, this might take some time.",
-        level=logging.WARNING,
-    )
+    monkeypatch.setattr(terminal, "received_signals", [signal.SIGINT])
     run.fail("simulate")
     run.display.end()
     assert run.lines[-1] == Facts("gyriflow:", "5 s", 0, 2)

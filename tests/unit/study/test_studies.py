@@ -64,6 +64,21 @@ def refusal(**sections):
     return str(error.value)
 
 
+def test_a_study_of_a_run_with_two_start_brains_has_its_members_from_both():
+    vary = {"thickness_mm": [1, 2]}
+    runs = {"reference": {"preset": "fetalfoldsim", "start": ["a", "b"]}}
+    study = {"base": "reference", "vary": vary, "compare_week": 26}
+    brains = [*BRAINS, {"id": "c", "week": 26, **LABELLED}]
+    found = resolved(brains=brains, runs=runs, studies={"both": study})
+    starts = [(one.run, one.start.id) for one, _ in found.sweeps["both"].members]
+    assert sorted(starts) == [
+        ("both-1", "a"),
+        ("both-1", "b"),
+        ("both-2", "a"),
+        ("both-2", "b"),
+    ]
+
+
 def test_a_study_makes_a_run_of_each_combination():
     vary = {"thickness_mm": [1, 2], "solver.max_halvings": [2, 3]}
     found = resolved(studies={"both": THICKNESS | {"vary": vary}})

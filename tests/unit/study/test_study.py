@@ -548,6 +548,16 @@ def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(
             assert refusal(of_two(22, 24, 26), **runs, **more) == Facts("own22", 22, 26)
 
 
+def test_a_brain_of_the_last_week_is_one_that_is_compared(of_two):
+    # between two weeks of the atlas
+    found = study(
+        of_two(22, 22.7, 23.6),
+        runs={"a": EXPECTED["runs"]["a"]},
+        folding={"end_week": 23.6},
+    )
+    assert found.chains["own22", "atlas"].further_weeks == (22.7, 23.6)
+
+
 def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
     brains = of_two(22.4, 23, 23.4, 23.7, 23.701, 26)
     found = study(brains, runs=EXPECTED["runs"] | {"plain": {}})
@@ -584,6 +594,27 @@ def test_brains_correspond_by_masks_in_their_poses_and_else_in_coordinates_of_fi
     )
     assert found.brains["own22"].registered.scheme.cortex
     assert found.brains["b21"].registered.path == str(files / "labels.nii.gz")
+
+
+def test_the_surfaces_of_a_study_are_those_of_all_its_brains(of_two):
+    found = study(of_two(22, 23), **EXPECTED)
+    for name in found.brains:
+        folder = f"results/brains/{name}/surface"
+        files = {file for file in found.surfaces if file.startswith(folder)}
+        expected = {"pial.surf.gii", "left.pial.surf.gii", "thickness.shape.gii"}
+        assert {f"{folder}/{file}" for file in expected} <= files
+
+
+def test_a_population_that_a_run_is_carried_along_has_rates_of_growth(of_two):
+    # its brains have no subject and belong to no known atlas
+    found = study(of_two(22), **EXPECTED)
+    (atlas,) = {
+        found.series.with_brain(brain) for brain in found.chains["own22", "atlas"].later
+    }
+    assert atlas in found.series_with_rates
+    plain = study(of_two(22))
+    assert atlas in {name for name, _ in plain.growth_brains}
+    assert atlas not in plain.series_with_rates
 
 
 @pytest.mark.parametrize("surfaces", ["start", "atlas", "both"])

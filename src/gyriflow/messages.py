@@ -1,0 +1,140 @@
+"""Messages of steps as data: warnings and errors, one JSON object a line, in a file
+beside the step's log. The progress of a simulation is in the same file."""
+
+import json
+import logging
+import traceback
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import GyriflowError
+
+INTERRUPTED = 130
+KILLED = 137
+"""Exit codes of programs that were interrupted or killed."""
+STOPPED = "it was stopped"
+OWN_LOGGERS = ("root", "gyriflow", "__main__")
+FOLDERS = {"brains": ["brain"], "runs": ["run", "brain"]}
+"""What the folders around a log name, by folder in `results`."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A warning or an error of a step.
+
+    `text` is what people read: the file, the problem, what was found and expected, and
+    a remedy. An error also has these one by one, as far as they are known, and its exit
+    code. Step, brain and run are those of the log, "" if not applicable.
+    """
+
+    level: str
+    text: str
+    step: str = ""
+    brain: str = ""
+    run: str = ""
+    file: str = ""
+    found: str = ""
+    expected: str = ""
+    remedy: str = ""
+    exit_code: int | None = None
+
+    @property
+    def first_line(self) -> str:
+        return self.text.partition("\n")[0]
+
+
+def error_message(error: BaseException) -> Message:
+    """Return the message of an exception that ends a step; unexpected ones have exit
+    code 1."""
+    if isinstance(error, GyriflowError):
+        return Message("error", str(error), exit_code=error.exit_code, **error.facts)
+    if isinstance(error, KeyboardInterrupt):
+        return Message("error", STOPPED, exit_code=INTERRUPTED)
+    if isinstance(error, MemoryError):
+        text = f"memory ran out ({error}). Free memory, or run fewer jobs at once"
+        return Message("error", text, exit_code=KILLED)
+    raised = traceback.format_exception_only(error)[-1].strip()
+    return Message("error", f"unexpected {raised}", exit_code=1)
+
+
+def messages_file(log: str | Path) -> Path:
+    """Return the file of the messages of the step that has this log."""
+    return Path(log).with_suffix(".jsonl")
+
+
+def write_message(log: str | Path, message: Message) -> None:
+    """Add a message to those of the step that has this log, a path in `results`."""
+    path = Path(log)
+    row = asdict(message) | {"step": path.stem}
+    if path.parts[0] == "results":
+        row |= zip(FOLDERS.get(path.parts[1], []), path.parts[2:], strict=False)
+    _append(log, {name: value for name, value in row.items() if value})
+
+
+def read_rows(log: str | Path) -> list[dict[str, Any]]:
+    """Return the lines that the step with this log has written, messages and progress;
+    progress has the key `event`."""
+    rows = []
+    # a step may have written none yet
+    with suppress(OSError):
+        for line in messages_file(log).read_text().splitlines():
+            # a full disk may leave half a line
+            with suppress(ValueError):
+                rows.append(json.loads(line))
+    return rows
+
+
+def read_messages(log: str | Path) -> list[Message]:
+    """Return the distinct messages of the step that has this log."""
+    messages = []
+    for row in read_rows(log):
+        # progress, and lines of another version, have other keys
+        with suppress(TypeError):
+            messages.append(Message(**row))
+    return list(dict.fromkeys(messages))
+
+
+def study_messages(directory: Path, since_s: float = 0.0) -> list[Message]:
+    """Return the messages of the steps of a working directory that wrote any after a
+    time (s since the epoch), the first step first."""
+    paths = (directory / "results").rglob("*.jsonl")
+    messages = []
+    for time_s, path in sorted((path.stat().st_mtime, path) for path in paths):
+        if time_s >= since_s:
+            messages += read_messages(path)
+    return messages
+
+
+class MessageHandler(logging.Handler):
+    """Writes the warnings, errors and progress that a step logs to its messages, which
+    begin empty. Those of libraries stay in the log.
+
+    A record with the attribute `data`, a `Message` or an event, is written as that.
+    """
+
+    def __init__(self, log: str | Path) -> None:
+        super().__init__()
+        self.log = log
+        messages_file(log).write_text("")
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record."""
+        data = getattr(record, "data", None)
+        is_own = record.name.partition(".")[0] in OWN_LOGGERS
+        if data is None and is_own and record.levelno >= logging.WARNING:
+            data = Message(record.levelname.lower(), record.getMessage())
+        try:
+            if isinstance(data, Message):
+                write_message(self.log, data)
+            elif data:
+                _append(self.log, data)
+        except OSError:
+            self.handleError(record)
+
+
+def _append(log: str | Path, row: Mapping[str, Any]) -> None:
+    with messages_file(log).open("a") as file:
+        file.write(json.dumps(row) + "\n")
