@@ -1,6 +1,7 @@
 """The rules of figures: which figures a study has, of what, and with which words."""
 
 import inspect
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -187,6 +188,17 @@ def test_every_figure_of_a_page_has_a_title_and_a_caption(figures, rules):
         assert line == len(title) * "="
         assert "{" not in (title + caption).format(**values[name])
         assert "system-message" not in caption_html(caption)
+
+
+def test_targets_ask_for_figures_that_there_are(figures, rules):
+    drawn = {figure.name for planned in figures.values() for figure in planned}
+    asked_for = set()
+    for path in (SHIPPED / "workflow" / "rules").glob("*.smk"):
+        for names in re.findall(r"figure_files\(([^)]*)\)", path.read_text()):
+            asked_for |= set(re.findall(r'"(\w+)"', names))
+    assert asked_for - set(rules["SECTIONS"]) <= drawn
+    # no figure is left that no target or page asks for
+    assert drawn == asked_for - set(rules["SECTIONS"]) | set(sectioned(rules))
 
 
 def test_the_paper_stands_in_its_own_figures_alone(figures, rules):
