@@ -190,6 +190,13 @@ def test_every_figure_of_a_page_has_a_title_and_a_caption(figures, rules):
         assert "system-message" not in caption_html(caption)
 
 
+def test_the_report_gets_the_paths_of_its_figures_as_text(rules):
+    shown = rules["on_page"](rules["SECTIONS"])
+    assert len(shown) > 5
+    # Snakemake's own files cannot be handed to a job
+    assert {type(figure["path"]) for figure in shown} == {str}
+
+
 def test_targets_ask_for_figures_that_there_are(figures, rules):
     drawn = {figure.name for planned in figures.values() for figure in planned}
     asked_for = set()

@@ -40,7 +40,9 @@ FIGURES = {}
 def show(outputs, names=({},)):
     """Add the figures of a rule to those of the study; one of each without wildcards."""
     for figure, files in outputs.items():
-        FIGURES[figure] = {"files": [files] if isinstance(files, str) else files, "names": list(names)}
+        files = [files] if isinstance(files, str) else files
+        # text, as the report's job gets it: files of Snakemake refer to their rules
+        FIGURES[figure] = {"files": [str(file) for file in files], "names": list(names)}
 
 
 def figure_files(*figures):
