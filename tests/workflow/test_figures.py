@@ -102,8 +102,8 @@ def figures(plans):
 
 @pytest.fixture(scope="module")
 def rules(plans):
-    """The names of the rules, the same for all studies."""
-    _, names = plans["shapes"]
+    """The names in the rules. Snakemake has one set of them: that of the last study."""
+    _, names = plans["cohort"]
     return names
 
 
@@ -192,7 +192,7 @@ def test_every_figure_of_a_page_has_a_title_and_a_caption(figures, rules):
 
 def test_the_report_gets_the_paths_of_its_figures_as_text(rules):
     shown = rules["on_page"](rules["SECTIONS"])
-    assert len(shown) > 5
+    assert "metrics_figure" in {figure["name"] for figure in shown}
     # Snakemake's own files cannot be handed to a job
     assert {type(figure["path"]) for figure in shown} == {str}
 
