@@ -33,6 +33,7 @@ if not workflow.overwrite_configfiles:
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/figures.smk"
 include: "workflow/rules/retrieve.smk"
 include: "workflow/rules/surface.smk"
 include: "workflow/rules/growth.smk"
@@ -46,7 +47,6 @@ include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
 include: "workflow/rules/studies.smk"
 include: "workflow/rules/calibration.smk"
-include: "workflow/rules/figures.smk"
 include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
 

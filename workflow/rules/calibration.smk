@@ -95,4 +95,4 @@ rule calibration_tables:
 rule calibrate:
     input:
         rules.calibration_tables.output if CALIBRATED else [],
-        target_files(FIGURES, "calibrate"),
+        figure_files("calibration_figure"),

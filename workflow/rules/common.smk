@@ -7,8 +7,6 @@ from gyriflow.grouping import grouped
 from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
-from gyriflow.study.figures import figures_of
-from gyriflow.study.registry import target_files, by_rule, files_in, observed_name
 from gyriflow.study.paths import *
 from gyriflow.running.launch import (
     KEEP_GOING_VAR,
@@ -88,7 +86,6 @@ if REFUSED and TELLS:
 if REFUSED and not study.brains:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
-FIGURES = figures_of(study)
 if TELLS:
     messages = [(brain, f"not folded: {cause}") for brain, cause in study.unreachable.items()]
     if not REFUSED:

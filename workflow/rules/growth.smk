@@ -33,4 +33,4 @@ rule growth_curves:
 rule growth:
     input:
         rules.growth_rates.output if study.growth_brains else [],
-        target_files(FIGURES, "growth"),
+        figure_files("growth_figure"),

@@ -1,5 +1,5 @@
 # Resources and warnings of all jobs, and the report: an HTML page of the study and one of each brain, with the figures
-# and tables of `workflow/figures.yaml`.
+# and tables of `figures.smk`.
 from itertools import takewhile
 
 from gyriflow.running.snakemake_internals import usage_patterns
@@ -21,7 +21,7 @@ rule study_records:
     input:
         # logs and records of time and memory are not inputs, since a missing one would repeat its job
         rules.figures.input,
-        target_files(FIGURES, "brain", "small"),
+        figure_files("brain_maps", "brain_regions", "small_pictures"),
         rules.metrics.input,
         rules.quality_table.output,
         run_params=study.files(PARAMETERS),
@@ -71,12 +71,24 @@ rule study_records:
         "../scripts/study_records.py"
 
 
-# the figures with their captions, by page: of each brain, and of the study (None)
-ON_PAGE = {brain: [] for brain in (*study.brains, None)}
-for figure in FIGURES:
-    if figure.kind.section:
-        of_brain = not {"quality", "brain"}.isdisjoint(figure.kind.targets)
-        ON_PAGE[figure.names["brain"] if of_brain else None].append(figure.described)
+def on_page(sections, brain=None):
+    """Return the figures of the page of the study or of a brain: their file, place, and names in title and caption."""
+    figures = []
+    for section, names in sections.items():
+        for name in names:
+            drawn = FIGURES.get(name, {"files": [], "names": []})
+            look = {"first": name in IN_SUMMARY, "technical": name in TECHNICAL}
+            for values in drawn["names"]:
+                if brain in (None, values.get("brain")):
+                    path = drawn["files"][0].format(**values)
+                    figures.append({"name": name, "section": section, "path": path, "names": values, **look})
+    return figures
+
+
+def captions_of(*pages):
+    """Return the files with title and caption of the figures of pages."""
+    names = [name for sections in pages for section in sections.values() for name in section]
+    return [f"{workflow.basedir}/workflow/report/captions/{name}.rst" for name in names if name in FIGURES]
 
 
 # the surfaces of the 3D view by week: of all runs, and of measured brains of the start's population
@@ -85,6 +97,9 @@ VIEWED = [
     for brain in study.brains.values()
     if study.starts and brain.config.population == study.starts[0].config.population
 ]
+VIEWED_ROWS = [brain.measurement for brain in VIEWED]
+for simulation in study.run_simulations:
+    VIEWED_ROWS += simulation.measurements
 SURFACES = {
     "runs": {
         name: [[row.week, row.halves] for row in simulation.measurements]
@@ -101,7 +116,7 @@ rule html_report:
         rules.figures.input,
         rules.metrics.input,
         rules.influence_figures.input,
-        target_files(FIGURES, "report", "quality", "brain"),
+        figure_files("study_resources", "quality_page", "brain_maps", "brain_regions"),
         quality=rules.quality_table.output[0],
         metrics=f"{STUDY}/metrics.csv",
         centiles=rules.metrics_tables.output.centiles,
@@ -110,9 +125,10 @@ rule html_report:
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         atlas_brain=study.prediction.atlas_surface if study.prediction else [],
         intervals=study.prediction.file(ENSEMBLE) if study.prediction and study.prediction.ensemble else [],
-        small=[figure.path for figure in FIGURES if "small" in figure.kind.targets],
+        small=[f"{BRAIN}/figures/small.png".format(brain=brain) for brain in study.brains],
         accuracy=PREDICTION_TESTS if study.prediction else [],
-        surfaces=files_in(SURFACES),
+        surfaces=[file for row in VIEWED_ROWS for file in (*row.hemispheres, *row.maps)],
+        captions=captions_of(SECTIONS, BRAIN_SECTIONS),
         provenance=rules.study_records.output.report,
         methods=rules.study_records.output.methods,
         page=f"{PAGE}/page.html",
@@ -126,8 +142,8 @@ rule html_report:
         brains=expand(f"{REPORT}/brains/{{brain}}.html", brain=study.brains),
         view=f"{REPORT}/surfaces.json",
     params:
-        figures=ON_PAGE[None],
-        brain_figures={brain: ON_PAGE[brain] for brain in study.brains},
+        figures=on_page(SECTIONS),
+        brain_figures={brain: on_page(BRAIN_SECTIONS, brain) for brain in study.brains},
         brains=DESCRIPTIONS,
         prediction=study.prediction_facts,
         surfaces=SURFACES,

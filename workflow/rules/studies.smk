@@ -66,3 +66,13 @@ rule study_tables:
 rule studies:
     input:
         expand(list(rules.study_tables.output), study=study.sweeps),
+
+
+# figures and tables of the paper; observed brains are measured only at the weeks of comparison
+rule paper:
+    input:
+        figure_files("inputs_figure", "growth_figure", "weekly_figure", "outlines_figure", "displacement_maps"),
+        figure_files("zones_figure", "model_figure", "run_tables", "paper_displacement_figure"),
+        figure_files("influence_figure", "influence_spectra", "paper_nearest_figure"),
+        rules.growth_rates.output if study.growth_brains else [],
+        rules.studies.input,

@@ -58,14 +58,29 @@ rule run_tables:
         "../scripts/run_tables.py"
 
 
-EXPORTED_FILES = ("surfaces", "maps", "regions", "report", "white", "white_maps", "template_maps", "volume")
+def exported_files():
+    """Return the files of all brains that are exported, each once."""
+    files = []
+    for brain in study.exported:
+        files.append(brain.report)
+        for by_side in (
+            brain.surfaces,
+            brain.maps,
+            brain.regions,
+            brain.white,
+            brain.white_maps,
+            brain.template_maps,
+        ):
+            files += by_side.values()
+        if brain.volume:
+            files += [brain.volume["surface"], brain.volume["thickness"], brain.volume["labels"].path]
+    return list(dict.fromkeys(files))
 
 
 # a separate target
 rule export:
     input:
-        files_in([[getattr(brain, kind) for kind in EXPORTED_FILES] for brain in study.exported]),
-        [brain.volume["labels"].path for brain in study.exported if brain.volume],
+        exported_files(),
         long=rules.metrics_tables.output.metrics_long,
     output:
         # a file, since Snakemake writes its own file into an output folder

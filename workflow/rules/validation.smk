@@ -149,4 +149,4 @@ rule validation_tables:
 rule validate:
     input:
         rules.validation_tables.output if study.validated else [],
-        target_files(FIGURES, "validate"),
+        figure_files(*SECTIONS["Validation"]),

@@ -9,7 +9,7 @@ from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_volume_map
 from gyriflow.messages import read_messages
-from gyriflow.report.pictures import ROUND_VIEWS, shape_maps, small_pictures
+from gyriflow.report.pictures import brain_maps, small_pictures
 from gyriflow.report.quality import (
     QualityBrain,
     quality_page,
@@ -59,9 +59,7 @@ with step(snakemake.log[0]):
         (read_surface(hemisphere), read_vertex_maps(maps))
         for hemisphere, maps in zip(files.hemispheres, files.maps, strict=True)
     ]
-    maps = shape_maps(
-        {"": {report["week"]: halves}}, quantity="shape_index", views=ROUND_VIEWS
-    )
+    maps = brain_maps(halves, week=report["week"])
     notes = [report["hindbrain"]] if "hindbrain" in report else []
     page = quality_page(brain, row, warnings, notes)
     write_figure(output.quality, output.quality_pdf, page)

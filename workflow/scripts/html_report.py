@@ -1,5 +1,7 @@
 """Write the report of a study and the pages of its brains, each a single HTML file."""
 
+from pathlib import Path
+
 from gyriflow.compare.accuracy import prediction_facts
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
@@ -30,8 +32,18 @@ TABLES = (
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 
 
+def read_caption(path):
+    """Return title and caption of a figure; the title is underlined."""
+    title, _, caption = read_text(path).split("\n", 2)
+    return {"title": title, "caption": caption.strip()}
+
+
+CAPTIONS = {Path(path).stem: read_caption(path) for path in files.captions}
+
+
 def with_content(figures):
-    """Return the figures and tables of a page with their content."""
+    """Return the figures and tables of a page with their title, caption and content."""
+    figures = [figure | CAPTIONS[figure["name"]] for figure in figures]
     paths = [figure["path"] for figure in figures]
     pictures = [path for path in paths if path.endswith(".png")]
     contents = dict(

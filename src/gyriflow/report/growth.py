@@ -19,7 +19,7 @@ MAX_RATE_PANELS = 4
 
 
 @styled
-def growth_chart(
+def growth_figure(
     areas: pd.DataFrame,
     rates: pd.DataFrame,
     *,

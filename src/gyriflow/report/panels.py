@@ -23,7 +23,6 @@ from .scene import (
     is_visible,
     picture_axes,
     render,
-    uniform_colours,
 )
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
@@ -80,11 +79,6 @@ class Row:
     label: str
     panels: Sequence[Panel | None]
     absent: str = ""
-
-
-def plain_panel(mesh: TriangleMesh, colour: str) -> Panel:
-    """Return a surface of one colour."""
-    return Panel(mesh, uniform_colours(mesh, colour))
 
 
 def round_length(limit_mm: float) -> float:

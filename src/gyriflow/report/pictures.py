@@ -1,7 +1,7 @@
 """Pictures of surfaces: simulated and observed brains, maps, regions and zones."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import cycle, pairwise
 from typing import Any
 
@@ -12,15 +12,16 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged
+from ..geometry.triangles import Floats, TriangleMesh, face_areas, merged
 from ..quantities import SIGNED_COLOURS, VERTEX_MAPS, name_in_interval
 from ..settings.folding import AXES, FoldingParameters
-from ..settings.terms import OBSERVED_BRAIN, ZONE_NAMES
+from ..settings.terms import ZONE_NAMES
 from ..units import CM2_PER_MM2
 from .labels import column_label, map_title, value_labels
-from .panels import MAX_COLUMNS, Panel, Row, panel_grid, plain_panel
+from .panels import MAX_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
+    TISSUE,
     UNKNOWN_COLOUR,
     VIEWS,
     View,
@@ -29,6 +30,7 @@ from .scene import (
     paint,
     render,
     restricted,
+    uniform_colours,
 )
 from .style import (
     NEUTRAL_COLOUR,
@@ -47,6 +49,7 @@ Halves = Sequence[SurfaceMaps]
 """The hemispheres of a brain, each with its maps."""
 
 SIDE_VIEWS = ("left", "top")
+OUTER_VIEWS = ("left", "top", "bottom")
 ROUND_VIEWS = ("left", "right", "top", "bottom")
 MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
 ROUNDING = 1e-9
@@ -74,166 +77,202 @@ TINTS = (0.0, 0.4, 0.7)
 """Shares of white in the colours of further regions."""
 
 
-def _ordered(*groups: Mapping) -> list:
-    """Return the keys of all groups: weeks and intervals sorted, names in their
-    order."""
-    keys = list(dict.fromkeys(key for group in groups for key in group))
-    return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
+@dataclass(frozen=True, eq=False)
+class GridBrain:
+    """A brain of a grid, and where it stands.
+
+    `row` is the label of its row, `column` a week, an interval of two weeks, or a name.
+    `halves` are its hemispheres, or its whole surface, with their maps; empty if it has
+    ended before. A brain without maps is blue if it is simulated, else beige, or has
+    its own `colours` (n, 3) of vertices or (m, 3) of faces. `light`, `mark`,
+    `directions` and the caption are those of its `Panel`.
+    """
+
+    row: str
+    column: Any
+    halves: Sequence[tuple[TriangleMesh, Any]] = ()
+    is_simulated: bool = False
+    view: View = VIEWS["left"]
+    colours: Floats | None = None
+    light: Mapping[str, Any] = field(default_factory=lambda: TISSUE)
+    caption: str = ""
+    mark: Floats | None = None
+    directions: Floats | None = None
+
+    @property
+    def is_mapped(self) -> bool:
+        return any(maps for _, maps in self.halves)
+
+    @property
+    def surface(self) -> TriangleMesh:
+        return merged(*(half for half, _ in self.halves))
+
+    def surface_map(self, quantity: str) -> SurfaceMap:
+        """Return its whole surface and a map; NaN on a hemisphere that lacks it."""
+        mesh, maps = whole_maps(self.halves, [quantity])
+        return mesh, maps[quantity]
 
 
-def _mapped(
-    surface_map: SurfaceMap, scale: ScalarMappable, directions: Floats | None = None
-) -> Panel:
-    mesh, values = surface_map
-    return Panel(mesh, paint(values, scale), light=MAP, directions=directions)
+Grid = Sequence[GridBrain]
 
 
 def brain_grid(
-    groups: Mapping[str, Mapping[Any, Panel]], views: Sequence[str], **more: Any
-) -> Figure:
-    """Draw groups of brains from several views, a column per week, interval or name;
-    `more` for `panel_grid`.
-
-    A group has a row with all views, or a row per view where these are too wide.
-    Captions are below the first view.
-    """
-    keys, seen = _ordered(*groups.values()), [VIEWS[name] for name in views]
-    heads = list(map(column_label, keys))
-
-    if len(seen) * len(keys) <= MAX_COLUMNS:
-        rows = [
-            Row(
-                name,
-                [
-                    panel
-                    for view in seen
-                    for panel in _seen(group, keys, view, with_caption=view == seen[0])
-                ],
-            )
-            for name, group in groups.items()
-        ]
-        return panel_grid(
-            [f"{head}\n{view.name} view" for view in seen for head in heads],
-            rows,
-            **more,
-        )
-    rows = [
-        Row(
-            f"{name}\n{view.name} view".strip(),
-            _seen(group, keys, view, with_caption=view == seen[0]),
-        )
-        for view in seen
-        for name, group in groups.items()
-    ]
-    return panel_grid(heads, rows, **more)
-
-
-def _seen(
-    group: Mapping[Any, Panel], keys: Iterable, view: View, *, with_caption: bool = True
-) -> list[Panel | None]:
-    """Return the brains of a group from a view, None where the group has none."""
-    panels = [group.get(key) for key in keys]
-    return [
-        panel
-        and replace(panel, view=view, caption=panel.caption if with_caption else "")
-        for panel in panels
-    ]
-
-
-@styled
-def runs_by_week(
-    runs: Mapping[str, Mapping[float, TriangleMesh]],
-    observed: Mapping[float, TriangleMesh],
+    grid: Grid,
+    quantity: str = "",
     *,
-    deviations: Mapping[float, SurfaceMaps] | None = None,
-    views: Sequence[str] = SIDE_VIEWS,
-    observed_name: str = OBSERVED_BRAIN,
-    predicted: str = "",
+    title: str = "",
+    legend: Sequence[Patch] = (),
+    absent: str = "",
 ) -> Figure:
-    """Draw the brains of several runs (blue) above observed ones (beige), a column per
-    week, rows by view.
+    """Draw brains in their rows and columns, in the order in which these occur.
 
-    `runs` are surfaces in RAS+ mm by run and week, `observed` those by week, or by
-    another heading; a missing week leaves its panel empty. `deviations` are surfaces
-    and maps by week, of which `distance_mm` is shown below. `predicted` is the heading
-    of a predicted brain (blue) in `observed`.
+    Brains with maps have the colours of a quantity, a name of `VERTEX_MAPS`, on one
+    scale with the `title` (default: that of the map). `absent` is the text where a row
+    has no brain.
     """
-    special: dict[Any, str] = {predicted: SIMULATED_SURFACE_COLOUR}
-    groups = {
-        name: {
-            week: plain_panel(mesh, SIMULATED_SURFACE_COLOUR)
-            for week, mesh in meshes.items()
-        }
-        for name, meshes in runs.items()
-        if meshes
-    }
-    if observed:
-        groups[observed_name] = {
-            key: plain_panel(mesh, special.get(key, OBSERVED_SURFACE_COLOUR))
-            for key, mesh in observed.items()
-        }
-    if not deviations:
-        return brain_grid(groups, views)
-    maps = {
-        week: (mesh, maps["distance_mm"]) for week, (mesh, maps) in deviations.items()
-    }
-    scale = scale_of(
-        "distance_mm", np.concatenate([values for _, values in maps.values()])
+    # each brain once, in however many views it is
+    mapped = {id(brain.halves): brain for brain in grid if brain.is_mapped}
+    scale = None
+    colour_bar = None
+    if quantity and mapped:
+        values = [brain.surface_map(quantity)[1] for brain in mapped.values()]
+        every = np.concatenate(values)
+        scale = scale_of(quantity, every)
+        colour_bar = (scale, title or map_title(quantity))
+        if not np.isfinite(every).all():
+            legend = [*legend, Patch(color=UNKNOWN_COLOUR, label="not measured")]
+    columns = list(dict.fromkeys(brain.column for brain in grid))
+    rows = []
+    for label in dict.fromkeys(brain.row for brain in grid):
+        panels = {}
+        for brain in grid:
+            if brain.row == label:
+                panels[brain.column] = _panel(brain, quantity, scale)
+        rows.append(Row(label, [panels.get(column) for column in columns], absent))
+    return panel_grid(columns, rows, colour_bar=colour_bar, legend=legend)
+
+
+def _panel(
+    brain: GridBrain, quantity: str, scale: ScalarMappable | None
+) -> Panel | None:
+    """Return a brain in its view and colours, None if it has no surface."""
+    if not brain.halves:
+        return None
+    if scale is not None and brain.is_mapped:
+        mesh, values = brain.surface_map(quantity)
+        colours = paint(values, scale)
+        light: Mapping[str, Any] = MAP
+    else:
+        mesh = brain.surface
+        plain = OBSERVED_SURFACE_COLOUR
+        if brain.is_simulated:
+            plain = SIMULATED_SURFACE_COLOUR
+        colours = uniform_colours(mesh, plain)
+        if brain.colours is not None:
+            colours = brain.colours
+        light = brain.light
+    return Panel(
+        mesh, colours, brain.view, brain.caption, light, brain.mark, brain.directions
     )
-    groups["distance"] = {
-        week: _mapped(surface_map, scale) for week, surface_map in maps.items()
-    }
-    return brain_grid(groups, views, colour_bar=(scale, map_title("distance_mm")))
 
 
-def displacements(
-    frames: Mapping[float, SurfaceMaps],
-) -> dict[tuple[float, float], SurfaceMap]:
-    """Return the norm in mm of the displacement between successive weeks, on the
-    surface at the later one."""
-    surfaces = {week: mesh for week, (mesh, _) in frames.items()}
-    return {
-        (a, b): (
-            surfaces[b],
-            np.linalg.norm(surfaces[b].vertices - surfaces[a].vertices, axis=1),
-        )
-        for a, b in pairwise(sorted(surfaces))
-    }
+def in_views(grid: Grid, views: Sequence[str] = SIDE_VIEWS) -> list[GridBrain]:
+    """Return brains from several views, a column per week, interval or name.
+
+    Weeks and intervals are sorted, names in their order. Each row has all views, or is
+    repeated for each view where all would be too wide. Captions are below the first
+    view.
+    """
+    columns = list(dict.fromkeys(brain.column for brain in grid))
+    if not any(isinstance(column, str) for column in columns):
+        columns.sort()
+    is_wide = len(views) * len(columns) > MAX_COLUMNS
+    places = {(brain.row, brain.column): brain for brain in grid}
+    seen = []
+    for name in views:
+        for row in dict.fromkeys(brain.row for brain in grid):
+            for column in columns:
+                brain = places.get((row, column), GridBrain(row, column))
+                heading = column_label(column)
+                if is_wide:
+                    row_label = f"{row}\n{name} view".strip()
+                else:
+                    row_label = row
+                    heading = f"{heading}\n{name} view"
+                seen.append(
+                    replace(
+                        brain,
+                        row=row_label,
+                        column=heading,
+                        view=VIEWS[name],
+                        caption=brain.caption if name == views[0] else "",
+                    )
+                )
+    return seen
+
+
+# brains by week
 
 
 @styled
-def displacement_maps(frames: Mapping[str, Mapping[float, SurfaceMaps]]) -> Figure:
+def inputs_figure(grid: Grid) -> Figure:
+    """Draw the first and the last brain of a study."""
+    return brain_grid(in_views(grid, OUTER_VIEWS))
+
+
+@styled
+def predicted_figure(grid: Grid) -> Figure:
+    """Draw the start brain, the predicted one, and the atlas' own brain."""
+    return brain_grid(in_views(grid, OUTER_VIEWS))
+
+
+@styled
+def weekly_figure(grid: Grid) -> Figure:
+    """Draw the brains of several runs (blue) above observed ones (beige) by week."""
+    return brain_grid(in_views(grid))
+
+
+@styled
+def expected_figure(grid: Grid) -> Figure:
+    """Draw expected brains above observed ones by week, and below the distance between
+    them (map `distance_mm`)."""
+    return brain_grid(in_views(grid), "distance_mm")
+
+
+@styled
+def displacement_maps(
+    frames: Sequence[Mapping[float, SurfaceMaps]], *, runs: Sequence[str]
+) -> Figure:
     """Draw the norm of the displacement of runs on the pial surface, a column per
     interval, on one colour scale.
 
-    `frames` are by run and week the surface in RAS+ mm and its fields. One vertex in
-    two hundred is above the scale, so that a single maximum does not determine it. The
-    maximum has a ring, dotted on the far side; the caption of each interval has its
-    size, its position in RAS+ mm, and the mean over the vertices.
+    `frames` are for each of the `runs` by week the surface in RAS+ mm and its fields.
+    One vertex in two hundred is above the scale, so that a single maximum does not
+    determine it. The maximum has a ring, dotted on the far side; the caption of each
+    interval has its size, its position in RAS+ mm, and the mean over the vertices.
     """
-    moved = {run: displacements(weeks) for run, weeks in frames.items()}
-    every = np.concatenate(
-        [norms for maps in moved.values() for _, norms in maps.values()]
-    )
-    scale = scale_of("displacement_mm", every)
+    grid = []
+    for run, weeks in zip(runs, frames, strict=True):
+        for before, week in pairwise(sorted(weeks)):
+            mesh, _ = weeks[week]
+            moved = mesh.vertices - weeks[before][0].vertices
+            norms = np.linalg.norm(moved, axis=1)
+            place = mesh.vertices[int(np.nanargmax(norms))]
+            brain = GridBrain(
+                run,
+                (before, week),
+                [(mesh, {"displacement_mm": norms})],
+                caption=_displacement_caption(norms, place),
+                mark=place,
+            )
+            grid.append(brain)
+    title = "norm of the displacement (mm)"
+    return brain_grid(in_views(grid), "displacement_mm", title=title)
 
-    def panel(mesh: TriangleMesh, norms: Floats) -> Panel:
-        place = mesh.vertices[int(np.nanargmax(norms))]
-        where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
-        words = (
-            f"max {np.nanmax(norms):.2f} mm\n"
-            f"at {where}\n"
-            f"mean {np.nanmean(norms):.2f} mm"
-        )
-        return replace(_mapped((mesh, norms), scale), caption=words, mark=place)
 
-    groups = {
-        run: {key: panel(*surface_map) for key, surface_map in maps.items()}
-        for run, maps in moved.items()
-    }
-    return brain_grid(
-        groups, SIDE_VIEWS, colour_bar=(scale, "norm of the displacement (mm)")
-    )
+def _displacement_caption(norms: Floats, place: Floats) -> str:
+    where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
+    return f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
 
 
 def round_up(value: float) -> float:
@@ -293,148 +332,132 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
     ), values
 
 
-def _map_of(halves: Halves, quantity: str) -> SurfaceMap:
-    mesh, maps = whole_maps(halves, [quantity])
-    return mesh, maps[quantity]
-
-
-def shape_maps(
-    brains: Mapping[str, Mapping[float, Halves]],
-    *,
-    quantity: str,
-    views: Sequence[str] = SIDE_VIEWS,
-) -> Figure:
-    """Draw `scalar_maps` of a quantity of hemispheres, {group: {week: hemispheres}},
-    without empty groups."""
-    maps = {
-        group: {week: _map_of(halves, quantity) for week, halves in weeks.items()}
-        for group, weeks in brains.items()
-        if weeks
-    }
-    return scalar_maps(maps, quantity=quantity, views=views)
+# maps
 
 
 @styled
-def scalar_maps(
-    maps: Mapping[str, Mapping[Any, SurfaceMap]],
-    *,
-    quantity: str,
-    directions: Mapping[Any, Floats] | None = None,
-    views: Sequence[str] = SIDE_VIEWS,
-) -> Figure:
-    """Draw a quantity on surfaces: a row per group and view, a column per week or run,
-    one colour scale.
+def shape_maps(grid: Grid) -> Figure:
+    """Draw the shape index of simulated and observed brains by week."""
+    return brain_grid(in_views(grid), "shape_index")
 
-    `maps` are by group and week, or run, such as {"simulated": {28.0: …}, "observed
-    brain": {28.0: …}}, surfaces and values of `quantity`, a name of `VERTEX_MAPS`.
-    `directions`, by week or run, are (n, 3) vectors at the vertices, drawn as lines of
-    proportional length; the longest tenth have the same length.
-    """
-    every = np.concatenate(
-        [values for group in maps.values() for _, values in group.values()]
-    )
-    scale, shares = scale_of(quantity, every), {}
-    if directions:
-        lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
-        shares = {
-            key: vectors / np.quantile(lengths, DIRECTION_QUANTILE)
-            for key, vectors in directions.items()
-        }
-    groups = {
-        group: {
-            key: _mapped(surface_map, scale, shares.get(key))
-            for key, surface_map in values.items()
-        }
-        for group, values in maps.items()
-    }
-    legend = (
-        []
-        if np.isfinite(every).all()
-        else [Patch(color=UNKNOWN_COLOUR, label="not measured")]
-    )
+
+@styled
+def brain_maps(halves: Halves, *, week: float) -> Figure:
+    """Draw the shape index of a brain from four sides."""
     return brain_grid(
-        groups, views, colour_bar=(scale, map_title(quantity)), legend=legend
-    )
-
-
-def growth_maps(
-    frames: Mapping[float, SurfaceMaps],
-    growth: Mapping[str, Floats],
-    *,
-    quantity: str = "area_growth_percent_per_gw",
-    views: Sequence[str] = SIDE_VIEWS,
-) -> Figure:
-    """Draw the growth found by a run towards target shapes, with lines along the
-    largest growth in the surface.
-
-    `frames` are by week the surface in RAS+ mm and its fields; `growth` are the maps of
-    `growth.rates.growth_per_week`, with their intervals in the names. The `quantity` is
-    that of area, or that across the surface (`thickness_growth_percent_per_gw`). Maps
-    without directions, as of standard deviations, have no lines.
-    """
-    intervals = list(pairwise(sorted(frames)))
-    maps = {
-        (a, b): (frames[b][0], growth[name_in_interval(quantity, a, b)])
-        for a, b in intervals
-    }
-    directions = {
-        interval: np.stack(
-            [
-                growth[name_in_interval(f"growth_direction_{axis}", *interval)]
-                for axis in AXES
-            ],
-            axis=1,
-        )
-        for interval in intervals
-        if name_in_interval("growth_direction_x", *interval) in growth
-    }
-    return scalar_maps(
-        {"growth": maps}, quantity=quantity, directions=directions, views=views
+        in_views([GridBrain("", week, halves)], ROUND_VIEWS), "shape_index"
     )
 
 
 @styled
-def influence_picture(
-    members: Mapping[str, Halves | None],
-    observed: Halves | None,
-    *,
-    values: Mapping[str, Mapping[str, Any]],
-    observed_name: str = OBSERVED_BRAIN,
-) -> Figure:
+def position_spread_figure(grid: Grid) -> Figure:
+    """Draw the standard deviation of positions over an ensemble by week."""
+    return brain_grid(in_views(grid), "position_sd_mm")
+
+
+@styled
+def sulcus_probability_figure(grid: Grid) -> Figure:
+    """Draw the share of an ensemble's members that have a sulcus, by week."""
+    return brain_grid(in_views(grid), "sulcus_probability")
+
+
+@styled
+def deviation_figure(grid: Grid, *, quantity: str) -> Figure:
+    """Draw how observed brains deviate from expected ones in a quantity, by week."""
+    return brain_grid(in_views(grid, ROUND_VIEWS), quantity)
+
+
+@styled
+def influence_figure(grid: Grid, *, values: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Draw the surfaces of the runs of a sweep at one week, and below their shape index
     on one scale.
 
-    `members` are by run, in the order of the sweep, the hemispheres with their maps,
-    None for a run that ended before the week. `observed` are those of the observed
-    brain of the week, shown last under `observed_name`. `values` are by run the varied
-    parameters with their values, for the headings.
+    The columns are runs, in the order of the sweep, and the observed brain of the week,
+    last. `values` are by run the varied parameters with their values, for the headings.
     """
     headings = dict(zip(values, value_labels(list(values.values())), strict=True))
-    brains = {headings[run]: halves for run, halves in members.items()} | (
-        {observed_name: observed} if observed else {}
-    )
-    maps = {
-        name: _map_of(halves, "shape_index")
-        for name, halves in brains.items()
-        if halves
-    }
-    scale = scale_of("shape_index", np.empty(0))
-    colours = {observed_name: OBSERVED_SURFACE_COLOUR}
-    groups = {
-        "": {
-            name: plain_panel(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR))
-            for name, (mesh, _) in maps.items()
-        },
-        "shape index\n": {
-            name: _mapped(surface_map, scale) for name, surface_map in maps.items()
-        },
-    }
-    rows = [
-        Row(f"{label}{view} view", _seen(group, brains, VIEWS[view]), ABSENT)
-        for label, group in groups.items()
-        for view in SIDE_VIEWS
-    ]
-    return panel_grid(list(brains), rows, colour_bar=(scale, map_title("shape_index")))
+    placed = []
+    for label in ("", "shape index\n"):
+        for view in SIDE_VIEWS:
+            for brain in grid:
+                halves = brain.halves
+                if not label:
+                    halves = [(mesh, {}) for mesh, _ in halves]
+                placed.append(
+                    replace(
+                        brain,
+                        row=f"{label}{view} view",
+                        column=headings.get(brain.column, brain.column),
+                        halves=halves,
+                        view=VIEWS[view],
+                    )
+                )
+    return brain_grid(placed, "shape_index", absent=ABSENT)
+
+
+# growth
+
+
+@styled
+def growth_found_figure(
+    frames: Mapping[float, SurfaceMaps], growth: Mapping[str, Floats]
+) -> Figure:
+    """Draw the growth in area by which a run approached its target shapes."""
+    return growth_grid(frames, growth, "area_growth_percent_per_gw")
+
+
+@styled
+def growth_across_figure(
+    frames: Mapping[float, SurfaceMaps], growth: Mapping[str, Floats]
+) -> Figure:
+    """Draw the growth across the surface by which a run approached its target
+    shapes."""
+    return growth_grid(frames, growth, "thickness_growth_percent_per_gw")
+
+
+@styled
+def growth_sd_figure(
+    frames: Mapping[float, SurfaceMaps], growth: Mapping[str, Floats]
+) -> Figure:
+    """Draw the standard deviation of growth in area over the members of an ensemble."""
+    return growth_grid(frames, growth, "area_growth_percent_per_gw")
+
+
+def growth_grid(
+    frames: Mapping[float, SurfaceMaps],
+    growth: Mapping[str, Floats],
+    quantity: str,
+    views: Sequence[str] = OUTER_VIEWS,
+) -> Figure:
+    """Draw a quantity of growth on the surface at the end of each interval.
+
+    `frames` are by week the surface in RAS+ mm and its fields; `growth` are the maps of
+    `growth.rates.growth_per_week`, with their intervals in the names. Lines run along
+    the largest growth in the surface, in proportion to its excess over the growth
+    across it; the longest tenth have the same length. Maps without directions, as of
+    standard deviations, have no lines.
+    """
+    intervals = list(pairwise(sorted(frames)))
+    directions = {}
+    for interval in intervals:
+        names = [
+            name_in_interval(f"growth_direction_{axis}", *interval) for axis in AXES
+        ]
+        if names[0] in growth:
+            directions[interval] = np.stack([growth[name] for name in names], axis=1)
+    if directions:
+        lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
+        longest = np.quantile(lengths, DIRECTION_QUANTILE)
+        directions = {key: lines / longest for key, lines in directions.items()}
+    grid = []
+    for interval in intervals:
+        mesh, _ = frames[interval[1]]
+        maps = {quantity: growth[name_in_interval(quantity, *interval)]}
+        brain = GridBrain(
+            "growth", interval, [(mesh, maps)], directions=directions.get(interval)
+        )
+        grid.append(brain)
+    return brain_grid(in_views(grid, views), quantity)
 
 
 @styled
@@ -493,83 +516,98 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
 
 
 @styled
-def regions_picture(
-    brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints, Mapping[int, str]]]]],
-) -> Figure:
-    """Draw brains coloured by region, a column per brain and a row per view, with the
-    regions' names.
-
-    `brains` are by heading of the column the hemispheres, each with the numbers of its
-    vertices' regions and their names. Numbers without a name mean no region.
-    """
-    colours = region_colours(
-        name
-        for halves in brains.values()
-        for _, (_, table) in halves
-        for name in table.values()
-    )
-    legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
-    painted, has_unnamed = {}, False
-    for heading, halves in brains.items():
-        shades = []
-        for mesh, (numbers, table) in halves:
-            side_colours = np.tile(
-                np.array(to_rgb(NEUTRAL_COLOUR)), (len(mesh.vertices), 1)
-            )
-            for number, name in table.items():
-                side_colours[numbers == number] = colours[name]
-            shades.append(side_colours)
-            has_unnamed |= not np.isin(numbers, list(table)).all()
-        painted[heading] = merged(*(mesh for mesh, _ in halves)), np.concatenate(shades)
-    if has_unnamed:
-        legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
-    rows = [
-        Row(
-            f"{view.name} view",
-            [Panel(mesh, shades, view=view) for mesh, shades in painted.values()],
-        )
-        for view in map(VIEWS.__getitem__, ROUND_VIEWS)
-    ]
-    return panel_grid(list(painted), rows, legend=legend)
+def brain_regions(grid: Grid) -> Figure:
+    """Draw the regions of the cortex of a brain."""
+    return region_grid(grid)
 
 
 @styled
-def zones_picture(
-    regions: tuple[TriangleMesh, Mapping[str, NDArray[np.integer]]],
-    params: FoldingParameters,
+def regions_figure(grid: Grid) -> Figure:
+    """Draw the regions of the cortex of observed and simulated brains."""
+    return region_grid(grid)
+
+
+def region_grid(grid: Grid) -> Figure:
+    """Draw brains coloured by region, a column per brain and a row per view, with the
+    regions' names.
+
+    In place of maps, the hemispheres have the numbers of their vertices' regions and
+    the names by number. Numbers without a name mean no region.
+    """
+    names: list[str] = []
+    has_unnamed = False
+    for brain in grid:
+        for _, (numbers, table) in brain.halves:
+            names += table.values()
+            has_unnamed |= not np.isin(numbers, list(table)).all()
+    colours = region_colours(names)
+    legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
+    if has_unnamed:
+        legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
+    placed = []
+    for view in ROUND_VIEWS:
+        for brain in grid:
+            placed.append(
+                replace(
+                    brain,
+                    row=f"{view} view",
+                    view=VIEWS[view],
+                    colours=_painted_regions(brain.halves, colours),
+                )
+            )
+    return brain_grid(placed, legend=legend)
+
+
+def _painted_regions(
+    halves: Sequence[tuple[TriangleMesh, Any]],
+    colours: Mapping[str, tuple[float, float, float]],
+) -> Floats:
+    """Return the colours of the vertices of all hemispheres."""
+    painted = []
+    for mesh, (numbers, table) in halves:
+        shades = uniform_colours(mesh, NEUTRAL_COLOUR)
+        for number, name in table.items():
+            shades[numbers == number] = colours[name]
+        painted.append(shades)
+    return np.concatenate(painted)
+
+
+@styled
+def zones_figure(
+    boundary: tuple[TriangleMesh, Mapping[str, NDArray[np.integer]]],
+    parameters: FoldingParameters,
 ) -> Figure:
     """Draw the zones of the brain's boundary from several sides, with their areas.
 
-    `regions` are the boundary in RAS+ mm and the tags (m,) of its faces, where `zone`
-    is an index into `ZONE_NAMES`; `fissure_x_mm` of the parameters separates the
+    `boundary` is the surface in RAS+ mm and the tags (m,) of its faces, where `zone` is
+    an index into `ZONE_NAMES`; `fissure_x_mm` of the parameters separates the
     hemispheres in medial views.
     """
-    (mesh, tags), fissure_x_mm = regions, params.fissure_x_mm
+    mesh, tags = boundary
     zones = tags["zone"]
-    colours = [ZONE_COLOURS[name] for name in ZONE_NAMES]
-    areas = (
-        np.bincount(zones, weights=face_areas(mesh), minlength=len(colours))
-        * CM2_PER_MM2
-    )
-    present = [item for item in zip(ZONE_NAMES, colours, areas, strict=True) if item[2]]
-    legend = [
-        Patch(color=colour, label=f"{name} {area:.1f} cm²")
-        for name, colour, area in present
-    ]
-    panels = [
-        Panel(
-            *restricted(
-                mesh, to_rgba_array(colours)[zones, :3], view.hemisphere, fissure_x_mm
-            ),
-            view=view,
-            light=MAP,
+    colours = to_rgba_array([ZONE_COLOURS[name] for name in ZONE_NAMES])[:, :3]
+    areas_mm2 = np.bincount(zones, face_areas(mesh), minlength=len(colours))
+    legend = []
+    for name, colour, area_mm2 in zip(ZONE_NAMES, colours, areas_mm2, strict=True):
+        if area_mm2:
+            label = f"{name} {CM2_PER_MM2 * area_mm2:.1f} cm²"
+            legend.append(Patch(color=colour, label=label))
+    grid = []
+    for name in MEDIAL_VIEWS:
+        view = VIEWS[name]
+        part, shades = restricted(
+            mesh, colours[zones], view.hemisphere, parameters.fissure_x_mm
         )
-        for view in map(VIEWS.__getitem__, MEDIAL_VIEWS)
-    ]
-    # a brain of one hemisphere has no medial view of the other
-    panels = [panel for panel in panels if len(panel.mesh.faces)]
-    return panel_grid(
-        [f"{panel.view.name} view" for panel in panels],
-        [Row("", panels)],
-        legend=legend,
-    )
+        # a brain of one hemisphere has no medial view of the other
+        if len(part.faces):
+            grid.append(
+                GridBrain(
+                    "",
+                    f"{name} view",
+                    [(part, {})],
+                    view=view,
+                    colours=shades,
+                    light=MAP,
+                )
+            )
+    return brain_grid(grid, legend=legend)

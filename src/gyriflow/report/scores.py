@@ -38,7 +38,7 @@ SIDE_NAMES = {
 
 
 @styled
-def validation_chart(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+def validation_figure(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     """Draw by week how much better a run's curvature correlates with the observed
     brain's than the scaled start's.
 
@@ -83,7 +83,7 @@ def _gain_line(
 
 
 @styled
-def nearest_chart(
+def nearest_figure(
     comparison: pd.DataFrame,
     *,
     varied: str,
@@ -177,6 +177,27 @@ def nearest_chart(
     return figure
 
 
+def paper_nearest_figure(
+    comparison: pd.DataFrame,
+    published: Mapping[str, Any],
+    *,
+    varied: str,
+    subject: str,
+    observed: Sequence[str],
+    week: float,
+) -> Figure:
+    """Draw the distance of the runs of a sweep with the paper's nearest values (see
+    `nearest_figure`)."""
+    return nearest_figure(
+        comparison,
+        varied=varied,
+        subject=subject,
+        observed=observed,
+        week=week,
+        published=published,
+    )
+
+
 def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> None:
     if rows.empty:
         return
@@ -208,7 +229,7 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
 
 
 @styled
-def calibration_chart(
+def calibration_figure(
     runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str]
 ) -> Figure:
     """Draw a panel for each parameter, with the scores of the runs and the optimum.

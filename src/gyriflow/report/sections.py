@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 
 from ..geometry.alignment import align
 from ..geometry.triangles import Floats, Ints, TriangleMesh
-from ..settings.terms import OBSERVED_BRAIN
 from .labels import week_label
+from .pictures import Grid
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
@@ -79,15 +79,15 @@ def _coronal_section(
 
 
 @styled
-def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> Figure:
+def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> Figure:
     """Draw coronal sections through the elements of a run at its start and at its end.
 
     Columns are the cortical weight with the elements, the growth zone (0 or 1), the
-    tangential growth in a step, and the normals in the cortex. `model` are the elements
-    (m, 4) or (m, 10), and by week the arrays of `folding.zones.model_fields` at their
-    nodes.
+    tangential growth in a step, and the normals in the cortex. `elements` are their
+    nodes (m, 4) or (m, 10), and by week the arrays of `folding.zones.model_fields` at
+    the nodes.
     """
-    tets, weeks = model
+    tets, weeks = elements
     largest = max(float(fields["increment"].max()) for fields in weeks.values())
     figure = Figure(figsize=(FULL_WIDTH_IN, 4.2), layout="constrained")
     rows = figure.subplots(2, 4, sharex="row", sharey="row")
@@ -156,29 +156,30 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
 
 
 @styled
-def outlines_chart(
-    runs: Mapping[str, Mapping[float, TriangleMesh]],
-    observed: Mapping[float, TriangleMesh],
-    *,
-    observed_name: str = OBSERVED_BRAIN,
-) -> Figure:
+def outlines_figure(grid: Grid) -> Figure:
     """Draw the outlines of runs over those of the observed brain, a row per plane, a
     column per week.
 
     The coronal and axial planes pass through the middle of the observed brain, the
     sagittal plane through its right hemisphere. All panels have one scale. At most the
-    last five weeks are shown. Surfaces in RAS+ mm are by run and week, observed ones by
-    week; those of runs are aligned rigidly with the observed brain of their week.
+    last five weeks are shown. The grid has a row for each run and one of observed
+    brains, by week; those of runs are aligned rigidly with the observed brain of their
+    week.
     """
-    weeks, colours = sorted(observed)[-MAX_WEEKS:], run_colours(runs)
-    runs = {
-        run: {
-            week: align(mesh, observed[week])
-            for week, mesh in brains.items()
-            if week in weeks
-        }
-        for run, brains in runs.items()
-    }
+    observed = {}
+    observed_name = ""
+    for brain in grid:
+        if not brain.is_simulated:
+            observed[brain.column] = brain.surface
+            observed_name = brain.row
+    weeks = sorted(observed)[-MAX_WEEKS:]
+    runs: dict[str, dict[float, TriangleMesh]] = {}
+    for brain in grid:
+        if brain.is_simulated:
+            aligned = runs.setdefault(brain.row, {})
+            if brain.column in weeks:
+                aligned[brain.column] = align(brain.surface, observed[brain.column])
+    colours = run_colours(runs)
     drawn = [
         brains[week]
         for brains in (observed, *runs.values())

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -277,7 +277,7 @@ def resources(jobs: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
 
 
-def atlas_ages_table(ages: pd.DataFrame) -> pd.DataFrame:
+def atlas_ages(ages: pd.DataFrame) -> pd.DataFrame:
     """Return the ages by size of an atlas' brains, a row per stated week.
 
     `ages` has the columns stated_week, age_by_size, volume_ml and curve_ml.
@@ -438,21 +438,24 @@ def range_text(values: pd.Series, pattern: str = ".2f") -> str:
     return " to ".join(dict.fromkeys(ends)) or "–"
 
 
-def mesh_quality_table(
-    quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]
+def mesh_quality(
+    quality: Sequence[Mapping[str, Any]],
+    *,
+    starts: Sequence[str],
+    gates: Mapping[str, float],
 ) -> pd.DataFrame:
     """Return the quality of meshes: a row per measure with its limit, a column per
     brain.
 
-    `quality` are the contents of the brains' quality.json by brain, `gates` the limits
-    in the configuration, by their keys in the section mesh.
+    `quality` are the contents of quality.json of each of the start brains, `gates` the
+    limits in the configuration, by their keys in the section mesh.
     """
     columns = {
         brain: {
             **values,
             "surface_distance_mm": values["surface_distance_mm"]["hausdorff99"],
         }
-        for brain, values in quality.items()
+        for brain, values in zip(starts, quality, strict=True)
     }
     table = (
         pd.DataFrame(columns, dtype=object)

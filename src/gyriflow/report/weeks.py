@@ -195,7 +195,7 @@ def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str,
 
 
 @styled
-def metrics_chart(
+def metrics_figure(
     metrics: pd.DataFrame,
     *,
     runs: Sequence[str] = (),
@@ -234,7 +234,7 @@ def metrics_chart(
 
 
 @styled
-def intervals_chart(ensemble: pd.DataFrame) -> Figure:
+def intervals_figure(ensemble: pd.DataFrame) -> Figure:
     """Draw the intervals of an ensemble over the weeks, a panel per metric, with its
     run and the observed brains.
 
@@ -258,14 +258,14 @@ def intervals_chart(ensemble: pd.DataFrame) -> Figure:
 
 
 @styled
-def norms_chart(
+def norms_figure(
     metrics: pd.DataFrame,
     curves: pd.DataFrame,
     *,
     reference: Sequence[str],
     brains: Sequence[str],
     runs: Sequence[str] = (),
-    observed_name: str = OBSERVED_BRAIN,
+    norm_name: str = OBSERVED_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
@@ -276,11 +276,11 @@ def norms_chart(
     spread of individuals is known. Stars are observed brains: black in the reference,
     else coloured, as are groups. Lines are runs.
 
-    Metrics, subjects and groups are as for `metrics_chart`; `curves` has the columns
+    Metrics, subjects and groups are as for `metrics_figure`; `curves` has the columns
     hemisphere, metric, week, expected, q05, q25, q75, q95, which were fitted to the
-    `reference` brains. `brains` have the same hemispheres as the reference: only they,
-    and simulations from them, are drawn. InputError if the table has none of the
-    metrics.
+    `reference` brains, called `norm_name`. `brains` have the same hemispheres as the
+    reference: only they, and simulations from them, are drawn. InputError if the table
+    has none of the metrics.
     """
     whole = runs_by_name(
         metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)]
@@ -322,9 +322,7 @@ def norms_chart(
         extra.append(Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95"))
     elif len(curves):
         extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
-    run_legend(
-        figure, colours, observed_name=observed_name, markers=markers, extra=extra
-    )
+    run_legend(figure, colours, observed_name=norm_name, markers=markers, extra=extra)
     return figure
 
 
@@ -398,7 +396,7 @@ def regions_chart(
 
 
 @styled
-def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     """Draw correlation with and distance from the observed brain by weeks after the
     start: a row of panels per start.
 
@@ -474,7 +472,7 @@ def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
 
 
 @styled
-def displacement_chart(
+def displacement_figure(
     displacement: pd.DataFrame,
     *,
     runs: Sequence[str] = (),
@@ -540,6 +538,17 @@ def displacement_chart(
     return figure
 
 
+def paper_displacement_figure(
+    displacement: pd.DataFrame,
+    published: Mapping[str, Any],
+    *,
+    runs: Sequence[str] = (),
+) -> Figure:
+    """Draw the displacement per week beside that of the paper (see
+    `displacement_figure`)."""
+    return displacement_figure(displacement, runs=runs, published=published)
+
+
 def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
     """Return the rows of some bands in the spectra of a proxy, with a column
     `trusted`."""
@@ -594,7 +603,7 @@ def _sides_in(rows: pd.DataFrame) -> list[str]:
 
 
 @styled
-def spectra_weeks_chart(
+def spectra_figure(
     spectra: pd.DataFrame,
     *,
     runs: Sequence[str] = (),
@@ -650,7 +659,7 @@ def spectra_weeks_chart(
 
 @styled
 def influence_spectra(
-    members: Mapping[str, pd.DataFrame | None],
+    members: Sequence[pd.DataFrame],
     observed: Sequence[pd.DataFrame],
     *,
     values: Mapping[str, Mapping[str, Any]],
@@ -665,16 +674,12 @@ def influence_spectra(
     denominator of the relative power, is cut off, or if the surface does not resolve
     it. A band without any power is labelled as beyond the modes.
 
-    `members` are by run tables as for `spectra_weeks_chart`, None for a run that ended
-    before the week; `observed` those of observed brains, whose run is "real". `values`
-    are by run the varied parameters with their values, in the order of the sweep.
+    `members` are tables as for `spectra_figure` of the runs that reached the week,
+    `observed` those of observed brains, whose run is "real". `values` are by run the
+    varied parameters with their values, in the order of the sweep.
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
-    simulated = [
-        table.assign(run=labels[run])
-        for run, table in members.items()
-        if table is not None
-    ]
+    simulated = [table.assign(run=table["run"].map(labels)) for table in members]
     shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
     colours = dict(zip(labels.values(), shades, strict=False))
     spectra = pd.concat([*simulated, *observed])

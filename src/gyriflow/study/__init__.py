@@ -1,5 +1,5 @@
-"""Studies: load and check a configuration, and resolve it into brains, simulations,
-sweeps and figures."""
+"""Studies: load and check a configuration, and resolve it into brains, simulations and
+sweeps."""
 
 from .resolve import resolve
 

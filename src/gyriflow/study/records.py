@@ -12,7 +12,7 @@ from ..settings.folding import VARYING
 from ..settings.growth import Origin
 from ..settings.runs import Run, members_of
 from ..settings.schemes import FILLED
-from ..settings.terms import MEASURED, Side
+from ..settings.terms import MEASURED, OBSERVED_BRAIN, Side
 from ..settings.varying import Varying
 from . import paths
 
@@ -192,6 +192,34 @@ class Brain:
             report=self.report,
             regions=self.regions,
         )
+
+
+def observed_name(brains: Iterable[Brain]) -> str:
+    """Return the name of observed brains in figures and tables: their populations if
+    known.
+
+    Several populations are listed with their weeks. Brains of unknown population are
+    called "observed brain"; shapes are called by their kind if they share one.
+    """
+    weeks: dict[str, list[float]] = {}
+    shapes = set()
+    for brain in brains:
+        if brain.config.shape is not None:
+            shapes.add(brain.config.shape.kind)
+        else:
+            name = brain.config.population or OBSERVED_BRAIN
+            weeks.setdefault(name, []).append(brain.week)
+    names = list(weeks)
+    if len(names) > 1:
+        names = []
+        for name, of_name in weeks.items():
+            ends = sorted({min(of_name), max(of_name)})
+            names.append(f"{name} ({'-'.join(f'{week:g}' for week in ends)} GW)")
+    if len(shapes) == 1:
+        names.append(shapes.pop())
+    elif shapes:
+        names.append("simple shape")
+    return " or ".join(names) or OBSERVED_BRAIN
 
 
 @dataclass(frozen=True, eq=False)

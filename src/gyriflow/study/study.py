@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..io.exports import ExportedBrain, labels_file
 from ..settings.atlas import Atlas
 from ..settings.root import Config
-from ..settings.terms import MEASURED, SIDES
+from ..settings.terms import MAX_COLOURS, MEASURED, SIDES, min_norm_subjects
 from . import paths
 from .atlases import UsedAtlas
 from .records import Brain, CalibrationRuns, Measurement, Simulation, Sweep
@@ -275,10 +275,42 @@ class Study:
             ]
         return [brain.id for brain in brains]
 
+    @property
+    def has_norm(self) -> bool:
+        """Whether metrics are compared with a norm: of another study, or of enough
+        subjects of this one."""
+        if self.config.metrics.norms is not None:
+            return True
+        subjects = {self.brains[brain].subject for brain in self.norm_reference}
+        are_individuals = self.are_individuals(self.norm_reference)
+        return len(subjects) >= min_norm_subjects(individuals=are_individuals)
+
     def _is_named(self, brain: Brain, names: Iterable[str]) -> bool:
         """Return whether a brain or its atlas is among names."""
         atlas = self.atlases.get(brain.id)
         return brain.id in names or (atlas is not None and atlas.name in names)
+
+    @cached_property
+    def colour_groups(self) -> dict[str, str]:
+        """The group of each observed brain: its value of the covariate that colours
+        show.
+
+        That is the first covariate with 2 to `MAX_COLOURS` values and fewer values than
+        subjects.
+        """
+        brains: dict[str, list[Brain]] = {}
+        for brain in self.brains.values():
+            for name in brain.config.covariates:
+                brains.setdefault(name, []).append(brain)
+        for name, with_value in brains.items():
+            groups = {}
+            for brain in with_value:
+                groups[brain.id] = f"{name}: {brain.config.covariates[name]}"
+            n_groups = len(set(groups.values()))
+            n_subjects = len({brain.subject for brain in with_value})
+            if 1 < n_groups <= MAX_COLOURS and n_groups < n_subjects:
+                return groups
+        return {}
 
     @property
     def scans(self) -> dict[str, list[str]]:

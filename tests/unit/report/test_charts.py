@@ -12,20 +12,20 @@ from pictures import words
 
 from gyriflow.errors import InputError
 from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
-from gyriflow.report.growth import growth_chart
+from gyriflow.report.growth import growth_figure
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.pictures import region_colours
-from gyriflow.report.scores import calibration_chart, nearest_chart, validation_chart
+from gyriflow.report.scores import calibration_figure, nearest_figure, validation_figure
 from gyriflow.report.tables import brain_table
 from gyriflow.report.weeks import (
-    displacement_chart,
+    displacement_figure,
     influence_spectra,
-    intervals_chart,
-    metrics_chart,
-    norms_chart,
-    prediction_chart,
+    intervals_figure,
+    metrics_figure,
+    norms_figure,
+    prediction_figure,
     regions_chart,
-    spectra_weeks_chart,
+    spectra_figure,
 )
 from gyriflow.settings.terms import SPREAD_UNKNOWN
 
@@ -100,9 +100,7 @@ def spectrum_rows(
 def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
     """Draw the spectra of a study with one member at 28 GW."""
     values = {"thin": {"thickness_mm": 1.5}}
-    return influence_spectra(
-        {"thin": pd.concat(members)}, real, values=values, week=28.0
-    )
+    return influence_spectra([pd.concat(members)], real, values=values, week=28.0)
 
 
 def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
@@ -116,7 +114,7 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
         )
     ]
     subjects = {"a1": "sub-a", "a2": "sub-a", "b1": "sub-b"}
-    figure = metrics_chart(pd.concat(parts), subjects=subjects)
+    figure = metrics_figure(pd.concat(parts), subjects=subjects)
     drawn = [
         (line.get_marker(), line.get_linestyle(), line.get_xdata().tolist())
         for line in figure.axes[0].lines
@@ -130,7 +128,7 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
     }
     assert {"sub-a", "sub-b", "observed brain"} <= words(figure)
     # a covariate has colours beside the markers
-    figure = metrics_chart(
+    figure = metrics_figure(
         pd.concat(parts),
         subjects=subjects,
         groups={"a1": "sex: F", "a2": "sex: F", "b1": "sex: M"},
@@ -144,7 +142,7 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
     assert {"sex: F", "sex: M", "sub-a", "observed brain"} <= words(figure)
     # more than a legend holds share the star
     many = pd.concat([parts[0].assign(subject=f"s{number}") for number in range(9)])
-    figure = metrics_chart(
+    figure = metrics_figure(
         many, subjects={f"s{number}": f"sub-{number}" for number in range(9)}
     )
     assert {line.get_marker() for line in figure.axes[0].lines} == {"*"}
@@ -162,7 +160,7 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
             ),
         ]
     )
-    figure = metrics_chart(metrics)
+    figure = metrics_figure(metrics)
     area, curvedness = figure.axes
     assert area.get_title() == "pial area (cm²)"
     drawn = {line.get_marker(): line.get_xydata().tolist() for line in area.lines}
@@ -173,7 +171,7 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
 
 def test_a_table_without_metrics_is_refused():
     with pytest.raises(InputError, check=Facts("spam")):
-        metrics_chart(metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""))
+        metrics_figure(metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""))
 
 
 def test_spectra_bars_are_the_relative_powers_of_each_side():
@@ -228,7 +226,7 @@ def test_bands_that_are_cut_off_are_marked_and_keyed(run, shown):
     ]
     assert hatches_and_open_stars(study_of(*good.values())) == (False, False)
     spectra = pd.concat([*cut["thin"], *cut["real"]])
-    assert hatches_and_open_stars(spectra_weeks_chart(spectra)) == (
+    assert hatches_and_open_stars(spectra_figure(spectra)) == (
         False,
         run == "real",
     )
@@ -277,7 +275,7 @@ def test_norms_show_the_reference_the_band_and_the_others(metrics_with_norms):
     # half a brain, which is not compared with whole ones
     half = metrics_with_norms[:1].assign(subject="half", value=5.0)
     brains = {"reference": REFERENCE, "brains": [*REFERENCE, "case"]}
-    figure = norms_chart(pd.concat([metrics_with_norms, half]), curves, **brains)
+    figure = norms_figure(pd.concat([metrics_with_norms, half]), curves, **brains)
     axes = figure.axes[0]
     stars = {
         point: line.get_color()
@@ -295,7 +293,7 @@ def test_norms_show_the_reference_the_band_and_the_others(metrics_with_norms):
 def test_norms_of_averages_have_a_curve_without_a_band(metrics_with_norms):
     curves = norm_curves(cohort_norms(metrics_with_norms, REFERENCE, individuals=False))
     brains = {"reference": REFERENCE, "brains": [*REFERENCE, "case"]}
-    figure = norms_chart(
+    figure = norms_figure(
         metrics_with_norms, curves, **brains, groups={"case": "sex: F"}
     )
     curve = next(line for line in figure.axes[0].lines if len(line.get_xdata()) > 20)
@@ -356,7 +354,7 @@ def test_bands_of_a_norm_lie_between_its_outer_and_its_inner_centiles():
     )
     other = curves.assign(hemisphere="left", expected=1.0, q05=0.0, q95=2.0)
     brain = metric_rows("real", "whole", "area", {24.0: 150.0}, "cm2")
-    axes = norms_chart(
+    axes = norms_figure(
         brain, pd.concat([other, curves]), reference=["s"], brains=["s"]
     ).axes[0]
     assert edges(axes, 0) == [
@@ -389,7 +387,7 @@ def test_intervals_are_around_the_run_and_observed_brains_are_stars():
             **ends,
         }
     )
-    figure = intervals_chart(
+    figure = intervals_figure(
         pd.concat([rows.assign(metric="area"), rows.assign(metric="folding_index")])
     )
     # a metric without intervals is not drawn
@@ -413,9 +411,7 @@ def test_spectra_over_weeks_are_by_side_and_band_and_open_where_a_band_is_cut_of
         for brain, week, power in (("a1", 26.0, {4: 0.25}), ("a2", 27.5, {4: 0.15}))
         for part in spectrum_rows("real", week, power)
     ]
-    figure = spectra_weeks_chart(
-        pd.concat([*thin, *scans]), subjects={"a1": "a", "a2": "a"}
-    )
+    figure = spectra_figure(pd.concat([*thin, *scans]), subjects={"a1": "a", "a2": "a"})
     left4, left5, right4, _ = figure.axes
 
     def drawn(axes):
@@ -473,7 +469,7 @@ def line_of(axes, label):
 
 
 def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
-    figure = growth_chart(AREAS, RATES, folding_rate_per_s=2e-7)
+    figure = growth_figure(AREAS, RATES, folding_rate_per_s=2e-7)
     area_axes, volume_axes, rate_axes = figure.axes
     assert {"a", "b", "c"} <= words(figure)
     assert [bar.get_height() for bar in rate_axes.patches] == pytest.approx([1.2, -0.3])
@@ -488,8 +484,8 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
 
 
 def test_brains_without_rates_have_areas_and_volumes_only():
-    assert len(growth_chart(AREAS, RATES[:0]).axes) == 2
-    figure = growth_chart(pd.concat([AREAS.assign(series="others"), AREAS]), RATES)
+    assert len(growth_figure(AREAS, RATES[:0]).axes) == 2
+    figure = growth_figure(pd.concat([AREAS.assign(series="others"), AREAS]), RATES)
     area_axes, _, rate_axes = figure.axes
     assert len(area_axes.lines) == 2
     assert [bar.get_height() for bar in rate_axes.patches] == pytest.approx([1.2, -0.3])
@@ -497,7 +493,7 @@ def test_brains_without_rates_have_areas_and_volumes_only():
 
 def test_the_rates_of_many_subjects_share_a_panel():
     names = [f"sub-{number}" for number in range(9)]
-    figure = growth_chart(
+    figure = growth_figure(
         pd.concat([AREAS.assign(series=name) for name in names]),
         pd.concat([RATES.assign(series=name) for name in names]),
     )
@@ -514,7 +510,7 @@ def test_the_rates_of_many_subjects_share_a_panel():
 
 def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
     curve = {21.5: 1e-7, 22.5: 2e-7, 25.0: 4.5e-7}
-    figure = growth_chart(AREAS, RATES, folding_rate_per_s=curve)
+    figure = growth_figure(AREAS, RATES, folding_rate_per_s=curve)
     # the bars of weeks 21-22 and 22-23 stand at 0 and 1, one wide: constant up to 21.5,
     # linear from there on
     assert line_of(figure.axes[2], "folding") == pytest.approx(
@@ -538,12 +534,12 @@ def test_displacement_is_that_of_all_nodes_per_week_at_the_middle_of_the_interva
             "mean_mm": [0.57, 0.8, 0.5],
         }
     )
-    largest, mean = displacement_chart(norms).axes
+    largest, mean = displacement_figure(norms).axes
     lines = {line.get_label(): line.get_xydata().tolist() for line in mean.lines}
     assert lines == {"thin": [[21.5, 0.57], [26.0, 0.25]]}
     assert largest.get_ylabel() == Facts("mm", "week")
     published = {"source": "a paper", "max_mm": [2.5, 2.2], "mean_mm": [0.5, 0.4]}
-    figure = displacement_chart(
+    figure = displacement_figure(
         norms, published={"displacement": {"from_weeks": [21, 22], "rows": [published]}}
     )
     for axes, values in zip(figure.axes, ([2.5, 2.2], [0.5, 0.4]), strict=True):
@@ -570,7 +566,7 @@ OPTIMUM = pd.DataFrame(
 
 
 def test_each_parameter_of_a_calibration_has_a_panel():
-    figure = calibration_chart(RUNS, OPTIMUM, score=["size"])
+    figure = calibration_figure(RUNS, OPTIMUM, score=["size"])
     assert [axes.get_xlabel() for axes in figure.axes] == [
         "cortical thickness (mm)",
         "growth rate (s⁻¹)",
@@ -606,7 +602,7 @@ def gains(runs, weeks=(22, 23, 24)):
 
 
 def test_gains_are_drawn_with_their_kind_and_interval():
-    axes = validation_chart(gains(["reference", "measured"])).axes[0]
+    axes = validation_figure(gains(["reference", "measured"])).axes[0]
     dots = [line for line in axes.lines if line.get_marker() == "o"]
     assert [line.get_markerfacecolor() for line in dots].count("white") == 2
     assert sum(len(line.get_xdata()) for line in dots) == 6
@@ -638,7 +634,7 @@ def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():
         for model in ("run", "scaled", "new")
         for horizon in (1.0, 2.0)
     ]
-    figure = prediction_chart(pd.DataFrame(rows), runs=["expected", "stiff"])
+    figure = prediction_figure(pd.DataFrame(rows), runs=["expected", "stiff"])
     first, away, second, _ = figure.axes
     assert [len(axes.lines) for axes in figure.axes] == [4] * 4
     full = [line.get_ydata() for line in second.lines if line.get_linestyle() == "-"]
@@ -667,7 +663,7 @@ def distances(
 def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
     good = distances({0.8: 3.0, 1.5: 2.0, 2.25: 1.0})
     bad = distances({6.0: 0.1}, flag="not resolved by the mesh")
-    figure = nearest_chart(pd.concat([good, bad]), **OF_THE_STUDY)
+    figure = nearest_figure(pd.concat([good, bad]), **OF_THE_STUDY)
     (axes,) = figure.axes
     assert [text.get_text() for text in axes.texts] == ["2.25"]
     assert axes.get_xlabel() == "cortical thickness (mm)"
@@ -697,7 +693,7 @@ def test_a_published_nearest_value_is_a_line_in_the_panel_of_its_measure_and_wee
         found | {"week": 29, "value": 1.4},
         found | {"parameter": "step_s", "value": 1.5},
     ]
-    figure = nearest_chart(
+    figure = nearest_figure(
         pd.concat(rows), **OF_THE_STUDY, published={"nearest": [found, *others]}
     )
     dashed = [
@@ -707,5 +703,5 @@ def test_a_published_nearest_value_is_a_line_in_the_panel_of_its_measure_and_wee
     assert dashed == [[], [1.3]]
     # and in the legend
     assert (
-        len(words(figure) - words(nearest_chart(pd.concat(rows), **OF_THE_STUDY))) == 1
+        len(words(figure) - words(nearest_figure(pd.concat(rows), **OF_THE_STUDY))) == 1
     )

@@ -12,22 +12,31 @@ from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.quantities import name_in_interval
 from gyriflow.report.panels import LINES_MM, direction_lines
 from gyriflow.report.pictures import (
+    GridBrain,
+    brain_grid,
     displacement_maps,
-    growth_maps,
-    influence_picture,
-    regions_picture,
-    runs_by_week,
-    scalar_maps,
+    expected_figure,
+    growth_grid,
+    in_views,
+    influence_figure,
+    predicted_figure,
+    region_grid,
     scale_of,
     shape_maps,
-    zones_picture,
+    weekly_figure,
+    zones_figure,
 )
 from gyriflow.report.scene import VIEWS, render, uniform_colours
-from gyriflow.report.sections import model_sections, outlines_chart
+from gyriflow.report.sections import model_figure, outlines_figure
 from gyriflow.settings.folding import parameters_from
 
 BRAIN = box((20, 30, 20))
 SMOOTH = ellipsoid((20.0, 26.0, 18.0))
+
+
+def plain(row, column, mesh, *, simulated=False):
+    """Return a brain of one colour."""
+    return GridBrain(row, column, [(mesh, {})], simulated)
 
 
 def seen(mesh, colours, view, mm=20, **look):
@@ -72,19 +81,23 @@ def test_up_is_superior_and_in_the_top_view_anterior():
 
 
 def test_a_predicted_brain_alone_is_blue_between_start_and_atlas():
-    real = {"start": BRAIN, "then": box((24, 34, 24)), "atlas": BRAIN}
-    figure = runs_by_week(
-        {}, real, views=("left", "top"), observed_name="", predicted="then"
+    figure = predicted_figure(
+        [
+            plain("", "start", BRAIN),
+            plain("", "then", box((24, 34, 24)), simulated=True),
+            plain("", "atlas", BRAIN),
+        ]
     )
-    tones = [tone(picture(figure, number)) for number in range(6)]
-    assert [blue > red for red, _, blue in tones] == 2 * [False, True, False]
+    tones = [tone(picture(figure, number)) for number in range(9)]
+    assert [blue > red for red, _, blue in tones] == 3 * [False, True, False]
 
 
 def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before():
-    figure = runs_by_week(
-        {"long": dict.fromkeys(np.arange(21.0, 31.0), BRAIN)},
-        {21.0: BRAIN},
-        views=("left",),
+    long = [
+        plain("long", week, BRAIN, simulated=True) for week in np.arange(21.0, 31.0)
+    ]
+    figure = brain_grid(
+        in_views([*long, plain("observed brain", 21.0, BRAIN)], ("left",))
     )
     written = [text.get_text() for text in figure.findobj(Text)]
     assert [
@@ -94,8 +107,13 @@ def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before()
 
 def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps_and_one_scale():
     small, large = BRAIN, box((60, 80, 60))
-    figure = runs_by_week(
-        {"simulated": {22.0: small, 23.5: large}}, {22.0: small}, views=("left", "top")
+    # weeks are sorted
+    figure = weekly_figure(
+        [
+            plain("simulated", 23.5, large, simulated=True),
+            plain("simulated", 22.0, small, simulated=True),
+            plain("observed brain", 22.0, small),
+        ]
     )
     panels = [axes.get_label() for axes in pictures(figure)]
     assert len(panels) == 6
@@ -133,11 +151,11 @@ def test_displacement_maps_share_their_colour_scale():
         norm: TriangleMesh(BRAIN.vertices - [0.0, 0, norm], BRAIN.faces)
         for norm in (1, 4)
     }
-    frames = {
-        "slow": {21.0: (before[1], {}), 22.0: (BRAIN, {})},
-        "fast": {22.0: (before[4], {}), 23.0: (BRAIN, {})},
-    }
-    figure = displacement_maps(frames)
+    frames = [
+        {21.0: (before[1], {}), 22.0: (BRAIN, {})},
+        {22.0: (before[4], {}), 23.0: (BRAIN, {})},
+    ]
+    figure = displacement_maps(frames, runs=["slow", "fast"])
     bar = colour_bar(figure, "displacement")
     assert bar.get_xlim() == pytest.approx((0.0, 4.0))
     assert "(mm)" in bar.get_xlabel()
@@ -160,7 +178,7 @@ def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed
     top = int((SMOOTH.vertices @ [0.3, 0, 1]).argmax())
     moves[top] *= 50
     before = TriangleMesh(SMOOTH.vertices - moves, SMOOTH.faces)
-    figure = displacement_maps({"run": {21.0: (before, {}), 22.0: (SMOOTH, {})}})
+    figure = displacement_maps([{21.0: (before, {}), 22.0: (SMOOTH, {})}], runs=["run"])
     bar = colour_bar(figure, "displacement")
     assert bar.get_xlim()[1] == pytest.approx(1.0)
     rings = [
@@ -175,11 +193,12 @@ def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed
 
 
 def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
-    maps = {
-        "simulated": {28.0: (BRAIN, np.full(8, 0.7))},
-        "observed brain": {28.0: (BRAIN, np.full(8, -0.7))},
-    }
-    figure = scalar_maps(maps, quantity="shape_index", views=("left",))
+    values = {"simulated": 0.7, "observed brain": -0.7}
+    grid = [
+        GridBrain(row, 28.0, [(BRAIN, {"shape_index": np.full(8, value)})])
+        for row, value in values.items()
+    ]
+    figure = brain_grid(in_views(grid, ("left",)), "shape_index")
     bar = colour_bar(figure, "shape index")
     assert bar.get_xlim() == (-1.0, 1.0)
     gyri, sulci = map(tone, (picture(figure, 0), picture(figure, 1)))
@@ -196,7 +215,7 @@ def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
         "output_weeks": [21, 22],
         "fissure_x_mm": 0.0,
     }
-    figure = zones_picture((brain, {"zone": zones}), parameters_from(run))
+    figure = zones_figure((brain, {"zone": zones}), parameters_from(run))
     # a box of 10 × 30 × 20 mm has 22 cm²
     assert {"clamped 22.0 cm²", "right contact 22.0 cm²"} <= words(figure)
     assert not any("free" in text for text in words(figure))
@@ -221,13 +240,14 @@ def test_lines_on_a_map_run_along_directions_where_these_are_seen():
     assert len(np.unique(np.floor(ends.mean(axis=1) / LINES_MM), axis=0)) > 0.6 * len(
         ends
     )
-    maps = {"growth": {(21.0, 22.0): (SMOOTH, np.full(len(right), 0.1))}}
-    figure = scalar_maps(
-        maps,
-        quantity="area_growth_percent_per_gw",
-        directions={(21.0, 22.0): right},
-        views=("right", "left"),
-    )
+    growth = {
+        name_in_interval(f"growth_direction_{axis}", 21.0, 22.0): right[:, number]
+        for number, axis in enumerate("xyz")
+    }
+    name = "area_growth_percent_per_gw"
+    growth[name_in_interval(name, 21.0, 22.0)] = np.full(len(right), 0.1)
+    frames = {21.0: (SMOOTH, {}), 22.0: (SMOOTH, {})}
+    figure = growth_grid(frames, growth, name, views=("right", "left"))
     dark = [(picture(figure, number) < 60).all(axis=-1).sum() for number in (0, 1)]
     assert dark[0] > 1000
     assert dark[1] == 0
@@ -236,15 +256,12 @@ def test_lines_on_a_map_run_along_directions_where_these_are_seen():
 def test_a_map_that_one_hemisphere_lacks_is_grey_there():
     halves = [
         (box((8, 30, 20), (x, 0, 0)), maps)
-        for x, maps in ((-6, {"curvedness": np.ones(8)}), (6, {}))
+        for x, maps in ((-6, {"shape_index": np.ones(8)}), (6, {}))
     ]
-    figure = shape_maps(
-        {"simulated": {21.0: halves}, "observed brain": {}},
-        quantity="curvedness",
-        views=("top",),
-    )
+    figure = shape_maps([GridBrain("simulated", 21.0, halves)])
     assert {"simulated", "not measured"} <= words(figure)
-    image = picture(figure).astype(float)
+    # from above
+    image = picture(figure, 1).astype(float)
     left = tone(image[:, : image.shape[1] // 2])
     right = tone(image[:, image.shape[1] // 2 :])
     assert np.ptp(right) < 3 < np.ptp(left)
@@ -262,7 +279,8 @@ def test_growth_of_an_interval_is_on_the_surface_at_its_end():
         for name, factor in names.items()
         for ends, value in values.items()
     }
-    figure = growth_maps(frames, maps, views=("left",))
+    area, across_surface = names
+    figure = growth_grid(frames, maps, area, views=("left",))
     assert {"21–22.5 GW\nleft view", "22.5–25 GW\nleft view"} <= words(figure)
     assert colour_bar(figure, "growth of area").get_xlim() == pytest.approx((0.0, 8.0))
     first, second = picture(figure, 0), picture(figure, 1)
@@ -270,23 +288,22 @@ def test_growth_of_an_interval_is_on_the_surface_at_its_end():
         axis=1
     ).sum() == pytest.approx(30 / 24, rel=0.02)
     assert tone(first).sum() > 1.3 * tone(second).sum()
-    across = growth_maps(
-        frames, maps, quantity="thickness_growth_percent_per_gw", views=("left",)
-    )
+    across = growth_grid(frames, maps, across_surface, views=("left",))
     assert colour_bar(across, "across").get_xlim() == pytest.approx((-4.0, 4.0))
 
 
 def test_an_observed_surface_outside_of_the_expected_one_is_red_and_inside_blue():
     distance = np.where(BRAIN.vertices[:, 1] > 0, 3.0, -1.5)
-    deviations = {26.0: (BRAIN, {"distance_mm": distance})}
-    figure = runs_by_week(
-        {"expected": {22.0: BRAIN, 26.0: BRAIN}},
-        {26.0: BRAIN},
-        deviations=deviations,
-        views=("top",),
+    figure = expected_figure(
+        [
+            plain("expected", 22.0, BRAIN, simulated=True),
+            plain("expected", 26.0, BRAIN, simulated=True),
+            plain("observed brain", 26.0, BRAIN),
+            GridBrain("distance", 26.0, [(BRAIN, {"distance_mm": distance})]),
+        ]
     )
-    # rows: the run in two weeks, the observed brain, the distance
-    image = picture(figure, 3).astype(float)
+    # rows: the run in two weeks from two sides, the observed brain, the distance
+    image = picture(figure, 7).astype(float)
     front = tone(image[: image.shape[0] // 3])
     back = tone(image[-image.shape[0] // 3 :])
     assert front[0] > front[2] + 30
@@ -303,14 +320,17 @@ def test_runs_of_a_sweep_stand_in_their_order_with_the_observed_brain_last():
             ("real", 24, 0.1),
         )
     }
-    members = {"a": halves["thick"], "b": None, "c": halves["thin"]}
+    grid = [
+        GridBrain("", "a", halves["thick"], is_simulated=True),
+        GridBrain("", "b", is_simulated=True),
+        GridBrain("", "c", halves["thin"], is_simulated=True),
+        GridBrain("", "seen", halves["real"]),
+    ]
     values = {
         run: {"thickness_mm": size}
         for run, size in (("a", 2.5), ("b", 2.0), ("c", 1.5))
     }
-    figure = influence_picture(
-        members, halves["real"], values=values, observed_name="seen"
-    )
+    figure = influence_figure(grid, values=values)
     assert {"2.5 mm", "2 mm", "1.5 mm", "seen", "ended\nbefore\nthis week"} <= words(
         figure
     )
@@ -334,7 +354,9 @@ def test_regions_are_seen_in_their_colours_where_they_are():
     mesh = sphere(20.0)
     y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
     regions = np.where(z < -12, 0, np.where(y > 0, 1, 2))
-    figure = regions_picture({"p": [(mesh, (regions, {1: "front", 2: "back"}))]})
+    figure = region_grid(
+        [GridBrain("", "p", [(mesh, (regions, {1: "front", 2: "back"}))])]
+    )
     hues = {
         patch.get_label(): np.array(patch.get_facecolor()[:3])
         for patch in figure.legends[0].legend_handles
@@ -369,7 +391,7 @@ def test_the_models_fields_are_drawn_in_the_elements_at_the_start_and_at_the_end
         week: model_fields(zones, size * mesh.vertices, p, week)
         for week, size in sizes.items()
     }
-    figure = model_sections((mesh.tets, weeks))
+    figure = model_figure((mesh.tets, weeks))
     assert {"cortical weight", "growth zone", "normals", "21 GW", "22 GW"} <= words(
         figure
     )
@@ -393,8 +415,13 @@ def test_outlines_are_those_of_both_brains_at_one_scale_laid_onto_each_other():
         TriangleMesh(mesh, SMOOTH.faces)
         for mesh in (1.1 * SMOOTH.vertices, SMOOTH.vertices + [5, -3, 2])
     )
-    figure = outlines_chart(
-        {"thin": {21.0: SMOOTH, 22.0: moved}}, {21.0: SMOOTH, 22.0: bigger}
+    figure = outlines_figure(
+        [
+            plain("thin", 21.0, SMOOTH, simulated=True),
+            plain("thin", 22.0, moved, simulated=True),
+            plain("observed brain", 21.0, SMOOTH),
+            plain("observed brain", 22.0, bigger),
+        ]
     )
     first, second = figure.axes[2:4]
     assert np.ptp(first.get_xlim()) == np.ptp(second.get_xlim())

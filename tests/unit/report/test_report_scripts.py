@@ -43,8 +43,6 @@ FOLDED = [("thin", "young"), ("thick", "old")]
 GROWTH = ["own", "population P"]
 FIGURE = {
     "section": "Surfaces",
-    "title": "Seen",
-    "caption": "a picture",
     "technical": False,
     "first": False,
     "names": {},
@@ -162,7 +160,9 @@ def pages(folder):
         "intervals": [],
         "provenance": "provenance.json",
         "methods": "methods.rst",
+        "captions": ["picture.rst"],
     }
+    write_text(folder / "picture.rst", "Seen\n====\na picture\n")
     pictures = {
         name: FIGURE | {"name": "picture", "path": str(folder / f"{name}.png")}
         for name in COLOURS

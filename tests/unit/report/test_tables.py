@@ -13,7 +13,7 @@ from gyriflow.report.tables import (
     accuracy_table,
     centile_text,
     html_table,
-    mesh_quality_table,
+    mesh_quality,
     metrics_table,
     predicted_table,
     resources,
@@ -209,8 +209,10 @@ def test_the_quality_of_a_mesh_stands_beside_its_limits():
         "surface_distance_mm": {"hausdorff99": 0.0625},
     }
     html = html_table(
-        mesh_quality_table(
-            {"a": quality}, {"min_radius_ratio": 0.02, "max_surface_distance_mm": 0.1}
+        mesh_quality(
+            [quality],
+            starts=["a"],
+            gates={"min_radius_ratio": 0.02, "max_surface_distance_mm": 0.1},
         )
     )
     rows = dict(

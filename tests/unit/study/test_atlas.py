@@ -22,7 +22,7 @@ from gyriflow.shipped import ATLASES, shipped_atlases
 from gyriflow.study import resolve
 from gyriflow.study.atlases import known_checksums, retrieval_note, used_atlases
 from gyriflow.study.loading import load
-from gyriflow.study.registry import observed_name
+from gyriflow.study.records import observed_name
 
 UNOPERATED = "spina bifida aperta, unoperated"
 OPERATED = "spina bifida aperta, operated"

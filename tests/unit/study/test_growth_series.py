@@ -19,7 +19,6 @@ from shapes import sphere
 from gyriflow.geometry.triangles import TriangleMesh, flipped
 from gyriflow.io.surfaces import write_surface
 from gyriflow.study import resolve
-from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
 
 SURFACE = sphere(30.0, 2)
@@ -212,12 +211,7 @@ def test_charts_are_coloured_by_a_covariate_that_groups_subjects():
         {"id": f"b{n}", "week": 21, "covariates": values, **LABELLED}
         for n, values in enumerate(covariates)
     ]
-    figures = figures_of(resolve(load({"brains": brains})))
-    (groups,) = [
-        figure.options["groups"]
-        for figure in figures
-        if figure.kind.name == "metrics_figure"
-    ]
+    groups = resolve(load({"brains": brains})).colour_groups
     # all are of one site, and each has its own mother
     assert groups == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
 

@@ -268,7 +268,6 @@ def test_runs_of_all_sections_have_folders_of_their_own(changes, key, facts):
 
 def test_folders_of_results_are_no_names_of_studies():
     sources = [
-        ROOT / "workflow/figures.yaml",
         *ROOT.glob("workflow/rules/*.smk"),
         *ROOT.glob("src/gyriflow/study/*.py"),
     ]

@@ -14,7 +14,6 @@ from gyriflow.io.surfaces import write_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings import ensemble
 from gyriflow.study import resolve
-from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
 from gyriflow.study.paths import CURVES
 
@@ -23,10 +22,6 @@ CURVE = {21: 99, 24: 150}
 SIZES = {"model": "sizes", "area_cm2": CURVE, "volume_ml": CURVE}
 SPHERE = {"shape": {}}
 EXPECTED = {"runs": {"a": {"preset": "expected"}}}
-
-
-def surface(brain):
-    return f"results/brains/{brain}/surface/pial.surf.gii"
 
 
 @pytest.fixture
@@ -243,12 +238,6 @@ def test_a_week_of_days_is_one_number_everywhere(labels):
         *(member.at(24.29) for member, _ in comparison.members),
     ]
     assert {row.week for row in rows} == {24.29}
-    spectra = next(
-        figure
-        for figure in figures_of(found)
-        if figure.kind.name == "influence_spectra"
-    )
-    assert spectra.options["week"] == 24.29
     assert one.measurements[-1].where.endswith("/week-24.29")
 
 
@@ -718,14 +707,6 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         "atlas_surface": f"{at}/atlas.pial.surf.gii",
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
-    (drawn,) = (
-        figure for figure in figures_of(found) if figure.kind.name == "predicted_figure"
-    )
-    shown = {22.4: surface("own22.4"), 23.9: f"{at}/pial.surf.gii", 24: surface("b24")}
-    assert list(drawn.inputs["observed"].items()) == [
-        (Facts(week, "GW"), path) for week, path in shown.items()
-    ]
-    assert drawn.options["predicted"] == list(drawn.inputs["observed"])[1]
     # no prediction is one that its own later brains explain, or a study of several runs
     assert (
         study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}}).prediction_facts

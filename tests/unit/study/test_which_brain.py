@@ -5,7 +5,6 @@ import pytest
 from configurations import LABELLED, ids, labelled, resolved
 
 from gyriflow.errors import InputError
-from gyriflow.study.figures import figures_of
 
 
 def brain(name, week, side=None, **more):
@@ -163,9 +162,7 @@ def test_norms_are_drawn_of_ten_subjects_however_often_each_was_scanned(
         for week in (21, 22)
     ]
     found = resolved(brains, start="s0w21", runs={"reference": {"end_week": 22}})
-    assert (
-        "norms_figure" in {figure.kind.name for figure in figures_of(found)}
-    ) == drawn
+    assert found.has_norm == drawn
 
 
 def test_a_chain_goes_from_its_own_start_to_the_first_brain_past_its_own_end():
@@ -302,10 +299,7 @@ def test_charts_have_the_colours_of_a_covariate_for_each_scan_of_a_subject():
         for week in (21, 22)
     ]
     found = resolved(brains, start="pw21", runs={"reference": {"end_week": 22}})
-    (chart,) = (
-        figure for figure in figures_of(found) if figure.kind.name == "metrics_figure"
-    )
-    assert chart.options["groups"] == {
+    assert found.colour_groups == {
         given["id"]: f"sex: {given['covariates']['sex']}" for given in brains
     }
 
