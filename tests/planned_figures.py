@@ -21,7 +21,7 @@ from snakemake.settings.types import (
     WorkflowSettings,
 )
 
-from gyriflow.running.launch import DRY_RUN_VAR
+from gyriflow.running.launch import DRY_RUN_VAR, LAUNCHED_VAR
 
 SNAKEFILE = Path(__file__).parents[1] / "Snakefile"
 
@@ -49,7 +49,7 @@ def planned_figures(folder, config, ended=()):
     # planned as in a dry run, which leaves no records
     with (
         chdir(folder),
-        patch.dict(os.environ, {DRY_RUN_VAR: "1"}),
+        patch.dict(os.environ, {DRY_RUN_VAR: "1", LAUNCHED_VAR: "1"}),
         SnakemakeApi(OutputSettings(quiet={Quietness.ALL})) as api,
     ):
         workflow = api.workflow(
