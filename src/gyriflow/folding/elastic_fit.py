@@ -340,8 +340,8 @@ class ElasticFit:
 
         Where elements would be inverted or faces cross on the straight way, the
         displacement is smoothed around them, over lengths that increase. The body
-        follows the shape, and is drawn to it, if faults remain or this changes the
-        shape too much.
+        follows the shape, and is drawn to it, if faults remain, if this changes the
+        shape by more than `MAX_CHANGE_MM`, or if curved elements fold over there.
         """
         motion = self._fit(shape, self.positions_mm)
         goal = transform_points(shape, motion)
@@ -360,7 +360,9 @@ class ElasticFit:
                 return self._move(np.linalg.inv(motion))
             log.info("curved elements fold over at a shape: the body follows it")
         else:
-            text = "the straight way has %d faults and ends %.2f mm away from the shape"
+            text = (
+                "after smoothing %d faults remain, and the shape is changed by %.2f mm"
+            )
             log.info(text + ": the body follows it", len(faults), changed_mm)
         self.follow(shape)
         return self.draw(shape[self._used])

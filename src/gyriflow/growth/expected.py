@@ -1,6 +1,7 @@
 """Predict a brain's later shapes: carry its mesh along an atlas' path and keep its
 individual differences."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -37,6 +38,7 @@ from .series_shapes import (
     with_stops,
 )
 
+log = logging.getLogger(__name__)
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do
 not predict later folds."""
@@ -195,17 +197,22 @@ def predict_shapes(
         smoothing_mm=smoothing_mm,
         fading_gw=fading_gw,
     )
+    sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
     body = make_body(mesh)
     shapes = [WeekShape(start_week, mesh.vertices)]
     _, used = boundary_surface(mesh)
     misfits_mm = {}
     for week, shape in zip(later, expected[1:], strict=True):
-        places = body.move_to(shape)
-        misfits_mm[week] = rms_length((places - shape)[used])
+        body.move_to(shape)
         shapes += with_stops(shapes[-1], week, body)
+        reached = shapes[-1].positions[used]
+        motion = rigid_fit(reached, shape[used], sizes[used])
+        misfits_mm[week] = rms_length(transform_points(reached, motion) - shape[used])
+        log.info("GW %g: %.2f mm from the expected shape", week, misfits_mm[week])
+    misfits_mm = {week: mm for week, mm in misfits_mm.items() if week <= end_week}
     if misfits_mm:
         worst = max(misfits_mm, key=misfits_mm.__getitem__)
-        warn_of_distance(f"the brain, most at GW {worst:g},", misfits_mm[worst])
+        warn_of_distance(f"at most, at GW {worst:g}, the brain", misfits_mm[worst])
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
     between = sorted({*further_weeks} - {*found.weeks})
@@ -222,7 +229,6 @@ def predict_shapes(
         smoothing_mm=0,
         fading_gw=fading_gw,
     )
-    sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
     atlas = [positions_at(week, carried, path.shapes.weeks, sizes) for week in weeks]
     baselines = {
         "atlas": [places[used] for places in atlas],

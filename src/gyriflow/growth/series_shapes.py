@@ -52,8 +52,8 @@ MAX_OPENING_DRAWS, OPENED_MM, MAX_GAP_LEFT = 6, 0.06, 0.9
 goals (root mean square), or where more than this fraction of the distance was left by
 the last one."""
 MAX_MISFIT_MM = 0.25
-"""Mean distance of a body from the surface or shape it is fitted to above which a
-warning is logged."""
+"""Distance of a body from the surface (mean) or the shape (root mean square) that it is
+fitted to above which a warning is logged."""
 CONTINUATION_TOL = 1e-4
 """Relative tolerance of the harmonic continuation that a body follows."""
 Target = tuple[TriangleMesh, Floats | None]
@@ -237,8 +237,8 @@ def warn_of_distance(body: str, misfit_mm: float) -> None:
     (root mean square over the vertices, in mm)."""
     if misfit_mm > MAX_MISFIT_MM:
         log.warning(
-            "%s stays %.2f mm (root mean square) from its shape, which inverts elements"
-            " or moves folds through each other",
+            "%s stays %.2f mm (root mean square) from its expected shape, where"
+            " elements would be inverted or folds would move through each other",
             body,
             misfit_mm,
         )
