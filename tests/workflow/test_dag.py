@@ -43,7 +43,7 @@ EXPECTED = {
     ),
     "simple-shapes": ("all", {"shape": 1, "pial": 1, "simulate": 2}),
     # twelve members: one is the reference, one is in both studies; the observed brain
-    # of 29 GW
+    # of 28 and 29 GW
     "paper": (
         "paper",
         {
@@ -53,7 +53,7 @@ EXPECTED = {
             "study_tables": 2,
             "tetrahedralise": 1,
         }
-        | {"measure": 1},
+        | {"measure": 2},
     ),
     "calibration": (
         "calibrate",

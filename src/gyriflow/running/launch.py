@@ -98,6 +98,8 @@ BY_MANIFEST = ("--rerun-triggers", "mtime", "--debug-dag")
 Dates do not count, either, as all inputs are `ancient`."""
 PLANNING = (*BY_MANIFEST, "--quiet", "rules", "progress", "--rerun-incomplete", "-n")
 """Options with which Snakemake only tells the jobs that it plans."""
+MAX_TIMES = 5
+"""How often a call plans and runs at most again."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 """Environment variable: continue after a failed step, or after a row of a table that
 cannot be used."""
@@ -511,14 +513,20 @@ class Call:
         return [*(self.options.forcerun or []), *targets]
 
 
-def plan_and_run(call: Call) -> int:
+def plan_and_run(call: Call, times: int = MAX_TIMES) -> int:
     """Have Snakemake plan, and call it again without the results that are outdated;
-    return its exit code."""
+    return its exit code.
+
+    Snakemake leaves out the jobs behind one that ends while it looks at what a
+    checkpoint has made. So it plans again after a run with checkpoints, some `times` at
+    most.
+    """
     if call.runs:
         # of a run that was killed
         restore_results(call.directory)
     if not call.is_planned:
-        return run_jobs(call, no_plan())
+        code, _ = run_jobs(call, no_plan())
+        return code
     events = Events()
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
@@ -534,7 +542,8 @@ def plan_and_run(call: Call) -> int:
         call.take_plan(plan)
         return 0
     if events.nothing and not plan.reasons:
-        say_nothing_runs(call, events.nothing)
+        if times == MAX_TIMES:
+            say_nothing_runs(call, events.nothing)
         return 0
     if call.runs:
         hide_results(call.directory, plan.outdated)
@@ -542,9 +551,12 @@ def plan_and_run(call: Call) -> int:
         link_results(call.directory, call.place, plan.outdated)
     os.environ[PLANNED_VAR] = "1"
     try:
-        return run_jobs(call, plan)
+        code, has_checkpoint = run_jobs(call, plan)
+        if code or not (call.runs and has_checkpoint and times):
+            return code
+        return plan_and_run(call, times - 1)
     finally:
-        del os.environ[PLANNED_VAR]
+        os.environ.pop(PLANNED_VAR, None)
 
 
 def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
@@ -558,14 +570,14 @@ def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
         print("gyriflow: everything is up to date", file=sys.stderr)
 
 
-def run_jobs(call: Call, plan: Plan) -> int:
+def run_jobs(call: Call, plan: Plan) -> tuple[int, bool]:
     """Run Snakemake, whose outdated results are hidden, and write the manifest of each
-    job that ends; return its exit code."""
+    job that ends; return its exit code, and whether a checkpoint has ended."""
     is_detailed = call.options.verbose or call.options.debug_dag
     is_wanted = is_anything if is_detailed else is_message
     arguments = [*BY_MANIFEST, *call.arguments]
     if not call.runs:
-        return call_snakemake(arguments, Events(plan.reasons), is_wanted)
+        return call_snakemake(arguments, Events(plan.reasons), is_wanted), False
 
     def finish(job: Job) -> None:
         # a result without a manifest is made again
@@ -586,9 +598,10 @@ def run_jobs(call: Call, plan: Plan) -> int:
         redirect_output(details)
     events = Events(plan.reasons, finish)
     try:
-        return call_snakemake(arguments, events, is_wanted)
+        code = call_snakemake(arguments, events, is_wanted)
     finally:
         restore_results(call.directory, events.started)
+    return code, events.has_checkpoint
 
 
 def main(

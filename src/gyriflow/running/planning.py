@@ -68,13 +68,15 @@ class Events:
 
     `reasons` replace Snakemake's own reasons to run a job, by the first of its results.
     `finished` is called with each job that has finished. `jobs` are the planned ones by
-    key. `nothing` is the record that nothing has to be done.
+    key. `nothing` is the record that nothing has to be done. `has_checkpoint` tells
+    whether a checkpoint has ended.
     """
 
     reasons: Mapping[str, str] = field(default_factory=dict)
     finished: Callable[[Job], None] | None = None
     jobs: dict[str, Job] = field(default_factory=dict)
     nothing: logging.LogRecord | None = None
+    has_checkpoint: bool = False
     _selected: dict[int, Any] = field(default_factory=dict)
     _keys: dict[int, str] = field(default_factory=dict)
 
@@ -93,8 +95,12 @@ class Events:
                 key = self._keys.get(event["job_id"], "")
                 if key in self.jobs:
                     self.finished(self.jobs[key])
-            case None if record.getMessage().startswith("Nothing to be done"):
-                self.nothing = record
+            case None:
+                text = record.getMessage()
+                if text.startswith("Nothing to be done"):
+                    self.nothing = record
+                elif text.startswith("Updating checkpoint dependencies"):
+                    self.has_checkpoint = True
 
     @property
     def started(self) -> set[str]:

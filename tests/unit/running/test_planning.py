@@ -1,9 +1,12 @@
 """Which jobs of a plan run again, and which files Snakemake is told to make."""
 
 import json
+import logging
+import os
 
 import pytest
 
+from gyriflow.running import launch
 from gyriflow.running.manifest import COPIES, Contents, Job, manifest_of, write_manifest
 from gyriflow.running.planning import (
     BY_ANOTHER_JOB,
@@ -14,6 +17,7 @@ from gyriflow.running.planning import (
     keep_contents,
     link_results,
     made_plan,
+    no_plan,
     restore_results,
     view_of,
 )
@@ -159,3 +163,38 @@ def test_a_view_has_all_but_snakemakes_records_and_can_be_written(study):
         assert (view / "results" / "manifest").is_dir()
     (study / "results").chmod(0o700)
     assert (study / "results" / "mesh").is_file()
+
+
+@pytest.mark.parametrize(
+    ("ends", "code", "n_runs"),
+    [
+        ([(0, False)], 0, 1),
+        ([(0, True), (0, False)], 0, 2),
+        ([(0, True), (4, True)], 4, 2),
+        ([(0, True)] * 20, 0, 6),
+    ],
+)
+def test_a_run_with_checkpoints_is_planned_again(
+    monkeypatch, tmp_path, ends, code, n_runs
+):
+    """Snakemake may leave out jobs behind a checkpoint."""
+    from snakemake.cli import get_argument_parser
+
+    options, _ = get_argument_parser().parse_known_args([])
+    left = list(ends)
+    monkeypatch.setattr(launch, "call_snakemake", lambda *_: 0)
+    monkeypatch.setattr(launch, "made_plan", lambda *_: no_plan())
+    monkeypatch.setattr(launch, "run_jobs", lambda *_: left.pop(0))
+    call = launch.Call([], options, tmp_path, tmp_path, None)
+    assert launch.plan_and_run(call) == code
+    assert len(ends) - len(left) == n_runs
+    assert launch.PLANNED_VAR not in os.environ
+
+
+def test_the_end_of_a_checkpoint_is_noticed():
+    events = Events()
+    for text in ("Select jobs to execute...", "Updating checkpoint dependencies."):
+        assert not events.has_checkpoint
+        record = logging.LogRecord("snakemake", 20, "", 1, text, None, None)
+        events.take(record)
+    assert events.has_checkpoint
