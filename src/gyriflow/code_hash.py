@@ -22,11 +22,17 @@ def code_hash(program: Path, *modules: Path) -> str:
     Further `modules` are those that the program imports by a name that it is given. A
     parameter of a rule, it reruns what depends on a change of the code.
     """
-    files = modules_behind(program).union(modules, *map(modules_behind, modules))
-    named = sorted(
-        (path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files
-    )
-    return f"code {hashlib.sha256(repr(named).encode()).hexdigest()[:12]}"
+    files = set(modules_behind(program))
+    for module in modules:
+        files.add(module)
+        files |= modules_behind(module)
+    named = []
+    for path in files:
+        name = path.relative_to(PACKAGE).as_posix()
+        named.append((name, _digest(path)))
+    text = repr(sorted(named))
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return f"code {digest[:12]}"
 
 
 def modules_behind(program: Path) -> set[Path]:

@@ -68,10 +68,14 @@ def messages_file(log: str | Path) -> Path:
 def write_message(log: str | Path, message: Message) -> None:
     """Add a message to those of the step that has this log, a path in `results`."""
     path = Path(log)
-    row = asdict(message) | {"step": path.stem}
+    row = asdict(message)
+    row["step"] = path.stem
     if path.parts[0] == "results":
-        row |= zip(FOLDERS.get(path.parts[1], []), path.parts[2:], strict=False)
-    _append(log, {name: value for name, value in row.items() if value})
+        _, kind, *names = path.parts
+        keys = FOLDERS.get(kind, [])
+        row |= zip(keys, names, strict=False)
+    known = {name: value for name, value in row.items() if value}
+    _append(log, known)
 
 
 def read_rows(log: str | Path) -> list[dict[str, Any]]:

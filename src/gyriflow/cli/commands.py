@@ -243,10 +243,13 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
 
     path = output or folder / CONFIG
     found = _recognise(folder, **selection)
-    if kept := write_configuration(found, folder, path, force=force):
+    kept = write_configuration(found, folder, path, force=force)
+    if kept:
         click.echo(f"the earlier configuration is now {kept}")
-    click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
-    sys.exit(_show_scans(found, may_fill_in=True))
+    argument = shlex.quote(str(path))
+    click.echo(f"wrote {path}; next: {command_name()} check {argument}")
+    code = _show_scans(found, may_fill_in=True)
+    sys.exit(code)
 
 
 def _recognise(

@@ -2,7 +2,6 @@
 or for a BIDS data set."""
 
 import re
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from pathlib import Path
@@ -113,8 +112,11 @@ def _keep_other(path: Path, text: str) -> Path | None:
     its new path."""
     if not path.exists() or read_text(path) == text:
         return None
-    names = (path.with_name(f"{path.name}.{number}") for number in count(1))
-    return path.rename(next(name for name in names if not name.exists()))
+    for number in count(1):
+        other = path.with_name(f"{path.name}.{number}")
+        if not other.exists():
+            return path.rename(other)
+    return None
 
 
 def commented_scans(path: Path) -> list[str]:
@@ -322,10 +324,15 @@ def write_bids(
 
 def _series(brains: Sequence[FoundBrain]) -> list[list[FoundBrain]]:
     """Return the scans of each subject or atlas that has several weeks."""
-    scans: dict[str, list[FoundBrain]] = defaultdict(list)
+    scans: dict[str, list[FoundBrain]] = {}
     for brain in brains:
-        scans[brain.entry.get("subject", "")].append(brain)
-    return [group for group in scans.values() if len(_weeks(group)) > 1]
+        subject = brain.entry.get("subject", "")
+        scans.setdefault(subject, []).append(brain)
+    series = []
+    for group in scans.values():
+        if len(_weeks(group)) > 1:
+            series.append(group)
+    return series
 
 
 def _weeks(brains: Sequence[FoundBrain]) -> list[float]:
@@ -415,5 +422,8 @@ def _absolute(value: object, folder: Path) -> object:
         return {key: _absolute(item, folder) for key, item in value.items()}
     if isinstance(value, list):
         return [_absolute(item, folder) for item in value]
-    is_file = isinstance(value, str) and (folder / value).is_file()
-    return str(own_name(folder / str(value))) if is_file else value
+    if isinstance(value, str):
+        path = folder / value
+        if path.is_file():
+            return str(own_name(path))
+    return value

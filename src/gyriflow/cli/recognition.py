@@ -162,12 +162,20 @@ def _scan_of(file: Path) -> str:
 def _scan_name(file: Path) -> str:
     """Return the name of the scan that a file is of: `sub-` and `ses-`, or else the
     name of the file or folder."""
-    subject, session = _label(file, "sub"), _label(file, "ses")
+    subject = _label(file, "sub")
+    session = _label(file, "ses")
+    if subject and session:
+        return f"sub-{subject}_ses-{session}"
     if subject:
-        return f"sub-{subject}_ses-{session}" if session else f"sub-{subject}"
-    name = SIDE_NAME.sub("", FREESURFER_INPUT.sub("", file.name))
-    name = SUFFIXES.sub("", RESAMPLED_NAME.sub("", LAYER_NAME.sub("", name)))
-    folders = [part for part in file.parts[:-1] if not GENERIC_FOLDER.fullmatch(part)]
+        return f"sub-{subject}"
+    name = file.name
+    # what names the file, not the scan, from the inner to the outer part
+    for part in (FREESURFER_INPUT, SIDE_NAME, LAYER_NAME, RESAMPLED_NAME, SUFFIXES):
+        name = part.sub("", name)
+    folders = []
+    for folder in file.parts[:-1]:
+        if not GENERIC_FOLDER.fullmatch(folder):
+            folders.append(folder)
     if folders and not re.search(r"\d", name):
         name = folders[-1]
     return name.strip(" ._-")

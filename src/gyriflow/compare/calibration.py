@@ -43,7 +43,8 @@ def first_round(bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
     The same seed gives the same rows.
     """
     # the sequence is balanced over powers of two
-    power = math.ceil(math.log2(max(count, 2)))
+    at_least_two = max(count, 2)
+    power = math.ceil(math.log2(at_least_two))
     random = np.random.default_rng(seed)
     sequence = qmc.Sobol(len(bounds), rng=random)
     points = sequence.random_base2(power)[:count]

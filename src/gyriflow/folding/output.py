@@ -27,7 +27,8 @@ def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
     `event`, if any, with its facts."""
     print(text, flush=True)
     if event:
-        log.info(text, extra={"data": {"event": event, **facts}})
+        data = {"event": event} | facts
+        log.info(text, extra={"data": data})
 
 
 def layer_fields(

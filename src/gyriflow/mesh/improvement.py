@@ -105,6 +105,7 @@ def _signed_ratios_of(corners: Floats) -> Floats:
     """Return the same from the corners (m, 4, 3)."""
     edges = corners[:, 1:] - corners[:, :1]
     signs = np.sign(np.linalg.det(edges))
-    tets = np.arange(4 * len(corners)).reshape(-1, 4)
-    mesh = TetrahedralMesh(corners.reshape(-1, 3), tets)
-    return signs * radius_ratios(mesh)
+    vertices = corners.reshape(-1, 3)
+    tets = np.arange(len(vertices)).reshape(-1, 4)
+    ratios = radius_ratios(TetrahedralMesh(vertices, tets))
+    return signs * ratios

@@ -181,7 +181,8 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
     opposite = reversed(SIDES_OF_ELEMENT)
-    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, opposite, strict=True)):
+    pairs = zip(SIDES_OF_ELEMENT, opposite, strict=True)
+    for i, ((a, b), (c, d)) in enumerate(pairs):
         start = corner[:, a]
         edge = corner[:, b] - start
         first = np.cross(edge, corner[:, c] - start)

@@ -137,8 +137,10 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
     wide = wide.reindex(columns=list(SIDES))
     in_order = sides[keys].drop_duplicates()
     wide = wide.reindex(pd.MultiIndex.from_frame(in_order)).reset_index()
-    difference = wide["left"] - wide["right"]
-    total = wide["left"] + wide["right"]
+    left = wide["left"]
+    right = wide["right"]
+    difference = left - right
+    total = left + right
     signed = [name for name, metric in METRICS.items() if metric.is_signed]
     has_index = (total > 0) & ~wide["metric"].isin(signed)
     index = 2.0 * difference / total.where(has_index)
@@ -232,7 +234,8 @@ def weekly_norms(
     rows = []
     shapes = zip(weeks, positions, strict=True)
     for (week, before), (next_week, after) in pairwise(shapes):
-        lengths = np.linalg.norm(np.asarray(after) - np.asarray(before), axis=1)
+        displacement = np.asarray(after) - np.asarray(before)
+        lengths = np.linalg.norm(displacement, axis=1)
         for nodes, of in (("all", lengths), ("pial", lengths[pial])):
             rows.append((week, next_week, nodes, of.max(), of.mean()))
     columns = ["from_week", "to_week", "nodes", "max_mm", "mean_mm"]

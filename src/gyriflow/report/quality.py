@@ -292,8 +292,10 @@ def _write_ends(
 ) -> None:
     """Name the left and the right end of a panel, at a fraction of its width from its
     sides and of its height."""
-    for x, end in zip((margin, 1 - margin), ends, strict=True):
-        axes.text(x, height, end, transform=axes.transAxes, ha="center", **style)
+    style |= {"transform": axes.transAxes, "ha": "center"}
+    left, right = ends
+    axes.text(margin, height, left, **style)
+    axes.text(1 - margin, height, right, **style)
 
 
 def _facts(row: Mapping[str, Any]) -> dict[str, str]:

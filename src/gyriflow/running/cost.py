@@ -245,12 +245,16 @@ def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
 def _series_seconds(study: Study, weeks: Sequence[float], mesh: MeshSettings) -> float:
     """Predict the time for a mesh to follow the brains of a series; with opened sulci,
     late weeks take most of it."""
-    first, last = weeks[0], weeks[-1]
-    per_week_s = SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(first, mesh)
+    first = weeks[0]
+    last = weeks[-1]
+    elements = linear_elements(first, mesh)
+    per_week_s = SERIES_SECONDS_PER_ELEMENT_AND_WEEK * elements
+    duration_gw = last - first
     if not study.config.surface.open_sulci:
-        return FUSED_SHARE["series"] * per_week_s * (last - first)
+        return FUSED_SHARE["series"] * per_week_s * duration_gw
     deep_gw = max(last - max(first, DEEP_FOLDS_GW), 0.0)
-    return per_week_s * (last - first + (DEEP_FOLDS_FACTOR - 1) * deep_gw)
+    more_gw = (DEEP_FOLDS_FACTOR - 1) * deep_gw
+    return per_week_s * (duration_gw + more_gw)
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:

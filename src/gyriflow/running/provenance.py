@@ -129,9 +129,12 @@ def _have_recorded_content(directory: Path, config: Config) -> bool:
     """Return whether any file of a study's brains has the content of an input of the
     results in a directory."""
     recorded = recorded_inputs(directory)
-    known = {sha256 for sha256, *_ in recorded.values()}
-    files = [file for brain in config.brains for file in brain.files]
-    return any(sha256 in known for sha256, *_ in contents(files, recorded).values())
+    known = {facts[0] for facts in recorded.values()}
+    files: list[str] = []
+    for brain in config.brains:
+        files += brain.files
+    found = contents(files, recorded)
+    return any(facts[0] in known for facts in found.values())
 
 
 def recorded_inputs(directory: Path) -> dict[str, Any]:
