@@ -4,7 +4,7 @@ beside the step's log. The progress of a simulation is in the same file."""
 import json
 import logging
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -93,8 +93,13 @@ def read_rows(log: str | Path) -> list[dict[str, Any]]:
 
 def read_messages(log: str | Path) -> list[Message]:
     """Return the distinct messages of the step that has this log."""
+    return messages_in(read_rows(log))
+
+
+def messages_in(rows: Iterable[Mapping[str, Any]]) -> list[Message]:
+    """Return the distinct messages among the lines that a step has written."""
     messages = []
-    for row in read_rows(log):
+    for row in rows:
         # progress, and lines of another version, have other keys
         with suppress(TypeError):
             messages.append(Message(**row))

@@ -236,8 +236,10 @@ def _why(reason: str, directory: Path) -> str:
         made_by, this = recorded_version(directory), version()
         if made_by not in (None, this):
             return f"{reason} (gyriflow {made_by}, now {this})"
-    general = [words for words in (MISSING, BY_ANOTHER_JOB) if reason.startswith(words)]
-    return general[0] if general else reason
+    for words in (MISSING, BY_ANOTHER_JOB):
+        if reason.startswith(words):
+            return words
+    return reason
 
 
 def plan(
@@ -250,8 +252,7 @@ def plan(
         place = directory.resolve() if directory.is_dir() else empty
         options = ["--configfile", str(config.absolute()), "--directory", str(place)]
         call = [*options, "--dry-run", *further]
-        code = launch(call) if show else 0
-        code = code or launch(call, plans.append)
+        code = launch(call, plans.append, is_shown=show)
         if code:
             sys.exit(code)
         jobs = []

@@ -94,7 +94,7 @@ def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
     """Return V^power (..., 3, 3) of Fe = V·R; an isotropic material does not depend on
     the rotation R."""
     squares, axes = np.linalg.eigh(Fe @ Fe.swapaxes(-1, -2))
-    return (axes * squares[..., None, :] ** (power / 2)) @ axes.swapaxes(-1, -2)
+    return from_principal(squares ** (power / 2), axes)
 
 
 def relaxed(

@@ -19,8 +19,14 @@ import sys
 import threading
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import chdir, nullcontext, suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import (
+    AbstractContextManager,
+    chdir,
+    contextmanager,
+    nullcontext,
+    suppress,
+)
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -94,12 +100,10 @@ MANAGING_OPTIONS = (
 )
 """Options that ask for something else than running steps."""
 BY_MANIFEST = ("--rerun-triggers", "mtime", "--debug-dag")
-"""Options with which Snakemake tells all jobs, and compares none with its own records.
+"""Options with which Snakemake lists all jobs, and compares none with its own records.
 Dates do not count, either, as all inputs are `ancient`."""
 PLANNING = (*BY_MANIFEST, "--quiet", "rules", "progress", "--rerun-incomplete", "-n")
-"""Options with which Snakemake only tells the jobs that it plans."""
-MAX_TIMES = 5
-"""How often a call plans and runs at most again."""
+"""Options with which Snakemake only lists the jobs that it plans."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 """Environment variable: continue after a failed step, or after a row of a table that
 cannot be used."""
@@ -220,18 +224,31 @@ def check_options(unknown: Sequence[str], usage: str) -> None:
         raise InputError(f"unknown option {name}; {did_you_mean(name, options)}")
 
 
-def redirect_output(log: Path) -> None:
-    """Append to a file what libraries and child processes print. Python's own streams
-    stay on the terminal."""
+@contextmanager
+def output_to(log: Path) -> Iterator[None]:
+    """Append to a file what libraries and child processes print meanwhile. Python's own
+    streams stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
     # readable by its owner only, since it may contain names of subjects
     file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-    for number, stream in ((1, "stdout"), (2, "stderr")):
-        getattr(sys, stream).flush()
-        setattr(
-            sys, stream, os.fdopen(os.dup(number), "w", buffering=1, errors="replace")
-        )
+    streams = {}
+    terminals = {}
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        streams[name] = getattr(sys, name)
+        streams[name].flush()
+        terminals[number] = os.dup(number)
+        stream = os.fdopen(os.dup(number), "w", buffering=1, errors="replace")
+        setattr(sys, name, stream)
         os.dup2(file, number)
+    os.close(file)
+    try:
+        yield
+    finally:
+        for number, terminal in terminals.items():
+            os.dup2(terminal, number)
+            os.close(terminal)
+        for name, stream in streams.items():
+            setattr(sys, name, stream)
 
 
 def refused_brains() -> dict[str, str]:
@@ -475,15 +492,16 @@ def end_scheduler_timers() -> None:
 class Call:
     """A call of Snakemake with its arguments, and the options in them.
 
-    `place` is the working directory or, if nothing runs, a view of it. With
-    `take_plan`, which gets the plan, nothing is run or shown.
+    `place` is the working directory or, if nothing runs, a view of it. `take_plan` gets
+    the plan; the call ends with it if nothing `is_shown`.
     """
 
     arguments: list[str]
     options: Namespace
     directory: Path
     place: Path
-    take_plan: Callable[[Plan], None] | None
+    take_plan: Callable[[Plan], None] | None = None
+    is_shown: bool = True
 
     def has_any(self, names: Sequence[str]) -> bool:
         """Return whether any of some options is given."""
@@ -505,6 +523,11 @@ class Call:
         """The rules and files that it asks for."""
         return self.options.targets or ["all"]
 
+    @property
+    def is_forced(self) -> bool:
+        """Whether some jobs run again in any case."""
+        return self.has_any(("force", "forceall", "forcerun"))
+
     def forced(self, jobs: Iterable[Job]) -> list[str]:
         """Return the rules and files of planned jobs that run again in any case."""
         if self.options.forceall:
@@ -513,13 +536,13 @@ class Call:
         return [*(self.options.forcerun or []), *targets]
 
 
-def plan_and_run(call: Call, times: int = MAX_TIMES) -> int:
+def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     """Have Snakemake plan, and call it again without the results that are outdated;
     return its exit code.
 
     Snakemake leaves out the jobs behind one that ends while it looks at what a
-    checkpoint has made. So it plans again after a run with checkpoints, some `times` at
-    most.
+    checkpoint has made. So it plans again if planned jobs are left, as long as others
+    have ended.
     """
     if call.runs:
         # of a run that was killed
@@ -540,9 +563,10 @@ def plan_and_run(call: Call, times: int = MAX_TIMES) -> int:
             keep_contents(plan)
     if call.take_plan:
         call.take_plan(plan)
+    if not call.is_shown:
         return 0
     if events.nothing and not plan.reasons:
-        if times == MAX_TIMES:
+        if not is_again:
             say_nothing_runs(call, events.nothing)
         return 0
     if call.runs:
@@ -551,10 +575,12 @@ def plan_and_run(call: Call, times: int = MAX_TIMES) -> int:
         link_results(call.directory, call.place, plan.outdated)
     os.environ[PLANNED_VAR] = "1"
     try:
-        code, has_checkpoint = run_jobs(call, plan)
-        if code or not (call.runs and has_checkpoint and times):
-            return code
-        return plan_and_run(call, times - 1)
+        code, ended = run_jobs(call, plan)
+        is_left = not ended.issuperset(plan.reasons)
+        # forced jobs would run again each time
+        if call.runs and code == 0 and ended and is_left and not call.is_forced:
+            return plan_and_run(call, is_again=True)
+        return code
     finally:
         os.environ.pop(PLANNED_VAR, None)
 
@@ -570,14 +596,14 @@ def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
         print("gyriflow: everything is up to date", file=sys.stderr)
 
 
-def run_jobs(call: Call, plan: Plan) -> tuple[int, bool]:
+def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
     """Run Snakemake, whose outdated results are hidden, and write the manifest of each
-    job that ends; return its exit code, and whether a checkpoint has ended."""
+    job that ends; return its exit code, and the keys of these jobs."""
     is_detailed = call.options.verbose or call.options.debug_dag
     is_wanted = is_anything if is_detailed else is_message
     arguments = [*BY_MANIFEST, *call.arguments]
     if not call.runs:
-        return call_snakemake(arguments, Events(plan.reasons), is_wanted), False
+        return call_snakemake(arguments, Events(plan.reasons), is_wanted), set()
 
     def finish(job: Job) -> None:
         # a result without a manifest is made again
@@ -586,31 +612,36 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, bool]:
 
     quiet = [item.name.lower() for item in call.options.quiet or []]
     if "progress" in quiet:
-        # Snakemake would not tell which jobs have finished
+        # Snakemake would not name the jobs that have finished
         quiet.remove("progress")
         arguments += ["--quiet", *(quiet or ["host"])]
         is_wanted = is_no_progress
+    output: AbstractContextManager[None] = nullcontext()
     if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         details = call.directory.resolve() / ".snakemake" / "log" / name
         logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
         arguments = [*logger, *arguments]
-        redirect_output(details)
+        output = output_to(details)
     events = Events(plan.reasons, finish)
     try:
-        code = call_snakemake(arguments, events, is_wanted)
+        with output:
+            code = call_snakemake(arguments, events, is_wanted)
     finally:
         restore_results(call.directory, events.started)
-    return code, events.has_checkpoint
+    return code, events.ended
 
 
 def main(
-    arguments: Sequence[str], take_plan: Callable[[Plan], None] | None = None
+    arguments: Sequence[str],
+    take_plan: Callable[[Plan], None] | None = None,
+    *,
+    is_shown: bool = True,
 ) -> int:
     """Run Snakemake; return the exit code of the first failed step, or else Snakemake's
     own.
 
-    With `take_plan`, a dry run shows nothing and calls it with the plan.
+    `take_plan` gets the plan of a dry run, whose jobs are listed if `is_shown`.
     """
     # the program name in Snakemake's usage messages
     sys.argv[0] = "snakemake"
@@ -652,7 +683,8 @@ def main(
             complete += ["--directory", str(place)]
             if directory.is_dir():
                 os.environ[DIRECTORY_VAR] = str(directory.absolute())
-        code = plan_and_run(Call(complete, options, directory, place, take_plan))
+        call = Call(complete, options, directory, place, take_plan, is_shown)
+        code = plan_and_run(call)
     if code > 128:
         print(
             "gyriflow: interrupted; run the same command again to resume",

@@ -1,5 +1,5 @@
-"""What results were made from: a manifest of each job beside its results, and whether a
-planned job still matches it.
+"""Write, in a manifest in the folder of its results, what each job has made them from,
+and find whether a planned job still matches it.
 
 Files are compared by content, inputs by their role in the rule. Dates mean nothing, nor
 do Snakemake's own records. Paths here are relative to the working directory.

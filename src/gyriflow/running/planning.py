@@ -1,7 +1,7 @@
-"""Which planned jobs run again: those whose results do not match their manifest, and
-those that depend on them.
+"""Find the planned jobs that run again: their results do not match their manifest, or
+they depend on such jobs.
 
-Snakemake tells its jobs as events of its log. It then makes the files that are missing,
+Snakemake lists its jobs in events of its log. It then makes the files that are missing,
 as outdated ones are hidden from it.
 """
 
@@ -64,19 +64,19 @@ def job_from(job: Any) -> Job:
 
 @dataclass
 class Events:
-    """Jobs that Snakemake plans and finishes, as its log tells them.
+    """Jobs that Snakemake plans and finishes, from the events of its log.
 
     `reasons` replace Snakemake's own reasons to run a job, by the first of its results.
     `finished` is called with each job that has finished. `jobs` are the planned ones by
-    key. `nothing` is the record that nothing has to be done. `has_checkpoint` tells
-    whether a checkpoint has ended.
+    key, `ended` the keys of those that have finished. `nothing` is the record that
+    nothing has to be done.
     """
 
     reasons: Mapping[str, str] = field(default_factory=dict)
     finished: Callable[[Job], None] | None = None
     jobs: dict[str, Job] = field(default_factory=dict)
     nothing: logging.LogRecord | None = None
-    has_checkpoint: bool = False
+    ended: set[str] = field(default_factory=set)
     _selected: dict[int, Any] = field(default_factory=dict)
     _keys: dict[int, str] = field(default_factory=dict)
 
@@ -91,16 +91,13 @@ class Events:
                 self._keys[event["jobid"]] = key
                 if key in self.reasons:
                     record.reason = self.reasons[key]
-            case "job_finished" if self.finished:
+            case "job_finished":
                 key = self._keys.get(event["job_id"], "")
-                if key in self.jobs:
+                self.ended.add(key)
+                if self.finished and key in self.jobs:
                     self.finished(self.jobs[key])
-            case None:
-                text = record.getMessage()
-                if text.startswith("Nothing to be done"):
-                    self.nothing = record
-                elif text.startswith("Updating checkpoint dependencies"):
-                    self.has_checkpoint = True
+            case None if record.getMessage().startswith("Nothing to be done"):
+                self.nothing = record
 
     @property
     def started(self) -> set[str]:
@@ -126,10 +123,12 @@ class Plan:
     now.
 
     `reasons` why jobs run are by their first result. `outdated` are files to be made
-    again. `found` are the contents of files before the run.
+    again. `found` are the contents of files before the run, `manifests` those of the
+    jobs by their key.
     """
 
     jobs: Collection[Job]
+    manifests: Mapping[str, Mapping[str, Any]]
     found: Contents
     reasons: Mapping[str, str]
     outdated: list[str]
@@ -146,23 +145,24 @@ class Plan:
 
 def no_plan() -> Plan:
     """Return the plan of a call that does not plan."""
-    return Plan([], Contents({}, {}), {}, [])
+    return Plan([], {}, Contents({}, {}), {}, [])
 
 
 def made_plan(
     events: Events, targets: Collection[str], forced: Collection[str]
 ) -> Plan:
-    """Return the plan of the jobs that Snakemake has told, for the working directory.
+    """Return the plan of the jobs that Snakemake has listed, for the working directory.
 
     `targets` and `forced` are rules and files that the call names.
     """
     jobs = events.jobs
-    found = _present_contents(jobs.values())
+    manifests = {key: read_manifest(job.manifest) for key, job in jobs.items()}
+    found = _present_contents(jobs, manifests)
     reasons = {}
     for key, job in jobs.items():
         if not set(forced).isdisjoint([job.rule, *job.outputs]):
             reasons[key] = FORCED
-        elif why := _outdated_by_itself(job, found):
+        elif why := _outdated_by_itself(job, manifests[key], found):
             reasons[key] = why
     producers = _producers(jobs)
     for file in _required(jobs.values(), targets):
@@ -172,15 +172,14 @@ def made_plan(
     outdated = []
     for key in reasons:
         outdated += [file for file in jobs[key].outputs if Path(file).exists()]
-    return Plan(jobs.values(), found, reasons, outdated)
+    return Plan(jobs.values(), manifests, found, reasons, outdated)
 
 
-def _outdated_by_itself(job: Job, found: Contents) -> str:
+def _outdated_by_itself(job: Job, manifest: Mapping[str, Any], found: Contents) -> str:
     """Return why the results of a job do not match their manifest, or ''. Results that
     were removed match as well, and those that were never made."""
     if job.manifest is None:
         return ""
-    manifest = read_manifest(job.manifest)
     is_made = manifest or any(Path(file).exists() for file in job.outputs)
     return difference(job, manifest, found) if is_made else ""
 
@@ -227,13 +226,15 @@ def _spread(
             waiting.append(reader)
 
 
-def _present_contents(jobs: Collection[Job]) -> Contents:
+def _present_contents(
+    jobs: Mapping[str, Job], manifests: Mapping[str, Mapping[str, Any]]
+) -> Contents:
     """Return the contents of the files of planned jobs."""
     known = recorded_inputs(Path())
     absent: dict[str, str] = {}
     results = []
-    for job in jobs:
-        recorded = read_manifest(job.manifest).get("results", {})
+    for key, job in jobs.items():
+        recorded = manifests[key].get("results", {})
         known |= recorded
         absent |= {path: facts[0] for path, facts in recorded.items()}
         results += job.outputs
@@ -253,7 +254,7 @@ def keep_contents(plan: Plan) -> None:
     for job in plan.jobs:
         for path in job.files:
             plan.found.get(path)
-        recorded = read_manifest(job.manifest).get("results", {})
+        recorded = plan.manifests[job.key].get("results", {})
         for path in job.outputs:
             facts = plan.found.facts(path)
             if facts and facts != recorded.get(path):
@@ -286,12 +287,12 @@ def restore_results(directory: Path, replaced: Collection[str] = ()) -> None:
 
 @contextmanager
 def view_of(directory: Path) -> Iterator[Path]:
-    """Yield a folder with links to what is in a working directory, in which Snakemake
-    may plan: it needs to write, and a study may be read-only."""
+    """Yield a folder with links to the files of a working directory. Snakemake can plan
+    there: it needs to write, and a study may be read-only."""
     with TemporaryDirectory() as scratch:
         view = Path(scratch)
-        others = directory.absolute().iterdir() if directory.is_dir() else []
-        for path in others:
+        paths = directory.absolute().iterdir() if directory.is_dir() else []
+        for path in paths:
             if path.name not in (".snakemake", "results"):
                 (view / path.name).symlink_to(path)
         link_results(directory, view, [])

@@ -22,6 +22,7 @@ from ..messages import (
     STOPPED,
     Message,
     messages_file,
+    messages_in,
     read_messages,
     read_rows,
     write_message,
@@ -299,7 +300,8 @@ class RunDisplay:
         """Show what a job has written to its messages since."""
         if job.log is None:
             return
-        for row in read_rows(job.log):
+        rows = read_rows(job.log)
+        for row in rows:
             match row:
                 case {
                     "event": "size",
@@ -316,7 +318,7 @@ class RunDisplay:
                         self.console.print(size)
                 case {"event": "step"}:
                     job.step = row
-        for message in read_messages(job.log):
+        for message in messages_in(rows):
             line = f"warning {job.name}: {message.first_line}"
             if message.level == "warning" and self.messages.add(job.name, line):
                 self.console.print(line)

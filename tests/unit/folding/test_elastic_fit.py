@@ -271,30 +271,29 @@ def test_a_body_is_not_moved_to_a_shape_whose_faces_cross():
     assert 5.7 < right.mean() - left.mean() < 6.3
 
 
-def test_stops_are_looked_for_in_halves_of_halves_of_halves(monkeypatch):
+def grown_body(monkeypatch):
+    """Return a body that has grown by a fifth in twenty states, as if each way between
+    two of them inverted an element."""
     body = ElasticFit(BODY)
     states = [(1 + 0.01 * number) * BODY.vertices for number in range(21)]
     body._passed = states[1:-1]
     body.positions_mm = states[-1]
     fault = BODY.vertices[:1]
-    # as if each way inverted an element
     monkeypatch.setattr(
         body, "_untangled", lambda before, after, lengths: (after, fault)
     )
+    return body
+
+
+def test_stops_are_looked_for_in_halves_of_halves_of_halves(monkeypatch):
+    body = grown_body(monkeypatch)
     way = body.way_from(BODY.vertices)
     fractions = [fraction for fraction, _ in way]
     assert fractions == pytest.approx(np.arange(1, 8) / 8, abs=0.06)
 
 
 def test_what_opens_a_shape_is_judged_on_the_way_from_the_last_stop(monkeypatch):
-    body = ElasticFit(BODY)
-    states = [(1 + 0.01 * number) * BODY.vertices for number in range(21)]
-    body._passed = states[1:-1]
-    body.positions_mm = states[-1]
-    fault = BODY.vertices[:1]
-    monkeypatch.setattr(
-        body, "_untangled", lambda before, after, lengths: (after, fault)
-    )
+    body = grown_body(monkeypatch)
     starts = []
 
     def note_start(before, places):

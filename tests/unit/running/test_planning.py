@@ -3,6 +3,7 @@
 import json
 import logging
 import os
+from dataclasses import replace
 
 import pytest
 
@@ -166,35 +167,63 @@ def test_a_view_has_all_but_snakemakes_records_and_can_be_written(study):
 
 
 @pytest.mark.parametrize(
-    ("ends", "code", "n_runs"),
+    ("options", "ends", "code", "n_runs"),
     [
-        ([(0, False)], 0, 1),
-        ([(0, True), (0, False)], 0, 2),
-        ([(0, True), (4, True)], 4, 2),
-        ([(0, True)] * 20, 0, 6),
+        ([], [(0, {"a", "b", "c"})], 0, 1),
+        ([], [(0, {"a"}), (0, {"b", "c"})], 0, 2),
+        ([], [(0, {"a"}), (0, {"b"}), (0, {"c"})], 0, 3),
+        # such as behind a rule that the call ends with
+        ([], [(0, {"a"}), (0, set())], 0, 2),
+        ([], [(4, {"a"})], 4, 1),
+        ([], [(0, {"a"}), (4, {"b"})], 4, 2),
+        (["--forceall"], [(0, {"a"})], 0, 1),
     ],
 )
-def test_a_run_with_checkpoints_is_planned_again(
-    monkeypatch, tmp_path, ends, code, n_runs
+def test_a_run_that_leaves_planned_jobs_is_planned_again(
+    monkeypatch, tmp_path, options, ends, code, n_runs
 ):
     """Snakemake may leave out jobs behind a checkpoint."""
     from snakemake.cli import get_argument_parser
 
-    options, _ = get_argument_parser().parse_known_args([])
-    left = list(ends)
+    parsed, _ = get_argument_parser().parse_known_args(options)
+    waiting = {"a", "b", "c"}
+    calls = []
+
+    def run(call, plan):
+        code, ended = ends[len(calls)]
+        calls.append(set(plan.reasons))
+        waiting.difference_update(ended)
+        return code, ended
+
+    def plan_rest(*_):
+        return replace(no_plan(), reasons=dict.fromkeys(waiting, "missing"))
+
     monkeypatch.setattr(launch, "call_snakemake", lambda *_: 0)
-    monkeypatch.setattr(launch, "made_plan", lambda *_: no_plan())
-    monkeypatch.setattr(launch, "run_jobs", lambda *_: left.pop(0))
-    call = launch.Call([], options, tmp_path, tmp_path, None)
+    monkeypatch.setattr(launch, "made_plan", plan_rest)
+    monkeypatch.setattr(launch, "run_jobs", run)
+    call = launch.Call([], parsed, tmp_path, tmp_path)
     assert launch.plan_and_run(call) == code
-    assert len(ends) - len(left) == n_runs
+    assert len(calls) == n_runs
+    assert calls[0] == {"a", "b", "c"}
     assert launch.PLANNED_VAR not in os.environ
 
 
-def test_the_end_of_a_checkpoint_is_noticed():
+def test_jobs_that_have_ended_are_known():
     events = Events()
-    for text in ("Select jobs to execute...", "Updating checkpoint dependencies."):
-        assert not events.has_checkpoint
-        record = logging.LogRecord("snakemake", 20, "", 1, text, None, None)
-        events.take(record)
-    assert events.has_checkpoint
+    started = {"event": "job_info", "jobid": 7, "output": ["results/a"]}
+    for facts in (started, {"event": "job_finished", "job_id": 7}):
+        assert not events.ended
+        events.take(logging.makeLogRecord(facts))
+    assert events.ended == {"results/a"}
+
+
+def test_output_goes_to_a_file_meanwhile_and_then_to_where_it_went(tmp_path, capfd):
+    log = tmp_path / "log" / "details"
+    for text in ("first", "second"):
+        with launch.output_to(log):
+            os.system(f"echo {text} child")
+            print(f"{text} python")
+        os.system("echo after")
+    assert log.read_text() == "first child\nsecond child\n"
+    expected = "first python\nafter\nsecond python\nafter\n"
+    assert capfd.readouterr().out == expected
