@@ -34,6 +34,8 @@ MISSING = "Missing output files"
 HIDDEN = ".outdated."
 """Start of the names of outdated results during a run."""
 BY_ANOTHER_JOB = "Input files updated by another job"
+UPDATED = " (update)"
+"""What Snakemake's log adds to the name of a result that a rule updates."""
 
 
 def job_from(job: Any) -> Job:
@@ -87,7 +89,7 @@ class Events:
             case "debug_dag" if event.get("status") == "selected":
                 self._add(event["job"])
             case "job_info" if event["output"]:
-                key = event["output"][0]
+                key = event["output"][0].removesuffix(UPDATED)
                 self._keys[event["jobid"]] = key
                 if key in self.reasons:
                     record.reason = self.reasons[key]

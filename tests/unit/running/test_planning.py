@@ -208,9 +208,10 @@ def test_a_run_that_leaves_planned_jobs_is_planned_again(
     assert launch.PLANNED_VAR not in os.environ
 
 
-def test_jobs_that_have_ended_are_known():
+@pytest.mark.parametrize("note", ["", " (update)"])
+def test_jobs_that_have_ended_are_known(note):
     events = Events()
-    started = {"event": "job_info", "jobid": 7, "output": ["results/a"]}
+    started = {"event": "job_info", "jobid": 7, "output": [f"results/a{note}"]}
     for facts in (started, {"event": "job_finished", "job_id": 7}):
         assert not events.ended
         events.take(logging.makeLogRecord(facts))
