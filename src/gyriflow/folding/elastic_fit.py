@@ -561,13 +561,19 @@ class ElasticFit:
 
     def _reopened(self, places: Floats) -> Floats:
         """Return valid positions (n, 3) at which fewer of the elements are flat that
-        straight sides flatten, if there are any."""
+        straight sides flatten, if there are any.
+
+        Elements that fold over when others are opened, or faces that cross, stay as
+        they are in the valid `places`.
+        """
         for _ in range(REOPENING_ROUNDS):
             n_flat = self._flat_count(places)
             if not n_flat:
                 break
             opened = straighten_sides(self._opened(places), self._tets)
-            if self._flat_count(opened) >= n_flat or self._faults_at(opened).any():
+            while (is_fault := self._faults_at(opened)).any():
+                opened[is_fault] = places[is_fault]
+            if self._flat_count(opened) >= n_flat:
                 break
             places = opened
         return places
