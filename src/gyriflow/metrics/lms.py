@@ -39,6 +39,9 @@ MIN_SUBJECTS_FOR_SKEWNESS = 100
 SKEWNESS, SKEWNESS_SD = 0.2, 1.0
 """Mean and standard deviation of the prior of the skewness of positive metrics: 0 is
 the lognormal distribution, 1 the normal one."""
+SKEWNESS_BY_SCALE = 0.25
+"""Standard deviation of that prior, times the scale, where the scale is small: the
+skewness of the values is about 3 (1 − L) S."""
 SIGNED_SKEWNESS, SIGNED_SKEWNESS_SD = 0.0, 1.0
 """The same of metrics of either sign: 0 is the normal distribution."""
 SKEWED_SD = 1.5
@@ -252,6 +255,7 @@ def fit_norm(
     squares = float(scans.weights @ (start - model.rows @ location) ** 2)
     scatter = np.sqrt(squares / max(subjects - model.freedom, 1.0))
     unit = max(float(scatter), MIN_SCATTER)
+    model = replace(model, scatter=unit)
     # the location is fitted in units of the scatter: then the information of an
     # observation on it is about 1
     rows = unit * model.rows
@@ -312,7 +316,8 @@ class _Model:
 
     `mean` (k,) is that of location, scale and, if it is estimated, skewness;
     `location_penalty` and `scale_penalty` are the inverses of their covariances.
-    `freedom` are the degrees of freedom of the location.
+    `freedom` are the degrees of freedom of the location, `scatter` the scale of all
+    values around it, on which the prior of the skewness depends.
     """
 
     first: float
@@ -325,6 +330,7 @@ class _Model:
     location_penalty: Floats
     scale_penalty: Floats
     freedom: float
+    scatter: float = 1.0
 
     @classmethod
     def of(
@@ -390,7 +396,9 @@ class _Model:
     def penalty(self) -> Floats:
         parts = [self.location_penalty, self.scale_penalty]
         if self.has_skewness:
-            sd = SKEWNESS_SD if self.is_positive else SIGNED_SKEWNESS_SD
+            sd = SIGNED_SKEWNESS_SD
+            if self.is_positive:
+                sd = max(SKEWNESS_SD, SKEWNESS_BY_SCALE / self.scatter)
             parts.append(np.array([[sd**-2]]))
         return block_diag(*parts)
 
