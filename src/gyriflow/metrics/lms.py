@@ -167,7 +167,9 @@ class WeeklyNorm:
         deviation, of positive metrics with the skewness of the prior: so outliers do
         not hide themselves by a large scale or skewness."""
         usual = SKEWNESS if self.is_positive else self.skewness
-        z = replace(self, skewness=usual)._terms(*self._bases(weeks), values).z
+        locations, scales = self._bases(weeks)
+        norm = replace(self, skewness=usual)
+        z = norm._terms(locations, scales, values).z
         deviation = stats.median_abs_deviation(z, scale="normal")
         return z / max(float(deviation), MIN_SCATTER)
 
@@ -441,16 +443,29 @@ class _Model:
         scans = state.scans
         if scans.correlation is None:
             return inverse
-        # the scatter of the slopes
-        scatter = state.information.copy()
-        size = rows.shape[1]
-        location = slice(0, size)
-        scale = slice(size, size + self.scale_rows.shape[1])
-        own = rows * np.exp(-state.log_scale)[:, None]
-        scatter[location, location] = self.location_penalty + own.T @ scans.spread(own)
-        own = np.sqrt(state.expected.scale * state.left)[:, None] * self.scale_rows
-        scatter[scale, scale] = self.scale_penalty + own.T @ scans.spread(own, 2)
-        return inverse @ scatter @ inverse
+        # the scatter of the slopes: they are about Hermite polynomials of z, whose
+        # correlation between scans is a power of that of z
+        size, count = rows.shape[1], len(inverse)
+        scale_end = size + self.scale_rows.shape[1]
+        ones = np.ones((len(rows), count - scale_end))
+        parts = [
+            (slice(0, size), rows),
+            (slice(size, scale_end), self.scale_rows),
+            (slice(scale_end, count), ones),
+        ]
+        e = state.expected
+        expected = [
+            [e.location, e.location_scale, e.location_skewness],
+            [e.location_scale, e.scale * state.left, e.scale_skewness],
+            [e.location_skewness, e.scale_skewness, e.skewness],
+        ]
+        powers = [[1, 2, 1], [2, 2, 2], [1, 2, 3]]
+        scatter = self.penalty.copy()
+        for i, (here, own) in enumerate(parts):
+            for j, (there, other) in enumerate(parts):
+                each = expected[i][j][:, None] * other
+                scatter[here, there] += own.T @ scans.spread(each, powers[i][j])
+        return inverse @ (0.5 * (scatter + scatter.T)) @ inverse
 
 
 @dataclass(frozen=True, eq=False)
