@@ -115,10 +115,8 @@ def parameters(**changes) -> FoldingParameters:
         "step_s": STEP_S,
         "thickness_mm": 2.5,
         "core_growth_rate_per_s": 1e-7,
-        "contact": {"kind": "planes"},
-        # clamped below, so that growth pushes the hemispheres against the planes
-        "no_growth": {"shift": [0.0, -0.5], "semi_axes": [0.6, 0.45, 0.25]},
-        "solver": {"newton_tolerance": 1e-12},
+        "contact": "planes",
+        "newton_tolerance": 1e-12,
     }
     return parameters_from(values | changes)
 

@@ -125,11 +125,7 @@ class FoundBrain:
     @property
     def files(self) -> str:
         """Its files, separated by commas."""
-        source = (
-            self.entry.get("labels")
-            or self.entry.get("pial")
-            or self.entry.get("hemisphere", {}).get("file")
-        )
+        source = self.entry.get("labels") or self.entry.get("pial")
         return str(source or ", ".join(self.entry["hemispheres"].values()))
 
 
@@ -467,7 +463,7 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
                 continue
             problem = "white surfaces alone; pial ones are needed"
         elif len(pair) == 1:
-            source = {"hemisphere": {"file": str(file), "side": first}}
+            source = {"pial": str(file), "side": first}
             for side, sign in files_of[_scan_of(file)].items():
                 if side != first:
                     found = (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
 from ..geometry.triangles import Floats, TriangleMesh, face_areas, face_normals
 from ..settings import terms
-from ..settings.folding import FoldingParameters, NoGrowth
+from ..settings.folding import FoldingParameters
 from ..settings.terms import Side
 from ..settings.varying import value_at
 from .layers import PialSearch, cortical_weight
@@ -20,6 +20,10 @@ from .layers import PialSearch, cortical_weight
 Tags = dict[str, NDArray[np.int32]]
 GAP_MM = 2.5
 """Largest width of the fissure, as in the FetalFoldSim paper."""
+ELLIPSOID_SHIFT = (0.0, 0.05, -0.15)
+ELLIPSOID_SEMI_AXES = (0.35, 0.40, 0.50)
+"""Shift from the middle and semi-axes along X, Y, Z of the ellipsoid without growth, in
+extents of the brain, as in the FetalFoldSim paper."""
 MAX_BETWEEN_PLANES = 0.01
 """Largest share of the pial area between the contact planes, where walls would have no
 contact."""
@@ -145,16 +149,13 @@ def _wall_anchors(
     return wall[[central, farthest]], fixed
 
 
-def inside_ellipsoid(
-    vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats
-) -> NDArray[np.bool_]:
+def inside_ellipsoid(vertices: NDArray, low: Floats, high: Floats) -> NDArray[np.bool_]:
     """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,)
     are the ends of the brain."""
     extent = high - low
-    centre = (low + high) / 2 + np.array([0.0, *ellipsoid.shift]) * extent
-    return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(
-        axis=1
-    ) <= 1
+    centre = (low + high) / 2 + np.array(ELLIPSOID_SHIFT) * extent
+    from_centre = (vertices - centre) / (np.array(ELLIPSOID_SEMI_AXES) * extent)
+    return (from_centre**2).sum(axis=1) <= 1
 
 
 def zones_of_run(
@@ -174,7 +175,7 @@ def zones_of_run(
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
     distance = bridge = gap_mm / 4
-    if p.contact.kind == "planes":
+    if p.contact == "planes":
         distance = min(distance, planes_distance(mesh.vertices, facets, fissure_x_mm))
     left_plane, right_plane = fissure_x_mm - distance, fissure_x_mm + distance
     if side is not None:
@@ -182,8 +183,7 @@ def zones_of_run(
     low, high = brain_box(mesh.vertices, side)
     reach = (high - low)[0] / 8
     facet_x = x[facets]
-    ellipsoid = p.no_growth
-    static = inside_ellipsoid(mesh.vertices, ellipsoid, low, high)
+    static = inside_ellipsoid(mesh.vertices, low, high)
 
     def all_of_face(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the mask (f,) of facets on elements' faces with a mask that is True at
@@ -193,7 +193,7 @@ def zones_of_run(
     zone = np.full(len(facets), terms.FREE)
     if support == "ellipsoid":
         zone[all_of_face(static[facets])] = terms.CLAMPED
-    if p.contact.kind != "none":
+    if p.contact != "none":
         between = (facet_x > left_plane) & (facet_x < right_plane)
         left = (facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)
         right = (facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)
@@ -208,14 +208,14 @@ def zones_of_run(
             anchors = _wall_anchors(mesh.vertices, wall)
 
     growth = np.ones(len(mesh.vertices))
-    if ellipsoid.kind != "none":
+    if p.no_growth != "none":
         growth[static] = 0.0
         if side is None:
             in_bridge = bridge_vertices(
                 mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
             )
             growth[in_bridge] = 0.0
-            if p.contact.kind == "planes":
+            if p.contact == "planes":
                 medial = medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
                 growth[medial] = 0.0
     free = support == "free" and side is None

@@ -1,4 +1,4 @@
-"""Smooth curves of area, volume and thickness over gestational weeks: fitted to series
+"""Smooth curves of area and volume over gestational weeks: fitted to series
 of brains, or given as a table.
 
 Runs follow them, or are compared with them.
@@ -37,9 +37,6 @@ MIN_WEEKS_PER_DEGREE = 2.0
 ROUNDS = 50
 KNOT_INTERVALS = 12
 Z_95 = 1.96
-THICKNESS = "thickness_mm"
-"""Column of the table of areas with the mean cortical thickness, if known. Thickness
-may decrease."""
 SPACING_GW = 0.25
 """Spacing of the weeks at which a run stores a curve."""
 
@@ -306,25 +303,15 @@ def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:
     """Fit curves to the measured sizes of each series of brains; return them by series
     and quantity.
 
-    `areas` has the columns series, week, area_cm2, volume_ml and, if known,
-    `THICKNESS`; each series has two weeks or more. A curve of thickness needs brains of
-    two weeks with a thickness.
+    `areas` has the columns series, week, area_cm2 and volume_ml; each series has two
+    weeks or more.
     """
-    quantities = list(SIZES)
-    if THICKNESS in areas:
-        quantities.append(THICKNESS)
     fits: dict[str, dict[str, CurveFit]] = {}
     for name, brains in areas.groupby("series", sort=False):
         of_series: dict[str, CurveFit] = {}
-        for quantity in quantities:
-            complete = brains.dropna(subset=quantity)
-            if quantity == THICKNESS and complete["week"].nunique() < 2:
-                continue
+        for quantity in SIZES:
             of_series[quantity] = fitted(
-                complete["week"].tolist(),
-                complete[quantity].tolist(),
-                name=quantity,
-                may_shrink=quantity == THICKNESS,
+                brains["week"].tolist(), brains[quantity].tolist(), name=quantity
             )
         fits[str(name)] = of_series
     return fits
@@ -340,14 +327,14 @@ def followed_sizes(
     """Return the sizes that a run follows, {quantity: {week: value}}, every quarter of
     a week.
 
-    For each of `SIZES` and the thickness that the run follows, `growth` has `measured`
+    For each of `SIZES` that the run follows, `growth` has `measured`
     or a table of values by week, which may decrease if `shrink`. `curves`, with the
     columns series, quantity, week and value, are needed for `measured`; InputError if
     the start brain's `series` is not in them. `weeks` are the output weeks of the run.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in (*SIZES, THICKNESS):
+    for quantity in SIZES:
         source = growth.get(quantity)
         if source is None:
             continue
@@ -358,7 +345,7 @@ def followed_sizes(
                 [float(week) for week in source],
                 list(source.values()),
                 name=quantity,
-                may_shrink=shrink or quantity == THICKNESS,
+                may_shrink=shrink,
             )
         by_week = zip(at.tolist(), value(curve, at).tolist(), strict=True)
         tables[quantity] = {round(week, 6): size for week, size in by_week}
@@ -397,8 +384,6 @@ def run_parameters(
         parameters["targets"] = {week: target_map(week) for week in later}
         parameters["stops"] = list(stops)
     parameters["growth"] = growth | sizes
-    if THICKNESS in sizes:
-        parameters[THICKNESS] = {"weeks": sizes[THICKNESS]}
     return parameters
 
 

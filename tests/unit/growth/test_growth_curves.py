@@ -214,9 +214,9 @@ AREAS = pd.DataFrame(
         "area_cm2": 90 * 1.1 ** (TWICE - 21),
         "volume_ml": 46 * 1.2 ** (TWICE - 21),
     }
-).assign(thickness_mm=np.nan)
+)
 AREAS[["area_cm2", "volume_ml"]] *= SIZE[:, None]
-MEASURED = {"area_cm2": "measured", "volume_ml": "measured", "thickness_mm": None}
+MEASURED = {"area_cm2": "measured", "volume_ml": "measured"}
 
 
 def curves(areas=AREAS):
@@ -243,14 +243,6 @@ def test_a_brain_without_a_series_has_no_measured_curve():
     for table, series in ((None, None), (curves(), "surface")):
         with pytest.raises(InputError, check=Facts("area_cm2")):
             followed_sizes(MEASURED, table, series, [21.0, 22.0], False)
-    with pytest.raises(InputError, check=Facts("thickness_mm")):
-        followed_sizes(
-            MEASURED | {"thickness_mm": "measured"},
-            curves(),
-            "volume",
-            [21.0, 22.0],
-            False,
-        )
 
 
 def test_sizes_of_a_week_are_those_followed_or_else_the_measured_ones():
@@ -286,12 +278,11 @@ def test_a_given_table_shrinks_only_where_that_is_allowed():
 def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_towards():
     weeks, surface = [21.0, 22.0], {"fissure_x_mm": 0.5, "side": "left"}
     settings = {
-        "growth": MEASURED | {"thickness_mm": "measured"},
+        "growth": MEASURED,
         "thickness_mm": 1.5,
         "end_week": 22.0,
     }
-    table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (TWICE - 21)))
-    found = run_parameters(settings, weeks, surface, {}, [], table, "volume")
+    found = run_parameters(settings, weeks, surface, {}, [], curves(), "volume")
     assert {
         name: found[name]
         for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")
@@ -303,7 +294,6 @@ def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_to
         "end_week": 22.0,
     }
     assert found["growth"]["area_cm2"][22.0] == pytest.approx(99, rel=5e-3)
-    assert found["thickness_mm"]["weeks"][22.0] == pytest.approx(2.3, rel=5e-3)
     assert "targets" not in found
     shapes = {
         "area_cm2": {21.0: 90.0, 23.0: 80.0},
@@ -387,7 +377,6 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
             tmp_path / f"{name}.json",
             {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {},
         )
-    write_json(tmp_path / "thickness.json", {"mean_mm": 1.8})
     inputs = {
         "whole": [f"{name}.gii" for name in "abcd"],
         "reports": [f"{name}.json" for name in "abcd"],
@@ -400,13 +389,12 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
     run_script(
         "growth_rates.py",
         tmp_path,
-        inputs | {"thickness": ["thickness.json"]},
+        inputs,
         {"areas": "areas.csv", "rates": "rates.csv"},
-        known | {"with_thickness": ["b"], "with_rates": ["mine", "atlas"]},
+        known | {"with_rates": ["mine", "atlas"]},
     )
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]
-    assert areas["thickness_mm"].isna().tolist() == [True, False, True, True]
     np.testing.assert_array_equal(areas["tissue_ml"], [30.0, 40.0, np.nan, np.nan])
     rates = pd.read_csv(tmp_path / "rates.csv").set_index("series")
     # radii grow as the square root of areas

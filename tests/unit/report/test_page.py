@@ -283,7 +283,7 @@ def foretold(weeks: float) -> dict:
     atlas = {
         "name": "crl",
         "title": "An atlas",
-        "reference": {"citation": "A. et al.", "doi": "10.1/x", "url": None},
+        "reference": "A. et al., doi 10.1/x",
     }
     atlas["licence"] = {
         "name": "CRL licence",
@@ -533,7 +533,7 @@ def test_the_methods_say_what_was_run():
         "growth_rate_per_s": 2e-7,
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
-        "contact": {"kind": "global"},
+        "contact": "global",
     }
     summary = {"weeks": [21.0, 24.5], "steps": 49, "tets": 1234}
     led = parameters | {"growth": {"model": "shapes", "of": "self"}}
