@@ -180,7 +180,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         record_usage(arguments.log, Usage(own.wall_s, cpu_s, memory_mib))
 
 
-def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
+def _guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Run `main` with the folder locked, and end every rank with the exit code of the
     first error."""
     try:
@@ -212,4 +212,4 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
 
 
 if __name__ == "__main__":
-    guarded(MPI.COMM_WORLD, parse())
+    _guarded(MPI.COMM_WORLD, parse())

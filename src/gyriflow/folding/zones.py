@@ -123,7 +123,7 @@ def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floa
     return low, high
 
 
-def medial_wall_facets(
+def _medial_wall_facets(
     mesh: TetrahedralMesh, facets: NDArray[np.int64], side: Side
 ) -> NDArray[np.bool_]:
     """Return the mask (f,) of the facets of a single hemisphere that face the missing
@@ -165,8 +165,8 @@ def zones_of_run(
 
     The planes are a quarter of `gap_mm`, the width of the fissure, left and right of
     its middle; with contact `planes` nearer, where the fissure is narrower: see
-    `planes_distance`. With any kind of contact, facets near the fissure are not
-    clamped; with `planes`, the `medial_vertices` do not grow. The ellipsoid without
+    `_planes_distance`. With any kind of contact, facets near the fissure are not
+    clamped; with `planes`, the `_medial_vertices` do not grow. The ellipsoid without
     growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single
     hemisphere has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
@@ -176,7 +176,7 @@ def zones_of_run(
     facets, _ = boundary_faces(mesh)
     distance = bridge = gap_mm / 4
     if p.contact == "planes":
-        distance = min(distance, planes_distance(mesh.vertices, facets, fissure_x_mm))
+        distance = min(distance, _planes_distance(mesh.vertices, facets, fissure_x_mm))
     left_plane, right_plane = fissure_x_mm - distance, fissure_x_mm + distance
     if side is not None:
         left_plane = right_plane = float(x.max() if side == "left" else x.min())
@@ -202,7 +202,7 @@ def zones_of_run(
         zone[all_of_face(right)] = terms.RIGHT_CONTACT
     anchors = None
     if side is not None:
-        zone[medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
+        zone[_medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
         wall = np.unique(facets[zone == terms.MEDIAL_WALL])
         if support == "free" and len(wall):
             anchors = _wall_anchors(mesh.vertices, wall)
@@ -211,12 +211,12 @@ def zones_of_run(
     if p.no_growth != "none":
         growth[static] = 0.0
         if side is None:
-            in_bridge = bridge_vertices(
+            in_bridge = _bridge_vertices(
                 mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
             )
             growth[in_bridge] = 0.0
             if p.contact == "planes":
-                medial = medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
+                medial = _medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
                 growth[medial] = 0.0
     free = support == "free" and side is None
     return Zones(
@@ -224,7 +224,7 @@ def zones_of_run(
     )
 
 
-def planes_distance(
+def _planes_distance(
     vertices: Floats, facets: NDArray[np.int64], fissure_x_mm: float
 ) -> float:
     """Return the distance in mm from the middle of the fissure that has
@@ -236,7 +236,7 @@ def planes_distance(
     return float(farthest[nearest_first][last])
 
 
-def bridge_vertices(
+def _bridge_vertices(
     mesh: TetrahedralMesh,
     facets: NDArray[np.int64],
     left_plane: float,
@@ -252,7 +252,7 @@ def bridge_vertices(
     return np.unique(mesh.tets[(between | ~deepest).all(axis=1)])
 
 
-def medial_vertices(
+def _medial_vertices(
     mesh: TetrahedralMesh, fissure_x_mm: float, left_plane: float, right_plane: float
 ) -> NDArray[np.int64]:
     """Return the vertices, each once, of the elements whose most medial vertex lies

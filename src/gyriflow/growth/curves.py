@@ -117,14 +117,13 @@ def fitted(
     *,
     name: str = "curve",
     degrees_of_freedom: float = DEGREES_OF_FREEDOM,
-    may_shrink: bool = False,
     keeps_first: bool = False,
 ) -> CurveFit:
     """Fit a smooth curve to measured weeks, robust against single outliers.
 
-    The growth rate (derivative of the logarithm) is a quadratic spline, not negative
-    unless `may_shrink`, with a penalty on its second differences (on its first ones
-    below three degrees of freedom; P-splines, Eilers and Marx 1996). The penalty leaves
+    The growth rate (derivative of the logarithm) is a quadratic spline, not negative,
+    with a penalty on its second differences (on its first ones below three degrees of
+    freedom; P-splines, Eilers and Marx 1996). The penalty leaves
     `degrees_of_freedom`, at most one less than the number of weeks. With at least twice
     as many weeks, outliers lose their weight (Tukey's biweight, started from least
     absolute deviations), but with `keeps_first` not those of the first week, the
@@ -132,7 +131,7 @@ def fitted(
     scatter of the weeks about the curve.
 
     At least two different weeks and positive sizes are needed; several brains may share
-    a week. InputError for other values, and if the sizes decrease without `may_shrink`.
+    a week. InputError for other values, and if the sizes decrease.
     """
     weeks_, values_ = _checked(weeks, values, name)
     count = len(np.unique(weeks_))
@@ -142,11 +141,11 @@ def fitted(
     design = splines.design(weeks_, *ends, KNOT_INTERVALS)
     penalty = splines.penalty(*ends, KNOT_INTERVALS, order=2 if degrees >= 3 else 1)
     strength = splines.strength(design.T @ design, penalty, degrees, name)
-    weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
+    weights = _robust_weights(design, logs, penalty, strength, degrees)
     if keeps_first:
         weights[weeks_ == weeks_[0]] = 1.0
-    coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
-    if not may_shrink and coefficients[1:].max() < 1e-6:
+    coefficients = _solve(design, logs, weights, strength * penalty)
+    if coefficients[1:].max() < 1e-6:
         _refuse_shrinking(name, weeks_)
     residual_degrees = weights.sum() - degrees
     squares = (weights * (logs - design @ coefficients) ** 2).sum()
@@ -156,7 +155,7 @@ def fitted(
     rows = splines.design(at, *ends, KNOT_INTERVALS)
     # rates at their bound of 0 are not free
     free = np.ones(len(coefficients), dtype=bool)
-    free[1:] = may_shrink | (coefficients[1:] > 1e-8)
+    free[1:] = coefficients[1:] > 1e-8
     normal = (design.T * weights) @ design + strength * penalty
     covariance = np.linalg.pinv(normal[np.ix_(free, free)])
     free_rows = rows[:, free]
@@ -214,9 +213,7 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def _solve(
-    design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool
-) -> Floats:
+def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats) -> Floats:
     # eigenvalues of a strong penalty that should be 0 are not, because of round-off
     sizes, directions = np.linalg.eigh(penalty)
     sizes = np.clip(sizes, 1e-10, None)
@@ -224,9 +221,6 @@ def _solve(
     factors = np.sqrt(weights)
     rows = np.concatenate([factors[:, None] * design, root])
     right = np.concatenate([factors * logs, np.zeros(len(root))])
-    if may_shrink:
-        coefficients, *_ = np.linalg.lstsq(rows, right, rcond=None)
-        return coefficients
     lowest = np.zeros(design.shape[1])
     lowest[0] = -np.inf
     found = lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls")
@@ -239,14 +233,13 @@ def _robust_weights(
     penalty: Floats,
     strength: float,
     degrees: float,
-    may_shrink: bool,
 ) -> Floats:
     count = len(logs)
     weights = np.ones(count)
     if count < MIN_WEEKS_PER_DEGREE * degrees:
         return weights
     for _ in range(ROUNDS):
-        coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
+        coefficients = _solve(design, logs, weights, strength * penalty)
         residuals = logs - design @ coefficients
         weights = 1.0 / np.maximum(np.abs(residuals), MIN_SCATTER)
         weights *= count / weights.sum()
@@ -255,7 +248,7 @@ def _robust_weights(
         scatter *= np.sqrt(count / (count - degrees))
         scale = TUKEY * max(scatter, MIN_SCATTER)
         weights = np.clip(1 - (residuals / scale) ** 2, 0, None) ** 2
-        coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
+        coefficients = _solve(design, logs, weights, strength * penalty)
         residuals = logs - design @ coefficients
     return weights
 

@@ -60,7 +60,7 @@ def edge_length_at(
     return np.minimum(surface_edge_mm + order * EDGE_GROWTH * below, core_edge_mm)
 
 
-def background_mesh(
+def _background_mesh(
     surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
     """Return a regular tetrahedral grid over the inside of the surface and the edge
@@ -126,7 +126,7 @@ def tetrahedralise(
         }
     else:
         diagonal = np.linalg.norm(np.ptp(surface.vertices, axis=0))
-        background, lengths = background_mesh(surface, edge, core, order)
+        background, lengths = _background_mesh(surface, edge, core, order)
         arrays = {
             "vertices": surface.vertices,
             "faces": surface.faces,

@@ -81,7 +81,7 @@ class Row:
     absent: str = ""
 
 
-def round_length(limit_mm: float) -> float:
+def _round_length(limit_mm: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
     decade = 10.0 ** np.floor(np.log10(limit_mm))
     return float(
@@ -378,7 +378,7 @@ def _draw_scale_bar(
 ) -> None:
     """Draw the scale bar, and below it what the letters of the views mean."""
     width, total = figure.get_size_inches()
-    length = round_length(
+    length = _round_length(
         min(0.6 * widest_in, _SCALE_SHARE * width - 2 * _EDGE_IN) / inches_per_mm
     )
     axes = figure.add_axes(
