@@ -153,9 +153,12 @@ def inside_ellipsoid(vertices: NDArray, low: Floats, high: Floats) -> NDArray[np
     """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,)
     are the ends of the brain."""
     extent = high - low
-    centre = (low + high) / 2 + np.array(ELLIPSOID_SHIFT) * extent
-    from_centre = (vertices - centre) / (np.array(ELLIPSOID_SEMI_AXES) * extent)
-    return (from_centre**2).sum(axis=1) <= 1
+    middle = (low + high) / 2
+    centre = middle + np.array(ELLIPSOID_SHIFT) * extent
+    semi_axes = np.array(ELLIPSOID_SEMI_AXES) * extent
+    from_centre = (vertices - centre) / semi_axes
+    squares = (from_centre**2).sum(axis=1)
+    return squares <= 1
 
 
 def zones_of_run(

@@ -219,8 +219,10 @@ def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats) -> Fl
     sizes = np.clip(sizes, 1e-10, None)
     root = (directions * np.sqrt(sizes)).T
     factors = np.sqrt(weights)
-    rows = np.concatenate([factors[:, None] * design, root])
-    right = np.concatenate([factors * logs, np.zeros(len(root))])
+    weighted = factors[:, None] * design
+    rows = np.concatenate([weighted, root])
+    no_rates = np.zeros(len(root))
+    right = np.concatenate([factors * logs, no_rates])
     lowest = np.zeros(design.shape[1])
     lowest[0] = -np.inf
     found = lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls")
