@@ -327,17 +327,14 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     closed = ndimage.distance_transform_edt(near, sampling=size) > CLOSING_MM
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
     clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
-    hit_share = _ray_share(
-        clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * RAY_SMOOTHING
-    )
-    number, _ = ndimage.label(
-        clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)),
-        extraction.OUTSIDE,
-    )
+    inner_tissue = tissue & ~np.isin(numbers, scheme.cortex)
+    hit_share = _ray_share(clear, inner_tissue, 0.5 * RAY_SMOOTHING)
+    needed = ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX
+    number, _ = ndimage.label(clear & (hit_share > needed), extraction.OUTSIDE)
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
-    enclosed = np.isin(
-        number, np.flatnonzero(sizes >= max(1, MIN_PART_SHARE * sizes.max())) + 1
-    )
+    smallest = max(1, MIN_PART_SHARE * sizes.max())
+    large = np.flatnonzero(sizes >= smallest) + 1
+    enclosed = np.isin(number, large)
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
         filled[box] = enclosed[(slice(margin, -margin),) * 3]
     return filled
@@ -346,20 +343,26 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
 def _ray_share(
     clear: Mask, tissue: Mask, smoothing_voxels: float
 ) -> NDArray[np.float32]:
-    pad = np.pad(clear, 1), np.pad(tissue, 1)
-    start = np.argwhere(pad[0])
+    is_clear = np.pad(clear, 1)
+    is_tissue = np.pad(tissue, 1)
+    start = np.argwhere(is_clear)
     hits = np.zeros(len(start), dtype=np.int32)
     for direction in DIRECTIONS:
-        places, rows = start + direction, np.arange(len(start))
+        places = start + direction
+        rows = np.arange(len(start))
         while len(rows):
             index = tuple(places.T)
-            hits[rows[pad[1][index]]] += 1
-            on = pad[0][index]
-            places, rows = places[on] + direction, rows[on]
-    share = np.zeros(pad[0].shape, dtype=np.float32)
+            hits[rows[is_tissue[index]]] += 1
+            # rays go on through what is clear
+            on = is_clear[index]
+            places = places[on] + direction
+            rows = rows[on]
+    share = np.zeros(is_clear.shape, dtype=np.float32)
     share[tuple(start.T)] = hits / len(DIRECTIONS)
-    smooth = ndimage.gaussian_filter(share[1:-1, 1:-1, 1:-1], smoothing_voxels)
-    return smooth / np.maximum(extraction.smooth_mask(clear, smoothing_voxels), 1e-6)
+    inner = share[1:-1, 1:-1, 1:-1]
+    smooth = ndimage.gaussian_filter(inner, smoothing_voxels)
+    weight = extraction.smooth_mask(clear, smoothing_voxels)
+    return smooth / np.maximum(weight, 1e-6)
 
 
 def border_share(mask: Mask) -> float:

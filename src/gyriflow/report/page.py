@@ -479,13 +479,14 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
 def _quality_verdict(quality: pd.DataFrame) -> str:
     """Return a sentence with the number of brains by verdict of quality control."""
     counts = quality["verdict"].value_counts()
-    words = {
-        name: name.replace("needs", "need" if counts.get(name, 0) > 1 else "needs")
-        for name in VERDICTS
-    }
-    brains = f"{len(quality)} brain{'s' if len(quality) > 1 else ''}"
-    parts = [f"{counts[name]} {word}" for name, word in words.items() if name in counts]
-    return f"{brains}: {', '.join(parts)}."
+    parts = []
+    for verdict in VERDICTS:
+        count = counts.get(verdict, 0)
+        words = verdict.replace("needs", "need") if count > 1 else verdict
+        if count:
+            parts.append(f"{count} {words}")
+    plural = "s" if len(quality) > 1 else ""
+    return f"{len(quality)} brain{plural}: {', '.join(parts)}."
 
 
 def verdict(
@@ -609,16 +610,19 @@ def _group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
     """Return each distinct warning once, with its brains and runs."""
     # steps of a brain have no run
     named = warnings[["subject", "run"]].astype(object).fillna("").astype(str)
-    places = [", ".join(filter(None, place)) for place in named.itertuples(index=False)]
-    prefix = warnings["level"].map(
-        lambda level: "" if level == "warning" else f"{level}: "
-    )
-    rows = warnings.assign(message=prefix + warnings["message"])
-    rows["brain, run"] = places
+    rows = warnings.copy()
+    rows["brain, run"] = [
+        ", ".join(filter(None, place)) for place in named.itertuples(index=False)
+    ]
+    is_error = rows["level"] != "warning"
+    prefix = (rows["level"] + ": ").where(is_error, "")
+    rows["message"] = prefix + rows["message"]
+
+    def joined(names: pd.Series) -> str:
+        return "; ".join(filter(None, names.unique()))
+
     groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
-    return groups.agg(
-        lambda names: "; ".join(filter(None, dict.fromkeys(names)))
-    ).reset_index()
+    return groups.agg(joined).reset_index()
 
 
 def hide_paths(value: Any) -> Any:

@@ -345,17 +345,24 @@ def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Float
 
 
 def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
-    middle = (panel.mesh.vertices.min(axis=0) + panel.mesh.vertices.max(axis=0)) / 2
-    right, up = (float((point - middle) @ axis) for axis in picture_axes(panel.view))
+    vertices = panel.mesh.vertices
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    to_right, to_top = picture_axes(panel.view)
+    place = float((point - middle) @ to_right), float((point - middle) @ to_top)
+    radius = 0.05 * np.ptp(axes.get_xlim()) / 2
     line = "-" if is_visible(panel.mesh, point, panel.view) else ":"
-    for colour, thickness in (("white", 2.0), ("black", 1.0)):
-        ring = Circle((right, up), 0.05 * np.ptp(axes.get_xlim()) / 2, fill=False)
-        ring.set(
+    # a white margin below the black ring
+    for colour, thickness, style in (("white", 2.0, "-"), ("black", 1.0, line)):
+        ring = Circle(
+            place,
+            radius,
+            fill=False,
             edgecolor=colour,
             linewidth=thickness,
-            linestyle=line if colour == "black" else "-",
+            linestyle=style,
+            clip_on=False,
+            zorder=5,
         )
-        ring.set(clip_on=False, zorder=5)
         axes.add_patch(ring)
 
 
