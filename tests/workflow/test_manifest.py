@@ -36,9 +36,9 @@ def made(checkout_copy, tmp_path_factory):
     """The brain's study, which counts as made."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("manifest") / "study")
     workflow.directory.mkdir()
-    for side, files in REGIONS.items():
-        for kind, name in files.items():
-            (workflow.directory / name).write_text(f"{kind} of {side}")
+    for files in REGIONS.values():
+        for name in files:
+            (workflow.directory / name).write_text(f"content of {name}")
     workflow.write("study.yaml", STUDY)
     workflow.lay_out(*CONFIGURED)
     workflow.count_as_made("--forceall", *CONFIGURED)
