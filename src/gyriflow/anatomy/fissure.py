@@ -397,8 +397,10 @@ def _signed_distance(mask: Mask, size: Floats) -> Floats:
     its voxels; negative outside."""
     inside = ndimage.distance_transform_edt(mask, sampling=size)
     outside = ndimage.distance_transform_edt(~mask, sampling=size)
-    half_voxel = 0.5 * size.mean() * np.where(mask, 1.0, -1.0)
-    return np.asarray(inside - outside - half_voxel)
+    sign = np.where(mask, 1.0, -1.0)
+    half_voxel = 0.5 * size.mean() * sign
+    distance = inside - outside - half_voxel
+    return np.asarray(distance)
 
 
 def hidden_fissure(

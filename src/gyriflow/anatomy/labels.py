@@ -322,21 +322,31 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     if np.isin(labels, scheme.ventricles).any() or 2 * margin > max(labels.shape):
         return filled
     (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
-    numbers, tissue = np.pad(labels[box], margin), np.pad(cerebrum[box], margin)
-    near = ndimage.distance_transform_edt(~tissue, sampling=size) <= CLOSING_MM
-    closed = ndimage.distance_transform_edt(near, sampling=size) > CLOSING_MM
+    numbers = np.pad(labels[box], margin)
+    tissue = np.pad(cerebrum[box], margin)
+
+    # the cerebrum without its openings
+    to_tissue = ndimage.distance_transform_edt(~tissue, sampling=size)
+    near = to_tissue <= CLOSING_MM
+    to_border = ndimage.distance_transform_edt(near, sampling=size)
+    closed = to_border > CLOSING_MM
+    inside = ndimage.binary_fill_holes(closed | tissue)
+
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
-    clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
-    inner_tissue = tissue & ~np.isin(numbers, scheme.cortex)
+    clear = inside & ~tissue & ~hindbrain
+    cortex = np.isin(numbers, scheme.cortex)
+    inner_tissue = tissue & ~cortex
     hit_share = _ray_share(clear, inner_tissue, 0.5 * RAY_SMOOTHING)
     needed = ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX
-    number, _ = ndimage.label(clear & (hit_share > needed), extraction.OUTSIDE)
+    is_enclosed = clear & (hit_share > needed)
+    number, _ = ndimage.label(is_enclosed, extraction.OUTSIDE)
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
     smallest = max(1, MIN_PART_SHARE * sizes.max())
     large = np.flatnonzero(sizes >= smallest) + 1
     enclosed = np.isin(number, large)
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
-        filled[box] = enclosed[(slice(margin, -margin),) * 3]
+        without_margin = (slice(margin, -margin),) * 3
+        filled[box] = enclosed[without_margin]
     return filled
 
 
