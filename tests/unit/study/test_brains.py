@@ -91,6 +91,11 @@ REGIONS = {"a": {"labels": "a.nii.gz", "names": {1: "frontal"}}}
         ),
         (HEMISPHERE, ".scheme", []),
         (
+            {"hemispheres": {"left": "l.gii", "right": "r.gii"}, "side": "left"},
+            ".side",
+            ["hemispheres", "labels", "pial"],
+        ),
+        (
             HEMISPHERE | {"scheme": "binary", "coordinates": "ras"},
             ".coordinates",
             ["pial"],
