@@ -112,7 +112,7 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     memory = predicted_memory_mib(
         round(elements / (8 if mesh.order == 2 else 1)),
         run.ranks,
-        run.contact.kind,
+        run.contact,
         mesh.order,
     )
     # positions and fields of each output week, by a quarter as many nodes
@@ -174,7 +174,7 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
     volume_stage = next(
         (stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None
     )
-    if volume_stage and brain.config.has_labels:
+    if volume_stage and brain.config.labels:
         opening = (
             1.0
             if study.config.surface.open_sulci

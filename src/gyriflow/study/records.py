@@ -265,8 +265,7 @@ class Simulation:
     @property
     def curves(self) -> str | list[str]:
         """The table of the curves of measured sizes, if it follows one."""
-        growth = self.settings.growth
-        if growth.follows_sizes or growth.thickness_mm == "measured":
+        if self.settings.growth.follows_sizes:
             return paths.CURVES["curves"]
         return []
 

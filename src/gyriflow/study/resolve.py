@@ -118,9 +118,9 @@ def _brain(
     checksums: Mapping[str, tuple[str, str]],
 ) -> Brain:
     labels = None
-    if settings.label_volume is not None:
+    if settings.labels is not None:
         scheme = label_scheme(config, settings)
-        labels = LabelSource(settings.label_volume, settings.affine_from, scheme)
+        labels = LabelSource(settings.labels, settings.affine_from, scheme)
     has_cortex = labels is not None and bool(labels.scheme.cortex)
     has_white_files = bool(settings.white_files)
     has_thickness = has_white_files or has_cortex

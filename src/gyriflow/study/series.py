@@ -115,7 +115,7 @@ class Series:
         """
         if self.are_matched(*pair):
             return [False, False]
-        return [not brain.config.has_labels for brain in pair]
+        return [brain.config.labels is None for brain in pair]
 
 
 def several_subjects(brains: Iterable[Brain]) -> bool:
@@ -142,7 +142,7 @@ def series_of(
     for name, members in growing_groups(configs, config.growth.brains):
         ids = [brain.id for brain in members]
         series[name] = tuple(brains[brain] for brain in ids)
-        if any(brain.has_labels or brain.synthetic for brain in members):
+        if any(brain.labels or brain.synthetic for brain in members):
             continue
         cause: str | None = "growth.matched_surfaces is false"
         if config.growth.matched_surfaces:
@@ -349,7 +349,7 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     last = min((brain.week for brain in members if brain.week >= end), default=end)
     by_week = {start.week: start}
     for brain in members:
-        have_labels = start.config.has_labels and brain.config.has_labels
+        have_labels = start.config.labels and brain.config.labels
         if not have_labels and not series.are_matched(start, brain):
             continue
         if start.week < brain.week <= last:

@@ -170,7 +170,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
         "vary": {"thickness_mm": [1.0, 2.0]},
         "compare_week": 24,
     }
-    regions = {"b23": {"volume": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
+    regions = {"b23": {"labels": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
     twin = real[3] | {"id": "twin"}
     asked = {
         "studies": {"thick": varied, "one": varied | {"base": "late"}},
@@ -764,7 +764,7 @@ def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
 
 
 def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
-    given = {"b21": {"volume": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
+    given = {"b21": {"labels": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
     sphere = {"id": "sphere", "week": 22, **SPHERE}
     found = study([labels(21), labels(22), sphere], metrics={"regions": given})
     assert [brain.regions_from for brain in found.brains.values()] == [

@@ -9,7 +9,7 @@ from gyriflow.errors import InputError
 
 def brain(name, week, side=None, **more):
     """Return a brain of labels, or of the surface of one hemisphere."""
-    half = {"hemisphere": {"file": __file__, "side": side}}
+    half = {"pial": __file__, "side": side}
     return {"id": name, "week": week, **(half if side else LABELLED), **more}
 
 
@@ -107,13 +107,16 @@ def test_half_a_brain_grows_by_no_atlas_of_whole_ones():
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0)])
-def test_regions_come_from_the_brain_nearest_in_week_that_has_any(order):
+def test_regions_come_from_the_brain_nearest_in_week_that_has_any(tmp_path, order):
     brains = labelled(21, 22, 26, names="ace")
     brains = [
         *(brains[number] for number in order),
         *labelled(21.4, 23, 24.5, 25.5, names="bdfg"),
     ]
-    regions = {name: {"volume": __file__, "names": {1: "frontal"}} for name in "ace"}
+    volume = tmp_path / "regions.nii.gz"
+    volume.touch()
+    frontal = {"labels": str(volume), "names": {1: "frontal"}}
+    regions = dict.fromkeys("ace", frontal)
     found = resolved(brains, metrics={"regions": regions})
     assert {name: found.region_source(name).id for name in "bdfg"} == {
         "b": "a",
