@@ -5,7 +5,8 @@ Of new subjects in the first, an inner and the last week of a norm, 5 % should b
 the 5th centile, 5 % above the 95th and 1 % below the 1st. Prints these shares in per
 cent by case and number of subjects, then one line of JSON. Of norms that say that they
 are skewed, the first two shares are those beyond the 10th and 90th centile, in a row of
-their own with the number of cohorts.
+their own with the number of cohorts. Of a case with outliers: the share of these that
+`outlying_brains` names, and of cohorts of which it names another subject.
 
 --members scores the subjects of the norms themselves instead, as `measured_scores`
 does: each against the others. Their thirds of the weeks take the place of the three
@@ -23,7 +24,7 @@ from scipy import stats
 
 from gyriflow.geometry.triangles import Floats
 from gyriflow.metrics.lms import fit_norm
-from gyriflow.metrics.norms import cohort_norms, measured_scores
+from gyriflow.metrics.norms import cohort_norms, measured_scores, outlying_brains
 from gyriflow.settings.terms import MEASURED
 
 FIRST, LAST = 21.0, 37.0
@@ -169,6 +170,33 @@ def new_subjects(
     return result
 
 
+def named(case: Case, subjects: int, cohorts: int, seed: int) -> tuple[float, float]:
+    """Return the share of a cohort's outliers that are named, in per cent, and that of
+    cohorts of which another subject is."""
+    random = np.random.default_rng((seed, subjects))
+    count = round(case.outliers * subjects)
+    n_found = 0
+    n_wrong = 0
+    for _ in range(cohorts):
+        weeks, values, _ = drawn(case, subjects, random)
+        table, names = as_table(case, weeks, values)
+        found = outlying_brains(table, names, cohort_norms(table, names)).keys()
+        n_found += len(found & set(names[:count]))
+        n_wrong += bool(found - set(names[:count]))
+    return 100 * n_found / max(count * cohorts, 1), 100 * n_wrong / cohorts
+
+
+def as_table(
+    case: Case, weeks: Floats, values: Floats
+) -> tuple[pd.DataFrame, list[str]]:
+    """Return the table of a metric of scans, and their names."""
+    names = [f"s{scan}" for scan in range(len(weeks))]
+    metric, unit = ("area", "cm2") if case.is_positive else ("mean_shape_index", "1")
+    scans = {"subject": names, "run": MEASURED, "week": weeks, "hemisphere": "whole"}
+    measured = {"metric": metric, "value": values, "unit": unit}
+    return pd.DataFrame(scans | measured), names
+
+
 def members(
     case: Case, subjects: int, cohorts: int, seed: int
 ) -> dict[str, list[float]]:
@@ -177,19 +205,8 @@ def members(
     random, found = np.random.default_rng((seed, subjects)), []
     for _ in range(cohorts):
         weeks, values, numbers = drawn(case, subjects, random)
-        names = [f"s{scan}" for scan in range(len(weeks))]
-        metric, unit = (
-            ("area", "cm2") if case.is_positive else ("mean_shape_index", "1")
-        )
-        table = pd.DataFrame(
-            {"subject": names, "run": MEASURED, "week": weeks, "hemisphere": "whole"}
-        )
-        table = table.assign(
-            metric=metric,
-            value=values,
-            unit=unit,
-            person=[f"p{number}" for number in numbers],
-        )
+        table, names = as_table(case, weeks, values)
+        table = table.assign(person=[f"p{number}" for number in numbers])
         found.append(
             measured_scores(table, names, cohort_norms(table, names))[["week", "z"]]
         )
@@ -260,6 +277,9 @@ def main() -> None:
             result.setdefault(name, {})[subjects] = found
             print_row(name, subjects, 5.0, found, "")
             print_row(f"… skewed, {name}", subjects, 10.0, found, "skewed, ")
+            if case.outliers and not options.members:
+                share, wrong = named(*arguments)
+                print(f"  outliers named: {share:.0f} %, others in {wrong:.0f} %")
     print(json.dumps({"cohorts": options.cohorts, "shares": result}))
 
 
