@@ -84,6 +84,18 @@ def test_a_vertex_far_off_the_surface_is_told():
     )
 
 
+def test_dropped_pieces_are_told_with_their_share_of_the_area():
+    # a ninth and a 900th of the area
+    far, farther = ball((0, 40, 0), RADIUS / 3), ball((0, 40, 30), RADIUS / 30)
+    found = sound_pieces(merged(far, WHOLE, farther), 3.0)
+    dropped = area(far) + area(farther)
+    share = 100 * dropped / (area(WHOLE) + dropped)
+    assert found.warnings == [Facts("2 pieces", f"{share:.1f} %")]
+    assert found.report["repair"]["area_dropped_mm2"] == pytest.approx(dropped)
+    assert area(found.mesh) == pytest.approx(area(WHOLE))
+    assert sound_pieces(merged(farther, WHOLE), 3.0).warnings == []
+
+
 def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():
     whole = ball()
     vertices = whole.vertices.copy()
