@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from facts import Facts
 from scipy.spatial import Delaunay
-from shapes import FAR, ellipsoid, octasphere, sphere
+from shapes import FAR, ellipsoid, octasphere, sphere, uneven
 
 from gyriflow.compare.accuracy import ensemble_maps
 from gyriflow.compare.deviation import deviation_maps
@@ -485,6 +485,30 @@ def test_thickness_metrics_leave_out_what_was_not_measured() -> None:
     assert (rows["thickness_q05"], rows["thickness_q95"]) == (1.0, 2.0)
     assert rows["thickness_measured_share"] == pytest.approx(0.5)
     assert thickness_metrics(np.full(3, np.nan), np.ones(3)) == {}
+
+
+def test_means_of_regions_are_over_the_reliable_area() -> None:
+    mesh = uneven(sphere(RADIUS))
+    z = mesh.vertices[:, 2] / RADIUS
+    # the height is the middle of a zone, over its area
+    depth = np.where(np.abs(z) < 0.5, 99.0, z)
+    maps = {"sulcal_depth_mm": depth, "reliable": np.abs(z) > 0.5}
+    sides = {"left": mesh, "right": TriangleMesh(0.5 * mesh.vertices, mesh.faces)}
+    labels = np.where(np.abs(z) < 0.8, 4, 0)
+    labels[z < 0.4] = 3
+    found = region_metrics(
+        sides,
+        dict.fromkeys(sides, maps),
+        dict.fromkeys(sides, labels),
+        {3: "a", 4: "b"},
+    ).set_index(["hemisphere", "region", "metric"])["value"]
+    for side, factor in (("left", 1.0), ("right", 0.25)):
+        sphere_cm2 = factor * 4 * np.pi * RADIUS**2 / 100
+        assert found[side, "a", "area"] == pytest.approx(0.7 * sphere_cm2, rel=0.02)
+        assert found[side, "b", "area_share"] == pytest.approx(0.2, abs=0.01)
+        # −1 to −0.5, and 0.5 to 0.8
+        assert found[side, "a", "mean_sulcal_depth"] == pytest.approx(-0.75, abs=0.01)
+        assert found[side, "b", "mean_sulcal_depth"] == pytest.approx(0.65, abs=0.01)
 
 
 def test_regions_have_their_area_and_means() -> None:
