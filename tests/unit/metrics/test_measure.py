@@ -211,6 +211,7 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
         left,
         right,
         thickness_mm=thickness,
+        label_volumes_ml={"cortex": 60.0},
         curvature_radius_mm=6.0,
         spangy_modes=30,
     )
@@ -279,6 +280,27 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
         assert both.loc["relative_area", name] == pytest.approx(
             both.loc["area", name] / both.loc["volume", name] ** (2 / 3)
         )
+        # κ1 κ2, of H and the curvedness
+        assert maps["gaussian_curvature"] == pytest.approx(
+            2 * maps["mean_curvature"] ** 2 - maps["curvedness"] ** 2, abs=1e-12
+        )
+        modes = found.coefficients.query("hemisphere == @name")
+        assert modes["mode"].tolist() == list(range(30))
+        assert (np.diff(modes["eigenvalue_per_mm2"]) > 0).all()
+        for proxy in PROXIES:
+            squares = modes[f"coefficient_{proxy}"] ** 2
+            bands = found.spectra.query("hemisphere == @name and proxy == @proxy")
+            assert squares.groupby(modes["band"]).sum().to_dict() == pytest.approx(
+                bands.set_index("band")["power"].loc[: modes["band"].max()].to_dict()
+            )
+    # the cortex as a bent sheet of its thickness
+    bent = [
+        np.average(found.maps[name]["mean_curvature"], weights=vertex_areas(mesh))
+        for name, mesh in sides.items()
+    ]
+    mean_mm = numbers.loc["mean_thickness", "whole"]
+    sheet_cm2 = 60_000 / mean_mm / 100 * (1 + np.average(bent, weights=areas) * mean_mm)
+    assert numbers.loc["area_ratio", "whole"] == pytest.approx(areas.sum() / sheet_cm2)
 
 
 def test_one_wavelength_is_one_band_of_mean_curvature_but_not_of_shape_index() -> None:
