@@ -69,10 +69,13 @@ def test_two_closed_pieces_are_the_hemispheres_though_they_reach_over_the_plane(
     assert left.tolist() == [True] * 1280 + [False] * 1280
 
 
-def test_asymmetry_is_the_distance_to_the_mirror_image():
-    # radii that differ by a millimetre
-    mesh = merged(ball_at(-14.0, 3.0, 0.0), sphere(11.0, 4, (14.0, 3.0, 0.0)))
-    assert mid_plane(mesh).asymmetry_mm == pytest.approx(1.0, rel=0.2)
+@pytest.mark.parametrize(("radius", "asymmetry_mm"), [(10.0, 0.0), (11.0, 1.0)])
+def test_asymmetry_is_the_distance_to_the_mirror_image(radius, asymmetry_mm):
+    # radii that are equal, or differ by a millimetre
+    right = sphere(radius, 3, (14.0, 3.0, 0.0))
+    mesh = merged(ball_at(-14.0, 3.0, 0.0), right)
+    found = mid_plane(mesh).asymmetry_mm
+    assert found == pytest.approx(asymmetry_mm, abs=0.2)
 
 
 def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
