@@ -17,6 +17,7 @@ from shapes import phantom, rigid
 from gyriflow.anatomy.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.anatomy.labels import (
     REPORTED_LOSS,
+    Layout,
     border_share,
     cerebrum_mask,
     layout_of,
@@ -400,6 +401,84 @@ def test_a_hemisphere_may_be_missing_but_only_with_all_of_its_tissues(missing):
         assert unequal == [Facts(*counts)]
     else:
         assert unequal == []
+
+
+SIDED = LabelScheme(
+    name="sided",
+    cerebrum=(1, 2, 3, 4, 5),
+    cortex=(3, 4),
+    white_matter=(1, 2),
+    ventricles=(5,),
+    left=(1, 3),
+    right=(2, 4),
+    known={9: "other tissue"},
+)
+COUNTS = {0: 5000, 1: 400, 2: 400, 3: 200, 4: 200, 5: 50, 9: 100}
+"""Voxels of air, white matter and cortex of both sides, ventricles and other tissue."""
+CONTACTS = {
+    (0, 3): 100,
+    (0, 4): 100,
+    (1, 3): 120,
+    (2, 4): 120,
+    (1, 5): 30,
+    (2, 5): 30,
+    (1, 2): 20,
+    (3, 4): 10,
+    (3, 9): 20,
+    (4, 9): 20,
+}
+"""Faces between the voxels of two labels."""
+
+
+def contradictions_of(counts=None, contacts=None):
+    """Return what contradicts the scheme if some counts or contacts are others."""
+    labels = np.array(list(COUNTS))
+    count = np.array(list((COUNTS | (counts or {})).values()))
+    contact = np.zeros((len(labels), len(labels)))
+    for (first, second), faces in (CONTACTS | (contacts or {})).items():
+        i, j = np.searchsorted(labels, (first, second))
+        contact[i, j] = contact[j, i] = faces
+    return list(scheme_contradictions(Layout(labels, contact, count), SIDED))
+
+
+@pytest.mark.parametrize(
+    ("counts", "contacts", "facts"),
+    [
+        # cortex at half of the surface, here 240 faces
+        ({}, {(0, 1): 235}, None),
+        ({}, {(0, 1): 245}, ["cortex (3, 4)", "49%", "surface"]),
+        # cortex is 3 to 60 % of the tissue, white matter 15 % or more
+        ({3: 13, 4: 13}, {}, None),
+        ({3: 12, 4: 12}, {}, ["cortex (3, 4)", "3%", "tissue"]),
+        ({3: 595, 4: 595}, {}, None),
+        ({3: 610, 4: 610}, {}, ["cortex (3, 4)", "60%", "tissue"]),
+        # 40 % of the neighbours of white matter and ventricles are inside
+        ({}, {(1, 9): 440, (0, 3): 999}, None),
+        ({}, {(1, 9): 460, (0, 3): 999}, ["white matter (1, 2)", "39%", "neighbours"]),
+        ({}, {(0, 5): 85}, None),
+        ({}, {(0, 5): 95}, ["ventricles (5)", "39%", "neighbours"]),
+        # half of the neighbours of other tissue, if it is more than a hundredth
+        ({}, {(5, 9): 39}, None),
+        ({}, {(5, 9): 42}, ["other tissue (9)", "51%", "neighbours"]),
+        ({9: 12}, {(5, 9): 42}, None),
+        # contacts with the other side
+        ({}, {(1, 2): 165}, None),
+        ({}, {(1, 2): 175}, ["left and right", "41%"]),
+        # four times as much cortex per white matter on one side
+        ({2: 101}, {}, None),
+        ({2: 99}, {}, ["200 and 200 voxels", "400 and 99"]),
+        ({1: 99}, {}, ["200 and 200 voxels", "99 and 400"]),
+        ({4: 49}, {}, ["200 and 49 voxels"]),
+    ],
+)
+def test_labels_contradict_a_scheme_beyond_its_limits_and_not_before(
+    counts, contacts, facts
+):
+    found = contradictions_of(counts, contacts)
+    if facts is None:
+        assert [text for text in found if "(9)" not in text or counts] == []
+    else:
+        assert Facts(*facts) in found
 
 
 def test_voids_between_labels_are_neither_inside_nor_outside():

@@ -22,6 +22,7 @@ from gyriflow.anatomy.plausible import facing_warnings, require_left_and_right
 from gyriflow.anatomy.pose import (
     PosedShape,
     axes_of_file,
+    pose_from_rotation,
     pose_of_hemisphere,
     pose_of_labels,
     pose_of_pair,
@@ -95,6 +96,52 @@ def test_separately_moved_hemispheres_are_posed(halves):
         for half, side, there in zip(halves, SIDES, moved, strict=True)
     )
     assert np.abs(right - left)[1:].max() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("degrees", "has_frame"),
+    [
+        ((14.9, 0, 0), True),
+        ((-14.9, 0, 0), True),
+        ((15.2, 0, 0), False),
+        ((0, 9.9, 0), True),
+        ((0, 0, -9.9), True),
+        ((0, 10.1, 0), False),
+        ((0, 0, 10.1), False),
+    ],
+)
+def test_a_pose_near_the_axes_of_a_convention_is_that_of_the_file(degrees, has_frame):
+    for frame, axes in (("ras", np.eye(4)), ("lps", LPS)):
+        found = posing._frame(rigid(*degrees) @ axes)
+        assert found == (frame if has_frame else None)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "has_sides", "by", "warnings"),
+    [
+        ((14.5, 0, 0), True, "file", []),
+        ((15.6, 0, 0), True, "file", [Facts("16°", "hindbrain")]),
+        ((30.0, 44.0, 0), True, "file", [Facts("53°")]),
+        ((40.0, 55.0, 0), False, "hindbrain", [Facts("67°", "left", "right")]),
+        ((40.0, 55.0, 0), True, "hindbrain", [Facts("67°")]),
+        # a quarter turn, nearly and not nearly enough
+        ((76.0, 0, 0), True, "hindbrain", [Facts("90°")]),
+        ((74.0, 0, 0), True, "hindbrain", [Facts("74°")]),
+    ],
+)
+def test_a_volume_is_turned_if_it_is_far_from_its_axes(
+    degrees, has_sides, by, warnings
+):
+    turn = rigid(*degrees)[:3, :3]
+    pose = pose_from_rotation(turn, "the hindbrain", has_sides)
+    assert pose.by == by
+    assert list(pose.warnings) == warnings
+    if by == "file":
+        assert np.array_equal(pose.world, np.eye(4))
+    else:
+        angle = 90.0 if degrees[0] == 76.0 else angle_deg(turn)
+        assert angle_deg(pose.world[:3, :3]) == pytest.approx(angle, abs=1e-5)
+        assert has_sides != ("left" in pose.warnings[0])
 
 
 def posed_pair():

@@ -5,11 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import box, moved, sphere, torus
+from shapes import LONG_MM, box, moved, rigid, sphere, torus
 
 from gyriflow.anatomy.extraction import smooth_mask
 from gyriflow.anatomy.repair import (
     clean,
+    filled_warning,
     make_even,
     pieces,
     rebuild,
@@ -82,6 +83,26 @@ def test_a_vertex_far_off_the_surface_is_told():
     assert sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings[0] == Facts(
         "60 mm"
     )
+
+
+@pytest.mark.parametrize(
+    ("subdivisions", "factor", "is_told"),
+    # 10 mm, or ten times the usual edge
+    [(4, 1.95, False), (4, 2.1, True), (1, 5.0, False), (1, 9.0, True)],
+)
+def test_an_edge_is_long_for_the_surface_and_for_a_brain(subdivisions, factor, is_told):
+    whole = sphere(RADIUS, subdivisions)
+    vertices = whole.vertices.copy()
+    vertices[7] *= factor
+    found = sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings
+    assert ["edge" in text for text in found] == [True] * is_told
+
+
+def test_gaps_of_a_tenth_of_a_millilitre_are_told():
+    affine = rigid(10, 20, 30) @ np.diag([*LONG_MM, 1.0])
+    for voxels, told in ((285, []), (286, [Facts("100 mm³")])):
+        counts = {"voxels_filled_in_tunnels": voxels}
+        assert filled_warning(counts, affine) == told
 
 
 def test_dropped_pieces_are_told_with_their_share_of_the_area():

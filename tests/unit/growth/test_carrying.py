@@ -129,6 +129,50 @@ def test_another_mesh_of_the_brain_goes_along_in_any_pose():
         follow_surfaces(TriangleMesh(own.vertices * 1.5, own.faces), [turned])
 
 
+@pytest.mark.parametrize(("turn_deg", "is_refused"), [(29.5, False), (30.5, True)])
+def test_matched_surfaces_may_be_turned_by_30_degrees(turn_deg, is_refused):
+    turned = TriangleMesh(ATLAS.vertices @ rigid(0, turn_deg, 0)[:3, :3], ATLAS.faces)
+    if is_refused:
+        with pytest.raises(InputError, check=Facts("30°")):
+            match_surfaces(ATLAS, turned)
+    else:
+        _, report = match_surfaces(ATLAS, turned)
+        assert report["turn_deg"] == pytest.approx(turn_deg, abs=1e-3)
+
+
+@pytest.mark.parametrize(("mm", "is_refused"), [(1.9, False), (2.1, True)])
+def test_a_surface_may_lie_2_mm_from_the_matched_one(mm, is_refused):
+    own = sphere(10.0 + mm, 3)
+    if is_refused:
+        with pytest.raises(InputError, check=Facts("2 mm")):
+            follow_surfaces(own, [GROWN])
+    else:
+        follow_surfaces(own, [GROWN])
+
+
+@pytest.mark.parametrize(
+    ("change", "facts"),
+    [
+        ({}, None),
+        ({"dice_cerebrum": 0.949}, ["cerebrum", 0.949, 0.95]),
+        ({"dice_cortex": 0.599}, ["cortex", 0.599, 0.6]),
+        ({"folded_share": 0.0051}, ["0.51%", "0.50%"]),
+        # without cortex
+        ({"dice_cortex": float("nan")}, None),
+    ],
+)
+def test_a_registration_is_good_within_its_limits(change, facts, caplog):
+    quality = {"dice_cerebrum": 0.951, "dice_cortex": 0.601, "folded_share": 0.0049}
+    quality |= change
+    if facts is None:
+        require_good(quality, pair="21-22")
+    else:
+        with pytest.raises(InputError, check=Facts("21-22", *facts)):
+            require_good(quality, pair="21-22")
+    require_good(quality, pair="21-22", only_warn=True)
+    assert caplog.messages == ([] if facts is None else [Facts("21-22", *facts)])
+
+
 def test_regions_are_carried_along_matched_surfaces():
     own, later = own_surface(), transformed(own_surface(), np.diag([*STRETCH, 1.0]))
     found = carry_regions((own.vertices[:, 0] > 0).astype(int), own, later, GROWN)

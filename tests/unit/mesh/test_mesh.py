@@ -27,6 +27,7 @@ from gyriflow.geometry.triangles import (
     mean_edge_length,
     merged,
     signed_volume,
+    transformed,
 )
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
@@ -136,6 +137,38 @@ def test_a_good_mesh_passes_every_gate():
     refuse_bad_mesh(
         REGULAR, summary_of(REGULAR), **(GATES | {"min_radius_ratio": 0.99})
     )
+
+
+@pytest.mark.parametrize(
+    ("change", "facts"),
+    [
+        ({}, None),
+        ({"gap_kept": 0.951}, None),
+        ({"gap_kept": 0.949}, ["95 %"]),
+        ({"gap_kept": None}, None),
+        ({"volume_change": 0.0199}, None),
+        ({"volume_change": -0.0201}, ["-2.0 %", "2 %"]),
+        ({"surface_distance_mm": {"hausdorff99": 0.099}}, None),
+        ({"surface_distance_mm": {"hausdorff99": 0.101}}, ["0.101 mm", "0.1 mm"]),
+        ({"crossing_faces": 2}, ["2 faces"]),
+    ],
+)
+def test_a_mesh_is_good_enough_within_its_gates(change, facts):
+    summary = summary_of(REGULAR) | change
+    if facts is None:
+        refuse_bad_mesh(REGULAR, summary, **GATES)
+    else:
+        with pytest.raises(MeshError, check=Facts(*facts)):
+            refuse_bad_mesh(REGULAR, summary, **GATES)
+
+
+@pytest.mark.parametrize(("degrees", "is_gap"), [(20.0, True), (30.0, False)])
+def test_walls_of_a_gap_are_parallel_to_25_degrees(degrees, is_gap):
+    wall = box((1.0, 6.0, 6.0))
+    turned = transformed(wall, shapes.rigid(0, 0, degrees))
+    apart = moved(turned, 2.6)
+    found = gap_summary(gap_walls(merged(wall, apart)))
+    assert (found["area_mm2"] > 10.0) == is_gap
 
 
 def test_flat_elements_are_refused_with_their_place_and_all_gates_they_fail():
