@@ -41,11 +41,14 @@ from gyriflow.io.surfaces import (
     write_vertex_maps,
 )
 from gyriflow.io.volumes import LabelSource, read_label_volume
-from gyriflow.io.yaml_files import write_yaml
+from gyriflow.io.yaml_files import SCHEMES, write_yaml
+from gyriflow.metrics.spangy import PART_POWERS
 from gyriflow.settings.schemes import LabelScheme
 from gyriflow.settings.terms import SIDES
+from gyriflow.shipped import SHIPPED
 from gyriflow.units import SECONDS_PER_GW
 
+NORMS = SHIPPED / "norms"
 AREA = "area_growth_percent_per_gw"
 
 
@@ -145,6 +148,110 @@ def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
     for place, (area_cm2, thickness_mm) in values.items():
         assert table["value"][*place, "area"] == pytest.approx(area_cm2, rel=0.07)
         assert table["value"][*place, "mean_thickness"] == thickness_mm
+
+
+WEEKS = 25.0 + 0.1 * np.arange(12)
+BRAINS = [f"b{number}" for number in range(12)]
+
+
+def metrics_of(brain, week, area_cm2, run="real"):
+    """Return the areas of the sides of a brain, the left one the larger by a tenth."""
+    sides = {"whole": 1.0, "left": 11 / 21, "right": 10 / 21}
+    table = pd.DataFrame({"hemisphere": list(sides), "metric": "area", "unit": "cm2"})
+    values = area_cm2 * np.array(list(sides.values()))
+    return table.assign(subject=brain, run=run, week=week, value=values)
+
+
+def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
+    """Twelve brains, of which the first two are scans of one subject, and a run."""
+    areas = 10 * WEEKS + np.tile([1.0, -1.0], 6)
+    rows = list(map(metrics_of, BRAINS, WEEKS, areas))
+    rows.append(metrics_of("b0", WEEKS[1], 260.0, "run"))
+    rows.append(metrics_of("b0", WEEKS[0], 249.0, "run"))
+    write_table(tmp_path / "metrics.csv", pd.concat(rows))
+    region = pd.concat([metrics_of("b0", WEEKS[0], 21.0)]).assign(region="insula")
+    write_table(tmp_path / "regions.csv", region)
+    bands = pd.DataFrame({"band": range(1, 7)})
+    bands[PART_POWERS] = 1.0
+    bands = bands.assign(wavelength_max_mm=256 / 2.0 ** bands["band"], is_open=False)
+    common = {"hemisphere": "left", "proxy": "mean_curvature", "run": "real"}
+    common |= {"complete": True, "resolved": True, "week": 25.0}
+    spectra = [bands.assign(subject=brain, **common) for brain in ("b0", "b1")]
+    # all power one octave further
+    shifted = np.roll(np.eye(6)[3], 1)
+    spectra[0][PART_POWERS] = np.eye(6)[3][:, None] * np.ones(16)
+    spectra[1][PART_POWERS] = shifted[:, None] * np.ones(16)
+    write_table(tmp_path / "spectra.csv", pd.concat(spectra))
+    noise = {"metrics": {"area": {"cv": 0.01}}, "distances": {}}
+    noise["distances"]["spectral_distance_B4_to_B5"] = 0.07
+    write_yaml(tmp_path / "noise.yaml", noise)
+    for name, ml in (("first", 2.0), ("second", 3.0)):
+        write_json(tmp_path / f"{name}.json", {"volumes_of_labels_mL": {"7": ml}})
+    inputs = {name: [f"{name}.csv"] for name in ("metrics", "spectra", "regions")}
+    inputs |= {"labelled": ["first.json", "second.json"], "cohort": []}
+    inputs |= {"noise": "noise.yaml", "norms": str(NORMS / "svrtk-volumes.yaml")}
+    names = ["metrics_long", "metrics_wide", "change", "asymmetry", "norm_curves"]
+    names += ["centiles", "spectral_distance", "volumes", "published_centiles"]
+    outputs = {name: f"{name}.out.csv" for name in [*names, "metrics"]}
+    people = {brain: brain for brain in BRAINS} | {"b0": "one", "b1": "one"}
+    params = {
+        "labelled": [
+            ("b0", 25.0, SIDES, SCHEMES["dhcp-19"]),
+            ("b3", 29.0, ("left",), SCHEMES["dhcp-19"]),
+        ],
+        "scans": {"one": ["b0", "b1"]},
+        "covariates": {"b1": {"sex": "F"}},
+        "reference": BRAINS,
+        "individuals": True,
+        "subjects": people,
+        "made_with": {"edge_length_mm": 1.0},
+        "population": ["normal"],
+    }
+    outputs["norms"] = "norms.json"
+    run_script("metrics_tables.py", tmp_path, inputs, outputs, params)
+    tables = {
+        name: read_table(tmp_path / file)
+        for name, file in outputs.items()
+        if name != "norms"
+    }
+    long = tables["metrics_long"]
+    assert len(long) == 3 * 15
+    assert long["region"].dropna().unique().tolist() == ["insula"]
+    wide = tables["metrics_wide"].set_index(["subject", "run", "week"])
+    assert wide.loc[("b1", "real", 25.1), "sex"] == "F"
+    assert wide.loc[("b0", "real", 25.0), "left_insula_area_cm2"] == pytest.approx(11.0)
+    change = tables["change"].query("hemisphere == 'whole'").set_index("run")
+    assert change.loc["real", "change"] == pytest.approx(areas[1] - areas[0])
+    assert change.loc["run", "change"] == pytest.approx(11.0)
+    assert change.loc["real", "noise"] == pytest.approx(np.sqrt(2) * 0.01 * areas[0])
+    difference = tables["asymmetry"].set_index(["subject", "run", "week", "region"])
+    assert difference.loc[("b0", "real", 25.0, "insula"), "difference"] == 1.0
+    assert len(difference) == 15
+    scores = tables["centiles"].query("hemisphere == 'whole'").set_index("run")
+    # eleven people: those of the other scan, and all for a run
+    assert set(scores.loc["real", "brains"]) == {10}
+    assert set(scores.loc["run", "brains"]) == {11}
+    assert scores.loc["run", "subject"].unique().tolist() == ["b0"]
+    assert len(tables["norm_curves"]) > 0
+    distances = tables["spectral_distance"].set_index("metric")
+    found = distances.loc["spectral_distance_B4_to_B5"]
+    assert found["noise"].unique().tolist() == [0.07]
+    assert found["value"].tolist() == pytest.approx([1.0, 1.0])
+    assert tables["volumes"].iloc[:, [0, 5]].to_numpy().tolist() == [
+        ["b0", 2.0],
+        ["b3", 3.0],
+    ]
+    assert tables["published_centiles"]["subject"].tolist() == ["b0", "b3"]
+    content = read_json(tmp_path / "norms.json")
+    assert content["population"] == ["normal"]
+    # the norms of this study score the brains of another
+    inputs["cohort"] = ["norms.json"]
+    again = {"centiles": "again.csv", "norms": "copied.json"}
+    params |= {"reference": [], "population": ["other"]}
+    run_script("metrics_tables.py", tmp_path, inputs, again, params)
+    new = read_table(tmp_path / "again.csv").query("hemisphere == 'whole'")
+    assert set(new["brains"]) == {11}
+    assert read_json(tmp_path / "copied.json")["population"] == ["normal"]
 
 
 @pytest.mark.parametrize("individuals", [True, False])
