@@ -275,6 +275,8 @@ def test_elements_are_left_right_or_between_the_planes():
     np.testing.assert_array_equal(tags["hemisphere"] == LEFT, x <= -2.0)
     np.testing.assert_array_equal(tags["hemisphere"] == RIGHT, x >= 2.0)
     assert (np.abs(x[tags["hemisphere"] == BRIDGE]) < 2.0).all()
+    # the numbers that docs/outputs.md has
+    assert (LEFT, RIGHT, BRIDGE, CORTEX, CORE) == (1, 2, 3, 1, 2)
     volumes = signed_volumes(mesh)
     left, right = (volumes[tags["hemisphere"] == side].sum() for side in (LEFT, RIGHT))
     assert left == pytest.approx(right)
