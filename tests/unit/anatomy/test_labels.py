@@ -108,6 +108,33 @@ def test_little_cortex_at_the_surface_is_told_with_its_share():
         assert told == [Facts(f"{100 * share:.0f} %")] * is_told
 
 
+def test_what_is_left_out_or_filled_is_told_with_its_volume():
+    voxel_ml = 0.8**3 / 1000
+    radius = np.linalg.norm(np.indices((50, 50, 50)).T - 24.5, axis=-1).T
+    ball = np.where(radius < 16.0, np.where(radius < 13.0, 1, 5), 0)
+    n_inside = (ball > 0).sum()
+    # a block beside it
+    strewn = ball.copy()
+    strewn[:6, :6, :6] = 5
+    told = read_cerebrum(strewn, AFFINE, ATLAS).warnings
+    share = 100 * 6**3 / n_inside
+    assert Facts(f"{6**3 * voxel_ml:.2f} mL", f"{share:.1f} %") in told
+    # a void in the middle, where other brains have ventricles
+    hollow = np.where(radius < 6.0, 0, ball)
+    told = read_cerebrum(hollow, AFFINE, ATLAS).warnings
+    assert Facts(f"{(radius < 6.0).sum() * voxel_ml:.2f} mL") in told
+    # a smaller ball that hangs on a stalk
+    mask, large = body(1.0)
+    inner = ndimage.binary_erosion(mask, iterations=3)
+    hanging = read_cerebrum(np.where(mask, np.where(inner, 1, 5), 0), AFFINE, ATLAS)
+    (stalk,) = hanging.report["outside"]["stalks"]
+    told = [text for text in hanging.warnings if "stalk" in text]
+    assert told == [Facts(f"{stalk['volume_mm3'] / 1000:.2f} mL")]
+    assert stalk["volume_mm3"] == pytest.approx(
+        (mask & ~large).sum() * 1000 * voxel_ml, rel=0.1
+    )
+
+
 def test_labels_of_the_left_on_the_right_are_refused():
     scheme = SCHEMES["dhcp-19"]
     labels = np.zeros((4, 1, 1), dtype=int)
