@@ -17,6 +17,7 @@ from gyriflow.geometry.matching import (
     layer_labels,
     match_layers,
     match_points,
+    match_surface,
     nearest_on,
     surface_mask,
     values_at,
@@ -98,6 +99,15 @@ def test_the_other_wall_is_not_matched():
     assert match.agrees.all()
     assert values_at(match, mesh.vertices)[0, 0] == pytest.approx(-0.5)
     assert match_points(point, -normal, mesh).distance_mm == pytest.approx([0.2])
+    # so are the walls of a body that moved as far
+    moved_walls = TriangleMesh(mesh.vertices + [0.8, 0.0, 0.0], mesh.faces)
+    match = match_surface(moved_walls, mesh)
+    assert match.distance_mm.max() <= 0.8 + 1e-9
+    assert match.agrees.all()
+    inside = np.isclose(mesh.vertices[:, 0], -0.5)
+    inside &= (np.abs(mesh.vertices[:, 1:]) < 4.0).all(axis=1)
+    assert inside.any()
+    assert values_at(match, mesh.vertices)[inside, 0] == pytest.approx(-0.5)
 
 
 @pytest.mark.parametrize(("degrees", "agrees"), [(55, True), (65, False)])

@@ -64,6 +64,7 @@ def test_the_range_of_a_curve_has_its_ends_and_all_between():
         {},
         {"weeks": {}},
         {"weeks": [1, 2]},
+        {"weeks": {21: 1, "21.0": 2, 31: 3}},
         {"week": {21: 1}},
         None,
         "estimated",
