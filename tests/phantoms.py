@@ -59,21 +59,23 @@ def cerebral_volume_ml(week: float) -> float:
 
 
 def phantom_labels(
-    week: float, *, voxel_mm: float = 0.8, seed: int = 0
+    week: float, *, voxel_mm: float | tuple[float, float, float] = 0.8, seed: int = 0
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the (i, j, k) labels of a synthetic brain of 21 to 36 GW and their (4, 4)
     affine to RAS+ mm.
 
-    Labels are those of the scheme spina-bifida-atlas. The axes are stored in the order
-    posterior, inferior, right. The same seed gives the same folds at every week, the
+    Labels are those of the scheme spina-bifida-atlas. Voxels have one edge, or three
+    along x, y and z. The axes are stored in the order posterior, inferior, right. The
+    same seed gives the same folds at every week, the
     deeper the older.
     """
+    edges_mm = np.broadcast_to(voxel_mm, 3)
     age = (week - FIRST_WEEK) / (LAST_WEEK - FIRST_WEEK)
     shape = Shape(
         half_length=28.0 * (cerebral_volume_ml(week) / 48.0) ** (1 / 3),
         fold_depth=0.6 + 8.4 * age**1.2,
         sylvian_depth=3.0 + 11.0 * age,
-        fissure=max(2.0 + 1.5 * age, 2.5 * voxel_mm),
+        fissure=max(2.0 + 1.5 * age, 2.5 * edges_mm[0]),
         ventricles=1.0 - 0.45 * age,
     )
     # sizes are found on a coarse grid; folds and fissure keep theirs, so this takes two
@@ -87,12 +89,12 @@ def phantom_labels(
         )
         factor = (cerebral_volume_ml(week) / volume) ** (1 / 3)
         shape = Shape(**{**vars(shape), "half_length": shape.half_length * factor})
-    points = _grid(shape, (voxel_mm,) * 3)
-    labels = _tissues(points, shape, seed, voxel_mm)
+    points = _grid(shape, tuple(edges_mm))
+    labels = _tissues(points, shape, seed, edges_mm)
     # from axes R, A, S to P, I, R
     stored = labels[:, ::-1, ::-1].transpose(1, 2, 0)
     affine = np.eye(4)
-    affine[:3, :3] = STORED_AXES * voxel_mm
+    affine[:3, :3] = STORED_AXES * np.roll(edges_mm, -1)
     first = np.array(
         [points[0][0, 0, 0], points[1][0, -1, 0], points[2][0, 0, -1]], dtype=float
     )
@@ -236,7 +238,7 @@ def _ellipsoid(
 
 
 def _tissues(
-    points: list[Floats], shape: Shape, seed: int, voxel_mm: float
+    points: list[Floats], shape: Shape, seed: int, edges_mm: Floats
 ) -> NDArray[np.int32]:
     """Return the labels on the grid of `points`."""
     x, y, z = points
@@ -265,14 +267,11 @@ def _tissues(
         (0.13 * a * size, 0.50 * b, 0.15 * c * size),
     )
     labels[cerebrum & ventricles] = VENTRICLES
-    cortex = cerebrum & (
-        ndimage.distance_transform_edt(cerebrum) * voxel_mm <= CORTEX_MM
-    )
+    depth = ndimage.distance_transform_edt(cerebrum, sampling=edges_mm)
+    cortex = cerebrum & (depth <= CORTEX_MM)
     # no cortex where the brainstem leaves the cerebrum, nor on the callosum
-    stem = (
-        ndimage.distance_transform_edt(labels != BRAINSTEM) * voxel_mm
-        <= CORTEX_MM + voxel_mm
-    )
+    from_stem = ndimage.distance_transform_edt(labels != BRAINSTEM, sampling=edges_mm)
+    stem = from_stem <= CORTEX_MM + edges_mm.max()
     labels[cortex & ~stem] = CORTEX
     arch = ((y / b - 0.05) / 0.50) ** 2 + ((z / c + 0.15) / 0.42) ** 2
     callosum = (np.abs(x) < 0.16 * a) & (arch > 0.72) & (arch < 1.02) & (z > -0.1 * c)

@@ -196,7 +196,9 @@ def torus(ring: float, tube: float, around: int = 32, across: int = 32) -> Trian
 
 
 @cache
-def phantom(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[np.ndarray, np.ndarray]:
+def phantom(
+    week: float = 24.0, voxel_mm: float | tuple[float, float, float] = 1.2
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the labels of a synthetic brain and their affine, which are not to be
     changed."""
     labels, affine = phantom_labels(week, voxel_mm=voxel_mm)
@@ -218,7 +220,7 @@ def cerebrum_surface(labels: np.ndarray, affine: np.ndarray) -> TriangleMesh:
 
 @cache
 def phantom_halves(
-    week: float = 24.0, voxel_mm: float = 1.2
+    week: float = 24.0, voxel_mm: float | tuple[float, float, float] = 1.2
 ) -> tuple[TriangleMesh, TriangleMesh]:
     """Return a phantom's left and right hemisphere as closed surfaces 1.2 mm apart, the
     fissure at x = 0, in RAS+."""

@@ -23,7 +23,12 @@ from verification_cases.mirrored import block, folded, hemisphere, rounded
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.step_fields import step_fields
+from gyriflow.folding.step_fields import (
+    hencky_equivalent,
+    pressure,
+    step_fields,
+    von_mises,
+)
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.settings.folding import parameters_from
@@ -198,6 +203,25 @@ def test_stress_is_a_rate_where_it_is_forgotten_and_whole_where_it_is_kept(memor
         )
     }
     assert set(of_elements) == elastic | {"total_strain", "area_stretch"}
+    # means over the points of each element
+    u, points = folding.solved.displacement, folding.problem.points
+    stress, stretch = (
+        folding.problem.evaluate(name, u).reshape(-1, 3, 3)
+        for name in ("stress", "elastic")
+    )
+    per_gw = 14.0 if end else 1.0
+    for name, values in (
+        ("von_mises_pa", von_mises(stress)),
+        ("pressure_pa", pressure(stress)),
+        ("elastic_strain", hencky_equivalent(stretch)),
+        ("elastic_volume_strain", np.log(np.linalg.det(stretch))),
+    ):
+        means = per_gw * values.reshape(-1, len(points.weights)) @ points.weights
+        found = of_elements[name + end]
+        assert np.sort(found) == pytest.approx(np.sort(means), rel=1e-6, abs=1e-12)
+    # nothing has grown: what is pressed is shorter, and wider along its surface
+    assert of_elements["total_strain"].max() > 0
+    assert (of_elements["area_stretch"] > 0.5).all()
 
 
 @pytest.mark.slow

@@ -33,7 +33,9 @@ from gyriflow.anatomy.fissure import (
     mid_plane,
     open_fissure,
     plane_between_labels,
+    separate,
     side_distance,
+    smallest_gap,
     upright,
 )
 from gyriflow.anatomy.pial import _with_fissure, from_labels
@@ -69,10 +71,13 @@ def test_two_closed_pieces_are_the_hemispheres_though_they_reach_over_the_plane(
     assert left.tolist() == [True] * 1280 + [False] * 1280
 
 
-def test_asymmetry_is_the_distance_to_the_mirror_image():
-    # radii that differ by a millimetre
-    mesh = merged(ball_at(-14.0, 3.0, 0.0), sphere(11.0, 4, (14.0, 3.0, 0.0)))
-    assert mid_plane(mesh).asymmetry_mm == pytest.approx(1.0, rel=0.2)
+@pytest.mark.parametrize(("radius", "asymmetry_mm"), [(10.0, 0.0), (11.0, 1.0)])
+def test_asymmetry_is_the_distance_to_the_mirror_image(radius, asymmetry_mm):
+    # radii that are equal, or differ by a millimetre
+    right = sphere(radius, 3, (14.0, 3.0, 0.0))
+    mesh = merged(ball_at(-14.0, 3.0, 0.0), right)
+    found = mid_plane(mesh).asymmetry_mm
+    assert found == pytest.approx(asymmetry_mm, abs=0.2)
 
 
 def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
@@ -343,6 +348,27 @@ def test_gyri_that_reach_over_the_middle_are_on_their_own_side(sided):
     number, _ = ndimage.label(~opened & brain & (z > 14))
     assert number[50, 20, 30] != number[10, 20, 30]
     assert not opened[core].any()
+
+
+@pytest.mark.parametrize(("overlap_mm", "is_refused"), [(18.5, False), (20.5, True)])
+def test_hemispheres_are_moved_apart_by_at_most_a_centimetre_each(
+    overlap_mm, is_refused
+):
+    # along a direction that is no axis
+    to_right = np.array([0.8, 0.6, 0.0])
+    left, right = (
+        sphere(15.0, 3, side * (15.0 - overlap_mm / 2) * to_right) for side in (-1, 1)
+    )
+    if is_refused:
+        with pytest.raises(InputError, check=Facts("20 mm")):
+            separate(left, right, 0.5, to_right)
+        return
+    first, second, moved_mm = separate(left, right, 0.5, to_right)
+    assert moved_mm == pytest.approx(overlap_mm / 2 + 0.25, abs=0.3)
+    assert smallest_gap(first, second) >= 0.5
+    for found, given, sign in ((first, left, -1), (second, right, 1)):
+        shift = sign * moved_mm * to_right
+        assert found.vertices == pytest.approx(given.vertices + shift)
 
 
 def test_the_share_of_a_cut_is_that_of_the_medial_wall():

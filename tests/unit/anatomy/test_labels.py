@@ -17,6 +17,7 @@ from shapes import phantom, rigid
 from gyriflow.anatomy.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.anatomy.labels import (
     REPORTED_LOSS,
+    Layout,
     border_share,
     cerebrum_mask,
     layout_of,
@@ -94,6 +95,46 @@ def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
     assert require_cortex_outside(brain, ATLAS) == 1.0
 
 
+def test_little_cortex_at_the_surface_is_told_with_its_share():
+    x, _, z = np.indices((40, 40, 40)) - 19.5
+    radius = np.linalg.norm(np.indices((40, 40, 40)).T - 19.5, axis=-1).T
+    for limit, is_told in ((-3.0, True), (-9.0, False)):
+        shell = (radius > 13.0) & (x + 0.3 * z > limit)
+        labels = np.where(radius < 16.0, np.where(shell, 5, 1), 0)
+        share = require_cortex_outside(labels, ATLAS)
+        assert (share < 0.7) == is_told
+        found = read_cerebrum(labels, AFFINE, ATLAS).warnings
+        told = [text for text in found if "surface" in text and "cortex lies" in text]
+        assert told == [Facts(f"{100 * share:.0f} %")] * is_told
+
+
+def test_what_is_left_out_or_filled_is_told_with_its_volume():
+    voxel_ml = 0.8**3 / 1000
+    radius = np.linalg.norm(np.indices((50, 50, 50)).T - 24.5, axis=-1).T
+    ball = np.where(radius < 16.0, np.where(radius < 13.0, 1, 5), 0)
+    n_inside = (ball > 0).sum()
+    # a block beside it
+    strewn = ball.copy()
+    strewn[:6, :6, :6] = 5
+    told = read_cerebrum(strewn, AFFINE, ATLAS).warnings
+    share = 100 * 6**3 / n_inside
+    assert Facts(f"{6**3 * voxel_ml:.2f} mL", f"{share:.1f} %") in told
+    # a void in the middle, where other brains have ventricles
+    hollow = np.where(radius < 6.0, 0, ball)
+    told = read_cerebrum(hollow, AFFINE, ATLAS).warnings
+    assert Facts(f"{(radius < 6.0).sum() * voxel_ml:.2f} mL") in told
+    # a smaller ball that hangs on a stalk
+    mask, large = body(1.0)
+    inner = ndimage.binary_erosion(mask, iterations=3)
+    hanging = read_cerebrum(np.where(mask, np.where(inner, 1, 5), 0), AFFINE, ATLAS)
+    (stalk,) = hanging.report["outside"]["stalks"]
+    told = [text for text in hanging.warnings if "stalk" in text]
+    assert told == [Facts(f"{stalk['volume_mm3'] / 1000:.2f} mL")]
+    assert stalk["volume_mm3"] == pytest.approx(
+        (mask & ~large).sum() * 1000 * voxel_ml, rel=0.1
+    )
+
+
 def test_labels_of_the_left_on_the_right_are_refused():
     scheme = SCHEMES["dhcp-19"]
     labels = np.zeros((4, 1, 1), dtype=int)
@@ -148,7 +189,8 @@ def body(stalk_mm, ball_mm=4.0):
 def test_a_ball_on_a_thin_stalk_is_cut_off_with_the_stalk():
     mask, large = body(1.0)
     left, stalks = without_stalks(mask, AFFINE)
-    assert (left ^ large).sum() < 30
+    # at most a millimetre of the stalk stays
+    assert (left ^ large).sum() < 12
     (found,) = stalks
     assert found["volume_mm3"] == pytest.approx((mask & ~large).sum() * 0.8**3, rel=0.1)
     assert found["stalk_mm2"] == pytest.approx(np.pi, rel=0.6)
@@ -230,6 +272,13 @@ def test_without_labels_of_the_hindbrain_all_that_is_open_is_outside():
     )
     assert out[15:25, 15:25, 4:18].all()
     assert not out[:, :, 24:].any()
+    # where the volume ends there is no tissue
+    labels[:6, :6, :6] = labels[-6:, -6:, :4] = 2
+    out = outside_ventricles(
+        labels, LabelScheme(name="mine", cerebrum=(1, 2), ventricles=(2,))
+    )
+    assert out[:6, :6, :6].all()
+    assert out[-6:, -6:, :4].all()
 
 
 UNNAMED = LabelScheme(
@@ -400,6 +449,84 @@ def test_a_hemisphere_may_be_missing_but_only_with_all_of_its_tissues(missing):
         assert unequal == [Facts(*counts)]
     else:
         assert unequal == []
+
+
+SIDED = LabelScheme(
+    name="sided",
+    cerebrum=(1, 2, 3, 4, 5),
+    cortex=(3, 4),
+    white_matter=(1, 2),
+    ventricles=(5,),
+    left=(1, 3),
+    right=(2, 4),
+    known={9: "other tissue"},
+)
+COUNTS = {0: 5000, 1: 400, 2: 400, 3: 200, 4: 200, 5: 50, 9: 100}
+"""Voxels of air, white matter and cortex of both sides, ventricles and other tissue."""
+CONTACTS = {
+    (0, 3): 100,
+    (0, 4): 100,
+    (1, 3): 120,
+    (2, 4): 120,
+    (1, 5): 30,
+    (2, 5): 30,
+    (1, 2): 20,
+    (3, 4): 10,
+    (3, 9): 20,
+    (4, 9): 20,
+}
+"""Faces between the voxels of two labels."""
+
+
+def contradictions_of(counts=None, contacts=None):
+    """Return what contradicts the scheme if some counts or contacts are others."""
+    labels = np.array(list(COUNTS))
+    count = np.array(list((COUNTS | (counts or {})).values()))
+    contact = np.zeros((len(labels), len(labels)))
+    for (first, second), faces in (CONTACTS | (contacts or {})).items():
+        i, j = np.searchsorted(labels, (first, second))
+        contact[i, j] = contact[j, i] = faces
+    return list(scheme_contradictions(Layout(labels, contact, count), SIDED))
+
+
+@pytest.mark.parametrize(
+    ("counts", "contacts", "facts"),
+    [
+        # cortex at half of the surface, here 240 faces
+        ({}, {(0, 1): 235}, None),
+        ({}, {(0, 1): 245}, ["cortex (3, 4)", "49%", "surface"]),
+        # cortex is 3 to 60 % of the tissue, white matter 15 % or more
+        ({3: 13, 4: 13}, {}, None),
+        ({3: 12, 4: 12}, {}, ["cortex (3, 4)", "3%", "tissue"]),
+        ({3: 595, 4: 595}, {}, None),
+        ({3: 610, 4: 610}, {}, ["cortex (3, 4)", "60%", "tissue"]),
+        # 40 % of the neighbours of white matter and ventricles are inside
+        ({}, {(1, 9): 440, (0, 3): 999}, None),
+        ({}, {(1, 9): 460, (0, 3): 999}, ["white matter (1, 2)", "39%", "neighbours"]),
+        ({}, {(0, 5): 85}, None),
+        ({}, {(0, 5): 95}, ["ventricles (5)", "39%", "neighbours"]),
+        # half of the neighbours of other tissue, if it is more than a hundredth
+        ({}, {(5, 9): 39}, None),
+        ({}, {(5, 9): 42}, ["other tissue (9)", "51%", "neighbours"]),
+        ({9: 12}, {(5, 9): 42}, None),
+        # contacts with the other side
+        ({}, {(1, 2): 165}, None),
+        ({}, {(1, 2): 175}, ["left and right", "41%"]),
+        # four times as much cortex per white matter on one side
+        ({2: 101}, {}, None),
+        ({2: 99}, {}, ["200 and 200 voxels", "400 and 99"]),
+        ({1: 99}, {}, ["200 and 200 voxels", "99 and 400"]),
+        ({4: 49}, {}, ["200 and 49 voxels"]),
+    ],
+)
+def test_labels_contradict_a_scheme_beyond_its_limits_and_not_before(
+    counts, contacts, facts
+):
+    found = contradictions_of(counts, contacts)
+    if facts is None:
+        assert [text for text in found if "(9)" not in text or counts] == []
+    else:
+        assert Facts(*facts) in found
 
 
 def test_voids_between_labels_are_neither_inside_nor_outside():

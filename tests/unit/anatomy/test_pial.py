@@ -14,10 +14,11 @@ from phantoms import CENTRE_MM
 from scripts import run_script
 from shapes import LPS, rigid, scaling, sphere
 
-from gyriflow.anatomy.fissure import smallest_gap, split
+from gyriflow.anatomy.fissure import cut_share, smallest_gap, split
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
 from gyriflow.anatomy.plausible import (
     expected_volume_ml,
+    max_cut_share,
     proportion_warnings,
     require_plausible_size,
     require_whole,
@@ -25,6 +26,7 @@ from gyriflow.anatomy.plausible import (
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError, MeshError
 from gyriflow.geometry.matching import nearest_on
+from gyriflow.geometry.poses import pose_from
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import (
     TriangleMesh,
@@ -99,6 +101,60 @@ def test_phantom_surface_is_sound_and_of_the_masks_volume(phantom):
     assert report["volume_mL"] == pytest.approx(signed_volume(phantom.whole) / 1e3)
     assert phantom.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
     assert report["rotation_deg"] < 1.0
+
+
+def test_the_report_describes_the_surface_of_long_voxels():
+    volume = shapes.phantom(24.0, (1.35, 1.6, 1.9))
+    phantom = from_labels(*volume, ATLAS, week=24.0, **QUICK)
+    report, whole = phantom.report, phantom.whole
+    expected = {
+        "source": "labels",
+        "scheme": ATLAS.name,
+        "week": 24.0,
+        "fissure_x_mm": phantom.fissure_x_mm,
+        "vertices": len(whole.vertices),
+        "faces": len(whole.faces),
+        "pieces": 1,
+        "euler_number": 2,
+        "usual_cut_share": max_cut_share(24.0),
+        "cut_share": pytest.approx(cut_share(phantom.left, phantom.right)),
+    }
+    assert {name: report[name] for name in expected} == expected
+    extents = whole.vertices.max(axis=0) - whole.vertices.min(axis=0)
+    assert report["extents_mm"] == pytest.approx(extents.tolist())
+    areas = {
+        "whole": area(whole) / 100,
+        "left": area(phantom.left) / 100,
+        "right": area(phantom.right) / 100,
+    }
+    assert report["area_cm2"] == pytest.approx(areas)
+    assert report["fissure_points"] > 100
+    assert report["asymmetry_mm"] < 1.0
+    smoothing = report["smoothing"]
+    assert smoothing["volume_change"] == pytest.approx(0.0, abs=1e-3)
+    change = signed_volume(whole) / 1e3 / smoothing["volume_expected_mL"] - 1
+    assert smoothing["volume_change"] == pytest.approx(change, abs=1e-6)
+    assert smoothing["terraces_moved_mm"] < smoothing["terraces_moved_most_mm"]
+    assert pose_from(report["pose"]).plain() == phantom.pose.plain()
+
+
+def test_unequal_sides_are_told_with_their_numbers():
+    small = shapes.ellipsoid((12.0, 24.0, 17.0), 3, (88.0, -50.0, 20.0))
+    large = shapes.ellipsoid((14.5, 29.0, 20.0), 3, (116.0, -50.0, 20.0))
+    surface = from_surface(merged(small, large), **COARSE)
+    areas = surface.report["area_cm2"]
+    assert areas["left"] == pytest.approx(area(small) / 100, rel=0.02)
+    assert areas["right"] == pytest.approx(area(large) / 100, rel=0.02)
+    percent = 100 * (areas["right"] / areas["left"] - 1)
+    asymmetry = surface.report["asymmetry_mm"]
+    assert asymmetry > 0.03 * surface.report["extents_mm"][0]
+    assert surface.report["fissure_points"] > 0
+    warnings = surface.report["warnings"]
+    assert Facts("areas", f"{percent:.0f} %") in warnings
+    assert Facts("mirror-symmetric", f"{asymmetry:.1f} mm") in warnings
+    assert Facts("no fissure") not in warnings
+    assert surface.fissure_x_mm == pytest.approx(100.8, abs=0.7)
+    assert surface.report["pieces"] == 2
 
 
 def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):

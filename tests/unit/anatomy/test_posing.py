@@ -22,6 +22,7 @@ from gyriflow.anatomy.plausible import facing_warnings, require_left_and_right
 from gyriflow.anatomy.pose import (
     PosedShape,
     axes_of_file,
+    pose_from_rotation,
     pose_of_hemisphere,
     pose_of_labels,
     pose_of_pair,
@@ -30,9 +31,10 @@ from gyriflow.anatomy.pose import (
     require_coordinates,
 )
 from gyriflow.anatomy.repair import pieces
-from gyriflow.anatomy.template import medial_wall, shape_of
+from gyriflow.anatomy.template import PointCloud, medial_wall, shape_of
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg, motion
+from gyriflow.geometry.alignment import MIRROR, RigidFit, angle_deg, motion
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     euler_number,
@@ -94,6 +96,127 @@ def test_separately_moved_hemispheres_are_posed(halves):
         for half, side, there in zip(halves, SIDES, moved, strict=True)
     )
     assert np.abs(right - left)[1:].max() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("degrees", "has_frame"),
+    [
+        ((14.9, 0, 0), True),
+        ((-14.9, 0, 0), True),
+        ((15.2, 0, 0), False),
+        ((0, 9.9, 0), True),
+        ((0, 0, -9.9), True),
+        ((0, 10.1, 0), False),
+        ((0, 0, 10.1), False),
+    ],
+)
+def test_a_pose_near_the_axes_of_a_convention_is_that_of_the_file(degrees, has_frame):
+    for frame, axes in (("ras", np.eye(4)), ("lps", LPS)):
+        found = posing._frame(rigid(*degrees) @ axes)
+        assert found == (frame if has_frame else None)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "has_sides", "by", "warnings"),
+    [
+        ((14.5, 0, 0), True, "file", []),
+        ((15.6, 0, 0), True, "file", [Facts("16°", "hindbrain")]),
+        ((30.0, 44.0, 0), True, "file", [Facts("53°")]),
+        ((40.0, 55.0, 0), False, "hindbrain", [Facts("67°", "left", "right")]),
+        ((40.0, 55.0, 0), True, "hindbrain", [Facts("67°")]),
+        # a quarter turn, nearly and not nearly enough
+        ((76.0, 0, 0), True, "hindbrain", [Facts("90°")]),
+        ((74.0, 0, 0), True, "hindbrain", [Facts("74°")]),
+    ],
+)
+def test_a_volume_is_turned_if_it_is_far_from_its_axes(
+    degrees, has_sides, by, warnings
+):
+    turn = rigid(*degrees)[:3, :3]
+    pose = pose_from_rotation(turn, "the hindbrain", has_sides)
+    assert pose.by == by
+    assert list(pose.warnings) == warnings
+    if by == "file":
+        assert np.array_equal(pose.world, np.eye(4))
+    else:
+        angle = 90.0 if degrees[0] == 76.0 else angle_deg(turn)
+        assert angle_deg(pose.world[:3, :3]) == pytest.approx(angle, abs=1e-5)
+        assert has_sides != ("left" in pose.warnings[0])
+
+
+def posed_pair():
+    """Return the shapes of a left hemisphere, mirrored, and a right one, whose centres
+    and walls differ."""
+    cloud = PointCloud(np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(3), 20.0)
+    turns = [rigid(10, 20, 30), rigid(-20, 5, 60)]
+    centres = [np.array([-80.0, 20.0, 50.0]), np.array([90.0, -30.0, 10.0])]
+    return [
+        PosedShape(
+            "hemisphere",
+            replace(cloud, centre=centre),
+            turn[:3, :3],
+            wall_mm,
+            0.05,
+            2.0,
+            1.2,
+            np.eye(3),
+        )
+        for turn, centre, wall_mm in zip(turns, centres, (-8.0, -9.5), strict=True)
+    ]
+
+
+def test_sides_are_posed_as_far_from_the_middle_and_each_other_as_they_fit():
+    left, right = posed_pair()
+    shift = right.rotation.T @ [0.3, 0.1, -0.25]
+    fit = RigidFit(np.eye(3), shift, 0.05)
+    to_left, to_right = posing._motions(left, right, fit)
+    found = transform_points(right.shape.centre, to_right)
+    # the left hemisphere as it is in its file
+    other = transform_points(MIRROR[:3, :3] @ left.shape.centre, to_left)
+    assert (found[0], other[0]) == pytest.approx((10.0, -8.5))
+    # half of the shift on either side: the left centre is in front of the right one
+    assert other[1:] == pytest.approx([1.0, -2.5])
+    assert found[1:] == pytest.approx([-1.0, 2.5])
+    assert to_right[:3, :3] == pytest.approx(right.rotation)
+    mirror = MIRROR[:3, :3]
+    assert to_left[:3, :3] == pytest.approx(mirror @ left.rotation @ mirror)
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "shift_mm", "declared", "expected"),
+    [
+        (4.9, (0.0, 0.0, 0.0), False, True),
+        (5.1, (0.0, 0.0, 0.0), False, False),
+        # a size is 20 mm
+        (0.0, (2.9, 0.0, 0.0), False, True),
+        (0.0, (-3.1, 0.0, 0.0), False, False),
+        (0.0, (0.0, 1.1, 1.1), False, True),
+        (0.0, (0.0, -1.2, 1.2), False, False),
+        (29.0, (0.0, 30.0, 0.0), True, True),
+        (31.0, (0.0, 0.0, 0.0), True, False),
+    ],
+)
+def test_files_of_nearly_one_pose_share_their_coordinates(
+    turn_deg, shift_mm, declared, expected
+):
+    left, right = posed_pair()
+    to_right = rigid(40.0, -70.0, 10.0, shift=(5.0, 6.0, 7.0))
+    # about the centre of the left one in its file
+    centre = MIRROR[:3, :3] @ left.shape.centre
+    about = motion(shift=centre) @ rigid(0, 0, turn_deg) @ motion(shift=-centre)
+    to_left = motion(shift=-np.array(shift_mm)) @ to_right @ about
+    found = posing._share_coordinates(to_left, to_right, left, right, declared)
+    assert found == expected
+    angle, shift = posing._difference(to_left, to_right, left)
+    assert angle == pytest.approx(turn_deg, abs=1e-5)
+    assert shift == pytest.approx(shift_mm, abs=1e-9)
+    # the mean of both motions, at the middle of both centres
+    mean = posing._mean_motion(to_left, to_right, left, right)
+    middle = 0.5 * (centre + right.shape.centre)
+    places = [transform_points(middle, each) for each in (to_left, to_right)]
+    assert transform_points(middle, mean) == pytest.approx(np.mean(places, axis=0))
+    half = mean[:3, :3] @ to_right[:3, :3].T
+    assert angle_deg(half) == pytest.approx(turn_deg / 2, abs=1e-5)
 
 
 @pytest.mark.usefixtures("shapes_once")

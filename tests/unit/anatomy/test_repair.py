@@ -5,11 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import box, moved, sphere, torus
+from shapes import LONG_MM, box, moved, rigid, scaling, sphere, torus
 
-from gyriflow.anatomy.extraction import smooth_mask
+from gyriflow.anatomy.extraction import isosurface, smooth_mask
 from gyriflow.anatomy.repair import (
     clean,
+    filled_warning,
     make_even,
     pieces,
     rebuild,
@@ -82,6 +83,58 @@ def test_a_vertex_far_off_the_surface_is_told():
     assert sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings[0] == Facts(
         "60 mm"
     )
+
+
+@pytest.mark.parametrize(
+    ("subdivisions", "factor", "is_told"),
+    # 10 mm, or ten times the usual edge
+    [(4, 1.95, False), (4, 2.1, True), (1, 5.0, False), (1, 9.0, True)],
+)
+def test_an_edge_is_long_for_the_surface_and_for_a_brain(subdivisions, factor, is_told):
+    whole = sphere(RADIUS, subdivisions)
+    vertices = whole.vertices.copy()
+    vertices[7] *= factor
+    found = sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings
+    assert ["edge" in text for text in found] == [True] * is_told
+
+
+def test_a_part_on_a_stalk_is_told_with_its_volume_and_the_stalk_s_area():
+    x, y, z = (0.8 * np.indices((50, 50, 70)).T - [20.0, 20.0, 32.0]).T
+    mask = x**2 + y**2 + z**2 < 15.0**2
+    mask |= (np.hypot(x, y) < 1.4) & (np.abs(z + 12.0) < 12.0)
+    mask |= x**2 + y**2 + (z + 24.0) ** 2 < 4.0**2
+    mesh = isosurface(smooth_mask(mask, 0.7), scaling(0.8))
+    found = sound_pieces(mesh, 3.0)
+    (stalk,) = found.report["stalks"]
+    texts = f"{stalk['volume_mm3']:.0f} mm³", f"{stalk['stalk_mm2']:.0f} mm²"
+    assert found.warnings == [Facts(*texts)]
+    # a ball of 4 mm, and a stalk of 1.4 mm
+    assert stalk["volume_mm3"] == pytest.approx(4 / 3 * np.pi * 4.0**3, rel=0.2)
+    assert stalk["stalk_mm2"] == pytest.approx(np.pi * 1.4**2, rel=0.6)
+    assert len(found.is_cap) == len(found.mesh.faces)
+    # the other part is what is left
+    assert signed_volume(found.mesh) == pytest.approx(
+        signed_volume(mesh) - stalk["volume_mm3"], rel=0.02
+    )
+
+
+def test_gaps_of_a_tenth_of_a_millilitre_are_told():
+    affine = rigid(10, 20, 30) @ np.diag([*LONG_MM, 1.0])
+    for voxels, told in ((285, []), (286, [Facts("100 mm³")])):
+        counts = {"voxels_filled_in_tunnels": voxels}
+        assert filled_warning(counts, affine) == told
+
+
+def test_dropped_pieces_are_told_with_their_share_of_the_area():
+    # a ninth and a 900th of the area
+    far, farther = ball((0, 40, 0), RADIUS / 3), ball((0, 40, 30), RADIUS / 30)
+    found = sound_pieces(merged(far, WHOLE, farther), 3.0)
+    dropped = area(far) + area(farther)
+    share = 100 * dropped / (area(WHOLE) + dropped)
+    assert found.warnings == [Facts("2 pieces", f"{share:.1f} %")]
+    assert found.report["repair"]["area_dropped_mm2"] == pytest.approx(dropped)
+    assert area(found.mesh) == pytest.approx(area(WHOLE))
+    assert sound_pieces(merged(farther, WHOLE), 3.0).warnings == []
 
 
 def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():

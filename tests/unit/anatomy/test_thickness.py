@@ -14,11 +14,18 @@ from gyriflow.anatomy.thickness import (
     mean_curvature,
     summary,
     thickness_from_labels,
+    thickness_from_white,
 )
 from gyriflow.errors import InputError
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.poses import Pose
-from gyriflow.geometry.triangles import area, flipped, merged, transformed
+from gyriflow.geometry.triangles import (
+    area,
+    flipped,
+    merged,
+    transformed,
+    vertex_areas,
+)
 from gyriflow.settings.schemes import LabelScheme
 
 FOLDS_MM = 2.0
@@ -237,6 +244,41 @@ def test_long_voxels_have_their_length_along_their_own_axis(ball, order):
     share = found.is_measured[z > bare + 2.4].mean()
     assert share == pytest.approx(0.968, abs=0.003)
     assert not found.is_measured[z < bare - 4.0].any()
+
+
+PIAL = sphere(10.0, 4, (40.0, 5.0, 0.0))
+
+
+@pytest.mark.parametrize(("shift_mm", "is_refused"), [(2.49, False), (2.6, True)])
+def test_a_white_surface_may_cross_the_pial_one_by_a_hundredth_of_its_area(
+    shift_mm, is_refused
+):
+    # off the middle, so that one side comes out
+    white = sphere(8.0, 4, (40.0, 5.0 + shift_mm, 0.0))
+    if not is_refused:
+        found = thickness_from_white(PIAL, Pose(), 0.0, {"right": white})
+        assert found.report["measured_area_share"] < 1.0
+        return
+    is_outside = np.linalg.norm(white.vertices - [40.0, 5.0, 0.0], axis=1) > 10.0
+    is_outside &= nearest_on(white.vertices, PIAL)[0] > 0.5
+    areas = vertex_areas(white)
+    share = areas[is_outside].sum() / areas.sum()
+    facts = Facts("right", f"{100 * share:.0f} %", "0.6 mm", "1 %", "0.5 mm")
+    with pytest.raises(InputError, check=facts):
+        thickness_from_white(PIAL, Pose(), 0.0, {"right": white})
+
+
+def test_a_white_surface_is_of_its_side_and_inside_the_pial_one():
+    white = sphere(8.0, 4, (40.0, 5.0, 0.0))
+    found = thickness_from_white(PIAL, Pose(), 39.0, {"right": white})
+    assert found.values_mm == pytest.approx(2.0, abs=0.05)
+    for side, fissure_x_mm in (("right", 41.5), ("left", 38.5)):
+        facts = Facts(side, "x = 40.0 mm", f"{fissure_x_mm} mm")
+        with pytest.raises(InputError, check=facts):
+            thickness_from_white(PIAL, Pose(), fissure_x_mm, {side: white})
+    same = sphere(9.75, 4, (40.0, 5.0, 0.0))
+    with pytest.raises(InputError, check=Facts("0.25 mm", "0.3 mm")):
+        thickness_from_white(PIAL, Pose(), 0.0, {"right": same})
 
 
 def test_a_summary_is_weighted_by_area_and_leaves_out_what_was_not_measured():

@@ -80,6 +80,10 @@ def test_the_largest_error_is_that_of_tests_as_near_and_no_longer():
             pytest.approx(largest),
         ), week
         assert not found.is_beyond
+    # tests of the same weeks over longer horizons do not count
+    longer = [*A, *B, *rows("a", 20, {4.0: 0.5, 6.0: 0.5})]
+    assert volume_error(longer, 24.0, 2.0).largest == pytest.approx(0.05)
+    assert volume_error(longer, 26.0, 4.0).largest == pytest.approx(0.50)
     # 30 GW reached over a short horizon: only tests over a long one have reached this
     # week
     assert volume_error([*A, *B], 30.0, 2.0).largest == pytest.approx(0.30)

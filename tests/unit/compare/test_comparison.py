@@ -139,7 +139,14 @@ def test_jagged_vertices_are_rough_and_even_ones_are_not():
     jagged = TriangleMesh(ball.vertices * (1 + ends[:, None] / 10), ball.faces)
     assert roughness_mm(ball) < 0.03
     # a vertex is 0.1 away, the mean of its six neighbours 0.1/√6
-    assert roughness_mm(jagged) == pytest.approx(0.1 * np.sqrt(1 + 1 / 6), rel=0.1)
+    rough_mm = 0.1 * np.sqrt(1 + 1 / 6)
+    assert roughness_mm(jagged) == pytest.approx(rough_mm, rel=0.1)
+    # the lower half alone, which has half of the area and far fewer vertices
+    low = uneven(sphere(10.0, 5), ratio=3.0)
+    ends = np.random.default_rng(0).choice([-0.1, 0.1], len(low.vertices))
+    ends[low.vertices[:, 2] > 0] = 0.0
+    jagged = TriangleMesh(low.vertices * (1 + ends[:, None] / 10), low.faces)
+    assert roughness_mm(jagged) == pytest.approx(rough_mm / np.sqrt(2), rel=0.1)
 
 
 def test_a_motion_is_no_distance():
@@ -218,7 +225,7 @@ def test_each_side_of_the_middle_has_its_distance():
 
 
 def test_distances_of_drawn_patches_are_those_of_these_patches():
-    ball = sphere(10.0)
+    ball = uneven(sphere(10.0))
     pair = pairwise_distances(raised(ball), ball)
     # patch 1 is the upper cap, patch 0 the rest
     patch = (ball.vertices[:, 2] > 9.0).astype(np.int64)

@@ -180,7 +180,7 @@ def test_spread_is_that_of_places_after_rigid_alignment():
         for number, places in enumerate(moved)
     ]
     assert np.isnan(ensemble_maps(mesh, [], [far * 1.0])["position_sd_mm"]).all()
-    values = [np.where(far, share, 0.5) for share in (-0.5, -0.5, 0.5, 0.0)]
+    values = [np.where(far, share, 0.5) for share in (-0.38, -0.5, 0.38, -0.37)]
     found = ensemble_maps(mesh, members, values)
     # ±1 mm along the radius
     assert found["position_sd_mm"][far] == pytest.approx(1.0, abs=0.15)
@@ -188,6 +188,8 @@ def test_spread_is_that_of_places_after_rigid_alignment():
     assert set(found["sulcus_probability"][far]) == {0.5}
     assert set(found["gyrus_probability"][far]) == {0.25}
     assert set(found["gyrus_probability"][~far]) == {1.0}
+    slight = ensemble_maps(mesh, members, [np.full(len(far), 0.37)])
+    assert set(slight["gyrus_probability"]) == {0.0}
 
 
 def test_the_scripts_read_run_members_and_observed_brain_of_both_sides(tmp_path):

@@ -138,6 +138,8 @@ def test_coordinates_keep_products_and_are_of_modes_or_of_what_is_finer():
     assert sampling.patch.max() + 1 == pytest.approx(
         PREPARED.areas.sum() / 10**2, abs=1
     )
+    n_patches = sampling.patch.max() + 1
+    assert set(sampling.drawn[1:, -n_patches:].sum(axis=1)) == {n_patches - 1}
     for values, share in ((long, 1.0), (short, 0.0)):
         coordinates = sampling.coordinates(values)
         centred = values - np.average(values, weights=PREPARED.areas)

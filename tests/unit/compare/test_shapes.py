@@ -4,7 +4,7 @@ cortices overlap."""
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import rigid
+from shapes import rigid, sphere, uneven
 
 from gyriflow.compare.shapes import (
     PreparedSurface,
@@ -61,6 +61,15 @@ def test_size_and_distance_of_curvature():
     )
     assert against["curvature_rms_ratio"] == pytest.approx(2.0)
     assert against["curvature_distance_per_mm"] == pytest.approx(0.1, rel=0.02)
+    # three times as curved on the lower half, which has few vertices
+    ball = uneven(sphere(RADIUS))
+    same = np.full(len(ball.vertices), 0.1)
+    more = np.where(ball.vertices[:, 2] < 0, 0.3, 0.1)
+    against = curvature_differences(
+        PreparedSurface(ball, more, more), PreparedSurface(ball, same, same)
+    )
+    assert against["curvature_rms_ratio"] == pytest.approx(np.sqrt(5), rel=0.02)
+    assert against["curvature_distance_per_mm"] == pytest.approx(0.1, rel=0.04)
 
 
 def test_cortices_of_two_balls_overlap_by_their_common_shell():

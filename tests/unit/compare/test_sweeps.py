@@ -19,8 +19,9 @@ from gyriflow.compare.sweeps import (
     nearest_runs,
     with_common_cut,
 )
-from gyriflow.io.files import read_table, write_table
+from gyriflow.io.files import read_table, write_json, write_table
 from gyriflow.io.surfaces import write_surface
+from gyriflow.io.yaml_files import write_yaml
 from gyriflow.metrics.spangy import PART_POWERS
 
 
@@ -369,3 +370,76 @@ def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared
     assert cut[5] == (0.4, 0.8, nan, "not resolved")
     assert cut[6] == (0.2, nan, nan, "cut off")
     assert table.loc[("few", "shape_index_relative_power_B4_weyl"), "flag"] == "cut off"
+
+
+def test_the_script_joins_each_run_with_its_own_files_and_finds_the_nearest(tmp_path):
+    """The coarse run is the nearer one by area and within the noise of the other."""
+    runs = {
+        "thin": {"thickness_mm": 1.0, "through": 1.3, "area": 104.0},
+        "thick": {"thickness_mm": 2.0, "through": 4.0, "area": 95.0},
+    }
+    compared = {"subject": "a", "observed": "b", "hemisphere": "left", "flag": "ok"}
+    compared |= {"observed_population": "", "same_population": True, "unit": "1"}
+    share = {"measure": "shape_index_relative_power_B4", "distance": 0.0}
+    number = {"measure": "weyl_number", "value": 3.0, "observed_value": 3.0}
+    observed = coefficients("real", "b", 4, 5)
+    for run, of_run in runs.items():
+        settings = {"thickness_mm": of_run["thickness_mm"], "end_week": 28.0}
+        write_yaml(tmp_path / f"{run}.yaml", settings | {"growth": {"model": "rates"}})
+        zones = {"elements_through_cortex": of_run["through"], "order": 1}
+        write_json(tmp_path / f"{run}.zones.json", zones)
+        summary = {"steps": 10 * of_run["through"], "cpu_seconds": 3.0}
+        write_json(tmp_path / f"{run}.json", summary)
+        distance = abs(of_run["area"] / 100.0 - 1.0)
+        size = {"measure": "area", "value": of_run["area"], "distance": distance}
+        rows = [compared | {"run": run} | row for row in (share, number, size)]
+        table = pd.DataFrame(rows, columns=COMPARISON_COLUMNS)
+        write_table(tmp_path / f"{run}.compared.csv", table)
+        modes = pd.concat([coefficients(run, "a", 4, 4), observed])
+        write_table(tmp_path / f"{run}.modes.csv", modes)
+    noise = {"metrics": {"area": {"cv": 0.02}}, "distances": {}}
+    write_yaml(tmp_path / "noise.yaml", noise)
+    inputs = {
+        name: [f"{run}.{end}" for run in runs]
+        for name, end in {
+            "comparisons": "compared.csv",
+            "coefficients": "modes.csv",
+            "params": "yaml",
+            "summaries": "json",
+            "zones": "zones.json",
+        }.items()
+    }
+    members = [
+        {
+            "run": run,
+            "subject": "a",
+            "values": {"thickness_mm": of_run["thickness_mm"]},
+        }
+        for run, of_run in runs.items()
+    ]
+    names = ("members", "comparison", "nearest")
+    run_script(
+        "study_tables.py",
+        tmp_path,
+        inputs | {"noise": "noise.yaml"},
+        {name: f"{name}.csv" for name in names},
+        {"members": members, "week": 28.0},
+        wildcards=SimpleNamespace(study="thickness"),
+    )
+    members, comparison, nearest = (read_table(tmp_path / f"{n}.csv") for n in names)
+    assert members["run"].tolist() == ["thin", "thick"]
+    assert members["steps"].tolist() == [13.0, 40.0]
+    assert members["compare_week"].tolist() == [28.0, 28.0]
+    assert (members["resolution"] == "ok").tolist() == [False, True]
+    comparison = comparison.set_index(["run", "measure"])
+    of_area = comparison.xs("area", level="measure")
+    assert of_area["thickness_mm"].to_dict() == {"thin": 1.0, "thick": 2.0}
+    # the mean of a difference between two measurements of one brain
+    assert of_area["noise"].tolist() == pytest.approx([0.04 / np.sqrt(np.pi)] * 2)
+    cut = comparison.xs("shape_index_relative_power_B4_weyl", level="measure")
+    assert cut["value"].tolist() == [1.0, 1.0]
+    assert cut["observed_value"].tolist() == [0.5, 0.5]
+    by_area = nearest.set_index("measure").loc["area"]
+    assert (by_area["run"], by_area["next_thickness_mm"]) == ("thin", 2.0)
+    assert WITHIN_NOISE in by_area["flag"]
+    assert "not resolved by the mesh" in by_area["flag"]

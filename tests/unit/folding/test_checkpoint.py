@@ -1,5 +1,7 @@
 """State and checkpoint."""
 
+import os
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,7 +21,9 @@ from gyriflow.folding.checkpoint import (
     run_key,
     write_checkpoint,
 )
+from gyriflow.folding.run import delete_old_checkpoints, frame_path, load_state
 from gyriflow.settings.folding import parameters_from
+from gyriflow.units import SECONDS_PER_GW
 
 VALUES = {
     "start_week": 21.0,
@@ -49,13 +53,14 @@ def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
     state = State.at_start(at(0.0), 1.0)
     for before, after in pairwise(times[:3]):
         state = state.after(at(after) - at(before), after - before, {})
-    np.testing.assert_allclose(
-        state.initial_guesses(1.5)[0], at(3.0) - at(1.5), rtol=1e-13
-    )
+    found = state.initial_guesses(1.5)
+    np.testing.assert_allclose(found[0], at(3.0) - at(1.5), rtol=1e-13)
+    # the second repeats the rate of the last step, of half a second
+    np.testing.assert_allclose(found[1], 3.0 * (at(1.5) - at(1.0)), rtol=1e-13)
 
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path):
-    state = some_state()
+    state = replace(some_state(), correction=(0.25, -0.5))
     write_checkpoint(tmp_path / "state.h5", "key", state)
     read, message = read_checkpoint(tmp_path / "state.h5", "key")
     assert message == Facts(3)
@@ -81,12 +86,22 @@ def test_a_checkpoint_with_any_damage_is_whole_or_not_used(tmp_path, data):
             np.testing.assert_array_equal(getattr(read, name), value)
 
 
-def test_the_key_depends_on_mesh_and_parameters_but_not_on_ranks():
+def test_the_key_depends_on_what_decides_a_state_and_on_nothing_else():
     mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
     base = parameters_from(VALUES)
-    assert run_key(mesh, base, {}) == run_key(
-        mesh, parameters_from(VALUES | {"ranks": 7}), {}
-    )
+    same = [
+        {"ranks": 7},
+        {"end_week": 23.0, "output_weeks": [21.0, 23.0]},
+        {"solver": {"max_halvings": 2}},
+    ]
+    for change in same:
+        assert run_key(mesh, base, {}) == run_key(
+            mesh, parameters_from(VALUES | change), {}
+        )
+    for change in ({"step_s": 7e4}, {"solver": {"newton_tolerance": 1e-3}}):
+        assert run_key(mesh, base, {}) != run_key(
+            mesh, parameters_from(VALUES | change), {}
+        )
     assert run_key(mesh, base, {}) != run_key(
         mesh, parameters_from(VALUES | {"thickness_mm": 2.0}), {}
     )
@@ -128,3 +143,49 @@ def test_the_key_of_a_run_does_not_depend_on_how_labels_are_read():
     assert not {"labels.py", "extraction.py", "brains.py"} & behind
     c_files = {path.name for path in Path(checkpoint.__file__).parent.glob("*.c")}
     assert {"products.c"} < c_files <= behind
+
+
+def test_a_run_is_resumed_with_the_frames_it_has_and_the_steps_before_its_end(tmp_path):
+    weeks = [21.0, 22.0, 23.0]
+    values = VALUES | {"end_week": 23.0, "output_weeks": weeks}
+    step_s = SECONDS_PER_GW / 2
+    state = State.at_start(np.zeros((4, 3)), step_s)
+    for week in (21.5, 22.0, 22.5):
+        state = state.after(np.ones((4, 3)), step_s, {"week": week})
+    state = replace(state, growth_s=step_s)
+    write_checkpoint(tmp_path / "state.h5", "key", state)
+    run = parameters_from(values)
+    for week in weeks[:2]:
+        assert load_state(tmp_path, "key", run)[0] is None
+        frame_path(tmp_path, week).touch()
+    resumed, message = load_state(tmp_path, "key", run)
+    assert message == Facts(3)
+    assert [row["week"] for row in resumed.rows] == [21.5, 22.0, 22.5]
+    # an earlier end leaves out later steps
+    earlier = parameters_from(values | {"end_week": 22.0, "output_weeks": weeks[:2]})
+    resumed, _ = load_state(tmp_path, "key", earlier)
+    assert [row["week"] for row in resumed.rows] == [21.5, 22.0]
+    # growth towards shapes is recorded since the last output week
+    sizes = {"area_cm2": {21: 90, 23: 99}, "volume_ml": {21: 40, 23: 46}}
+    towards = {"growth": {"model": "shapes", **sizes}, "targets": {23.0: "target"}}
+    assert load_state(tmp_path, "key", parameters_from(values | towards))[0]
+    others = {"output_weeks": [21.0, 22.25, 23.0]}
+    frame_path(tmp_path, 22.25).touch()
+    other = parameters_from(values | towards | others)
+    found, message = load_state(tmp_path, "key", other)
+    assert found is None
+    assert message == Facts(tmp_path, "output weeks")
+
+
+def test_of_checkpoints_of_other_runs_the_last_two_are_kept(tmp_path):
+    names = [f"checkpoint-{letter}" for letter in "dabc"]
+    for age, name in enumerate(names):
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
+    own = tmp_path / "checkpoint-b"
+    notes = delete_old_checkpoints(tmp_path, own)
+    assert notes == [
+        Facts(tmp_path / name) for name in ("checkpoint-d", "checkpoint-a")
+    ]
+    assert not (tmp_path / "checkpoint-c").exists()
+    assert own.exists()

@@ -4,10 +4,12 @@ carried along by the scripts."""
 import numpy as np
 import pytest
 from ellipsoid import CENTRE_MM, RUN, SEMI_AXES, brain_mesh
+from facts import Facts
 from scripts import run_script
 from shapes import ellipsoid
 
 from gyriflow.anatomy.fissure import nearer_left
+from gyriflow.errors import InputError
 from gyriflow.folding.start_regions import start_regions
 from gyriflow.geometry.triangles import area, corners, submesh
 from gyriflow.io.files import read_table
@@ -71,6 +73,17 @@ def made(tmp_path_factory):
     return folder
 
 
+@pytest.mark.parametrize("maps", [{}, {"thickness_mm": 0.0}])
+def test_regions_of_a_start_need_its_maps_within_their_bounds(maps):
+    brain = brain_mesh(6)
+    of_vertices = {
+        name: np.full(len(brain.vertices), value) for name, value in maps.items()
+    }
+    p = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
+    with pytest.raises(InputError, check=Facts("thickness_mm")):
+        start_regions(brain, p, of_vertices, lambda mesh: mesh.faces[:, 0] >= 0)
+
+
 def test_facets_have_the_hemisphere_that_they_lie_on_though_the_fissure_is_bent(made):
     regions = read_regions(made / "regions.xdmf")
     centres = regions.mesh.vertices[regions.facets].mean(axis=1)
@@ -105,6 +118,18 @@ def test_metrics_of_the_folded_brain_are_of_its_week_and_its_surfaces(made):
         assert len(read_vertex_maps(made / f"{side}_maps.gii")["thickness_mm"]) == len(
             surface.vertices
         )
+    # every metric, band and mode of both sides
+    names = {
+        side: metrics.loc[side].index.tolist() for side in ("whole", "left", "right")
+    }
+    assert names["left"] == names["right"]
+    assert "spangy_shape_index_captured_share" in names["left"]
+    assert "mean_thickness" in names["whole"]
+    spectra = read_table(made / "spectra.csv")
+    by_side = spectra.groupby(["hemisphere", "proxy"])["band"].apply(list)
+    assert by_side.tolist() == [list(range(7))] * 4
+    modes = read_table(made / "coefficients.csv").groupby("hemisphere")["mode"]
+    assert modes.apply(list).tolist() == [list(range(30))] * 2
     # the cortex has grown with the rest
     thickness = read_vertex_maps(made / "thickness.gii")["thickness_mm"]
     assert np.nanmedian(thickness) == pytest.approx(1.3 * RUN["thickness_mm"], rel=0.1)

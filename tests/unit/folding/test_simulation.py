@@ -16,7 +16,12 @@ from gyriflow.folding.contact import MAX_STIFFENING, stiffening
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.predicted_memory import predicted_memory_mib
-from gyriflow.folding.run import quality_note, shortened_step_note
+from gyriflow.folding.run import (
+    quality_note,
+    report_step,
+    shortened_step_note,
+    steps_summary,
+)
 from gyriflow.folding.simulation import (
     STEPS_BEFORE_DOUBLING,
     advance,
@@ -26,6 +31,7 @@ from gyriflow.folding.simulation import (
 )
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.settings.folding import parameters_from
+from gyriflow.units import SECONDS_PER_GW
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 
@@ -233,3 +239,32 @@ def test_predicted_memory_is_what_runs_have_taken(
 )
 def test_the_barrier_is_stiffer_where_folds_are_close(gap, stiffness):
     assert stiffening(gap) == pytest.approx(stiffness)
+
+
+def test_the_summary_of_a_run_adds_up_its_steps():
+    counts = {"newton": (3, 5, 2, 2), "krylov": (10, 40, 20, 30)}
+    more = {"min_J": (0.9, 0.4, 0.8, 0.7), "seconds": (1.0, 9.0, 2.0, 4.0)}
+    values = list((counts | more).values())
+    rows = [
+        dict(zip(counts | more, row, strict=True)) for row in zip(*values, strict=True)
+    ]
+    assert steps_summary(rows) == {
+        "steps": 4,
+        "newton": 12,
+        "krylov": 100,
+        "seconds_per_step": 3.0,
+        "min_J": 0.4,
+    }
+    assert np.isnan(steps_summary([])["min_J"])
+
+
+def test_the_time_that_is_left_is_that_of_the_steps_to_the_end(capsys):
+    step_s = SECONDS_PER_GW / 14
+    row = {"step": 7, "week": 21.5, "newton": 3, "krylov": 40, "seconds": 2.5}
+    row |= {"max_u_mm": 0.7, "min_J": 0.85}
+    state = State.at_start(np.zeros((1, 3)), step_s).after(
+        np.zeros((1, 3)), step_s, row
+    )
+    # 21 steps of 5 s
+    report_step(state, 23.0, 5.0)
+    assert capsys.readouterr().out == Facts("GW 21.500/23", "1:45", "0.700 mm", 0.85)

@@ -1,6 +1,7 @@
 """Growth of a step towards shapes: what the path gives, and what feedback makes up
 for."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,11 +11,12 @@ from shapes import box_mesh, ellipsoid_mesh
 from verification_cases.growth_maps import WavyBox, errors_of_map
 
 from gyriflow.errors import InputError
-from gyriflow.folding.growth import GrowthInputs, StepStart
+from gyriflow.folding.growth import GrowthInputs, Size, StepStart
 from gyriflow.folding.targets import (
     FEEDBACK_FROM_MM,
     FEEDBACK_GW,
     FEEDBACK_SMOOTHING_MM,
+    MAX_SHRINKAGE_PER_DAY,
     TargetGrowth,
     growth_on_path,
     missed_targets,
@@ -166,6 +168,19 @@ def test_a_path_ends_with_its_last_shape_though_the_step_goes_on():
     assert growth.goal_mm == pytest.approx(1.1 * BODY.vertices, abs=1e-3)
 
 
+def test_elements_that_shrink_by_more_than_a_share_of_their_volume_a_day_are_counted():
+    p = parameters_from(RUN | {"step_s": 2 * DAY_S})
+    inputs = GrowthInputs(UNEVEN, zones_of_run(UNEVEN, p), {})
+    # a layer that shrinks to its half in two days
+    later = UNEVEN.vertices.copy()
+    later[UNEVEN.vertices[:, 0] > -7.5, 0] -= 0.5
+    path = path_through([21.0, 21.0 + 2 * DAY_GW], [UNEVEN.vertices, later], UNEVEN)
+    start = StepStart(UNEVEN.vertices, 0.0, 2 * DAY_S)
+    layer = UNEVEN.vertices[UNEVEN.tets, 0].max(axis=1) < -6.5
+    assert 2 * MAX_SHRINKAGE_PER_DAY < 0.5
+    assert growth_on_path(p, inputs, path, start).shrinking == layer.sum()
+
+
 def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goal():
     p = parameters_from(RUN)
     tets = (
@@ -191,6 +206,18 @@ def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goa
     for found, stretch in zip(inverse, (1.5, np.exp(0.7), 1.0), strict=True):
         assert found == pytest.approx(np.diag([1 / stretch, 1.0, 1.0]))
     assert (growth.held, counted) == ([2], [2])
+    row = replace(growth, misfit_mm=0.3, shrinking=5).row(Size(200.0, 3000.0))
+    assert row == {
+        "area_cm2": 2.0,
+        "volume_ml": 3.0,
+        "to_path_mm": 0.3,
+        "held_elements": 2,
+        "shrinking_elements": 5,
+    }
+    fixed = np.arange(36).reshape(12, 3) % 5 == 0
+    guess = growth.guess(fixed)
+    assert (guess[fixed] == 0).all()
+    assert guess[~fixed] == pytest.approx((goals - start.positions_mm)[~fixed] / 1000)
 
 
 def test_a_run_off_its_path_tells_how_far_and_how_many_elements_were_held_in_any_step():

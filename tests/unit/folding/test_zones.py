@@ -13,6 +13,7 @@ from gyriflow.folding import zones as zones_module
 from gyriflow.folding.checks import refuse_impossible, zone_report
 from gyriflow.folding.zones import brain_box, cell_tags, inside_ellipsoid, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from gyriflow.geometry.triangles import TriangleMesh, area, face_areas
 from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import (
     BRIDGE,
@@ -125,10 +126,41 @@ def test_the_report_adds_up(brain):
     zones = find_zones(brain)
     report = zone_report(brain, zones, 3.0)
     assert sum(zone["facets"] for zone in report["zones"].values()) == len(zones.facets)
+    surface = TriangleMesh(brain.vertices, zones.facets)
+    areas = [zone["area_mm2"] for zone in report["zones"].values()]
+    assert sum(areas) == pytest.approx(area(surface))
+    assert report["zones"]["clamped"]["facets"] == (zones.facet_zone == CLAMPED).sum()
     assert report["initial_penetration_mm"] == 0
     assert report["clamped_share"]["left"] == pytest.approx(
         report["clamped_share"]["right"], rel=0.05
     )
+
+
+def test_the_clamped_share_is_that_of_the_area_on_each_side_of_the_fissure(brain):
+    # 6 mm beside the middle, so that the sides differ
+    zones = find_zones(brain, fissure_x_mm=MIDDLE_MM + 6.0)
+    shares = zone_report(brain, zones, 3.0)["clamped_share"]
+    triangles = brain.vertices[zones.facets]
+    areas = face_areas(TriangleMesh(brain.vertices, zones.facets))
+    is_clamped = zones.facet_zone == CLAMPED
+    on_left = triangles[:, :, 0].mean(axis=1) < MIDDLE_MM + 6.0
+    for side, mask in (("left", on_left), ("right", ~on_left)):
+        expected = areas[mask & is_clamped].sum() / areas[mask].sum()
+        assert shares[side] == pytest.approx(expected)
+    assert abs(shares["left"] - shares["right"]) > 0.02
+
+
+def test_elements_through_the_cortex_are_counted_by_the_edges_in_it():
+    box = box_mesh((8, 8, 8), (8.0, 8.0, 8.0))
+    vertices = box.vertices + CENTRE_MM
+    # the inner half is made of longer elements
+    depth = np.abs(box.vertices).max(axis=1)
+    vertices += box.vertices * np.where(depth < 2.5, 0.3, 0.0)[:, None]
+    mesh = TetrahedralMesh(vertices, box.tets)
+    zones = find_zones(mesh, contact="none", support="free", no_growth="none")
+    edge = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
+    found = zone_report(mesh, zones, 0.8)["elements_through_cortex"]
+    assert found == pytest.approx(0.8 / edge)
 
 
 def test_few_walls_lie_between_the_planes(brain):
@@ -234,9 +266,12 @@ def test_elements_are_left_right_or_between_the_planes():
     mesh = brain_mesh(12)
     tags = cell_tags(
         mesh,
-        zones_of_run(mesh, parameters_from(RUN), GAP_MM),
+        find_zones(mesh, GAP_MM),
         (mesh.vertices[:, 1] > CENTRE_MM[1]).astype(float),
     )
+    growth = find_zones(mesh, GAP_MM).growth[mesh.tets]
+    assert set(tags["growing"][(growth > 0).any(axis=1)]) == {1}
+    assert set(tags["growing"][(growth == 0).all(axis=1)]) == {0}
     y = mesh.vertices[mesh.tets, 1] - CENTRE_MM[1]
     assert set(tags["layer"][y.min(axis=1) > 0]) == {CORTEX}
     assert set(tags["layer"][y.max(axis=1) <= 0]) == {CORE}
@@ -245,6 +280,8 @@ def test_elements_are_left_right_or_between_the_planes():
     np.testing.assert_array_equal(tags["hemisphere"] == LEFT, x <= -2.0)
     np.testing.assert_array_equal(tags["hemisphere"] == RIGHT, x >= 2.0)
     assert (np.abs(x[tags["hemisphere"] == BRIDGE]) < 2.0).all()
+    # the numbers that docs/outputs.md has
+    assert (LEFT, RIGHT, BRIDGE, CORTEX, CORE) == (1, 2, 3, 1, 2)
     volumes = signed_volumes(mesh)
     left, right = (volumes[tags["hemisphere"] == side].sum() for side in (LEFT, RIGHT))
     assert left == pytest.approx(right)

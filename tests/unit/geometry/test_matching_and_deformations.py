@@ -1,7 +1,7 @@
 import igl
 import numpy as np
 import pytest
-from shapes import box, box_mesh, rigid, scaling, sphere
+from shapes import FAR, LONG_MM, box, box_mesh, rigid, scaling, sphere, uneven
 
 from gyriflow.geometry.deformations import (
     Deformation,
@@ -17,6 +17,7 @@ from gyriflow.geometry.matching import (
     layer_labels,
     match_layers,
     match_points,
+    match_surface,
     nearest_on,
     surface_mask,
     values_at,
@@ -74,10 +75,14 @@ def test_determinant_is_the_growth_of_volume():
     assert determinants(bent(3.0)) == pytest.approx(np.full((31, 31, 31), 1.1**3))
     squeezed = Deformation(np.eye(4), -0.5 * bent(0.0).displacement, GRID)
     assert determinants(squeezed) == pytest.approx(np.ones((31, 31, 31)))
-    index = np.moveaxis(np.indices((31, 31, 31)), 0, -1) * 2.0 - 30.0
-    assert determinants(
-        Deformation(np.eye(4), -1.5 * index * [1, 0, 0], GRID)
-    ) == pytest.approx(np.full((31, 31, 31), -0.5))
+    # long voxels of a turned grid, and different growth along x, y and z
+    affine = FAR[0] @ scaling(LONG_MM)
+    index = np.moveaxis(np.indices((5, 7, 6)), 0, -1)
+    points = transform_points(index.reshape(-1, 3), affine).reshape(5, 7, 6, 3)
+    growth = np.array([[-1.5, 0.3, 0.0], [0.0, 0.2, -0.1], [0.4, 0.0, 0.5]])
+    grown = Deformation(np.eye(4), points @ growth.T, affine)
+    expected = np.linalg.det(np.eye(3) + growth)
+    assert determinants(grown) == pytest.approx(np.full((5, 7, 6), expected))
 
 
 def walls() -> TriangleMesh:
@@ -94,6 +99,15 @@ def test_the_other_wall_is_not_matched():
     assert match.agrees.all()
     assert values_at(match, mesh.vertices)[0, 0] == pytest.approx(-0.5)
     assert match_points(point, -normal, mesh).distance_mm == pytest.approx([0.2])
+    # so are the walls of a body that moved as far
+    moved_walls = TriangleMesh(mesh.vertices + [0.8, 0.0, 0.0], mesh.faces)
+    match = match_surface(moved_walls, mesh)
+    assert match.distance_mm.max() <= 0.8 + 1e-9
+    assert match.agrees.all()
+    inside = np.isclose(mesh.vertices[:, 0], -0.5)
+    inside &= (np.abs(mesh.vertices[:, 1:]) < 4.0).all(axis=1)
+    assert inside.any()
+    assert values_at(match, mesh.vertices)[inside, 0] == pytest.approx(-0.5)
 
 
 @pytest.mark.parametrize(("degrees", "agrees"), [(55, True), (65, False)])
@@ -139,15 +153,16 @@ def test_values_are_linear_in_faces_and_labels_those_of_the_nearest_corner():
 
 
 def test_diffusion_on_a_sphere_damps_a_harmonic_as_the_heat_equation_does():
-    ball = sphere()
+    ball = uneven(sphere())
     z = ball.vertices[:, 2] / 10
     second = 1.5 * z**2 - 0.5
     smooth = diffuse(
         ball.vertices, ball.faces, np.stack([second, np.ones(len(z))], 1), 4.0
     )
+    weighted = second * vertex_sizes(ball.vertices, ball.faces)
     # eigenvalue l(l + 1)/R² = 0.06, time σ²/2 = 8; eight implicit steps instead of the
     # exponential
-    assert smooth[:, 0] @ second / (second @ second) == pytest.approx(
+    assert smooth[:, 0] @ weighted / (second @ weighted) == pytest.approx(
         (1 + 0.06) ** -8, rel=0.01
     )
     assert smooth[:, 1] == pytest.approx(np.ones(len(z)))

@@ -122,6 +122,19 @@ def test_an_element_inverted_in_the_middle_of_a_straight_way_is_found():
     ]
 
 
+def test_elements_inverted_at_the_end_of_an_interval_are_found():
+    mesh = box_mesh((4, 2, 2), (16.0, 8.0, 8.0))
+    shapes = np.repeat(mesh.vertices[None], 2, axis=0)
+    # a layer that has just passed the next one
+    shapes[1, np.isclose(mesh.vertices[:, 0], 0.0), 0] += 4.1
+    path = path_through([21.0, 22.0], shapes, mesh)
+    (found,) = path.inverted
+    corners = shapes[1][mesh.tets]
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1])
+    assert found.tolist() == np.flatnonzero(volumes < 0).tolist()
+    assert len(found) > 0
+
+
 def test_each_shape_is_aligned_with_the_one_before_by_volume():
     """A box that is bent to and fro: elements on the right are five times as long, and
     move on."""

@@ -14,6 +14,8 @@ from gyriflow.geometry.triangles import (
     mean_edge_length,
     merged,
     signed_volume,
+    smallest_patch,
+    split_sheets,
     submesh,
     transformed,
     vertex_areas,
@@ -72,3 +74,40 @@ def test_a_mirroring_motion_keeps_the_surface_outward(box):
     np.testing.assert_allclose(
         shifted.vertices.mean(axis=0) - box.vertices.mean(axis=0), [5, 6, 7]
     )
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_hole_is_closed_by_the_smallest_patch_without_edges_that_are_there(first):
+    # two corners are raised: the diagonal between the low ones gives the smaller area
+    height = np.array([0.0, 6.0, 0.0, 3.0])
+    loop = np.array([[0, 0, 0], [9.0, 0, 0], [9, 7, 0], [0, 7, 0]])
+    loop[:, 2] = np.roll(height, first)
+    outside = [[4.0, 3.0, 20.0]]
+    rim = TriangleMesh(np.concatenate([loop, outside]), [[0, 1, 4]])
+    patch = smallest_patch(rim, np.arange(4))
+    diagonals = {0: {0, 2}, 1: {1, 3}}
+    assert all(diagonals[first] <= set(face) for face in patch.tolist())
+    # each side of the hole in its order
+    assert (0, 1) in [tuple(pair) for face in patch for pair in (face[:2], face[1:])]
+    low = sorted(diagonals[first])
+    taken = TriangleMesh(rim.vertices, [[*low, 4]])
+    patch = smallest_patch(taken, np.arange(4))
+    assert all(diagonals[1 - first] <= set(face) for face in patch.tolist())
+
+
+@pytest.mark.parametrize("is_outward", [True, False])
+def test_bodies_that_share_an_edge_are_parted_there_each_closed(is_outward):
+    large, small = shapes.box((2.0, 2.0, 6.0)), shapes.box((1.0, 3.0, 6.0))
+    # edges along z of both, at the same place
+    small = TriangleMesh(small.vertices + [1.5, 2.5, 0.0], small.faces)
+    both = merged(large, small)
+    points, number = np.unique(both.vertices, axis=0, return_inverse=True)
+    joined = TriangleMesh(points, number.ravel()[both.faces])
+    assert not is_closed(joined)
+    parted = split_sheets(joined if is_outward else flipped(joined))
+    assert is_closed(parted)
+    assert len(parted.vertices) == 16
+    component = face_components(parted)
+    sizes = [signed_volume(submesh(parted, component == n)[0]) for n in (0, 1)]
+    assert np.abs(sizes) == pytest.approx([24.0, 18.0])
+    assert split_sheets(large) is large

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from facts import Facts
 from scipy.ndimage import binary_dilation, gaussian_filter, morphological_gradient
-from shapes import LPS, ellipsoid_mesh, rigid, scaling, sphere
+from shapes import (
+    FAR,
+    LONG_MM,
+    LPS,
+    ellipsoid_mesh,
+    rigid,
+    scaling,
+    sphere,
+    uneven,
+)
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import (
@@ -27,6 +36,8 @@ from gyriflow.growth.carrying import (
     outward,
 )
 from gyriflow.growth.registration import (
+    MARGIN_MM,
+    SMOOTHING_MM,
     Channels,
     channels,
     measure_quality,
@@ -70,6 +81,22 @@ def test_surfaces_are_matched_whatever_the_order_of_their_triangles():
     assert report["area_ratio"] == pytest.approx(1.21, abs=0.01)
 
 
+def test_numbers_of_matched_surfaces_do_not_depend_on_their_triangles():
+    reports = []
+    for ball in (sphere(10.0, 5), uneven(sphere(10.0, 5))):
+        # the lower half grows, is turned and bent
+        down = np.clip(-ball.vertices[:, 2:] / 10, 0, 1)
+        bent = ball.vertices * (1 + 0.3 * down) + 3.0 * down**2 * [1.0, 0.0, 0.0]
+        second = TriangleMesh(transform_points(bent, FAR[0]), ball.faces)
+        near = transform_points(second.vertices, rigid(0.0, 0.0, -20.0))
+        reports.append(match_surfaces(ball, TriangleMesh(near, ball.faces))[1])
+    even, other = reports
+    assert 8.0 < even["turn_deg"] < 20.0
+    assert even["scatter"] > 0.05
+    for name in ("turn_deg", "scatter", "area_ratio"):
+        assert other[name] == pytest.approx(even[name], rel=0.02), name
+
+
 def test_other_triangles_and_other_places_are_refused():
     with pytest.raises(
         InputError, check=Facts(642, 1280, 2562, 5120, "growth.matched_surfaces")
@@ -100,6 +127,50 @@ def test_another_mesh_of_the_brain_goes_along_in_any_pose():
     assert carry_surface(own, []) is own.vertices
     with pytest.raises(InputError, check=Facts("5.16 mm", "2 mm")):
         follow_surfaces(TriangleMesh(own.vertices * 1.5, own.faces), [turned])
+
+
+@pytest.mark.parametrize(("turn_deg", "is_refused"), [(29.5, False), (30.5, True)])
+def test_matched_surfaces_may_be_turned_by_30_degrees(turn_deg, is_refused):
+    turned = TriangleMesh(ATLAS.vertices @ rigid(0, turn_deg, 0)[:3, :3], ATLAS.faces)
+    if is_refused:
+        with pytest.raises(InputError, check=Facts("30°")):
+            match_surfaces(ATLAS, turned)
+    else:
+        _, report = match_surfaces(ATLAS, turned)
+        assert report["turn_deg"] == pytest.approx(turn_deg, abs=1e-3)
+
+
+@pytest.mark.parametrize(("mm", "is_refused"), [(1.9, False), (2.1, True)])
+def test_a_surface_may_lie_2_mm_from_the_matched_one(mm, is_refused):
+    own = sphere(10.0 + mm, 3)
+    if is_refused:
+        with pytest.raises(InputError, check=Facts("2 mm")):
+            follow_surfaces(own, [GROWN])
+    else:
+        follow_surfaces(own, [GROWN])
+
+
+@pytest.mark.parametrize(
+    ("change", "facts"),
+    [
+        ({}, None),
+        ({"dice_cerebrum": 0.949}, ["cerebrum", 0.949, 0.95]),
+        ({"dice_cortex": 0.599}, ["cortex", 0.599, 0.6]),
+        ({"folded_share": 0.0051}, ["0.51%", "0.50%"]),
+        # without cortex
+        ({"dice_cortex": float("nan")}, None),
+    ],
+)
+def test_a_registration_is_good_within_its_limits(change, facts, caplog):
+    quality = {"dice_cerebrum": 0.951, "dice_cortex": 0.601, "folded_share": 0.0049}
+    quality |= change
+    if facts is None:
+        require_good(quality, pair="21-22")
+    else:
+        with pytest.raises(InputError, check=Facts("21-22", *facts)):
+            require_good(quality, pair="21-22")
+    require_good(quality, pair="21-22", only_warn=True)
+    assert caplog.messages == ([] if facts is None else [Facts("21-22", *facts)])
 
 
 def test_regions_are_carried_along_matched_surfaces():
@@ -366,10 +437,87 @@ def test_a_map_that_folds_is_refused(pair, found):
         require_good(quality, pair="21-22")
 
 
-def test_a_cerebrum_at_the_edge_of_the_volume_is_refused():
-    affine = centred()
-    with pytest.raises(InputError, check=Facts(280, "i = 0")):
-        channels(volume(affine, later=False)[21:], affine, cerebrum=(WHITE, CORTEX))
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_cerebrum_at_the_edge_of_the_volume_is_refused(axis, is_first):
+    labels = np.zeros((20, 22, 24), np.uint8)
+    labels[6:14, 6:14, 6:14] = WHITE
+    channels(labels, np.eye(4), cerebrum=(WHITE,))
+    at_end = np.roll(labels, -6 if is_first else labels.shape[axis] - 14, axis)
+    place = f"{'ijk'[axis]} = {0 if is_first else 'last'}"
+    with pytest.raises(InputError, check=Facts("64 voxels", place)):
+        channels(at_end, np.eye(4), cerebrum=(WHITE,))
+
+
+@pytest.mark.parametrize("voxel_mm", [None, 0.9])
+def test_channels_of_long_turned_voxels_lie_where_the_brain_is_smoothed_alike(voxel_mm):
+    half_mm = np.array([7.0, 9.0, 6.0])
+    shape = np.array([34, 32, 20])
+    affine = FAR[1] @ scaling(LONG_MM)
+    centre = transform_points((shape - 1) / 2, affine)
+    index = np.indices(shape).reshape(3, -1).T
+    from_centre = (transform_points(index, affine) - centre) @ FAR[1][:3, :3]
+    radius = np.linalg.norm(from_centre / half_mm, axis=1).reshape(shape)
+    labels = np.where(radius < 0.7, WHITE, np.where(radius < 1.0, CORTEX, 0))
+    found = channels(
+        labels, affine, cerebrum=(WHITE, CORTEX), cortex=(CORTEX,), voxel_mm=voxel_mm
+    )
+    voxel = voxel_mm or 0.5
+    assert found.affine[:3, :3] == pytest.approx(voxel * np.eye(3))
+    places = transform_points(
+        np.indices(found.tissue.shape).reshape(3, -1).T, found.affine
+    )
+    widths = []
+    for bit, field, share in (
+        (1, found.cerebrum, 1.0),
+        (2, found.cortex, 1 - 0.7**3),
+    ):
+        solid = (found.tissue & bit > 0).ravel()
+        volume_mm3 = 4 / 3 * np.pi * half_mm.prod() * share
+        assert solid.sum() * voxel**3 == pytest.approx(volume_mm3, rel=0.03)
+        assert places[solid].mean(axis=0) == pytest.approx(centre, abs=0.1)
+        # the variance that smoothing adds, along each axis of the voxels
+        along = (places - centre) @ FAR[1][:3, :3]
+        widths.append(
+            np.average(along**2, axis=0, weights=field.ravel())
+            - (along[solid] ** 2).mean(axis=0)
+        )
+    if voxel_mm is None:
+        # interpolation in larger voxels smooths further
+        assert widths[0] == pytest.approx(SMOOTHING_MM**2, abs=0.15)
+        assert widths[1] == pytest.approx(SMOOTHING_MM**2, abs=0.3)
+    margins = np.minimum(places[solid].min(axis=0) - places.min(axis=0), 99)
+    assert margins.min() > MARGIN_MM - 2 * voxel
+    assert (
+        places.max(axis=0) - places[solid].max(axis=0)
+    ).min() > MARGIN_MM - 2 * voxel
+
+
+def test_the_quality_of_a_registration_is_that_of_its_map_inside_the_brain(
+    coarse_brain,
+):
+    # growth by a quarter along x, more in front, and a shift by 3 mm at the rim
+    index = np.moveaxis(np.indices((12, 14, 13)), 0, -1)
+    affine = scaling(6.0, (-33.0, -39.0, -36.0))
+    points = transform_points(index.reshape(-1, 3), affine).reshape(index.shape)
+    x, y, _ = np.moveaxis(points, -1, 0)
+    displacement = np.zeros(index.shape)
+    displacement[..., 0] = x * np.where(y > 0, 0.5, 0.25)
+    deformation = Deformation(scaling(1.1), displacement, affine)
+    found = measure_quality(coarse_brain, coarse_brain, deformation)
+    grid = np.indices(coarse_brain.tissue.shape).reshape(3, -1).T
+    inside = (coarse_brain.tissue & 1 > 0).ravel()
+    places = transform_points(grid[inside], coarse_brain.affine)
+    is_front = places[:, 1] > 0
+    factors = 1.1**3 * np.where(is_front, 1.5, 1.25)
+    assert found["volume_ratio"] == pytest.approx(factors.mean(), rel=0.02)
+    assert found["log_growth_sd"] == pytest.approx(np.log(factors).std(), rel=0.2)
+    assert found["least_determinant"] == pytest.approx(1.1**3 * 1.25, rel=0.02)
+    assert found["folded_share"] == 0
+    moved_mm = np.abs(places[:, 0]) * np.where(is_front, 0.5, 0.25)
+    assert found["inside_mm"] == pytest.approx(np.quantile(moved_mm, 0.95), rel=0.1)
+    # most of the rim is as far from x = 0 as the volume reaches
+    assert found["rim_mm"] == pytest.approx(0.5 * 33.0, rel=0.1)
 
 
 def test_images_are_compared_where_both_brains_have_one(coarse, coarse_brain):

@@ -121,6 +121,48 @@ def test_regions_are_carried_from_the_brain_on_which_they_are_given(tmp_path, po
         assert (found == front(mesh) + 2 * (side == "right")).mean() > 0.98
 
 
+@pytest.mark.parametrize("source", ["volume", "surfaces"])
+def test_regions_are_given_in_the_coordinates_of_the_files(tmp_path, source):
+    """Each surface file has a pose of its own, and other numbers for its regions."""
+    sides = {"left": hemisphere(-1), "right": hemisphere(1)}
+    poses = {"left": FAR[1], "right": FAR[1] @ FAR[0]}
+    write_json(tmp_path / "report.json", {"pose": Pose(FAR[0], poses).plain()})
+    inputs = {"report": "report.json"}
+    params = {"names": {}, "affine_from": "auto"}
+    for side, mesh in sides.items():
+        write_surface(tmp_path / f"{side}.gii", mesh)
+        inputs[side] = f"{side}.gii"
+    if source == "volume":
+        affine = scaling((1.2, 1.0, 1.4), (-27.0, -28.0, -20.0))
+        shape = (46, 57, 30)
+        x, y, z = transform_points(np.indices(shape).reshape(3, -1).T, affine).T
+        inside = (np.abs(x) < 26) & (np.abs(z) < 18)
+        labels = np.where(inside, np.where(y > 2.0, 9, 4), 0).reshape(shape)
+        volume = LabelVolume(labels, np.linalg.inv(FAR[0]) @ affine)
+        write_label_volume(tmp_path / "regions.nii.gz", volume)
+        inputs["volume"] = "regions.nii.gz"
+        params["names"] = {9: "front", 4: "back"}
+    else:
+        for number, (side, mesh) in enumerate(sides.items()):
+            own = transformed(mesh, np.linalg.inv(poses[side]))
+            write_surface(tmp_path / f"{side}.own.gii", own)
+            names = {5: ("front", "back")[number], 6: ("back", "front")[number]}
+            is_front = mesh.vertices[:, 1] > 2.0
+            labels = np.where(is_front == (number == 0), 5, 6)
+            write_vertex_labels(tmp_path / f"{side}.label.gii", labels, names)
+            inputs |= {f"{side}_labels": f"{side}.label.gii"}
+            inputs |= {f"{side}_surface": f"{side}.own.gii"}
+    outputs = {f"{side}_regions": f"{side}.found.gii" for side in SIDES}
+    run_script("given_regions.py", tmp_path, inputs, outputs, params)
+    for side, mesh in sides.items():
+        found, names = read_vertex_labels(tmp_path / f"{side}.found.gii", side)
+        assert set(names.values()) == {"front", "back"}
+        y = mesh.vertices[:, 1]
+        clear = np.abs(y - 2.0) > 0.8
+        words = np.array([names[number] for number in found[clear].tolist()])
+        assert (words == np.where(y[clear] > 2.0, "front", "back")).all()
+
+
 @WHETHER_POSED
 def test_maps_come_to_the_template_from_the_brain(tmp_path, posed):
     brains = write_brains(tmp_path, posed=posed)

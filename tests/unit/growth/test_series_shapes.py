@@ -126,6 +126,13 @@ def test_a_body_is_drawn_until_it_is_close_or_hardly_comes_closer(
     assert body.n_draws == n_draws
 
 
+def test_a_body_without_an_observed_surface_is_drawn_to_its_shape_once():
+    body = StubbornBody(1.0)
+    fit_body(body, 1.02 * BALL.vertices, None, EVERY, open_sulci=True)
+    assert body.n_draws == 1
+    assert body.positions_mm == pytest.approx(1.02 * BALL.vertices)
+
+
 @pytest.mark.parametrize(("mm", "is_warned"), [(0.15, False), (0.4, True)])
 def test_a_body_that_stays_from_its_shape_or_surface_is_warned_of(
     caplog, mm, is_warned

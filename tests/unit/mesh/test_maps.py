@@ -139,6 +139,18 @@ def test_a_surface_that_is_not_this_brains_is_refused_with_its_distance(
         )
 
 
+@pytest.mark.parametrize(("mm", "is_refused"), [(4.8, False), (5.2, True)])
+def test_a_surface_of_a_map_may_lie_5_mm_from_the_mesh(ball, mm, is_refused):
+    facets, _ = boundary_faces(ball)
+    surface = sphere(RADIUS + mm, 3)
+    values = linear(surface.vertices)
+    if is_refused:
+        with pytest.raises(InputError, check=Facts("5 mm")):
+            vertex_map_on_mesh(ball.vertices, facets, surface, values)
+    else:
+        vertex_map_on_mesh(ball.vertices, facets, surface, values)
+
+
 @pytest.mark.parametrize(
     "given_posed", [False, True], ids=["input's coordinates", "posed already"]
 )

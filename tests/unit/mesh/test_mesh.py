@@ -17,6 +17,7 @@ from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_faces,
     boundary_surface,
+    grid,
     radius_ratios,
     signed_volumes,
 )
@@ -26,6 +27,7 @@ from gyriflow.geometry.triangles import (
     mean_edge_length,
     merged,
     signed_volume,
+    transformed,
 )
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
@@ -88,14 +90,84 @@ def test_the_corner_element_has_its_known_quality():
     )
 
 
+NO_GAP = {"percentile1": None, "median": None, "area_mm2": 0.0}
+
+
 def summary_of(mesh):
     return quality_summary(mesh, boundary_surface(mesh)[0])
+
+
+def test_the_quality_of_a_box_of_uneven_cells_is_known():
+    mesh = grid(
+        [np.array([0.0, 1, 3]), np.array([0.0, 1, 2, 4]), np.array([0.0, 3, 6])]
+    )
+    larger = boundary_surface(box_mesh((2, 3, 2), (3.0, 4.0, 8.0)))[0]
+    found = quality_summary(mesh, moved(larger, 1.5, 2.0, 4.0))
+    ratios, angles = radius_ratios(mesh), dihedral_angles(mesh)
+    boundary = boundary_surface(mesh)[0]
+    expected = {
+        "order": 1,
+        "tets": 72,
+        "vertices": 36,
+        "pial_faces": 2 * 2 * (2 * 3 + 3 * 2 + 2 * 2),
+        "pial_edge_mm": mean_edge_length(boundary),
+        "pial_area_mm2": 2 * (3 * 4 + 4 * 6 + 3 * 6),
+        "smallest_pial_face_mm2": 0.5,
+        "crossing_faces": 0,
+        "gap_kept": None,
+        "volume_mm3": 72.0,
+        "volume_change": 72.0 / 96.0 - 1.0,
+        "min_radius_ratio": ratios.min(),
+        "mean_radius_ratio": ratios.mean(),
+        "median_radius_ratio": np.median(ratios),
+        "min_dihedral_deg": angles.min(),
+        "max_dihedral_deg": angles.max(),
+        "min_volume_mm3": 0.5,
+        "min_jacobian_ratio": 1.0,
+    }
+    assert found.pop("gap_mm") == {"input": NO_GAP, "mesh": NO_GAP}
+    assert found.pop("surface_distance_mm")["hausdorff"] == pytest.approx(2.0)
+    assert set(found) == set(expected)
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value), name
 
 
 def test_a_good_mesh_passes_every_gate():
     refuse_bad_mesh(
         REGULAR, summary_of(REGULAR), **(GATES | {"min_radius_ratio": 0.99})
     )
+
+
+@pytest.mark.parametrize(
+    ("change", "facts"),
+    [
+        ({}, None),
+        ({"gap_kept": 0.951}, None),
+        ({"gap_kept": 0.949}, ["95 %"]),
+        ({"gap_kept": None}, None),
+        ({"volume_change": 0.0199}, None),
+        ({"volume_change": -0.0201}, ["-2.0 %", "2 %"]),
+        ({"surface_distance_mm": {"hausdorff99": 0.099}}, None),
+        ({"surface_distance_mm": {"hausdorff99": 0.101}}, ["0.101 mm", "0.1 mm"]),
+        ({"crossing_faces": 2}, ["2 faces"]),
+    ],
+)
+def test_a_mesh_is_good_enough_within_its_gates(change, facts):
+    summary = summary_of(REGULAR) | change
+    if facts is None:
+        refuse_bad_mesh(REGULAR, summary, **GATES)
+    else:
+        with pytest.raises(MeshError, check=Facts(*facts)):
+            refuse_bad_mesh(REGULAR, summary, **GATES)
+
+
+@pytest.mark.parametrize(("degrees", "is_gap"), [(20.0, True), (30.0, False)])
+def test_walls_of_a_gap_are_parallel_to_25_degrees(degrees, is_gap):
+    wall = box((1.0, 6.0, 6.0))
+    turned = transformed(wall, shapes.rigid(0, 0, degrees))
+    apart = moved(turned, 2.6)
+    found = gap_summary(gap_walls(merged(wall, apart)))
+    assert (found["area_mm2"] > 10.0) == is_gap
 
 
 def test_flat_elements_are_refused_with_their_place_and_all_gates_they_fail():
@@ -497,11 +569,7 @@ def test_the_gap_between_two_boxes_has_its_width_and_area():
 
 
 def test_walls_far_apart_or_thin_tissue_are_no_gap():
-    assert gap_summary(gap_walls(pair(4.0))) == {
-        "percentile1": None,
-        "median": None,
-        "area_mm2": 0.0,
-    }
+    assert gap_summary(gap_walls(pair(4.0))) == NO_GAP
     assert gap_kept(gap_walls(pair(4.0)), pair(0.1)) is None
     plate = box((0.5, 6.0, 6.0))
     assert gap_summary(gap_walls(plate))["area_mm2"] == 0.0

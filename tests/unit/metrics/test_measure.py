@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from facts import Facts
 from scipy.spatial import Delaunay
-from shapes import FAR, ellipsoid, octasphere, sphere
+from shapes import FAR, ellipsoid, octasphere, sphere, uneven
 
 from gyriflow.compare.accuracy import ensemble_maps
 from gyriflow.compare.deviation import deviation_maps
@@ -211,6 +211,7 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
         left,
         right,
         thickness_mm=thickness,
+        label_volumes_ml={"cortex": 60.0},
         curvature_radius_mm=6.0,
         spangy_modes=30,
     )
@@ -279,6 +280,27 @@ def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() 
         assert both.loc["relative_area", name] == pytest.approx(
             both.loc["area", name] / both.loc["volume", name] ** (2 / 3)
         )
+        # κ1 κ2, of H and the curvedness
+        assert maps["gaussian_curvature"] == pytest.approx(
+            2 * maps["mean_curvature"] ** 2 - maps["curvedness"] ** 2, abs=1e-12
+        )
+        modes = found.coefficients.query("hemisphere == @name")
+        assert modes["mode"].tolist() == list(range(30))
+        assert (np.diff(modes["eigenvalue_per_mm2"]) > 0).all()
+        for proxy in PROXIES:
+            squares = modes[f"coefficient_{proxy}"] ** 2
+            bands = found.spectra.query("hemisphere == @name and proxy == @proxy")
+            assert squares.groupby(modes["band"]).sum().to_dict() == pytest.approx(
+                bands.set_index("band")["power"].loc[: modes["band"].max()].to_dict()
+            )
+    # the cortex as a bent sheet of its thickness
+    bent = [
+        np.average(found.maps[name]["mean_curvature"], weights=vertex_areas(mesh))
+        for name, mesh in sides.items()
+    ]
+    mean_mm = numbers.loc["mean_thickness", "whole"]
+    sheet_cm2 = 60_000 / mean_mm / 100 * (1 + np.average(bent, weights=areas) * mean_mm)
+    assert numbers.loc["area_ratio", "whole"] == pytest.approx(areas.sum() / sheet_cm2)
 
 
 def test_one_wavelength_is_one_band_of_mean_curvature_but_not_of_shape_index() -> None:
@@ -485,6 +507,30 @@ def test_thickness_metrics_leave_out_what_was_not_measured() -> None:
     assert (rows["thickness_q05"], rows["thickness_q95"]) == (1.0, 2.0)
     assert rows["thickness_measured_share"] == pytest.approx(0.5)
     assert thickness_metrics(np.full(3, np.nan), np.ones(3)) == {}
+
+
+def test_means_of_regions_are_over_the_reliable_area() -> None:
+    mesh = uneven(sphere(RADIUS))
+    z = mesh.vertices[:, 2] / RADIUS
+    # the height is the middle of a zone, over its area
+    depth = np.where(np.abs(z) < 0.5, 99.0, z)
+    maps = {"sulcal_depth_mm": depth, "reliable": np.abs(z) > 0.5}
+    sides = {"left": mesh, "right": TriangleMesh(0.5 * mesh.vertices, mesh.faces)}
+    labels = np.where(np.abs(z) < 0.8, 4, 0)
+    labels[z < 0.4] = 3
+    found = region_metrics(
+        sides,
+        dict.fromkeys(sides, maps),
+        dict.fromkeys(sides, labels),
+        {3: "a", 4: "b"},
+    ).set_index(["hemisphere", "region", "metric"])["value"]
+    for side, factor in (("left", 1.0), ("right", 0.25)):
+        sphere_cm2 = factor * 4 * np.pi * RADIUS**2 / 100
+        assert found[side, "a", "area"] == pytest.approx(0.7 * sphere_cm2, rel=0.02)
+        assert found[side, "b", "area_share"] == pytest.approx(0.2, abs=0.01)
+        # −1 to −0.5, and 0.5 to 0.8
+        assert found[side, "a", "mean_sulcal_depth"] == pytest.approx(-0.75, abs=0.01)
+        assert found[side, "b", "mean_sulcal_depth"] == pytest.approx(0.65, abs=0.01)
 
 
 def test_regions_have_their_area_and_means() -> None:

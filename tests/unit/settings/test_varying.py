@@ -6,7 +6,7 @@ from facts import Facts
 
 from gyriflow.errors import InputError
 from gyriflow.settings.folding import parameters_from, require_maps
-from gyriflow.settings.varying import value_at, value_range
+from gyriflow.settings.varying import mean_of_curve, value_at, value_range
 
 RUN = {
     "start_week": 21.0,
@@ -44,6 +44,18 @@ def test_a_map_is_multiplied_with_the_curve():
     )
 
 
+def test_the_range_of_a_curve_has_its_ends_and_all_between():
+    curve = value({"weeks": {21: 1.0, 25: 5.0, 28: 0.5, 31: 2.0}})
+    assert value_range(curve, {}, 21.0, 31.0) == (0.5, 5.0)
+    assert value_range(curve, {}, 22.0, 24.0) == (2.0, 4.0)
+    assert value_range(curve, {}, 26.0, 30.0) == (0.5, 3.5)
+    assert value_range(curve, {}, 22.0, 27.0) == (2.0, 5.0)
+    assert mean_of_curve(curve) == pytest.approx(8.5 / 4)
+    both = value({"weeks": {21: 2.0, 31: 4.0}, "map": "thickness_mm"})
+    assert mean_of_curve(both) == 3.0
+    assert mean_of_curve(value({"map": "thickness_mm"})) == 1.0
+
+
 @pytest.mark.parametrize(
     "given",
     [
@@ -52,6 +64,7 @@ def test_a_map_is_multiplied_with_the_curve():
         {},
         {"weeks": {}},
         {"weeks": [1, 2]},
+        {"weeks": {21: 1, "21.0": 2, 31: 3}},
         {"week": {21: 1}},
         None,
         "estimated",

@@ -1,0 +1,473 @@
+"""Scripts of the workflow that only read, call and write: each takes its files by role,
+side and unit, and all of them.
+
+Sides differ in size, files in content and number, so that none stands for another.
+"""
+
+import h5py
+import nibabel as nib
+import numpy as np
+import pandas as pd
+import pytest
+from ellipsoid import RUN
+from local_server import Server, gifti, serving, sha256
+from scripts import run_script
+from shapes import (
+    FAR,
+    LONG_MM,
+    ellipsoid,
+    inner,
+    moved,
+    octasphere,
+    save_labels,
+    sphere,
+)
+
+from gyriflow.anatomy.fissure import split
+from gyriflow.geometry.poses import Pose
+from gyriflow.geometry.triangles import area, signed_volume, transformed, volume_ml
+from gyriflow.io.exports import ExportedBrain
+from gyriflow.io.files import read_json, read_table, write_json, write_table
+from gyriflow.io.registrations import (
+    WeeklyShapes,
+    read_weekly_shapes,
+    write_weekly_shapes,
+)
+from gyriflow.io.surfaces import (
+    read_surface,
+    read_vertex_maps,
+    write_surface,
+    write_vertex_labels,
+    write_vertex_maps,
+)
+from gyriflow.io.volumes import LabelSource, read_label_volume
+from gyriflow.io.yaml_files import SCHEMES, write_yaml
+from gyriflow.metrics.spangy import PART_POWERS
+from gyriflow.settings.schemes import LabelScheme
+from gyriflow.settings.terms import SIDES
+from gyriflow.shipped import SHIPPED
+from gyriflow.units import SECONDS_PER_GW
+
+NORMS = SHIPPED / "norms"
+AREA = "area_growth_percent_per_gw"
+
+
+def structure_of(path):
+    """Return the side that a GIFTI file names, of a surface or of maps."""
+    image = nib.load(path)
+    name = "AnatomicalStructurePrimary"
+    return image.meta.get(name) or image.darrays[0].meta[name]
+
+
+def write_frames(path, growth_by_week):
+    """Write a tetrahedron with a log growth per step since the week before."""
+    with h5py.File(path, "w") as file:
+        file["tets"] = [[0, 1, 2, 3]]
+        for week, growth in growth_by_week.items():
+            group = file.create_group(f"week_{week:.2f}")
+            group["positions"] = 10.0 * np.eye(4, 3)
+            group["tangential_growth_per_step"] = np.full(4, growth)
+            group["radial_growth_per_step"] = np.full(4, 2 * growth)
+            group["growth_direction_per_step"] = np.eye(4, 3)
+            group["cell_fields/J"] = np.ones(1)
+
+
+def test_growth_maps_are_of_each_interval_and_their_deviation_is_of_the_members(
+    tmp_path,
+):
+    steps = 8
+    write_yaml(tmp_path / "params.yaml", RUN | {"step_s": SECONDS_PER_GW / steps})
+    runs = {"run": (0.01, 0.03), "one": (0.02, 0.04), "two": (0.025, 0.07)}
+    for name, (first, second) in runs.items():
+        growth = {21.0: 0.0, 22.0: first, 23.5: second}
+        write_frames(tmp_path / f"{name}.h5", growth)
+        inputs = {"frames": f"{name}.h5", "params": "params.yaml"}
+        run_script("growth_maps.py", tmp_path, inputs, {0: f"{name}.shape.gii"})
+    maps = read_vertex_maps(tmp_path / "run.shape.gii")
+    for interval, growth in (("21-22", 0.01), ("22-23.5", 0.03)):
+        expected = 100 * np.expm1(2 * steps * growth)
+        assert maps[f"{AREA} {interval} GW"] == pytest.approx(expected)
+    inputs = {"run": "run.shape.gii", "members": ["one.shape.gii", "two.shape.gii"]}
+    run_script("growth_sd.py", tmp_path, inputs, {0: "sd.shape.gii"})
+    found = read_vertex_maps(tmp_path / "sd.shape.gii")[f"{AREA} 22-23.5 GW"]
+    of_members = [100 * np.expm1(2 * steps * growth) for growth in (0.04, 0.07)]
+    assert found == pytest.approx(np.std(of_members, ddof=1), rel=1e-5)
+
+
+def test_a_kept_path_is_copied_whole(tmp_path):
+    random = np.random.default_rng(5)
+    weeks = np.array([21.0, 22.0, 24.5])
+    kept = WeeklyShapes(
+        weeks,
+        random.normal(size=(3, 6, 3)),
+        {"area_cm2": np.array([90.0, 100.0, 140.0])},
+        {"own": list(random.normal(size=(3, 4, 3)))},
+        pd.DataFrame({"week": weeks}),
+        stops=(22.0,),
+        between=(24.5,),
+        tets=np.array([[0, 1, 2, 3], [2, 1, 4, 5]]),
+        made_from="a key",
+    )
+    write_weekly_shapes(tmp_path / "kept.h5", kept)
+    params = {"kept": str(tmp_path / "kept.h5")}
+    run_script("kept_path.py", tmp_path, {}, {0: "path.h5"}, params)
+    copy = read_weekly_shapes(tmp_path / "path.h5")
+    for name in ("weeks", "positions", "tets"):
+        assert getattr(copy, name) == pytest.approx(getattr(kept, name), abs=1e-6)
+    assert copy.sizes["area_cm2"].tolist() == [90.0, 100.0, 140.0]
+    assert copy.surfaces["own"][2] == pytest.approx(kept.surfaces["own"][2], abs=1e-6)
+    assert (copy.stops, copy.between, copy.made_from) == ([22.0], [24.5], "a key")
+    assert copy.ages["week"].tolist() == weeks.tolist()
+
+
+def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
+    tmp_path,
+):
+    inputs = {}
+    for number, side in enumerate(SIDES, start=1):
+        mesh = sphere(10.0 * number, 3)
+        write_surface(tmp_path / f"{side}.gii", mesh)
+        thickness = {"thickness_mm": np.full(len(mesh.vertices), 1.0 + number)}
+        write_vertex_maps(tmp_path / f"{side}.shape.gii", thickness)
+        labels = np.where(mesh.vertices[:, 2] > 0, number, 0)
+        names = {number: f"top {side}"}
+        write_vertex_labels(tmp_path / f"{side}.label.gii", labels, names)
+        inputs |= {side: f"{side}.gii", f"{side}_maps": f"{side}.shape.gii"}
+        inputs[f"{side}_regions"] = f"{side}.label.gii"
+    labels = {"labels": {"subject": "a", "run": "real", "week": 22.5}}
+    run_script("region_metrics.py", tmp_path, inputs, {0: "regions.csv"}, labels)
+    table = read_table(tmp_path / "regions.csv")
+    assert list(table)[:4] == ["subject", "run", "week", "hemisphere"]
+    assert table["week"].unique() == [22.5]
+    table = table.dropna(subset=["value"]).set_index(["hemisphere", "region", "metric"])
+    half_sphere_cm2 = 2 * np.pi
+    values = {
+        ("left", "top left"): (half_sphere_cm2, 2.0),
+        ("right", "top right"): (4 * half_sphere_cm2, 3.0),
+    }
+    for place, (area_cm2, thickness_mm) in values.items():
+        assert table["value"][*place, "area"] == pytest.approx(area_cm2, rel=0.07)
+        assert table["value"][*place, "mean_thickness"] == thickness_mm
+
+
+WEEKS = 25.0 + 0.1 * np.arange(12)
+BRAINS = [f"b{number}" for number in range(12)]
+
+
+def metrics_of(brain, week, area_cm2, run="real"):
+    """Return the areas of the sides of a brain, the left one the larger by a tenth."""
+    sides = {"whole": 1.0, "left": 11 / 21, "right": 10 / 21}
+    table = pd.DataFrame({"hemisphere": list(sides), "metric": "area", "unit": "cm2"})
+    values = area_cm2 * np.array(list(sides.values()))
+    return table.assign(subject=brain, run=run, week=week, value=values)
+
+
+def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
+    """Twelve brains, of which the first two are scans of one subject, and a run."""
+    areas = 10 * WEEKS + np.tile([1.0, -1.0], 6)
+    rows = list(map(metrics_of, BRAINS, WEEKS, areas))
+    rows.append(metrics_of("b0", WEEKS[1], 260.0, "run"))
+    rows.append(metrics_of("b0", WEEKS[0], 249.0, "run"))
+    write_table(tmp_path / "metrics.csv", pd.concat(rows))
+    region = pd.concat([metrics_of("b0", WEEKS[0], 21.0)]).assign(region="insula")
+    write_table(tmp_path / "regions.csv", region)
+    bands = pd.DataFrame({"band": range(1, 7)})
+    bands[PART_POWERS] = 1.0
+    bands = bands.assign(wavelength_max_mm=256 / 2.0 ** bands["band"], is_open=False)
+    common = {"hemisphere": "left", "proxy": "mean_curvature", "run": "real"}
+    common |= {"complete": True, "resolved": True, "week": 25.0}
+    spectra = [bands.assign(subject=brain, **common) for brain in ("b0", "b1")]
+    # all power one octave further
+    shifted = np.roll(np.eye(6)[3], 1)
+    spectra[0][PART_POWERS] = np.eye(6)[3][:, None] * np.ones(16)
+    spectra[1][PART_POWERS] = shifted[:, None] * np.ones(16)
+    write_table(tmp_path / "spectra.csv", pd.concat(spectra))
+    noise = {"metrics": {"area": {"cv": 0.01}}, "distances": {}}
+    noise["distances"]["spectral_distance_B4_to_B5"] = 0.07
+    write_yaml(tmp_path / "noise.yaml", noise)
+    for name, ml in (("first", 2.0), ("second", 3.0)):
+        write_json(tmp_path / f"{name}.json", {"volumes_of_labels_mL": {"7": ml}})
+    inputs = {name: [f"{name}.csv"] for name in ("metrics", "spectra", "regions")}
+    inputs |= {"labelled": ["first.json", "second.json"], "cohort": []}
+    inputs |= {"noise": "noise.yaml", "norms": str(NORMS / "svrtk-volumes.yaml")}
+    names = ["metrics_long", "metrics_wide", "change", "asymmetry", "norm_curves"]
+    names += ["centiles", "spectral_distance", "volumes", "published_centiles"]
+    outputs = {name: f"{name}.out.csv" for name in [*names, "metrics"]}
+    people = {brain: brain for brain in BRAINS} | {"b0": "one", "b1": "one"}
+    params = {
+        "labelled": [
+            ("b0", 25.0, SIDES, SCHEMES["dhcp-19"]),
+            ("b3", 29.0, ("left",), SCHEMES["dhcp-19"]),
+        ],
+        "scans": {"one": ["b0", "b1"]},
+        "covariates": {"b1": {"sex": "F"}},
+        "reference": BRAINS,
+        "individuals": True,
+        "subjects": people,
+        "made_with": {"edge_length_mm": 1.0},
+        "population": ["normal"],
+    }
+    outputs["norms"] = "norms.json"
+    run_script("metrics_tables.py", tmp_path, inputs, outputs, params)
+    tables = {
+        name: read_table(tmp_path / file)
+        for name, file in outputs.items()
+        if name != "norms"
+    }
+    long = tables["metrics_long"]
+    assert len(long) == 3 * 15
+    assert long["region"].dropna().unique().tolist() == ["insula"]
+    wide = tables["metrics_wide"].set_index(["subject", "run", "week"])
+    assert wide.loc[("b1", "real", 25.1), "sex"] == "F"
+    assert wide.loc[("b0", "real", 25.0), "left_insula_area_cm2"] == pytest.approx(11.0)
+    change = tables["change"].query("hemisphere == 'whole'").set_index("run")
+    assert change.loc["real", "change"] == pytest.approx(areas[1] - areas[0])
+    assert change.loc["run", "change"] == pytest.approx(11.0)
+    assert change.loc["real", "noise"] == pytest.approx(np.sqrt(2) * 0.01 * areas[0])
+    difference = tables["asymmetry"].set_index(["subject", "run", "week", "region"])
+    assert difference.loc[("b0", "real", 25.0, "insula"), "difference"] == 1.0
+    assert len(difference) == 15
+    scores = tables["centiles"].query("hemisphere == 'whole'").set_index("run")
+    # eleven people: those of the other scan, and all for a run
+    assert set(scores.loc["real", "brains"]) == {10}
+    assert set(scores.loc["run", "brains"]) == {11}
+    assert scores.loc["run", "subject"].unique().tolist() == ["b0"]
+    assert len(tables["norm_curves"]) > 0
+    distances = tables["spectral_distance"].set_index("metric")
+    found = distances.loc["spectral_distance_B4_to_B5"]
+    assert found["noise"].unique().tolist() == [0.07]
+    assert found["value"].tolist() == pytest.approx([1.0, 1.0])
+    assert tables["volumes"].iloc[:, [0, 5]].to_numpy().tolist() == [
+        ["b0", 2.0],
+        ["b3", 3.0],
+    ]
+    assert tables["published_centiles"]["subject"].tolist() == ["b0", "b3"]
+    content = read_json(tmp_path / "norms.json")
+    assert content["population"] == ["normal"]
+    # the norms of this study score the brains of another
+    inputs["cohort"] = ["norms.json"]
+    again = {"centiles": "again.csv", "norms": "copied.json"}
+    params |= {"reference": [], "population": ["other"]}
+    run_script("metrics_tables.py", tmp_path, inputs, again, params)
+    new = read_table(tmp_path / "again.csv").query("hemisphere == 'whole'")
+    assert set(new["brains"]) == {11}
+    assert read_json(tmp_path / "copied.json")["population"] == ["normal"]
+
+
+@pytest.mark.parametrize("individuals", [True, False])
+def test_tables_of_all_runs_are_joined_and_individuals_have_centiles(
+    tmp_path, individuals
+):
+    subjects = [f"s{number}" for number in range(12)]
+    weeks = 25.0 + 0.1 * np.arange(12.0)
+    for run, usual in (("a", 0.0), ("b", 50.0)):
+        columns = {"run": run, "start": subjects, "subject": subjects, "week": weeks}
+        columns |= {"hemisphere": "whole", "region": "", "metric": "distance"}
+        values = usual + np.tile([1.0, -1.0], 6)
+        deviation = pd.DataFrame(columns | {"value": values, "unit": "mm"})
+        write_table(tmp_path / f"deviation.{run}.csv", deviation)
+        validation = pd.DataFrame({"run": [run], "r": [usual]})
+        write_table(tmp_path / f"validation.{run}.csv", validation)
+    names = ("deviation", "validation")
+    inputs = {name: [f"{name}.a.csv", f"{name}.b.csv"] for name in names}
+    inputs["prediction"] = []
+    outputs = {name: f"{name}.csv" for name in (*names, "deviation_centiles")}
+    params = {"individuals": individuals}
+    run_script("validation_tables.py", tmp_path, inputs, outputs, params)
+    assert read_table(tmp_path / "validation.csv")["r"].tolist() == [0.0, 50.0]
+    deviation = read_table(tmp_path / "deviation.csv")
+    assert deviation.groupby("run")["value"].mean().tolist() == [0.0, 50.0]
+    scores = read_table(tmp_path / "deviation_centiles.csv")
+    assert scores.groupby("run")["expected"].mean().tolist() == pytest.approx(
+        [0.0, 50.0], abs=0.5
+    )
+    assert scores["centile"].notna().all() == individuals
+
+
+PIAL_MM, WHITE_MM = 20.0, 16.0
+TWO = LabelScheme(name="two", cerebrum=(1, 2), cortex=(2,))
+
+
+def write_halves(folder):
+    """Write the left and right half of a sphere, moved by 2 mm to the left, and the
+    pose that they have been brought to."""
+    for side, half in zip(SIDES, split(sphere(PIAL_MM, 4), 0.0), strict=True):
+        write_surface(folder / f"{side}.gii", moved(half, -2.0))
+    pose = Pose(FAR[0], {"left": FAR[1], "right": FAR[1], "whole": FAR[1]})
+    report = {"pose": pose.plain(), "fissure_x_mm": -2.0}
+    write_json(folder / "surface.json", report)
+
+
+def white_made(folder, inputs, sides=SIDES, **params):
+    """Run the script that makes white surfaces; return them by side and the table."""
+    params = {"labels": None, "white": {}, "curvature_radius_mm": 5.0} | params
+    params["columns"] = {"subject": "a", "run": "real", "week": 22.5}
+    params["surface"] = {"edge_length_mm": 2.0, "max_hole_mm": 3.0}
+    outputs = {"metrics": "metrics.csv"}
+    for side in sides:
+        outputs[f"{side}_surface"] = f"{side}.white.gii"
+        outputs[f"{side}_maps"] = f"{side}.shape.gii"
+    inputs = {"report": "surface.json", "given": [], **inputs}
+    run_script("white.py", folder, inputs, outputs, params)
+    found = {}
+    for side in sides:
+        for file in (f"{side}.white.gii", f"{side}.shape.gii"):
+            assert structure_of(folder / file) == f"Cortex{side.title()}"
+        found[side] = read_surface(folder / f"{side}.white.gii")
+        (depth, *_) = read_vertex_maps(folder / f"{side}.shape.gii").values()
+        assert len(depth) == len(found[side].vertices)
+    table = read_table(folder / "metrics.csv")
+    assert list(table)[:4] == ["subject", "run", "week", "hemisphere"]
+    return found, table.set_index(["hemisphere", "metric"])["value"]
+
+
+def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
+    write_halves(tmp_path)
+    size = np.array(LONG_MM)
+    axes = [np.arange(-23, 23, step) for step in size]
+    affine = np.diag([*size, 1.0])
+    affine[:3, 3] = -23.0
+    affine[0, 3] -= 2.0
+    radius = np.sqrt(sum(np.square(np.meshgrid(*axes, indexing="ij"))))
+    labels = np.where(radius < WHITE_MM, 1, np.where(radius < PIAL_MM, 2, 0))
+    path = tmp_path / "labels.nii.gz"
+    save_labels(path, labels, np.linalg.inv(FAR[0]) @ affine)
+    inputs = {side: f"{side}.gii" for side in SIDES}
+    source = LabelSource(str(path), "auto", TWO)
+    found, values = white_made(tmp_path, inputs, labels=source)
+    centre = [-2.0, 0.0, 0.0]
+    for sign, (side, mesh) in zip((-1, 1), found.items(), strict=True):
+        radii = np.linalg.norm(mesh.vertices - centre, axis=1)
+        assert radii.mean() == pytest.approx(WHITE_MM, abs=0.1)
+        assert sign * (mesh.vertices.mean(axis=0) - centre)[0] > WHITE_MM / 3
+        assert values[side, "white_area"] == pytest.approx(area(mesh) / 100)
+
+
+def test_white_surfaces_of_files_are_posed_as_files_are(tmp_path):
+    write_halves(tmp_path)
+    given = {"left": ellipsoid((8.0, 14.0, 12.0), 3), "right": sphere(7.0, 3)}
+    paths = {}
+    for side, mesh in given.items():
+        paths[side] = str(tmp_path / f"given.{side}.gii")
+        write_surface(paths[side], transformed(mesh, np.linalg.inv(FAR[1])))
+    inputs = {side: f"{side}.gii" for side in SIDES}
+    found, values = white_made(tmp_path, inputs, white=paths)
+    for side, mesh in found.items():
+        assert signed_volume(mesh) == pytest.approx(
+            signed_volume(given[side]), rel=0.03
+        )
+        assert mesh.vertices.mean(axis=0) == pytest.approx(0.0, abs=0.2)
+        assert values[side, "white_area"] == pytest.approx(area(mesh) / 100)
+    # a brain of one hemisphere
+    right = {"right": paths["right"]}
+    inputs = {"right": "right.gii", "left": None}
+    _, values = white_made(tmp_path, inputs, ["right"], white=right)
+    assert set(values.index.get_level_values(0)) == {"right", "whole"}
+
+
+@pytest.mark.parametrize(
+    ("has_white", "similar", "voxel_mm"),
+    [(True, None, 0.8), (False, {"mean_mm": 4.0, "voxel_mm": 1.5}, 1.5)],
+)
+def test_labels_are_filled_with_the_brain_s_cortex_or_that_of_a_similar_one(
+    tmp_path, has_white, similar, voxel_mm
+):
+    """Halves that are 1 mm apart are joined at their fissure, not at x = 0."""
+    whole = octasphere(PIAL_MM, 4)
+    parts = split(whole, 0.0)
+    for sign, side, half in zip((-1, 1), SIDES, parts, strict=True):
+        write_surface(tmp_path / f"{side}.gii", moved(half, -8.0 + sign * 0.01))
+    write_surface(tmp_path / "whole.gii", moved(whole, -8.0))
+    pose = Pose(FAR[0], {"whole": FAR[1]})
+    report = {"pose": pose.plain(), "fissure_x_mm": -8.0}
+    write_json(tmp_path / "surface.json", report)
+    white = {}
+    if has_white:
+        white["whole"] = str(tmp_path / "white.gii")
+        posed = moved(inner(whole, 3.0), -8.0)
+        write_surface(white["whole"], transformed(posed, np.linalg.inv(FAR[1])))
+    if similar:
+        write_json(tmp_path / "similar.json", similar)
+    inputs = {"whole": "whole.gii", "sides": ["left.gii", "right.gii"]}
+    inputs |= {"report": "surface.json", "white": [f"{name}.gii" for name in white]}
+    inputs["similar"] = "similar.json" if similar else None
+    outputs, params = {0: "filled.nii.gz"}, {"white": white}
+    run_script("filled_labels.py", tmp_path, inputs, outputs, params)
+    volume = read_label_volume(tmp_path / "filled.nii.gz")
+    assert abs(np.linalg.det(volume.affine[:3, :3])) == pytest.approx(
+        voxel_mm**3, rel=1e-4
+    )
+    depth_mm = 3.0 if has_white else 4.0
+    core = (volume.labels == 1).sum() * voxel_mm**3 / 1000
+    assert core == pytest.approx(volume_ml(sphere(PIAL_MM - depth_mm, 5)), rel=0.04)
+
+
+def test_a_shape_has_the_given_axes(tmp_path):
+    shape = {"semi_axes_mm": (10.0, 13.0, 8.0), "edge_length_mm": 1.6, "noise_mm": 0.0}
+    run_script("shape.py", tmp_path, {}, {0: "shape.gii"}, {"shape": shape})
+    found = read_surface(tmp_path / "shape.gii")
+    largest = np.abs(found.vertices).max(axis=0)
+    assert largest == pytest.approx(shape["semi_axes_mm"], abs=0.2)
+
+
+def test_an_export_has_the_tables_of_the_study_and_covariates_as_they_are(tmp_path):
+    paths = {}
+    for side in SIDES:
+        write_surface(tmp_path / f"{side}.gii", sphere(10.0, 2))
+        write_vertex_maps(
+            tmp_path / f"{side}.shape.gii", {"thickness_mm": np.ones(162)}
+        )
+        paths[side] = str(tmp_path / side)
+    write_json(tmp_path / "surface.json", {"pose": Pose().plain()})
+    files = {
+        kind: {side: path + end for side, path in paths.items()}
+        for kind, end in (("surfaces", ".gii"), ("maps", ".shape.gii"))
+    }
+    report = str(tmp_path / "surface.json")
+    brain = ExportedBrain(
+        "a", "real", 22.5, "a", **files, regions={}, report=report, covariates={}
+    )
+    brains = [brain._replace(covariates={"field": "07"})]
+    brains.append(brain._replace(brain="b", subject="b", covariates={"field": "1.50"}))
+    long = pd.DataFrame(
+        {
+            "subject": ["a", "b"],
+            "run": "real",
+            "week": 22.5,
+            "hemisphere": "whole",
+            "region": "",
+            "metric": "area",
+            "value": [90.5, 95.5],
+            "unit": "cm2",
+        }
+    )
+    write_table(tmp_path / "long.csv", long)
+    (tmp_path / "export").mkdir()
+    inputs, outputs = {"long": "long.csv"}, {0: "export/dataset_description.json"}
+    run_script("export.py", tmp_path, inputs, outputs, {"brains": brains})
+    wide = (tmp_path / "export" / "metrics_wide.tsv").read_text().splitlines()
+    assert [line.split("\t")[-2:] for line in wide] == [
+        ["field", "whole_area_cm2"],
+        ["07", "90.5"],
+        ["1.50", "95.5"],
+    ]
+    described = read_json(tmp_path / "export" / "metrics_wide.json")
+    assert described["whole_area_cm2"]["Units"] == "cm^2"
+    assert (tmp_path / "export" / "metrics_long.tsv").exists()
+    assert not (tmp_path / "export" / "metrics_wide.csv").exists()
+
+
+def test_a_file_is_fetched_only_with_its_checksum_and_room_for_it(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+    content = gifti()
+    with serving(Server({"left.gii": content})) as server:
+        params = {"url": f"{server.url}/left.gii", "size": len(content)}
+        params["sha256"] = sha256(content)
+        run_script("retrieve.py", tmp_path, {}, {0: "left.gii"}, params)
+        assert (tmp_path / "left.gii").read_bytes() == content
+        for wrong in ({"sha256": sha256(b"another")}, {"size": 10**18}):
+            with pytest.raises(SystemExit, match="5"):
+                run_script("retrieve.py", tmp_path, {}, {0: "new.gii"}, params | wrong)
+            assert not (tmp_path / "new.gii").exists()
