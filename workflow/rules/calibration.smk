@@ -8,7 +8,7 @@ CALIBRATED = study.calibration
 IS_SPECTRAL = CALIBRATED and not set(CONFIG.calibrate.score).isdisjoint(SPECTRAL_SCORES)
 # spectra of the observed brains, if they are scored
 OBSERVED_SPECTRA = [
-    f"{real.measurement.folder}/spectra.csv"
+    f"{real.folder}/spectra.csv"
     for brains in (CALIBRATED.observed.values() if IS_SPECTRAL else [])
     for real in brains
 ]
@@ -37,7 +37,7 @@ rule prepare_calibrated:
         design=lambda w: CALIBRATED.design(w.run),
         base=lambda w: PARAMETERS.format(run=CONFIG.calibrate.base, brain=w.brain),
         maps=lambda w: simulation_of(w).maps,
-        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
+        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in BRAINS[w.brain].sides],
     output:
         **START_REGIONS,
         params=PARAMETERS,

@@ -7,7 +7,11 @@ from gyriflow.grouping import grouped
 from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
+from gyriflow.study.atlases import known_checksums
+from gyriflow.study.brains import label_source, registered_source
 from gyriflow.study.paths import *
+from gyriflow.study.records import Brain
+from gyriflow.study.tables import write_rows
 from gyriflow.running.launch import (
     KEEP_GOING_VAR,
     DIRECTORY_VAR,
@@ -58,7 +62,7 @@ def validated_study():
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             check_results_belong_to(Path.cwd(), files, found, record=RUNS)
-        return study, input_contents(Path.cwd(), found, study.checksums, record=RUNS)
+        return study, input_contents(Path.cwd(), found, known_checksums(study.used_atlases), record=RUNS)
     except GyriflowError as error:
         end_with(error)
 
@@ -76,14 +80,18 @@ if workflow.is_main_process and LAUNCHED_VAR not in os.environ:
 
 study, CONTENTS = validated_study()
 CONFIG = study.config
+# the plan: rules look up in it, and people read it
+BRAINS = study.brains
+if RUNS:
+    write_rows(f"{PLAN}/brains.csv", Brain, BRAINS.values())
 # brains refused in an earlier pass of this call, with the cause; the study is finished without them
 KNOWN = {brain.id for brain in CONFIG.brains}
 REFUSED = {brain: cause for brain, cause in refused_brains().items() if brain in KNOWN}
 if REFUSED and TELLS:
     # the causes have been printed
-    rest = "finishing the study without" if study.brains else "no brain is left"
+    rest = "finishing the study without" if BRAINS else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
-if REFUSED and not study.brains:
+if REFUSED and not BRAINS:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
 if TELLS:
@@ -108,32 +116,26 @@ START_REGIONS = {"regions": REGIONS["mesh"], "data": REGIONS["data"]}
 POSED_SIDES = {**{side: PIAL[side] for side in SIDES}, "report": PIAL["report"]}
 
 
-def brain_of(wildcards):
-    """Return the brain of the wildcards."""
-    return study.brains[wildcards.brain]
-
-
 def simulation_of(wildcards):
     """Return the simulation of the wildcards."""
     return study.simulations[wildcards.run, wildcards.brain]
 
 
-def brains_with(*sides, **properties):
-    """Return a regular expression for the ids of the brains with exactly these hemispheres and properties.
+def brains_with(*sides, has_thickness=None):
+    """Return a regular expression for the ids of the brains with exactly these hemispheres, with or without thickness.
 
     Brains of one hemisphere have fewer files. They have rules of their own (`use rule … as …_left with:`), since all
     output files of a rule are made by each of its jobs.
     """
-    return one_of(
-        brain.id
-        for brain in study.brains.values()
-        if (not sides or brain.sides == sides)
-        and all(getattr(brain, name) == value for name, value in properties.items())
-    )
+    ids = []
+    for brain in BRAINS.values():
+        if brain.sides == sides and has_thickness in (None, bool(brain.thickness)):
+            ids.append(brain.id)
+    return one_of(ids)
 
 
 wildcard_constraints:
-    **dict.fromkeys(("brain", "earlier", "later"), one_of(study.brains)),
+    **dict.fromkeys(("brain", "earlier", "later"), one_of(BRAINS)),
     study=one_of(study.sweeps),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",

@@ -92,35 +92,34 @@ def files_in_grid(grid):
 
 show(
     {"quality_page": [f"{BRAIN}/figures/quality.png", f"{BRAIN}/figures/quality.pdf"]},
-    names_of(study.brains.values()),
+    names_of(BRAINS.values()),
 )
 show(
     {"brain_maps": [f"{BRAIN}/figures/shape_index.png", f"{BRAIN}/figures/shape_index.pdf"]},
-    names_of(study.brains.values()),
+    names_of(BRAINS.values()),
 )
 show(
     {"small_pictures": [f"{BRAIN}/figures/small.png", f"{BRAIN}/figures/small.pdf"]},
-    names_of(study.brains.values()),
+    names_of(BRAINS.values()),
 )
 
-WITH_REGIONS = [brain for brain in study.brains.values() if brain.has_regions]
+WITH_REGIONS = [brain for brain in BRAINS.values() if brain.regions]
 
 
 def brain_regions_grid(brain):
-    row = brain.measurement
-    return [placed("", brain.id, row.hemispheres, row.regions.values())]
+    return [placed("", brain.id, brain.hemispheres, brain.regions)]
 
 
 rule brain_regions:
     input:
-        grid=lambda w: files_in_grid(brain_regions_grid(brain_of(w))),
+        grid=lambda w: files_in_grid(brain_regions_grid(BRAINS[w.brain])),
     output:
         brain_regions=multiext(f"{BRAIN}/figures/regions", ".png", ".pdf"),
     wildcard_constraints:
         brain=one_of(brain.id for brain in WITH_REGIONS),
     params:
         **drawn_by("pictures"),
-        grid=lambda w: brain_regions_grid(brain_of(w)),
+        grid=lambda w: brain_regions_grid(BRAINS[w.brain]),
     script:
         "../scripts/figures.py"
 
@@ -129,7 +128,7 @@ show(rules.brain_regions.output, names_of(WITH_REGIONS))
 
 
 def first_and_last_grid():
-    by_week = sorted(study.brains.values(), key=lambda brain: brain.week)
+    by_week = sorted(BRAINS.values(), key=lambda brain: brain.week)
     # of several brains of the last week, the first
     last = next(brain for brain in by_week if brain.week == by_week[-1].week)
     return [placed("", f"{brain.id}\n{brain.week:g} GW", [brain.pial]) for brain in (by_week[0], last)]
@@ -162,7 +161,7 @@ if study.run_simulations:
             **drawn_by("tables"),
             starts=[start.id for start in study.starts],
             gates=CONFIG.mesh.gates,
-            observed_name=observed_name(study.brains.values()),
+            observed_name=observed_name(BRAINS.values()),
         script:
             "../scripts/figures.py"
 
@@ -233,11 +232,11 @@ show(rules.atlas_ages.output, names_of(CARRIED))
 
 def predicted_grid(simulation):
     start = simulation.start
-    predicted = simulation.measurements[-1]
+    predicted = simulation.simulated[-1]
     atlas_brain = study.atlas_brain(simulation)
     return [
         placed("", f"start\n{start.week:g} GW", [start.pial]),
-        placed("", f"predicted\n{predicted.week:g} GW", [predicted.parts["whole"]], simulated=True),
+        placed("", f"predicted\n{predicted.week:g} GW", [predicted.pial], simulated=True),
         placed("", f"atlas' own brain\n{atlas_brain.week:g} GW", [atlas_brain.pial]),
     ]
 
@@ -343,7 +342,7 @@ show(rules.growth_sd_figure.output, names_of(ENSEMBLES_WITH_GROWTH))
 def ensemble_grid(simulation):
     grid = []
     # without the start brain, which all members share
-    for row in simulation.measurements[1:]:
+    for row in simulation.simulated[1:]:
         maps = [simulation.file(ENSEMBLE_MAPS, week=row.week, side=side) for side in row.sides]
         grid.append(placed(simulation.run, row.week, row.hemispheres, maps, simulated=True))
     return grid
@@ -471,11 +470,11 @@ def shape_grid(brain):
     simulations, observed = runs_from(brain)
     grid = []
     for simulation in simulations:
-        for row in simulation.measurements:
+        for row in simulation.simulated:
             grid.append(placed(simulation.run, row.week, row.hemispheres, row.maps, simulated=True))
     name = observed_name(observed.values())
     for week, brain in observed.items():
-        grid.append(placed(name, week, brain.measurement.hemispheres, brain.measurement.maps))
+        grid.append(placed(name, week, brain.hemispheres, brain.maps))
     return grid
 
 
@@ -498,12 +497,10 @@ show(rules.shape_maps.output, names_of(study.starts))
 # the names and colours of brains in charts over the weeks
 CHARTED = {
     "runs": run_names(study.pairs),
-    "subjects": {
-        brain.id: brain.subject for brain in study.brains.values() if brain.config.subject is not None
-    },
-    "groups": study.colour_groups,
+    "subjects": {brain.id: brain.subject for brain in BRAINS.values() if brain.subject is not None},
+    "groups": {brain.id: brain.group for brain in BRAINS.values() if brain.group},
 }
-UNGROUPED = [brain for brain in study.brains.values() if brain.id not in study.colour_groups]
+UNGROUPED = [brain for brain in BRAINS.values() if brain.group is None]
 
 
 rule metrics_charts:
@@ -516,14 +513,14 @@ rule metrics_charts:
     params:
         **drawn_by("weeks"),
         **CHARTED,
-        observed_name=observed_name(UNGROUPED or study.brains.values()),
+        observed_name=observed_name(UNGROUPED or BRAINS.values()),
     script:
         "../scripts/figures.py"
 
 
 show(rules.metrics_charts.output)
 
-NORM_BRAINS = [study.brains[brain] for brain in study.norm_reference]
+NORM_BRAINS = [BRAINS[brain] for brain in study.norm_reference]
 
 if study.has_norm:
 
@@ -539,7 +536,7 @@ if study.has_norm:
             norm_name=observed_name(NORM_BRAINS),
             # norms of another study have no brains here
             reference=[] if CONFIG.metrics.norms else study.norm_reference,
-            brains=[brain.id for brain in study.brains.values() if brain.sides == NORM_BRAINS[0].sides],
+            brains=[brain.id for brain in BRAINS.values() if brain.sides == NORM_BRAINS[0].sides],
         script:
             "../scripts/figures.py"
 
@@ -569,9 +566,9 @@ def regions_grid():
         grid += brain_regions_grid(brain)
     for simulation, name in zip(study.run_simulations, run_names(study.pairs)):
         if simulation.has_regions:
-            last = simulation.measurements[-1]
+            last = simulation.simulated[-1]
             column = f"{name}, {last.week:g} GW"
-            grid.append(placed("", column, last.hemispheres, last.regions.values(), simulated=True))
+            grid.append(placed("", column, last.hemispheres, last.regions, simulated=True))
     return grid
 
 
@@ -688,7 +685,7 @@ show(rules.expected_figure.output, names_of(study.atlas_predictions))
 DEVIATIONS = []
 for simulation in study.atlas_predictions:
     DEVIATIONS.append(simulation.names | {"quantity": "log_area"})
-    if simulation.start.has_thickness:
+    if simulation.start.thickness:
         DEVIATIONS.append(simulation.names | {"quantity": "thickness_difference_mm"})
 
 
@@ -734,8 +731,7 @@ def influence_grid(sweep):
         files = (row.hemispheres, row.maps) if has_files else ([], [])
         grid.append(placed("", run, *files, simulated=True))
     for brain in sweep.first_observed:
-        row = brain.measurement
-        grid.append(placed("", observed_name([brain]), row.hemispheres, row.maps))
+        grid.append(placed("", observed_name([brain]), brain.hemispheres, brain.maps))
     return grid
 
 
@@ -760,7 +756,7 @@ def member_spectra(wildcards):
     sweep = study.sweeps[wildcards.study]
     members, _ = first_members(sweep)
     return [
-        simulation.at(sweep.week).spectra
+        f"{simulation.at(sweep.week).folder}/spectra.csv"
         for run, simulation in members.items()
         if reaches(run, sweep.first_start.id, sweep.week)
     ]
@@ -769,7 +765,7 @@ def member_spectra(wildcards):
 rule influence_spectra:
     input:
         members=member_spectra,
-        observed=lambda w: [brain.measurement.spectra for brain in study.sweeps[w.study].first_observed],
+        observed=lambda w: [f"{brain.folder}/spectra.csv" for brain in study.sweeps[w.study].first_observed],
     output:
         influence_spectra=multiext(f"{SWEEP}/figures/spectra", ".png", ".pdf"),
     params:

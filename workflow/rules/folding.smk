@@ -34,7 +34,7 @@ rule prepare:
         curves=lambda w: simulation_of(w).curves,
         targets=lambda w: simulation_of(w).targets,
         # the simulated brain has the hemispheres of its start brain
-        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
+        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in BRAINS[w.brain].sides],
     output:
         **START_REGIONS,
         params=PARAMETERS,
@@ -47,7 +47,7 @@ rule prepare:
         weeks=lambda w: simulation_of(w).weeks,
         series=lambda w: simulation_of(w).followed_series,
         # volumes of maps are read like label volumes
-        affine_from=lambda w: brain_of(w).config.affine_from,
+        affine_from=lambda w: BRAINS[w.brain].affine_from,
         maps=map_sources,
     script:
         "../scripts/prepare.py"

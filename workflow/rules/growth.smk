@@ -1,7 +1,7 @@
 # Growth rates of the cortex, from the areas of the brains' pial surfaces over the weeks.
 FOLLOWS_THICKNESS = any(run.growth.thickness_mm == "measured" for run in CONFIG.runs.values())
 # brains whose cortical thickness gives a curve that a run follows
-WITH_THICKNESS = [brain.id for _, brain in study.growth_brains if FOLLOWS_THICKNESS and brain.has_thickness]
+WITH_THICKNESS = [brain.id for _, brain in study.growth_brains if FOLLOWS_THICKNESS and brain.thickness]
 
 
 rule growth_rates:

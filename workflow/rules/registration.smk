@@ -12,37 +12,37 @@ if TELLS:
             )
 
 
-def similar_thickness(brain):
-    """Return the summary of the thickness of a similar brain; empty if there is none."""
-    similar = study.similar_in_thickness(brain)
-    return THICKNESS["summary"].format(brain=similar.id) if similar else []
+def similar_thickness(wildcards):
+    """Return the summary of the thickness that fills a brain; empty if there is none."""
+    source = BRAINS[wildcards.brain].thickness_of
+    return THICKNESS["summary"].format(brain=source) if source else []
 
 
 # labels for the registration of brains that are given as surfaces
 rule filled_labels:
     input:
         whole=PIAL["whole"],
-        sides=lambda w: brain_of(w).measurement.hemispheres,
+        sides=lambda w: BRAINS[w.brain].hemispheres,
         report=PIAL["report"],
-        white=lambda w: list(brain_of(w).config.white_files.values()),
-        similar=lambda w: similar_thickness(brain_of(w)),
+        white=lambda w: list(BRAINS[w.brain].white_files.values()),
+        similar=similar_thickness,
     output:
         FILLED_LABELS,
     params:
-        white=lambda w: brain_of(w).config.white_files,
+        white=lambda w: BRAINS[w.brain].white_files,
     script:
         "../scripts/filled_labels.py"
 
 
 def pair_of(wildcards):
     """Return the two brains of the wildcards."""
-    return study.brains[wildcards.earlier], study.brains[wildcards.later]
+    return BRAINS[wildcards.earlier], BRAINS[wildcards.later]
 
 
 rule register:
     input:
-        brains=lambda w: [brain.registered.path for brain in pair_of(w)],
-        images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
+        brains=lambda w: [registered_source(CONFIG, brain).path for brain in pair_of(w)],
+        images=lambda w: [brain.image for brain in pair_of(w) if brain.image],
     output:
         REGISTERED,
     wildcard_constraints:
@@ -50,8 +50,8 @@ rule register:
         seed=r"\d+",
     priority: 1
     params:
-        brains=lambda w: [brain.registered for brain in pair_of(w)],
-        images=lambda w: [brain.config.image for brain in pair_of(w)],
+        brains=lambda w: [registered_source(CONFIG, brain) for brain in pair_of(w)],
+        images=lambda w: [brain.image for brain in pair_of(w)],
         smoothing=lambda w: float(dict(w).get("smoothing", 1)),
         seed=lambda w: int(dict(w).get("seed", 0)),
         is_varied=lambda w: "seed" in dict(w),
@@ -68,12 +68,12 @@ use rule register as register_varied with:
 # the original surfaces with all their vertices, in the pose of the mesh
 rule match_surfaces:
     input:
-        lambda w: [path for brain in pair_of(w) for path in brain.config.files],
+        lambda w: [path for brain in pair_of(w) for path in brain.files],
         reports=lambda w: [brain.report for brain in pair_of(w)],
     output:
         MATCHED,
     params:
-        files=lambda w: [brain.config.files for brain in pair_of(w)],
+        files=lambda w: [brain.files for brain in pair_of(w)],
     script:
         "../scripts/match_surfaces.py"
 
@@ -108,7 +108,7 @@ rule targets:
         origin=origins("self"),
     priority: 1
     resources:
-        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
+        mem_mb=lambda w: targets_memory_mib(BRAINS[w.brain], CONFIG.mesh),
     params:
         weeks=lambda w: chain_of(w).weeks,
         posed=lambda w: chain_of(w).posed,
@@ -149,7 +149,7 @@ use rule targets as atlas_path with:
     wildcard_constraints:
         brain=one_of(brain for brain, kept in KEPT_PATHS.items() if kept is None),
     resources:
-        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.growth.path_mesh),
+        mem_mb=lambda w: targets_memory_mib(BRAINS[w.brain], CONFIG.growth.path_mesh),
     params:
         weeks=lambda w: path_of(w).weeks,
         posed=lambda w: path_of(w).posed,
@@ -191,9 +191,9 @@ rule predicted_targets:
         origin=origins("atlas"),
     priority: 1
     resources:
-        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
+        mem_mb=lambda w: targets_memory_mib(BRAINS[w.brain], CONFIG.mesh),
     params:
-        start_week=lambda w: brain_of(w).week,
+        start_week=lambda w: BRAINS[w.brain].week,
         end_week=lambda w: max(run.settings.end_week for run in followers_of(w)),
         atlas_week=lambda w: atlas_of(w).week,
         further_weeks=lambda w: chain_of(w).further_weeks,

@@ -9,7 +9,7 @@ def files_of_member(wildcards):
     if not reaches(wildcards.run, wildcards.brain, compared.week):
         return {}
     simulated, real = simulation_of(wildcards).at(compared.week), compared.observed[wildcards.brain]
-    rows = [simulated, *(brain.measurement for brain in real)]
+    rows = [simulated, *real]
     tables = ("metrics", "spectra", "coefficients")
     return {
         **{name: [f"{row.folder}/{name}.csv" for row in rows] for name in tables},
@@ -34,9 +34,9 @@ rule compare_member:
         table=COMPARED_MEMBER,
         coefficients=MEMBER_COEFFICIENTS,
     params:
-        real=lambda w: {real.id: real.population for real in study.sweeps[w.study].observed[w.brain]},
-        population=lambda w: brain_of(w).population,
-        parts=lambda w: ["whole", *brain_of(w).sides],
+        real=lambda w: {real.id: real.population_name for real in study.sweeps[w.study].observed[w.brain]},
+        population=lambda w: BRAINS[w.brain].population_name,
+        parts=lambda w: ["whole", *BRAINS[w.brain].sides],
     script:
         "../scripts/compare_member.py"
 

@@ -22,7 +22,7 @@ def compared_files(wildcards):
     }
     return {
         **prepared,
-        "simulated": [run.at(week).parts["whole"] for week in run.observed],
+        "simulated": [run.at(week).pial for week in run.observed],
         "whole": [real.pial for real in run.observed.values()],
     }
 
@@ -30,7 +30,7 @@ def compared_files(wildcards):
 # of both rules that compare a run
 COMPARED = {
     "run": lambda w: w.run,
-    "start_week": lambda w: brain_of(w).week,
+    "start_week": lambda w: BRAINS[w.brain].week,
     "weeks": lambda w: list(simulation_of(w).observed),
     "observed": lambda w: [brain.id for brain in simulation_of(w).observed.values()],
     "kind": lambda w: simulation_of(w).kind,
@@ -72,7 +72,7 @@ rule prediction:
 rule atlas_brain:
     input:
         **START_MESH,
-        predicted=lambda w: simulation_of(w).at(float(w.week)).parts["whole"],
+        predicted=lambda w: simulation_of(w).at(float(w.week)).pial,
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         ATLAS_BRAIN,
@@ -86,7 +86,7 @@ def deviating(wildcards):
     """Return the start brain, its run at the first week and at another week, and the observed brain of that week."""
     simulation, week = simulation_of(wildcards), float(wildcards.week)
     simulated = {"first": simulation.at(simulation.start.week), "expected": simulation.at(week)}
-    return {"start": simulation.start.measurement, **simulated, "real": simulation.observed[week].measurement}
+    return {"start": simulation.start, **simulated, "real": simulation.observed[week]}
 
 
 def deviation_labels(wildcards):
@@ -94,12 +94,12 @@ def deviation_labels(wildcards):
     week = float(wildcards.week)
     real = simulation_of(wildcards).observed[week]
     names = {"run": wildcards.run, "start": wildcards.brain, "week": week}
-    return names | {"real": real.id, "subject": real.subject}
+    return names | {"real": real.id, "subject": real.subject_name}
 
 
 rule deviation:
     input:
-        unpack(lambda w: {name: row.parts["whole"] for name, row in deviating(w).items()}),
+        unpack(lambda w: {name: row.pial for name, row in deviating(w).items()}),
         # in the order of the surfaces; only if all of them have one
         thickness=lambda w: (
             [row.thickness for row in deviating(w).values()]
@@ -107,11 +107,11 @@ rule deviation:
             else []
         ),
         sides=lambda w: deviating(w)["expected"].hemispheres,
-        regions=lambda w: list(deviating(w)["expected"].regions.values()),
+        regions=lambda w: deviating(w)["expected"].regions,
     output:
         **DEVIATION,
     params:
-        sides=lambda w: brain_of(w).sides,
+        sides=lambda w: BRAINS[w.brain].sides,
         labels=deviation_labels,
     script:
         "../scripts/deviation.py"

@@ -55,8 +55,9 @@ from ..settings.terms import (
 )
 from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
+from ..study.brains import label_scheme
 from ..study.loading import load
-from ..study.resolve import label_scheme, resolve
+from ..study.resolve import resolve
 from ..study.study import Study
 from ..version import version
 from .init import commented_scans
@@ -331,7 +332,7 @@ def export_problems(study: Study) -> Iterator[str]:
     subjects and runs."""
     try:
         require_bids_names(
-            [brain.subject for brain in study.brains.values()], study.config.runs
+            [brain.subject_name for brain in study.brains.values()], study.config.runs
         )
     except InputError as error:
         yield str(error)
@@ -390,7 +391,7 @@ def _check_files(
     require_checksums({path: checksums[path] for path in files})
     volume = brain.label_volume
     if volume is not None and Path(volume).is_file():
-        yield from _check_labels(volume, brain, label_scheme(config, brain))
+        yield from _check_labels(volume, brain, label_scheme(config, brain.scheme))
     # takes half a second, which other commands need not wait for
     from .inputs import check_brain_files
 

@@ -42,7 +42,7 @@ from ..io.surfaces import (
 )
 from ..io.volumes import read_header, read_label_volume, read_volume_map
 from ..settings.brains import BrainConfig, GivenRegions
-from ..settings.terms import SIDES
+from ..settings.terms import SIDES, AffineSource
 from ..settings.varying import files_of, mean_of_curve
 from ..study.study import Study
 from .recognition import NATIVE_SPACES, SPACE_NAME
@@ -235,11 +235,12 @@ def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], No
     function that checks them."""
     regions = study.config.metrics.regions
     for name, given in ({} if isinstance(regions, str) else regions).items():
-        brain = study.brains[name].config if name in study.brains else None
+        brain = study.brains.get(name)
+        affine_from = brain.affine_from if brain else "auto"
         yield (
             f"regions of {name}",
             [*given.files.values()],
-            partial(_check_regions, given, brain),
+            partial(_check_regions, given, affine_from),
         )
     for simulation in study.run_simulations:
         for name, value in simulation.mapped.items():
@@ -251,9 +252,9 @@ def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], No
             )
 
 
-def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:
+def _check_regions(regions: GivenRegions, affine_from: AffineSource) -> None:
     if regions.volume is not None:
-        read_label_volume(regions.volume, brain.affine_from if brain else "auto")
+        read_label_volume(regions.volume, affine_from)
     for side in SIDES:
         if (given := getattr(regions, side)) is not None:
             labels = read_vertex_labels(given.labels, side)[0]

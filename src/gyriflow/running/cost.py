@@ -174,7 +174,7 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
     volume_stage = next(
         (stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None
     )
-    if volume_stage and brain.config.has_labels:
+    if volume_stage and brain.labels is not None:
         opening = (
             1.0
             if study.config.surface.open_sulci
@@ -197,7 +197,7 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
         vertices = share * surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
         has_slits = (
             brain.labels is not None
-            and brain.labels.scheme.cortex
+            and brain.thickness is not None
             and study.config.surface.open_sulci
         )
         if has_slits and not is_simulated:

@@ -9,7 +9,9 @@ from typing import Any
 from ..code_hash import code_hash
 from ..errors import InputError
 from ..io.registrations import read_path_key, read_weekly_shapes, stored_name
+from ..settings.root import Config
 from ..shipped import SHIPPED
+from ..study.brains import label_source
 from ..study.paths import ATLAS_PATH
 from ..study.records import Brain
 from ..study.series import Chain
@@ -30,7 +32,7 @@ def path_origin(study: Study, path: Chain) -> dict[str, Any]:
     """
     brains = [*path.brains, *_thickness_sources(study, path)]
     return {
-        "brains": [_description(brain) for brain in brains],
+        "brains": [_description(study.config, brain) for brain in brains],
         # by matched vertices or by registration
         "correspondences": path.correspondences,
         "surface": study.config.surface.model_dump(mode="json"),
@@ -45,17 +47,19 @@ def _thickness_sources(study: Study, path: Chain) -> list[Brain]:
     sources: dict[str, Brain] = {}
     for pair, posed in path.pairs:
         for brain, is_filled in zip(pair, posed, strict=True):
-            source = study.similar_in_thickness(brain) if is_filled else None
-            if source is not None:
-                sources[source.id] = source
+            if is_filled and brain.thickness_of is not None:
+                sources[brain.thickness_of] = study.brains[brain.thickness_of]
     return list(sources.values())
 
 
-def _description(brain: Brain) -> dict[str, Any]:
+def _description(config: Config, brain: Brain) -> dict[str, Any]:
     """Return everything that a study says of a brain, with the meaning of its
     labels."""
-    scheme = brain.labels.scheme.model_dump(mode="json") if brain.labels else None
-    return {"brain": brain.config.model_dump(mode="json"), "scheme": scheme}
+    labels = label_source(config, brain)
+    return {
+        "brain": config.brain(brain.id).model_dump(mode="json"),
+        "scheme": labels.scheme.model_dump(mode="json") if labels else None,
+    }
 
 
 def _code() -> str:
@@ -78,7 +82,7 @@ def _code() -> str:
 def store_folder(study: Study, path: Chain) -> Path | None:
     """Return the folder for a path of an atlas, next to the files of the atlas; None
     for other brains."""
-    if not all(brain.id in study.atlases for brain in path.brains):
+    if not all(brain.atlas for brain in path.brains):
         return None
     atlas = study.atlases[path.brains[0].id]
     return (

@@ -1,106 +1,95 @@
 """Records of a study: brains, simulations and sweeps as the configuration defines them,
-with their files."""
+with their files.
+
+Brains are rows of the plan's table `brains.csv`; `docs/outputs.md` describes the
+columns.
+"""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
-from ..io.volumes import LabelSource
-from ..settings.brains import BrainConfig
+from ..settings.brains import ShapeSettings
 from ..settings.folding import VARYING
 from ..settings.growth import Origin
 from ..settings.runs import Run, members_of
-from ..settings.schemes import FILLED
-from ..settings.terms import MEASURED, OBSERVED_BRAIN, Side
+from ..settings.terms import (
+    OBSERVED_BRAIN,
+    AffineSource,
+    Coordinates,
+    Side,
+)
 from ..settings.varying import Varying
 from . import paths
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """The files of one measured brain, observed or simulated.
+@dataclass(frozen=True, kw_only=True)
+class MeasuredBrain:
+    """A brain that is measured, observed or simulated.
 
-    `where` is the folder of its metrics under `results`, `surfaces` that of its
-    surfaces. `subject` is the brain's id, for a simulated brain that of the start;
-    `run` is "real" for observed brains. Files of thickness, report (volumes of tissues)
-    and regions (by side) are empty if they are not made.
+    `id` is the brain's, of a simulated one that of the start; `run` is "real" for
+    observed brains. `pial` is the surface of the whole brain, `hemispheres` those of
+    its `sides`; `maps` and `regions` lie at their vertices. `folder` has its tables.
     """
 
-    where: str
-    subject: str
+    id: str
     run: str
     week: float
     sides: tuple[Side, ...]
-    surfaces: str
-    thickness: str | list[str]
-    report: str | list[str]
-    regions: Mapping[str, str]
+    pial: str
+    hemispheres: tuple[str, ...]
+    thickness: str | None
+    folder: str
+    maps: tuple[str, ...]
+    regions: tuple[str, ...]
 
     @property
-    def folder(self) -> str:
-        return f"results/{self.where}"
-
-    @property
-    def spectra(self) -> str:
-        return f"{self.folder}/spectra.csv"
-
-    @property
-    def labels(self) -> dict[str, Any]:
+    def columns(self) -> dict[str, Any]:
         """The first columns of its tables, with values."""
-        return {"subject": self.subject, "run": self.run, "week": self.week}
+        return {"subject": self.id, "run": self.run, "week": self.week}
 
     @property
     def parts(self) -> dict[str, str]:
-        """The files of its surfaces: whole, left, right."""
-        return paths.surfaces_in(self.surfaces, self.sides)
+        """Its surfaces: whole, left, right."""
+        sides = zip(self.sides, self.hemispheres, strict=True)
+        return {"whole": self.pial, **dict(sides)}
 
     @property
-    def hemispheres(self) -> list[str]:
-        return [self.parts[side] for side in self.sides]
-
-    @property
-    def maps(self) -> list[str]:
-        """The files with the vertex maps of its hemispheres."""
-        return [f"{self.folder}/{side}.shape.gii" for side in self.sides]
-
-    @property
-    def halves(self) -> list[list[str]]:
-        """Its hemispheres, each with its maps."""
-        return _pairs(self.hemispheres, self.maps)
-
-    @property
-    def halves_with_regions(self) -> list[list[str]]:
-        """Its hemispheres, each with its regions."""
-        return _pairs(self.hemispheres, self.regions.values())
+    def place(self) -> str:
+        """The wildcard `where` of its folder."""
+        return self.folder.removeprefix("results/")
 
 
-def _pairs(surfaces: Iterable[str], files: Iterable[str]) -> list[list[str]]:
-    pairs = zip(surfaces, files, strict=True)
-    return [list(pair) for pair in pairs]
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Brain(MeasuredBrain):
+    """An observed brain, or a shape in place of one: a row of `brains.csv`.
 
-
-@dataclass(frozen=True, eq=False)
-class Brain:
-    """A brain of the study; `config` is its entry in the configuration.
-
-    `labels` is None if it is defined by surfaces. `has_thickness`, `has_white`: there
-    are results for its cortical thickness and its white surfaces, from labels or from
-    white surfaces of the configuration. `regions_from` is the source of its regions:
-    given for this brain, carried from another brain, or None without regions.
+    `files` are given, `white_files` by part of the brain; `white` and
+    `white_maps` are results. `regions_of` is the brain whose regions
+    it has, `thickness_of` that whose thickness fills its surface to labels.
     `checksums` has atlas and SHA-256 of its files that belong to an atlas, by path.
     """
 
-    config: BrainConfig
-    labels: LabelSource | None
-    has_thickness: bool
-    has_white: bool
-    regions_from: Literal["given", "carried"] | None
+    subject: str | None
+    population: str | None
+    source: str
+    files: tuple[str, ...]
+    labels: str | None
+    scheme: str | None
+    affine_from: AffineSource
+    image: str | None
+    white_files: Mapping[str, str]
+    coordinates: Coordinates
+    shape: ShapeSettings | None
+    report: str
+    white: tuple[str, ...]
+    white_maps: tuple[str, ...]
+    thickness_of: str | None
+    regions_of: str | None
+    group: str | None
+    atlas: str | None
     checksums: Mapping[str, tuple[str, str]]
-
-    @property
-    def id(self) -> str:
-        return self.config.id
+    covariates: Mapping[str, str]
 
     @property
     def names(self) -> dict[str, str]:
@@ -108,90 +97,31 @@ class Brain:
         return {"brain": self.id}
 
     @property
-    def week(self) -> float:
-        return self.config.week
+    def subject_name(self) -> str:
+        """Its subject in tables; its own id if none is named."""
+        return self.subject or self.id
 
     @property
-    def sides(self) -> tuple[Side, ...]:
-        return self.config.sides
-
-    @property
-    def source(self) -> str:
-        return self.config.source
-
-    @property
-    def subject(self) -> str:
-        """The subject that was scanned; the brain's own id if none is named."""
-        return self.config.subject or self.id
-
-    @property
-    def population(self) -> str:
+    def population_name(self) -> str:
         """Its population in tables; "synthetic" or "unknown" if none is named."""
-        if self.config.population is not None:
-            return self.config.population
-        return "synthetic" if self.config.synthetic else "unknown"
+        default = "unknown" if self.shape is None else "synthetic"
+        return self.population or default
 
-    def comparable(self, brains: Iterable["Brain"]) -> list["Brain"]:
-        """Return the brains with the same hemispheres, population and subject.
 
-        A brain without a population or subject, as of an atlas, may be compared with
-        any.
-        """
-        population = self.config.population
-        subject = self.config.subject
-        comparable = []
-        for brain in brains:
-            is_of_population = population in (None, brain.config.population)
-            is_of_subject = subject is None or brain.config.subject in (None, subject)
-            if brain.sides == self.sides and is_of_population and is_of_subject:
-                comparable.append(brain)
-        return comparable
-
-    @property
-    def registered(self) -> LabelSource:
-        """The volume for its registration: its labels, or those that its surfaces are
-        filled with."""
-        if self.labels is not None:
-            return self.labels
-        filled = paths.FILLED_LABELS.format(brain=self.id)
-        return LabelSource(filled, "auto", FILLED)
-
-    @property
-    def pial(self) -> str:
-        return paths.PIAL["whole"].format(brain=self.id)
-
-    @property
-    def report(self) -> str:
-        """The report of its surface, which contains its pose."""
-        return paths.PIAL["report"].format(brain=self.id)
-
-    @property
-    def has_regions(self) -> bool:
-        """Whether its metrics are also measured by region."""
-        return self.regions_from is not None
-
-    @property
-    def regions(self) -> Mapping[str, str]:
-        if not self.has_regions:
-            return {}
-        return paths.region_files(f"results/brains/{self.id}/metrics")
-
-    @cached_property
-    def measurement(self) -> Measurement:
-        thickness: str | list[str] = []
-        if self.has_thickness:
-            thickness = paths.THICKNESS["measured"].format(brain=self.id)
-        return Measurement(
-            where=f"brains/{self.id}/metrics",
-            subject=self.id,
-            run=MEASURED,
-            week=self.week,
-            sides=self.sides,
-            surfaces=f"results/brains/{self.id}/surface",
-            thickness=thickness,
-            report=self.report,
-            regions=self.regions,
-        )
+def measured_files(
+    sides: tuple[Side, ...], surfaces: str, folder: str, regions: str | None
+) -> dict[str, Any]:
+    """Return the files of a brain that is measured: in the folder of its surfaces, that
+    of its tables and maps, and that of its regions if it has any."""
+    pial, *hemispheres = paths.surfaces_in(surfaces, sides).values()
+    return {
+        "sides": sides,
+        "pial": pial,
+        "hemispheres": tuple(hemispheres),
+        "folder": folder,
+        "maps": tuple(f"{folder}/{side}.shape.gii" for side in sides),
+        "regions": tuple(paths.region_files(regions).values()) if regions else (),
+    }
 
 
 def observed_name(brains: Iterable[Brain]) -> str:
@@ -204,10 +134,10 @@ def observed_name(brains: Iterable[Brain]) -> str:
     weeks: dict[str, list[float]] = {}
     shapes = set()
     for brain in brains:
-        if brain.config.shape is not None:
-            shapes.add(brain.config.shape.kind)
+        if brain.shape is not None:
+            shapes.add(brain.shape.kind)
         else:
-            name = brain.config.population or OBSERVED_BRAIN
+            name = brain.population or OBSERVED_BRAIN
             weeks.setdefault(name, []).append(brain.week)
     names = list(weeks)
     if len(names) > 1:
@@ -358,33 +288,33 @@ class Simulation:
                 settings[name]["map"] = name
         return settings
 
-    def at(self, week: float) -> Measurement:
-        """Return the measurement of the simulated brain at a week."""
-        metrics = f"runs/{self.run}/{self.start.id}/metrics"
+    def at(self, week: float) -> MeasuredBrain:
+        """Return the simulated brain at a week."""
         week_folder = paths.file_of(paths.WEEK, week=week)
-        surfaces = f"{self.file(paths.RUN)}/surfaces/{week_folder}"
+        run_folder = self.file(paths.RUN)
+        surfaces = f"{run_folder}/surfaces/{week_folder}"
         # the regions of a run are the same at all its weeks
-        regions = paths.region_files(f"results/{metrics}") if self.has_regions else {}
-        return Measurement(
-            where=f"{metrics}/{week_folder}",
-            subject=self.start.id,
+        return MeasuredBrain(
+            id=self.start.id,
             run=self.run,
             week=week,
-            sides=self.start.sides,
-            surfaces=surfaces,
             thickness=f"{surfaces}/thickness.shape.gii",
-            report=[],
-            regions=regions,
+            **measured_files(
+                self.start.sides,
+                surfaces,
+                f"{run_folder}/metrics/{week_folder}",
+                f"{run_folder}/metrics" if self.has_regions else None,
+            ),
         )
 
     @property
-    def measurements(self) -> list[Measurement]:
+    def simulated(self) -> list[MeasuredBrain]:
         return [self.at(week) for week in self.weeks]
 
     @property
     def surfaces(self) -> dict[float, str]:
         """The surfaces of the simulated brains by week."""
-        return {row.week: row.parts["whole"] for row in self.measurements}
+        return {row.week: row.pial for row in self.simulated}
 
 
 @dataclass(frozen=True)

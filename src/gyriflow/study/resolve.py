@@ -3,12 +3,9 @@ sweep."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 from ..errors import InputError
-from ..io.volumes import LabelSource
-from ..io.yaml_files import SCHEMES
-from ..settings.brains import BrainConfig
 from ..settings.folding import output_weeks
 from ..settings.growth import BEFORE_GW
 from ..settings.root import Config
@@ -20,9 +17,8 @@ from ..settings.runs import (
     starts_of,
     variants,
 )
-from ..settings.schemes import LabelScheme
-from ..settings.terms import SIDES
-from .atlases import known_checksums, used_atlases
+from .atlases import used_atlases
+from .brains import comparable, plan_brains
 from .records import Brain, CalibrationRuns, Simulation, Sweep
 from .series import (
     Chain,
@@ -66,11 +62,7 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     """
     # their descriptions and folders are read once
     atlases = used_atlases(config)
-    checksums = known_checksums(atlases)
-    brains = {}
-    for settings in config.brains:
-        if settings.id not in refused:
-            brains[settings.id] = _brain(settings, config, refused, checksums)
+    brains = plan_brains(config, refused, atlases)
     accepted = list(brains.values())
     series = series_of(config, brains, atlases)
     swept = _variants(config)
@@ -92,7 +84,6 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     return Study(
         config=config,
         used_atlases=atlases,
-        checksums=checksums,
         brains=brains,
         series=series,
         simulations=planned.simulations,
@@ -100,47 +91,6 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
         sweeps=_sweeps(config, swept, names, simulations, accepted),
         calibration=_calibration(config, simulations, accepted),
         unreachable=unreachable,
-    )
-
-
-def label_scheme(config: Config, brain: BrainConfig) -> LabelScheme:
-    """Return the scheme of a brain's labels; KeyError if it has none."""
-    name = str(brain.scheme)
-    if name not in config.schemes:
-        return SCHEMES[name]
-    return LabelScheme(name=name, **config.schemes[name].model_dump())
-
-
-def _brain(
-    settings: BrainConfig,
-    config: Config,
-    refused: Collection[str],
-    checksums: Mapping[str, tuple[str, str]],
-) -> Brain:
-    labels = None
-    if settings.label_volume is not None:
-        scheme = label_scheme(config, settings)
-        labels = LabelSource(settings.label_volume, settings.affine_from, scheme)
-    has_cortex = labels is not None and bool(labels.scheme.cortex)
-    has_white_files = bool(settings.white_files)
-    has_thickness = has_white_files or has_cortex
-    measures_all_white = config.metrics.white_surfaces == "all"
-    with_regions = set(config.metrics.regions) - set(refused)
-    regions_from: Literal["given", "carried"] | None = None
-    if len(settings.sides) == len(SIDES):
-        if settings.id in with_regions:
-            regions_from = "given"
-        elif with_regions and not settings.synthetic:
-            regions_from = "carried"
-    return Brain(
-        config=settings,
-        labels=labels,
-        has_thickness=has_thickness,
-        has_white=has_white_files or (has_thickness and measures_all_white),
-        regions_from=regions_from,
-        checksums={
-            path: checksums[path] for path in settings.files if path in checksums
-        },
     )
 
 
@@ -259,25 +209,23 @@ class _Simulations:
         growth = folded.settings.growth
         # the run is also compared with brains of other subjects if it grows towards
         # them
-        candidates = start.comparable(self.brains)
+        candidates = comparable(start, self.brains)
         for brain in self.chains[start.id, "self"].later:
             if brain.sides == start.sides and brain not in candidates:
                 candidates.append(brain)
-        candidates.sort(key=lambda brain: brain.subject != start.subject)
+        candidates.sort(key=lambda brain: brain.subject_name != start.subject_name)
         observed_brains = {}
         observed = {}
         for week in weeks[1:]:
             same_week = [brain for brain in candidates if brain.week == week]
             if same_week:
                 observed_brains[week] = tuple(same_week)
-            real = [brain for brain in same_week if not brain.config.synthetic]
-            if real and not start.config.synthetic:
+            real = [brain for brain in same_week if brain.shape is None]
+            if real and start.shape is None:
                 observed[week] = real[0]
         later = set()
         for brain in self.brains:
-            is_scan = (
-                start.config.subject is not None and brain.subject == start.subject
-            )
+            is_scan = start.subject is not None and brain.subject == start.subject
             if brain.week > start.week and (is_scan or brain in candidates):
                 later.add(brain)
         atlas_brains = self.chains[start.id, "atlas"].later
@@ -301,7 +249,7 @@ class _Simulations:
             observed=observed,
             kind="explained" if is_explained else "predicted",
             is_atlas_prediction=is_atlas_prediction,
-            has_regions=start.has_regions and folded.run in self.config.runs,
+            has_regions=bool(start.regions) and folded.run in self.config.runs,
         )
         return self.simulations.setdefault((folded.run, start.id), simulation)
 
@@ -356,7 +304,7 @@ def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]
 def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
     """Return a run that ends with the last scan if it follows the scans of one
     subject."""
-    if run.growth.shapes != "self" or start.config.subject is None:
+    if run.growth.shapes != "self" or start.subject is None:
         return run
     scans = series.brains.get(series.with_brain(start), ())
     last = max((brain.week for brain in scans), default=start.week)
@@ -420,8 +368,7 @@ def _compared_with(
     if settings.compare_with is not None:
         return tuple(brain for brain in brains if brain.id in settings.compare_with)
     same_week = [brain for brain in brains if brain.week == settings.compare_week]
-    population = start.config.population
-    own = [brain for brain in same_week if brain.config.population == population]
+    own = [brain for brain in same_week if brain.population == start.population]
     return tuple(own or same_week)
 
 

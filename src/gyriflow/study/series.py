@@ -13,6 +13,7 @@ from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
 from ..settings.runs import Run, growing_groups
 from .atlases import UsedAtlas
+from .brains import comparable
 from .paths import MATCHED, REGISTERED, VARIED_REGISTRATION
 from .records import Brain
 
@@ -71,8 +72,8 @@ class Series:
         for name, brains in self.brains.items():
             if name != self.preferred and self._is_single_subject(name):
                 continue
-            populations = {brain.config.population for brain in brains} - {None}
-            is_own = start in brains or start.config.population in populations
+            populations = {brain.population for brain in brains} - {None}
+            is_own = start in brains or start.population in populations
             if not is_own and all(brain.sides == start.sides for brain in brains):
                 names.append(name)
         names.sort(key=lambda name: name != self.preferred)
@@ -82,7 +83,7 @@ class Series:
 
     def _is_single_subject(self, name: str) -> bool:
         brains = self.brains[name]
-        return brains[0].config.subject is not None and not several_subjects(brains)
+        return brains[0].subject is not None and not several_subjects(brains)
 
     def are_matched(self, *brains: Brain) -> bool:
         """Return whether brains have surfaces with the same vertices."""
@@ -115,13 +116,13 @@ class Series:
         """
         if self.are_matched(*pair):
             return [False, False]
-        return [not brain.config.has_labels for brain in pair]
+        return [brain.labels is None for brain in pair]
 
 
 def several_subjects(brains: Iterable[Brain]) -> bool:
     """Return whether brains have different subjects. Brains without a subject, as of an
     atlas, count as one."""
-    return len({brain.config.subject for brain in brains}) > 1
+    return len({brain.subject for brain in brains}) > 1
 
 
 def series_of(
@@ -138,7 +139,7 @@ def series_of(
             if used.atlas.series[file.series].matched:
                 assumed.add(str(file.path))
     series, matched, unmatched = {}, {}, {}
-    configs = [brain.config for brain in brains.values()]
+    configs = [brain for brain in config.brains if brain.id in brains]
     for name, members in growing_groups(configs, config.growth.brains):
         ids = [brain.id for brain in members]
         series[name] = tuple(brains[brain] for brain in ids)
@@ -243,8 +244,8 @@ def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
     """Return the weeks of brains, not shapes, that simulations from a start brain are
     compared with."""
     weeks = set()
-    for brain in start.comparable(brains):
-        if brain.week > start.week and not brain.config.synthetic:
+    for brain in comparable(start, brains):
+        if brain.week > start.week and brain.shape is None:
             weeks.add(brain.week)
     return sorted(weeks)
 
@@ -343,14 +344,14 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     # scans of the same subject come first in a population's series
     members = sorted(
         series.brains.get(series.with_brain(start), ()),
-        key=lambda brain: brain.subject != start.subject,
+        key=lambda brain: brain.subject_name != start.subject_name,
     )
     # growth up to the end week needs the first brain at or past it
     last = min((brain.week for brain in members if brain.week >= end), default=end)
     by_week = {start.week: start}
     for brain in members:
-        have_labels = start.config.has_labels and brain.config.has_labels
-        if not have_labels and not series.are_matched(start, brain):
+        lack_labels = start.labels is None or brain.labels is None
+        if lack_labels and not series.are_matched(start, brain):
             continue
         if start.week < brain.week <= last:
             by_week.setdefault(brain.week, brain)

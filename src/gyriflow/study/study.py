@@ -11,10 +11,11 @@ from ..errors import InputError
 from ..io.exports import ExportedBrain, labels_file
 from ..settings.atlas import Atlas
 from ..settings.root import Config
-from ..settings.terms import MAX_COLOURS, MEASURED, SIDES, min_norm_subjects
+from ..settings.terms import MEASURED, SIDES, min_norm_subjects
 from . import paths
 from .atlases import UsedAtlas
-from .records import Brain, CalibrationRuns, Measurement, Simulation, Sweep
+from .brains import closest, comparable, label_source, registered_source
+from .records import Brain, CalibrationRuns, MeasuredBrain, Simulation, Sweep
 from .series import Chain, Series, several_subjects
 
 
@@ -23,16 +24,14 @@ class Study:
     """Everything a configuration asks for. Refused brains are in `config`, not in
     `brains`.
 
-    `checksums` are those of atlas files (see `known_checksums`). `simulations` are
-    those of runs, sweeps and calibration, and of members of ensembles, by run and start
-    brain. `chains` are the brains on which growth for a start brain is measured, by its
+    `simulations` are those of runs, sweeps and calibration, and of members of
+    ensembles, by run and start brain. `chains` are the brains on which growth for a start brain is measured, by its
     id and their `chain_name`. `unreachable` has the reasons why start brains are not
     folded.
     """
 
     config: Config
     used_atlases: Sequence[UsedAtlas]
-    checksums: Mapping[str, tuple[str, str]]
     brains: Mapping[str, Brain]
     series: Series
     simulations: Mapping[tuple[str, str], Simulation]
@@ -102,9 +101,9 @@ class Study:
         for name, brains in self.series.brains.items():
             if several_subjects(brains):
                 continue
-            is_of_atlas = all(brain.id in self.atlases for brain in brains)
+            is_of_atlas = all(brain.atlas for brain in brains)
             # brains without a subject may be different fetuses
-            if brains[0].config.subject or is_of_atlas or starts & {*brains}:
+            if brains[0].subject or is_of_atlas or starts & {*brains}:
                 used.add(name)
         return [name for name in self.series.brains if name in used]
 
@@ -152,8 +151,11 @@ class Study:
         references = {}
         for simulation in self.validated:
             start = simulation.start
-            comparable = start.comparable(self.brains.values())
-            candidates = [brain for brain in comparable if not brain.config.synthetic]
+            candidates = [
+                brain
+                for brain in comparable(start, self.brains.values())
+                if brain.shape is None
+            ]
             for week, observed in simulation.observed.items():
                 earlier = [brain for brain in candidates if brain.week < week]
                 latest = max(earlier, key=lambda brain: brain.week)
@@ -183,7 +185,7 @@ class Study:
         """Return the brain of a prediction's atlas that is closest in week to its
         end."""
         chain = self.chains[simulation.start.id, "atlas"]
-        return _closest(chain.later, simulation.weeks[-1])
+        return closest(chain.later, simulation.weeks[-1])
 
     @cached_property
     def predictions(self) -> list[Simulation]:
@@ -198,31 +200,30 @@ class Study:
     # measurements
 
     @cached_property
-    def measurements(self) -> dict[str, Measurement]:
-        """The measurements in the tables of the study, of observed and simulated
-        brains, by folder."""
-        rows = [brain.measurement for brain in self.brains.values()]
+    def measured(self) -> dict[str, MeasuredBrain]:
+        """The brains in the tables of the study, observed and simulated, by place."""
+        rows: list[MeasuredBrain] = list(self.brains.values())
         for simulation in self.run_simulations:
-            rows += simulation.measurements
-        return {row.where: row for row in rows}
+            rows += simulation.simulated
+        return {row.place: row for row in rows}
 
     @cached_property
-    def all_measurements(self) -> dict[str, Measurement]:
-        """All measurements by folder, including those of sweeps at their week of
+    def all_measured(self) -> dict[str, MeasuredBrain]:
+        """All measured brains by place, including those of sweeps at their week of
         comparison."""
         rows = {}
         for sweep in self.sweeps.values():
             for simulation, _ in sweep.members:
                 row = simulation.at(sweep.week)
-                rows[row.where] = row
-        return rows | self.measurements
+                rows[row.place] = row
+        return rows | self.measured
 
     @property
     def surfaces(self) -> list[str]:
         files = []
         for brain in self.brains.values():
             patterns = [*paths.pial_of(*brain.sides).values()]
-            if brain.has_thickness:
+            if brain.thickness:
                 patterns += paths.THICKNESS.values()
             files += [pattern.format(**brain.names) for pattern in patterns]
         return files
@@ -241,8 +242,8 @@ class Study:
         Brains without named subjects at intervals of half a week or more may be the
         averages of an unknown atlas.
         """
-        brains = [self.brains[brain].config for brain in ids]
-        if any(brain.id in self.atlases for brain in brains):
+        brains = [self.brains[brain] for brain in ids]
+        if any(brain.atlas for brain in brains):
             return False
         weeks = sorted(brain.week for brain in brains)
         is_dense = any(late - early < 0.5 for early, late in pairwise(weeks))
@@ -266,13 +267,15 @@ class Study:
         brains = [brain for brain in self.brains.values() if brain.sides == start.sides]
         reference = self.config.metrics.norm_reference
         if reference is not None:
-            return [brain.id for brain in brains if self._is_named(brain, reference)]
-        brains = [brain for brain in brains if not brain.config.synthetic]
-        if len({brain.config.population for brain in brains}) > 1:
-            population = start.config.population
-            brains = [
-                brain for brain in brains if brain.config.population == population
+            # their ids, or that of their atlas
+            return [
+                brain.id
+                for brain in brains
+                if brain.id in reference or brain.atlas in reference
             ]
+        brains = [brain for brain in brains if brain.shape is None]
+        if len({brain.population for brain in brains}) > 1:
+            brains = [brain for brain in brains if brain.population == start.population]
         return [brain.id for brain in brains]
 
     @property
@@ -281,36 +284,9 @@ class Study:
         subjects of this one."""
         if self.config.metrics.norms is not None:
             return True
-        subjects = {self.brains[brain].subject for brain in self.norm_reference}
+        subjects = {self.brains[name].subject_name for name in self.norm_reference}
         are_individuals = self.are_individuals(self.norm_reference)
         return len(subjects) >= min_norm_subjects(individuals=are_individuals)
-
-    def _is_named(self, brain: Brain, names: Iterable[str]) -> bool:
-        """Return whether a brain or its atlas is among names."""
-        atlas = self.atlases.get(brain.id)
-        return brain.id in names or (atlas is not None and atlas.name in names)
-
-    @cached_property
-    def colour_groups(self) -> dict[str, str]:
-        """The group of each observed brain: its value of the covariate that colours
-        show.
-
-        That is the first covariate with 2 to `MAX_COLOURS` values and fewer values than
-        subjects.
-        """
-        brains: dict[str, list[Brain]] = {}
-        for brain in self.brains.values():
-            for name in brain.config.covariates:
-                brains.setdefault(name, []).append(brain)
-        for name, with_value in brains.items():
-            groups = {}
-            for brain in with_value:
-                groups[brain.id] = f"{name}: {brain.config.covariates[name]}"
-            n_groups = len(set(groups.values()))
-            n_subjects = len({brain.subject for brain in with_value})
-            if 1 < n_groups <= MAX_COLOURS and n_groups < n_subjects:
-                return groups
-        return {}
 
     @property
     def scans(self) -> dict[str, list[str]]:
@@ -318,7 +294,7 @@ class Study:
         order of weeks."""
         scans: dict[str, list[Brain]] = {}
         for brain in self.brains.values():
-            if brain.config.subject is not None:
+            if brain.subject is not None:
                 scans.setdefault(brain.subject, []).append(brain)
         several = {}
         for subject in sorted(scans):
@@ -326,22 +302,6 @@ class Study:
                 by_week = sorted(scans[subject], key=lambda brain: brain.week)
                 several[subject] = [brain.id for brain in by_week]
         return several
-
-    def similar_in_thickness(self, brain: Brain) -> Brain | None:
-        """Return the brain whose measured thickness fills another one's pial surface;
-        None if none is measured.
-
-        It is the brain with labels, or else with white surfaces, that is closest in
-        week.
-        """
-        measured = []
-        labelled = []
-        for other in self.brains.values():
-            if other.has_thickness and other is not brain:
-                measured.append(other)
-                if other.labels is not None:
-                    labelled.append(other)
-        return _closest(labelled or measured, brain.week) if measured else None
 
     @property
     def filled(self) -> list[dict[str, Any]]:
@@ -358,7 +318,7 @@ class Study:
         groups: dict[tuple[str, bool], dict[str, None]] = {}
         for chain in chains.values():
             for pair, posed in chain.pairs:
-                by_cortex = all(brain.registered.scheme.cortex for brain in pair)
+                by_cortex = all(self._has_cortex(brain) for brain in pair)
                 for brain, is_posed in zip(pair, posed, strict=True):
                     if is_posed:
                         group = (self._cortex_source(brain), by_cortex)
@@ -369,62 +329,52 @@ class Study:
         ]
 
     def _cortex_source(self, brain: Brain) -> str:
-        if brain.config.white_files:
+        if brain.white_files:
             return "white"
-        return "measured" if self.similar_in_thickness(brain) else "typical"
+        return "measured" if brain.thickness_of else "typical"
 
-    # regions, and maps at the vertices of the template
+    def _has_cortex(self, brain: Brain) -> bool:
+        return bool(registered_source(self.config, brain).scheme.cortex)
 
-    def region_source(self, name: str) -> Brain:
-        """Return the brain with regions of its own that is closest in week to a
-        brain."""
-        sources = [
-            brain for brain in self.brains.values() if brain.regions_from == "given"
-        ]
-        return _closest(sources, self.brains[name].week)
+    # export
 
     @cached_property
     def exported(self) -> list[ExportedBrain]:
         """Each observed or simulated brain for the export."""
         return [
-            self._exported(row, self.brains[row.subject])
-            for row in self.measurements.values()
+            self._exported(row, self.brains[row.id]) for row in self.measured.values()
         ]
 
-    def _exported(self, row: Measurement, brain: Brain) -> ExportedBrain:
+    def _exported(self, row: MeasuredBrain, brain: Brain) -> ExportedBrain:
         is_observed = row.run == MEASURED
         volume: dict[str, Any] = {}
         if brain.labels and not is_observed:
             volume = {
-                "labels": brain.labels,
-                "surface": row.parts["whole"],
+                "labels": label_source(self.config, brain),
+                "surface": row.pial,
                 "thickness": row.thickness,
             }
-        white = {}
-        white_maps = {}
+        white = brain.white if is_observed else ()
+        white_maps = brain.white_maps if is_observed else ()
         template_maps = {}
-        files = paths.white_of(*row.sides)
         template = self.brains.get(self.config.metrics.template or "")
         for side in row.sides:
-            if brain.has_white and is_observed:
-                white[side] = files[f"{side}_surface"].format(**brain.names)
-                white_maps[side] = files[f"{side}_maps"].format(**brain.names)
             # the template may have been refused
             if template is not None and side in template.sides:
-                place = {"where": row.where, "side": side}
+                place = {"where": row.place, "side": side}
                 template_maps[side] = paths.TEMPLATE_MAPS.format(**place)
         return ExportedBrain(
-            brain=row.subject,
+            brain=row.id,
             run=row.run,
             week=row.week,
-            subject=brain.subject,
+            subject=brain.subject_name,
             surfaces=dict(zip(row.sides, row.hemispheres, strict=True)),
             maps=dict(zip(row.sides, row.maps, strict=True)),
-            regions=dict(zip(SIDES, row.regions.values(), strict=False)),
+            regions=dict(zip(SIDES, row.regions, strict=False)),
             report=brain.report,
-            covariates=brain.config.covariates,
-            white=white,
-            white_maps=white_maps,
+            covariates=brain.covariates,
+            white=dict(zip(row.sides, white, strict=False)),
+            white_maps=dict(zip(row.sides, white_maps, strict=False)),
             template=self.config.metrics.template,
             template_maps=template_maps,
             volume=volume,
@@ -439,7 +389,7 @@ class Study:
         simulation = self.prediction
         if simulation is None:
             return None
-        last = simulation.measurements[-1]
+        last = simulation.simulated[-1]
         atlas_brain = self.atlas_brain(simulation)
         exported = self._exported(last, simulation.start)
         labels = None
@@ -454,14 +404,9 @@ class Study:
             "atlas_brain": atlas_brain.id,
             "atlas_week": atlas_brain.week,
             # the population whose growth was used
-            "population": atlas_brain.population,
+            "population": atlas_brain.population_name,
             "atlas": atlas and atlas.model_dump(include=atlas_keys),
             "surfaces": [*last.parts.values()],
             "atlas_surface": simulation.atlas_surface,
             "labels": labels,
         }
-
-
-def _closest(brains: Iterable[Brain], week: float) -> Brain:
-    """Return the first of the brains that are closest to a week."""
-    return min(brains, key=lambda brain: abs(brain.week - week))

@@ -243,9 +243,7 @@ def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(
     )
     study = resolve(load(section))
     assert all(
-        Path(file).is_file()
-        for brain in study.brains.values()
-        for file in brain.config.files
+        Path(file).is_file() for brain in study.brains.values() for file in brain.files
     )
     # growth towards shapes is not by layers
     assert list(coarse_cortices(study)) == []

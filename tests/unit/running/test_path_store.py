@@ -216,10 +216,9 @@ def test_a_path_is_made_from_every_brain_whose_thickness_fills_one_of_its(paths)
     """Also where two of these are of one week."""
     _, path = paths()
     first, second, third = path.brains[:3]
-    same_week = third.config.model_copy(update={"week": first.week})
-    third = replace(third, config=same_week)
-    assert third.week == first.week
-    similar = {first.id: third, second.id: first}
-    study = SimpleNamespace(similar_in_thickness=lambda brain: similar[brain.id])
+    third = replace(third, week=first.week)
+    first = replace(first, thickness_of=third.id)
+    second = replace(second, thickness_of=first.id)
+    study = SimpleNamespace(brains={first.id: first, third.id: third})
     pairs = SimpleNamespace(pairs=[((first, second), (True, True))])
     assert path_store._thickness_sources(study, pairs) == [third, first]

@@ -211,7 +211,8 @@ def test_charts_are_coloured_by_a_covariate_that_groups_subjects():
         {"id": f"b{n}", "week": 21, "covariates": values, **LABELLED}
         for n, values in enumerate(covariates)
     ]
-    groups = resolve(load({"brains": brains})).colour_groups
+    found = resolve(load({"brains": brains})).brains
+    groups = {name: brain.group for name, brain in found.items()}
     # all are of one site, and each has its own mother
     assert groups == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
 

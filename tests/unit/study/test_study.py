@@ -14,6 +14,7 @@ from gyriflow.io.surfaces import write_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings import ensemble
 from gyriflow.study import resolve
+from gyriflow.study.brains import registered_source
 from gyriflow.study.loading import load
 from gyriflow.study.paths import CURVES
 
@@ -192,7 +193,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     } == {"thick": ["b21", "b21"]}
     assert ids(found.sweeps["thick"].observed["b21"]) == ["twin"]
     assert found.simulations["reference", "b21"].observed == {24: found.brains["twin"]}
-    assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], None)
+    assert (found.norm_reference, found.brains["b21"].regions_of) == (["b21"], None)
     # maps are brought to a template that is there
     in_both = study(real[:3], metrics={"template": "b23"}), found
     assert [{len(row.template_maps) for row in one.exported} for one in in_both] == [
@@ -233,12 +234,12 @@ def test_a_week_of_days_is_one_number_everywhere(labels):
     assert ids(one.observed.values()) == ids(comparison.observed["b21"]) == ["late"]
     # the rows of tables that figures look for by their week
     rows = [
-        found.brains["late"].measurement,
-        one.measurements[-1],
+        found.brains["late"],
+        one.simulated[-1],
         *(member.at(24.29) for member, _ in comparison.members),
     ]
     assert {row.week for row in rows} == {24.29}
-    assert one.measurements[-1].where.endswith("/week-24.29")
+    assert one.simulated[-1].place.endswith("/week-24.29")
 
 
 def cohort(labels):
@@ -589,11 +590,12 @@ def test_brains_correspond_by_masks_in_their_poses_and_else_in_coordinates_of_fi
     assert list(found.chains["own22", "atlas"].posed) == [[True, False]]
     assert list(found.chains["own22", "atlas"].path.posed) == [[False, False]] * 4
     assert (
-        found.brains["own22"].registered.path
+        registered_source(found.config, found.brains["own22"]).path
         == "results/brains/own22/surface/filled.nii.gz"
     )
-    assert found.brains["own22"].registered.scheme.cortex
-    assert found.brains["b21"].registered.path == str(files / "labels.nii.gz")
+    assert registered_source(found.config, found.brains["own22"]).scheme.cortex
+    labels = registered_source(found.config, found.brains["b21"])
+    assert labels.path == str(files / "labels.nii.gz")
 
 
 def test_the_surfaces_of_a_study_are_those_of_all_its_brains(of_two):
@@ -643,9 +645,9 @@ def test_brains_without_labels_are_filled_with_their_own_cortex_or_a_similar_bra
     source = "typical" if surfaces == "both" else "measured"
     ids = names[surfaces]
     assert found.filled == [{"ids": ids, "cortex": source, "by_cortex": True}]
-    similar = {found.similar_in_thickness(found.brains[name]) for name in ids}
+    similar = {found.brains[name].thickness_of for name in ids}
     expected = {"start": "b22", "atlas": "own22", "both": None}[surfaces]
-    assert {brain and brain.id for brain in similar} == {expected}
+    assert similar == {expected}
     with_white = study(
         [given(brain, white=str(files / "white.gii")) for brain in brains], **settings
     )
@@ -732,14 +734,14 @@ def test_a_study_is_compared_at_its_week_and_its_members_are_measured_there(real
     )
     compared = found.sweeps["thick"]
     assert [one.run for one, _ in compared.members] == ["reference", "thick-2"]
-    place = found.all_measurements["runs/thick-2/b21/metrics/week-23.00"]
-    assert place.labels == {"subject": "b21", "run": "thick-2", "week": 23}
+    place = found.all_measured["runs/thick-2/b21/metrics/week-23.00"]
+    assert place.columns == {"subject": "b21", "run": "thick-2", "week": 23}
     assert (
         place.thickness
         == "results/runs/thick-2/b21/surfaces/week-23.00/thickness.shape.gii"
     )
-    assert place.where not in found.measurements
-    assert [brain.population for brain in compared.observed["b21"]] == ["unknown"]
+    assert place.place not in found.measured
+    assert [brain.population_name for brain in compared.observed["b21"]] == ["unknown"]
 
 
 def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
@@ -767,14 +769,7 @@ def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
     given = {"b21": {"volume": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
     sphere = {"id": "sphere", "week": 22, **SPHERE}
     found = study([labels(21), labels(22), sphere], metrics={"regions": given})
-    assert [brain.regions_from for brain in found.brains.values()] == [
-        "given",
-        "carried",
-        None,
-    ]
+    assert [brain.regions_of for brain in found.brains.values()] == ["b21", "b21", None]
     # those of a run hold at all its weeks
-    regions = found.all_measurements["runs/reference/b21/metrics/week-22.00"].regions
-    assert (
-        regions["left_regions"]
-        == "results/runs/reference/b21/metrics/left.regions.label.gii"
-    )
+    regions = found.all_measured["runs/reference/b21/metrics/week-22.00"].regions
+    assert regions[0] == "results/runs/reference/b21/metrics/left.regions.label.gii"

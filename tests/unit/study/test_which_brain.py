@@ -5,6 +5,7 @@ import pytest
 from configurations import LABELLED, ids, labelled, resolved
 
 from gyriflow.errors import InputError
+from gyriflow.study.brains import comparable
 
 
 def brain(name, week, side=None, **more):
@@ -34,7 +35,7 @@ def test_the_adjacent_brain_is_the_latest_before_the_week_that_runs_are_compared
         23: ["c", "b"],
         24: ["d", "c"],
     }
-    assert list(found.all_measurements["brains/half/metrics"].parts) == [
+    assert list(found.all_measured["brains/half/metrics"].parts) == [
         "whole",
         "left",
     ]
@@ -85,7 +86,7 @@ def test_brains_are_comparable_by_their_hemispheres_population_and_subject(
         brain("theirs", 23, subject="t"),
     ]
     found = resolved(brains, start="whole").brains
-    assert ids(found[start].comparable(found.values())) == others
+    assert ids(comparable(found[start], found.values())) == others
 
 
 def test_half_a_brain_grows_by_no_atlas_of_whole_ones():
@@ -115,7 +116,7 @@ def test_regions_come_from_the_brain_nearest_in_week_that_has_any(order):
     ]
     regions = {name: {"volume": __file__, "names": {1: "frontal"}} for name in "ace"}
     found = resolved(brains, metrics={"regions": regions})
-    assert {name: found.region_source(name).id for name in "bdfg"} == {
+    assert {name: found.brains[name].regions_of for name in "bdfg"} == {
         "b": "a",
         "d": "c",
         "f": "e",
@@ -261,9 +262,9 @@ def test_a_second_hemisphere_is_of_another_series_norm_and_template(side):
     ]
     assert ids(found.chains[f"{side}22", "self"].brains) == [f"{side}22"]
     assert found.norm_reference == [f"{side}22", f"{side}23.5"]
-    assert found.measurements[f"brains/{side}22/metrics"].maps == [
-        f"results/brains/{side}22/metrics/{side}.shape.gii"
-    ]
+    assert found.measured[f"brains/{side}22/metrics"].maps == (
+        f"results/brains/{side}22/metrics/{side}.shape.gii",
+    )
     sides = {
         brain.brain: list(brain.template_maps)
         for brain in found.exported
@@ -289,7 +290,7 @@ def test_a_brain_has_white_surfaces_that_are_given_or_follow_from_its_labels():
     for wanted, expected in (("given", {"white"}), ("all", {"white", "a"})):
         found = resolved(brains, start="bare", metrics={"white_surfaces": wanted})
         brains_found = found.brains.values()
-        assert {brain.id for brain in brains_found if brain.has_white} == expected
+        assert {brain.id for brain in brains_found if brain.white} == expected
 
 
 def test_charts_have_the_colours_of_a_covariate_for_each_scan_of_a_subject():
@@ -299,7 +300,7 @@ def test_charts_have_the_colours_of_a_covariate_for_each_scan_of_a_subject():
         for week in (21, 22)
     ]
     found = resolved(brains, start="pw21", runs={"reference": {"end_week": 22}})
-    assert found.colour_groups == {
+    assert {name: brain.group for name, brain in found.brains.items()} == {
         given["id"]: f"sex: {given['covariates']['sex']}" for given in brains
     }
 
@@ -314,7 +315,7 @@ def test_thickness_is_of_the_brain_nearest_in_week_with_labels_or_else_white_sur
         {"id": "white", "week": 23.1, **pial, "white": __file__},
     ]
     found = resolved([*brains, *labelled(*weeks, names="xy")], start="bare")
-    assert found.similar_in_thickness(found.brains["bare"]).id == similar
+    assert found.brains["bare"].thickness_of == similar
     alone = resolved(brains, start="bare")
-    assert alone.similar_in_thickness(alone.brains["bare"]).id == "white"
-    assert alone.similar_in_thickness(alone.brains["white"]) is None
+    assert alone.brains["bare"].thickness_of == "white"
+    assert alone.brains["white"].thickness_of is None
