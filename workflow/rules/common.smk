@@ -1,4 +1,4 @@
-# Shared by all rules: the validated configuration, names and paths of results.
+# Shared by all rules: the plan of the study, names and paths of results.
 import os
 from contextlib import chdir
 
@@ -10,8 +10,7 @@ from gyriflow.study import resolve
 from gyriflow.study.atlases import known_checksums
 from gyriflow.study.brains import label_source, registered_source
 from gyriflow.study.paths import *
-from gyriflow.study.records import Brain
-from gyriflow.study.tables import write_rows
+from gyriflow.study.study import read_plan, write_plan
 from gyriflow.running.launch import (
     KEEP_GOING_VAR,
     DIRECTORY_VAR,
@@ -39,10 +38,10 @@ RUNS = workflow.is_main_process and DRY_RUN_VAR not in os.environ
 TELLS = workflow.is_main_process and PLANNED_VAR not in os.environ
 
 
-def validated_study():
-    """Return the study without refused brains, and the contents of the input files.
+def planned_study():
+    """Return the plan of the study, without refused brains, and the contents of its input files.
 
-    Ends with a message and exit code 2 if the configuration is not valid.
+    A process that runs the study writes the plan. Ends with a message and exit code 2 if the configuration is not valid.
     """
     from gyriflow.study.loading import load
     from gyriflow.io.yaml_files import read_keys
@@ -59,10 +58,12 @@ def validated_study():
             found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
             used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
             study = resolve(used, refused_brains())
-        if workflow.is_main_process:
-            files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
-            check_results_belong_to(Path.cwd(), files, found, record=RUNS)
-        return study, input_contents(Path.cwd(), found, known_checksums(study.used_atlases), record=RUNS)
+            checksums = known_checksums(study.used_atlases)
+        files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
+        check_results_belong_to(Path.cwd(), files, found, record=RUNS)
+        if RUNS:
+            write_plan(study, Path(PLAN))
+        return study, input_contents(Path.cwd(), found, checksums, record=RUNS)
     except GyriflowError as error:
         end_with(error)
 
@@ -78,15 +79,15 @@ if workflow.is_main_process and LAUNCHED_VAR not in os.environ:
     remedy = "Start it by ./run snakemake or python -m gyriflow.running.launch, with the same arguments."
     end_with(InputError(problem, remedy=remedy))
 
-study, CONTENTS = validated_study()
+# a job reads the plan
+study, CONTENTS = planned_study() if workflow.is_main_process else (read_plan(Path(PLAN)), {})
 CONFIG = study.config
-# the plan: rules look up in it, and people read it
 BRAINS = study.brains
-if RUNS:
-    write_rows(f"{PLAN}/brains.csv", Brain, BRAINS.values())
+# by run and start brain, and by week
+SIMULATED = study.simulated
 # brains refused in an earlier pass of this call, with the cause; the study is finished without them
-KNOWN = {brain.id for brain in CONFIG.brains}
-REFUSED = {brain: cause for brain, cause in refused_brains().items() if brain in KNOWN}
+REFUSED = {row.brain: row.cause for row in study.left_out if row.why == "refused"}
+UNUSED_ROWS = [row for row in study.left_out if row.why == "cannot be used"]
 if REFUSED and TELLS:
     # the causes have been printed
     rest = "finishing the study without" if BRAINS else "no brain is left"
@@ -95,9 +96,9 @@ if REFUSED and not BRAINS:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
 if TELLS:
-    messages = [(brain, f"not folded: {cause}") for brain, cause in study.unreachable.items()]
+    messages = [(row.brain, f"not folded: {row.cause}") for row in study.left_out if row.why == "not folded"]
     if not REFUSED:
-        messages += [(scan, f"left out: {row['cause']}") for scan, row in CONFIG.left_out.items()]
+        messages += [(row.brain, f"left out: {row.cause}") for row in UNUSED_ROWS]
     for line, _ in grouped(messages):
         print(f"gyriflow: {line}", file=sys.stderr)
 

@@ -7,10 +7,10 @@ def ensemble_of(wildcards):
 def reached(simulations, weeks):
     """Return the simulated brains at those of some weeks that each simulation has reached."""
     return [
-        simulation.at(week)
+        SIMULATED[simulation.run, simulation.brain][week]
         for simulation in simulations
         for week in weeks
-        if reaches(simulation.run, simulation.start.id, week)
+        if reaches(simulation.run, simulation.brain, week)
     ]
 
 
@@ -20,9 +20,9 @@ def metrics_of(rows):
 
 rule ensemble:
     input:
-        run=lambda w: metrics_of(simulation_of(w).simulated),
+        run=lambda w: metrics_of(SIMULATED[w.run, w.brain].values()),
         members=lambda w: metrics_of(reached(ensemble_of(w), simulation_of(w).weeks)),
-        observed=lambda w: metrics_of(brains[0] for brains in simulation_of(w).observed_brains.values()),
+        observed=lambda w: metrics_of(BRAINS[row.shown] for row in study.compared[w.run, w.brain].values()),
         # the tested errors of predictions
         accuracy=lambda w: PREDICTION_TESTS if simulation_of(w).is_atlas_prediction else [],
         # all members at once, not one after the other as `reaches` asks for them

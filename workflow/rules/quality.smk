@@ -44,9 +44,9 @@ rule quality_table:
     params:
         refused=[
             *(quality_columns(name) | {"cause": cause, "page": None} for name, cause in REFUSED.items()),
-            *({"subject": name, **row} for name, row in CONFIG.left_out.items()),
+            *({"subject": row.brain, "week": row.week, "cause": row.cause} for row in UNUSED_ROWS),
         ],
-        order=[*(brain.id for brain in CONFIG.brains), *CONFIG.left_out],
+        order=[*(brain.id for brain in CONFIG.brains), *(row.brain for row in UNUSED_ROWS)],
     script:
         "../scripts/quality_table.py"
 

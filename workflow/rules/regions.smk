@@ -23,6 +23,11 @@ def region_pair(wildcards):
     return BRAINS[brain.regions_of], brain
 
 
+def region_link(wildcards):
+    """Return the map by which regions are carried."""
+    return study.link(BRAINS[wildcards.brain].regions_of, wildcards.brain)
+
+
 rule carried_regions:
     input:
         **POSED_SIDES,
@@ -31,13 +36,13 @@ rule carried_regions:
         given_left=lambda w: region_pair(w)[0].parts["left"],
         given_right=lambda w: region_pair(w)[0].parts["right"],
         given_report=lambda w: region_pair(w)[0].report,
-        correspondence=lambda w: study.series.correspondence(*region_pair(w)),
+        correspondence=lambda w: region_link(w).file,
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
         brain=one_of(brain.id for brain in BRAINS.values() if brain.regions_of not in (None, brain.id)),
     params:
-        posed=lambda w: study.series.posed(*region_pair(w)),
+        posed=lambda w: region_link(w).posed,
     script:
         "../scripts/carried_regions.py"
 
@@ -86,14 +91,14 @@ def mapped_surface(wildcards):
     """Return the hemisphere with a brain's maps; for a simulated brain that of its start, with the same vertices."""
     row = MEASURED[wildcards.where]
     if row.run in CONFIG.runs:
-        row = study.simulations[row.run, row.id].at(BRAINS[row.id].week)
+        row = SIMULATED[row.run, row.id][BRAINS[row.id].week]
     return row.parts[wildcards.side]
 
 
-def template_correspondence(wildcards):
-    """Return the correspondence of the template with a brain; none for the template itself."""
+def template_links(wildcards):
+    """Return the map from the template to a brain; none for the template itself."""
     template, brain = on_template(wildcards)
-    return [] if brain is template else [study.series.correspondence(template, brain)]
+    return [] if brain is template else [study.link(template.id, brain.id)]
 
 
 rule template_maps:
@@ -102,13 +107,13 @@ rule template_maps:
         template_report=lambda w: on_template(w)[0].report,
         surface=mapped_surface,
         report=lambda w: on_template(w)[1].report,
-        correspondence=template_correspondence,
+        correspondence=lambda w: [link.file for link in template_links(w)],
         maps=f"{PLACE}/{{side}}.shape.gii",
     output:
         TEMPLATE_MAPS,
     wildcard_constraints:
         where=one_of(study.measured),
     params:
-        posed=lambda w: study.series.posed(*on_template(w)),
+        posed=lambda w: template_links(w)[0].posed if template_links(w) else [False, False],
     script:
         "../scripts/template_maps.py"

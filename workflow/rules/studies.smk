@@ -3,13 +3,19 @@
 # results/study/STUDY/ has members (per run: values, resolution, outcome with its cause, time), comparison (distance of
 # each run from each observed brain by each measure) and nearest (the nearest run by each measure). A run that diverged
 # before the week of comparison is only in `members`.
+def sweep_run(wildcards):
+    """Return the run of a sweep from a start brain; runs that share a simulation are compared with the same brains."""
+    rows = study.sweeps[wildcards.study]
+    return next(row for row in rows if (row.run, row.brain) == (wildcards.run, wildcards.brain))
+
+
 def files_of_member(wildcards):
     """Return the files of a run at the week of comparison and of the observed brains; none if it has not reached it."""
-    compared = study.sweeps[wildcards.study]
+    compared = sweep_run(wildcards)
     if not reaches(wildcards.run, wildcards.brain, compared.week):
         return {}
-    simulated, real = simulation_of(wildcards).at(compared.week), compared.observed[wildcards.brain]
-    rows = [simulated, *real]
+    simulated = SIMULATED[wildcards.run, wildcards.brain][compared.week]
+    rows = [simulated, *(BRAINS[brain] for brain in compared.observed)]
     tables = ("metrics", "spectra", "coefficients")
     return {
         **{name: [f"{row.folder}/{name}.csv" for row in rows] for name in tables},
@@ -21,7 +27,7 @@ def files_of_member(wildcards):
 def from_members(pattern):
     """Return an input function: a file of each run of a sweep."""
     return lambda w: [
-        simulation.file(pattern, study=w.study) for simulation, _ in study.sweeps[w.study].members
+        pattern.format(study=w.study, run=row.run, brain=row.brain) for row in study.sweeps[w.study]
     ]
 
 
@@ -34,7 +40,7 @@ rule compare_member:
         table=COMPARED_MEMBER,
         coefficients=MEMBER_COEFFICIENTS,
     params:
-        real=lambda w: {real.id: real.population_name for real in study.sweeps[w.study].observed[w.brain]},
+        real=lambda w: {brain: BRAINS[brain].population_name for brain in sweep_run(w).observed},
         population=lambda w: BRAINS[w.brain].population_name,
         parts=lambda w: ["whole", *BRAINS[w.brain].sides],
     script:
@@ -55,10 +61,9 @@ rule study_tables:
         nearest=f"{SWEEP}/nearest.csv",
     params:
         members=lambda w: [
-            {"run": simulation.run, "subject": simulation.start.id, "values": dict(values)}
-            for simulation, values in study.sweeps[w.study].members
+            {"run": row.run, "subject": row.brain, "values": row.values} for row in study.sweeps[w.study]
         ],
-        week=lambda w: study.sweeps[w.study].week,
+        week=lambda w: study.sweeps[w.study][0].week,
     script:
         "../scripts/study_tables.py"
 

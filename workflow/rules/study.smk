@@ -53,7 +53,7 @@ rule run_tables:
         displacement=f"{STUDY}/displacement.csv",
     params:
         folded=study.pairs,
-        growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
+        growth_of=[simulation.growth_of for simulation in study.run_simulations],
     script:
         "../scripts/run_tables.py"
 

@@ -274,11 +274,10 @@ def _contents(study: Study) -> str:
         else "measured only"
     )
     parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
-    parts += [
-        f"{len(sweep.members)} of study {name}" for name, sweep in study.sweeps.items()
-    ]
-    if study.calibration is not None:
-        parts.append(f"{len(study.calibration.rounds)} of the calibration")
+    parts += [f"{len(runs)} of study {name}" for name, runs in study.sweeps.items()]
+    if study.calibration:
+        calibrated = {row.run for row in study.calibration}
+        parts.append(f"{len(calibrated)} of the calibration")
     return ", ".join(parts)
 
 
@@ -296,7 +295,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         if isinstance(thickness, Varying) and thickness.map:
             continue
         through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(
-            thickness, simulation.start.week
+            thickness, simulation.weeks[0]
         )
         elements = through / mesh.surface_edge_mm
         error, text = element_error(mesh.order, elements)
@@ -308,7 +307,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
             )
         if is_coarse or error > LARGE_ELEMENT_ERROR:
             coarse[f"about {text}{few}; use {remedy}"].append(
-                f"run {simulation.run} from {simulation.start.id}"
+                f"run {simulation.run} from {simulation.brain}"
             )
     yield from (f"{', '.join(names)}: {text}" for text, names in coarse.items())
 
@@ -321,7 +320,7 @@ def deep_curved_folds(study: Study) -> Iterator[str]:
     for simulation in study.run_simulations:
         if simulation.shapes and simulation.settings.end_week > DEEP_FOLDS_GW:
             yield (
-                f"run {simulation.run} from {simulation.start.id}: quadratic elements"
+                f"run {simulation.run} from {simulation.brain}: quadratic elements"
                 f" fold over on the way to shapes later than {DEEP_FOLDS_GW:g} GW; use"
                 " mesh.order: 1"
             )

@@ -44,6 +44,7 @@ from ..io.volumes import read_header, read_label_volume, read_volume_map
 from ..settings.brains import BrainConfig, GivenRegions
 from ..settings.terms import SIDES, AffineSource
 from ..settings.varying import files_of, mean_of_curve
+from ..study.records import mapped_parameters
 from ..study.study import Study
 from .recognition import NATIVE_SPACES, SPACE_NAME
 
@@ -243,7 +244,7 @@ def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], No
             partial(_check_regions, given, affine_from),
         )
     for simulation in study.run_simulations:
-        for name, value in simulation.mapped.items():
+        for name, value in mapped_parameters(simulation.settings).items():
             files = [*files_of(value.map), *files_of(value.surface)]
             yield (
                 f"{name} of run {simulation.run}",

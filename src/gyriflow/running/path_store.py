@@ -13,8 +13,7 @@ from ..settings.root import Config
 from ..shipped import SHIPPED
 from ..study.brains import label_source
 from ..study.paths import ATLAS_PATH
-from ..study.records import Brain
-from ..study.series import Chain
+from ..study.records import Brain, Chain
 from ..study.study import Study
 
 RULE_FILES = ("surface", "registration", "mesh")
@@ -30,11 +29,11 @@ def path_origin(study: Study, path: Chain) -> dict[str, Any]:
     fills one of them, with all files that they name; the settings of surfaces and of
     the mesh; and a hash of the rules and scripts.
     """
-    brains = [*path.brains, *_thickness_sources(study, path)]
+    brains = [*study.brains_of(path), *_thickness_sources(study, path)]
     return {
         "brains": [_description(study.config, brain) for brain in brains],
         # by matched vertices or by registration
-        "correspondences": path.correspondences,
+        "correspondences": path.links,
         "surface": study.config.surface.model_dump(mode="json"),
         "mesh": study.config.growth.path_mesh.model_dump(mode="json"),
         "code": _code(),
@@ -45,10 +44,12 @@ def _thickness_sources(study: Study, path: Chain) -> list[Brain]:
     """Return the brains whose measured thickness fills the surfaces of a path's brains
     to labels."""
     sources: dict[str, Brain] = {}
-    for pair, posed in path.pairs:
-        for brain, is_filled in zip(pair, posed, strict=True):
-            if is_filled and brain.thickness_of is not None:
-                sources[brain.thickness_of] = study.brains[brain.thickness_of]
+    for file in path.links:
+        link = study.links[file]
+        for name, is_filled in zip((link.earlier, link.later), link.posed, strict=True):
+            source = study.brains[name].thickness_of
+            if is_filled and source is not None:
+                sources[source] = study.brains[source]
     return list(sources.values())
 
 
@@ -82,9 +83,9 @@ def _code() -> str:
 def store_folder(study: Study, path: Chain) -> Path | None:
     """Return the folder for a path of an atlas, next to the files of the atlas; None
     for other brains."""
-    if not all(brain.atlas for brain in path.brains):
+    if not all(brain.atlas for brain in study.brains_of(path)):
         return None
-    atlas = study.atlases[path.brains[0].id]
+    atlas = study.atlases[path.brain]
     return (
         next(used.folder for used in study.used_atlases if used.atlas is atlas)
         / "paths"
@@ -97,7 +98,7 @@ def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
     folder = store_folder(study, path)
     if folder is None or key is None:
         return None
-    store = folder / stored_name(path.brains[0].id, key)
+    store = folder / stored_name(path.brain, key)
     if not store.exists():
         return None
     try:
@@ -110,5 +111,5 @@ def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
 def has_path(path: Chain, key: str | None) -> bool:
     """Return whether the study in the working directory has a path that was made from
     all that `key` stands for."""
-    file = Path(ATLAS_PATH.format(brain=path.brains[0].id))
+    file = Path(ATLAS_PATH.format(brain=path.brain))
     return key is not None and file.exists() and read_path_key(file) == key

@@ -156,6 +156,8 @@ DEVIATION = {
     "table": f"{RUN}/metrics/{WEEK}/deviation.csv",
     "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii",
 }
+DESIGN = f"{CALIBRATION}/round-{{round}}.csv"
+SCORE = f"{CALIBRATION}/scores/{{run}}.csv"
 VALIDATION = f"{RUN}/metrics/validation.csv"
 COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}/comparison.csv"
 MEMBER_COEFFICIENTS = f"{SWEEP}/members/{{run}}/{{brain}}/coefficients.csv"

@@ -1,44 +1,66 @@
-"""A resolved study: its records, and selections of them for rules, tables and the
-report."""
+"""The plan of a study: its tables, and selections of their rows for rules and the
+report.
 
-from collections.abc import Iterable, Mapping, Sequence
+The tables are written before rules are read; jobs read them.
+"""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+import yaml
+
 from ..io.exports import ExportedBrain, labels_file
+from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas
 from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, min_norm_subjects
 from . import paths
-from .atlases import UsedAtlas
-from .brains import closest, comparable, label_source, registered_source
-from .records import Brain, CalibrationRuns, MeasuredBrain, Simulation, Sweep
-from .series import Chain, Series, several_subjects
+from .atlases import UsedAtlas, used_atlases
+from .brains import closest, label_source, registered_source
+from .records import (
+    Brain,
+    CalibrationRun,
+    Chain,
+    Comparison,
+    Download,
+    GrowthSeries,
+    LeftOut,
+    Link,
+    MeasuredBrain,
+    Simulation,
+    SweepRun,
+)
+from .series import PATH
+from .tables import read_rows, write_changed, write_rows
 
 
 @dataclass(frozen=True)
 class Study:
-    """Everything a configuration asks for. Refused brains are in `config`, not in
-    `brains`.
+    """Everything a configuration asks for. Refused brains are in `config` and
+    `left_out`, not in `brains`.
 
     `simulations` are those of runs, sweeps and calibration, and of members of
-    ensembles, by run and start brain. `chains` are the brains on which growth for a start brain is measured, by its
-    id and their `chain_name`. `unreachable` has the reasons why start brains are not
-    folded.
+    ensembles, by run and start brain; so are `simulated` brains and comparisons, by
+    week. `links` are by file, `chains` by the id of their first brain and their name,
+    `series` and `sweeps` by name.
     """
 
     config: Config
-    used_atlases: Sequence[UsedAtlas]
     brains: Mapping[str, Brain]
-    series: Series
+    series: Mapping[str, GrowthSeries]
     simulations: Mapping[tuple[str, str], Simulation]
+    simulated: Mapping[tuple[str, str], Mapping[float, MeasuredBrain]]
+    compared: Mapping[tuple[str, str], Mapping[float, Comparison]]
+    links: Mapping[str, Link]
     chains: Mapping[tuple[str, str], Chain]
-    sweeps: Mapping[str, Sweep]
-    calibration: CalibrationRuns | None
-    unreachable: Mapping[str, InputError]
+    sweeps: Mapping[str, Sequence[SweepRun]]
+    calibration: Sequence[CalibrationRun]
+    left_out: Sequence[LeftOut]
+    downloads: Sequence[Download]
 
     @cached_property
     def run_simulations(self) -> list[Simulation]:
@@ -47,20 +69,24 @@ class Study:
         return [
             simulation
             for simulation in self.simulations.values()
-            if simulation.run in self.config.runs
+            if not simulation.may_diverge
         ]
 
     @cached_property
     def may_diverge(self) -> list[str]:
         """The runs of sweeps, calibration and ensembles, which may diverge without
         stopping the study."""
-        runs = dict.fromkeys(run for run, _ in self.simulations)
-        return [run for run in runs if run not in self.config.runs]
+        runs = [
+            simulation.run
+            for simulation in self.simulations.values()
+            if simulation.may_diverge
+        ]
+        return list(dict.fromkeys(runs))
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
         return [
-            (simulation.run, simulation.start.id) for simulation in self.run_simulations
+            (simulation.run, simulation.brain) for simulation in self.run_simulations
         ]
 
     def files(self, *patterns: str) -> list[str]:
@@ -73,93 +99,95 @@ class Study:
     @cached_property
     def starts(self) -> list[Brain]:
         """The start brains of `runs`, in the order of `brains`."""
-        starts = {simulation.start for simulation in self.run_simulations}
-        return [brain for brain in self.brains.values() if brain in starts]
+        starts = {simulation.brain for simulation in self.run_simulations}
+        return [brain for brain in self.brains.values() if brain.id in starts]
+
+    def rows_of(self, simulation: Simulation) -> list[MeasuredBrain]:
+        """Return the simulated brains of a simulation, in the order of weeks."""
+        return list(self.simulated[simulation.run, simulation.brain].values())
+
+    @property
+    def paths(self) -> dict[str, Chain]:
+        """The paths of atlases by their first brain."""
+        paths = {}
+        for chain in self.chains.values():
+            if chain.name == PATH:
+                paths[chain.brain] = chain
+        return paths
+
+    def brains_of(self, chain: Chain) -> list[Brain]:
+        """Return the brains of a chain."""
+        return [self.brains[name] for name in chain.brains]
+
+    def link(self, earlier: str, later: str) -> Link:
+        """Return the map between two brains that no member of an ensemble varies."""
+        return self._plain_links[earlier, later]
+
+    @cached_property
+    def _plain_links(self) -> dict[tuple[str, str], Link]:
+        links = {}
+        for link in self.links.values():
+            if link.seed == 0:
+                links[link.earlier, link.later] = link
+        return links
 
     @cached_property
     def growth_brains(self) -> list[tuple[str, Brain]]:
         """All brains that growth is measured on, each with its series, in the order of
         weeks within a series."""
         growth_brains = []
-        for name, brains in self.series.brains.items():
-            by_week = sorted(brains, key=lambda brain: brain.week)
-            growth_brains += [(name, brain) for brain in by_week]
+        for series in self.series.values():
+            growth_brains += [
+                (series.name, self.brains[name]) for name in series.brains
+            ]
         return growth_brains
-
-    @cached_property
-    def series_with_rates(self) -> list[str]:
-        """The series whose differences between weeks are growth: of a subject, of an
-        atlas, or used by a run."""
-        starts = set()
-        used = set()
-        for simulation in self.simulations.values():
-            starts.add(simulation.start)
-            used.add(simulation.followed_series)
-            if simulation.shapes:
-                chain = self.chains[simulation.start.id, simulation.shapes]
-                used |= {self.series.with_brain(brain) for brain in chain.later}
-        for name, brains in self.series.brains.items():
-            if several_subjects(brains):
-                continue
-            is_of_atlas = all(brain.atlas for brain in brains)
-            # brains without a subject may be different fetuses
-            if brains[0].subject or is_of_atlas or starts & {*brains}:
-                used.add(name)
-        return [name for name in self.series.brains if name in used]
-
-    def growth_source(self, simulation: Simulation) -> str:
-        """Describe whose measured growth a simulation follows, or return ""."""
-        if simulation.shapes:
-            chain = self.chains[simulation.start.id, simulation.shapes]
-            brains = chain.later if simulation.shapes == "atlas" else chain.brains
-            name = self.series.with_brain(brains[0])
-        else:
-            name = simulation.followed_series or ""
-            brains = self.series.brains.get(name, ())
-        if several_subjects(brains):
-            return f"population {name}"
-        if simulation.start in brains:
-            return "own"
-        return f"series {name}" if brains else ""
 
     @cached_property
     def with_ensemble(self) -> list[Simulation]:
         """The simulations of runs that have an ensemble."""
-        return [
-            simulation for simulation in self.run_simulations if simulation.ensemble
-        ]
+        return [simulation for simulation in self.run_simulations if simulation.members]
 
     def members(self, simulation: Simulation) -> list[Simulation]:
         """Return the members of a simulation's ensemble."""
-        return [
-            self.simulations[name, simulation.start.id] for name in simulation.ensemble
-        ]
+        return [self.simulations[run, simulation.brain] for run in simulation.members]
 
     # comparison with observed brains
+
+    def observed(self, simulation: Simulation) -> dict[float, Brain]:
+        """Return the brain that a simulation is compared with by week."""
+        observed = {}
+        for week, row in self.compared[simulation.run, simulation.brain].items():
+            if row.observed is not None:
+                observed[week] = self.brains[row.observed]
+        return observed
+
+    def shown(self, simulation: Simulation) -> dict[float, Brain]:
+        """Return the brain that figures show for each week of a simulation, the start
+        brain first."""
+        start = self.brains[simulation.brain]
+        shown = {start.week: start}
+        for week, row in self.compared[simulation.run, simulation.brain].items():
+            shown[week] = self.brains[row.shown]
+        return shown
 
     @cached_property
     def validated(self) -> list[Simulation]:
         """The simulations of runs that are compared with an observed brain."""
         return [
-            simulation for simulation in self.run_simulations if simulation.observed
+            simulation
+            for simulation in self.run_simulations
+            if self.observed(simulation)
         ]
 
     @cached_property
-    def references(self) -> dict[tuple[str, float], tuple[Brain, Brain]]:
-        """The observed brain, and the latest comparable one of an earlier week, by
-        start brain and week."""
+    def references(self) -> dict[tuple[str, float], Comparison]:
+        """The comparisons of validated simulations by start brain and week, which are
+        the same for all runs."""
         references = {}
         for simulation in self.validated:
-            start = simulation.start
-            candidates = [
-                brain
-                for brain in comparable(start, self.brains.values())
-                if brain.shape is None
-            ]
-            for week, observed in simulation.observed.items():
-                earlier = [brain for brain in candidates if brain.week < week]
-                latest = max(earlier, key=lambda brain: brain.week)
-                references[start.id, week] = (observed, latest)
+            for row in self.compared[simulation.run, simulation.brain].values():
+                if row.observed is not None:
+                    references[row.brain, row.week] = row
         return references
 
     @cached_property
@@ -184,17 +212,17 @@ class Study:
     def atlas_brain(self, simulation: Simulation) -> Brain:
         """Return the brain of a prediction's atlas that is closest in week to its
         end."""
-        chain = self.chains[simulation.start.id, "atlas"]
-        return closest(chain.later, simulation.weeks[-1])
+        chain = self.chains[simulation.brain, "atlas"]
+        return closest(self.brains_of(chain)[1:], simulation.weeks[-1])
 
     @cached_property
     def predictions(self) -> list[Simulation]:
         """The `atlas_predictions`, and other predictions from the same start brains."""
-        starts = {simulation.start for simulation in self.atlas_predictions}
+        starts = {simulation.brain for simulation in self.atlas_predictions}
         return [
             simulation
             for simulation in self.validated
-            if simulation.start in starts and simulation.kind == "predicted"
+            if simulation.brain in starts and simulation.kind == "predicted"
         ]
 
     # measurements
@@ -204,18 +232,15 @@ class Study:
         """The brains in the tables of the study, observed and simulated, by place."""
         rows: list[MeasuredBrain] = list(self.brains.values())
         for simulation in self.run_simulations:
-            rows += simulation.simulated
+            rows += self.rows_of(simulation)
         return {row.place: row for row in rows}
 
     @cached_property
     def all_measured(self) -> dict[str, MeasuredBrain]:
-        """All measured brains by place, including those of sweeps at their week of
-        comparison."""
-        rows = {}
-        for sweep in self.sweeps.values():
-            for simulation, _ in sweep.members:
-                row = simulation.at(sweep.week)
-                rows[row.place] = row
+        """All measured brains by place, including those of further simulations."""
+        rows: dict[str, MeasuredBrain] = {}
+        for weeks in self.simulated.values():
+            rows |= {row.place: row for row in weeks.values()}
         return rows | self.measured
 
     @property
@@ -229,8 +254,14 @@ class Study:
         return files
 
     @cached_property
+    def used_atlases(self) -> list[UsedAtlas]:
+        """The atlases of the study, with the files that exist now."""
+        return used_atlases(self.config)
+
+    @cached_property
     def atlases(self) -> dict[str, Atlas]:
-        """The atlas of each brain of an atlas, by the id of the brain."""
+        """The atlas of each brain of an atlas, refused ones too, by the id of the
+        brain."""
         atlases: dict[str, Atlas] = {}
         for used in self.used_atlases:
             atlases |= {file.brain: used.atlas for file in used.files}
@@ -310,23 +341,30 @@ class Study:
 
         The source is "white", "measured" (on a similar brain) or "typical".
         """
-        chains = {}
-        for simulation in self.run_simulations:
-            if simulation.shapes:
-                key = (simulation.start.id, simulation.shapes)
-                chains[key] = self.chains[key]
         groups: dict[tuple[str, bool], dict[str, None]] = {}
-        for chain in chains.values():
-            for pair, posed in chain.pairs:
-                by_cortex = all(self._has_cortex(brain) for brain in pair)
-                for brain, is_posed in zip(pair, posed, strict=True):
-                    if is_posed:
-                        group = (self._cortex_source(brain), by_cortex)
-                        groups.setdefault(group, {})[brain.id] = None
+        for link in self._followed_links:
+            pair = (self.brains[link.earlier], self.brains[link.later])
+            by_cortex = all(self._has_cortex(brain) for brain in pair)
+            for brain, is_posed in zip(pair, link.posed, strict=True):
+                if is_posed:
+                    group = (self._cortex_source(brain), by_cortex)
+                    groups.setdefault(group, {})[brain.id] = None
         return [
             {"ids": list(ids), "cortex": cortex, "by_cortex": by_cortex}
             for (cortex, by_cortex), ids in groups.items()
         ]
+
+    @property
+    def _followed_links(self) -> list[Link]:
+        """The links of the chains that runs, without their ensembles, follow."""
+        files: list[str] = []
+        for simulation in self.run_simulations:
+            if simulation.chain is not None:
+                chain = self.chains[simulation.brain, simulation.chain]
+                files += chain.links
+                if chain.path is not None:
+                    files += self.chains[chain.path, PATH].links
+        return [self.links[file] for file in files]
 
     def _cortex_source(self, brain: Brain) -> str:
         if brain.white_files:
@@ -389,9 +427,10 @@ class Study:
         simulation = self.prediction
         if simulation is None:
             return None
-        last = simulation.simulated[-1]
+        start = self.brains[simulation.brain]
+        last = self.rows_of(simulation)[-1]
         atlas_brain = self.atlas_brain(simulation)
-        exported = self._exported(last, simulation.start)
+        exported = self._exported(last, start)
         labels = None
         if exported.volume:
             labels = labels_file("results/export", exported, self.exported)
@@ -399,7 +438,7 @@ class Study:
         atlas_keys = {"name", "title", "licence", "reference"}
         return {
             **simulation.names,
-            "start_week": simulation.start.week,
+            "start_week": start.week,
             "week": last.week,
             "atlas_brain": atlas_brain.id,
             "atlas_week": atlas_brain.week,
@@ -407,6 +446,95 @@ class Study:
             "population": atlas_brain.population_name,
             "atlas": atlas and atlas.model_dump(include=atlas_keys),
             "surfaces": [*last.parts.values()],
-            "atlas_surface": simulation.atlas_surface,
+            "atlas_surface": self.atlas_surface(simulation),
             "labels": labels,
         }
+
+    @staticmethod
+    def atlas_surface(prediction: Simulation) -> str:
+        """Return the file with the atlas' own brain in the last week of a
+        prediction."""
+        return prediction.file(paths.ATLAS_BRAIN, week=prediction.weeks[-1])
+
+
+# the tables on disk
+
+
+def write_plan(study: Study, folder: Path) -> None:
+    """Write the tables and the configuration of a study, those that have changed."""
+    for name, kind, rows in plan_tables(study):
+        write_rows(folder / f"{name}.csv", kind, rows)
+    plain = study.config.model_dump(mode="json", exclude_unset=True)
+    text = yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
+    write_changed(folder / "config.yaml", text)
+
+
+def plan_tables(study: Study) -> list[tuple[str, type, Collection[Any]]]:
+    """Return the name, the class and the rows of each table."""
+    simulated: list[MeasuredBrain] = []
+    for by_week in study.simulated.values():
+        simulated += by_week.values()
+    compared: list[Comparison] = []
+    for comparisons in study.compared.values():
+        compared += comparisons.values()
+    swept: list[SweepRun] = []
+    for runs in study.sweeps.values():
+        swept += runs
+    return [
+        ("brains", Brain, study.brains.values()),
+        ("simulations", Simulation, study.simulations.values()),
+        ("simulated", MeasuredBrain, simulated),
+        ("compared", Comparison, compared),
+        ("links", Link, study.links.values()),
+        ("chains", Chain, study.chains.values()),
+        ("series", GrowthSeries, study.series.values()),
+        ("sweeps", SweepRun, swept),
+        ("calibration", CalibrationRun, study.calibration),
+        ("left_out", LeftOut, study.left_out),
+        ("downloads", Download, study.downloads),
+    ]
+
+
+def read_plan(folder: Path) -> Study:
+    """Return the study whose plan is in a folder; InputError if there is none."""
+    brains = {row.id: row for row in read_rows(folder / "brains.csv", Brain)}
+    files: list[str | None] = []
+    for brain in brains.values():
+        files += [*brain.files, *brain.white_files.values(), brain.image]
+    # a file of an atlas may be missing
+    context = {"folder": str(folder), "awaited": files}
+    plain = read_keys(folder / "config.yaml")
+    config = Config.model_validate(plain, context=context)
+    simulations = {}
+    simulated: dict[tuple[str, str], dict[float, MeasuredBrain]] = {}
+    compared: dict[tuple[str, str], dict[float, Comparison]] = {}
+    for simulation in read_rows(folder / "simulations.csv", Simulation):
+        key = (simulation.run, simulation.brain)
+        simulations[key] = simulation
+        simulated[key] = {}
+        compared[key] = {}
+    for row in read_rows(folder / "simulated.csv", MeasuredBrain):
+        simulated[row.run, row.id][row.week] = row
+    for comparison in read_rows(folder / "compared.csv", Comparison):
+        compared[comparison.run, comparison.brain][comparison.week] = comparison
+    sweeps: dict[str, list[SweepRun]] = {}
+    for run in read_rows(folder / "sweeps.csv", SweepRun):
+        sweeps.setdefault(run.sweep, []).append(run)
+    links = read_rows(folder / "links.csv", Link)
+    chains = read_rows(folder / "chains.csv", Chain)
+    series = read_rows(folder / "series.csv", GrowthSeries)
+    left_out = read_rows(folder / "left_out.csv", LeftOut)
+    return Study(
+        config=config,
+        brains=brains,
+        series={row.name: row for row in series},
+        simulations=simulations,
+        simulated=simulated,
+        compared=compared,
+        links={link.file: link for link in links},
+        chains={(chain.brain, chain.name): chain for chain in chains},
+        sweeps=sweeps,
+        calibration=read_rows(folder / "calibration.csv", CalibrationRun),
+        left_out=left_out,
+        downloads=read_rows(folder / "downloads.csv", Download),
+    )

@@ -1,14 +1,9 @@
 """Tables of a plan: what is read is what was written."""
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
-import pytest
-from configurations import LABELLED, resolved, touched
-
-from gyriflow.errors import InputError
 from gyriflow.settings.brains import ShapeSettings
 from gyriflow.settings.terms import Side
-from gyriflow.study.records import Brain
 from gyriflow.study.tables import read_rows, write_rows
 
 
@@ -49,27 +44,3 @@ def test_a_table_is_only_written_if_it_changed(tmp_path):
     assert (path.stat().st_mtime_ns, path.stat().st_ino) == written
     write_rows(path, Row, ROWS[:1])
     assert read_rows(path, Row) == ROWS[:1]
-
-
-def test_a_missing_table_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"brains\.csv"):
-        read_rows(tmp_path / "brains.csv", Brain)
-
-
-def test_brains_are_read_as_they_were_written(tmp_path):
-    touched(tmp_path, "left.gii", "right.gii", "white.gii")
-    pial = str(tmp_path / "left.gii")
-    brains = [
-        {"id": "007", "week": 21, "subject": "12", **LABELLED},
-        {"id": "half", "week": 22.29, "hemisphere": {"file": pial, "side": "left"}},
-        {"id": "white", "week": 23, "pial": pial, "white": pial},
-        {"id": "ball", "week": 22, "shape": {"seed": 2}, "covariates": {"sex": "F"}},
-    ]
-    regions = {"007": {"volume": pial, "names": {1: "frontal"}}}
-    found = resolved(brains, start="007", metrics={"regions": regions}).brains
-    path = tmp_path / "brains.csv"
-    write_rows(path, Brain, found.values())
-    read = read_rows(path, Brain)
-    assert [astuple(brain) for brain in read] == [
-        astuple(brain) for brain in found.values()
-    ]
