@@ -4,7 +4,7 @@
 # runs are not repeated, so an interrupted calibration continues.
 from gyriflow.settings.terms import SPECTRAL_SCORES
 
-CALIBRATED = study.calibration
+CALIBRATED = list(study.calibration.values())
 # by run; the rows of a run, one for each start brain, differ in that only
 ROUNDS = {row.run: row for row in CALIBRATED}
 STARTS = [row for row in CALIBRATED if row.run == CALIBRATED[0].run]

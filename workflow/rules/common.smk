@@ -41,31 +41,28 @@ TELLS = workflow.is_main_process and PLANNED_VAR not in os.environ
 def planned_study():
     """Return the plan of the study, without refused brains, and the contents of its input files.
 
-    A process that runs the study writes the plan. Ends with a message and exit code 2 if the configuration is not valid.
+    A process that runs the study writes the plan. InputError if the configuration is not valid.
     """
     from gyriflow.study.loading import load
     from gyriflow.io.yaml_files import read_keys
 
-    try:
-        base = Path(os.environ.get(DIRECTORY_VAR, os.curdir)).absolute()
-        for path in workflow.configfiles:
-            # Snakemake itself keeps the last of two equal keys
-            file = Path(workflow.workdir_init, path)
-            if set(read_keys(file)) & {"brains", "atlas", "participants"}:
-                base = folder_of(file)
-        # a dry run is in a view of the working directory
-        with chdir(os.environ.get(DIRECTORY_VAR, os.curdir)):
-            found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
-            used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
-            study = resolve(used, refused_brains())
-            checksums = known_checksums(study.used_atlases)
-        files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
-        check_results_belong_to(Path.cwd(), files, found, record=RUNS)
-        if RUNS:
-            write_plan(study, Path(PLAN))
-        return study, input_contents(Path.cwd(), found, checksums, record=RUNS)
-    except GyriflowError as error:
-        end_with(error)
+    base = Path(os.environ.get(DIRECTORY_VAR, os.curdir)).absolute()
+    for path in workflow.configfiles:
+        # Snakemake itself keeps the last of two equal keys
+        file = Path(workflow.workdir_init, path)
+        if set(read_keys(file)) & {"brains", "atlas", "participants"}:
+            base = folder_of(file)
+    # a dry run is in a view of the working directory
+    with chdir(os.environ.get(DIRECTORY_VAR, os.curdir)):
+        found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
+        used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
+        study = resolve(used, refused_brains())
+        checksums = known_checksums(study.used_atlases)
+    files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
+    check_results_belong_to(Path.cwd(), files, found, record=RUNS)
+    if RUNS:
+        write_plan(study, Path(PLAN))
+    return study, input_contents(Path.cwd(), found, checksums, record=RUNS)
 
 
 def end_with(error):
@@ -79,15 +76,20 @@ if workflow.is_main_process and LAUNCHED_VAR not in os.environ:
     remedy = "Start it by ./run snakemake or python -m gyriflow.running.launch, with the same arguments."
     end_with(InputError(problem, remedy=remedy))
 
-# a job reads the plan
-study, CONTENTS = planned_study() if workflow.is_main_process else (read_plan(Path(PLAN)), {})
+try:
+    # a job reads the plan
+    study, CONTENTS = planned_study() if workflow.is_main_process else (read_plan(Path(PLAN)), {})
+except GyriflowError as error:
+    end_with(error)
 CONFIG = study.config
 BRAINS = study.brains
-# by run and start brain, and by week
+# by run, start brain and week
 SIMULATED = study.simulated
+# the runs of each sweep
+SWEEPS = study.by_sweep
 # brains refused in an earlier pass of this call, with the cause; the study is finished without them
-REFUSED = {row.brain: row.cause for row in study.left_out if row.why == "refused"}
-UNUSED_ROWS = [row for row in study.left_out if row.why == "cannot be used"]
+REFUSED = {row.brain: row.cause for row in study.left_out.values() if row.why == "refused"}
+UNUSED_ROWS = [row for row in study.left_out.values() if row.why == "cannot be used"]
 if REFUSED and TELLS:
     # the causes have been printed
     rest = "finishing the study without" if BRAINS else "no brain is left"
@@ -96,7 +98,9 @@ if REFUSED and not BRAINS:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
 if TELLS:
-    messages = [(row.brain, f"not folded: {row.cause}") for row in study.left_out if row.why == "not folded"]
+    messages = [
+        (row.brain, f"not folded: {row.cause}") for row in study.left_out.values() if row.why == "not folded"
+    ]
     if not REFUSED:
         messages += [(row.brain, f"left out: {row.cause}") for row in UNUSED_ROWS]
     for line, _ in grouped(messages):
@@ -137,7 +141,7 @@ def brains_with(*sides, has_thickness=None):
 
 wildcard_constraints:
     **dict.fromkeys(("brain", "earlier", "later"), one_of(BRAINS)),
-    study=one_of(study.sweeps),
+    study=one_of(SWEEPS),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

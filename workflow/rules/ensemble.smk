@@ -7,7 +7,7 @@ def ensemble_of(wildcards):
 def reached(simulations, weeks):
     """Return the simulated brains at those of some weeks that each simulation has reached."""
     return [
-        SIMULATED[simulation.run, simulation.brain][week]
+        SIMULATED[*simulation.key, week]
         for simulation in simulations
         for week in weeks
         if reaches(simulation.run, simulation.brain, week)
@@ -20,9 +20,9 @@ def metrics_of(rows):
 
 rule ensemble:
     input:
-        run=lambda w: metrics_of(SIMULATED[w.run, w.brain].values()),
+        run=lambda w: metrics_of(study.rows_of(simulation_of(w))),
         members=lambda w: metrics_of(reached(ensemble_of(w), simulation_of(w).weeks)),
-        observed=lambda w: metrics_of(BRAINS[row.shown] for row in study.compared[w.run, w.brain].values()),
+        observed=lambda w: metrics_of(BRAINS[row.shown] for row in study.comparisons(simulation_of(w))),
         # the tested errors of predictions
         accuracy=lambda w: PREDICTION_TESTS if simulation_of(w).is_atlas_prediction else [],
         # all members at once, not one after the other as `reaches` asks for them

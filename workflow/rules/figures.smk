@@ -662,7 +662,7 @@ def expected_grid(simulation):
 def deviation_grid(simulation):
     grid = []
     for week in study.observed(simulation):
-        surface = SIMULATED[simulation.run, simulation.brain][week].pial
+        surface = SIMULATED[*simulation.key, week].pial
         maps = simulation.file(DEVIATION["maps"], week=week)
         grid.append(placed("observed minus expected", week, [surface], [maps]))
     return grid
@@ -714,13 +714,13 @@ show(rules.deviation_figure.output, DEVIATIONS)
 
 def first_members(sweep):
     """Return the runs of a sweep from its first start brain, by name."""
-    rows = study.sweeps[sweep]
+    rows = SWEEPS[sweep]
     return {row.run: row for row in rows if row.brain == rows[0].brain}
 
 
 def first_observed(sweep):
     """Return the first brain that these runs are compared with, if any."""
-    return [BRAINS[brain] for brain in study.sweeps[sweep][0].observed[:1]]
+    return [BRAINS[brain] for brain in SWEEPS[sweep][0].observed[:1]]
 
 
 def first_values(sweep):
@@ -730,13 +730,13 @@ def first_values(sweep):
 
 def names_of_sweeps(sweeps):
     """Return the names of sweeps with their weeks."""
-    return [{"study": sweep, "week": f"{study.sweeps[sweep][0].week:g}"} for sweep in sweeps]
+    return [{"study": sweep, "week": f"{SWEEPS[sweep][0].week:g}"} for sweep in sweeps]
 
 
 def influence_grid(sweep):
     grid = []
     for run, member in first_members(sweep).items():
-        row = SIMULATED[run, member.brain][member.week]
+        row = SIMULATED[run, member.brain, member.week]
         # a run that ended before has no files
         has_files = reaches(run, member.brain, member.week)
         files = (row.hemispheres, row.maps) if has_files else ([], [])
@@ -759,13 +759,13 @@ rule influence_figure:
         "../scripts/figures.py"
 
 
-show(rules.influence_figure.output, names_of_sweeps(study.sweeps))
+show(rules.influence_figure.output, names_of_sweeps(SWEEPS))
 
 
 def member_spectra(wildcards):
     """Return the spectra of the runs of a sweep that reached its week."""
     return [
-        f"{SIMULATED[run, member.brain][member.week].folder}/spectra.csv"
+        f"{SIMULATED[run, member.brain, member.week].folder}/spectra.csv"
         for run, member in first_members(wildcards.study).items()
         if reaches(run, member.brain, member.week)
     ]
@@ -780,13 +780,13 @@ rule influence_spectra:
     params:
         **drawn_by("weeks"),
         values=lambda w: first_values(w.study),
-        week=lambda w: study.sweeps[w.study][0].week,
+        week=lambda w: SWEEPS[w.study][0].week,
         observed_name=lambda w: observed_name(first_observed(w.study)),
     script:
         "../scripts/figures.py"
 
 
-show(rules.influence_spectra.output, names_of_sweeps(study.sweeps))
+show(rules.influence_spectra.output, names_of_sweeps(SWEEPS))
 
 
 def has_nearest(sweep):
@@ -797,7 +797,7 @@ def has_nearest(sweep):
     return bool(first_observed(sweep)) and len(vary) == 1 and are_numbers
 
 
-OVER_NUMBERS = [sweep for sweep in study.sweeps if has_nearest(sweep)]
+OVER_NUMBERS = [sweep for sweep in SWEEPS if has_nearest(sweep)]
 
 
 rule nearest_figure:
@@ -810,9 +810,9 @@ rule nearest_figure:
     params:
         **drawn_by("scores"),
         varied=lambda w: next(iter(CONFIG.studies[w.study].vary)),
-        subject=lambda w: study.sweeps[w.study][0].brain,
+        subject=lambda w: SWEEPS[w.study][0].brain,
         observed=lambda w: [brain.id for brain in first_observed(w.study)],
-        week=lambda w: study.sweeps[w.study][0].week,
+        week=lambda w: SWEEPS[w.study][0].week,
     script:
         "../scripts/figures.py"
 

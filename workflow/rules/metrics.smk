@@ -33,7 +33,7 @@ rule measure_simulated:
     wildcard_constraints:
         brain=brains_with(*SIDES),
     params:
-        labels=lambda w: SIMULATED[w.run, w.brain][float(w.week)].columns,
+        labels=lambda w: SIMULATED[w.run, w.brain, float(w.week)].columns,
         settings=MEASURED_WITH,
     script:
         "../scripts/measure.py"

@@ -91,7 +91,7 @@ def mapped_surface(wildcards):
     """Return the hemisphere with a brain's maps; for a simulated brain that of its start, with the same vertices."""
     row = MEASURED[wildcards.where]
     if row.run in CONFIG.runs:
-        row = SIMULATED[row.run, row.id][BRAINS[row.id].week]
+        row = SIMULATED[row.run, row.id, BRAINS[row.id].week]
     return row.parts[wildcards.side]
 
 

@@ -2,7 +2,7 @@
 # replaced.
 from gyriflow.study.atlases import retrieval_note
 
-ATLAS_FILES = {row.file.removeprefix("/"): row for row in study.downloads}
+ATLAS_FILES = {row.file.removeprefix("/"): row for row in study.downloads.values()}
 
 if TELLS:
     for atlas in study.used_atlases:

@@ -5,7 +5,7 @@
 # before the week of comparison is only in `members`.
 def sweep_run(wildcards):
     """Return the run of a sweep from a start brain; runs that share a simulation are compared with the same brains."""
-    rows = study.sweeps[wildcards.study]
+    rows = SWEEPS[wildcards.study]
     return next(row for row in rows if (row.run, row.brain) == (wildcards.run, wildcards.brain))
 
 
@@ -14,7 +14,7 @@ def files_of_member(wildcards):
     compared = sweep_run(wildcards)
     if not reaches(wildcards.run, wildcards.brain, compared.week):
         return {}
-    simulated = SIMULATED[wildcards.run, wildcards.brain][compared.week]
+    simulated = SIMULATED[wildcards.run, wildcards.brain, compared.week]
     rows = [simulated, *(BRAINS[brain] for brain in compared.observed)]
     tables = ("metrics", "spectra", "coefficients")
     return {
@@ -26,9 +26,7 @@ def files_of_member(wildcards):
 
 def from_members(pattern):
     """Return an input function: a file of each run of a sweep."""
-    return lambda w: [
-        pattern.format(study=w.study, run=row.run, brain=row.brain) for row in study.sweeps[w.study]
-    ]
+    return lambda w: [pattern.format(study=w.study, run=row.run, brain=row.brain) for row in SWEEPS[w.study]]
 
 
 rule compare_member:
@@ -61,16 +59,16 @@ rule study_tables:
         nearest=f"{SWEEP}/nearest.csv",
     params:
         members=lambda w: [
-            {"run": row.run, "subject": row.brain, "values": row.values} for row in study.sweeps[w.study]
+            {"run": row.run, "subject": row.brain, "values": row.values} for row in SWEEPS[w.study]
         ],
-        week=lambda w: study.sweeps[w.study][0].week,
+        week=lambda w: SWEEPS[w.study][0].week,
     script:
         "../scripts/study_tables.py"
 
 
 rule studies:
     input:
-        expand(list(rules.study_tables.output), study=study.sweeps),
+        expand(list(rules.study_tables.output), study=SWEEPS),
 
 
 # figures and tables of the paper; observed brains are measured only at the weeks of comparison

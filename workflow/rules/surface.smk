@@ -44,7 +44,7 @@ rule shape:
 
 rule pial:
     input:
-        given=lambda w: BRAINS[w.brain].files or SHAPE.format(brain=w.brain),
+        given=lambda w: BRAINS[w.brain].files or [SHAPE.format(brain=w.brain)],
         white=lambda w: list(BRAINS[w.brain].white_files.values()),
     output:
         **pial_of(*SIDES),

@@ -27,7 +27,7 @@ def compared_files(wildcards):
     }
     return {
         **prepared,
-        "simulated": [SIMULATED[wildcards.run, wildcards.brain][week].pial for week in observed],
+        "simulated": [SIMULATED[wildcards.run, wildcards.brain, week].pial for week in observed],
         "whole": [brain.pial for brain in observed.values()],
     }
 
@@ -77,7 +77,7 @@ rule prediction:
 rule atlas_brain:
     input:
         **START_MESH,
-        predicted=lambda w: SIMULATED[w.run, w.brain][float(w.week)].pial,
+        predicted=lambda w: SIMULATED[w.run, w.brain, float(w.week)].pial,
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         ATLAS_BRAIN,
@@ -91,11 +91,10 @@ def deviating(wildcards):
     """Return the start brain, its run at the first week and at another week, and the observed brain of that week."""
     start = BRAINS[wildcards.brain]
     week = float(wildcards.week)
-    simulated = SIMULATED[wildcards.run, wildcards.brain]
     return {
         "start": start,
-        "first": simulated[start.week],
-        "expected": simulated[week],
+        "first": SIMULATED[wildcards.run, start.id, start.week],
+        "expected": SIMULATED[wildcards.run, start.id, week],
         "real": observed_of(wildcards)[week],
     }
 

@@ -57,6 +57,7 @@ from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.brains import label_scheme
 from ..study.loading import load
+from ..study.paths import PLAN
 from ..study.resolve import resolve
 from ..study.study import Study
 from ..version import version
@@ -156,6 +157,8 @@ def check_study(
         )
     if valid:
         yield "  input files: no problem found", False
+        plan_folder = directory / PLAN
+        yield f"  plan: tables in {plan_folder}, written before the first step", False
         yield from work_of(
             path, directory, cores, ["--cores", str(cores), *stages], study
         )
@@ -274,9 +277,9 @@ def _contents(study: Study) -> str:
         else "measured only"
     )
     parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
-    parts += [f"{len(runs)} of study {name}" for name, runs in study.sweeps.items()]
+    parts += [f"{len(runs)} of study {name}" for name, runs in study.by_sweep.items()]
     if study.calibration:
-        calibrated = {row.run for row in study.calibration}
+        calibrated = {run for run, _ in study.calibration}
         parts.append(f"{len(calibrated)} of the calibration")
     return ", ".join(parts)
 

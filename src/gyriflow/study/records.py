@@ -186,6 +186,10 @@ class Simulation:
     settings: Run
 
     @property
+    def key(self) -> tuple[str, str]:
+        return self.run, self.brain
+
+    @property
     def names(self) -> dict[str, str]:
         """The values of its wildcards."""
         return {"run": self.run, "brain": self.brain}
@@ -261,11 +265,12 @@ class SweepRun:
     """A run of a sweep (key `studies`) from one start brain, with its varied values: a
     row of `sweeps.csv`.
 
-    `run` is the run that simulates it. `observed` are the brains that it is compared
-    with at the `week` of the sweep.
+    `member` is its name, `run` the run that simulates it, as equal runs are simulated
+    once. `observed` are the brains that it is compared with at the `week` of the sweep.
     """
 
     sweep: str
+    member: str
     week: float
     run: str
     brain: str

@@ -44,7 +44,7 @@ from .series import (
     series_of,
     several_subjects,
 )
-from .study import Study
+from .study import Study, study_of
 
 Chains = dict[tuple[str, str], Chain]
 
@@ -98,20 +98,20 @@ def resolve(config: Config, refused: Mapping[str, str] | None = None) -> Study:
     simulations = list(planned.simulations.values())
     followed = _followed_chains(simulations, chains, series)
     links = _links(config, brains, series, followed.values())
-    return Study(
-        config=config,
-        brains=brains,
-        series=_series_rows(config, brains, series, followed, simulations),
-        simulations=planned.simulations,
-        simulated=planned.simulated,
-        compared=planned.compared,
-        links=links,
-        chains=followed,
-        sweeps=_sweeps(config, swept, names, simulations, brains),
-        calibration=_calibration(config, simulations, brains),
-        left_out=_left_out(config, refused, unreachable),
-        downloads=_downloads(atlases),
-    )
+    rows: dict[str, Iterable[Any]] = {
+        "brains": brains.values(),
+        "series": _series_rows(config, brains, series, followed, simulations),
+        "simulations": simulations,
+        "simulated": planned.simulated,
+        "compared": planned.compared,
+        "links": links,
+        "chains": followed.values(),
+        "sweeps": _sweeps(config, swept, names, simulations, brains),
+        "calibration": _calibration(config, simulations, brains),
+        "left_out": _left_out(config, refused, unreachable),
+        "downloads": _downloads(atlases),
+    }
+    return study_of(config, rows)
 
 
 def _downloads(atlases: Iterable[UsedAtlas]) -> list[Download]:
@@ -172,9 +172,9 @@ def _links(
     brains: Mapping[str, Brain],
     series: Series,
     chains: Iterable[Chain],
-) -> dict[str, Link]:
-    """Return the maps between brains by their file: of chains, to carry regions, and
-    to move maps to the template."""
+) -> list[Link]:
+    """Return the maps between brains: of chains, to carry regions, and to move maps to
+    the template."""
     files: list[str] = []
     for chain in chains:
         files += chain.links
@@ -184,7 +184,7 @@ def _links(
             files.append(series.link(brains[str(brain.regions_of)], brain))
         if template is not None and template is not brain:
             files.append(series.link(template, brain))
-    return {file: series.links[file] for file in files}
+    return [series.links[file] for file in files]
 
 
 def _series_rows(
@@ -193,8 +193,8 @@ def _series_rows(
     series: Series,
     chains: Chains,
     simulations: Iterable[Simulation],
-) -> dict[str, GrowthSeries]:
-    """Return the growth series by name. Differences between weeks are growth in a
+) -> list[GrowthSeries]:
+    """Return the growth series. Differences between weeks are growth in a
     series of a subject, of an atlas, or used by a run."""
     starts = set()
     used = set()
@@ -205,7 +205,7 @@ def _series_rows(
         if simulation.chain and simulation.member_of is None:
             for brain in chains[simulation.brain, simulation.chain].later:
                 used.add(series.with_brain(brains[brain]))
-    rows = {}
+    rows = []
     for name, members in series.brains.items():
         by_week = sorted(members, key=lambda brain: brain.week)
         ids = tuple(brain.id for brain in by_week)
@@ -216,12 +216,13 @@ def _series_rows(
             or not starts.isdisjoint(ids)
         )
         is_growth = is_one and not several_subjects(members)
-        rows[name] = GrowthSeries(
+        row = GrowthSeries(
             name=name,
             brains=ids,
             has_rates=is_growth or name in used,
             unmatched=series.unmatched.get(name),
         )
+        rows.append(row)
     return rows
 
 
@@ -293,12 +294,8 @@ class _Simulations:
     chains: Chains
     brains: Mapping[str, Brain]
     simulations: dict[tuple[str, str], Simulation] = field(default_factory=dict)
-    simulated: dict[tuple[str, str], dict[float, MeasuredBrain]] = field(
-        default_factory=dict
-    )
-    compared: dict[tuple[str, str], dict[float, Comparison]] = field(
-        default_factory=dict
-    )
+    simulated: list[MeasuredBrain] = field(default_factory=list)
+    compared: list[Comparison] = field(default_factory=list)
 
     def _add_runs(self, folded: Iterable[_Folded]) -> None:
         """Add the simulations of `runs`, and the members of their ensembles."""
@@ -364,7 +361,7 @@ class _Simulations:
                 candidates.append(self.brains[name])
                 ids.add(name)
         candidates.sort(key=lambda brain: brain.subject_name != start.subject_name)
-        self.compared[key] = _compared(run, start, weeks, candidates, same)
+        self.compared += _compared(run, start, weeks, candidates, same)
         later = set()
         for brain in self.brains.values():
             is_scan = start.subject is not None and brain.subject == start.subject
@@ -410,7 +407,7 @@ class _Simulations:
             may_diverge=run not in self.config.runs,
             settings=settings,
         )
-        self.simulated[key] = _simulated(self.simulations[key], start)
+        self.simulated += _simulated(self.simulations[key], start)
 
     def _growth_source(
         self, start: Brain, origin: Origin | None, *, has_curves: bool
@@ -439,12 +436,12 @@ def _compared(
     weeks: Sequence[float],
     candidates: Sequence[Brain],
     same: Sequence[Brain],
-) -> dict[float, Comparison]:
-    """Return the comparisons of a run by week, each with the first of the candidates.
+) -> list[Comparison]:
+    """Return the comparisons of a run, each with the first candidate of a later week.
 
     `same` are the brains that are comparable with the start brain itself.
     """
-    rows = {}
+    rows = []
     observed_brains = [brain for brain in candidates if brain.shape is None]
     if start.shape is not None:
         observed_brains = []
@@ -455,7 +452,7 @@ def _compared(
         earlier = [brain for brain in adjacent_brains if brain.week < week]
         adjacent = max(earlier, key=lambda brain: brain.week, default=None)
         if shown:
-            rows[week] = Comparison(
+            row = Comparison(
                 run=run,
                 brain=start.id,
                 week=week,
@@ -463,12 +460,13 @@ def _compared(
                 observed=observed[0] if observed else None,
                 adjacent=adjacent.id if adjacent and observed else None,
             )
+            rows.append(row)
     return rows
 
 
-def _simulated(simulation: Simulation, start: Brain) -> dict[float, MeasuredBrain]:
-    """Return the simulated brains of a simulation by week."""
-    rows = {}
+def _simulated(simulation: Simulation, start: Brain) -> list[MeasuredBrain]:
+    """Return the simulated brains of a simulation."""
+    rows = []
     run_folder = simulation.file(paths.RUN)
     # the regions of a run are the same at all its weeks
     regions = f"{run_folder}/metrics" if simulation.has_regions else None
@@ -476,13 +474,14 @@ def _simulated(simulation: Simulation, start: Brain) -> dict[float, MeasuredBrai
         week_folder = paths.file_of(paths.WEEK, week=week)
         surfaces = f"{run_folder}/surfaces/{week_folder}"
         tables = f"{run_folder}/metrics/{week_folder}"
-        rows[week] = MeasuredBrain(
+        row = MeasuredBrain(
             id=start.id,
             run=simulation.run,
             week=week,
             thickness=f"{surfaces}/thickness.shape.gii",
             **measured_files(start.sides, surfaces, tables, regions),
         )
+        rows.append(row)
     return rows
 
 
@@ -616,9 +615,9 @@ def _sweeps(
     names: Mapping[str, str],
     simulations: Collection[Simulation],
     brains: Mapping[str, Brain],
-) -> dict[str, list[SweepRun]]:
-    """Return the runs of each sweep, by its name, each with its varied values."""
-    sweeps: dict[str, list[SweepRun]] = {}
+) -> list[SweepRun]:
+    """Return the runs of all sweeps, each with its varied values."""
+    rows = []
     for variant in variants:
         settings = config.studies[variant.sweep]
         for simulation in simulations:
@@ -626,14 +625,15 @@ def _sweeps(
                 start = brains[simulation.brain]
                 row = SweepRun(
                     sweep=variant.sweep,
+                    member=variant.run,
                     week=settings.compare_week,
                     run=simulation.run,
                     brain=simulation.brain,
                     values=variant.values,
                     observed=_compared_with(settings, start, brains),
                 )
-                sweeps.setdefault(variant.sweep, []).append(row)
-    return sweeps
+                rows.append(row)
+    return rows
 
 
 def _calibration(

@@ -4,10 +4,11 @@ report.
 The tables are written before rules are read; jobs read them.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -43,24 +44,21 @@ class Study:
     """Everything a configuration asks for. Refused brains are in `config` and
     `left_out`, not in `brains`.
 
-    `simulations` are those of runs, sweeps and calibration, and of members of
-    ensembles, by run and start brain; so are `simulated` brains and comparisons, by
-    week. `links` are by file, `chains` by the id of their first brain and their name,
-    `series` and `sweeps` by name.
+    The rows of each table are by their key (see `TABLES`).
     """
 
     config: Config
     brains: Mapping[str, Brain]
     series: Mapping[str, GrowthSeries]
     simulations: Mapping[tuple[str, str], Simulation]
-    simulated: Mapping[tuple[str, str], Mapping[float, MeasuredBrain]]
-    compared: Mapping[tuple[str, str], Mapping[float, Comparison]]
+    simulated: Mapping[tuple[str, str, float], MeasuredBrain]
+    compared: Mapping[tuple[str, str, float], Comparison]
     links: Mapping[str, Link]
     chains: Mapping[tuple[str, str], Chain]
-    sweeps: Mapping[str, Sequence[SweepRun]]
-    calibration: Sequence[CalibrationRun]
-    left_out: Sequence[LeftOut]
-    downloads: Sequence[Download]
+    sweeps: Mapping[tuple[str, str, str], SweepRun]
+    calibration: Mapping[tuple[str, str], CalibrationRun]
+    left_out: Mapping[tuple[str, str], LeftOut]
+    downloads: Mapping[str, Download]
 
     @cached_property
     def run_simulations(self) -> list[Simulation]:
@@ -104,7 +102,20 @@ class Study:
 
     def rows_of(self, simulation: Simulation) -> list[MeasuredBrain]:
         """Return the simulated brains of a simulation, in the order of weeks."""
-        return list(self.simulated[simulation.run, simulation.brain].values())
+        return [self.simulated[*simulation.key, week] for week in simulation.weeks]
+
+    def comparisons(self, simulation: Simulation) -> list[Comparison]:
+        """Return the later weeks of a simulation with an observed brain."""
+        keys = [(*simulation.key, week) for week in simulation.weeks]
+        return [self.compared[key] for key in keys if key in self.compared]
+
+    @cached_property
+    def by_sweep(self) -> dict[str, list[SweepRun]]:
+        """The runs of each sweep, by its name."""
+        runs: dict[str, list[SweepRun]] = {}
+        for row in self.sweeps.values():
+            runs.setdefault(row.sweep, []).append(row)
+        return runs
 
     @property
     def paths(self) -> dict[str, Chain]:
@@ -156,9 +167,9 @@ class Study:
     def observed(self, simulation: Simulation) -> dict[float, Brain]:
         """Return the brain that a simulation is compared with by week."""
         observed = {}
-        for week, row in self.compared[simulation.run, simulation.brain].items():
+        for row in self.comparisons(simulation):
             if row.observed is not None:
-                observed[week] = self.brains[row.observed]
+                observed[row.week] = self.brains[row.observed]
         return observed
 
     def shown(self, simulation: Simulation) -> dict[float, Brain]:
@@ -166,8 +177,8 @@ class Study:
         brain first."""
         start = self.brains[simulation.brain]
         shown = {start.week: start}
-        for week, row in self.compared[simulation.run, simulation.brain].items():
-            shown[week] = self.brains[row.shown]
+        for row in self.comparisons(simulation):
+            shown[row.week] = self.brains[row.shown]
         return shown
 
     @cached_property
@@ -185,7 +196,7 @@ class Study:
         the same for all runs."""
         references = {}
         for simulation in self.validated:
-            for row in self.compared[simulation.run, simulation.brain].values():
+            for row in self.comparisons(simulation):
                 if row.observed is not None:
                     references[row.brain, row.week] = row
         return references
@@ -238,9 +249,7 @@ class Study:
     @cached_property
     def all_measured(self) -> dict[str, MeasuredBrain]:
         """All measured brains by place, including those of further simulations."""
-        rows: dict[str, MeasuredBrain] = {}
-        for weeks in self.simulated.values():
-            rows |= {row.place: row for row in weeks.values()}
+        rows = {row.place: row for row in self.simulated.values()}
         return rows | self.measured
 
     @property
@@ -460,81 +469,57 @@ class Study:
 # the tables on disk
 
 
+@dataclass(frozen=True)
+class Table:
+    """A table of the plan: the class of its rows, and the key of a row in the field of
+    `Study` with the table's name."""
+
+    kind: type
+    key: Callable[[Any], Any]
+
+
+TABLES = {
+    "brains": Table(Brain, attrgetter("id")),
+    "simulations": Table(Simulation, attrgetter("run", "brain")),
+    "simulated": Table(MeasuredBrain, attrgetter("run", "id", "week")),
+    "compared": Table(Comparison, attrgetter("run", "brain", "week")),
+    "links": Table(Link, attrgetter("file")),
+    "chains": Table(Chain, attrgetter("brain", "name")),
+    "series": Table(GrowthSeries, attrgetter("name")),
+    "sweeps": Table(SweepRun, attrgetter("sweep", "member", "brain")),
+    "calibration": Table(CalibrationRun, attrgetter("run", "brain")),
+    "left_out": Table(LeftOut, attrgetter("brain", "why")),
+    "downloads": Table(Download, attrgetter("file")),
+}
+
+
+def study_of(config: Config, rows: Mapping[str, Iterable[Any]]) -> Study:
+    """Return the study with the rows of each table."""
+    tables = {}
+    for name, table in TABLES.items():
+        tables[name] = {table.key(row): row for row in rows[name]}
+    return Study(config, **tables)
+
+
 def write_plan(study: Study, folder: Path) -> None:
     """Write the tables and the configuration of a study, those that have changed."""
-    for name, kind, rows in plan_tables(study):
-        write_rows(folder / f"{name}.csv", kind, rows)
+    for name, table in TABLES.items():
+        rows = getattr(study, name).values()
+        write_rows(folder / f"{name}.csv", table.kind, rows)
     plain = study.config.model_dump(mode="json", exclude_unset=True)
     text = yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
     write_changed(folder / "config.yaml", text)
 
 
-def plan_tables(study: Study) -> list[tuple[str, type, Collection[Any]]]:
-    """Return the name, the class and the rows of each table."""
-    simulated: list[MeasuredBrain] = []
-    for by_week in study.simulated.values():
-        simulated += by_week.values()
-    compared: list[Comparison] = []
-    for comparisons in study.compared.values():
-        compared += comparisons.values()
-    swept: list[SweepRun] = []
-    for runs in study.sweeps.values():
-        swept += runs
-    return [
-        ("brains", Brain, study.brains.values()),
-        ("simulations", Simulation, study.simulations.values()),
-        ("simulated", MeasuredBrain, simulated),
-        ("compared", Comparison, compared),
-        ("links", Link, study.links.values()),
-        ("chains", Chain, study.chains.values()),
-        ("series", GrowthSeries, study.series.values()),
-        ("sweeps", SweepRun, swept),
-        ("calibration", CalibrationRun, study.calibration),
-        ("left_out", LeftOut, study.left_out),
-        ("downloads", Download, study.downloads),
-    ]
-
-
 def read_plan(folder: Path) -> Study:
     """Return the study whose plan is in a folder; InputError if there is none."""
-    brains = {row.id: row for row in read_rows(folder / "brains.csv", Brain)}
-    files: list[str | None] = []
-    for brain in brains.values():
-        files += [*brain.files, *brain.white_files.values(), brain.image]
+    rows: dict[str, list[Any]] = {}
+    for name, table in TABLES.items():
+        rows[name] = read_rows(folder / f"{name}.csv", table.kind)
     # a file of an atlas may be missing
-    context = {"folder": str(folder), "awaited": files}
+    awaited: list[str | None] = []
+    for brain in rows["brains"]:
+        awaited += [*brain.files, *brain.white_files.values(), brain.image]
+    context = {"folder": str(folder), "awaited": awaited}
     plain = read_keys(folder / "config.yaml")
-    config = Config.model_validate(plain, context=context)
-    simulations = {}
-    simulated: dict[tuple[str, str], dict[float, MeasuredBrain]] = {}
-    compared: dict[tuple[str, str], dict[float, Comparison]] = {}
-    for simulation in read_rows(folder / "simulations.csv", Simulation):
-        key = (simulation.run, simulation.brain)
-        simulations[key] = simulation
-        simulated[key] = {}
-        compared[key] = {}
-    for row in read_rows(folder / "simulated.csv", MeasuredBrain):
-        simulated[row.run, row.id][row.week] = row
-    for comparison in read_rows(folder / "compared.csv", Comparison):
-        compared[comparison.run, comparison.brain][comparison.week] = comparison
-    sweeps: dict[str, list[SweepRun]] = {}
-    for run in read_rows(folder / "sweeps.csv", SweepRun):
-        sweeps.setdefault(run.sweep, []).append(run)
-    links = read_rows(folder / "links.csv", Link)
-    chains = read_rows(folder / "chains.csv", Chain)
-    series = read_rows(folder / "series.csv", GrowthSeries)
-    left_out = read_rows(folder / "left_out.csv", LeftOut)
-    return Study(
-        config=config,
-        brains=brains,
-        series={row.name: row for row in series},
-        simulations=simulations,
-        simulated=simulated,
-        compared=compared,
-        links={link.file: link for link in links},
-        chains={(chain.brain, chain.name): chain for chain in chains},
-        sweeps=sweeps,
-        calibration=read_rows(folder / "calibration.csv", CalibrationRun),
-        left_out=left_out,
-        downloads=read_rows(folder / "downloads.csv", Download),
-    )
+    return study_of(Config.model_validate(plain, context=context), rows)

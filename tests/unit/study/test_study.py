@@ -78,7 +78,7 @@ def refusal(brains, **sections):
 def test_the_paper_is_planned_with_the_paper_s_steps_and_ratios():
     found = resolve(load(read_yaml(EXAMPLES / "paper.yaml"), EXAMPLES))
     members = {}
-    for name, rows in found.sweeps.items():
+    for name, rows in found.by_sweep.items():
         members[name] = [
             (row.values, found.simulations[row.run, row.brain].settings) for row in rows
         ]
@@ -121,9 +121,9 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     found = study([*real, twin], ["b22", "b23", "b24"], **asked)
     # a study none of whose runs has a start is none
     assert {
-        name: [row.brain for row in rows] for name, rows in found.sweeps.items()
+        name: [row.brain for row in rows] for name, rows in found.by_sweep.items()
     } == {"thick": ["b21", "b21"]}
-    assert found.sweeps["thick"][0].observed == ("twin",)
+    assert found.by_sweep["thick"][0].observed == ("twin",)
     simulation = found.simulations["reference", "b21"]
     assert found.observed(simulation) == {24: found.brains["twin"]}
     assert (found.norm_reference, found.brains["b21"].regions_of) == (["b21"], None)
@@ -142,7 +142,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     }
     empty = study(real, ["b21"], studies={"thick": varied}, calibrate=search)
     assert empty.run_simulations == empty.norm_reference == [] == list(empty.sweeps)
-    assert empty.calibration == []
+    assert empty.calibration == {}
 
 
 # which real brains a run is compared with

@@ -127,7 +127,7 @@ def test_a_second_hemisphere_is_of_another_series_norm_and_template(side):
         "b",
     ]
     assert sides["right22"] == sides["right23.5"] == []
-    assert other not in str(found.simulated["reference", f"{side}22"][23].parts)
+    assert other not in str(found.simulated["reference", f"{side}22", 23].parts)
 
 
 def test_a_brain_has_white_surfaces_that_are_given_or_follow_from_its_labels():
