@@ -44,8 +44,7 @@ DEEP_AREA_RATIOS = (1.6, 2.0)
 DEEP_MEMORIES_GW = (0.0, 1.0)
 CONTACT_DISTANCES = ((0.05, 0.1), (0.1, 0.2), (0.2, 0.4), (0.4, 0.8))
 """Contact distance as a multiple of the mean edge, at most of a short edge."""
-CONTACT_SLABS = ((4, 1, 0.02), (1, 2, 0.02), (1.5, 2, 0.04), (1.5, 2, 0.02))
-"""Cells, order and growth of a step."""
+CONTACT_CELLS: dict[int, tuple[float, ...]] = {1: (2, 3, 4), 2: (1, 1.5, 2)}
 MAPS = {
     "box of 30 mm": (30.0, 37.7, (10, 16, 24)),
     "folds of 10 mm": (20.0, 10.0, (10, 16, 20, 24, 30)),
@@ -253,9 +252,14 @@ def waves_on_slab(counts: tuple[int, ...], *case: float) -> list[np.ndarray]:
 def deep() -> list[dict]:
     """Fold a slab until its banks press on each other: growth, depth and pressure at
     area ratios, and crossings."""
+    return deep_folds(DEEP_CELLS)
+
+
+def deep_folds(cells_of_order: dict[int, tuple[float, ...]]) -> list[dict]:
+    """Fold slabs of some meshes with each step and memory of stress."""
     found = []
     for memory_gw in DEEP_MEMORIES_GW:
-        for order, counts in DEEP_CELLS.items():
+        for order, counts in cells_of_order.items():
             for growth in DEEP_GROWTH:
                 found += [
                     deep_fold(cells, order, growth, memory_gw) for cells in counts
@@ -264,7 +268,7 @@ def deep() -> list[dict]:
 
 
 def deep_fold(
-    cells: float, order: int, growth_of_step: float, memory_gw: float = 0.0
+    cells: float, order: int, growth_of_step: float, memory_gw: float
 ) -> dict:
     """Return what a slab has at each area ratio, and the CPU seconds of its run."""
     from verification_cases.deep_folds import Slab, at_ratio, folded
@@ -300,14 +304,8 @@ def contact_distance() -> list[dict]:
     for per_mean_edge, per_short_edge in CONTACT_DISTANCES:
         contact.DISTANCE_PER_MEAN_EDGE = per_mean_edge
         contact.DISTANCE_PER_SHORT_EDGE = per_short_edge
-        for slab in CONTACT_SLABS:
-            found.append(
-                {
-                    "per_mean_edge": per_mean_edge,
-                    "per_short_edge": per_short_edge,
-                    **deep_fold(*slab),
-                }
-            )
+        distances = {"per_mean_edge": per_mean_edge, "per_short_edge": per_short_edge}
+        found += [distances | row for row in deep_folds(CONTACT_CELLS)]
     return found
 
 

@@ -93,6 +93,9 @@ a multiple of them."""
 MAX_CHANGE_MM = 0.25
 """Largest change of a shape by smoothing around faults, as a root mean square on the
 boundary: shapes that would change more are followed."""
+REOPENING_ROUNDS = 4
+"""Largest number of rounds in which elements that straightened sides have left flat are
+opened again."""
 HOLDING_MM = (1.0, 1.0, 2.0, 2.0, 4.0, 4.0, 8.0, 16.0, 32.0)
 """Lengths around curved elements that fold over at which the body is held, round by
 round, with the same reach: others may fold over in its turn."""
@@ -341,31 +344,48 @@ class ElasticFit:
         Where elements would be inverted or faces cross on the straight way, the
         displacement is smoothed around them, over lengths that increase. The body
         follows the shape, and is drawn to it, if faults remain, if this changes the
-        shape by more than `MAX_CHANGE_MM`, or if curved elements fold over there.
+        shape by more than `MAX_CHANGE_MM`, or if curved elements fold over there. If
+        that leaves it farther from the shape, it is moved to the smoothed one after
+        all.
         """
-        motion = self._fit(shape, self.positions_mm)
+        start, n_passed = self.positions_mm, len(self._passed)
+        motion = self._fit(shape, start)
         goal = transform_points(shape, motion)
-        untangled, faults = self._untangled(self.positions_mm, goal, UNTANGLING_MM)
+        untangled, faults = self._untangled(start, goal, UNTANGLING_MM)
+        smoothed = None if len(faults) else self._valid_near(untangled)
         changed_mm = rms_length((untangled - goal)[self._used])
-        if not len(faults) and changed_mm <= MAX_CHANGE_MM:
-            start = self.positions_mm
-            opened = self._opened_after(start, untangled)
-            self.positions_mm = opened
-            # linear pieces of valid elements may be inverted
-            if self._make_valid(start):
-                if self.positions_mm is not opened:
-                    # straightened sides may have brought faults onto the way
-                    faults = self._faults_between(start, self.positions_mm)
-                self._moved_straight = not len(faults)
-                return self._move(np.linalg.inv(motion))
-            log.info("curved elements fold over at a shape: the body follows it")
-        else:
-            text = (
-                "after smoothing %d faults remain, and the shape is changed by %.2f mm"
-            )
-            log.info(text + ": the body follows it", len(faults), changed_mm)
-        self.follow(shape)
-        return self.draw(shape[self._used])
+        if smoothed is None or changed_mm > MAX_CHANGE_MM:
+            text = "smoothing leaves %d faults and changes a shape by %.2f mm%s"
+            folds_over = smoothed is None and not len(faults)
+            and_then = "; curved elements fold over" if folds_over else ""
+            log.info(text + ": the body follows it", len(faults), changed_mm, and_then)
+            try:
+                self.follow(shape)
+                followed = self.draw(shape[self._used])
+            except SolverError:
+                if smoothed is None:
+                    raise
+                left_mm = math.inf
+            else:
+                left_mm = rms_length((followed - shape)[self._used])
+            if smoothed is None or left_mm <= changed_mm:
+                return followed
+            log.info("the body is moved to the smoothed shape, which is nearer")
+            del self._passed[n_passed:]
+        self.positions_mm = smoothed
+        # opened elements and straightened sides may have brought faults onto the way
+        self._moved_straight = not len(self._faults_between(start, smoothed))
+        return self._move(np.linalg.inv(motion))
+
+    def _valid_near(self, places: Floats) -> Floats | None:
+        """Return valid positions (n, 3) near given ones, to which the straight way has
+        no more faults; None where curved elements fold over."""
+        start = self.positions_mm
+        self.positions_mm = self._opened_after(start, places)
+        is_valid = self._make_valid(start)
+        found = self.positions_mm if is_valid else None
+        self.positions_mm = start
+        return found
 
     def _untangled(
         self, before: Floats, after: Floats, lengths_mm: Sequence[float]
@@ -521,17 +541,42 @@ class ElasticFit:
                 near = nearness(moved, held, length_mm)[:, None]
                 places = moved + near * (start - moved)
             places = straighten_sides(places, self._tets)
-            is_bad = may_fold_over(places, self._tets)
-            surface = TriangleMesh(places[self._used], self._surface.faces)
-            crossing = faces_that_cross(surface)
-            if not is_bad.any() and not len(crossing):
-                self.positions_mm = places
+            is_fault = self._faults_at(places)
+            if not is_fault.any():
+                self.positions_mm = self._reopened(places)
                 return True
-            bad_places = moved[self._tets[is_bad]].mean(axis=1)
-            crossing_places = moved[self._used[surface.faces[crossing]]].mean(axis=1)
-            held = np.concatenate([held, bad_places, crossing_places])
+            held = np.concatenate([held, moved[is_fault]])
         self.positions_mm = start
         return False
+
+    def _faults_at(self, places: Floats) -> Mask:
+        """Return (n,) whether a vertex belongs to a curved element that may fold over
+        or to a face that crosses another."""
+        is_fault = np.zeros(len(places), dtype=bool)
+        is_fault[self._tets[may_fold_over(places, self._tets)]] = True
+        surface = TriangleMesh(places[self._used], self._surface.faces)
+        crossing = self._surface.faces[faces_that_cross(surface)]
+        is_fault[self._used[crossing]] = True
+        return is_fault
+
+    def _reopened(self, places: Floats) -> Floats:
+        """Return valid positions (n, 3) at which fewer of the elements are flat that
+        straight sides flatten, if there are any.
+
+        Elements that fold over when others are opened, or faces that cross, stay as
+        they are in the valid `places`.
+        """
+        for _ in range(REOPENING_ROUNDS):
+            n_flat = self._flat_count(places)
+            if not n_flat:
+                break
+            opened = straighten_sides(self._opened(places), self._tets)
+            while (is_fault := self._faults_at(opened)).any():
+                opened[is_fault] = places[is_fault]
+            if self._flat_count(opened) >= n_flat:
+                break
+            places = opened
+        return places
 
     def _move(self, motion: NDArray) -> Floats:
         self.positions_mm = transform_points(self.positions_mm, motion)

@@ -141,7 +141,8 @@ def inverted_on_the_way(
 
     The volume of a linear element is a cubic of the way, decided by its Bernstein
     coefficients, else its roots; it must stay above the fraction `least` of that
-    before. Quadratic ones are checked by `lower_bounds` at quarters of the way.
+    before. Quadratic ones are checked by `lower_bounds` at quarters of the way, and
+    for inversion only: their bound depends on how bent their sides are.
     """
     inverted = np.zeros(len(tets), dtype=bool)
     if tets.shape[1] == len(NODES):

@@ -248,6 +248,29 @@ def test_a_shape_that_would_change_much_around_faults_is_followed(
     assert ratios(found).min() > 0.1
 
 
+@pytest.mark.parametrize("is_refused", [False, True])
+def test_a_body_that_stays_behind_when_it_follows_is_moved_to_the_smoothed_shape(
+    monkeypatch, is_refused
+):
+    shape = waves(1.0, 12.0)
+    body = ElasticFit(BODY)
+    untangled, _ = body._untangled(BODY.vertices, shape, (1.0, 2.0, 4.0, 8.0))
+    change_mm = rms_length((untangled - shape)[USED])
+
+    def stay_behind(goal):
+        body._passed.append(goal)
+        body.positions_mm = BODY.vertices + 5.0
+        if is_refused:
+            raise SolverError("a shape cannot be reached")
+
+    monkeypatch.setattr(body, "follow", stay_behind)
+    monkeypatch.setattr(body, "draw", lambda goals: BODY.vertices)
+    found = body.move_to(shape)
+    assert rms_length((BODY.vertices - shape)[USED]) > change_mm
+    assert rms_length((found - shape)[USED]) == pytest.approx(change_mm, abs=0.03)
+    assert body.way_from(BODY.vertices) == []
+
+
 def two_boxes(shift_mm):
     """Return two boxes, the right one shifted along x from where it is 0.5 mm away from
     the left one."""

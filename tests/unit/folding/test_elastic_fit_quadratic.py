@@ -13,7 +13,7 @@ from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.alignment import rigid_fit
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
-from gyriflow.geometry.jacobians import inverted_on_the_way, lower_bounds
+from gyriflow.geometry.jacobians import EDGES, inverted_on_the_way, lower_bounds
 from gyriflow.geometry.paths import path_through
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
@@ -214,3 +214,42 @@ def test_a_path_reports_the_elements_that_it_inverts_between_two_shapes(order):
         [21.0, 22.0, 22.5, 23.0], [*shapes[:2], middle, shapes[2]], mesh, step_gw=0.25
     )
     assert [len(faults) for faults in whole.inverted] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("breaks_another", [False, True])
+def test_flat_elements_between_straight_sides_are_opened(monkeypatch, breaks_another):
+    # a corner inside is moved towards the face opposite to it, with the middles of its
+    # sides
+    inner = np.setdiff1d(BODY.corners, USED)
+    from_middle = np.linalg.norm(BODY.vertices[inner], axis=1)
+    centre, other = inner[[from_middle.argmin(), from_middle.argmax()]]
+    around = BODY.tets[(BODY.corners == centre).any(axis=1)]
+    opposite = np.setdiff1d(around[0, :4], centre)
+    places = BODY.vertices.copy()
+    face = places[opposite].mean(axis=0)
+    places[centre] = face + 0.05 * (places[centre] - face)
+    places[around[:, 4:]] = places[around[:, EDGES]].mean(axis=2)
+    body = ElasticFit(BODY)
+    pieces = linear_pieces(BODY)
+
+    def least_ratio(positions):
+        ratios = volumes_between(positions, pieces) / volumes_between(
+            BODY.vertices, pieces
+        )
+        return ratios.min()
+
+    assert least_ratio(places) == pytest.approx(0.05)
+    if breaks_another:
+        find_opened = body._opened
+
+        def opened_elsewhere_broken(positions):
+            opened = find_opened(positions).copy()
+            opened[other] += [3.0, 0.0, 0.0]
+            return opened
+
+        monkeypatch.setattr(body, "_opened", opened_elsewhere_broken)
+    body.positions_mm = places
+    assert body._make_valid(BODY.vertices)
+    assert least_ratio(body.positions_mm) > 0.15
+    assert folded_over(body.positions_mm) == 0
+    assert body.positions_mm[other] == pytest.approx(places[other])
