@@ -20,7 +20,6 @@ from snakemake.settings.types import (
     StorageSettings,
     WorkflowSettings,
 )
-
 from snakemake_interface_executor_plugins.settings import ExecMode
 
 from gyriflow.running.launch import DRY_RUN_VAR, LAUNCHED_VAR
