@@ -1,10 +1,10 @@
-"""Measure how long a study of many brains takes to plan: its check, a dry run, and the
-start of one of its jobs.
+"""Measure how long a study of many brains takes to plan: its tables, a dry run, the
+start of one of its jobs, and with `--check` its check.
 
-    ./run python benchmarks/planning.py [--brains 10 100 1000] [--out FOLDER]
+    ./run python benchmarks/planning.py [--brains 10 100 1000] [--check] [--out FOLDER]
 
 Each brain is a link to one shipped label volume, each a subject of its own that is
-measured. The first check reads the volumes. Times are CPU seconds of all processes. The
+measured. A check reads the volumes. Times are CPU seconds of all processes. The
 last line is one JSON object.
 """
 

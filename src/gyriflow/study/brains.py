@@ -184,9 +184,11 @@ def comparable(brain: Brain, brains: Iterable[Brain]) -> list[Brain]:
 
 def label_scheme(config: Config, name: str | None) -> LabelScheme:
     """Return a label scheme by name; KeyError if there is none."""
-    if str(name) not in config.schemes:
-        return SCHEMES[str(name)]
-    return LabelScheme(name=str(name), **config.schemes[str(name)].model_dump())
+    key = str(name)
+    if key not in config.schemes:
+        return SCHEMES[key]
+    settings = config.schemes[key].model_dump()
+    return LabelScheme(name=key, **settings)
 
 
 def label_source(config: Config, brain: Brain) -> LabelSource | None:
