@@ -89,11 +89,11 @@ PARAMETERS = {
     "thickness_mm": THICKNESS_MM,
     "shear_modulus_cortex_pa": 1500.0,
     "shear_modulus_core_pa": 300.0,
-    "contact": {"kind": "global"},
+    "contact": "global",
     "fissure_x_mm": 0.0,
     "growth_rate_per_s": 2.0e-7,
     "support": "free",
-    "no_growth": {"kind": "none"},
+    "no_growth": "none",
     "fields": ["displacement"],
 }
 COMPARED = (
@@ -170,7 +170,6 @@ def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
         surface,
         surface_edge_mm=spacing_mm,
         core_edge_mm=CORE_FACTOR * spacing_mm,
-        envelope_mm=0.1,
         time_limit_s=1800,
         mesher="tetgen",
         order=case.order,

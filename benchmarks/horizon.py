@@ -261,10 +261,7 @@ def main() -> None:
     ]
     result = {
         "source": "benchmarks/horizon.py",
-        "references": [
-            f"{paper['citation']}, {paper.get('doi') or paper['url']}"
-            for paper in references
-        ],
+        "references": references,
         "note": NOTE,
         "mesh": {"order": 1, "surface_edge_mm": arguments.edge, "elements": elements},
         "rows": found,

@@ -95,13 +95,9 @@ def main() -> None:
     if arguments.before:
         runs = {"before": (arguments.before, values), "now": (ROOT, values)}
     elif arguments.tolerances:
-        solvers = {
-            value: values["solver"] | {"newton_tolerance": value}
-            for value in arguments.tolerances
-        }
         runs = {
-            f"{value:g}": (ROOT, values | {"solver": solver})
-            for value, solver in solvers.items()
+            f"{value:g}": (ROOT, values | {"newton_tolerance": value})
+            for value in arguments.tolerances
         }
     else:
         runs = {

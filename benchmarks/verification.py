@@ -135,9 +135,9 @@ def ranks() -> dict:
     linear, quadratic = hemisphere(8), rounded(hemisphere(4))
     runs = {
         "tight": (linear, {}),
-        "usual": (linear, {"solver": {}}),
+        "usual": (linear, {"newton_tolerance": 1e-4}),
         "quadratic_tight": (quadratic, {}),
-        "quadratic_usual": (quadratic, {"solver": {}}),
+        "quadratic_usual": (quadratic, {"newton_tolerance": 1e-4}),
     }
     return {
         name: folded(half, 4, stress_memory_gw=1.0, **changes)[0].positions

@@ -14,7 +14,7 @@ RUN = {
     "output_weeks": [21.0, 22.0],
     "fissure_x_mm": CENTRE_MM[0],
     "thickness_mm": 4.0,
-    "contact": {"kind": "planes"},
+    "contact": "planes",
 }
 GAP_MM = 8.0
 """Width of its fissure."""

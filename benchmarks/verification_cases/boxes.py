@@ -33,7 +33,7 @@ def slab_parameters(contrast: float, growth: float, **more: Any) -> FoldingParam
         "growth_rate_per_s": RATE_PER_S,
         "step_s": growth / RATE_PER_S,
         "support": "free",
-        "no_growth": {"kind": "none"},
+        "no_growth": "none",
     }
     return parameters_from(values | more)
 

@@ -58,7 +58,7 @@ class Slab:
             fissure_x_mm=0.0,
             core_growth_rate_per_s=RATE_PER_S,
             stress_memory_gw=self.memory_gw,
-            contact={"kind": self.contact},
+            contact=self.contact,
         )
 
 

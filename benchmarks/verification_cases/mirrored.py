@@ -1,11 +1,13 @@
 """Fold two hemispheres that are mirror images: the result must stay symmetric."""
 
 from dataclasses import dataclass
+from unittest import mock
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from gyriflow.folding import zones as zones_module
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones, zones_of_run
@@ -26,6 +28,12 @@ MIDDLE_MM = 7.5
 GAP_MM = 1.9
 """Width of the fissure for the contact planes, which the hemispheres almost touch at
 the start."""
+CLAMPED_BELOW = {
+    "ELLIPSOID_SHIFT": (0.0, 0.0, -0.5),
+    "ELLIPSOID_SEMI_AXES": (0.6, 0.45, 0.25),
+}
+"""The ellipsoid without growth at the bottom, so that growth pushes the hemispheres
+against the planes."""
 STEP_S = 86_400.0
 TURNED = {1: [0, 1, 3, 2], 2: [0, 1, 3, 2, 4, 8, 7, 6, 5, 9]}
 """An element's nodes, by its order, after exchanging corners 2 and 3."""
@@ -115,10 +123,8 @@ def parameters(**changes) -> FoldingParameters:
         "step_s": STEP_S,
         "thickness_mm": 2.5,
         "core_growth_rate_per_s": 1e-7,
-        "contact": {"kind": "planes"},
-        # clamped below, so that growth pushes the hemispheres against the planes
-        "no_growth": {"shift": [0.0, -0.5], "semi_axes": [0.6, 0.45, 0.25]},
-        "solver": {"newton_tolerance": 1e-12},
+        "contact": "planes",
+        "newton_tolerance": 1e-12,
     }
     return parameters_from(values | changes)
 
@@ -142,7 +148,8 @@ def folded(
     some steps."""
     mesh = reflected_and_merged(half)
     p = parameters(**changes)
-    zones = zones_of_run(mesh, p, GAP_MM)
+    with mock.patch.multiple(zones_module, **CLAMPED_BELOW):
+        zones = zones_of_run(mesh, p, GAP_MM)
     folding = Folding(comm, mesh, zones, p)
     state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
     for _ in range(steps):

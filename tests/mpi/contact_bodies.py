@@ -107,8 +107,8 @@ def closing_sulcus(kind, comm=COMM, support="box", **changes):
             "thickness_mm": 2.0,
             "growth_rate_per_s": 1e-6,
             "support": "free",
-            "contact": {"kind": kind},
-            "no_growth": {"kind": "none"},
+            "contact": kind,
+            "no_growth": "none",
         }
         | changes
     )

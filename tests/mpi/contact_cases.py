@@ -134,7 +134,7 @@ def test_a_surface_that_crosses_itself_is_refused():
         mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets
     )
     facets, _ = boundary_faces(mesh)
-    with pytest.raises(MeshError, match=r"mesh\.envelope_mm"):
+    with pytest.raises(MeshError, match=r"mesh\.surface_edge_mm"):
         SelfContact(Domain(COMM, mesh), facets, 1000.0, 0.2)
 
 

@@ -122,7 +122,7 @@ def test_a_solve_that_takes_too_many_iterations_raises_an_error():
         solved(problem, newton_tolerance=1e-9, krylov_tolerance=1e-8, max_krylov=2)
 
 
-TIGHT = {"solver": {"newton_tolerance": 1e-9}}
+TIGHT = {"newton_tolerance": 1e-9}
 
 
 def counted(monkeypatch, problem):

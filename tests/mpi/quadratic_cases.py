@@ -163,7 +163,7 @@ def test_inner_sides_that_bow_are_straightened_unless_stress_is_kept(memory_gw):
         0.01,
         stress_memory_gw=memory_gw,
         fissure_x_mm=0.0,
-        contact={"kind": "global"},
+        contact="global",
     )
     state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
     after = Folding(COMM, mesh, zones_of(mesh, at_the_bottom), p).step(state, p.step_s)

@@ -37,7 +37,7 @@ from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
 
 DAY_S = 86_400.0
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
-TIGHT = {"solver": {"newton_tolerance": 1e-11}}
+TIGHT = {"newton_tolerance": 1e-11}
 
 
 def bent(week):
@@ -60,8 +60,8 @@ def towards(targets, mesh=BODY, **changes):
     }
     settings = {
         "support": "free",
-        "no_growth": {"kind": "none"},
-        "contact": {"kind": "none"},
+        "no_growth": "none",
+        "contact": "none",
         "thickness_mm": 4.0,
     }
     uniform = {
@@ -272,7 +272,7 @@ def test_growth_and_positions_hardly_depend_on_the_time_step():
 
 @pytest.mark.one_rank
 def test_a_body_that_is_held_misses_its_target_and_says_so():
-    clamped = {"support": "ellipsoid", "no_growth": {"kind": "none"}}
+    clamped = {"support": "ellipsoid", "no_growth": "none"}
     folding, state = towards({23.0: BODY.vertices * 1.2}, **clamped)
     rows = after_steps(folding, state, 3).rows
     assert missed_targets(rows) == []
@@ -396,8 +396,8 @@ def following(growth):
     }
     weeks |= {
         "support": "free",
-        "no_growth": {"kind": "none"},
-        "contact": {"kind": "none"},
+        "no_growth": "none",
+        "contact": "none",
         "thickness_mm": 4.0,
     }
     start = GrowthInputs(mesh, zones_of_run(mesh, parameters_from(weeks)), {}).size(

@@ -29,7 +29,7 @@ BASE = {
     "fissure_x_mm": 0.0,
     "thickness_mm": 3.0,
     "step_s": 151200.0,
-    "contact": {"kind": "planes"},
+    "contact": "planes",
 }
 # sizes alone do not tell the rate from the thickness: a thinner cortex that grows
 # faster comes to the same

@@ -36,7 +36,7 @@ def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(
     path, axes = tmp_path / "curved.xdmf", (20.0, 26.0, 18.0)
     write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, axes), ellipsoid(axes)))
     fields = ["displacement", "cortex_weight", "stress", "strain"]
-    settings = {"solver": TIGHT, "stress_memory_gw": 1.0, "fields": fields}
+    settings = {**TIGHT, "stress_memory_gw": 1.0, "fields": fields}
     assert fold(path, tmp_path / "three", 3, **settings).returncode == 0
     mesh, p = read_tetrahedral_mesh(path), parameters_from(WEEK | settings)
     zones = zones_of_run(mesh, p)
@@ -73,7 +73,7 @@ def long_run(mesh, tmp_path_factory):
     """A run of so many steps that it does not end before it is killed,
     uninterrupted."""
     out = tmp_path_factory.mktemp("long") / "out"
-    done = fold(mesh, out, solver=TIGHT, step_s=MANY_STEPS)
+    done = fold(mesh, out, **TIGHT, step_s=MANY_STEPS)
     assert done.returncode == 0, done.stdout + done.stderr
     return out
 
@@ -96,11 +96,9 @@ def test_a_killed_run_resumes_and_ends_like_an_uninterrupted_one(
     mesh, long_run, tmp_path, first, then
 ):
     out = tmp_path / "out"
-    printed = killed_after(
-        3, command(mesh, out, first, solver=TIGHT, step_s=MANY_STEPS)
-    )
+    printed = killed_after(3, command(mesh, out, first, **TIGHT, step_s=MANY_STEPS))
     assert not (out / "frames.h5").exists(), printed
-    again = fold(mesh, out, then, solver=TIGHT, step_s=MANY_STEPS)
+    again = fold(mesh, out, then, **TIGHT, step_s=MANY_STEPS)
     assert again.returncode == 0, again.stderr
     resumed = read_json(out / "summary.json")["resumed_after_step"]
     assert resumed >= 3
@@ -146,7 +144,7 @@ def test_the_last_good_state_of_a_failed_run_serves_an_earlier_end(
     zones = zones_of_run(brain, parameters)
     with pytest.raises(
         SolverError,
-        check=Facts("no way on", "folding.end_week", "folding.solver.max_halvings"),
+        check=Facts("no way on", "folding.end_week", "folding.max_halvings"),
     ):
         run(MPI.COMM_SELF, brain, zones, parameters, {}, tmp_path)
     key = run_key(brain, parameters, {})

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def tight_run(mesh, tmp_path_factory):
     out = tmp_path_factory.mktemp("tight") / "out"
-    done = fold(mesh, out, solver=TIGHT)
+    done = fold(mesh, out, **TIGHT)
     assert done.returncode == 0, done.stdout + done.stderr
     return out
 
@@ -113,7 +113,7 @@ def test_ziglang_compiles_forms_and_c_code_where_there_is_no_compiler(
     environment = {
         name: value for name, value in os.environ.items() if name != "CC"
     } | without_cc
-    program = command(mesh, tmp_path / "out", solver=TIGHT)
+    program = command(mesh, tmp_path / "out", **TIGHT)
     done = ran(*program, env=environment, timeout_s=900)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "cache" / "zig").is_dir()
@@ -183,7 +183,7 @@ def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     hard = {
         "growth_rate_per_s": 1e-5,
         "step_s": 86400.0,
-        "solver": {"max_halvings": 0},
+        "max_halvings": 0,
         "program": IMPATIENT,
     }
     done = fold(mesh, tmp_path / "out", 2, **hard)
@@ -209,7 +209,7 @@ def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_p
         out = tmp_path / f"out{ranks}"
         settings = {
             "thickness_mm": {"map": "thickness_mm"},
-            "solver": TIGHT,
+            **TIGHT,
             "fields": ["cortex_weight"],
         }
         call = [

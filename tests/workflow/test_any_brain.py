@@ -124,7 +124,8 @@ def alone(side, change):
     def made(folder, name):
         entry = labelled(change)(folder, name)
         return {
-            "hemisphere": {"file": entry["labels"], "side": side},
+            "labels": entry["labels"],
+            "side": side,
             "scheme": entry["scheme"],
         }
 

@@ -59,7 +59,7 @@ def cohort(checkout_copy, tmp_path_factory):
         "folding": {
             "end_week": 23,
             "step_s": 302400,
-            "solver": {"newton_tolerance": 1e-4},
+            "newton_tolerance": 1e-4,
         },
     }
     name = workflow.write("study.yaml", config)

@@ -61,7 +61,7 @@ PREDICTIONS = {
     "start": "own22",
     "folding": {"end_week": 23, "preset": "expected"},
     "runs": {"expected": {"ensemble": 3}, "plain": {"preset": "fetalfoldsim"}},
-    "metrics": {"regions": {"own22": {"volume": LABELS, "names": {5: "cortex"}}}},
+    "metrics": {"regions": {"own22": {"labels": LABELS, "names": {5: "cortex"}}}},
 }
 PREDICTION = {
     "brains": [*brains_of("own", 22.4), *brains_of("atlas", 21, 22, 23, 24)],

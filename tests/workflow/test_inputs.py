@@ -51,7 +51,7 @@ def jobs(planned):
     """Brains of four weeks, the first folded, beside a sweep; the third has regions, to
     the second maps are brought."""
     brains = population("b", 21, 22, 23, 24)
-    regions = {"b23": {"volume": brains[0]["labels"], "names": {1: "frontal"}}}
+    regions = {"b23": {"labels": brains[0]["labels"], "names": {1: "frontal"}}}
     sweep = {
         "base": "reference",
         "vary": {"thickness_mm": [1.0, 2.0]},

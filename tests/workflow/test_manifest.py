@@ -18,8 +18,8 @@ from .conftest import SMALL_STUDY, Workflow, labelled
 pytestmark = pytest.mark.slow
 
 REGIONS = {
-    side: {"labels": f"{side}.label.gii", "surface": f"{side}.surf.gii"}
-    for side in SIDES
+    "labels": [f"{side}.label.gii" for side in SIDES],
+    "surface": [f"{side}.surf.gii" for side in SIDES],
 }
 STUDY = {
     "brains": [{"id": "a", "week": 21, **labelled(21)}],
@@ -36,9 +36,9 @@ def made(checkout_copy, tmp_path_factory):
     """The brain's study, which counts as made."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("manifest") / "study")
     workflow.directory.mkdir()
-    for side, files in REGIONS.items():
-        for kind, name in files.items():
-            (workflow.directory / name).write_text(f"{kind} of {side}")
+    for files in REGIONS.values():
+        for name in files:
+            (workflow.directory / name).write_text(f"content of {name}")
     workflow.write("study.yaml", STUDY)
     workflow.lay_out(*CONFIGURED)
     workflow.count_as_made("--forceall", *CONFIGURED)
@@ -116,12 +116,11 @@ def test_exchanged_files_of_the_two_sides_run_again_what_reads_them(
 ):
     shutil.copytree(made.directory, tmp_path / "study")
     workflow = Workflow(made.checkout, tmp_path / "study")
-    left, right = REGIONS.values()
     if how == "files":
-        for kind in left:
-            exchange(workflow.directory / left[kind], workflow.directory / right[kind])
+        for left, right in REGIONS.values():
+            exchange(workflow.directory / left, workflow.directory / right)
     else:
-        regions = {"a": {"left": right, "right": left}}
+        regions = {"a": {kind: files[::-1] for kind, files in REGIONS.items()}}
         change(workflow, {"metrics": {"regions": regions}})
     assert steps(workflow, "given_regions", "measure") == {"given_regions": 1}
 

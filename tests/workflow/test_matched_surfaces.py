@@ -75,10 +75,8 @@ def write_study(workflow, hemispheres, kind="hemispheres") -> str:
             write_surface(
                 workflow.directory / files[side], TriangleMesh(vertices, faces)
             )
-        one = {"file": files["left"], "side": "left"}
-        source = (
-            {"hemispheres": files} if kind == "hemispheres" else {"hemisphere": one}
-        )
+        one = {"pial": files["left"], "side": "left"}
+        source = {"hemispheres": files} if kind == "hemispheres" else one
         brains.append(
             {
                 "id": f"b{week}",

@@ -25,9 +25,7 @@ STUDY = {
     "mesh": COARSE | {"surface_edge_mm": 2.8, "max_surface_distance_mm": 1.5},
     "growth": {"brains": {"atlas": ["a21", "a22", "a23"]}},
     "folding": {"end_week": 23},
-    "runs": {
-        "expected": {"preset": "expected", "contact": {"kind": "none"}, "ranks": 1}
-    },
+    "runs": {"expected": {"preset": "expected", "contact": "none", "ranks": 1}},
 }
 
 

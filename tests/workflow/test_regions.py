@@ -39,7 +39,7 @@ STUDY = {
         "white_surfaces": "all",
         "regions": {
             "p22": {
-                "volume": "regions.nii.gz",
+                "labels": "regions.nii.gz",
                 "names": {1: "front", 2: "front", 3: "back", 4: "back"},
             }
         },

@@ -21,7 +21,7 @@ STUDY = {
         "step_s": 86400,
         "ranks": 1,
         "thickness_mm": 3.0,
-        "contact": {"kind": "planes"},
+        "contact": "planes",
     },
 }
 
@@ -43,7 +43,7 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
     rates = {
         "base": "reference",
         "vary": {"growth_rate_per_s": [1.0e-7, 1.0e-5]},
-        "fixed": {"solver.max_halvings": 0},
+        "fixed": {"max_halvings": 0},
         "compare_week": 28,
     }
     brains = ellipsoids(27, [28, 36, 25], [29, 37, 26])

@@ -1,21 +1,16 @@
 # Growth rates of the cortex, from the areas of the brains' pial surfaces over the weeks.
-FOLLOWS_THICKNESS = any(run.growth.thickness_mm == "measured" for run in CONFIG.runs.values())
-# brains whose cortical thickness gives a curve that a run follows
-WITH_THICKNESS = [brain.id for _, brain in study.growth_brains if FOLLOWS_THICKNESS and brain.thickness]
 
 
 rule growth_rates:
     input:
         whole=[brain.pial for _, brain in study.growth_brains],
         reports=[brain.report for _, brain in study.growth_brains],
-        thickness=expand(THICKNESS["summary"], brain=WITH_THICKNESS),
     output:
         **GROWTH,
     params:
         series=[series for series, _ in study.growth_brains],
         brains=[brain.id for _, brain in study.growth_brains],
         with_rates=[series.name for series in study.series.values() if series.has_rates],
-        with_thickness=WITH_THICKNESS,
         weeks=[brain.week for _, brain in study.growth_brains],
     script:
         "../scripts/growth_rates.py"

@@ -18,7 +18,7 @@ from gyriflow.step import step
 files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
 
 
-def surfaces_at_week(regions, frames):
+def _surfaces_at_week(regions, frames):
     """Return the pial surfaces of a simulation at the week of the comparison: the
     whole, left and right."""
     return folded_surfaces(read_regions(regions), read_positions(frames, params.week))
@@ -34,7 +34,7 @@ with step(snakemake.log[0]):
     radius_mm = params.settings["curvature_radius_mm"]
     # a diverged run has not reached the week
     simulated = (
-        [] if causes else list(map(surfaces_at_week, files.regions, files.frames))
+        [] if causes else list(map(_surfaces_at_week, files.regions, files.frames))
     )
 
     def pair_up(simulations, observed):

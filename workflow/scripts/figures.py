@@ -24,21 +24,21 @@ from gyriflow.step import step
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 
 
-def read_parameters(path):
+def _read_parameters(path):
     """Return the parameters of a run."""
     return parameters_from(read_yaml(path))
 
 
-def read_boundary(path):
+def _read_boundary(path):
     """Return the boundary of a run's start mesh, and the tags of its faces by name."""
     regions = read_regions(path)
     return TriangleMesh(regions.mesh.vertices, regions.facets), regions.facet_tags
 
 
-def read_elements(frames):
+def _read_elements(frames):
     """Return the elements of a run, and the fields of the model at its first and last
     week."""
-    parameters = read_parameters(files.parameters)
+    parameters = _read_parameters(files.parameters)
     weeks = read_weeks(frames)
     mesh = TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames))
     zones = zones_of_run(mesh, parameters)
@@ -56,11 +56,11 @@ def read_ages(path):
 
 READERS = {
     "ages": read_ages,
-    "boundary": read_boundary,
-    "elements": read_elements,
+    "boundary": _read_boundary,
+    "elements": _read_elements,
     "frames": read_pial_frames,
     "growth": read_vertex_maps,
-    "parameters": read_parameters,
+    "parameters": _read_parameters,
     "published": read_yaml,
     "quality": read_json,
 }

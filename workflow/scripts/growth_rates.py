@@ -3,7 +3,6 @@ their weeks."""
 
 import pandas as pd
 
-from gyriflow.anatomy.plausible import logged, thickness_jumps
 from gyriflow.geometry.triangles import area_cm2, volume_ml
 from gyriflow.growth.rates import TISSUES, rates_of_series
 from gyriflow.io.files import read_json, write_table
@@ -11,25 +10,13 @@ from gyriflow.io.surfaces import read_surface
 from gyriflow.step import step
 
 files, params, output = snakemake.input, snakemake.params, snakemake.output
-thickness = dict(zip(params.with_thickness, files.thickness, strict=True))
 with step(snakemake.log[0]):
     areas = pd.DataFrame(
         {"series": params.series, "subject": params.brains, "week": params.weeks}
     )
     surfaces = [read_surface(file) for file in files.whole]
     areas["area_cm2"] = list(map(area_cm2, surfaces))
-    areas["thickness_mm"] = areas["subject"].map(
-        {name: read_json(path)["mean_mm"] for name, path in thickness.items()}
-    )
     areas["volume_ml"] = list(map(volume_ml, surfaces))
-    for _, brains in areas.groupby("series", sort=False):
-        logged(
-            thickness_jumps(
-                brains[["subject", "week", "thickness_mm"]].itertuples(
-                    index=False, name=None
-                )
-            )
-        )
     tissues = [
         read_json(report).get("label_volumes_mL", {}) for report in files.reports
     ]

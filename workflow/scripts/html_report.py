@@ -32,16 +32,16 @@ TABLES = (
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 
 
-def read_caption(path):
+def _read_caption(path):
     """Return title and caption of a figure; the title is underlined."""
     title, _, caption = read_text(path).split("\n", 2)
     return {"title": title, "caption": caption.strip()}
 
 
-CAPTIONS = {Path(path).stem: read_caption(path) for path in files.captions}
+CAPTIONS = {Path(path).stem: _read_caption(path) for path in files.captions}
 
 
-def with_content(figures):
+def _with_content(figures):
     """Return the figures and tables of a page with their title, caption and content."""
     figures = [figure | CAPTIONS[figure["name"]] for figure in figures]
     paths = [figure["path"] for figure in figures]
@@ -75,7 +75,9 @@ with step(snakemake.log[0]):
     for path, (name, figures) in zip(
         output.brains, params.brain_figures.items(), strict=True
     ):
-        page = brain_page(brains[name], tables, with_content(figures), norm=params.norm)
+        page = brain_page(
+            brains[name], tables, _with_content(figures), norm=params.norm
+        )
         write_text(path, report_page(template, parts, {"groups": []}, **origin, **page))
     small = dict(
         zip(
@@ -92,7 +94,7 @@ with step(snakemake.log[0]):
         )
         prediction = prediction | {"accuracy": accuracy, "tests": tests}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
-    page = study_page(params.brains, tables, with_content(params.figures), **about)
+    page = study_page(params.brains, tables, _with_content(params.figures), **about)
     runs, observed = params.surfaces["runs"], params.surfaces["observed"]
     runs = {run: read_weeks(weeks) for run, weeks in runs.items()}
     view = surfaces_view(runs, read_weeks(observed), observed_name=params.observed_name)

@@ -27,7 +27,7 @@ files, output, params = snakemake.input, snakemake.output, snakemake.params
 LEFT_OUT = ("logs", "benchmarks", FOLDER, "provenance.json")
 
 
-def results_in(folder):
+def _results_in(folder):
     """Return the fingerprints of the results in a folder."""
     return fingerprints(files_in(folder, *LEFT_OUT), recorded_results(folder))
 
@@ -58,7 +58,7 @@ with step(snakemake.log[0]):
         record = {
             "configuration": brain,
             "inputs": inputs[brain["id"]],
-            "results": results_in(Path(path).parent),
+            "results": _results_in(Path(path).parent),
         }
         write_json(path, used | record)
     runs = []
@@ -79,7 +79,7 @@ with step(snakemake.log[0]):
         record = {
             "configuration": settings,
             "inputs": start | inputs[brain],
-            "results": results_in(folder),
+            "results": _results_in(folder),
         }
         write_json(path, used | record)
         runs.append(settings | {"growth_of": growth_of, "summary": read_json(summary)})
@@ -98,6 +98,6 @@ with step(snakemake.log[0]):
     record = {
         "configuration": params.config,
         "inputs": inputs,
-        "results": results_in(Path(output.study).parent),
+        "results": _results_in(Path(output.study).parent),
     }
     write_json(output.study, used | record)

@@ -28,7 +28,7 @@ def prepared(name, number):
     )
 
 
-def simple_models():
+def _simple_models():
     """Yield for each week the predictions without mechanics, the same for all runs from
     a start brain."""
     targets = read_weekly_shapes(files.targets)
@@ -53,7 +53,7 @@ with step(snakemake.log[0]):
     if params.get("of_atlas"):
         models = {
             week: models[week] | simple
-            for week, simple in zip(models, simple_models(), strict=True)
+            for week, simple in zip(models, _simple_models(), strict=True)
         }
     observed = {}
     for number, week in enumerate(params.weeks):

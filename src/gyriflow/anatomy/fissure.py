@@ -196,14 +196,15 @@ def _middles(
 def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
     """Return the smallest (4, 4) rotation about `centre` to a plane x = const, and its
     degrees; none below 0.5°."""
-    angle = float(np.degrees(np.arccos(np.clip(plane.normal[0], -1.0, 1.0))))
+    cosine = np.clip(plane.normal[0], -1.0, 1.0)
+    angle = float(np.degrees(np.arccos(cosine)))
     if angle < MIN_TILT_DEG:
         return np.eye(4), 0.0
     axis = np.cross(plane.normal, [1.0, 0.0, 0.0])
-    turn = Rotation.from_rotvec(
-        np.radians(angle) * axis / np.linalg.norm(axis)
-    ).as_matrix()
-    return motion(turn, centre - turn @ centre), angle
+    rotation = np.radians(angle) * axis / np.linalg.norm(axis)
+    turn = Rotation.from_rotvec(rotation).as_matrix()
+    shift = centre - turn @ centre
+    return motion(turn, shift), angle
 
 
 def _symmetry_planes(
@@ -394,10 +395,12 @@ def side_distance(
 def _signed_distance(mask: Mask, size: Floats) -> Floats:
     """Return each voxel's distance (mm) from the border of a mask, half a voxel from
     its voxels; negative outside."""
-    inside, outside = (
-        ndimage.distance_transform_edt(part, sampling=size) for part in (mask, ~mask)
-    )
-    return np.asarray(inside - outside - 0.5 * size.mean() * np.where(mask, 1.0, -1.0))
+    inside = ndimage.distance_transform_edt(mask, sampling=size)
+    outside = ndimage.distance_transform_edt(~mask, sampling=size)
+    sign = np.where(mask, 1.0, -1.0)
+    half_voxel = 0.5 * size.mean() * sign
+    distance = inside - outside - half_voxel
+    return np.asarray(distance)
 
 
 def hidden_fissure(
@@ -490,17 +493,21 @@ def plane_between_labels(
     """Fit a plane half-way between (i, j, k) labels of unequal sides, in and around a
     brain."""
     size = np.linalg.norm(affine[:3, :3], axis=0)
-    to_left, to_right = (
-        ndimage.distance_transform_edt(~side, sampling=size) for side in (left, right)
-    )
+    to_left = ndimage.distance_transform_edt(~left, sampling=size)
+    to_right = ndimage.distance_transform_edt(~right, sampling=size)
     side = to_left - to_right
-    near = ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
-    places = transform_points(np.argwhere(near & (np.abs(side) < size.max())), affine)
+    to_brain = ndimage.distance_transform_edt(~brain, sampling=size)
+    near = to_brain < MARGIN_MM
+    is_between = near & (np.abs(side) < size.max())
+    places = transform_points(np.argwhere(is_between), affine)
     centre = places.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov(places.T))
     normal = axes[:, 0]
-    heights = (transform_points(np.argwhere(near), affine) - centre) @ normal
-    normal = normal * np.sign(np.corrcoef(heights, side[near])[0, 1])
+    # the normal points to where the right side is nearer
+    around = transform_points(np.argwhere(near), affine)
+    heights = (around - centre) @ normal
+    towards_right = np.corrcoef(heights, side[near])[0, 1]
+    normal = normal * np.sign(towards_right)
     return MidPlane(normal, float(normal @ centre), float("nan"), len(places))
 
 

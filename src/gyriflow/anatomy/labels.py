@@ -322,44 +322,57 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     if np.isin(labels, scheme.ventricles).any() or 2 * margin > max(labels.shape):
         return filled
     (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
-    numbers, tissue = np.pad(labels[box], margin), np.pad(cerebrum[box], margin)
-    near = ndimage.distance_transform_edt(~tissue, sampling=size) <= CLOSING_MM
-    closed = ndimage.distance_transform_edt(near, sampling=size) > CLOSING_MM
+    numbers = np.pad(labels[box], margin)
+    tissue = np.pad(cerebrum[box], margin)
+
+    # the cerebrum without its openings
+    to_tissue = ndimage.distance_transform_edt(~tissue, sampling=size)
+    near = to_tissue <= CLOSING_MM
+    to_border = ndimage.distance_transform_edt(near, sampling=size)
+    closed = to_border > CLOSING_MM
+    inside = ndimage.binary_fill_holes(closed | tissue)
+
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
-    clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
-    hit_share = _ray_share(
-        clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * RAY_SMOOTHING
-    )
-    number, _ = ndimage.label(
-        clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)),
-        extraction.OUTSIDE,
-    )
+    clear = inside & ~tissue & ~hindbrain
+    cortex = np.isin(numbers, scheme.cortex)
+    inner_tissue = tissue & ~cortex
+    hit_share = _ray_share(clear, inner_tissue, 0.5 * RAY_SMOOTHING)
+    needed = ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX
+    is_enclosed = clear & (hit_share > needed)
+    number, _ = ndimage.label(is_enclosed, extraction.OUTSIDE)
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
-    enclosed = np.isin(
-        number, np.flatnonzero(sizes >= max(1, MIN_PART_SHARE * sizes.max())) + 1
-    )
+    smallest = max(1, MIN_PART_SHARE * sizes.max())
+    large = np.flatnonzero(sizes >= smallest) + 1
+    enclosed = np.isin(number, large)
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
-        filled[box] = enclosed[(slice(margin, -margin),) * 3]
+        without_margin = (slice(margin, -margin),) * 3
+        filled[box] = enclosed[without_margin]
     return filled
 
 
 def _ray_share(
     clear: Mask, tissue: Mask, smoothing_voxels: float
 ) -> NDArray[np.float32]:
-    pad = np.pad(clear, 1), np.pad(tissue, 1)
-    start = np.argwhere(pad[0])
+    is_clear = np.pad(clear, 1)
+    is_tissue = np.pad(tissue, 1)
+    start = np.argwhere(is_clear)
     hits = np.zeros(len(start), dtype=np.int32)
     for direction in DIRECTIONS:
-        places, rows = start + direction, np.arange(len(start))
+        places = start + direction
+        rows = np.arange(len(start))
         while len(rows):
             index = tuple(places.T)
-            hits[rows[pad[1][index]]] += 1
-            on = pad[0][index]
-            places, rows = places[on] + direction, rows[on]
-    share = np.zeros(pad[0].shape, dtype=np.float32)
+            hits[rows[is_tissue[index]]] += 1
+            # rays go on through what is clear
+            on = is_clear[index]
+            places = places[on] + direction
+            rows = rows[on]
+    share = np.zeros(is_clear.shape, dtype=np.float32)
     share[tuple(start.T)] = hits / len(DIRECTIONS)
-    smooth = ndimage.gaussian_filter(share[1:-1, 1:-1, 1:-1], smoothing_voxels)
-    return smooth / np.maximum(extraction.smooth_mask(clear, smoothing_voxels), 1e-6)
+    inner = share[1:-1, 1:-1, 1:-1]
+    smooth = ndimage.gaussian_filter(inner, smoothing_voxels)
+    weight = extraction.smooth_mask(clear, smoothing_voxels)
+    return smooth / np.maximum(weight, 1e-6)
 
 
 def border_share(mask: Mask) -> float:

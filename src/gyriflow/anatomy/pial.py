@@ -376,7 +376,7 @@ def from_hemispheres(
     vertices of a cut are joined. InputError if the pose is unclear, or they are swapped
     or of different or impossible size; MeshError if one cannot be made sound.
     """
-    if (joined := joined_along_cut(left, right)) is not None:
+    if (joined := _joined_along_cut(left, right)) is not None:
         connected = from_surface(
             joined,
             week=week,
@@ -457,7 +457,7 @@ def from_hemispheres(
     return _two_pieces(surface, is_left, plane, pose, brain, named=named)
 
 
-def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | None:
+def _joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | None:
     """Return the closed surface of two open hemispheres with the same vertices along
     their cut, or None."""
     if triangles.is_closed(left) or triangles.is_closed(right):

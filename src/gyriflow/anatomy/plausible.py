@@ -3,7 +3,6 @@ and similarity of hemispheres."""
 
 import logging
 from collections.abc import Iterable
-from itertools import pairwise
 from os import PathLike
 
 import numpy as np
@@ -54,9 +53,6 @@ WRONG_HEADERS = {"metres": "micrometres", "micrometres": "metres"}
 DOUBTFUL_RATIO = 1.15
 # shift of one hemisphere along the mid-plane, in cube roots of its volume
 MAX_USUAL_SHIFT = 0.08
-# usual limits of the ratio of mean thickness a week later and later still: CRL's has
-# 1.2 from 21 to 22 GW
-MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO = 1.25, 1.5
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single
 # hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
@@ -328,25 +324,3 @@ def facing_warnings(
         f"the medial walls do not face each other: they are shifted by {shift:.1f} mm."
         " Are both in one space?"
     ]
-
-
-def thickness_jumps(series: Iterable[tuple[str, float, float]]) -> list[str]:
-    """Return warnings of brains (name, week, mean mm or NaN) next in age with very
-    different thickness."""
-    measured = sorted(
-        (brain for brain in series if brain[2] > 0), key=lambda brain: brain[1]
-    )
-    warnings = []
-    for (first, week, before), (second, later, after) in pairwise(measured):
-        limit = np.clip(
-            MAX_WEEKLY_RATIO ** (later - week), MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO
-        )
-        if max(before / after, after / before) > limit:
-            thick = (
-                f"the cortex of {first} ({week:g} GW) is {before:.2f} mm thick, that of"
-                f" {second} ({later:g} GW)"
-            )
-            warnings.append(
-                f"{thick} {after:.2f} mm: were both labelled in the same way?"
-            )
-    return warnings

@@ -392,12 +392,12 @@ def _frame(to_ras: Floats) -> str | None:
     for name, axes in CONVENTIONS.items():
         turn = to_ras[:3, :3] @ axes[:3, :3].T
         tilt = np.degrees(np.arccos(np.clip(turn[0, 0], -1.0, 1.0)))
-        if tilt < TILT_TOL_DEG and abs(pitch_deg(turn)) < PITCH_TOL_DEG:
+        if tilt < TILT_TOL_DEG and abs(_pitch_deg(turn)) < PITCH_TOL_DEG:
             return name
     return None
 
 
-def pitch_deg(rotation: Floats) -> float:
+def _pitch_deg(rotation: Floats) -> float:
     """Return the angle in degrees of the rotation about x that is closest to a (3, 3)
     rotation."""
     block = rotation[1:, 1:]
@@ -487,7 +487,7 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
     return (
         unchecked
         if pose.by == "default"
-        else pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
+        else _pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
     )
 
 
@@ -644,10 +644,10 @@ def pose_of_labels(
     by = " and ".join(
         [*hindbrain, *(["the labelled sides"] if sides is not None else [])]
     )
-    return pose_from_rotation(rotation, by, sides is not None)
+    return _pose_from_rotation(rotation, by, sides is not None)
 
 
-def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
+def _pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
     """Return the pose of a volume that an estimated (3, 3) rotation about its origin
     would bring to RAS+.
 

@@ -16,6 +16,7 @@ SHARP_DEG = 45.0
 # bumps of all these wavelengths, so that they contain that of the folds
 WAVELENGTHS_MM = (8.0, 40.0)
 WAVES = 64
+PATTERN_SEED = 0
 
 
 def shape_surface(
@@ -23,13 +24,12 @@ def shape_surface(
     *,
     edge_length_mm: float,
     noise_mm: float = ShapeSettings.model_fields["noise_mm"].default,
-    seed: int = ShapeSettings.model_fields["seed"].default,
 ) -> TriangleMesh:
     """Return an ellipsoid as a closed, outward surface of even triangles, with smooth
     bumps along the normal.
 
-    They have the root mean square height `noise_mm` and a pattern of the `seed`.
-    InputError if the edges are too long.
+    They have the root mean square height `noise_mm`. InputError if the edges are too
+    long.
     """
     size = np.array(semi_axes_mm, dtype=float)
     longest = 0.5 * size.min() ** 2 / size.max()
@@ -49,7 +49,7 @@ def shape_surface(
     vertices = mesh.vertices / np.linalg.norm(
         mesh.vertices / size, axis=1, keepdims=True
     )
-    heights = noise_mm * _pattern(vertices, seed)
+    heights = noise_mm * _pattern(vertices)
     return TriangleMesh(
         vertices + heights[:, None] * unit(vertices / size**2), mesh.faces
     )
@@ -69,8 +69,8 @@ def _directions(count: int) -> Floats:
     return unit(lattice.astype(float))
 
 
-def _pattern(points: Floats, seed: int) -> Floats:
-    random = np.random.default_rng(seed)
+def _pattern(points: Floats) -> Floats:
+    random = np.random.default_rng(PATTERN_SEED)
     waves = random.normal(size=(WAVES, 3))
     shortest, longest = np.log(WAVELENGTHS_MM)
     lengths = np.exp(random.uniform(shortest, longest, WAVES))

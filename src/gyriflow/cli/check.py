@@ -106,7 +106,7 @@ def check_study(
         volumes = [
             volume
             for brain in config.brains
-            if (volume := brain.label_volume) and Path(volume).is_file()
+            if (volume := brain.labels) and Path(volume).is_file()
         ]
         without_unit = (
             sum(read_header(volume).unit == "unknown" for volume in volumes)
@@ -391,7 +391,7 @@ def _check_files(
         if path in checksums and Path(path).is_file()
     ]
     require_checksums({path: checksums[path] for path in files})
-    volume = brain.label_volume
+    volume = brain.labels
     if volume is not None and Path(volume).is_file():
         yield from _check_labels(volume, brain, label_scheme(config, brain.scheme))
     # takes half a second, which other commands need not wait for
@@ -411,7 +411,7 @@ def _check_labels(
         )
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
-    whole = brain.hemisphere is None
+    whole = brain.side is None
     cerebrum = read_cerebrum(
         read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0
     )

@@ -127,19 +127,19 @@ class Commands(click.Group):
     def invoke(self, context: click.Context) -> Any:
         """Run the command that is asked for."""
         try:
-            require_current_folder()
+            _require_current_folder()
             return super().invoke(context)
         except GyriflowError as error:
             click.echo(f"gyriflow: {error}", err=True)
             sys.exit(error.exit_code)
         except click.UsageError as error:
-            command = error.ctx.command_path if error.ctx else command_name()
+            command = error.ctx.command_path if error.ctx else _command_name()
             message = " ".join(error.format_message().split())
             click.echo(f"gyriflow: {message} See `{command} --help`.", err=True)
             sys.exit(error.exit_code)
 
 
-def require_current_folder() -> None:
+def _require_current_folder() -> None:
     """Raise InputError if the current folder was deleted, since all paths are relative
     to it."""
     try:
@@ -161,7 +161,7 @@ def _one_by_one(args: Sequence[str]) -> list[str]:
     return single
 
 
-def command_name() -> str:
+def _command_name() -> str:
     """Return what a user types to get this command: in a checkout that is not
     installed, `./run gyriflow`."""
     return (
@@ -247,7 +247,7 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
     if kept:
         click.echo(f"the earlier configuration is now {kept}")
     argument = shlex.quote(str(path))
-    click.echo(f"wrote {path}; next: {command_name()} check {argument}")
+    click.echo(f"wrote {path}; next: {_command_name()} check {argument}")
     code = _show_scans(found, may_fill_in=True)
     sys.exit(code)
 
@@ -363,7 +363,7 @@ def _require_no_selection(data: Path | None, **selection: Any) -> None:
     }
     if given := [names[key] for key, value in selection.items() if value is not None]:
         remedy = (
-            f"Set these in the configuration, or write it anew: {command_name()} init"
+            f"Set these in the configuration, or write it anew: {_command_name()} init"
             " FOLDER --force."
         )
         raise InputError(
@@ -699,7 +699,7 @@ def _find_config(config: Path | None, directory: Path) -> Path:
     )
     if not found.is_file():
         remedy = (
-            f"Write one from the files of a folder: {command_name()} init FOLDER. The"
+            f"Write one from the files of a folder: {_command_name()} init FOLDER. The"
             f" demo's is {DEMO}."
         )
         raise InputError("found no configuration", path=found.absolute(), remedy=remedy)

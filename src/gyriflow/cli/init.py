@@ -351,13 +351,9 @@ def _growth_series(
     with `least_gw` between them only those that a prediction to the end needs.
     """
     if atlas.licence.accept and not accepted:
-        terms = (
-            f"{atlas.licence.name} ({atlas.licence.url}):"
-            f" {atlas.licence.terms.rstrip('.')}"
-        )
         raise InputError(
             f"the licence of {atlas.name} is not accepted",
-            found=terms,
+            found=f"{atlas.licence.name}: {atlas.licence.terms.rstrip('.')}",
             remedy="Add --accept-licence.",
         )
     for name, series in atlas.series.items():

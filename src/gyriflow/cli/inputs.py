@@ -130,7 +130,7 @@ def check_brain_files(brain: BrainConfig) -> Iterator[str]:
         yield from _named_otherwise(path, brain)
     if brain.image and Path(brain.image).is_file():
         read_volume_map(brain.image, brain.affine_from)
-    if brain.has_labels or not all(Path(path).is_file() for path in brain.files):
+    if brain.labels or not all(Path(path).is_file() for path in brain.files):
         return
     for side, path in brain.white_files.items():
         read_surface(path, side)
@@ -140,7 +140,7 @@ def check_brain_files(brain: BrainConfig) -> Iterator[str]:
         )
         yield from _check_pair(brain, left, right, declared=declared)
     elif brain.files:
-        own_side = brain.hemisphere.side if brain.hemisphere else None
+        own_side = brain.side
         mesh = _outward(read_surface(brain.files[0], own_side))
         yield from _check_size(brain, mesh)
         if own_side and is_closed(mesh):
@@ -169,7 +169,7 @@ def _check_pair(
 
 
 def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:
-    sides = 1 if brain.hemisphere is None else 2
+    sides = 1 if brain.side is None else 2
     closed = all(map(is_closed, meshes))
     volumes = [signed_volume(mesh if closed else convex_hull(mesh)) for mesh in meshes]
     doubts = require_plausible_size(
@@ -256,20 +256,21 @@ def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], No
 def _check_regions(regions: GivenRegions, affine_from: AffineSource) -> None:
     if regions.volume is not None:
         read_label_volume(regions.volume, affine_from)
+        return
     for side in SIDES:
-        if (given := getattr(regions, side)) is not None:
-            labels = read_vertex_labels(given.labels, side)[0]
-            surface = read_surface(given.surface, side)
-            if len(labels) != len(surface.vertices):
-                problem = "does not belong to its surface"
-                found = f"{len(labels)} labels"
-                expected = (
-                    f"{len(surface.vertices)}, the number of vertices of"
-                    f" {given.surface}"
-                )
-                raise InputError(
-                    problem, path=given.labels, found=found, expected=expected
-                )
+        path = regions.files[f"{side}_labels"]
+        surface_path = regions.files[f"{side}_surface"]
+        labels = read_vertex_labels(path, side)[0]
+        surface = read_surface(surface_path, side)
+        if len(labels) != len(surface.vertices):
+            raise InputError(
+                "does not belong to its surface",
+                path=path,
+                found=f"{len(labels)} labels",
+                expected=(
+                    f"{len(surface.vertices)}, the number of vertices of {surface_path}"
+                ),
+            )
 
 
 def _check_map(name: str, value: Any) -> None:

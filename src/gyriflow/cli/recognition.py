@@ -125,11 +125,7 @@ class FoundBrain:
     @property
     def files(self) -> str:
         """Its files, separated by commas."""
-        source = (
-            self.entry.get("labels")
-            or self.entry.get("pial")
-            or self.entry.get("hemisphere", {}).get("file")
-        )
+        source = self.entry.get("labels") or self.entry.get("pial")
         return str(source or ", ".join(self.entry["hemispheres"].values()))
 
 
@@ -268,7 +264,7 @@ def recognise(
     tables.require_clear_decimals(folder)
     require_clear_decimals([brain.named_age for brain in brains], notation, folder)
     _refuse_equal_weeks(brains)
-    choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
+    _choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
     brains.sort(
         key=lambda brain: (
             brain.entry["week"] == UNSET,
@@ -467,7 +463,7 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
                 continue
             problem = "white surfaces alone; pial ones are needed"
         elif len(pair) == 1:
-            source = {"hemisphere": {"file": str(file), "side": first}}
+            source = {"pial": str(file), "side": first}
             for side, sign in files_of[_scan_of(file)].items():
                 if side != first:
                     found = (
@@ -784,7 +780,7 @@ def recognise_brain(
                 found=found,
                 expected="one label volume, or surfaces alone",
             )
-        return recognise_labels(own_name(files[0]), scheme)
+        return _recognise_labels(own_name(files[0]), scheme)
     if scheme:
         raise InputError(
             "--scheme: surfaces have no labels", found=scheme, remedy="Leave it out."
@@ -854,7 +850,7 @@ def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
     ]
 
 
-def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
+def _recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     """Return the entry of a label volume: its id, file and scheme; InputError if the
     scheme is unknown or unclear."""
     if scheme not in (None, *SCHEMES):
@@ -866,7 +862,7 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     if scheme:
         require_fit(fits, scheme, file, fits.get(scheme) or "labels that are not in it")
     brain = FoundBrain(file, entry, fits=fits)
-    choose_schemes([brain], scheme)
+    _choose_schemes([brain], scheme)
     if brain.notes:
         raise InputError(
             "has labels of an unknown scheme",
@@ -877,7 +873,7 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     return brain.entry
 
 
-def choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> None:
+def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> None:
     """Set the scheme of all brains with labels: `scheme`, otherwise the only scheme
     that fits all of them.
 

@@ -66,7 +66,7 @@ def next_round(
     `runs` has columns of the parameters, score (NaN if diverged) and cause. The same
     runs and seed give the same rows. InputError if no run has a score.
     """
-    require_finished(runs)
+    _require_finished(runs)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     # another seed each round, or the same places would be drawn again
     sampler = optuna.samplers.TPESampler(seed=seed + len(runs), n_startup_trials=1)
@@ -106,7 +106,7 @@ def _rounded(values: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
     return rounded
 
 
-def require_finished(runs: pd.DataFrame) -> None:
+def _require_finished(runs: pd.DataFrame) -> None:
     """Raise InputError if none of the runs (columns score, NaN if diverged, and cause)
     has a score."""
     if runs["score"].notna().any():
@@ -131,7 +131,7 @@ def find_optimum(runs: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
     the value is within 1 % of a bound), run and score. InputError if no run has a
     score.
     """
-    require_finished(runs)
+    _require_finished(runs)
     best = runs.iloc[int(np.nanargmin(runs["score"].to_numpy(dtype=float)))]
     rows = []
     for name, (low, high) in bounds.items():

@@ -93,7 +93,7 @@ def require_space(
         mesh.tets
     )
     points = len(IntegrationPoints.for_order(mesh.order).weights)
-    values = 6 if parameters.keeps_stretch else 0
+    values = 6 if parameters.stress_memory_gw > 0 else 0
     stretch = 8 * values * points * len(mesh.tets)
     # positions and two displacements
     checkpoint = 2 * (8 * 3 * 3 * len(mesh.vertices) + stretch)
@@ -126,7 +126,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         thickness = value_at(parameters.thickness_mm, parameters.start_week, maps)
         report = zone_report(mesh, zones, float(np.median(thickness)))
         memory = predicted_memory_mib(
-            len(mesh.tets), comm.size, parameters.contact.kind, mesh.order
+            len(mesh.tets), comm.size, parameters.contact, mesh.order
         )
         size = (
             f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size}"
@@ -180,7 +180,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         record_usage(arguments.log, Usage(own.wall_s, cpu_s, memory_mib))
 
 
-def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
+def _guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Run `main` with the folder locked, and end every rank with the exit code of the
     first error."""
     try:
@@ -212,4 +212,4 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
 
 
 if __name__ == "__main__":
-    guarded(MPI.COMM_WORLD, parse())
+    _guarded(MPI.COMM_WORLD, parse())

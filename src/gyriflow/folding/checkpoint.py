@@ -129,9 +129,14 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) ->
     earlier end or more halvings.
     """
     values = parameters.model_dump(mode="json")
-    for name in ("ranks", "end_week", "output_weeks", "output_every_gw"):
+    for name in (
+        "ranks",
+        "end_week",
+        "output_weeks",
+        "output_every_gw",
+        "max_halvings",
+    ):
         del values[name]
-    del values["solver"]["max_halvings"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
     solver = modules_behind(Path(__file__).with_name("__main__.py"))
     for source in sorted(module for module in solver if room_of(module) in SUBPACKAGES):

@@ -51,12 +51,12 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
         "order": mesh.order,
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
         "elements_through_cortex": (
-            thickness_mm / edge_length_within(mesh, zones, thickness_mm)
+            thickness_mm / _edge_length_within(mesh, zones, thickness_mm)
         ),
     }
 
 
-def edge_length_within(
+def _edge_length_within(
     mesh: TetrahedralMesh, zones: Zones, thickness_mm: float
 ) -> float:
     """Return the mean edge length in mm of the elements whose centroid is in the

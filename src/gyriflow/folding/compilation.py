@@ -75,7 +75,7 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
         if comm.rank == 0:
             cache.mkdir(parents=True, exist_ok=True)
             lock_file(stack.enter_context((cache / "lock").open("w")), wait=True)
-            remove_incomplete_entries(cache)
+            _remove_incomplete_entries(cache)
         comm.barrier()
         yield options
         comm.barrier()
@@ -126,7 +126,7 @@ def pointer(
     return interface.from_buffer(array, require_writable=is_written)
 
 
-def remove_incomplete_entries(cache: Path) -> None:
+def _remove_incomplete_entries(cache: Path) -> None:
     """Remove the files of each form that has no source, no library, or no mark that
     both are complete."""
     names = {path.name.split(".")[0] for path in cache.glob("libffcx_*")}

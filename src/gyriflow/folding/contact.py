@@ -112,7 +112,7 @@ class SelfContact:
             raise MeshError(
                 "the pial surface of the mesh crosses itself, which contact cannot"
                 " undo",
-                remedy="Repair the surface, or mesh with a smaller mesh.envelope_mm.",
+                remedy="Repair the surface, or mesh with shorter mesh.surface_edge_mm.",
             )
         if distance_mm is None:
             gaps = np.full(len(start), np.inf)

@@ -142,7 +142,7 @@ class ContactSearch:
         pairs = ipctk.NormalCollisions()
         pairs.use_area_weighting = True
         pairs.build(candidates, mesh, at, self._distance)
-        pairs = drop_parallel_edges(pairs, part.edges, at)
+        pairs = _drop_parallel_edges(pairs, part.edges, at)
         return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
 
     def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
@@ -171,7 +171,7 @@ class ContactSearch:
         if step < MIN_STEP:
             if candidates is None:
                 part, mesh, candidates = self._search(first, last)
-            candidates = drop_distant_parallel_edges(candidates, part.edges, *ends)
+            candidates = _drop_distant_parallel_edges(candidates, part.edges, *ends)
             step = candidates.compute_collision_free_stepsize(
                 mesh, *ends, narrow_phase_ccd=CCD
             )
@@ -224,7 +224,7 @@ class ContactSearch:
         return part, mesh, candidates
 
 
-def drop_parallel_edges(
+def _drop_parallel_edges(
     pairs: ipctk.NormalCollisions, edges: NDArray[np.integer], positions: Floats
 ) -> ipctk.NormalCollisions:
     """Return the pairs without those of two edges (e, 2) that are parallel, at
@@ -235,7 +235,7 @@ def drop_parallel_edges(
     for round-off may be computed as zero, however far apart they are on one line, and
     then their barrier would be infinite.
     """
-    are_parallel = parallel_edges(pairs.ee_collisions, edges, positions)
+    are_parallel = _parallel_edges(pairs.ee_collisions, edges, positions)
     if not are_parallel.any():
         return pairs
     # a new object, since items of the old lists read the memory of their list when they
@@ -253,7 +253,7 @@ def drop_parallel_edges(
     return result
 
 
-def drop_distant_parallel_edges(
+def _drop_distant_parallel_edges(
     candidates: ipctk.Candidates,
     edges: NDArray[np.integer],
     first: Floats,
@@ -266,11 +266,11 @@ def drop_distant_parallel_edges(
     if their vertices move less than half of that, apart from their mean displacement.
     """
     pairs = candidates.ee_candidates
-    are_parallel = parallel_edges(pairs, edges, first)
+    are_parallel = _parallel_edges(pairs, edges, first)
     kept = []
     for pair, is_parallel in zip(pairs, are_parallel, strict=True):
         vertices = np.array([*edges[pair.edge0_id], *edges[pair.edge1_id]])
-        if not is_parallel or can_meet(first[vertices], last[vertices]):
+        if not is_parallel or _can_meet(first[vertices], last[vertices]):
             kept.append(pair)
     result = ipctk.Candidates()
     result.vv_candidates = candidates.vv_candidates
@@ -280,7 +280,7 @@ def drop_distant_parallel_edges(
     return result
 
 
-def parallel_edges(
+def _parallel_edges(
     pairs: Sequence[EdgePair], edges: NDArray[np.integer], positions: Floats
 ) -> NDArray[np.bool_]:
     """Return for each pair whether its two edges (e, 2) are parallel at (p, 3)
@@ -299,7 +299,7 @@ def parallel_edges(
     return np.asarray(crosses < PARALLEL_TOL * lengths)
 
 
-def can_meet(first: Floats, last: Floats) -> bool:
+def _can_meet(first: Floats, last: Floats) -> bool:
     """Return whether two parallel edges may meet, from (4, 3) places of their ends
     before and after a motion."""
     a, b, c, d = first

@@ -145,8 +145,8 @@ class TwoLevelPreconditioner:
 
 
 def inverse_blocks(blocks: Floats) -> Floats:
-    """Return the inverses of (n, 3, 3) symmetric blocks, as `positive_inverses` if they
-    are indefinite."""
+    """Return the inverses of (n, 3, 3) symmetric blocks, as `_positive_inverses` if
+    they are indefinite."""
     a, b, c = blocks.swapaxes(0, 1)
     of_a = np.cross(b, c)
     of_b = np.cross(c, a)
@@ -158,21 +158,21 @@ def inverse_blocks(blocks: Floats) -> Floats:
     definite = np.min(leading_minors, axis=0) > 0
     divisors = np.where(definite, determinants, 1.0)
     inverses = cofactors / divisors[:, None, None]
-    inverses[~definite] = positive_inverses(blocks[~definite])
+    inverses[~definite] = _positive_inverses(blocks[~definite])
     return np.asarray(inverses)
 
 
 def inverse_matrix(matrix: Floats) -> Floats:
-    """Return the inverse of a (k, k) symmetric matrix, as `positive_inverses` if it is
+    """Return the inverse of a (k, k) symmetric matrix, as `_positive_inverses` if it is
     indefinite."""
     factor, failed = dpotrf(matrix, lower=1)
     if failed:
-        return positive_inverses(matrix)
+        return _positive_inverses(matrix)
     inverse = np.tril(dpotri(factor, lower=1)[0])
     return np.asarray(inverse + np.tril(inverse, -1).T)
 
 
-def positive_inverses(matrices: Floats) -> Floats:
+def _positive_inverses(matrices: Floats) -> Floats:
     """Return inverses of (..., k, k) symmetric matrices with the absolute values of
     their eigenvalues."""
     values, directions = np.linalg.eigh(matrices)

@@ -36,7 +36,7 @@ class NewtonSettings:
     """Tolerances and limits of the iteration.
 
     `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the
-    linear right-hand side: see `forcing_term`. An iteration that lowers the energy by
+    linear right-hand side: see `_forcing_term`. An iteration that lowers the energy by
     more than the fraction `min_progress` does not count towards `max_newton`.
     `keeps_iterates` is for those who need the way to a solution.
     """
@@ -88,7 +88,7 @@ def residual_floor(mesh: TetrahedralMesh, modulus_pa: float) -> float:
     return 1e-11 * modulus_pa * edge_m**2 * math.sqrt(len(mesh.vertices))
 
 
-def forcing_term(final: float, left: float, tightest: float) -> float:
+def _forcing_term(final: float, left: float, tightest: float) -> float:
     """Return the forcing term of inexact Newton, the relative tolerance of a linear
     solve (Eisenstat and Walker 1996).
 
@@ -167,7 +167,7 @@ class NewtonSolver:
                 if solution.newton > 1
                 else max(norm / at_rest.norm, self._first_left)
             )
-            forcing = forcing_term(
+            forcing = _forcing_term(
                 0.4 * tolerance / norm, left, settings.krylov_tolerance
             )
             # a lagged tangent with an error below the forcing term is as good as a new

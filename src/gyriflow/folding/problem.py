@@ -188,8 +188,8 @@ class NonlinearProblem:
         if V is not None:
             self._volume = np.linalg.det(V)[..., None, None]
             weight, H = mu / self._volume[..., 0, 0], V @ G_inverse
-        set_at_points(self._weight, weight)
-        set_at_points(self._H, H)
+        _set_at_points(self._weight, weight)
+        _set_at_points(self._H, H)
         if self._linear:
             self._linear.weight = np.ascontiguousarray(weight)
             self._linear.H = np.ascontiguousarray(H)
@@ -336,7 +336,7 @@ class NonlinearProblem:
         return np.asarray(self.domain.local(self.domain.positions) + u)
 
 
-def set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:
+def _set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:
     """Set a field at integration points to (c, q, ...) values."""
     places = field.function_space.dofmap.list
     field.x.array.reshape(-1, field.function_space.dofmap.bs)[places] = values.reshape(

@@ -65,30 +65,30 @@ def run(
     key = run_key(mesh, parameters, maps)
     folder = out / f"checkpoint-{key}"
     state, message = comm.bcast(
-        load_state(folder, key, parameters) if comm.rank == 0 else None, root=0
+        _load_state(folder, key, parameters) if comm.rank == 0 else None, root=0
     )
     if comm.rank == 0:
         for note in filter(
             None,
             (
                 message,
-                *delete_old_checkpoints(out, folder),
+                *_delete_old_checkpoints(out, folder),
                 shortened_step_note(parameters),
             ),
         ):
             print_line(note)
     if state is None:
         state = State.at_start(folding.start, parameters.step_s)
-        state = save_frame(folding, state, parameters.output_weeks[0], folder)
+        state = _save_frame(folding, state, parameters.output_weeks[0], folder)
     resumed_after = len(state.rows)
     state, diverged = simulate(folding, state, folder, key, may_diverge=may_diverge)
-    memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
+    memory = comm.reduce(_peak_memory_mib(), op=MPI.SUM, root=0)
     processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
     if comm.rank == 0:
         reached = parameters.start_week + state.time_s / SECONDS_PER_GW
         weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
         join_frames(
-            out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks]
+            out / FRAMES, mesh.tets, [_frame_path(folder, week) for week in weeks]
         )
         seconds = time.monotonic() - began
         summary = {
@@ -96,7 +96,7 @@ def run(
             "dofs": 3 * len(mesh.vertices),
             "pial_faces": len(zones.facets),
             "ranks": comm.size,
-            **steps_summary(state.rows),
+            **_steps_summary(state.rows),
             "seconds": seconds,
             "cpu_seconds": processor,
             "peak_memory_MiB": memory,
@@ -145,7 +145,7 @@ def simulate(
     p, rank = folding.parameters, folding.domain.comm.rank
     resumed_after, resumed = len(state.rows), time.monotonic()
     for week_before, week in pairwise(p.output_weeks):
-        until = seconds_to(week, p)
+        until = _seconds_to(week, p)
         while state.time_s < until * (1 - 1e-12):
             try:
                 state = advance(folding, state, until)
@@ -155,7 +155,7 @@ def simulate(
                 return state, str(error)
             arrived = until - state.time_s < 1e-9 * until
             if arrived:
-                state = save_frame(folding, state, week, folder)
+                state = _save_frame(folding, state, week, folder)
             if rank == 0:
                 if arrived:
                     since = [row for row in state.rows if row["week"] > week_before]
@@ -164,7 +164,7 @@ def simulate(
                     ):
                         log.warning(warning)
                 write_checkpoint(folder / "state.h5", key, state)
-                report_step(
+                _report_step(
                     state,
                     p.end_week,
                     (time.monotonic() - resumed) / (len(state.rows) - resumed_after),
@@ -172,7 +172,7 @@ def simulate(
     return state, None
 
 
-def save_frame(folding: Folding, state: State, week: float, folder: Path) -> State:
+def _save_frame(folding: Folding, state: State, week: float, folder: Path) -> State:
     """Write the frame of a week and return the state to continue with; collective over
     the ranks."""
     names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
@@ -198,12 +198,12 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
         )
         smoothing = {} if logs is None else {"growth_smoothing_mm": GROWTH_SMOOTHING_MM}
         write_frame(
-            frame_path(folder, week), week, fields | pressure, elements, smoothing
+            _frame_path(folder, week), week, fields | pressure, elements, smoothing
         )
     return replace(state, growth=None, growth_s=0.0)
 
 
-def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
+def _report_step(state: State, end_week: float, seconds_per_step: float) -> None:
     """Print the progress line of the last step: week, iterations, displacement,
     time."""
     row = state.rows[-1]
@@ -225,7 +225,7 @@ def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
     )
 
 
-def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
+def _steps_summary(rows: Sequence[dict]) -> dict[str, float]:
     """Return totals over the step table."""
     return {
         "steps": len(rows),
@@ -258,7 +258,7 @@ def quality_note(
     return text, flat > MAX_FLAT_SHARE * len(ratios)
 
 
-def load_state(
+def _load_state(
     folder: Path, key: str, parameters: FoldingParameters
 ) -> tuple[State | None, str]:
     """Return the state to resume from, or None, and a message for the user.
@@ -270,13 +270,13 @@ def load_state(
     state, message = read_checkpoint(folder / "state.h5", key)
     if state is None:
         return state, message
-    end_s = seconds_to(parameters.end_week, parameters)
+    end_s = _seconds_to(parameters.end_week, parameters)
     passed = [
         week
         for week in parameters.output_weeks
-        if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)
+        if _seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)
     ]
-    if not all(frame_path(folder, week).exists() for week in passed):
+    if not all(_frame_path(folder, week).exists() for week in passed):
         return (
             None,
             (
@@ -287,7 +287,7 @@ def load_state(
     since = state.time_s - state.growth_s
     if (
         parameters.targets
-        and min(abs(seconds_to(week, parameters) - since) for week in passed)
+        and min(abs(_seconds_to(week, parameters) - since) for week in passed)
         > 1e-6 * since
     ):
         return (
@@ -300,22 +300,22 @@ def load_state(
     within = tuple(
         row
         for row in state.rows
-        if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9)
+        if _seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9)
     )
     return replace(state, rows=within), message
 
 
-def frame_path(folder: Path, week: float) -> Path:
+def _frame_path(folder: Path, week: float) -> Path:
     """Return the file of a single frame, which exists until the run has ended."""
     return folder / f"frame-{week_tag(week)}.h5"
 
 
-def seconds_to(week: float, parameters: FoldingParameters) -> float:
+def _seconds_to(week: float, parameters: FoldingParameters) -> float:
     """Return the time in s from the start of a run to a week."""
     return (week - parameters.start_week) * SECONDS_PER_GW
 
 
-def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
+def _delete_old_checkpoints(out: Path, own: Path) -> list[str]:
     """Delete all but the newest two checkpoints of other meshes or parameters, and
     return messages about these two."""
     folders = [path for path in out.glob("checkpoint-*") if path != own]
@@ -341,7 +341,7 @@ def shortened_step_note(parameters: FoldingParameters) -> str:
     return ""
 
 
-def peak_memory_mib() -> float:
+def _peak_memory_mib() -> float:
     """Return the peak memory of this process in MiB."""
     unit = 1024 if sys.platform != "darwin" else 1024**2
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

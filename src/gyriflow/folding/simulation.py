@@ -80,18 +80,18 @@ class Folding:
             self.domain,
             zones,
             MATERIALS[p.material](p.poisson_ratio),
-            has_planes=p.contact.kind == "planes",
+            has_planes=p.contact == "planes",
         )
         # of all weeks, so that it does not depend on the end of the run
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, *WEEK_RANGE)[1]
         self.contact: SelfContact | None = None
-        if p.contact.kind == "global":
+        if p.contact == "global":
             barrier_pa = STIFFNESS_PER_MODULUS * stiffest
             self.contact = SelfContact(
                 self.domain, zones.facets, barrier_pa, stiffens=p.stress_memory_gw > 0
             )
             self.problem.contributions.append(self.contact)
-        newton = NewtonSettings(p.solver.newton_tolerance)
+        newton = NewtonSettings(p.newton_tolerance)
         self.solver = NewtonSolver(self.problem, newton, residual_floor(mesh, stiffest))
         self.inputs = GrowthInputs(mesh, zones, self.maps, comm.allreduce)
         self.model = growth_model(p, self.inputs)
@@ -106,7 +106,7 @@ class Folding:
         self._pial = np.unique(zones.cortex_facets)
         # with stress memory, or growth that is recorded by element, tissue must stay in
         # its element
-        has_free_nodes = mesh.order == 2 and not p.keeps_stretch and not p.targets
+        has_free_nodes = mesh.order == 2 and p.stress_memory_gw == 0 and not p.targets
         self._inner_sides = InnerSides.of(mesh) if has_free_nodes else None
 
     def step(self, state: State, step_s: float) -> State:
@@ -134,7 +134,7 @@ class Folding:
             self.maps,
         )
         stretch = None
-        if self.parameters.keeps_stretch:
+        if self.parameters.stress_memory_gw > 0:
             stretch = self.domain.gather_cells(
                 packed(left_stretch(self.problem.evaluate("elastic", u)))
             )
@@ -196,12 +196,7 @@ class Folding:
         if state.stretch is not None:
             before = unpacked(state.stretch[domain.tet_of_cell])
             step_gw = step_s / SECONDS_PER_GW
-            stretch = relaxed(
-                before,
-                step_gw,
-                p.stress_memory_gw,
-                keeps_volume=p.relaxation == "shape",
-            )
+            stretch = relaxed(before, step_gw, p.stress_memory_gw)
         growth = self.model(start)
         mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
         inverse = growth.inverse(tissue)
@@ -269,7 +264,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
     remaining = until_s - state.time_s
     # a remainder shorter than a whole step may be halved as often as a whole one
     whole = min(p.step_s, remaining) if state.step_s >= p.step_s else p.step_s
-    smallest = whole / 2**p.solver.max_halvings
+    smallest = whole / 2**p.max_halvings
     while True:
         # a remainder as small as round-off gets no step of its own
         step_s = remaining if remaining < state.step_s * (1 + 1e-6) else state.step_s
@@ -284,7 +279,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                     found=f"{error}; {folding.solver.worst_places()}",
                     remedy=(
                         "The last good state is kept: the same command with an earlier"
-                        " folding.end_week or more folding.solver.max_halvings resumes"
+                        " folding.end_week or more folding.max_halvings resumes"
                         " from it. A finer mesh or less growth may help."
                     ),
                 ) from None
@@ -350,5 +345,5 @@ def unconverged_warning(row: dict) -> str:
         return ""
     return (
         f"step {row['step']} ends at {row['residual']:.1e} of its initial residual,"
-        " above folding.solver.newton_tolerance: round-off prevents further progress"
+        " above folding.newton_tolerance: round-off prevents further progress"
     )

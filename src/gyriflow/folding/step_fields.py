@@ -26,26 +26,21 @@ def step_fields(
     of elements (m,), averaged over points. Both are equal on every rank. The problem's
     mesh is still at the start of the step. Without stress memory, stress, strain and
     contact pressure of a step are proportional to its length, so they are given per
-    week; but a pressure and an elastic change of volume that tissue keeps are given as
-    they are. Growth towards shapes leaves no stress and elastic strain but next to
+    week. Growth towards shapes leaves no stress and elastic strain but next to
     contact, where they depend on the mesh: there are none.
     """
     p = folding.parameters
     problem = folding.problem
     domain = folding.domain
     u = folding.solved.displacement
-    kept = {"pressure_pa", "elastic_volume_strain"} if p.keeps_volume_only else set()
 
     def as_rates(fields: dict[str, Floats]) -> dict[str, Floats]:
         if p.stress_memory_gw > 0:
             return fields
         steps_per_gw = SECONDS_PER_GW / folding.solved.step_s
-        rates = {
-            f"{name}_per_gw": values * steps_per_gw
-            for name, values in fields.items()
-            if name not in kept
+        return {
+            f"{name}_per_gw": values * steps_per_gw for name, values in fields.items()
         }
-        return {name: values for name, values in fields.items() if name in kept} | rates
 
     at_vertices: dict[str, Floats] = {}
     if folding.contact is not None and "contact_pressure" in names:

@@ -97,18 +97,10 @@ def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
     return from_principal(squares ** (power / 2), axes)
 
 
-def relaxed(
-    V: Floats, step_gw: float, memory_gw: float, *, keeps_volume: bool = False
-) -> Floats:
+def relaxed(V: Floats, step_gw: float, memory_gw: float) -> Floats:
     """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as
-    exp(−t/τ), with τ = `memory_gw`.
-
-    With `keeps_volume` only the deviator of ln V decays.
-    """
+    exp(−t/τ), with τ = `memory_gw`."""
     if np.isinf(memory_gw):
         return V
-    left = float(np.exp(-step_gw / memory_gw)) if memory_gw else 0.0
-    stretches = left_stretch(V, left)
-    if keeps_volume:
-        stretches = stretches * (np.linalg.det(V) ** ((1 - left) / 3))[..., None, None]
-    return stretches
+    left = float(np.exp(-step_gw / memory_gw))
+    return left_stretch(V, left)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
 from ..geometry.triangles import Floats, TriangleMesh, face_areas, face_normals
 from ..settings import terms
-from ..settings.folding import FoldingParameters, NoGrowth
+from ..settings.folding import FoldingParameters
 from ..settings.terms import Side
 from ..settings.varying import value_at
 from .layers import PialSearch, cortical_weight
@@ -20,6 +20,10 @@ from .layers import PialSearch, cortical_weight
 Tags = dict[str, NDArray[np.int32]]
 GAP_MM = 2.5
 """Largest width of the fissure, as in the FetalFoldSim paper."""
+ELLIPSOID_SHIFT = (0.0, 0.05, -0.15)
+ELLIPSOID_SEMI_AXES = (0.35, 0.40, 0.50)
+"""Shift from the middle and semi-axes along X, Y, Z of the ellipsoid without growth, in
+extents of the brain, as in the FetalFoldSim paper."""
 MAX_BETWEEN_PLANES = 0.01
 """Largest share of the pial area between the contact planes, where walls would have no
 contact."""
@@ -119,7 +123,7 @@ def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floa
     return low, high
 
 
-def medial_wall_facets(
+def _medial_wall_facets(
     mesh: TetrahedralMesh, facets: NDArray[np.int64], side: Side
 ) -> NDArray[np.bool_]:
     """Return the mask (f,) of the facets of a single hemisphere that face the missing
@@ -145,16 +149,16 @@ def _wall_anchors(
     return wall[[central, farthest]], fixed
 
 
-def inside_ellipsoid(
-    vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats
-) -> NDArray[np.bool_]:
+def inside_ellipsoid(vertices: NDArray, low: Floats, high: Floats) -> NDArray[np.bool_]:
     """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,)
     are the ends of the brain."""
     extent = high - low
-    centre = (low + high) / 2 + np.array([0.0, *ellipsoid.shift]) * extent
-    return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(
-        axis=1
-    ) <= 1
+    middle = (low + high) / 2
+    centre = middle + np.array(ELLIPSOID_SHIFT) * extent
+    semi_axes = np.array(ELLIPSOID_SEMI_AXES) * extent
+    from_centre = (vertices - centre) / semi_axes
+    squares = (from_centre**2).sum(axis=1)
+    return squares <= 1
 
 
 def zones_of_run(
@@ -164,8 +168,8 @@ def zones_of_run(
 
     The planes are a quarter of `gap_mm`, the width of the fissure, left and right of
     its middle; with contact `planes` nearer, where the fissure is narrower: see
-    `planes_distance`. With any kind of contact, facets near the fissure are not
-    clamped; with `planes`, the `medial_vertices` do not grow. The ellipsoid without
+    `_planes_distance`. With any kind of contact, facets near the fissure are not
+    clamped; with `planes`, the `_medial_vertices` do not grow. The ellipsoid without
     growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single
     hemisphere has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
@@ -174,16 +178,15 @@ def zones_of_run(
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
     distance = bridge = gap_mm / 4
-    if p.contact.kind == "planes":
-        distance = min(distance, planes_distance(mesh.vertices, facets, fissure_x_mm))
+    if p.contact == "planes":
+        distance = min(distance, _planes_distance(mesh.vertices, facets, fissure_x_mm))
     left_plane, right_plane = fissure_x_mm - distance, fissure_x_mm + distance
     if side is not None:
         left_plane = right_plane = float(x.max() if side == "left" else x.min())
     low, high = brain_box(mesh.vertices, side)
     reach = (high - low)[0] / 8
     facet_x = x[facets]
-    ellipsoid = p.no_growth
-    static = inside_ellipsoid(mesh.vertices, ellipsoid, low, high)
+    static = inside_ellipsoid(mesh.vertices, low, high)
 
     def all_of_face(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the mask (f,) of facets on elements' faces with a mask that is True at
@@ -193,7 +196,7 @@ def zones_of_run(
     zone = np.full(len(facets), terms.FREE)
     if support == "ellipsoid":
         zone[all_of_face(static[facets])] = terms.CLAMPED
-    if p.contact.kind != "none":
+    if p.contact != "none":
         between = (facet_x > left_plane) & (facet_x < right_plane)
         left = (facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)
         right = (facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)
@@ -202,21 +205,21 @@ def zones_of_run(
         zone[all_of_face(right)] = terms.RIGHT_CONTACT
     anchors = None
     if side is not None:
-        zone[medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
+        zone[_medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
         wall = np.unique(facets[zone == terms.MEDIAL_WALL])
         if support == "free" and len(wall):
             anchors = _wall_anchors(mesh.vertices, wall)
 
     growth = np.ones(len(mesh.vertices))
-    if ellipsoid.kind != "none":
+    if p.no_growth != "none":
         growth[static] = 0.0
         if side is None:
-            in_bridge = bridge_vertices(
+            in_bridge = _bridge_vertices(
                 mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
             )
             growth[in_bridge] = 0.0
-            if p.contact.kind == "planes":
-                medial = medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
+            if p.contact == "planes":
+                medial = _medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
                 growth[medial] = 0.0
     free = support == "free" and side is None
     return Zones(
@@ -224,7 +227,7 @@ def zones_of_run(
     )
 
 
-def planes_distance(
+def _planes_distance(
     vertices: Floats, facets: NDArray[np.int64], fissure_x_mm: float
 ) -> float:
     """Return the distance in mm from the middle of the fissure that has
@@ -236,7 +239,7 @@ def planes_distance(
     return float(farthest[nearest_first][last])
 
 
-def bridge_vertices(
+def _bridge_vertices(
     mesh: TetrahedralMesh,
     facets: NDArray[np.int64],
     left_plane: float,
@@ -252,7 +255,7 @@ def bridge_vertices(
     return np.unique(mesh.tets[(between | ~deepest).all(axis=1)])
 
 
-def medial_vertices(
+def _medial_vertices(
     mesh: TetrahedralMesh, fissure_x_mm: float, left_plane: float, right_plane: float
 ) -> NDArray[np.int64]:
     """Return the vertices, each once, of the elements whose most medial vertex lies

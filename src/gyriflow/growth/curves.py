@@ -1,4 +1,4 @@
-"""Smooth curves of area, volume and thickness over gestational weeks: fitted to series
+"""Smooth curves of area and volume over gestational weeks: fitted to series
 of brains, or given as a table.
 
 Runs follow them, or are compared with them.
@@ -37,9 +37,6 @@ MIN_WEEKS_PER_DEGREE = 2.0
 ROUNDS = 50
 KNOT_INTERVALS = 12
 Z_95 = 1.96
-THICKNESS = "thickness_mm"
-"""Column of the table of areas with the mean cortical thickness, if known. Thickness
-may decrease."""
 SPACING_GW = 0.25
 """Spacing of the weeks at which a run stores a curve."""
 
@@ -120,14 +117,13 @@ def fitted(
     *,
     name: str = "curve",
     degrees_of_freedom: float = DEGREES_OF_FREEDOM,
-    may_shrink: bool = False,
     keeps_first: bool = False,
 ) -> CurveFit:
     """Fit a smooth curve to measured weeks, robust against single outliers.
 
-    The growth rate (derivative of the logarithm) is a quadratic spline, not negative
-    unless `may_shrink`, with a penalty on its second differences (on its first ones
-    below three degrees of freedom; P-splines, Eilers and Marx 1996). The penalty leaves
+    The growth rate (derivative of the logarithm) is a quadratic spline, not negative,
+    with a penalty on its second differences (on its first ones below three degrees of
+    freedom; P-splines, Eilers and Marx 1996). The penalty leaves
     `degrees_of_freedom`, at most one less than the number of weeks. With at least twice
     as many weeks, outliers lose their weight (Tukey's biweight, started from least
     absolute deviations), but with `keeps_first` not those of the first week, the
@@ -135,7 +131,7 @@ def fitted(
     scatter of the weeks about the curve.
 
     At least two different weeks and positive sizes are needed; several brains may share
-    a week. InputError for other values, and if the sizes decrease without `may_shrink`.
+    a week. InputError for other values, and if the sizes decrease.
     """
     weeks_, values_ = _checked(weeks, values, name)
     count = len(np.unique(weeks_))
@@ -145,11 +141,11 @@ def fitted(
     design = splines.design(weeks_, *ends, KNOT_INTERVALS)
     penalty = splines.penalty(*ends, KNOT_INTERVALS, order=2 if degrees >= 3 else 1)
     strength = splines.strength(design.T @ design, penalty, degrees, name)
-    weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
+    weights = _robust_weights(design, logs, penalty, strength, degrees)
     if keeps_first:
         weights[weeks_ == weeks_[0]] = 1.0
-    coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
-    if not may_shrink and coefficients[1:].max() < 1e-6:
+    coefficients = _solve(design, logs, weights, strength * penalty)
+    if coefficients[1:].max() < 1e-6:
         _refuse_shrinking(name, weeks_)
     residual_degrees = weights.sum() - degrees
     squares = (weights * (logs - design @ coefficients) ** 2).sum()
@@ -159,7 +155,7 @@ def fitted(
     rows = splines.design(at, *ends, KNOT_INTERVALS)
     # rates at their bound of 0 are not free
     free = np.ones(len(coefficients), dtype=bool)
-    free[1:] = may_shrink | (coefficients[1:] > 1e-8)
+    free[1:] = coefficients[1:] > 1e-8
     normal = (design.T * weights) @ design + strength * penalty
     covariance = np.linalg.pinv(normal[np.ix_(free, free)])
     free_rows = rows[:, free]
@@ -217,19 +213,16 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def _solve(
-    design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool
-) -> Floats:
+def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats) -> Floats:
     # eigenvalues of a strong penalty that should be 0 are not, because of round-off
     sizes, directions = np.linalg.eigh(penalty)
     sizes = np.clip(sizes, 1e-10, None)
     root = (directions * np.sqrt(sizes)).T
     factors = np.sqrt(weights)
-    rows = np.concatenate([factors[:, None] * design, root])
-    right = np.concatenate([factors * logs, np.zeros(len(root))])
-    if may_shrink:
-        coefficients, *_ = np.linalg.lstsq(rows, right, rcond=None)
-        return coefficients
+    weighted = factors[:, None] * design
+    rows = np.concatenate([weighted, root])
+    no_rates = np.zeros(len(root))
+    right = np.concatenate([factors * logs, no_rates])
     lowest = np.zeros(design.shape[1])
     lowest[0] = -np.inf
     found = lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls")
@@ -242,14 +235,13 @@ def _robust_weights(
     penalty: Floats,
     strength: float,
     degrees: float,
-    may_shrink: bool,
 ) -> Floats:
     count = len(logs)
     weights = np.ones(count)
     if count < MIN_WEEKS_PER_DEGREE * degrees:
         return weights
     for _ in range(ROUNDS):
-        coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
+        coefficients = _solve(design, logs, weights, strength * penalty)
         residuals = logs - design @ coefficients
         weights = 1.0 / np.maximum(np.abs(residuals), MIN_SCATTER)
         weights *= count / weights.sum()
@@ -258,7 +250,7 @@ def _robust_weights(
         scatter *= np.sqrt(count / (count - degrees))
         scale = TUKEY * max(scatter, MIN_SCATTER)
         weights = np.clip(1 - (residuals / scale) ** 2, 0, None) ** 2
-        coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
+        coefficients = _solve(design, logs, weights, strength * penalty)
         residuals = logs - design @ coefficients
     return weights
 
@@ -306,25 +298,15 @@ def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:
     """Fit curves to the measured sizes of each series of brains; return them by series
     and quantity.
 
-    `areas` has the columns series, week, area_cm2, volume_ml and, if known,
-    `THICKNESS`; each series has two weeks or more. A curve of thickness needs brains of
-    two weeks with a thickness.
+    `areas` has the columns series, week, area_cm2 and volume_ml; each series has two
+    weeks or more.
     """
-    quantities = list(SIZES)
-    if THICKNESS in areas:
-        quantities.append(THICKNESS)
     fits: dict[str, dict[str, CurveFit]] = {}
     for name, brains in areas.groupby("series", sort=False):
         of_series: dict[str, CurveFit] = {}
-        for quantity in quantities:
-            complete = brains.dropna(subset=quantity)
-            if quantity == THICKNESS and complete["week"].nunique() < 2:
-                continue
+        for quantity in SIZES:
             of_series[quantity] = fitted(
-                complete["week"].tolist(),
-                complete[quantity].tolist(),
-                name=quantity,
-                may_shrink=quantity == THICKNESS,
+                brains["week"].tolist(), brains[quantity].tolist(), name=quantity
             )
         fits[str(name)] = of_series
     return fits
@@ -340,14 +322,14 @@ def followed_sizes(
     """Return the sizes that a run follows, {quantity: {week: value}}, every quarter of
     a week.
 
-    For each of `SIZES` and the thickness that the run follows, `growth` has `measured`
+    For each of `SIZES` that the run follows, `growth` has `measured`
     or a table of values by week, which may decrease if `shrink`. `curves`, with the
     columns series, quantity, week and value, are needed for `measured`; InputError if
     the start brain's `series` is not in them. `weeks` are the output weeks of the run.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in (*SIZES, THICKNESS):
+    for quantity in SIZES:
         source = growth.get(quantity)
         if source is None:
             continue
@@ -358,7 +340,7 @@ def followed_sizes(
                 [float(week) for week in source],
                 list(source.values()),
                 name=quantity,
-                may_shrink=shrink or quantity == THICKNESS,
+                may_shrink=shrink,
             )
         by_week = zip(at.tolist(), value(curve, at).tolist(), strict=True)
         tables[quantity] = {round(week, 6): size for week, size in by_week}
@@ -397,8 +379,6 @@ def run_parameters(
         parameters["targets"] = {week: target_map(week) for week in later}
         parameters["stops"] = list(stops)
     parameters["growth"] = growth | sizes
-    if THICKNESS in sizes:
-        parameters[THICKNESS] = {"weeks": sizes[THICKNESS]}
     return parameters
 
 

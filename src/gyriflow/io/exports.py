@@ -176,7 +176,7 @@ def export_bids(
     for name in map(str, tables.get("metrics_wide", ())):
         wide.setdefault(_column_of_input(name), OF_INPUT)
     wide |= {
-        name: {"Description": text, "Units": bids_unit(unit)}
+        name: {"Description": text, "Units": _bids_unit(unit)}
         for name, (text, unit) in columns.items()
     }
     wide.pop("subject", None)
@@ -295,7 +295,7 @@ def _write_maps(
                 suffix, sign = quantity.bids_suffix, quantity.export_sign
                 described = {
                     "Description": quantity.description,
-                    "Units": bids_unit(quantity.unit),
+                    "Units": _bids_unit(quantity.unit),
                 }
                 sidecars["_".join(filter(None, (entity, suffix)))] = {
                     **described,
@@ -457,7 +457,7 @@ def _column_of_input(name: str) -> str:
     return f"{name}_of_input" if name in OWN_COLUMNS else name
 
 
-def bids_unit(unit: str) -> str:
+def _bids_unit(unit: str) -> str:
     """Return a unit as BIDS writes it: powers with ^, and "arbitrary" for none."""
     return "arbitrary" if unit == "1" else re.sub(r"([cm]m)(\d)", r"\1^\2", unit)
 

@@ -82,7 +82,7 @@ TEXT_COLUMNS = (
 like numbers, such as ids."""
 
 
-def companion_files(path: AnyPath) -> list[str]:
+def _companion_files(path: AnyPath) -> list[str]:
     """Return the further files that readers open with a file: the second of a pair, the
     external data of GIFTI."""
     path = Path(path)
@@ -128,7 +128,7 @@ def reading(
     try:
         yield
     except Exception as error:  # readers raise whatever a file leads them into
-        for companion in companion_files(path):
+        for companion in _companion_files(path):
             require_content(companion)
         if isinstance(error, InputError):
             raise
@@ -384,13 +384,13 @@ def sha256_of(path: AnyPath) -> str:
 @cache
 def _facts(path: str, size: int, written_ns: int, changed_ns: int) -> list[Any]:
     """Return the contents of a file in one state, which is read once in a process."""
-    return [sha256_of(path), size, written_ns, changed_ns, companion_files(path)]
+    return [sha256_of(path), size, written_ns, changed_ns, _companion_files(path)]
 
 
 def contents(
     files: Iterable[AnyPath], earlier: Mapping[str, Any]
 ) -> dict[str, list[Any]]:
-    """Return SHA-256, size, times and `companion_files` of each file that can be read,
+    """Return SHA-256, size, times and `_companion_files` of each file that can be read,
     companions included, by path.
 
     Files with the size (bytes) and times of writing and change (ns) of an `earlier`

@@ -61,7 +61,7 @@ def read_surface(path: AnyPath, side: str | None = None) -> TriangleMesh:
     the other hemisphere than `side`.
     """
     mesh, _, structure = surface_space_structure(path)
-    require_side(path, structure, side)
+    _require_side(path, structure, side)
     return mesh
 
 
@@ -113,18 +113,18 @@ def surface_space_structure(
     return (
         TriangleMesh(vertices, np.rint(faces).astype(np.int64)),
         space,
-        structure or structure_in_name(path),
+        structure or _structure_in_name(path),
     )
 
 
-def structure_in_name(path: AnyPath) -> str | None:
+def _structure_in_name(path: AnyPath) -> str | None:
     """Return the structure of the hemisphere that a file's name has, such as `lh.pial`
     or `sub-01_hemi-R_dseg.gii`."""
     side = side_in_name(Path(path).name)
     return STRUCTURES[side] if side else None
 
 
-def require_side(path: AnyPath, structure: str | None, side: str | None) -> None:
+def _require_side(path: AnyPath, structure: str | None, side: str | None) -> None:
     """Raise InputError if a file's structure is the other hemisphere than `side`,
     "left" or "right"."""
     expected = next((name for key, name in STRUCTURES.items() if key == side), None)
@@ -151,7 +151,7 @@ def read_hemispheres(
     warn if they differ."""
     read = [surface_space_structure(path) for path in (left, right)]
     for path, (_, _, structure), side in zip((left, right), read, SIDES, strict=True):
-        require_side(path, structure, side)
+        _require_side(path, structure, side)
     meshes, spaces, _ = zip(*read, strict=True)
     if spaces[0] != spaces[1]:
         words = " and ".join(
@@ -294,8 +294,8 @@ def read_surface_map(
         raise InputError(
             problem, path=path, found=", ".join(kinds) or "none", expected=expected
         )
-    require_side(surface_path, structure, side)
-    require_side(
+    _require_side(surface_path, structure, side)
+    _require_side(
         path, structure_of(image, path), side or SIDES_BY_STRUCTURE.get(structure or "")
     )
     values = np.asarray(arrays[0].data, dtype=float).ravel()
@@ -348,7 +348,7 @@ def structure_of(image: GiftiImage, path: AnyPath) -> str | None:
         meta.get("AnatomicalStructurePrimary")
         for meta in (*(array.meta for array in image.darrays), image.meta)
     )
-    return next(filter(None, named), None) or structure_in_name(path)
+    return next(filter(None, named), None) or _structure_in_name(path)
 
 
 def _read_gifti_surface(path: Path) -> RawSurface:
@@ -472,7 +472,7 @@ def read_vertex_labels(
     `side`.
     """
     image = load_gifti(path)
-    require_side(path, structure_of(image, path), side)
+    _require_side(path, structure_of(image, path), side)
     arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
         shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"

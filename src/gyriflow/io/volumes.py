@@ -64,12 +64,14 @@ class LabelVolume:
     @property
     def volumes_ml(self) -> dict[int, float]:
         """The volume of each label in mL, without the background."""
-        numbers, voxels = np.unique(self.labels[self.labels > 0], return_counts=True)
-        voxel_ml = float(abs(np.linalg.det(self.affine[:3, :3]))) * ML_PER_MM3
-        return {
-            int(number): int(count) * voxel_ml
-            for number, count in zip(numbers, voxels, strict=True)
-        }
+        inside = self.labels[self.labels > 0]
+        numbers, voxels = np.unique(inside, return_counts=True)
+        axes = self.affine[:3, :3]
+        voxel_ml = float(abs(np.linalg.det(axes))) * ML_PER_MM3
+        volumes = {}
+        for number, count in zip(numbers, voxels, strict=True):
+            volumes[int(number)] = int(count) * voxel_ml
+        return volumes
 
 
 class LabelSource(NamedTuple):

@@ -305,7 +305,7 @@ def refuse_bad_mesh(
             found="; ".join(fault for fault, _ in faults),
             expected="; ".join(expected for _, expected in faults),
             remedy=(
-                "Mesh with another mesh.envelope_mm, other edge lengths or another"
-                " mesh.mesher, or lower the gates of mesh."
+                "Mesh with other edge lengths or another mesh.mesher, or raise"
+                " mesh.max_surface_distance_mm."
             ),
         )

@@ -35,6 +35,8 @@ from .splitting import split_inner_edges
 log = logging.getLogger(__name__)
 TIME_LIMIT_S = 3600.0
 """After which a mesher is stopped."""
+ENVELOPE_MM = 0.1
+"""Largest distance of fTetWild's surface from the pial surface."""
 FINE_DEPTH_EDGES = 2.5
 """Elements of fTetWild are as fine as at the surface down to so many edges of it ..."""
 EDGE_GROWTH = 0.5
@@ -58,7 +60,7 @@ def edge_length_at(
     return np.minimum(surface_edge_mm + order * EDGE_GROWTH * below, core_edge_mm)
 
 
-def background_mesh(
+def _background_mesh(
     surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
     """Return a regular tetrahedral grid over the inside of the surface and the edge
@@ -94,7 +96,6 @@ def tetrahedralise(
     *,
     surface_edge_mm: float,
     core_edge_mm: float,
-    envelope_mm: float,
     time_limit_s: float = TIME_LIMIT_S,
     mesher: Mesher = "pytetwild",
     order: int = 1,
@@ -105,7 +106,7 @@ def tetrahedralise(
     `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the
     surface and deep inside, for linear elements (`order` 1) and quadratic ones (2),
     which are curved to follow the surface. "pytetwild" (fTetWild) makes a surface
-    within `envelope_mm`, and sizes elements by depth; "tetgen" keeps the remeshed
+    within `ENVELOPE_MM`, and sizes elements by depth; "tetgen" keeps the remeshed
     surface exactly, and elements grow from it as fast as their quality allows.
     MeshError where the surface is open or inside out, the mesher fails or takes longer
     than `time_limit_s`, or its mesh is not the inside of the surface.
@@ -124,7 +125,8 @@ def tetrahedralise(
             "volume": REGULAR_VOLUME * core**3,
         }
     else:
-        background, lengths = background_mesh(surface, edge, core, order)
+        diagonal = np.linalg.norm(np.ptp(surface.vertices, axis=0))
+        background, lengths = _background_mesh(surface, edge, core, order)
         arrays = {
             "vertices": surface.vertices,
             "faces": surface.faces,
@@ -132,9 +134,7 @@ def tetrahedralise(
             "bg_tets": background.tets,
             "bg_values": lengths,
             "edge": core,
-            "epsilon": (
-                envelope_mm / float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
-            ),
+            "epsilon": ENVELOPE_MM / float(diagonal),
         }
     mesh = run_mesher(mesher, arrays, time_limit_s)
     if order == 2:

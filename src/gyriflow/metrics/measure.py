@@ -1,7 +1,7 @@
 """Measure a brain: the metrics of its surfaces and the maps over them.
 
 A metric is an entry of `size_metrics` (any surface), `folding_metrics` (one hemisphere
-or both), `thickness_metrics` or `spectrum_metrics` (one hemisphere); a map is an entry
+or both), `thickness_metrics` or `_spectrum_metrics` (one hemisphere); a map is an entry
 of `measure_folds` or added by `measure_brain`. Each has a record in
 `gyriflow.quantities`.
 """
@@ -275,7 +275,7 @@ def area_ratio(whole: Metrics, mean_curvature: float) -> Metrics:
     }
 
 
-def spectrum_metrics(spectra: Mapping[str, Spectrum], area_mm2: float) -> Metrics:
+def _spectrum_metrics(spectra: Mapping[str, Spectrum], area_mm2: float) -> Metrics:
     """Return the metrics of a hemisphere's spectra.
 
     A band that is cut off has NaN, and relative powers are NaN where a band that they
@@ -421,7 +421,7 @@ def measure_brain(
         metrics[name] = (
             size_metrics(mesh)
             | folding_and_thickness([name])
-            | spectrum_metrics(found, area(mesh))
+            | _spectrum_metrics(found, area(mesh))
         )
         maps[name] = dict(folds[name].maps)
         if np.isfinite(thickness[name]).any():

@@ -96,7 +96,7 @@ def weyl_number(area_mm2: float, first: float) -> int:
     return round(area_mm2 * first * 4.0**BANDS / (8.0 * np.pi**2))
 
 
-def band_limits(first: float) -> Floats:
+def _band_limits(first: float) -> Floats:
     """Return the (7,) limits of the bands B1 to B6 in mm⁻²: Bk holds λ1·4^(k−1) ≤ λ <
     λ1·4^k."""
     return first * 4.0 ** np.arange(BANDS + 1, dtype=np.float64)
@@ -124,7 +124,7 @@ class Basis:
     @property
     def band(self) -> Ints:
         """The (k,) band of each mode: 0 for the constant alone, −1 beyond B6."""
-        limits = band_limits(self.first)
+        limits = _band_limits(self.first)
         band = np.searchsorted(limits, self.eigenvalues, side="right")
         # λ1 of the copy may be below that of the surface by rounding
         band[1:] = np.maximum(band[1:], 1)
@@ -156,7 +156,7 @@ def spectral_basis(
     )
     by_name = isinstance(choice, str)
     end = (
-        float(band_limits(first)[int(str(choice)[1:])])
+        float(_band_limits(first)[int(str(choice)[1:])])
         if by_name
         else 4.0 * np.pi * int(choice) / area(mesh)
     )
@@ -215,7 +215,7 @@ def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
 
 
 def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.DataFrame:
-    limits = band_limits(basis.first)
+    limits = _band_limits(basis.first)
     powers = coefficients**2
     bands = np.arange(BANDS + 1)
     is_mean = bands == 0

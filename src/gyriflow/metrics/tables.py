@@ -35,7 +35,7 @@ def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     return rows[columns]
 
 
-def wide_names(table: pd.DataFrame) -> list[str]:
+def _wide_names(table: pd.DataFrame) -> list[str]:
     """Return the column of the wide table that each row of one as of `long_table`
     belongs in.
 
@@ -70,8 +70,8 @@ def wide_names(table: pd.DataFrame) -> list[str]:
 
 
 def described_columns(table: pd.DataFrame) -> dict[str, tuple[str, str]]:
-    """Return what each of the `wide_names` of a table as of `long_table` means, and its
-    unit."""
+    """Return what each of the `_wide_names` of a table as of `long_table` means, and
+    its unit."""
     rows = (
         table[["hemisphere", "region", "metric", "unit"]]
         .fillna("")
@@ -79,7 +79,7 @@ def described_columns(table: pd.DataFrame) -> dict[str, tuple[str, str]]:
     )
     columns = {}
     for name, (hemisphere, region, metric, unit) in zip(
-        wide_names(table), rows, strict=True
+        _wide_names(table), rows, strict=True
     ):
         place = (
             f"{hemisphere} hemisphere" if hemisphere in SIDES else "both hemispheres"
@@ -95,12 +95,12 @@ def wide_table(
     table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]]
 ) -> pd.DataFrame:
     """Return a table as of `long_table` with a row per brain, run and week, and the
-    columns of `wide_names`.
+    columns of `_wide_names`.
 
     Before these stand the covariates of each brain, by its id; of a simulated one, its
     start's.
     """
-    names = wide_names(table)
+    names = _wide_names(table)
     wide = table.assign(column=names).pivot_table(
         "value", BRAIN, "column", aggfunc="first"
     )

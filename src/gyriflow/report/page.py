@@ -163,7 +163,7 @@ def study_page(
     """
     runs, validation, centiles = tables.runs, tables.validation, tables.centiles
     title = "Measured cortical folding"
-    sentence = quality_verdict(tables.quality)
+    sentence = _quality_verdict(tables.quality)
     scores = ""
     if runs is not None:
         title = (
@@ -221,7 +221,9 @@ def study_page(
         "flags": flags,
         "spread_unknown": SPREAD_UNKNOWN,
         "warnings": (
-            "" if tables.warnings.empty else html_table(group_warnings(tables.warnings))
+            ""
+            if tables.warnings.empty
+            else html_table(_group_warnings(tables.warnings))
         ),
         "weeks": next((item for item in figures if item["first"]), None),
         "sections": sections([item for item in figures if not item["first"]]),
@@ -474,16 +476,17 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
     ).lstrip()
 
 
-def quality_verdict(quality: pd.DataFrame) -> str:
+def _quality_verdict(quality: pd.DataFrame) -> str:
     """Return a sentence with the number of brains by verdict of quality control."""
     counts = quality["verdict"].value_counts()
-    words = {
-        name: name.replace("needs", "need" if counts.get(name, 0) > 1 else "needs")
-        for name in VERDICTS
-    }
-    brains = f"{len(quality)} brain{'s' if len(quality) > 1 else ''}"
-    parts = [f"{counts[name]} {word}" for name, word in words.items() if name in counts]
-    return f"{brains}: {', '.join(parts)}."
+    parts = []
+    for verdict in VERDICTS:
+        count = counts.get(verdict, 0)
+        words = verdict.replace("needs", "need") if count > 1 else verdict
+        if count:
+            parts.append(f"{count} {words}")
+    plural = "s" if len(quality) > 1 else ""
+    return f"{len(quality)} brain{plural}: {', '.join(parts)}."
 
 
 def verdict(
@@ -511,7 +514,7 @@ def verdict(
         ).replace("-", "−")
     serious = list(warnings.loc[warnings["level"] == "error", "message"])
     for _, run in runs.iterrows():
-        serious += run_doubts(run)
+        serious += _run_doubts(run)
     texts = serious or list(warnings["message"].unique())
     if not texts:
         return f"{sentence} There were no warnings."
@@ -529,10 +532,10 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
         ending = f"reached {week_label(reached)}"
     else:
         ending = f"ended at {week_label(reached)} of {end:g}"
-    return "; ".join([ending, *run_doubts(run)])
+    return "; ".join([ending, *_run_doubts(run)])
 
 
-def run_doubts(run: Mapping[str, Any] | pd.Series) -> list[str]:
+def _run_doubts(run: Mapping[str, Any] | pd.Series) -> list[str]:
     """Return the limitations of a run's folds."""
     words = []
     if run["min_J"] <= 0:
@@ -603,20 +606,23 @@ def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
     }
 
 
-def group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
+def _group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
     """Return each distinct warning once, with its brains and runs."""
     # steps of a brain have no run
     named = warnings[["subject", "run"]].astype(object).fillna("").astype(str)
-    places = [", ".join(filter(None, place)) for place in named.itertuples(index=False)]
-    prefix = warnings["level"].map(
-        lambda level: "" if level == "warning" else f"{level}: "
-    )
-    rows = warnings.assign(message=prefix + warnings["message"])
-    rows["brain, run"] = places
+    rows = warnings.copy()
+    rows["brain, run"] = [
+        ", ".join(filter(None, place)) for place in named.itertuples(index=False)
+    ]
+    is_error = rows["level"] != "warning"
+    prefix = (rows["level"] + ": ").where(is_error, "")
+    rows["message"] = prefix + rows["message"]
+
+    def joined(names: pd.Series) -> str:
+        return "; ".join(filter(None, names.unique()))
+
     groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
-    return groups.agg(
-        lambda names: "; ".join(filter(None, dict.fromkeys(names)))
-    ).reset_index()
+    return groups.agg(joined).reset_index()
 
 
 def hide_paths(value: Any) -> Any:

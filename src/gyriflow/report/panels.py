@@ -81,7 +81,7 @@ class Row:
     absent: str = ""
 
 
-def round_length(limit_mm: float) -> float:
+def _round_length(limit_mm: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
     decade = 10.0 ** np.floor(np.log10(limit_mm))
     return float(
@@ -345,17 +345,24 @@ def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Float
 
 
 def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
-    middle = (panel.mesh.vertices.min(axis=0) + panel.mesh.vertices.max(axis=0)) / 2
-    right, up = (float((point - middle) @ axis) for axis in picture_axes(panel.view))
+    vertices = panel.mesh.vertices
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    to_right, to_top = picture_axes(panel.view)
+    place = float((point - middle) @ to_right), float((point - middle) @ to_top)
+    radius = 0.05 * np.ptp(axes.get_xlim()) / 2
     line = "-" if is_visible(panel.mesh, point, panel.view) else ":"
-    for colour, thickness in (("white", 2.0), ("black", 1.0)):
-        ring = Circle((right, up), 0.05 * np.ptp(axes.get_xlim()) / 2, fill=False)
-        ring.set(
+    # a white margin below the black ring
+    for colour, thickness, style in (("white", 2.0, "-"), ("black", 1.0, line)):
+        ring = Circle(
+            place,
+            radius,
+            fill=False,
             edgecolor=colour,
             linewidth=thickness,
-            linestyle=line if colour == "black" else "-",
+            linestyle=style,
+            clip_on=False,
+            zorder=5,
         )
-        ring.set(clip_on=False, zorder=5)
         axes.add_patch(ring)
 
 
@@ -378,7 +385,7 @@ def _draw_scale_bar(
 ) -> None:
     """Draw the scale bar, and below it what the letters of the views mean."""
     width, total = figure.get_size_inches()
-    length = round_length(
+    length = _round_length(
         min(0.6 * widest_in, _SCALE_SHARE * width - 2 * _EDGE_IN) / inches_per_mm
     )
     axes = figure.add_axes(

@@ -275,7 +275,7 @@ def _displacement_caption(norms: Floats, place: Floats) -> str:
     return f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
 
 
-def round_up(value: float) -> float:
+def _round_up(value: float) -> float:
     """Return a positive value rounded up to two digits, as the end of a colour bar."""
     step = 10.0 ** (np.floor(np.log10(value)) - 1)
     return float(np.ceil(value / step - 1e-9) * step)
@@ -301,7 +301,7 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     if len(sizes):
         high = float(np.quantile(sizes, record.quantile))
         if high > 0:
-            end = round_up(high)
+            end = _round_up(high)
     is_cut = bool((sizes > end).any())
     if signed:
         return colour_scale(SIGNED_COLOURS, -end, end, cut=is_cut)

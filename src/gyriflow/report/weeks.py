@@ -99,7 +99,7 @@ def weeks_chart(
     return figure, dict(zip(titles, panels, strict=True))
 
 
-def run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
+def _run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
     """Return the line of each run."""
     style = {"marker": "o", "markersize": 2.5}
     return [
@@ -108,7 +108,7 @@ def run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
     ]
 
 
-def observed_marks(
+def _observed_marks(
     rows: pd.DataFrame,
     colour: Any = OBSERVED_COLOUR,
     *,
@@ -140,7 +140,7 @@ def observed_marks(
     return layers
 
 
-def subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
+def _subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
     """Return the marker of each subject with observed brains; none if there are more
     subjects than markers."""
     brains = rows.loc[rows["run"] == MEASURED, "subject"]
@@ -154,7 +154,7 @@ def subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str
     )
 
 
-def group_shades(
+def _group_shades(
     groups: Mapping[str, str], colours: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[Artist]]:
     """Return the colour of each brain in a group, not used by any run, and the legend
@@ -217,10 +217,10 @@ def metrics_figure(
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     rows, titles = _shown(whole, Shown.CHART)
     colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == MEASURED]
-    markers = subject_markers(whole, subjects)
-    shades, entries = group_shades(groups, colours)
-    marks = observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
-    figure, _ = weeks_chart(titles, [*run_lines(rows, colours), *marks], whole["week"])
+    markers = _subject_markers(whole, subjects)
+    shades, entries = _group_shades(groups, colours)
+    marks = _observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
+    figure, _ = weeks_chart(titles, [*_run_lines(rows, colours), *marks], whole["week"])
     named = [*(subjects if markers else ()), *shades]
     has_stars = not observed["subject"].isin(named).all()
     run_legend(
@@ -289,8 +289,8 @@ def norms_figure(
     norm = curves[(curves["hemisphere"] == "whole") & curves["metric"].isin(titles)]
     norm = norm.assign(panel=norm["metric"])
     colours = run_colours(whole["run"], runs)
-    markers = subject_markers(whole, subjects)
-    shades, extra = group_shades(groups, colours)
+    markers = _subject_markers(whole, subjects)
+    shades, extra = _group_shades(groups, colours)
     observed = rows[rows["run"] == MEASURED]
     own, others = (
         observed[observed["subject"].isin(reference) == is_own]
@@ -307,11 +307,11 @@ def norms_figure(
         Layer(norm, {"color": NEUTRAL_COLOUR}, ("q25", "q75")),
         Layer(norm, line, "expected"),
         *(Layer(norm, thin, quantile) for quantile in ("q05", "q25", "q75", "q95")),
-        *run_lines(rows, colours),
-        *observed_marks(
+        *_run_lines(rows, colours),
+        *_observed_marks(
             own, subjects=subjects, markers=markers, shades=shades, **small
         ),
-        *observed_marks(
+        *_observed_marks(
             others, RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades
         ),
     ]
@@ -361,7 +361,7 @@ def regions_chart(
     layers = []
     for (region, run), part in rows.groupby(["region", "run"], sort=False):
         if run == MEASURED:
-            layers += observed_marks(part, colours[str(region)], markersize=6)
+            layers += _observed_marks(part, colours[str(region)], markersize=6)
         elif run in lines:
             layers.append(
                 Layer(
@@ -628,8 +628,8 @@ def spectra_figure(
         value=rows["relative_power"],
     )
     sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
-    shades, entries = group_shades(groups, colours)
-    layers = run_lines(rows, colours) + observed_marks(
+    shades, entries = _group_shades(groups, colours)
+    layers = _run_lines(rows, colours) + _observed_marks(
         rows[rows["run"] == MEASURED], subjects=subjects, shades=shades
     )
     cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}

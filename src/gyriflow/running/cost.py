@@ -111,7 +111,7 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     memory = predicted_memory_mib(
         round(elements / (8 if mesh.order == 2 else 1)),
         run.ranks,
-        run.contact.kind,
+        run.contact,
         mesh.order,
     )
     # positions and fields of each output week, by a quarter as many nodes

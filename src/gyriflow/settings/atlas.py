@@ -19,7 +19,6 @@ from .base import (
     not_a_path,
     refused,
 )
-from .terms import AffineSource, Coordinates
 from .weeks import AnyWeek
 
 DOWNLOADS = Path("resources", "atlases")
@@ -68,22 +67,9 @@ class AtlasLicence(Settings):
     name: str
     """Name of the licence, as `CC0 1.0`."""
     terms: str
-    """Summary in a sentence or two."""
-    url: str | None = None
-    """Address of the full text."""
+    """Summary in a sentence or two, with the address of the full text."""
     accept: bool = False
     """Whether users have to accept terms that are narrow or unclear."""
-
-
-class AtlasReference(Settings):
-    """The reference to cite."""
-
-    citation: str
-    """Authors, title, journal and year."""
-    doi: str | None = None
-    """Digital object identifier."""
-    url: str | None = None
-    """Page of the atlas."""
 
 
 class AtlasFileRecord(Settings):
@@ -102,10 +88,6 @@ class AtlasSeries(Settings):
     """Name of these brains in figures and tables."""
     scheme: str | None = None
     """Meaning of the labels, as for `brains`; required with `labels`."""
-    affine_from: AffineSource = "auto"
-    """As for `brains`, with `labels`."""
-    coordinates: Coordinates = "auto"
-    """As for `brains`, with surfaces."""
     matched: bool = False
     """Whether surfaces of all weeks have the same vertices; believed until the files
     are there."""
@@ -176,8 +158,8 @@ class Atlas(Settings):
     """What it is."""
     licence: AtlasLicence
     """Terms of use."""
-    reference: AtlasReference | None = None
-    """The reference to cite."""
+    reference: str | None = None
+    """The reference to cite: authors, title, journal, year, and DOI or address."""
     url: str | None = Field(None, pattern="^https?://")
     """Address of the files' root; `null`: not online."""
     folder: str | None = None

@@ -12,18 +12,15 @@ from .terms import MAX_NAME_LENGTH, SIDES, AffineSource, Coordinates, Side
 from .varying import FileOrPair, files_of
 from .weeks import Week, WeekNotation
 
-SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
+SOURCES = ("labels", "hemispheres", "pial", "shape")
 """A brain has exactly one of these keys."""
-
-HEMISPHERE_LABELS = "labels of a hemisphere"
-HEMISPHERE_SURFACE = "a hemisphere's surface"
-LABEL_SOURCES = ("labels", HEMISPHERE_LABELS)
-SURFACE_SOURCES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
+SURFACE_SOURCES = ("hemispheres", "pial")
 KEY_SOURCES: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("scheme", "image", "affine_from"), LABEL_SOURCES),
+    **dict.fromkeys(("scheme", "image", "affine_from"), ("labels",)),
     "coordinates": SURFACE_SOURCES,
     "white": SURFACE_SOURCES,
-    "population": (*LABEL_SOURCES, *SURFACE_SOURCES),
+    "side": ("labels", "pial"),
+    "population": ("labels", *SURFACE_SOURCES),
 }
 """Keys that can only be used with some sources."""
 
@@ -46,8 +43,6 @@ class ShapeSettings(Settings):
     noise_mm: float = Field(0.05, ge=0, le=0.5)
     """Root mean square height of the smooth bumps that start the folding, at most a
     fiftieth of the shortest semi-axis. [mm]"""
-    seed: int = Field(0, ge=0)
-    """Seed of the bumps' random pattern."""
 
     @property
     def kind(self) -> str:
@@ -79,20 +74,9 @@ class HemisphereFiles(Settings):
     """File of the right hemisphere."""
 
 
-class OneHemisphere(Settings):
-    """The only hemisphere of a brain, after hemispherectomy or if the data has one
-    side."""
-
-    file: InputFile
-    """Closed pial surface or, with the brain's `scheme`, a label volume without cortex
-    of the other hemisphere."""
-    side: Side
-    """The hemisphere, `left` or `right`."""
-
-
 class BrainConfig(Settings):
-    """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial`
-    and `shape`."""
+    """One brain, made from exactly one of `labels`, `hemispheres`, `pial` and
+    `shape`."""
 
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=MAX_NAME_LENGTH)
     """Name in paths and tables: letters, digits, - _ ."""
@@ -118,10 +102,11 @@ class BrainConfig(Settings):
     """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
     hemispheres: HemisphereFiles | None = None
     """Surface files of both hemispheres."""
-    hemisphere: OneHemisphere | None = None
-    """The only hemisphere, as a surface or as labels."""
     pial: InputFile | None = None
     """Closed surface of the whole brain."""
+    side: Side | None = None
+    """The only hemisphere, after hemispherectomy or if the data has one side: `labels`
+    have no cortex of the other one, or `pial` is the closed surface of this one."""
     white: FileOrPair | None = None
     """White surface in the same coordinates, for the cortical thickness: a file; with
     `hemispheres`, a list of the left and the right file."""
@@ -140,39 +125,19 @@ class BrainConfig(Settings):
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        return SIDES if self.hemisphere is None else (self.hemisphere.side,)
-
-    @property
-    def label_volume(self) -> str | None:
-        if self.hemisphere is not None and self.scheme is not None:
-            return self.hemisphere.file
-        return self.labels
-
-    @property
-    def has_labels(self) -> bool:
-        return self.label_volume is not None
+        return SIDES if self.side is None else (self.side,)
 
     @property
     def files(self) -> list[str]:
         paths = [self.labels, self.pial]
         if self.hemispheres is not None:
             paths += [self.hemispheres.left, self.hemispheres.right]
-        if self.hemisphere is not None:
-            paths.append(self.hemisphere.file)
         return [path for path in paths if path is not None]
 
     @property
     def white_files(self) -> dict[str, str]:
         files = files_of(self.white)
         return dict(zip(SIDES if len(files) == 2 else ("whole",), files, strict=False))
-
-    @property
-    def _kind(self) -> str:
-        if self.hemisphere is None:
-            return self.source
-        if is_volume(self.hemisphere.file):
-            return HEMISPHERE_LABELS
-        return HEMISPHERE_SURFACE
 
     def problems(self) -> Problems:
         sources = [key for key in SOURCES if self.is_set(key)]
@@ -189,34 +154,25 @@ class BrainConfig(Settings):
             yield KeyProblem(text)
         else:
             for key, kinds in KEY_SOURCES.items():
-                if key in self.model_fields_set and self._kind not in kinds:
+                if key in self.model_fields_set and self.source not in kinds:
                     yield KeyProblem(
-                        f"is not used with {self._kind}, only with"
+                        f"is not used with {self.source}, only with"
                         f" {' or '.join(kinds)}; remove it",
                         (key,),
                     )
-            has_white = self.white is not None and self._kind in SURFACE_SOURCES
+            has_white = self.white is not None and self.source in SURFACE_SOURCES
             has_pair = "left" in self.white_files
-            if has_white and has_pair != (self._kind == "hemispheres"):
+            if has_white and has_pair != (self.source == "hemispheres"):
                 yield KeyProblem(
                     "should have one file for each pial surface", ("white",)
                 )
-            if self._kind in LABEL_SOURCES and self.scheme is None:
+            if self.labels is not None and self.scheme is None:
                 yield KeyProblem(
                     "is missing; it defines the meaning of the labels", ("scheme",)
                 )
 
 
 # regions
-
-
-class SurfaceRegions(Settings):
-    """Regions at the vertices of a hemisphere's surface."""
-
-    labels: InputFile
-    """GIFTI label file (.label.gii), a label for each vertex."""
-    surface: InputFile
-    """The surface, in the coordinates of the brain's own files."""
 
 
 class GivenRegions(Settings):
@@ -227,29 +183,39 @@ class GivenRegions(Settings):
     of the brain closest in week.
     """
 
-    volume: InputFile | None = None
+    labels: FileOrPair
     """Label volume (NIfTI) in the space of the brain's `labels`, with regions along the
-    cortex."""
-    left: SurfaceRegions | None = None
-    """Instead of a volume, labels of the left hemisphere."""
-    right: SurfaceRegions | None = None
-    """Labels of the right hemisphere."""
+    cortex; or a list of the left and the right GIFTI label file (.label.gii), with a
+    label for each vertex of `surface`."""
+    surface: tuple[InputFile, InputFile] | None = None
+    """With label files, the left and the right surface, in the coordinates of the
+    brain's own files."""
     names: dict[Label, str] = Field({})
     """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`. Labels
     with the same name are one region; labels without a name are ignored. Required with
     a volume; by default the label files' own names are used."""
 
+    @property
+    def volume(self) -> str | None:
+        return self.labels if isinstance(self.labels, str) else None
+
     def problems(self) -> Problems:
-        sides = [side for side in SIDES if self.is_set(side)]
-        if (self.volume is not None) == bool(sides):
+        if self.volume is None:
+            if self.surface is None:
+                yield KeyProblem(
+                    "is missing; the labels belong to its vertices", ("surface",)
+                )
+            return
+        if not is_volume(self.volume):
             yield KeyProblem(
-                f"found {'both' if sides else 'neither'}; expected volume, or left and"
-                " right"
+                "found one file of a surface; expected the left and the right one, or a"
+                " volume",
+                ("labels",),
             )
-        elif len(sides) == 1:
-            side = "right" if sides == ["left"] else "left"
-            yield KeyProblem("is missing; both hemispheres need labels", (side,))
-        if self.volume is not None and not self.names:
+            return
+        if self.surface is not None:
+            yield KeyProblem("is not used with a volume; remove it", ("surface",))
+        if not self.names:
             yield KeyProblem(
                 "is missing; it defines the regions of the volume", ("names",)
             )
@@ -259,10 +225,11 @@ class GivenRegions(Settings):
         if self.volume is not None:
             return {"volume": self.volume}
         files = {}
-        for side, given in (("left", self.left), ("right", self.right)):
-            if given is not None:
-                files[f"{side}_labels"] = given.labels
-                files[f"{side}_surface"] = given.surface
+        for side, labels, surface in zip(
+            SIDES, self.labels, self.surface or (), strict=True
+        ):
+            files[f"{side}_labels"] = labels
+            files[f"{side}_surface"] = surface
         return files
 
 
@@ -278,9 +245,10 @@ class ParticipantsSettings(Settings):
     `scan_age_days`); and keys of brains, inner ones with a dot (`hemispheres.left`),
     two `white` surfaces with a semicolon between. Instead of keys, `files` may name
     labels, a pial surface, or left and right surfaces with a semicolon between; with
-    `side`, one hemisphere. `n/a` is an empty value. Other columns are covariates. Each
-    participant is a subject. One with a `sub-01/sub-01_sessions.tsv` next to the table
-    has a brain for each session, with its age.
+    `side`, one of these is the only hemisphere. `n/a` is an empty value. Other columns
+    are covariates. Each participant is a subject. One with a
+    `sub-01/sub-01_sessions.tsv` next to the table has a brain for each session, with
+    its age.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})

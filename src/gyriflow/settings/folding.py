@@ -56,42 +56,8 @@ Memory = Annotated[
         lambda time: "infinite" if math.isinf(time) else time, when_used="json"
     ),
 ]
-Share = Annotated[float, Field(ge=-1, le=1)]
-Fraction = Annotated[float, Field(gt=0, le=2)]
 AXES = ("x", "y", "z")
 """Which end the names of the maps of positions."""
-
-
-class Contact(Settings):
-    """Contact between folds, and between the two hemispheres."""
-
-    kind: Literal["global", "planes", "none"] = "global"
-    """`global`: no part of the pial surface crosses another; `planes`: neither
-    hemisphere passes the fissure's plane, but folds may cross each other (the paper);
-    `none`: no contact."""
-
-
-class NoGrowth(Settings):
-    """The ellipsoid inside which nothing grows, and whose pial facets are clamped with
-    `support: ellipsoid`."""
-
-    kind: Literal["ellipsoid", "none"] = "ellipsoid"
-    """`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`:
-    all tissue grows."""
-    shift: tuple[Share, Share] = (0.05, -0.15)
-    """Shift of its centre from the middle, anterior and superior. [extents along Y,
-    Z]"""
-    semi_axes: tuple[Fraction, Fraction, Fraction] = (0.35, 0.40, 0.50)
-    """Semi-axes along X, Y, Z. [extents]"""
-
-
-class Solver(Settings):
-    """The nonlinear and the linear solver."""
-
-    newton_tolerance: float = Field(1e-4, gt=0, lt=1)
-    """Residual at which Newton stops, over its value at u = 0."""
-    max_halvings: int = Field(6, ge=0, le=30)
-    """Halvings of the time step before the run ends."""
 
 
 class FoldingSettings(Settings):
@@ -131,24 +97,26 @@ class FoldingSettings(Settings):
     stress_memory_gw: Memory = 0.0
     """Relaxation time of elastic stress: after each step 0 forgets it (the paper),
     `infinite` keeps all of it. [GW]"""
-    relaxation: Literal["all", "shape"] = "all"
-    """What relaxes: `all` of the elastic strain (the paper), or its `shape` only, so
-    that tissue keeps its change of volume and the pressure that goes with it."""
     support: Literal["ellipsoid", "free"] = "ellipsoid"
-    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no
-    growth; `free` removes rigid motions only."""
-    contact: Contact = Contact()
-    """Contact."""
-    no_growth: NoGrowth = NoGrowth()
-    """Tissue that does not grow."""
+    """What holds the brain: `ellipsoid` clamps pial facets in the paper's ellipsoid;
+    `free` removes rigid motions only."""
+    contact: Literal["global", "planes", "none"] = "global"
+    """Contact between folds, and between the two hemispheres. `global`: no part of the
+    pial surface crosses another; `planes`: neither hemisphere passes the fissure's
+    plane, but folds may cross each other (the paper); `none`: no contact."""
+    no_growth: Literal["ellipsoid", "none"] = "ellipsoid"
+    """Tissue that does not grow. `ellipsoid`: that in the paper's ellipsoid
+    (docs/model.md), and in the bridge between hemispheres; `none`: all tissue grows."""
     output_every_gw: float = Field(1.0, ge=0.01, le=10)
     """Interval between output weeks, besides the first and the last, and where some run
     predicts the start's growth (`growth.of: atlas`) those of the brains to compare
     with. [GW]"""
     fields: tuple[FieldName, ...] = ("displacement", "cortex_weight", "growth")
     """Fields for ParaView at each output week."""
-    solver: Solver = Solver()
-    """Solvers."""
+    newton_tolerance: float = Field(1e-4, gt=0, lt=1)
+    """Residual at which Newton stops, over its value at u = 0."""
+    max_halvings: int = Field(6, ge=0, le=30)
+    """Halvings of the time step before the run ends."""
     ensemble: int | None = Field(None, ge=3, le=64)
     """With growth by `shapes`, the number of further runs with perturbed inputs, which
     give prediction intervals. They differ in registrations (smoothing; label
@@ -156,16 +124,6 @@ class FoldingSettings(Settings):
     several atlases cover the run, and the individual differences that persist."""
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
-
-    @property
-    def keeps_stretch(self) -> bool:
-        """Whether elastic stretch, or a part of it, is kept between steps."""
-        return self.stress_memory_gw > 0 or self.keeps_volume_only
-
-    @property
-    def keeps_volume_only(self) -> bool:
-        """Whether only the elastic change of volume is kept between steps."""
-        return self.relaxation == "shape" and self.stress_memory_gw == 0
 
     def problems(self) -> Problems:
         for key in GROWTH_RATES:

@@ -106,13 +106,13 @@ GROWTH_MODELS: dict[ModelName, GrowthModel] = {
         sentence=_rates_sentence,
     ),
     "sizes": GrowthModel(
-        keys=("thickness_mm", *SIZES),
+        keys=SIZES,
         rates=("radial_growth_rate_per_s",),
         measured="sizes",
         sentence=_sizes_sentence,
     ),
     "shapes": GrowthModel(
-        keys=("of", "thickness_mm"),
+        keys=("of",),
         rates=(),
         measured="shapes",
         sentence=_shapes_sentence,
@@ -146,9 +146,6 @@ class Growth(Settings):
     `measured`: a smooth curve through the brains of the start's growth series. [cm²]"""
     volume_ml: SizeCurve = "measured"
     """With `sizes`, volume inside the pial surface, likewise. [mL]"""
-    thickness_mm: SizeCurve | None = None
-    """With `sizes` and `shapes`, mean cortical thickness, likewise; `null`: the run's
-    `thickness_mm`. [mm]"""
 
     @property
     def definition(self) -> GrowthModel:
@@ -191,8 +188,3 @@ class Growth(Settings):
 
     def problems(self) -> Problems:
         yield from self.unused_keys((*self.definition.keys, *self.definition.resolved))
-        if self.of == "atlas" and self.thickness_mm == "measured":
-            yield KeyProblem(
-                "is measured on the start's own later brains, unknown to a prediction",
-                ("thickness_mm",),
-            )

@@ -35,8 +35,8 @@ FREE_GROWTH: dict[str, Any] = {
     "shear_modulus_cortex_pa": 300.0,
     "shear_modulus_core_pa": 300.0,
     "support": "free",
-    "contact": {"kind": "global"},
-    "no_growth": {"kind": "none"},
+    "contact": "global",
+    "no_growth": "none",
 }
 """Growth everywhere, a free body, a cortex as stiff as the core: growth makes the
 folds, not buckling."""
@@ -57,12 +57,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
-        "contact": {"kind": "planes"},
-        "no_growth": {
-            "kind": "ellipsoid",
-            "shift": [0.05, -0.15],
-            "semi_axes": [0.35, 0.40, 0.50],
-        },
+        "contact": "planes",
+        "no_growth": "ellipsoid",
     },
     # growth towards the shapes that were measured on the brain's own series
     "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},
@@ -223,7 +219,7 @@ def growing_groups(
         groups: dict[tuple[str, str, str], list[BrainConfig]] = {}
         for brain in brains:
             if given is None or brain.id in given:
-                side = f"{brain.sides[0]} hemisphere" if brain.hemisphere else ""
+                side = f"{brain.sides[0]} hemisphere" if brain.side else ""
                 owner = (brain.subject or "", brain.population or "", side)
                 groups.setdefault(owner, []).append(brain)
         for owner, same_owner in groups.items():
@@ -239,8 +235,8 @@ def growing_groups(
 
 
 def _series_by_kind(brains: Sequence[BrainConfig]) -> dict[str, Sequence[BrainConfig]]:
-    surfaces = [brain for brain in brains if not brain.has_labels]
-    volumes = [brain for brain in brains if brain.has_labels]
+    surfaces = [brain for brain in brains if brain.labels is None]
+    volumes = [brain for brain in brains if brain.labels is not None]
     if not volumes:
         return {"surface": surfaces}
     if not surfaces:
@@ -298,7 +294,7 @@ class SweepSettings(ComparisonSettings):
 
     vary: dict[str, tuple[Value, ...]]
     """Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`;
-    inner keys with dots (`solver.newton_tolerance`)."""
+    inner keys with dots (`growth.model`)."""
     fixed: dict[str, Value] = Field({})
     """Keys of `folding` that are changed in all runs."""
     fixed_at: dict[float, dict[str, Value]] = Field({})

@@ -36,8 +36,8 @@ class MeshSettings(Settings):
 
     mesher: Mesher = "pytetwild"
     """`pytetwild` (fTetWild) makes the best elements and remeshes the surface within
-    `envelope_mm`. `tetgen` takes seconds; it makes a finer surface with few elements
-    below it."""
+    0.1 mm. `tetgen` takes seconds; it makes a finer surface with few elements below
+    it."""
     order: Literal[1, 2] = 2
     """Order of the elements: linear, or quadratic with curved sides. Both have about as
     many nodes; quadratic elements are an eighth as many."""
@@ -47,9 +47,6 @@ class MeshSettings(Settings):
     length of linear elements and half that of quadratic ones. [mm]"""
     core_edge_mm: float = Field(2.5, gt=0.1, le=20)
     """Distance between neighbouring nodes deep inside. [mm]"""
-    envelope_mm: float = Field(0.1, gt=0.001, le=2)
-    """Largest distance of the mesh's surface from the pial surface (`pytetwild`).
-    [mm]"""
     max_surface_distance_mm: float = Field(0.1, gt=0, le=5)
     """Largest 99th percentile of the distance between mesh and pial surface, in both
     directions. [mm]"""

@@ -112,7 +112,7 @@ def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
     if not isinstance(value, Varying):
         numbers = [value]
     elif value.map is None:
-        numbers = list(weeks_of(value).values())
+        numbers = list(_weeks_of(value).values())
     else:
         numbers = []
     for name, bound in bounds.items():
@@ -128,7 +128,7 @@ def map_of(value: float | Varying) -> str | None:
     return None
 
 
-def weeks_of(value: float | Varying) -> dict[float, float]:
+def _weeks_of(value: float | Varying) -> dict[float, float]:
     """Return the curve of a parameter, {week: value} in ascending order; empty if it
     has none."""
     return (value.weeks or {}) if isinstance(value, Varying) else {}
@@ -139,7 +139,7 @@ def curve_at(value: float | Varying, week: float) -> float:
     outside, 1 without a curve."""
     if not isinstance(value, Varying):
         return value
-    curve = weeks_of(value)
+    curve = _weeks_of(value)
     if not curve:
         return 1.0
     return float(np.interp(week, list(curve), list(curve.values())))
@@ -148,7 +148,7 @@ def curve_at(value: float | Varying, week: float) -> float:
 def mean_of_curve(value: float | Varying) -> float:
     """Return the mean of a parameter's curve over its weeks, 1 without a curve: about
     what its map is multiplied by."""
-    curve = weeks_of(value)
+    curve = _weeks_of(value)
     if not curve:
         return 1.0
     return float(np.mean([*curve.values()]))
@@ -173,7 +173,7 @@ def value_range(
     places = np.ones(1) if name is None else maps[name]
     # the extremes of a curve lie at its weeks, or at the ends
     weeks = [start, end]
-    for week in weeks_of(value):
+    for week in _weeks_of(value):
         if start < week < end:
             weeks.append(week)
     curve = [curve_at(value, week) for week in weeks]

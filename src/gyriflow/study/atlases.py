@@ -155,9 +155,7 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
         else:
             entry[file.key] = str(file.path)
         if "labels" in series.files:
-            entry |= {"scheme": series.scheme, "affine_from": series.affine_from}
-        else:
-            entry["coordinates"] = series.coordinates
+            entry["scheme"] = series.scheme
     return list(entries.values())
 
 
@@ -178,9 +176,8 @@ def atlas_problems(used: UsedAtlas) -> Problems:
         yield KeyProblem(f"{used.folder} is a file; expected a folder", ("folder",))
         return
     if licence.accept and not settings.accept_licence:
-        name = ", ".join(filter(None, (licence.name, licence.url)))
         yield KeyProblem(
-            f"found false; true accepts the licence of {atlas.name} ({name}):"
+            f"found false; true accepts the licence of {atlas.name} ({licence.name}):"
             f" {licence.terms}",
             ("accept_licence",),
         )
@@ -222,17 +219,9 @@ def retrieval_note(used: UsedAtlas) -> str:
     if not all(record.sha256 for record in records):
         note += "; no checksums are known"
     if atlas.reference is not None:
-        reference = atlas.reference
-        note += f"\n  cite: {reference.citation}"
-        if reference.doi:
-            note += f", doi {reference.doi}"
-        elif reference.url:
-            note += f", {reference.url}"
+        note += f"\n  cite: {atlas.reference}"
     licence = atlas.licence
-    note += f"\n  licence: {licence.name}"
-    if licence.url:
-        note += f" ({licence.url})"
-    return f"{note}. {licence.terms}"
+    return f"{note}\n  licence: {licence.name}. {licence.terms}"
 
 
 def _listed(weeks: Iterable[float]) -> str:

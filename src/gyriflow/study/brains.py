@@ -43,7 +43,7 @@ def _brain(
 ) -> Brain:
     names = {"brain": settings.id}
     has_cortex = False
-    if settings.label_volume is not None:
+    if settings.labels is not None:
         has_cortex = bool(label_scheme(config, settings.scheme).cortex)
     has_thickness = bool(settings.white_files) or has_cortex
     measures_all_white = config.metrics.white_surfaces == "all"
@@ -69,7 +69,7 @@ def _brain(
         subject=settings.subject,
         population=settings.population,
         source=settings.source,
-        labels=settings.label_volume,
+        labels=settings.labels,
         scheme=settings.scheme,
         affine_from=settings.affine_from,
         image=settings.image,

@@ -364,7 +364,7 @@ def _metrics(config: Config) -> Problems:
     single = []
     scans: Counter[tuple[str, float]] = Counter()
     for brain in config.brains:
-        if brain.id in settings.regions and brain.hemisphere is not None:
+        if brain.id in settings.regions and brain.side is not None:
             single.append(brain.id)
         if brain.subject is not None:
             scans[brain.subject, brain.week] += 1

@@ -371,7 +371,6 @@ PATHS = (
     "white",
     "hemispheres.left",
     "hemispheres.right",
-    "hemisphere.file",
 )
 """Columns that are keys of brains with paths, inner keys with dots."""
 BRAIN_KEYS = (
@@ -381,11 +380,11 @@ BRAIN_KEYS = (
     "scheme",
     "affine_from",
     "coordinates",
-    "hemisphere.side",
+    "side",
 )
 """All columns that are keys of brains, except ids and age."""
-FILES, SIDE = "files", "side"
-"""Columns of files of any source, and of their hemisphere."""
+FILES = "files"
+"""Column of files of any source."""
 KNOWN_COLUMNS = (
     *IDS,
     *SESSIONS,
@@ -393,7 +392,6 @@ KNOWN_COLUMNS = (
     "scan_age",
     "week",
     FILES,
-    SIDE,
     *BRAIN_KEYS,
 )
 MIN_SIMILARITY = 0.85
@@ -513,7 +511,7 @@ def _difference(rows: Iterable[Row]) -> str:
 def covariates(values: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the values of its tables without
     another meaning."""
-    own_keys = (FILES, SIDE, *BRAIN_KEYS)
+    own_keys = (FILES, *BRAIN_KEYS)
     further = {}
     for key, text in values.items():
         if key not in own_keys and not is_missing(text):
@@ -551,14 +549,13 @@ def _entry(
     }
     if FILES in values:
         files = [part.strip() for part in values[FILES].split(";")]
-        side = values.get(SIDE)
         limit, expected = 2, "at most a left and a right hemisphere"
-        if side is not None:
+        if "side" in values:
             limit, expected = 1, "the file of this side"
         if len(files) > limit:
             found = f"{len(files)}, {'; '.join(files)}"
             return {}, f"files: found {found}; expected {expected}"
-        values |= _file_keys(files, side)
+        values |= _file_keys(files)
     for column, text in values.items():
         if column not in BRAIN_KEYS:
             continue
@@ -584,10 +581,8 @@ def _entry(
     return entry, ""
 
 
-def _file_keys(files: list[str], side: str | None) -> dict[str, str]:
+def _file_keys(files: list[str]) -> dict[str, str]:
     first = files[0]
-    if side is not None:
-        return {"hemisphere.file": first, "hemisphere.side": side}
     if len(files) == 2:
         return {
             "hemispheres.left": first,

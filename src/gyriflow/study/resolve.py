@@ -377,7 +377,7 @@ class _Simulations:
         if self.config.calibrate and run in self.config.calibrate.runs:
             base = self.config.calibrate.base
         curves = None
-        if growth.follows_sizes or growth.thickness_mm == "measured":
+        if growth.follows_sizes:
             curves = paths.CURVES["curves"]
         chain: str | None = growth.shapes
         if chain and member_of:

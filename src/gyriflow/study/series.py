@@ -152,7 +152,7 @@ def series_of(
     for name, members in growing_groups(configs, config.growth.brains):
         ids = [brain.id for brain in members]
         series[name] = tuple(brains[brain] for brain in ids)
-        if any(brain.has_labels or brain.synthetic for brain in members):
+        if any(brain.labels or brain.synthetic for brain in members):
             continue
         cause: str | None = "growth.matched_surfaces is false"
         if config.growth.matched_surfaces:

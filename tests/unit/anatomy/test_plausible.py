@@ -19,31 +19,10 @@ from gyriflow.anatomy.plausible import (
     require_plausible_thickness,
     require_single_hemisphere,
     require_whole,
-    thickness_jumps,
 )
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
 from gyriflow.units import ML_PER_MM3
-
-
-@pytest.mark.parametrize(
-    ("series", "told"),
-    [
-        ([(25, 1.22), (27, 2.32)], [("25", "1.22 mm", "27", "2.32 mm")]),
-        # thinner, in the order of the weeks, over a brain whose thickness is not known
-        (
-            [(29, 1.0), (24.5, 2.0), (26, float("nan"))],
-            [("24.5", "2.00 mm", "29", "1.00 mm")],
-        ),
-        ([(21, 1.6), (22, 1.95), (25, 2.6), (35, 3.0)], []),
-        ([(24, 2.0), (24.2, 2.45)], []),
-        ([(24, 2.0), (24.2, 2.6)], [("24.2", "2.60 mm")]),
-    ],
-)
-def test_thickness_that_jumps_between_two_weeks_is_told(series, told):
-    # names in another order than the weeks
-    found = thickness_jumps((f"scan-{99 - week:g}", week, mm) for week, mm in series)
-    assert found == [Facts(*facts) for facts in told]
 
 
 def test_the_usual_share_of_a_cut_is_between_those_of_the_weeks_beside():

@@ -87,25 +87,18 @@ def test_the_labels_of_one_hemisphere_are_read_as_labels(tmp_path):
     write_label_volume(tmp_path / "unknown.nii.gz", LabelVolume(labels, np.eye(4)))
     scheme = "spina-bifida-atlas"
     # its wall towards the side that is not there may have no cortex
-    assert (
-        problems(
-            tmp_path, hemisphere={"file": "l.nii.gz", "side": "left"}, scheme=scheme
-        )
-        == []
-    )
+    assert problems(tmp_path, labels="l.nii.gz", side="left", scheme=scheme) == []
     assert problems(tmp_path, labels="l.nii.gz", scheme=scheme)[0] == Facts(
         scheme, "cortex", "32 %", "50 %"
     )
-    found = problems(
-        tmp_path, hemisphere={"file": "unknown.nii.gz", "side": "left"}, scheme=scheme
-    )
+    found = problems(tmp_path, labels="unknown.nii.gz", side="left", scheme=scheme)
     assert found == [Facts(scheme, "99 among 1, 5, 99")]
 
 
 def test_the_surface_of_one_hemisphere_is_of_its_side(tmp_path):
     write_surface(tmp_path / "r.surf.gii", hemisphere(1), "CortexRight")
-    assert problems(tmp_path, hemisphere={"file": "r.surf.gii", "side": "right"}) == []
-    found = problems(tmp_path, hemisphere={"file": "r.surf.gii", "side": "left"})
+    assert problems(tmp_path, pial="r.surf.gii", side="right") == []
+    found = problems(tmp_path, pial="r.surf.gii", side="left")
     assert found == [Facts(tmp_path / "r.surf.gii", "CortexRight", "CortexLeft")]
 
 
@@ -154,7 +147,7 @@ def test_every_file_is_told_with_its_size_side_and_number_of_vertices(
         tmp_path / "regions.nii.gz",
         LabelVolume(np.ones((4, 5, 6), np.int32), np.diag([2, 1, 0.5, 1])),
     )
-    regions = {"sub-1": {"volume": "regions.nii.gz", "names": {1: "a"}}}
+    regions = {"sub-1": {"labels": "regions.nii.gz", "names": {1: "a"}}}
     lines, bad = checked(
         tmp_path,
         monkeypatch,
@@ -237,14 +230,14 @@ def test_files_of_regions_and_white_surfaces_are_opened(tmp_path, monkeypatch):
             tmp_path / f"{side}.label.gii", np.ones(number, int), {1: "a"}, structure
         )
     given = {
-        side: {"labels": f"{side[0]}.label.gii", "surface": f"{side}.surf.gii"}
-        for side in ("left", "right")
+        "labels": ["l.label.gii", "r.label.gii"],
+        "surface": ["left.surf.gii", "right.surf.gii"],
     }
     _, bad = checked(tmp_path, monkeypatch, metrics={"regions": {"sub-1": given}})
     assert bad == [
         Facts("regions of sub-1", tmp_path / "r.label.gii", count, count - 1)
     ]
-    given["left"]["labels"] = "r.label.gii"
+    given["labels"] = ["r.label.gii", "r.label.gii"]
     _, bad = checked(tmp_path, monkeypatch, metrics={"regions": {"sub-1": given}})
     assert bad == [Facts("r.label.gii", "CortexRight", "CortexLeft")]
     (tmp_path / "white.surf.gii").write_text("torn")

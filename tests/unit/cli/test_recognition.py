@@ -177,10 +177,10 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
         },
         "white": ["fetal.week22.left.wm.surf.gii", "fetal.week22.right.wm.surf.gii"],
     }
-    assert alone["hemisphere"] == {
-        "file": "fetal.week23.left.pial.surf.gii",
-        "side": "left",
-    }
+    assert (alone["pial"], alone["side"]) == (
+        "fetal.week23.left.pial.surf.gii",
+        "left",
+    )
     assert (second["id"], second["week"], second["covariates"]) == (
         "sub-07",
         27.3,

@@ -125,7 +125,7 @@ def test_targets_are_the_weeks_that_the_path_passes_and_their_sizes(folder):
     shapes = WeeklyShapes(weeks, positions, sizes, stops=[22.0], between=[21.5])
     write_weekly_shapes(folder / "targets.h5", shapes)
     growth = {"model": "shapes", "of": "self"}
-    settings = {"growth": growth, "contact": {"kind": "none"}, "support": "free"}
+    settings = {"growth": growth, "contact": "none", "support": "free"}
     parameters, maps = prepared(folder, settings=settings, targets="targets.h5")
     assert list(parameters["targets"]) == parameters["stops"] + [23.0] == [22.0, 23.0]
     for week, factor in ((22.0, 1.1), (23.0, 1.2)):

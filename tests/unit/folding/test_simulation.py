@@ -97,7 +97,7 @@ def test_the_last_step_to_an_output_week_takes_what_is_left():
 
 
 def test_where_the_smallest_step_fails_the_place_is_named():
-    stepper = Stepper(lambda time_s: 1.0, solver={"max_halvings": 2})
+    stepper = Stepper(lambda time_s: 1.0, max_halvings=2)
     stepper.solver = SimpleNamespace(worst_places=lambda: "at [1.0, 2.0, 3.0] mm")
     with pytest.raises(SolverError, check=Facts("10800 s", "[1.0, 2.0, 3.0] mm")):
         steps_to(stepper, 604_800.0)
@@ -106,9 +106,7 @@ def test_where_the_smallest_step_fails_the_place_is_named():
 def test_a_short_remainder_is_halved_as_often_as_a_whole_step():
     # 43 200 s and 800 s: what is left over is far below the smallest part of a whole
     # step
-    stepper = Stepper(
-        lambda time_s: 1e9 if time_s < 43_000 else 300.0, solver={"max_halvings": 3}
-    )
+    stepper = Stepper(lambda time_s: 1e9 if time_s < 43_000 else 300.0, max_halvings=3)
     assert steps_to(stepper, 44_000.0) == pytest.approx(
         [43_200.0, 200.0, 200.0, 200.0, 200.0]
     )

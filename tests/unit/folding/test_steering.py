@@ -28,7 +28,7 @@ from gyriflow.geometry.triangles import TriangleMesh, face_areas
 from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 
-GROWING = {"no_growth": {"kind": "none"}, "support": "free", "thickness_mm": 2.0}
+GROWING = {"no_growth": "none", "support": "free", "thickness_mm": 2.0}
 CURVE = {21.0: 100.0, 22.0: 110.0, 24.0: 121.0}
 MADE = np.array([[2.0, 0.0], [1.2, 1.75]])
 BOUNDS = (0.0, 1.0)

@@ -9,10 +9,11 @@ from shapes import box_mesh
 from verification_cases.boxes import box_zones
 
 from gyriflow.errors import InputError, MeshError
+from gyriflow.folding import zones as zones_module
 from gyriflow.folding.checks import refuse_impossible, zone_report
 from gyriflow.folding.zones import brain_box, cell_tags, inside_ellipsoid, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from gyriflow.settings.folding import NoGrowth, parameters_from
+from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import (
     BRIDGE,
     CLAMPED,
@@ -26,13 +27,17 @@ from gyriflow.settings.terms import (
 )
 
 MIDDLE_MM = CENTRE_MM[0]
-ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 
 
-def find_zones(mesh, gap_mm=2.5, contact="planes", no_growth=None, **given):
+def find_zones(mesh, gap_mm=2.5, contact="planes", **given):
     """Return the zones of a run by the settings that decide them."""
-    values = {"contact": {"kind": contact}, "no_growth": ELLIPSOID | (no_growth or {})}
-    return zones_of_run(mesh, parameters_from(RUN | values | given), gap_mm)
+    parameters = parameters_from(RUN | {"contact": contact} | given)
+    return zones_of_run(mesh, parameters, gap_mm)
+
+
+@pytest.fixture
+def tiny_ellipsoid(monkeypatch):
+    monkeypatch.setattr(zones_module, "ELLIPSOID_SEMI_AXES", (0.01, 0.01, 0.01))
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +52,7 @@ def test_the_ellipsoid_stands_where_the_model_puts_it():
     points = np.concatenate(
         [box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)]
     )
-    inside = inside_ellipsoid(points, NoGrowth(**ELLIPSOID), *brain_box(points))
+    inside = inside_ellipsoid(points, *brain_box(points))
     assert inside.tolist() == [False, False, True, True, True, False, False, False]
 
 
@@ -68,24 +73,24 @@ def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
     zones = find_zones(brain)
     clamped = zones.vertices_of(CLAMPED)
     assert len(clamped)
-    inside = inside_ellipsoid(
-        brain.vertices, NoGrowth(**ELLIPSOID), *brain_box(brain.vertices)
-    )
+    inside = inside_ellipsoid(brain.vertices, *brain_box(brain.vertices))
     assert inside[clamped].all()
     # nothing inside grows, at the surface or below it
     assert inside.sum() > 2 * len(clamped)
     assert (zones.growth[inside] == 0).all()
 
 
+@pytest.mark.usefixtures("tiny_ellipsoid")
 def test_tissue_that_bridges_the_planes_does_not_grow():
     # a vertex between the planes under the pial surface: its elements are the bridge
     mesh = brain_mesh(6)
-    zones = find_zones(mesh, no_growth={"semi_axes": (0.01, 0.01, 0.01)})
+    zones = find_zones(mesh)
     top = np.argmax(mesh.vertices[:, 2])
     assert zones.growth[top] == 0
     assert zones.growth[np.argmax(mesh.vertices[:, 0])] == 1
 
 
+@pytest.mark.usefixtures("tiny_ellipsoid")
 @pytest.mark.parametrize("gap", [0.5, 2.0, 4.0])
 def test_the_planes_follow_the_fissure(gap):
     """Walls of separate hemispheres have contact and grow at any distance; the planes
@@ -97,7 +102,7 @@ def test_the_planes_follow_the_fissure(gap):
     ]
     tets = [boxes[0].tets, boxes[1].tets + len(x[0])]
     pair = TetrahedralMesh(np.concatenate(x), np.concatenate(tets))
-    zones = find_zones(pair, no_growth={"semi_axes": (0.01, 0.01, 0.01)})
+    zones = find_zones(pair)
     planes = min(gap / 2, 0.625)
     expected = [MIDDLE_MM - planes, MIDDLE_MM + planes]
     np.testing.assert_allclose(zones.planes_mm, expected, rtol=1e-12)
@@ -136,9 +141,9 @@ def test_few_walls_lie_between_the_planes(brain):
 def test_the_sides_of_a_box_slide_in_their_planes():
     box = box_mesh((4, 3, 2), (8.0, 6.0, 4.0))
     values = {
-        "contact": {"kind": "none"},
+        "contact": "none",
         "support": "free",
-        "no_growth": {"kind": "none"},
+        "no_growth": "none",
     }
     zones = box_zones(box, parameters_from(RUN | values))
     x, y, z = box.vertices.T
@@ -150,8 +155,9 @@ def test_the_sides_of_a_box_slide_in_their_planes():
     assert (zones.growth == 1).all()
 
 
+@pytest.mark.usefixtures("tiny_ellipsoid")
 def test_a_brain_without_clamped_facets_is_refused(brain):
-    zones = find_zones(brain, no_growth={"semi_axes": (0.1, 0.1, 0.1)})
+    zones = find_zones(brain)
     with pytest.raises(InputError, check=Facts("folding.no_growth", "folding.support")):
         refuse_impossible(brain, zones)
 

@@ -87,13 +87,9 @@ def test_a_small_scatter_is_no_outlier_and_few_weeks_show_none():
 
 def test_it_is_monotone_where_weeks_are_not():
     measured = [50.0, 60.0, 70.0, 64.0, 63.0, 75.0, 90.0]
-    fit, free = (
-        fitted(WEEKS[:7], measured, degrees_of_freedom=6, may_shrink=shrinks)
-        for shrinks in (False, True)
-    )
+    fit = fitted(WEEKS[:7], measured, degrees_of_freedom=6)
     assert (np.diff(fit.curve.values) >= 0).all()
     assert (rate(fit.curve, np.linspace(21, 27, 200)) >= 0).all()
-    assert rate(free.curve, 23.7) < -0.02
 
 
 def test_noise_is_smoothed_and_covered_by_the_interval():
@@ -152,12 +148,9 @@ def test_beyond_its_ends_growth_goes_on():
     )
 
 
-def test_shrinking_is_refused_unless_named():
+def test_shrinking_is_refused_but_for_a_table_that_may_shrink():
     with pytest.raises(InputError, check=Facts("ventricles", "21, 22", 30)):
         fitted(WEEKS, VOLUMES[::-1], name="ventricles")
-    fit = fitted(WEEKS, VOLUMES[::-1], may_shrink=True)
-    assert value(fit.curve, WEEKS) == pytest.approx(VOLUMES[::-1], rel=2e-3)
-    assert rate(fit.curve, 25.0) < 0
     with pytest.raises(InputError, check=Facts(23)):
         tabulated([21, 22, 23], [1.0, 2.0, 1.5])
     assert rate(tabulated([21, 22, 23], [1.0, 2.0, 1.5], may_shrink=True), 22.5) < 0
@@ -214,9 +207,9 @@ AREAS = pd.DataFrame(
         "area_cm2": 90 * 1.1 ** (TWICE - 21),
         "volume_ml": 46 * 1.2 ** (TWICE - 21),
     }
-).assign(thickness_mm=np.nan)
+)
 AREAS[["area_cm2", "volume_ml"]] *= SIZE[:, None]
-MEASURED = {"area_cm2": "measured", "volume_ml": "measured", "thickness_mm": None}
+MEASURED = {"area_cm2": "measured", "volume_ml": "measured"}
 
 
 def curves(areas=AREAS):
@@ -243,14 +236,6 @@ def test_a_brain_without_a_series_has_no_measured_curve():
     for table, series in ((None, None), (curves(), "surface")):
         with pytest.raises(InputError, check=Facts("area_cm2")):
             followed_sizes(MEASURED, table, series, [21.0, 22.0], False)
-    with pytest.raises(InputError, check=Facts("thickness_mm")):
-        followed_sizes(
-            MEASURED | {"thickness_mm": "measured"},
-            curves(),
-            "volume",
-            [21.0, 22.0],
-            False,
-        )
 
 
 def test_sizes_of_a_week_are_those_followed_or_else_the_measured_ones():
@@ -286,12 +271,11 @@ def test_a_given_table_shrinks_only_where_that_is_allowed():
 def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_towards():
     weeks, surface = [21.0, 22.0], {"fissure_x_mm": 0.5, "side": "left"}
     settings = {
-        "growth": MEASURED | {"thickness_mm": "measured"},
+        "growth": MEASURED,
         "thickness_mm": 1.5,
         "end_week": 22.0,
     }
-    table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (TWICE - 21)))
-    found = run_parameters(settings, weeks, surface, {}, [], table, "volume")
+    found = run_parameters(settings, weeks, surface, {}, [], curves(), "volume")
     assert {
         name: found[name]
         for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")
@@ -303,7 +287,6 @@ def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_to
         "end_week": 22.0,
     }
     assert found["growth"]["area_cm2"][22.0] == pytest.approx(99, rel=5e-3)
-    assert found["thickness_mm"]["weeks"][22.0] == pytest.approx(2.3, rel=5e-3)
     assert "targets" not in found
     shapes = {
         "area_cm2": {21.0: 90.0, 23.0: 80.0},
@@ -387,7 +370,6 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
             tmp_path / f"{name}.json",
             {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {},
         )
-    write_json(tmp_path / "thickness.json", {"mean_mm": 1.8})
     inputs = {
         "whole": [f"{name}.gii" for name in "abcd"],
         "reports": [f"{name}.json" for name in "abcd"],
@@ -400,13 +382,12 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
     run_script(
         "growth_rates.py",
         tmp_path,
-        inputs | {"thickness": ["thickness.json"]},
+        inputs,
         {"areas": "areas.csv", "rates": "rates.csv"},
-        known | {"with_thickness": ["b"], "with_rates": ["mine", "atlas"]},
+        known | {"with_rates": ["mine", "atlas"]},
     )
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]
-    assert areas["thickness_mm"].isna().tolist() == [True, False, True, True]
     np.testing.assert_array_equal(areas["tissue_ml"], [30.0, 40.0, np.nan, np.nan])
     rates = pd.read_csv(tmp_path / "rates.csv").set_index("series")
     # radii grow as the square root of areas

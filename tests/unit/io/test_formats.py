@@ -171,7 +171,7 @@ def test_each_format_has_a_reader_and_each_reader_a_format():
 
 @pytest.mark.parametrize("suffix", [".nii.gz", ".HDR", ".mgz"])
 def test_a_single_hemisphere_with_a_scheme_may_be_any_volume(suffix):
-    one = {"id": "a", "week": 22, "hemisphere": {"file": f"a{suffix}", "side": "left"}}
-    assert BrainConfig(**one, scheme="feta-7").has_labels
+    one = {"id": "a", "week": 22, "labels": f"a{suffix}", "side": "left"}
+    assert BrainConfig(**one, scheme="feta-7").labels == f"a{suffix}"
     with pytest.raises(ValidationError, match="scheme"):
         BrainConfig(**one)

@@ -58,7 +58,6 @@ GATES = {
 SIZES = {
     "surface_edge_mm": 1.5,
     "core_edge_mm": 3.0,
-    "envelope_mm": 0.1,
     "time_limit_s": 120,
 }
 OUTPUTS = {

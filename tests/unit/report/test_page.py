@@ -283,7 +283,7 @@ def foretold(weeks: float) -> dict:
     atlas = {
         "name": "crl",
         "title": "An atlas",
-        "reference": {"citation": "A. et al.", "doi": "10.1/x", "url": None},
+        "reference": "A. et al., doi 10.1/x",
     }
     atlas["licence"] = {
         "name": "CRL licence",
@@ -462,6 +462,21 @@ def test_a_brain_has_a_page_of_its_own():
     assert re.search(r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 %", text)
 
 
+def test_a_measured_study_begins_with_how_many_brains_have_which_verdict():
+    quality = pd.concat([QUALITY, QUALITY[:1].assign(subject="third")])
+    text = page([], runs=None, validation=None, quality=quality)
+    assert "3 brains: 2 need review, 1 refused." in text
+
+
+def test_equal_warnings_are_one_row_with_each_brain_once():
+    names = ["young", "old", "young"]
+    warnings = pd.DataFrame({"subject": names, "run": np.nan, "step": "s"})
+    warnings = warnings.assign(level="warning", message="too small")
+    text = page([], warnings=warnings)
+    assert text.count("too small") == 1
+    assert "young; old<" in text
+
+
 def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     (row,) = scores_table(RUNS, VALIDATION).to_dict("records")
     assert row["verdict"] == Facts("22 GW", 23, 1.2, 2)
@@ -533,7 +548,7 @@ def test_the_methods_say_what_was_run():
         "growth_rate_per_s": 2e-7,
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
-        "contact": {"kind": "global"},
+        "contact": "global",
     }
     summary = {"weeks": [21.0, 24.5], "steps": 49, "tets": 1234}
     led = parameters | {"growth": {"model": "shapes", "of": "self"}}

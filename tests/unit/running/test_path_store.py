@@ -130,8 +130,6 @@ def test_a_path_has_another_key_where_anything_differs_that_it_is_made_from(keys
         keys(atlas={"images": True}, changed=["t2-22.nii.gz"]),
         keys(atlas={"weeks": [21, 22]}),
         # what they mean
-        keys(LABELS | {"affine_from": "qform"}),
-        keys(LABELS | {"affine_from": "sform"}),
         keys(LABELS | {"scheme": "own"}, **own),
         keys(LABELS | {"scheme": "own"}, schemes={"own": SCHEME | {"cortex": [2]}}),
         keys(LABELS | {"scheme": "feta-7"}),
@@ -147,7 +145,6 @@ def test_a_path_has_another_key_where_anything_differs_that_it_is_made_from(keys
         keys(pial_only, **unmatched),
         keys(SURFACES, **unmatched),
         keys(SURFACES, changed=["white-21.surf.gii"], **unmatched),
-        keys(SURFACES | {"coordinates": "ras"}, **unmatched),
         # the thickness of the only brain with labels fills the surfaces
         keys(pial_only, changed=["mine.nii.gz"], **unmatched),
         keys(pial_only, start={"affine_from": "qform"}, **unmatched),

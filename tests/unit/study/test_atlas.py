@@ -311,7 +311,7 @@ def test_a_narrow_licence_has_to_be_accepted_and_is_told(tmp_path):
     (found,) = problems(study({"name": "crl", "weeks": [21]}, "crl-21"), tmp_path)
     licence = Atlas(**read_yaml(ATLASES / "crl" / "atlas.yaml")).licence
     assert found == Facts(
-        "atlas.accept_licence:", "true", "crl", licence.name, licence.url, licence.terms
+        "atlas.accept_licence:", "true", "crl", licence.name, licence.terms
     )
     config = load(
         study({"name": "crl", "weeks": [21, 22], "accept_licence": True}, "crl-21"),

@@ -43,30 +43,31 @@ def test_files_are_found_beside_the_configuration(folder):
         },
         {"id": "b", "week": 21, "hemispheres": pair, "white": ["lw.gii", "rw.gii"]},
         {"id": "c", "week": 22, "pial": "all.stl", "white": "white.stl"},
-        {"id": "d", "week": 22, "hemisphere": {"file": "l.gii", "side": "left"}},
+        {"id": "d", "week": 22, "pial": "l.gii", "side": "left"},
         {
             "id": "e",
             "week": 22,
-            "hemisphere": {"file": "a.nii.gz", "side": "right"},
+            "labels": "a.nii.gz",
+            "side": "right",
             "scheme": "binary",
         },
         {"id": "f", "week": 22, "shape": {}},
     ]
     labels, both, whole, left, right, shape = load(study(brains), folder).brains
-    assert labels.files == [labels.label_volume] == [str(folder / "a.nii.gz")]
+    assert labels.files == [labels.labels] == [str(folder / "a.nii.gz")]
     assert both.files == [str(folder / "l.gii"), str(folder / "r.gii")]
     assert both.white_files == {
         "left": str(folder / "lw.gii"),
         "right": str(folder / "rw.gii"),
     }
     assert whole.white_files == {"whole": str(folder / "white.stl")}
-    assert (left.sides, left.label_volume) == (("left",), None)
-    assert (right.sides, right.label_volume) == (("right",), str(folder / "a.nii.gz"))
+    assert (left.sides, left.labels) == (("left",), None)
+    assert (right.sides, right.labels) == (("right",), str(folder / "a.nii.gz"))
     assert (shape.source, shape.files, shape.shape.kind) == ("shape", [], "ellipsoid")
 
 
-HEMISPHERE = {"file": "a.nii.gz", "side": "left"}
-REGIONS = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
+HEMISPHERE = {"labels": "a.nii.gz", "side": "left"}
+REGIONS = {"a": {"labels": "a.nii.gz", "names": {1: "frontal"}}}
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ REGIONS = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
             "",
             ["labels", "pial", "shape"],
         ),
-        ({}, "", ["labels", "hemispheres", "hemisphere", "pial", "shape"]),
+        ({}, "", ["labels", "hemispheres", "pial", "shape"]),
         ({"labels": "a.nii.gz"}, ".scheme", []),
         ({"labels": "a.nii.gz", "scheme": "d"}, ".scheme", ["d", "binary, crl"]),
         ({"image": "t2w.nii.gz"}, ".image", ["labels"]),
@@ -88,20 +89,25 @@ REGIONS = {"a": {"volume": "a.nii.gz", "names": {1: "frontal"}}}
             ".white",
             [],
         ),
-        ({"hemisphere": HEMISPHERE}, ".scheme", []),
+        (HEMISPHERE, ".scheme", []),
         (
-            {"hemisphere": HEMISPHERE, "scheme": "binary", "coordinates": "ras"},
+            {"hemispheres": {"left": "l.gii", "right": "r.gii"}, "side": "left"},
+            ".side",
+            ["hemispheres", "labels", "pial"],
+        ),
+        (
+            HEMISPHERE | {"scheme": "binary", "coordinates": "ras"},
             ".coordinates",
             ["pial"],
         ),
         (
-            {"hemisphere": HEMISPHERE | {"file": "l.gii"}, "scheme": "binary"},
+            {"pial": "l.gii", "side": "left", "scheme": "binary"},
             ".scheme",
             ["labels"],
         ),
         (
-            {"hemisphere": HEMISPHERE | {"side": "middle"}, "scheme": "binary"},
-            ".hemisphere.side",
+            HEMISPHERE | {"side": "middle", "scheme": "binary"},
+            ".side",
             ["left", "right"],
         ),
         ({"shape": {}, "coordinates": "lps"}, ".coordinates", ["shape", "pial"]),
@@ -211,11 +217,16 @@ def test_all_mistakes_in_schemes_are_named_at_once():
 @pytest.mark.parametrize(
     ("metrics", "facts"),
     [
-        ({"regions": {"a": {}}}, Facts("regions.a:", "volume", "left", "right")),
-        ({"regions": {"a": {"volume": "a.nii.gz"}}}, Facts("regions.a.names:")),
+        ({"regions": {"a": {}}}, Facts("regions.a.labels:")),
+        ({"regions": {"a": {"labels": "a.nii.gz"}}}, Facts("regions.a.names:")),
+        ({"regions": {"a": {"labels": "l.gii"}}}, Facts("regions.a.labels:")),
         (
-            {"regions": {"a": {"left": {"labels": "l.gii", "surface": "l.gii"}}}},
-            Facts("regions.a.right:"),
+            {"regions": {"a": {"labels": ["l.gii", "r.gii"]}}},
+            Facts("regions.a.surface:"),
+        ),
+        (
+            {"regions": {"a": REGIONS["a"] | {"surface": ["l.gii", "r.gii"]}}},
+            Facts("regions.a.surface:"),
         ),
         ({"regions": {"q": REGIONS["a"]}}, Facts("regions:", "q", "a")),
         ({"norm_reference": ["x"]}, Facts("norm_reference:", "x", "a")),
@@ -227,9 +238,7 @@ def test_what_is_wrong_with_regions_and_references_is_said(folder, metrics, fact
 
 
 def test_regions_need_both_hemispheres(folder):
-    raw = one(hemisphere=HEMISPHERE, scheme="binary") | {
-        "metrics": {"regions": REGIONS}
-    }
+    raw = one(**HEMISPHERE, scheme="binary") | {"metrics": {"regions": REGIONS}}
     assert problems(raw, folder) == [Facts("metrics.regions:", "a")]
 
 

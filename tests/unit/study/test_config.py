@@ -100,8 +100,8 @@ def test_a_folder_of_an_atlas_is_not_made_of_a_variable_or_an_address():
         ({"growth_rate_per_s": float("nan")}, "growth_rate_per_s", ["nan"]),
         ({"fields": ["tension"]}, "fields[0]", ["displacement", "tension"]),
         (
-            {"contact": {"kind": "walls"}},
-            "contact.kind",
+            {"contact": "walls"},
+            "contact",
             ["global", "planes", "none", "walls"],
         ),
         ({"end_week": 21}, "end_week", [21, "a"]),

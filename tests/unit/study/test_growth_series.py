@@ -140,7 +140,8 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
         {
             "id": f"{side}{week}",
             "week": week,
-            "hemisphere": {"file": "lh.surf.gii", "side": side},
+            "pial": "lh.surf.gii",
+            "side": side,
         }
         for side in ("left", "right")
         for week in (24, 25)

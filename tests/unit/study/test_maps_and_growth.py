@@ -113,10 +113,6 @@ CURVE = {21: 99, 30: 252}
             [Facts("growth.area_cm2:", "shapes", "sizes")],
         ),
         ({"model": "sizes", "of": "atlas"}, [Facts("growth.of:", "sizes", "shapes")]),
-        (
-            {"model": "shapes", "of": "atlas", "thickness_mm": "measured"},
-            [Facts("growth.thickness_mm:")],
-        ),
         ("shape", [Facts("growth.model:", "shape", "rates", "sizes", "shapes")]),
     ],
 )
@@ -129,20 +125,17 @@ def test_a_growth_model_has_its_own_keys(growth, found):
 
 def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
     runs = {
-        "thin": {"growth": {"thickness_mm": {21: 3}}},
-        "sizes": {"growth": "sizes"},
-        "same": {"growth": "shapes"},
+        "large": {"growth": {"area_cm2": {21: 110, 30: 280}}},
+        "shapes": {"growth": "shapes"},
+        "same": {"growth": "sizes"},
     }
-    config = load(
-        study({"preset": "expected", "growth": {"thickness_mm": {21: 2}}}, runs=runs)
-    )
+    growth = {"model": "sizes", "area_cm2": CURVE}
+    config = load(study({"growth": growth}, runs=runs))
     found = {name: config.runs[name].growth for name in runs}
-    assert [
-        (growth.model, growth.of, growth.thickness_mm) for growth in found.values()
-    ] == [
-        ("shapes", "atlas", {21: 3}),
-        ("sizes", "self", None),
-        ("shapes", "atlas", {21: 2}),
+    assert [(growth.model, growth.area_cm2) for growth in found.values()] == [
+        ("sizes", {21: 110, 30: 280}),
+        ("shapes", "measured"),
+        ("sizes", CURVE),
     ]
 
 

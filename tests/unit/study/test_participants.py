@@ -70,7 +70,7 @@ def test_rows_are_brains_whatever_their_files_are_of(folder):
     ]
     assert brains["sub-1"].covariates == {"sex": "F"}
     assert brains["sub-3"].sides == ("left",)
-    assert brains["sub-3"].label_volume == str(folder / "bids" / "a.nii.gz")
+    assert brains["sub-3"].labels == str(folder / "bids" / "a.nii.gz")
 
 
 def test_values_for_all_rows_stand_in_the_configuration(folder):

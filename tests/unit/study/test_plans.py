@@ -17,8 +17,12 @@ from gyriflow.study import resolve
 from gyriflow.study.loading import load
 from gyriflow.study.study import TABLES, read_plan, write_plan
 
+ATLASES = Path(__file__).parents[3] / "atlases"
 PLANS = sorted((Path(__file__).parent / "plans").glob("*.yaml"))
 FILE = __file__
+VOLUME = str(
+    ATLASES / "spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz"
+)
 
 
 def planned(plan):
@@ -27,7 +31,7 @@ def planned(plan):
     for brain in configuration["brains"]:
         if not any(source in brain for source in SOURCES):
             brain.update(LABELLED)
-    text = yaml.safe_dump(configuration).replace("FILE", FILE)
+    text = yaml.safe_dump(configuration).replace("FILE", FILE).replace("VOLUME", VOLUME)
     refused = dict.fromkeys(plan.get("refused", ()), "not read")
     return resolve(load(yaml.safe_load(text)), refused)
 

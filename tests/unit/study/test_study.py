@@ -104,7 +104,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
         "vary": {"thickness_mm": [1.0, 2.0]},
         "compare_week": 24,
     }
-    regions = {"b23": {"volume": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
+    regions = {"b23": {"labels": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
     twin = real[3] | {"id": "twin"}
     asked = {
         "studies": {"thick": varied, "one": varied | {"base": "late"}},

@@ -10,7 +10,7 @@ from gyriflow.study.brains import comparable
 
 def brain(name, week, side=None, **more):
     """Return a brain of labels, or of the surface of one hemisphere."""
-    half = {"hemisphere": {"file": __file__, "side": side}}
+    half = {"pial": __file__, "side": side}
     return {"id": name, "week": week, **(half if side else LABELLED), **more}
 
 
