@@ -1,6 +1,8 @@
 """Join the metrics of all brains into tables, and write change, asymmetry, norms and
 distances between spectra."""
 
+import logging
+
 import pandas as pd
 
 from gyriflow.io.files import read_json, read_tables, write_json, write_table
@@ -11,6 +13,7 @@ from gyriflow.metrics.norms import (
     cohort_norms,
     measured_scores,
     norm_curves,
+    outlying_brains,
     published_norms,
     volume_tables,
 )
@@ -44,6 +47,13 @@ with step(snakemake.log[0]):
             reference,
             individuals=params.individuals,
             made_with=params.made_with,
+        )
+    for brain, names in outlying_brains(people, reference, cohort).items():
+        logging.warning(
+            "%s is far from the norm of the other reference brains: %s. Look at it:"
+            " with a brain that is badly segmented or not normal, norms are too wide",
+            brain,
+            ", ".join(names),
         )
     parts = [
         asymmetry(table.fillna({"region": ""}))

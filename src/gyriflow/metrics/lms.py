@@ -1,12 +1,12 @@
 """Norms of a metric over gestational weeks: location, scale and skewness as smooth
 curves.
 
-The LMS method of Cole and Green (1992, doi 10.1002/sim.4780111005), as in the growth
-standards of the WHO, with the scale by restricted likelihood. Scores of new subjects
-allow for the errors of the curves.
+Positive metrics by the LMS method of Cole and Green (1992, doi 10.1002/sim.4780111005),
+as in the growth standards of the WHO; metrics of either sign by a smooth form of the
+split normal distribution (Wallis 2014, doi 10.1214/13-STS417). The scale is fitted by
+restricted likelihood. Scores of new subjects allow for the errors of the curves.
 """
 
-import logging
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -19,7 +19,6 @@ from scipy.linalg import block_diag
 from .. import splines
 from ..geometry.triangles import Floats
 
-log = logging.getLogger(__name__)
 INTERVAL_Z = 1.645
 """Half the width of a 90 % interval in standard errors."""
 
@@ -36,16 +35,29 @@ HALF_CHANGE_SD = 1.5
 """Standard deviation of the prior of half the change of ln S over all weeks, around
 0."""
 MIN_SUBJECTS_FOR_SKEWNESS = 100
-"""With fewer subjects, the skewness is not known and is `SKEWNESS`."""
+"""With fewer subjects, the skewness is not known and is the mean of its prior."""
 SKEWNESS, SKEWNESS_SD = 0.2, 1.0
-"""Mean and standard deviation of the prior of the skewness: 0 is the lognormal
-distribution, 1 the normal one."""
+"""Mean and standard deviation of the prior of the skewness of positive metrics: 0 is
+the lognormal distribution, 1 the normal one."""
+SKEWNESS_BY_SCALE = 0.25
+"""Standard deviation of that prior, times the scale, where the scale is small: the
+skewness of the values is about 3 (1 − L) S."""
+SIGNED_SKEWNESS, SIGNED_SKEWNESS_SD = 0.0, 1.0
+"""The same of metrics of either sign: 0 is the normal distribution."""
+SKEWED_SD = 1.5
+"""Skewness of the residuals, in its standard deviations for normal ones, from which a
+norm of few subjects is skewed."""
+SKEWED_SCALE = 0.18
+"""Scale of positive metrics from which the skewness that a norm of few subjects does
+not know moves the 5th centile by a quarter of a standard deviation."""
+MAX_SKEWNESS_STEP = 0.5
 SHAPE_WEIGHT = 0.6
 """Weight of the error of ln S at a week, relative to that of its mean, in the degrees
 of freedom of Student's distribution.
 
 Such errors are nearer to normal than those of the mean, and make fewer extreme
 scores."""
+QUADRATURE_POINTS = 40
 MAX_LEVERAGE = 0.9
 MIN_SCATTER = 1e-9
 ROUNDS, MAX_STEP = 60, 1.0
@@ -62,11 +74,16 @@ class WeeklyNorm:
     """The distribution of a metric by week, from `first` to `last`.
 
     A value y is z = ((y/M)^L − 1)/(L S) scales from the location M, with scale S and
-    skewness L, if the metric is positive, and z = (y − M)/S if it may have either sign.
-    ln M (or M) and ln S are linear in `location` and `scale`, which are coefficients of
-    `splines`, or of powers of the week if there are few weeks. The covariance is that
-    of location, scale and skewness, the last only if it was estimated. `freedom` are
-    the degrees of freedom that are left for the mean of the scale.
+    skewness L, if the metric is positive. If it may have either sign, z = u − κ(√(1 +
+    u²) − 1) with u = (y − M)/S and κ = tanh L: far above M the scale is S/(1 − κ), far
+    below it S/(1 + κ). ln M (or M) and ln S are linear in `location` and `scale`, which
+    are coefficients of `splines`, or of powers of the week if there are few weeks. The
+    covariance is that of location, scale and skewness, the last only if it was
+    estimated. `freedom` are the degrees of freedom that are left for the mean of the
+    scale.
+
+    If it `is_skewed`, its subjects are too few to know how much, and centiles beyond
+    the 10th and 90th do not hold. The fit may not have converged.
     """
 
     first: float
@@ -79,6 +96,8 @@ class WeeklyNorm:
     subjects: int
     is_spline: bool
     freedom: float
+    is_skewed: bool
+    has_converged: bool
 
     def _bases(self, weeks: ArrayLike) -> tuple[Floats, Floats]:
         at = np.atleast_1d(np.asarray(weeks, dtype=float))
@@ -117,16 +136,12 @@ class WeeklyNorm:
         interval is that of the z which the value has in the population.
         """
         locations, scales = self._bases(weeks)
-        at = np.atleast_1d(np.asarray(values, dtype=float))
-        terms = _terms(
-            locations @ self.location,
-            scales @ self.scale,
-            self.skewness,
-            at,
-            self.is_positive,
-        )
+        terms = self._terms(locations, scales, values)
         slopes = np.hstack(
-            [terms.by_location[:, None] * locations, -terms.z[:, None] * scales]
+            [
+                terms.by_location[:, None] * locations,
+                terms.by_scale[:, None] * scales,
+            ]
         )
         if len(self.covariance) > slopes.shape[1]:
             slopes = np.hstack([slopes, terms.by_skewness[:, None]])
@@ -138,17 +153,37 @@ class WeeklyNorm:
         )
         return z, terms.z + INTERVAL_Z * np.stack([-error, error])
 
+    def _terms(self, locations: Floats, scales: Floats, values: ArrayLike) -> "_Terms":
+        return _terms(
+            locations @ self.location,
+            scales @ self.scale,
+            self.skewness,
+            np.atleast_1d(np.asarray(values, dtype=float)),
+            self.is_positive,
+        )
+
+    def robust_scores(self, weeks: ArrayLike, values: ArrayLike) -> Floats:
+        """Return z (n,) of the norm's own values at weeks over their median absolute
+        deviation, of positive metrics with the skewness of the prior: so outliers do
+        not hide themselves by a large scale or skewness."""
+        usual = SKEWNESS if self.is_positive else self.skewness
+        locations, scales = self._bases(weeks)
+        norm = replace(self, skewness=usual)
+        z = norm._terms(locations, scales, values).z
+        deviation = stats.median_abs_deviation(z, scale="normal")
+        return z / max(float(deviation), MIN_SCATTER)
+
     def values(self, weeks: ArrayLike, z: float) -> Floats:
         """Return the values with a z at weeks (n,): the inverse of `scores`."""
         locations, scales = self._bases(weeks)
         freedom, spread = self._student(locations, scales)
-        distance = (
-            np.exp(scales @ self.scale)
-            * spread
-            * stats.t.ppf(stats.norm.cdf(z), freedom)
-        )
+        new_z = spread * stats.t.ppf(stats.norm.cdf(z), freedom)
+        scale = np.exp(scales @ self.scale)
         if not self.is_positive:
-            return locations @ self.location + distance
+            return locations @ self.location + scale * _signed_distance(
+                new_z, self.skewness
+            )
+        distance = scale * new_z
         power = np.maximum(1.0 + self.skewness * distance, 1e-9)
         logs = distance if abs(self.skewness) < 1e-6 else np.log(power) / self.skewness
         return np.exp(locations @ self.location + logs)
@@ -167,14 +202,8 @@ class WeeklyNorm:
     def without(self, week: float, value: float) -> "WeeklyNorm":
         """Return the norm without the only scan of a subject, by one Newton step from
         the whole."""
-        (locations, scales), values = self._bases(week), np.array([value])
-        terms = _terms(
-            locations @ self.location,
-            scales @ self.scale,
-            self.skewness,
-            values,
-            self.is_positive,
-        )
+        locations, scales = self._bases(week)
+        terms = self._terms(locations, scales, value)
         left = 1 - np.minimum(self._errors(locations, scales)[0], MAX_LEVERAGE)
         slope = _slope(terms, locations, scales, np.ones(1), left)
         step, size = self.covariance @ slope[: len(self.covariance)], len(self.location)
@@ -216,125 +245,241 @@ def fit_norm(
     a constant. The skewness is estimated from `MIN_SUBJECTS_FOR_SKEWNESS` on.
     """
     scans = _Scans.of(people)
-    weights, subjects = scans.weights, int(scans.person.max()) + 1
-    first, last, count = float(weeks.min()), float(weeks.max()), len(np.unique(weeks))
-    is_spline = count >= MIN_WEEKS_FOR_SPLINES
-    powers = 3 if count > 3 else 2 if count > 1 else 1
-    size, scale_size = (INTERVALS + 3,) * 2 if is_spline else (powers, min(powers, 2))
-    rows, scale_rows = (
-        _basis(weeks, first, last, each, is_spline) for each in (size, scale_size)
-    )
+    subjects = int(scans.person.max()) + 1
+    has_skewness = subjects >= MIN_SUBJECTS_FOR_SKEWNESS
+    model = _Model.of(weeks, scans.weights, subjects, is_positive, has_skewness)
+    size = model.rows.shape[1]
     start = np.log(values) if is_positive else values
-    normal, freedom = (rows.T * weights) @ rows, float(size)
-    location_penalty: Floats = np.zeros((size, size))
-    ends = _basis(np.array([first, last]), first, last, scale_size, is_spline)
-    half_change = 0.5 * np.diff(ends, axis=0) / HALF_CHANGE_SD
-    scale_penalty = half_change.T @ half_change
-    if is_spline:
-        freedom = min(
-            LOCATION_FREEDOM[0] + subjects / SUBJECTS_PER_LOCATION,
-            LOCATION_FREEDOM[1],
-            count - 1.0,
-        )
-        location_penalty = splines.penalty(first, last, INTERVALS, order=2)
-        location_penalty *= splines.strength(
-            normal, location_penalty, freedom, "location of the norm"
-        )
-        scale_freedom = min(
-            SCALE_FREEDOM[0] + subjects / SUBJECTS_PER_SCALE, SCALE_FREEDOM[1]
-        )
-        roughness = splines.penalty(first, last, INTERVALS, order=1)
-        # the information of an observation on ln S is 2
-        scale_penalty += (
-            2.0
-            * splines.strength(normal, roughness, scale_freedom, "scale of the norm")
-            * roughness
-        )
-    location = np.linalg.solve(normal + location_penalty, rows.T @ (weights * start))
-    variance = float(weights @ (start - rows @ location) ** 2) / max(
-        subjects - freedom, 1.0
+    normal = (model.rows.T * scans.weights) @ model.rows
+    location = np.linalg.solve(
+        normal + model.location_penalty, model.rows.T @ (scans.weights * start)
     )
-    has_scatter = variance > MIN_SCATTER**2
-    unit = max(float(np.sqrt(variance)), MIN_SCATTER)
-    with_skewness = is_positive and subjects >= MIN_SUBJECTS_FOR_SKEWNESS
-    mean = np.zeros(size + scale_size + with_skewness)
-    mean[size + scale_size :] = SKEWNESS
+    squares = float(scans.weights @ (start - model.rows @ location) ** 2)
+    scatter = np.sqrt(squares / max(subjects - model.freedom, 1.0))
+    unit = max(float(scatter), MIN_SCATTER)
+    model = replace(model, scatter=unit)
     # the location is fitted in units of the scatter: then the information of an
     # observation on it is about 1
-    rows = unit * rows
-    penalty = block_diag(
-        location_penalty, scale_penalty, *[[[SKEWNESS_SD**-2]]] * with_skewness
-    )
-    fit: Floats = mean.copy()
-    fit[:size], fit[size] = location / unit, np.log(unit)
+    rows = unit * model.rows
+    fit: Floats = model.mean.copy()
+    fit[:size] = location / unit
+    fit[size] = np.log(unit)
+    shift = 0.0
     for number in range(ROUNDS):
-        log_scale = scale_rows @ fit[size : size + scale_size]
-        skewness = _skewness(fit, with_skewness, is_positive)
-        terms = _terms(rows @ fit[:size], log_scale, skewness, values, is_positive)
-        scans = scans.correlated(terms.z)
-        information, left = _information(
-            rows, scale_rows, log_scale, skewness, scans, penalty
-        )
-        slope = _slope(terms, rows, scale_rows, weights, left)[: len(fit)] - penalty @ (
-            fit - mean
-        )
-        information = information[: len(fit), : len(fit)] + penalty
-        step = np.linalg.solve(information, slope)
-        shifts = np.abs(
-            [
-                rows @ step[:size] * np.exp(-log_scale),
-                scale_rows @ step[size : size + scale_size],
-            ]
-        )
-        if not has_scatter or shifts.max() < STEP_TOL:
+        state = model.state(rows, fit, values, scans)
+        scans = state.scans
+        step = np.linalg.solve(state.information, state.slope)
+        shifts = [
+            rows @ step[:size] * np.exp(-state.log_scale),
+            model.scale_rows @ step[size : size + model.scale_rows.shape[1]],
+        ]
+        shift = float(np.abs(shifts).max())
+        if scatter <= MIN_SCATTER or shift < STEP_TOL:
             break
-        fit += (
-            step
-            * min(1.0, MAX_STEP / shifts.max())
-            * (1.0 if number < ROUNDS_UNTIL_DAMPED else DAMPED_STEP)
-        )
-    if has_scatter and shifts.max() > POOR_STEP:
-        log.warning(
-            "the norm of %d subjects at weeks %g to %g has not converged",
-            subjects,
-            first,
-            last,
-        )
-    skewness = _skewness(fit, with_skewness, is_positive)
-    inverse = np.linalg.inv(information)
-    if scans.correlation is not None:
-        # the scatter of the slopes with correlated scans
-        scatter = information.copy()
-        parts = (slice(0, size), slice(size, size + scale_size))
-        scaled_rows = (
-            rows * np.exp(-log_scale)[:, None],
-            np.sqrt(2 * left)[:, None] * scale_rows,
-        )
-        for part, part_rows, power in zip(parts, scaled_rows, (1, 2), strict=True):
-            scatter[part, part] = penalty[part, part] + part_rows.T @ scans.spread(
-                part_rows, power
-            )
-        inverse = inverse @ scatter @ inverse
+        factor = min(1.0, MAX_STEP / shift)
+        if has_skewness:
+            factor = min(factor, MAX_SKEWNESS_STEP / max(abs(step[-1]), MIN_SCATTER))
+        if number >= ROUNDS_UNTIL_DAMPED:
+            factor *= DAMPED_STEP
+        fit += factor * step
     units = np.ones(len(fit))
     units[:size] = unit
-    fit, covariance = fit * units, inverse * np.outer(units, units)
-    free = (
-        float(weights @ left)
-        * subjects
-        / float(scans.spread(np.ones((len(weights), 1)), 2).sum())
-    )
-    curves = fit[:size], fit[size : size + scale_size]
+    covariance = model.covariance(rows, state) * np.outer(units, units)
+    fit *= units
+    scale = fit[size : size + model.scale_rows.shape[1]]
+    shared = scans.spread(np.ones((len(values), 1)), 2).sum()
+    is_wide = is_positive and np.exp(model.scale_rows @ scale).max() > SKEWED_SCALE
+    is_few = not has_skewness
     return WeeklyNorm(
-        first,
-        last,
+        model.first,
+        model.last,
         is_positive,
-        *curves,
-        skewness,
+        fit[:size],
+        scale,
+        model.skewness(fit),
         covariance,
         subjects,
-        is_spline,
-        free,
+        model.is_spline,
+        freedom=float(scans.weights @ state.left) * subjects / float(shared),
+        is_skewed=bool(is_few and (is_wide or _are_skewed(state.terms.z))),
+        has_converged=bool(scatter <= MIN_SCATTER or shift <= POOR_STEP),
     )
+
+
+def _are_skewed(z: Floats) -> bool:
+    """Return whether residuals are more skewed than normal ones usually are."""
+    expected_sd = np.sqrt(6 / len(z))
+    return bool(abs(stats.skew(z)) > SKEWED_SD * expected_sd)
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """The bases of location and scale at the weeks of the values, and the prior.
+
+    `mean` (k,) is that of location, scale and, if it is estimated, skewness;
+    `location_penalty` and `scale_penalty` are the inverses of their covariances.
+    `freedom` are the degrees of freedom of the location, `scatter` the scale of all
+    values around it, on which the prior of the skewness depends.
+    """
+
+    first: float
+    last: float
+    is_spline: bool
+    is_positive: bool
+    has_skewness: bool
+    rows: Floats
+    scale_rows: Floats
+    location_penalty: Floats
+    scale_penalty: Floats
+    freedom: float
+    scatter: float = 1.0
+
+    @classmethod
+    def of(
+        cls,
+        weeks: Floats,
+        weights: Floats,
+        subjects: int,
+        is_positive: bool,
+        has_skewness: bool,
+    ) -> "_Model":
+        first, last = float(weeks.min()), float(weeks.max())
+        count = len(np.unique(weeks))
+        is_spline = count >= MIN_WEEKS_FOR_SPLINES
+        size = scale_size = INTERVALS + 3
+        if not is_spline:
+            size = 3 if count > 3 else min(count, 2)
+            scale_size = min(size, 2)
+        rows = _basis(weeks, first, last, size, is_spline)
+        scale_rows = _basis(weeks, first, last, scale_size, is_spline)
+        freedom = float(size)
+        location_penalty: Floats = np.zeros((size, size))
+        ends = _basis(np.array([first, last]), first, last, scale_size, is_spline)
+        half_change = 0.5 * np.diff(ends, axis=0) / HALF_CHANGE_SD
+        scale_penalty = half_change.T @ half_change
+        if is_spline:
+            normal = (rows.T * weights) @ rows
+            lowest, highest = LOCATION_FREEDOM
+            freedom = lowest + subjects / SUBJECTS_PER_LOCATION
+            freedom = min(freedom, highest, count - 1.0)
+            bending = splines.penalty(first, last, INTERVALS, order=2)
+            location_penalty = bending * splines.strength(
+                normal, bending, freedom, "location of the norm"
+            )
+            lowest, highest = SCALE_FREEDOM
+            scale_freedom = min(lowest + subjects / SUBJECTS_PER_SCALE, highest)
+            roughness = splines.penalty(first, last, INTERVALS, order=1)
+            strength = splines.strength(
+                normal, roughness, scale_freedom, "scale of the norm"
+            )
+            # the information of an observation on ln S is 2
+            scale_penalty += 2.0 * strength * roughness
+        return cls(
+            first,
+            last,
+            is_spline,
+            is_positive,
+            has_skewness,
+            rows,
+            scale_rows,
+            location_penalty,
+            scale_penalty,
+            freedom,
+        )
+
+    @property
+    def mean(self) -> Floats:
+        count = self.rows.shape[1] + self.scale_rows.shape[1]
+        mean = np.zeros(count + self.has_skewness)
+        mean[count:] = SKEWNESS if self.is_positive else SIGNED_SKEWNESS
+        return mean
+
+    @property
+    def penalty(self) -> Floats:
+        parts = [self.location_penalty, self.scale_penalty]
+        if self.has_skewness:
+            sd = SIGNED_SKEWNESS_SD
+            if self.is_positive:
+                sd = max(SKEWNESS_SD, SKEWNESS_BY_SCALE / self.scatter)
+            parts.append(np.array([[sd**-2]]))
+        return block_diag(*parts)
+
+    def skewness(self, fit: Floats) -> float:
+        """Return the skewness of parameters (k,)."""
+        if self.has_skewness:
+            return float(fit[-1])
+        return SKEWNESS if self.is_positive else SIGNED_SKEWNESS
+
+    def state(
+        self, rows: Floats, fit: Floats, values: Floats, scans: "_Scans"
+    ) -> "_State":
+        """Return slope and information of the likelihood of values (n,) at parameters
+        (k,), of which the location has the basis `rows`."""
+        size = rows.shape[1]
+        log_scale = self.scale_rows @ fit[size : size + self.scale_rows.shape[1]]
+        skewness = self.skewness(fit)
+        terms = _terms(rows @ fit[:size], log_scale, skewness, values, self.is_positive)
+        scans = scans.correlated(terms.z)
+        expected = _expected(log_scale, skewness, self.is_positive)
+        information, left = _information(
+            rows, self.scale_rows, expected, scans, self.penalty
+        )
+        count = len(fit)
+        slope = _slope(terms, rows, self.scale_rows, scans.weights, left)[:count]
+        return _State(
+            terms,
+            log_scale,
+            expected,
+            left,
+            slope - self.penalty @ (fit - self.mean),
+            information[:count, :count] + self.penalty,
+            scans,
+        )
+
+    def covariance(self, rows: Floats, state: "_State") -> Floats:
+        """Return the covariance (k, k) of the parameters, whose scans of a subject may
+        be correlated."""
+        inverse = np.linalg.inv(state.information)
+        scans = state.scans
+        if scans.correlation is None:
+            return inverse
+        # the scatter of the slopes: they are about Hermite polynomials of z, whose
+        # correlation between scans is a power of that of z
+        size, count = rows.shape[1], len(inverse)
+        scale_end = size + self.scale_rows.shape[1]
+        ones = np.ones((len(rows), count - scale_end))
+        parts = [
+            (slice(0, size), rows),
+            (slice(size, scale_end), self.scale_rows),
+            (slice(scale_end, count), ones),
+        ]
+        e = state.expected
+        expected = [
+            [e.location, e.location_scale, e.location_skewness],
+            [e.location_scale, e.scale * state.left, e.scale_skewness],
+            [e.location_skewness, e.scale_skewness, e.skewness],
+        ]
+        powers = [[1, 2, 1], [2, 2, 2], [1, 2, 3]]
+        scatter = self.penalty.copy()
+        for i, (here, own) in enumerate(parts):
+            for j, (there, other) in enumerate(parts):
+                each = expected[i][j][:, None] * other
+                scatter[here, there] += own.T @ scans.spread(each, powers[i][j])
+        return inverse @ (0.5 * (scatter + scatter.T)) @ inverse
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """A step of a fit: slope (k,) and information (k, k) of the penalised likelihood,
+    and what the location leaves of each observation's scatter."""
+
+    terms: "_Terms"
+    log_scale: Floats
+    expected: "_Expected"
+    left: Floats
+    slope: Floats
+    information: Floats
+    scans: "_Scans"
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,52 +529,80 @@ class _Scans:
         )
 
 
-def _skewness(fit: Floats, is_estimated: bool, is_positive: bool) -> float:
-    return float(fit[-1]) if is_estimated else SKEWNESS if is_positive else 0.0
+@dataclass(frozen=True, eq=False)
+class _Expected:
+    """The expected information (n,) of observations on location, ln scale and skewness,
+    and on two of them."""
+
+    location: Floats
+    scale: Floats
+    skewness: Floats
+    location_scale: Floats
+    location_skewness: Floats
+    scale_skewness: Floats
+
+
+def _expected(log_scale: Floats, skewness: float, is_positive: bool) -> _Expected:
+    """Return the expected information of observations.
+
+    That of positive ones is by Rigby and Stasinopoulos (2005, doi
+    10.1111/j.1467-9876.2005.00510.x), for small S, by logarithms; that of others is
+    integrated.
+    """
+    scale = np.exp(log_scale)
+    one = np.ones(len(scale))
+    if is_positive:
+        return _Expected(
+            location=(1 + 2 * skewness**2 * scale**2) / scale**2,
+            scale=2 * one,
+            skewness=7 / 4 * scale**2,
+            location_scale=2 * skewness * one,
+            location_skewness=-0.5 * one,
+            scale_skewness=-skewness * scale**2,
+        )
+    z, weights = np.polynomial.hermite_e.hermegauss(QUADRATURE_POINTS)
+    distance = _signed_distance(z, skewness)
+    terms = _signed_terms(0.0, np.zeros(len(z)), skewness, distance)
+    slopes = np.stack(
+        [terms.slope_location, terms.slope_scale - 1, terms.slope_skewness]
+    )
+    found = (slopes * weights / weights.sum()) @ slopes.T
+    return _Expected(
+        location=found[0, 0] / scale**2,
+        scale=found[1, 1] * one,
+        skewness=found[2, 2] * one,
+        location_scale=found[0, 1] / scale,
+        location_skewness=found[0, 2] / scale,
+        scale_skewness=found[1, 2] * one,
+    )
 
 
 def _information(
     rows: Floats,
     scale_rows: Floats,
-    log_scale: Floats,
-    skewness: float,
+    expected: _Expected,
     scans: "_Scans",
     penalty: Floats,
 ) -> tuple[Floats, Floats]:
     """Return the expected information on all parameters, and what the location leaves
-    of each observation's scatter.
-
-    It is that of Rigby and Stasinopoulos (2005, doi 10.1111/j.1467-9876.2005.00510.x),
-    for small S, by logarithms.
-    """
-    size, squared, weights = rows.shape[1], np.exp(2 * log_scale), scans.weights
-    each = (1 + 2 * skewness**2 * squared) / squared
-    location = (rows.T * (weights * each)) @ rows
-    own = np.sqrt(each)[:, None] * rows
-    leverage = (
-        np.einsum(
-            "ij,ij->i",
-            own @ np.linalg.inv(location + penalty[:size, :size]),
-            scans.spread(own),
-        )
-        / weights
-    )
+    of each observation's scatter."""
+    size, weights = rows.shape[1], scans.weights
+    location = (rows.T * (weights * expected.location)) @ rows
+    own = np.sqrt(expected.location)[:, None] * rows
+    inverse = np.linalg.inv(location + penalty[:size, :size])
+    leverage = np.einsum("ij,ij->i", own @ inverse, scans.spread(own)) / weights
     left = 1 - np.minimum(leverage, MAX_LEVERAGE)
-    scale = 2 * (scale_rows.T * (weights * left)) @ scale_rows
-    both = 2 * skewness * (rows.T * weights) @ scale_rows
-    location_skewness = -0.5 * rows.T @ weights[:, None]
-    scale_skewness = -skewness * scale_rows.T @ (weights * squared)[:, None]
-    last = [
-        location_skewness.T,
-        scale_skewness.T,
-        np.array([[7 / 4 * (weights @ squared)]]),
+    scale = (scale_rows.T * (weights * expected.scale * left)) @ scale_rows
+    both = (rows.T * (weights * expected.location_scale)) @ scale_rows
+    location_skewness = rows.T @ (weights * expected.location_skewness)[:, None]
+    scale_skewness = scale_rows.T @ (weights * expected.scale_skewness)[:, None]
+    skewness = np.array([[weights @ expected.skewness]])
+    blocks = [
+        [location, both, location_skewness],
+        [both.T, scale, scale_skewness],
+        [location_skewness.T, scale_skewness.T, skewness],
     ]
-    return (
-        np.block(
-            [[location, both, location_skewness], [both.T, scale, scale_skewness], last]
-        ),
-        left,
-    )
+    return np.block(blocks), left
 
 
 def _slope(
@@ -437,11 +610,9 @@ def _slope(
 ) -> Floats:
     """Return the slope of the restricted log-likelihood by location, ln scale and
     skewness."""
-    parts = (
-        (weights * terms.slope_location) @ rows,
-        (weights * (terms.z**2 - left)) @ scale_rows,
-    )
-    return np.concatenate([*parts, [weights @ terms.slope_skewness]])
+    location = (weights * terms.slope_location) @ rows
+    scale = (weights * (terms.slope_scale - left)) @ scale_rows
+    return np.concatenate([location, scale, [weights @ terms.slope_skewness]])
 
 
 def _squares(rows: Floats, covariance: Floats) -> Floats:
@@ -450,13 +621,15 @@ def _squares(rows: Floats, covariance: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """z of values, its slopes by location and skewness (by ln scale it is −z), and two
-    slopes of the log-likelihood."""
+    """z of values, and slopes by location, ln scale and skewness, of z and of the
+    log-likelihood: that by ln scale is 1 larger, as the restricted one takes less."""
 
     z: Floats
     by_location: Floats
+    by_scale: Floats
     by_skewness: Floats
     slope_location: Floats
+    slope_scale: Floats
     slope_skewness: Floats
 
 
@@ -467,10 +640,9 @@ def _terms(
     values: Floats,
     is_positive: bool,
 ) -> _Terms:
-    scale = np.exp(log_scale)
     if not is_positive:
-        z, zero = (values - location) / scale, np.zeros(len(values))
-        return _Terms(z, -1 / scale, zero, z / scale, zero)
+        return _signed_terms(location, log_scale, skewness, values)
+    scale = np.exp(log_scale)
     logs = np.log(values) - location
     power = np.exp(skewness * logs)
     # the limits for small skewness
@@ -481,10 +653,46 @@ def _terms(
     return _Terms(
         z=z,
         by_location=-power / scale,
+        by_scale=-z,
         by_skewness=by_skewness / scale,
         slope_location=z * power / scale - skewness,
+        slope_scale=z**2,
         slope_skewness=logs - z * by_skewness / scale,
     )
+
+
+def _signed_terms(
+    location: Floats | float, log_scale: Floats, skewness: float, values: Floats
+) -> _Terms:
+    scale = np.exp(log_scale)
+    kappa = np.tanh(skewness)
+    u = (values - location) / scale
+    root = np.sqrt(1 + u**2)
+    z = u - kappa * (root - 1)
+    slope = 1 - kappa * u / root
+    curvature = -kappa / root**3
+    # of the log-likelihood by u
+    change = z * slope - curvature / slope
+    by_skewness = (1 - kappa**2) * (1 - root)
+    of_slope = -(1 - kappa**2) * u / root
+    return _Terms(
+        z=z,
+        by_location=-slope / scale,
+        by_scale=-u * slope,
+        by_skewness=by_skewness,
+        slope_location=change / scale,
+        slope_scale=u * change,
+        slope_skewness=of_slope / slope - z * by_skewness,
+    )
+
+
+def _signed_distance(z: Floats, skewness: float) -> Floats:
+    """Return the distances (n,) from the location, in scales, of z of a metric of
+    either sign."""
+    kappa = np.tanh(skewness)
+    shifted = z - kappa
+    root = np.sqrt(shifted**2 + 1 - kappa**2)
+    return (shifted + kappa * root) / (1 - kappa**2)
 
 
 def _basis(

@@ -1,6 +1,7 @@
 """Norms of published curves and of measured brains over gestational weeks, and the
 scores of brains against them."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,11 @@ WINDOW_GW = 0.5
 FEW_SUBJECTS, FEW_CENTILES = 30, (5.0, 95.0)
 """With fewer subjects, centiles end at these, and norms without one of them are fitted
 again."""
+SKEWED_CENTILES = (10.0, 90.0)
+"""Ends of the centiles of skewed norms, whose subjects are too few to know how much."""
+SUSPECT_Z, OUTLIER_Z = 3.0, 5.0
+"""Distances of a reference brain from the norm, in robust standard deviations: from
+which the norm is fitted again without it, and from which it is warned of then."""
 MAX_ONE_STEP_Z = 1.5
 """Other norms are fitted again without a subject that is beyond this z or has several
 scans; else it is removed by one Newton step."""
@@ -259,6 +265,30 @@ def cohort_norms(
     return CohortNorms(norms, individuals, made_with or {})
 
 
+def outlying_brains(
+    metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms
+) -> dict[str, list[str]]:
+    """Return the reference brains that are far from the norms that were fitted to them,
+    and the hemispheres and metrics in which they are.
+
+    They make norms too wide, and others seem usual. Averages are not looked at.
+    """
+    outlying = defaultdict(list)
+    for name, brains in _by_metric(metrics, reference):
+        if name not in cohort.norms or not cohort.individuals:
+            continue
+        _, norm = cohort.norms[name]
+        places = brains["week"], brains["value"]
+        is_near = np.abs(norm.robust_scores(*places)) < SUSPECT_Z
+        if not is_near.all():
+            # outliers draw the norm towards themselves
+            norm = _fit(brains[is_near], name[1])
+        z = norm.robust_scores(*places)
+        for brain in brains["subject"][np.abs(z) > OUTLIER_Z]:
+            outlying[brain].append(" ".join(name))
+    return dict(outlying)
+
+
 def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
     values = brains["value"].to_numpy(dtype=float)
     is_positive = not METRICS[metric].is_signed and bool((values > 0).all())
@@ -283,7 +313,8 @@ def measured_scores(
     (half the distance between z = −1 and 1), z and centile (0 to 100) as those of a new
     subject with the uncertainty of the norm, z_low, z_high, centile_low, centile_high
     (90 % intervals of those in the population), brains (subjects of the norm), flag:
-    "ok"; "few brains" (centiles end at 5 and 95); `SPREAD_UNKNOWN` (only expected is
+    "ok"; "few brains" (centiles end at 5 and 95); "skewed" (they end at 10 and 90);
+    "not converged" (the fit of the norm); `SPREAD_UNKNOWN` (only expected is
     given); "outside the reference's weeks", "too few brains", "other hemispheres" (than
     the reference), "not positive" (as all values of the norm are) or "no spread" (of
     the norm), whose scores are NaN.
@@ -373,13 +404,20 @@ def _score(
         return score | {"flag": "not positive"}
     low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
     z, interval = norm.scores([week], [value])
-    ends = np.array(FEW_CENTILES if is_small else (0.0, 100.0)) / 100
+    centiles, flag = (0.0, 100.0), "ok"
+    if is_small:
+        centiles, flag = FEW_CENTILES, "few brains"
+    if norm.is_skewed:
+        centiles, flag = SKEWED_CENTILES, "skewed"
+    if not norm.has_converged:
+        flag = "not converged"
+    ends = np.array(centiles) / 100
     scores = np.clip(np.append(z, interval), *stats.norm.ppf(ends))
     numbers = (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores))
     score |= dict(zip(SCORES, numbers, strict=False))
     if score["sd"] <= MIN_SPREAD * abs(score["expected"]):
         return {"brains": norm.subjects, "flag": "no spread"}
-    return score | {"flag": "few brains" if is_small else "ok"}
+    return score | {"flag": flag}
 
 
 def _with_norm(metrics: pd.DataFrame) -> pd.DataFrame:
