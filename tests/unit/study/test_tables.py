@@ -21,7 +21,9 @@ class Row:
 
 ROWS = [
     Row("021", 21.0, "left", "NA", True, ("a b;c.nii", 'q"u,\n.gii'), {}, None),
-    Row("1e3", 24.29, None, None, False, (), {"sex": "F"}, ShapeSettings(noise_mm=0.04)),
+    Row(
+        "1e3", 24.29, None, None, False, (), {"sex": "F"}, ShapeSettings(noise_mm=0.04)
+    ),
     Row("true", 22.0, "right", "ü", False, ("null",), {"a": "1"}, ShapeSettings()),
 ]
 
