@@ -68,7 +68,7 @@ rule all:
 complete_rules(workflow.rules, ENVIRONMENT)
 SCRIPTS = Path(workflow.basedir, "workflow", "scripts")
 rerun_on_code_changes(workflow.rules, SCRIPTS)
-if RUNS and (REFUSED or CONFIG.left_out):
+if RUNS and study.left_out:
     remove_stale(workflow.rules, STUDY, REPORT)
 
 

@@ -5,8 +5,12 @@ import yaml
 from facts import Facts
 
 from gyriflow.errors import InputError
+from gyriflow.settings.root import Config
 from gyriflow.study import resolve
+from gyriflow.study.atlases import used_atlases
+from gyriflow.study.brains import plan_brains
 from gyriflow.study.loading import load
+from gyriflow.study.series import Series, series_of
 from gyriflow.study.study import Study
 
 LABELLED = {"labels": __file__, "scheme": "spina-bifida-atlas"}
@@ -33,7 +37,7 @@ def study(brains=None, **changes):
 
 def resolved(brains=None, refused=(), **changes):
     """Return the study of such a configuration, without some refused brains."""
-    return resolve(load(study(brains, **changes)), refused)
+    return resolve(load(study(brains, **changes)), dict.fromkeys(refused, "refused"))
 
 
 def ids(brains):
@@ -108,11 +112,18 @@ def keys(raw, folder="."):
     return [line.partition(": ")[0] for line in problems(raw, folder)]
 
 
-def series_of(study: Study) -> dict[str, list[str]]:
+def growth_series(config: Config) -> Series:
+    """Return the growth series of a configuration, as they are planned."""
+    atlases = used_atlases(config)
+    return series_of(config, plan_brains(config, {}, atlases), atlases)
+
+
+def series_ids(study: Study) -> dict[str, list[str]]:
     """Return the ids of the brains of each growth series."""
-    return {name: ids(brains) for name, brains in study.series.brains.items()}
+    return {name: list(series.brains) for name, series in study.series.items()}
 
 
-def series_for(study: Study, brain: str) -> str | None:
+def series_for(config: Config, brain: str) -> str | None:
     """Return the growth series whose curves a brain follows."""
-    return study.series.for_sizes(study.brains[brain])
+    brains = plan_brains(config, {}, used_atlases(config))
+    return growth_series(config).for_sizes(brains[brain])

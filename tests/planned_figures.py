@@ -20,6 +20,7 @@ from snakemake.settings.types import (
     StorageSettings,
     WorkflowSettings,
 )
+from snakemake_interface_executor_plugins.settings import ExecMode
 
 from gyriflow.running.launch import DRY_RUN_VAR, LAUNCHED_VAR
 
@@ -39,10 +40,11 @@ class PlannedFigure:
     params: dict
 
 
-def planned_figures(folder, config, ended=()):
+def planned_figures(folder, config, ended=(), mode=ExecMode.DEFAULT):
     """Return the figures that are planned in a folder, and the globals of the rules.
 
-    Runs that `ended` have not reached the week of their sweep.
+    Runs that `ended` have not reached the week of their sweep. `mode` is that of
+    Snakemake: by default of the process that runs a study.
     """
     path = folder / "study.yaml"
     path.write_text(yaml.safe_dump(config, sort_keys=False))
@@ -56,7 +58,7 @@ def planned_figures(folder, config, ended=()):
             resource_settings=ResourceSettings(cores=1),
             config_settings=ConfigSettings(configfiles=[path]),
             storage_settings=StorageSettings(),
-            workflow_settings=WorkflowSettings(),
+            workflow_settings=WorkflowSettings(exec_mode=mode),
             deployment_settings=DeploymentSettings(),
             snakefile=SNAKEFILE,
             workdir=folder,

@@ -4,29 +4,35 @@
 # runs are not repeated, so an interrupted calibration continues.
 from gyriflow.settings.terms import SPECTRAL_SCORES
 
-CALIBRATED = study.calibration
+CALIBRATED = list(study.calibration.values())
+# by run; the rows of a run, one for each start brain, differ in that only
+ROUNDS = {row.run: row for row in CALIBRATED}
+STARTS = [row for row in CALIBRATED if row.run == CALIBRATED[0].run]
 IS_SPECTRAL = CALIBRATED and not set(CONFIG.calibrate.score).isdisjoint(SPECTRAL_SCORES)
 # spectra of the observed brains, if they are scored
 OBSERVED_SPECTRA = [
-    f"{real.measurement.folder}/spectra.csv"
-    for brains in (CALIBRATED.observed.values() if IS_SPECTRAL else [])
-    for real in brains
+    f"{BRAINS[brain].folder}/spectra.csv" for row in (STARTS if IS_SPECTRAL else []) for brain in row.observed
 ]
+
+
+def scores_before(number):
+    """Return the scores of all runs in earlier rounds."""
+    return [row.score for row in ROUNDS.values() if row.round < number]
 
 
 rule calibration_design:
     input:
         # bands that are not resolved are refused before the first run
         spectra=OBSERVED_SPECTRA,
-        scores=lambda w: CALIBRATED.scores_before(int(w.round)),
+        scores=lambda w: scores_before(int(w.round)),
     output:
-        f"{CALIBRATION}/round-{{round}}.csv",
+        DESIGN,
     wildcard_constraints:
         round=r"\d+",
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         score=lambda w: list(CONFIG.calibrate.score),
-        runs=lambda w: [run for run, number in CALIBRATED.rounds.items() if number == int(w.round)],
+        runs=lambda w: [run for run, row in ROUNDS.items() if row.round == int(w.round)],
     script:
         "../scripts/calibration_design.py"
 
@@ -34,15 +40,15 @@ rule calibration_design:
 rule prepare_calibrated:
     input:
         **START_MESH,
-        design=lambda w: CALIBRATED.design(w.run),
+        design=lambda w: ROUNDS[w.run].design,
         base=lambda w: PARAMETERS.format(run=CONFIG.calibrate.base, brain=w.brain),
-        maps=lambda w: simulation_of(w).maps,
-        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
+        maps=lambda w: simulation_of(w).maps or [],
+        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in BRAINS[w.brain].sides],
     output:
         **START_REGIONS,
         params=PARAMETERS,
     wildcard_constraints:
-        run=one_of(CALIBRATED.rounds if CALIBRATED else []),
+        run=one_of(ROUNDS),
     params:
         week=lambda w: CONFIG.calibrate.compare_week,
     script:
@@ -51,7 +57,7 @@ rule prepare_calibrated:
 
 def from_bases(pattern):
     """Return an input function: a file of a run of the calibration from each brain that the base run folds."""
-    return lambda w: [pattern.format(run=w.run, brain=base.start.id) for base in CALIBRATED.base]
+    return lambda w: [pattern.format(run=w.run, brain=start.brain) for start in STARTS]
 
 
 rule calibration_score:
@@ -60,19 +66,19 @@ rule calibration_score:
         regions=from_bases(REGIONS["mesh"]),
         data=from_bases(REGIONS["data"]),
         summaries=from_bases(FOLDING["summary"]),
-        real=lambda w: [real.pial for brains in CALIBRATED.observed.values() for real in brains],
+        real=lambda w: [BRAINS[brain].pial for start in STARTS for brain in start.observed],
         spectra=OBSERVED_SPECTRA,
-        design=lambda w: CALIBRATED.design(w.run),
+        design=lambda w: ROUNDS[w.run].design,
     output:
-        f"{CALIBRATION}/scores/{{run}}.csv",
+        SCORE,
     wildcard_constraints:
-        run=one_of(CALIBRATED.rounds if CALIBRATED else []),
+        run=one_of(ROUNDS),
     params:
         # number of observed brains of each simulated one
-        compared=lambda w: list(map(len, CALIBRATED.observed.values())),
+        compared=lambda w: [len(start.observed) for start in STARTS],
         week=lambda w: CONFIG.calibrate.compare_week,
         weights=lambda w: CONFIG.calibrate.score,
-        round=lambda w: CALIBRATED.rounds[w.run],
+        round=lambda w: ROUNDS[w.run].round,
         settings=MEASURED_WITH,
     script:
         "../scripts/calibration_score.py"
@@ -80,7 +86,7 @@ rule calibration_score:
 
 rule calibration_tables:
     input:
-        scores=CALIBRATED.scores_before(max(CALIBRATED.rounds.values()) + 1) if CALIBRATED else [],
+        scores=[row.score for row in ROUNDS.values()],
         noise=f"{workflow.basedir}/norms/repeatability.yaml",
     output:
         runs=f"{CALIBRATION}/runs.csv",

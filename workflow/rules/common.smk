@@ -1,4 +1,4 @@
-# Shared by all rules: the validated configuration, names and paths of results.
+# Shared by all rules: the plan of the study, names and paths of results.
 import os
 from contextlib import chdir
 
@@ -7,7 +7,10 @@ from gyriflow.grouping import grouped
 from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
+from gyriflow.study.atlases import known_checksums
+from gyriflow.study.brains import label_source, registered_source
 from gyriflow.study.paths import *
+from gyriflow.study.study import read_plan, write_plan
 from gyriflow.running.launch import (
     KEEP_GOING_VAR,
     DIRECTORY_VAR,
@@ -35,32 +38,31 @@ RUNS = workflow.is_main_process and DRY_RUN_VAR not in os.environ
 TELLS = workflow.is_main_process and PLANNED_VAR not in os.environ
 
 
-def validated_study():
-    """Return the study without refused brains, and the contents of the input files.
+def planned_study():
+    """Return the plan of the study, without refused brains, and the contents of its input files.
 
-    Ends with a message and exit code 2 if the configuration is not valid.
+    A process that runs the study writes the plan. InputError if the configuration is not valid.
     """
     from gyriflow.study.loading import load
     from gyriflow.io.yaml_files import read_keys
 
-    try:
-        base = Path(os.environ.get(DIRECTORY_VAR, os.curdir)).absolute()
-        for path in workflow.configfiles:
-            # Snakemake itself keeps the last of two equal keys
-            file = Path(workflow.workdir_init, path)
-            if set(read_keys(file)) & {"brains", "atlas", "participants"}:
-                base = folder_of(file)
-        # a dry run is in a view of the working directory
-        with chdir(os.environ.get(DIRECTORY_VAR, os.curdir)):
-            found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
-            used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
-            study = resolve(used, refused_brains())
-        if workflow.is_main_process:
-            files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
-            check_results_belong_to(Path.cwd(), files, found, record=RUNS)
-        return study, input_contents(Path.cwd(), found, study.checksums, record=RUNS)
-    except GyriflowError as error:
-        end_with(error)
+    base = Path(os.environ.get(DIRECTORY_VAR, os.curdir)).absolute()
+    for path in workflow.configfiles:
+        # Snakemake itself keeps the last of two equal keys
+        file = Path(workflow.workdir_init, path)
+        if set(read_keys(file)) & {"brains", "atlas", "participants"}:
+            base = folder_of(file)
+    # a dry run is in a view of the working directory
+    with chdir(os.environ.get(DIRECTORY_VAR, os.curdir)):
+        found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
+        used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
+        study = resolve(used, refused_brains())
+        checksums = known_checksums(study.used_atlases)
+    files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
+    check_results_belong_to(Path.cwd(), files, found, record=RUNS)
+    if RUNS:
+        write_plan(study, Path(PLAN))
+    return study, input_contents(Path.cwd(), found, checksums, record=RUNS)
 
 
 def end_with(error):
@@ -74,22 +76,33 @@ if workflow.is_main_process and LAUNCHED_VAR not in os.environ:
     remedy = "Start it by ./run snakemake or python -m gyriflow.running.launch, with the same arguments."
     end_with(InputError(problem, remedy=remedy))
 
-study, CONTENTS = validated_study()
+try:
+    # a job reads the plan
+    study, CONTENTS = planned_study() if workflow.is_main_process else (read_plan(Path(PLAN)), {})
+except GyriflowError as error:
+    end_with(error)
 CONFIG = study.config
+BRAINS = study.brains
+# by run, start brain and week
+SIMULATED = study.simulated
+# the runs of each sweep
+SWEEPS = study.by_sweep
 # brains refused in an earlier pass of this call, with the cause; the study is finished without them
-KNOWN = {brain.id for brain in CONFIG.brains}
-REFUSED = {brain: cause for brain, cause in refused_brains().items() if brain in KNOWN}
+REFUSED = {row.brain: row.cause for row in study.left_out.values() if row.why == "refused"}
+UNUSED_ROWS = [row for row in study.left_out.values() if row.why == "cannot be used"]
 if REFUSED and TELLS:
     # the causes have been printed
-    rest = "finishing the study without" if study.brains else "no brain is left"
+    rest = "finishing the study without" if BRAINS else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
-if REFUSED and not study.brains:
+if REFUSED and not BRAINS:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
 if TELLS:
-    messages = [(brain, f"not folded: {cause}") for brain, cause in study.unreachable.items()]
+    messages = [
+        (row.brain, f"not folded: {row.cause}") for row in study.left_out.values() if row.why == "not folded"
+    ]
     if not REFUSED:
-        messages += [(scan, f"left out: {row['cause']}") for scan, row in CONFIG.left_out.items()]
+        messages += [(row.brain, f"left out: {row.cause}") for row in UNUSED_ROWS]
     for line, _ in grouped(messages):
         print(f"gyriflow: {line}", file=sys.stderr)
 
@@ -108,33 +121,27 @@ START_REGIONS = {"regions": REGIONS["mesh"], "data": REGIONS["data"]}
 POSED_SIDES = {**{side: PIAL[side] for side in SIDES}, "report": PIAL["report"]}
 
 
-def brain_of(wildcards):
-    """Return the brain of the wildcards."""
-    return study.brains[wildcards.brain]
-
-
 def simulation_of(wildcards):
     """Return the simulation of the wildcards."""
     return study.simulations[wildcards.run, wildcards.brain]
 
 
-def brains_with(*sides, **properties):
-    """Return a regular expression for the ids of the brains with exactly these hemispheres and properties.
+def brains_with(*sides, has_thickness=None):
+    """Return a regular expression for the ids of the brains with exactly these hemispheres, with or without thickness.
 
     Brains of one hemisphere have fewer files. They have rules of their own (`use rule … as …_left with:`), since all
     output files of a rule are made by each of its jobs.
     """
-    return one_of(
-        brain.id
-        for brain in study.brains.values()
-        if (not sides or brain.sides == sides)
-        and all(getattr(brain, name) == value for name, value in properties.items())
-    )
+    ids = []
+    for brain in BRAINS.values():
+        if brain.sides == sides and has_thickness in (None, bool(brain.thickness)):
+            ids.append(brain.id)
+    return one_of(ids)
 
 
 wildcard_constraints:
-    **dict.fromkeys(("brain", "earlier", "later"), one_of(study.brains)),
-    study=one_of(study.sweeps),
+    **dict.fromkeys(("brain", "earlier", "later"), one_of(BRAINS)),
+    study=one_of(SWEEPS),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

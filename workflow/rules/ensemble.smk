@@ -5,12 +5,12 @@ def ensemble_of(wildcards):
 
 
 def reached(simulations, weeks):
-    """Return the measurements of simulations at those of some weeks that each has reached."""
+    """Return the simulated brains at those of some weeks that each simulation has reached."""
     return [
-        simulation.at(week)
+        SIMULATED[*simulation.key, week]
         for simulation in simulations
         for week in weeks
-        if reaches(simulation.run, simulation.start.id, week)
+        if reaches(simulation.run, simulation.brain, week)
     ]
 
 
@@ -20,11 +20,9 @@ def metrics_of(rows):
 
 rule ensemble:
     input:
-        run=lambda w: metrics_of(simulation_of(w).measurements),
+        run=lambda w: metrics_of(study.rows_of(simulation_of(w))),
         members=lambda w: metrics_of(reached(ensemble_of(w), simulation_of(w).weeks)),
-        observed=lambda w: metrics_of(
-            brains[0].measurement for brains in simulation_of(w).observed_brains.values()
-        ),
+        observed=lambda w: metrics_of(BRAINS[row.shown] for row in study.comparisons(simulation_of(w))),
         # the tested errors of predictions
         accuracy=lambda w: PREDICTION_TESTS if simulation_of(w).is_atlas_prediction else [],
         # all members at once, not one after the other as `reaches` asks for them
@@ -36,7 +34,7 @@ rule ensemble:
 
 
 def rows_of_ensemble(wildcards):
-    """Return the measurements of a run and of its members at a week."""
+    """Return the simulated brains of a run and of its members at a week."""
     return reached([simulation_of(wildcards), *ensemble_of(wildcards)], [float(wildcards.week)])
 
 

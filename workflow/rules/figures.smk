@@ -92,35 +92,34 @@ def files_in_grid(grid):
 
 show(
     {"quality_page": [f"{BRAIN}/figures/quality.png", f"{BRAIN}/figures/quality.pdf"]},
-    names_of(study.brains.values()),
+    names_of(BRAINS.values()),
 )
 show(
     {"brain_maps": [f"{BRAIN}/figures/shape_index.png", f"{BRAIN}/figures/shape_index.pdf"]},
-    names_of(study.brains.values()),
+    names_of(BRAINS.values()),
 )
 show(
     {"small_pictures": [f"{BRAIN}/figures/small.png", f"{BRAIN}/figures/small.pdf"]},
-    names_of(study.brains.values()),
+    names_of(BRAINS.values()),
 )
 
-WITH_REGIONS = [brain for brain in study.brains.values() if brain.has_regions]
+WITH_REGIONS = [brain for brain in BRAINS.values() if brain.regions]
 
 
 def brain_regions_grid(brain):
-    row = brain.measurement
-    return [placed("", brain.id, row.hemispheres, row.regions.values())]
+    return [placed("", brain.id, brain.hemispheres, brain.regions)]
 
 
 rule brain_regions:
     input:
-        grid=lambda w: files_in_grid(brain_regions_grid(brain_of(w))),
+        grid=lambda w: files_in_grid(brain_regions_grid(BRAINS[w.brain])),
     output:
         brain_regions=multiext(f"{BRAIN}/figures/regions", ".png", ".pdf"),
     wildcard_constraints:
         brain=one_of(brain.id for brain in WITH_REGIONS),
     params:
         **drawn_by("pictures"),
-        grid=lambda w: brain_regions_grid(brain_of(w)),
+        grid=lambda w: brain_regions_grid(BRAINS[w.brain]),
     script:
         "../scripts/figures.py"
 
@@ -129,7 +128,7 @@ show(rules.brain_regions.output, names_of(WITH_REGIONS))
 
 
 def first_and_last_grid():
-    by_week = sorted(study.brains.values(), key=lambda brain: brain.week)
+    by_week = sorted(BRAINS.values(), key=lambda brain: brain.week)
     # of several brains of the last week, the first
     last = next(brain for brain in by_week if brain.week == by_week[-1].week)
     return [placed("", f"{brain.id}\n{brain.week:g} GW", [brain.pial]) for brain in (by_week[0], last)]
@@ -162,7 +161,7 @@ if study.run_simulations:
             **drawn_by("tables"),
             starts=[start.id for start in study.starts],
             gates=CONFIG.mesh.gates,
-            observed_name=observed_name(study.brains.values()),
+            observed_name=observed_name(BRAINS.values()),
         script:
             "../scripts/figures.py"
 
@@ -173,7 +172,7 @@ if study.run_simulations:
 
 # for many subjects without simulations, charts of metrics and change.csv show growth; here each would need a panel
 MAX_SERIES = 4
-HAS_FEW_SERIES = len(study.series.brains) <= MAX_SERIES
+HAS_FEW_SERIES = len(study.series) <= MAX_SERIES
 
 
 def common_growth_rate():
@@ -209,8 +208,8 @@ if study.growth_brains and (HAS_FEW_SERIES or study.run_simulations):
 
 
 # start brains of predictions by the growth of an atlas
-BY_ATLAS = {simulation.start for simulation in study.run_simulations if simulation.shapes == "atlas"}
-CARRIED = [start for start in study.starts if start in BY_ATLAS]
+BY_ATLAS = {simulation.brain for simulation in study.run_simulations if simulation.shapes == "atlas"}
+CARRIED = [start for start in study.starts if start.id in BY_ATLAS]
 
 
 rule atlas_ages:
@@ -232,12 +231,12 @@ show(rules.atlas_ages.output, names_of(CARRIED))
 
 
 def predicted_grid(simulation):
-    start = simulation.start
-    predicted = simulation.measurements[-1]
+    start = BRAINS[simulation.brain]
+    predicted = study.rows_of(simulation)[-1]
     atlas_brain = study.atlas_brain(simulation)
     return [
         placed("", f"start\n{start.week:g} GW", [start.pial]),
-        placed("", f"predicted\n{predicted.week:g} GW", [predicted.parts["whole"]], simulated=True),
+        placed("", f"predicted\n{predicted.week:g} GW", [predicted.pial], simulated=True),
         placed("", f"atlas' own brain\n{atlas_brain.week:g} GW", [atlas_brain.pial]),
     ]
 
@@ -265,10 +264,10 @@ show(rules.predicted_figure.output, names_of(PREDICTIONS))
 
 def runs_from(brain):
     """Return the simulations from a start brain, and by week the observed brains shown with them."""
-    simulations = [simulation for simulation in study.run_simulations if simulation.start.id == brain]
+    simulations = [simulation for simulation in study.run_simulations if simulation.brain == brain]
     observed = {}
     for simulation in simulations:
-        observed |= simulation.observed_with_start
+        observed |= study.shown(simulation)
     return simulations, observed
 
 
@@ -276,8 +275,8 @@ def weekly_grid(brain):
     simulations, observed = runs_from(brain)
     grid = []
     for simulation in simulations:
-        for week, surface in simulation.surfaces.items():
-            grid.append(placed(simulation.run, week, [surface], simulated=True))
+        for row in study.rows_of(simulation):
+            grid.append(placed(simulation.run, row.week, [row.pial], simulated=True))
     name = observed_name(observed.values())
     for week, brain in observed.items():
         grid.append(placed(name, week, [brain.pial]))
@@ -343,7 +342,7 @@ show(rules.growth_sd_figure.output, names_of(ENSEMBLES_WITH_GROWTH))
 def ensemble_grid(simulation):
     grid = []
     # without the start brain, which all members share
-    for row in simulation.measurements[1:]:
+    for row in study.rows_of(simulation)[1:]:
         maps = [simulation.file(ENSEMBLE_MAPS, week=row.week, side=side) for side in row.sides]
         grid.append(placed(simulation.run, row.week, row.hemispheres, maps, simulated=True))
     return grid
@@ -391,7 +390,7 @@ ZONES = {"contact", "no_growth", "support"}
 BY_ZONES = {}
 for simulation in study.run_simulations:
     zones = repr(simulation.settings.model_dump(include=ZONES))
-    BY_ZONES.setdefault((simulation.start.id, zones), simulation)
+    BY_ZONES.setdefault((simulation.brain, zones), simulation)
 ZONED = list(BY_ZONES.values())
 
 
@@ -471,11 +470,11 @@ def shape_grid(brain):
     simulations, observed = runs_from(brain)
     grid = []
     for simulation in simulations:
-        for row in simulation.measurements:
+        for row in study.rows_of(simulation):
             grid.append(placed(simulation.run, row.week, row.hemispheres, row.maps, simulated=True))
     name = observed_name(observed.values())
     for week, brain in observed.items():
-        grid.append(placed(name, week, brain.measurement.hemispheres, brain.measurement.maps))
+        grid.append(placed(name, week, brain.hemispheres, brain.maps))
     return grid
 
 
@@ -498,12 +497,10 @@ show(rules.shape_maps.output, names_of(study.starts))
 # the names and colours of brains in charts over the weeks
 CHARTED = {
     "runs": run_names(study.pairs),
-    "subjects": {
-        brain.id: brain.subject for brain in study.brains.values() if brain.config.subject is not None
-    },
-    "groups": study.colour_groups,
+    "subjects": {brain.id: brain.subject for brain in BRAINS.values() if brain.subject is not None},
+    "groups": {brain.id: brain.group for brain in BRAINS.values() if brain.group},
 }
-UNGROUPED = [brain for brain in study.brains.values() if brain.id not in study.colour_groups]
+UNGROUPED = [brain for brain in BRAINS.values() if brain.group is None]
 
 
 rule metrics_charts:
@@ -516,14 +513,14 @@ rule metrics_charts:
     params:
         **drawn_by("weeks"),
         **CHARTED,
-        observed_name=observed_name(UNGROUPED or study.brains.values()),
+        observed_name=observed_name(UNGROUPED or BRAINS.values()),
     script:
         "../scripts/figures.py"
 
 
 show(rules.metrics_charts.output)
 
-NORM_BRAINS = [study.brains[brain] for brain in study.norm_reference]
+NORM_BRAINS = [BRAINS[brain] for brain in study.norm_reference]
 
 if study.has_norm:
 
@@ -539,7 +536,7 @@ if study.has_norm:
             norm_name=observed_name(NORM_BRAINS),
             # norms of another study have no brains here
             reference=[] if CONFIG.metrics.norms else study.norm_reference,
-            brains=[brain.id for brain in study.brains.values() if brain.sides == NORM_BRAINS[0].sides],
+            brains=[brain.id for brain in BRAINS.values() if brain.sides == NORM_BRAINS[0].sides],
         script:
             "../scripts/figures.py"
 
@@ -569,9 +566,9 @@ def regions_grid():
         grid += brain_regions_grid(brain)
     for simulation, name in zip(study.run_simulations, run_names(study.pairs)):
         if simulation.has_regions:
-            last = simulation.measurements[-1]
+            last = study.rows_of(simulation)[-1]
             column = f"{name}, {last.week:g} GW"
-            grid.append(placed("", column, last.hemispheres, last.regions.values(), simulated=True))
+            grid.append(placed("", column, last.hemispheres, last.regions, simulated=True))
     return grid
 
 
@@ -642,16 +639,17 @@ MAX_DEVIATIONS = 4
 
 
 def expected_grid(simulation):
-    observed = simulation.observed_with_start
+    observed = study.shown(simulation)
     # the last week, and others at equal steps
-    step = -(-len(simulation.observed) // MAX_DEVIATIONS)
-    deviating = sorted(simulation.observed, reverse=True)[::step]
+    compared = study.observed(simulation)
+    step = -(-len(compared) // MAX_DEVIATIONS)
+    deviating = sorted(compared, reverse=True)[::step]
     weeks = {simulation.weeks[0], *deviating}
     name = observed_name(observed.values())
     grid = []
-    for week, surface in simulation.surfaces.items():
-        if week in weeks:
-            grid.append(placed("expected", week, [surface], simulated=True))
+    for row in study.rows_of(simulation):
+        if row.week in weeks:
+            grid.append(placed("expected", row.week, [row.pial], simulated=True))
     for week, brain in observed.items():
         if week in weeks:
             grid.append(placed(name, week, [brain.pial]))
@@ -663,9 +661,10 @@ def expected_grid(simulation):
 
 def deviation_grid(simulation):
     grid = []
-    for week in simulation.observed:
+    for week in study.observed(simulation):
+        surface = SIMULATED[*simulation.key, week].pial
         maps = simulation.file(DEVIATION["maps"], week=week)
-        grid.append(placed("observed minus expected", week, [simulation.surfaces[week]], [maps]))
+        grid.append(placed("observed minus expected", week, [surface], [maps]))
     return grid
 
 
@@ -688,7 +687,7 @@ show(rules.expected_figure.output, names_of(study.atlas_predictions))
 DEVIATIONS = []
 for simulation in study.atlas_predictions:
     DEVIATIONS.append(simulation.names | {"quantity": "log_area"})
-    if simulation.start.has_thickness:
+    if BRAINS[simulation.brain].thickness:
         DEVIATIONS.append(simulation.names | {"quantity": "thickness_difference_mm"})
 
 
@@ -714,85 +713,91 @@ show(rules.deviation_figure.output, DEVIATIONS)
 
 
 def first_members(sweep):
-    """Return the simulations of a sweep from its first start brain, with their varied values by run."""
-    members = {}
-    values = {}
-    for simulation, varied in sweep.members:
-        if simulation.start is sweep.first_start:
-            members[simulation.run] = simulation
-            values[simulation.run] = dict(varied)
-    return members, values
+    """Return the runs of a sweep from its first start brain, by name."""
+    rows = SWEEPS[sweep]
+    return {row.run: row for row in rows if row.brain == rows[0].brain}
+
+
+def first_observed(sweep):
+    """Return the first brain that these runs are compared with, if any."""
+    return [BRAINS[brain] for brain in SWEEPS[sweep][0].observed[:1]]
+
+
+def first_values(sweep):
+    """Return the varied values of these runs."""
+    return {run: row.values for run, row in first_members(sweep).items()}
+
+
+def names_of_sweeps(sweeps):
+    """Return the names of sweeps with their weeks."""
+    return [{"study": sweep, "week": f"{SWEEPS[sweep][0].week:g}"} for sweep in sweeps]
 
 
 def influence_grid(sweep):
     grid = []
-    members, _ = first_members(sweep)
-    for run, simulation in members.items():
-        row = simulation.at(sweep.week)
+    for run, member in first_members(sweep).items():
+        row = SIMULATED[run, member.brain, member.week]
         # a run that ended before has no files
-        has_files = reaches(run, sweep.first_start.id, sweep.week)
+        has_files = reaches(run, member.brain, member.week)
         files = (row.hemispheres, row.maps) if has_files else ([], [])
         grid.append(placed("", run, *files, simulated=True))
-    for brain in sweep.first_observed:
-        row = brain.measurement
-        grid.append(placed("", observed_name([brain]), row.hemispheres, row.maps))
+    for brain in first_observed(sweep):
+        grid.append(placed("", observed_name([brain]), brain.hemispheres, brain.maps))
     return grid
 
 
 rule influence_figure:
     input:
-        grid=lambda w: files_in_grid(influence_grid(study.sweeps[w.study])),
+        grid=lambda w: files_in_grid(influence_grid(w.study)),
     output:
         influence_figure=multiext(f"{SWEEP}/figures/influence", ".png", ".pdf"),
     params:
         **drawn_by("pictures"),
-        grid=lambda w: influence_grid(study.sweeps[w.study]),
-        values=lambda w: first_members(study.sweeps[w.study])[1],
+        grid=lambda w: influence_grid(w.study),
+        values=lambda w: first_values(w.study),
     script:
         "../scripts/figures.py"
 
 
-show(rules.influence_figure.output, names_of(study.sweeps.values()))
+show(rules.influence_figure.output, names_of_sweeps(SWEEPS))
 
 
 def member_spectra(wildcards):
     """Return the spectra of the runs of a sweep that reached its week."""
-    sweep = study.sweeps[wildcards.study]
-    members, _ = first_members(sweep)
     return [
-        simulation.at(sweep.week).spectra
-        for run, simulation in members.items()
-        if reaches(run, sweep.first_start.id, sweep.week)
+        f"{SIMULATED[run, member.brain, member.week].folder}/spectra.csv"
+        for run, member in first_members(wildcards.study).items()
+        if reaches(run, member.brain, member.week)
     ]
 
 
 rule influence_spectra:
     input:
         members=member_spectra,
-        observed=lambda w: [brain.measurement.spectra for brain in study.sweeps[w.study].first_observed],
+        observed=lambda w: [f"{brain.folder}/spectra.csv" for brain in first_observed(w.study)],
     output:
         influence_spectra=multiext(f"{SWEEP}/figures/spectra", ".png", ".pdf"),
     params:
         **drawn_by("weeks"),
-        values=lambda w: first_members(study.sweeps[w.study])[1],
-        week=lambda w: study.sweeps[w.study].week,
-        observed_name=lambda w: observed_name(study.sweeps[w.study].first_observed),
+        values=lambda w: first_values(w.study),
+        week=lambda w: SWEEPS[w.study][0].week,
+        observed_name=lambda w: observed_name(first_observed(w.study)),
     script:
         "../scripts/figures.py"
 
 
-show(rules.influence_spectra.output, names_of(study.sweeps.values()))
+show(rules.influence_spectra.output, names_of_sweeps(SWEEPS))
 
 
 def has_nearest(sweep):
     """Return whether the runs of a sweep are compared over one parameter with numbers."""
-    vary = CONFIG.studies[sweep.name].vary
+    vary = CONFIG.studies[sweep].vary
     values = next(iter(vary.values()))
     are_numbers = all(isinstance(value, int | float) for value in values)
-    return bool(sweep.first_observed) and len(vary) == 1 and are_numbers
+    return bool(first_observed(sweep)) and len(vary) == 1 and are_numbers
 
 
-OVER_NUMBERS = [sweep for sweep in study.sweeps.values() if has_nearest(sweep)]
+OVER_NUMBERS = [sweep for sweep in SWEEPS if has_nearest(sweep)]
 
 
 rule nearest_figure:
@@ -801,18 +806,18 @@ rule nearest_figure:
     output:
         nearest_figure=multiext(f"{SWEEP}/figures/nearest", ".png", ".pdf"),
     wildcard_constraints:
-        study=one_of(sweep.name for sweep in OVER_NUMBERS),
+        study=one_of(OVER_NUMBERS),
     params:
         **drawn_by("scores"),
         varied=lambda w: next(iter(CONFIG.studies[w.study].vary)),
-        subject=lambda w: study.sweeps[w.study].first_start.id,
-        observed=lambda w: [brain.id for brain in study.sweeps[w.study].first_observed],
-        week=lambda w: study.sweeps[w.study].week,
+        subject=lambda w: SWEEPS[w.study][0].brain,
+        observed=lambda w: [brain.id for brain in first_observed(w.study)],
+        week=lambda w: SWEEPS[w.study][0].week,
     script:
         "../scripts/figures.py"
 
 
-show(rules.nearest_figure.output, names_of(OVER_NUMBERS))
+show(rules.nearest_figure.output, names_of_sweeps(OVER_NUMBERS))
 
 
 use rule nearest_figure as paper_nearest_figure with:
@@ -823,7 +828,7 @@ use rule nearest_figure as paper_nearest_figure with:
         paper_nearest_figure=multiext(f"{SWEEP}/figures/nearest_paper", ".png", ".pdf"),
 
 
-show(rules.paper_nearest_figure.output, names_of(OVER_NUMBERS))
+show(rules.paper_nearest_figure.output, names_of_sweeps(OVER_NUMBERS))
 
 if study.calibration:
 

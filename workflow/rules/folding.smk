@@ -2,13 +2,14 @@
 from gyriflow.io.files import read_json
 from gyriflow.running.cost import job_limits
 from gyriflow.settings.varying import files_of, mean_of_curve
+from gyriflow.study.records import mapped_parameters, parameters
 
 
 def map_sources(wildcards):
     """Return, for each parameter with a map, the user's files as "map" and "surface", and its mean "curve"."""
     return {
         name: {"map": files_of(value.map), "surface": files_of(value.surface), "curve": mean_of_curve(value)}
-        for name, value in simulation_of(wildcards).mapped.items()
+        for name, value in mapped_parameters(simulation_of(wildcards).settings).items()
     }
 
 
@@ -31,10 +32,10 @@ rule prepare:
         ],
         **START_MESH,
         surface=PIAL["report"],
-        curves=lambda w: simulation_of(w).curves,
-        targets=lambda w: simulation_of(w).targets,
+        curves=lambda w: simulation_of(w).curves or [],
+        targets=lambda w: simulation_of(w).targets or [],
         # the simulated brain has the hemispheres of its start brain
-        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
+        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in BRAINS[w.brain].sides],
     output:
         **START_REGIONS,
         params=PARAMETERS,
@@ -43,11 +44,11 @@ rule prepare:
     wildcard_constraints:
         run=prepared_runs(with_maps=False),
     params:
-        settings=lambda w: simulation_of(w).parameters,
+        settings=lambda w: parameters(simulation_of(w).settings),
         weeks=lambda w: simulation_of(w).weeks,
-        series=lambda w: simulation_of(w).followed_series,
+        series=lambda w: simulation_of(w).series if simulation_of(w).curves else None,
         # volumes of maps are read like label volumes
-        affine_from=lambda w: brain_of(w).config.affine_from,
+        affine_from=lambda w: BRAINS[w.brain].affine_from,
         maps=map_sources,
     script:
         "../scripts/prepare.py"
@@ -66,7 +67,7 @@ SOLVED_FROM = {
     "mesh": MESH["mesh"],
     "data": MESH["data"],
     "params": PARAMETERS,
-    "maps": lambda w: simulation_of(w).maps,
+    "maps": lambda w: simulation_of(w).maps or [],
     # made before the ranks start, so that impossible zones are refused early
     "regions": REGIONS["mesh"],
 }
@@ -171,7 +172,7 @@ rule folding:
         [
             simulation.file(file, week=week)
             for simulation in study.run_simulations
-            for file in folded_of(*simulation.start.sides).values()
+            for file in folded_of(*BRAINS[simulation.brain].sides).values()
             for week in simulation.weeks
         ],
         [simulation.file(GROWTH_MAPS) for simulation in study.run_simulations if simulation.has_growth_maps],

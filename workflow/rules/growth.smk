@@ -10,7 +10,7 @@ rule growth_rates:
     params:
         series=[series for series, _ in study.growth_brains],
         brains=[brain.id for _, brain in study.growth_brains],
-        with_rates=study.series_with_rates,
+        with_rates=[series.name for series in study.series.values() if series.has_rates],
         weeks=[brain.week for _, brain in study.growth_brains],
     script:
         "../scripts/growth_rates.py"

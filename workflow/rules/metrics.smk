@@ -2,16 +2,10 @@
 MEASURED_WITH = CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes", "spangy_mass"})
 
 
-def labels_or_white(wildcards):
-    """Return the labels of a brain, or its white surfaces."""
-    brain = brain_of(wildcards)
-    return brain.labels.path if brain.labels else list(brain.config.white_files.values())
-
-
 rule measure:
     input:
-        unpack(lambda w: brain_of(w).measurement.parts),
-        thickness=lambda w: brain_of(w).measurement.thickness,
+        unpack(lambda w: BRAINS[w.brain].parts),
+        thickness=lambda w: BRAINS[w.brain].thickness or [],
         report=PIAL["report"],
     output:
         **measures_in(f"{BRAIN}/metrics", *SIDES),
@@ -20,7 +14,7 @@ rule measure:
     wildcard_constraints:
         brain=brains_with(*SIDES),
     params:
-        labels=lambda w: brain_of(w).measurement.labels,
+        labels=lambda w: BRAINS[w.brain].columns,
         settings=MEASURED_WITH,
     script:
         "../scripts/measure.py"
@@ -39,28 +33,33 @@ rule measure_simulated:
     wildcard_constraints:
         brain=brains_with(*SIDES),
     params:
-        labels=lambda w: simulation_of(w).at(float(w.week)).labels,
+        labels=lambda w: SIMULATED[w.run, w.brain, float(w.week)].columns,
         settings=MEASURED_WITH,
     script:
         "../scripts/measure.py"
 
 
+def white_brains(*sides):
+    """Return a regular expression for the ids of the brains of these hemispheres that have white surfaces."""
+    return one_of(brain.id for brain in BRAINS.values() if brain.white and brain.sides == sides)
+
+
 rule white:
     input:
-        unpack(lambda w: brain_of(w).measurement.parts),
+        unpack(lambda w: BRAINS[w.brain].parts),
         report=PIAL["report"],
-        given=labels_or_white,
+        given=lambda w: BRAINS[w.brain].labels or list(BRAINS[w.brain].white_files.values()),
     output:
         **white_of(*SIDES),
     log:
         f"{BRAIN}/logs/white.log",
     wildcard_constraints:
-        brain=brains_with(*SIDES, has_white=True),
+        brain=white_brains(*SIDES),
     params:
-        columns=lambda w: brain_of(w).measurement.labels,
-        labels=lambda w: brain_of(w).labels,
-        white=lambda w: brain_of(w).config.white_files,
-        surface=surface_settings("edge_length_mm", "max_hole_mm"),
+        columns=lambda w: BRAINS[w.brain].columns,
+        labels=lambda w: label_source(CONFIG, BRAINS[w.brain]),
+        white=lambda w: BRAINS[w.brain].white_files,
+        surface=MESH_SETTINGS,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/white.py"
@@ -85,7 +84,7 @@ use rule white as white_left with:
     output:
         **white_of("left"),
     wildcard_constraints:
-        brain=brains_with("left", has_white=True),
+        brain=white_brains("left"),
 
 
 use rule measure as measure_right with:
@@ -107,4 +106,4 @@ use rule white as white_right with:
     output:
         **white_of("right"),
     wildcard_constraints:
-        brain=brains_with("right", has_white=True),
+        brain=white_brains("right"),

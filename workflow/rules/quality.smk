@@ -11,13 +11,13 @@ rule brain_figures:
     input:
         surface=PIAL["whole"],
         report=PIAL["report"],
-        labels=lambda w: brain_of(w).labels.path if brain_of(w).labels else [],
-        image=lambda w: brain_of(w).config.image or [],
-        white=lambda w: list(brain_of(w).config.white_files.values()),
-        thickness=lambda w: brain_of(w).measurement.thickness,
-        measured=lambda w: THICKNESS["summary"].format(brain=w.brain) if brain_of(w).has_thickness else [],
-        hemispheres=lambda w: brain_of(w).measurement.hemispheres,
-        maps=lambda w: brain_of(w).measurement.maps,
+        labels=lambda w: BRAINS[w.brain].labels or [],
+        image=lambda w: BRAINS[w.brain].image or [],
+        white=lambda w: list(BRAINS[w.brain].white_files.values()),
+        thickness=lambda w: BRAINS[w.brain].thickness or [],
+        measured=lambda w: THICKNESS["summary"].format(brain=w.brain) if BRAINS[w.brain].thickness else [],
+        hemispheres=lambda w: BRAINS[w.brain].hemispheres,
+        maps=lambda w: BRAINS[w.brain].maps,
     output:
         quality=f"{BRAIN}/figures/quality.png",
         quality_pdf=f"{BRAIN}/figures/quality.pdf",
@@ -27,10 +27,10 @@ rule brain_figures:
         small_pdf=f"{BRAIN}/figures/small.pdf",
         row=f"{BRAIN}/quality.json",
     params:
-        white_files=lambda w: brain_of(w).config.white_files,
-        labels=lambda w: brain_of(w).labels,
+        white_files=lambda w: BRAINS[w.brain].white_files,
+        labels=lambda w: label_source(CONFIG, BRAINS[w.brain]),
         columns=lambda w: quality_columns(w.brain),
-        side=lambda w: brain_of(w).sides[0],
+        side=lambda w: BRAINS[w.brain].sides[0],
         log=lambda w: f"{BRAIN}/logs/pial.log".format(brain=w.brain),
     script:
         "../scripts/brain_figures.py"
@@ -38,20 +38,20 @@ rule brain_figures:
 
 rule quality_table:
     input:
-        expand(rules.brain_figures.output.row, brain=study.brains),
+        expand(rules.brain_figures.output.row, brain=BRAINS),
     output:
         f"{STUDY}/quality.csv",
     params:
         refused=[
             *(quality_columns(name) | {"cause": cause, "page": None} for name, cause in REFUSED.items()),
-            *({"subject": name, **row} for name, row in CONFIG.left_out.items()),
+            *({"subject": row.brain, "week": row.week, "cause": row.cause} for row in UNUSED_ROWS),
         ],
-        order=[*(brain.id for brain in CONFIG.brains), *CONFIG.left_out],
+        order=[*(brain.id for brain in CONFIG.brains), *(row.brain for row in UNUSED_ROWS)],
     script:
         "../scripts/quality_table.py"
 
 
 rule quality:
     input:
-        expand(list(rules.brain_figures.output), brain=study.brains),
+        expand(list(rules.brain_figures.output), brain=BRAINS),
         rules.quality_table.output,

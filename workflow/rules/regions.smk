@@ -9,9 +9,9 @@ rule given_regions:
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
-        brain=brains_with(regions_from="given"),
+        brain=one_of(brain.id for brain in BRAINS.values() if brain.regions_of == brain.id),
     params:
-        affine_from=lambda w: brain_of(w).config.affine_from,
+        affine_from=lambda w: BRAINS[w.brain].affine_from,
         names=lambda w: CONFIG.metrics.regions[w.brain].names,
     script:
         "../scripts/given_regions.py"
@@ -19,27 +19,30 @@ rule given_regions:
 
 def region_pair(wildcards):
     """Return the brain on which regions are given, and the brain to which they are carried."""
-    return study.region_source(wildcards.brain), brain_of(wildcards)
+    brain = BRAINS[wildcards.brain]
+    return BRAINS[brain.regions_of], brain
 
 
-def regions_to_carry(wildcards):
-    """Return the given regions and the surfaces of their brain."""
-    giver, _ = region_pair(wildcards)
-    return {**giver.regions, **{f"given_{side}": giver.measurement.parts[side] for side in SIDES}}
+def region_link(wildcards):
+    """Return the map by which regions are carried."""
+    return study.link(BRAINS[wildcards.brain].regions_of, wildcards.brain)
 
 
 rule carried_regions:
     input:
-        unpack(regions_to_carry),
         **POSED_SIDES,
+        left_regions=lambda w: region_pair(w)[0].regions[0],
+        right_regions=lambda w: region_pair(w)[0].regions[1],
+        given_left=lambda w: region_pair(w)[0].parts["left"],
+        given_right=lambda w: region_pair(w)[0].parts["right"],
         given_report=lambda w: region_pair(w)[0].report,
-        correspondence=lambda w: study.series.correspondence(*region_pair(w)),
+        correspondence=lambda w: region_link(w).file,
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
-        brain=brains_with(regions_from="carried"),
+        brain=one_of(brain.id for brain in BRAINS.values() if brain.regions_of not in (None, brain.id)),
     params:
-        posed=lambda w: study.series.posed(*region_pair(w)),
+        posed=lambda w: region_link(w).posed,
     script:
         "../scripts/carried_regions.py"
 
@@ -53,64 +56,64 @@ rule simulated_regions:
     output:
         **region_files(f"{RUN}/metrics"),
     wildcard_constraints:
-        brain=brains_with(has_regions=True),
+        brain=one_of(brain.id for brain in WITH_REGIONS),
     script:
         "../scripts/simulated_regions.py"
 
 
-def place_of(wildcards):
-    """Return the brain that is measured in the folder of the wildcards."""
-    return study.all_measurements[wildcards.where]
+# observed and simulated brains that are measured, by the place of their tables
+MEASURED = study.all_measured
 
 
 rule region_metrics:
     input:
-        unpack(lambda w: place_of(w).regions),
-        unpack(lambda w: place_of(w).parts),
+        unpack(lambda w: MEASURED[w.where].parts),
+        left_regions=lambda w: MEASURED[w.where].regions[0],
+        right_regions=lambda w: MEASURED[w.where].regions[1],
         left_maps=f"{PLACE}/left.shape.gii",
         right_maps=f"{PLACE}/right.shape.gii",
     output:
         f"{PLACE}/regions.csv",
     wildcard_constraints:
-        where=one_of(where for where, row in study.all_measurements.items() if row.regions),
+        where=one_of(place for place, row in MEASURED.items() if row.regions),
     params:
-        labels=lambda w: place_of(w).labels,
+        labels=lambda w: MEASURED[w.where].columns,
     script:
         "../scripts/region_metrics.py"
 
 
 def on_template(wildcards):
     """Return the template, and the brain whose maps are moved to its vertices."""
-    return study.brains[CONFIG.metrics.template], study.brains[place_of(wildcards).subject]
+    return BRAINS[CONFIG.metrics.template], BRAINS[MEASURED[wildcards.where].id]
 
 
 def mapped_surface(wildcards):
     """Return the hemisphere with a brain's maps; for a simulated brain that of its start, with the same vertices."""
-    row, brain = place_of(wildcards), study.brains[place_of(wildcards).subject]
+    row = MEASURED[wildcards.where]
     if row.run in CONFIG.runs:
-        row = study.simulations[row.run, brain.id].at(brain.week)
+        row = SIMULATED[row.run, row.id, BRAINS[row.id].week]
     return row.parts[wildcards.side]
 
 
-def template_correspondence(wildcards):
-    """Return the correspondence of the template with a brain; none for the template itself."""
+def template_links(wildcards):
+    """Return the map from the template to a brain; none for the template itself."""
     template, brain = on_template(wildcards)
-    return [] if brain is template else [study.series.correspondence(template, brain)]
+    return [] if brain is template else [study.link(template.id, brain.id)]
 
 
 rule template_maps:
     input:
-        template=lambda w: on_template(w)[0].measurement.parts[w.side],
+        template=lambda w: on_template(w)[0].parts[w.side],
         template_report=lambda w: on_template(w)[0].report,
         surface=mapped_surface,
         report=lambda w: on_template(w)[1].report,
-        correspondence=template_correspondence,
+        correspondence=lambda w: [link.file for link in template_links(w)],
         maps=f"{PLACE}/{{side}}.shape.gii",
     output:
         TEMPLATE_MAPS,
     wildcard_constraints:
-        where=one_of(study.measurements),
+        where=one_of(study.measured),
     params:
-        posed=lambda w: study.series.posed(*on_template(w)),
+        posed=lambda w: template_links(w)[0].posed if template_links(w) else [False, False],
     script:
         "../scripts/template_maps.py"

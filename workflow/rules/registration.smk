@@ -4,45 +4,45 @@ from gyriflow.io.origins import origin_key
 from gyriflow.running.path_store import has_path, kept_path, path_origin, store_folder
 
 if TELLS:
-    for series, cause in study.series.unmatched.items():
-        if set(study.starts) & set(study.series.brains[series]):
+    for series in study.series.values():
+        if series.unmatched and any(start.id in series.brains for start in study.starts):
             print(
-                f"gyriflow: surfaces of {series} are not matched by their vertices: {cause}",
+                f"gyriflow: surfaces of {series.name} are not matched by their vertices: {series.unmatched}",
                 file=sys.stderr,
             )
 
 
-def similar_thickness(brain):
-    """Return the summary of the thickness of a similar brain; empty if there is none."""
-    similar = study.similar_in_thickness(brain)
-    return THICKNESS["summary"].format(brain=similar.id) if similar else []
+def similar_thickness(wildcards):
+    """Return the summary of the thickness that fills a brain; empty if there is none."""
+    source = BRAINS[wildcards.brain].thickness_of
+    return THICKNESS["summary"].format(brain=source) if source else []
 
 
 # labels for the registration of brains that are given as surfaces
 rule filled_labels:
     input:
         whole=PIAL["whole"],
-        sides=lambda w: brain_of(w).measurement.hemispheres,
+        sides=lambda w: BRAINS[w.brain].hemispheres,
         report=PIAL["report"],
-        white=lambda w: list(brain_of(w).config.white_files.values()),
-        similar=lambda w: similar_thickness(brain_of(w)),
+        white=lambda w: list(BRAINS[w.brain].white_files.values()),
+        similar=similar_thickness,
     output:
         FILLED_LABELS,
     params:
-        white=lambda w: brain_of(w).config.white_files,
+        white=lambda w: BRAINS[w.brain].white_files,
     script:
         "../scripts/filled_labels.py"
 
 
 def pair_of(wildcards):
     """Return the two brains of the wildcards."""
-    return study.brains[wildcards.earlier], study.brains[wildcards.later]
+    return BRAINS[wildcards.earlier], BRAINS[wildcards.later]
 
 
 rule register:
     input:
-        brains=lambda w: [brain.registered.path for brain in pair_of(w)],
-        images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
+        brains=lambda w: [registered_source(CONFIG, brain).path for brain in pair_of(w)],
+        images=lambda w: [brain.image for brain in pair_of(w) if brain.image],
     output:
         REGISTERED,
     wildcard_constraints:
@@ -50,8 +50,8 @@ rule register:
         seed=r"\d+",
     priority: 1
     params:
-        brains=lambda w: [brain.registered for brain in pair_of(w)],
-        images=lambda w: [brain.config.image for brain in pair_of(w)],
+        brains=lambda w: [registered_source(CONFIG, brain) for brain in pair_of(w)],
+        images=lambda w: [brain.image for brain in pair_of(w)],
         smoothing=lambda w: float(dict(w).get("smoothing", 1)),
         seed=lambda w: int(dict(w).get("seed", 0)),
         is_varied=lambda w: "seed" in dict(w),
@@ -68,12 +68,12 @@ use rule register as register_varied with:
 # the original surfaces with all their vertices, in the pose of the mesh
 rule match_surfaces:
     input:
-        lambda w: [path for brain in pair_of(w) for path in brain.config.files],
+        lambda w: [path for brain in pair_of(w) for path in brain.files],
         reports=lambda w: [brain.report for brain in pair_of(w)],
     output:
         MATCHED,
     params:
-        files=lambda w: [brain.config.files for brain in pair_of(w)],
+        files=lambda w: [brain.files for brain in pair_of(w)],
     script:
         "../scripts/match_surfaces.py"
 
@@ -94,24 +94,29 @@ def followers_of(wildcards):
     return [simulation for simulation in study.simulations.values() if simulation.targets == file]
 
 
+def posed_links(chain):
+    """Return, for each link of a chain, whether it refers to the posed surfaces of its two brains."""
+    return [study.links[file].posed for file in chain.links]
+
+
 # shapes of a start brain's mesh in the later weeks of its own series, for runs that grow towards them
 rule targets:
     input:
         **START_MESH,
         report=PIAL["report"],
-        correspondences=lambda w: chain_of(w).correspondences,
-        surfaces=lambda w: [brain.pial for brain in chain_of(w).later],
-        reports=lambda w: [brain.report for brain in chain_of(w).later],
+        correspondences=lambda w: chain_of(w).links,
+        surfaces=lambda w: [BRAINS[brain].pial for brain in chain_of(w).later],
+        reports=lambda w: [BRAINS[brain].report for brain in chain_of(w).later],
     output:
         TARGETS,
     wildcard_constraints:
         origin=origins("self"),
     priority: 1
     resources:
-        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
+        mem_mb=lambda w: targets_memory_mib(BRAINS[w.brain], CONFIG.mesh),
     params:
         weeks=lambda w: chain_of(w).weeks,
-        posed=lambda w: chain_of(w).posed,
+        posed=lambda w: posed_links(chain_of(w)),
         opens_sulci=CONFIG.surface.open_sulci,
         origin=None,
         store=None,
@@ -120,7 +125,9 @@ rule targets:
 
 
 # by the id of their first brain, from which rules get them
-PATHS = {chain.path.brains[0].id: chain.path for chain in study.chains.values() if chain.path}
+PATHS = study.paths
+if PATHS and not CONTENTS:
+    CONTENTS = input_contents(Path.cwd(), CONFIG, known_checksums(study.used_atlases), record=False)
 PATH_ORIGINS = {brain: path_origin(study, path) for brain, path in PATHS.items()}
 # None until all files of the atlas are there
 PATH_KEYS = {brain: origin_key(origin, CONTENTS) for brain, origin in PATH_ORIGINS.items()}
@@ -141,18 +148,18 @@ use rule targets as atlas_path with:
         mesh=PATH_MESH["mesh"],
         data=PATH_MESH["data"],
         report=PIAL["report"],
-        correspondences=lambda w: path_of(w).correspondences,
-        surfaces=lambda w: [brain.pial for brain in path_of(w).later],
-        reports=lambda w: [brain.report for brain in path_of(w).later],
+        correspondences=lambda w: path_of(w).links,
+        surfaces=lambda w: [BRAINS[brain].pial for brain in path_of(w).later],
+        reports=lambda w: [BRAINS[brain].report for brain in path_of(w).later],
     output:
         ATLAS_PATH,
     wildcard_constraints:
         brain=one_of(brain for brain, kept in KEPT_PATHS.items() if kept is None),
     resources:
-        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.growth.path_mesh),
+        mem_mb=lambda w: targets_memory_mib(BRAINS[w.brain], CONFIG.growth.path_mesh),
     params:
         weeks=lambda w: path_of(w).weeks,
-        posed=lambda w: path_of(w).posed,
+        posed=lambda w: posed_links(path_of(w)),
         opens_sulci=CONFIG.surface.open_sulci,
         origin=lambda w: PATH_ORIGINS[w.brain],
         store=lambda w: store_folder(study, path_of(w)),
@@ -171,15 +178,15 @@ rule kept_path:
 
 def atlas_of(wildcards):
     """Return the brain of an atlas that a start brain is registered to."""
-    return chain_of(wildcards).later[0]
+    return BRAINS[chain_of(wildcards).later[0]]
 
 
 # shapes that a start brain would have in later weeks if it grew as an atlas
 rule predicted_targets:
     input:
         **START_MESH,
-        path=lambda w: ATLAS_PATH.format(brain=chain_of(w).path.brains[0].id),
-        correspondence=lambda w: chain_of(w).correspondences,
+        path=lambda w: ATLAS_PATH.format(brain=chain_of(w).path),
+        correspondence=lambda w: chain_of(w).links,
         reports=lambda w: [PIAL["report"], atlas_of(w).report],
         # norms of another study, whose volumes the curve of the atlas follows as well
         norms=CONFIG.metrics.norms or [],
@@ -191,13 +198,13 @@ rule predicted_targets:
         origin=origins("atlas"),
     priority: 1
     resources:
-        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
+        mem_mb=lambda w: targets_memory_mib(BRAINS[w.brain], CONFIG.mesh),
     params:
-        start_week=lambda w: brain_of(w).week,
+        start_week=lambda w: BRAINS[w.brain].week,
         end_week=lambda w: max(run.settings.end_week for run in followers_of(w)),
         atlas_week=lambda w: atlas_of(w).week,
         further_weeks=lambda w: chain_of(w).further_weeks,
-        posed=lambda w: chain_of(w).posed[0],
+        posed=lambda w: posed_links(chain_of(w))[0],
         opens_sulci=CONFIG.surface.open_sulci,
         variation=lambda w: chain_of(w).variation,
     script:

@@ -7,13 +7,18 @@ from gyriflow.settings.terms import run_names
 
 # the configuration; brains of atlases and of the table of participants are already among its brains
 USED_SETTINGS = CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
-# of each brain, refused ones too, with the licence of its atlas
-DESCRIPTIONS = [
-    {name: getattr(brain, name) for name in ("id", "week", "population", "source", "synthetic", "covariates")}
-    | {"licence": study.atlases[brain.id].licence.name if brain.id in study.atlases else None}
-    for brain in CONFIG.brains
-]
+DESCRIBED = ("id", "week", "population", "source", "synthetic", "covariates")
 PAGE = f"{workflow.basedir}/workflow/report/page"
+
+
+def descriptions(brains):
+    """Return the properties of brains, refused ones too, with the licence of their atlas."""
+    described = []
+    for brain in brains:
+        facts = {name: getattr(brain, name) for name in DESCRIBED}
+        atlas = study.atlases.get(brain.id)
+        described.append(facts | {"licence": atlas.licence.name if atlas else None})
+    return described
 
 
 # also of the report's own tables, so that they exist if the page cannot be made
@@ -32,7 +37,7 @@ rule study_records:
         resources_page=f"{STUDY}/resources.html",
         warnings=f"{STUDY}/warnings.csv",
         study=f"{STUDY}/provenance.json",
-        brains=expand(f"{BRAIN}/provenance.json", brain=study.brains),
+        brains=expand(f"{BRAIN}/provenance.json", brain=BRAINS),
         runs=study.files(f"{RUN}/provenance.json"),
         report=f"{REPORT}/provenance.json",
         methods=f"{REPORT}/methods.rst",
@@ -42,14 +47,18 @@ rule study_records:
         config=USED_SETTINGS,
         # also refused brains
         known_brains=[brain.id for brain in CONFIG.brains],
-        brains=[brain.config.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
+        brains=[
+            brain.model_dump(mode="json", exclude_defaults=True)
+            for brain in CONFIG.brains
+            if brain.id in BRAINS
+        ],
         files=[
             (brain.id, what, path)
-            for brain in study.brains.values()
+            for brain in BRAINS.values()
             for what, paths in (
-                (brain.config.source, brain.config.files),
-                ("image", [brain.config.image] if brain.config.image else []),
-                ("white", list(brain.config.white_files.values())),
+                (brain.source, brain.files),
+                ("image", [brain.image] if brain.image else []),
+                ("white", brain.white_files.values()),
             )
             for path in paths
         ],
@@ -58,10 +67,10 @@ rule study_records:
         benchmarks=lambda w: usage_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)
         ),
-        growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
+        growth_of=[simulation.growth_of for simulation in study.run_simulations],
         # used by the methods text
-        method={
-            "brains": [brain for brain in DESCRIPTIONS if brain["id"] in study.brains],
+        method=lambda w: {
+            "brains": descriptions(brain for brain in CONFIG.brains if brain.id in BRAINS),
             "filled": study.filled,
             "surface": surface_settings("edge_length_mm", "open_sulci"),
             "mesh": CONFIG.mesh.model_dump(mode="json", include={"mesher", "order"}),
@@ -92,22 +101,23 @@ def captions_of(*pages):
 
 
 # the surfaces of the 3D view by week: of all runs, and of measured brains of the start's population
-VIEWED = [
-    brain
-    for brain in study.brains.values()
-    if study.starts and brain.config.population == study.starts[0].config.population
-]
-VIEWED_ROWS = [brain.measurement for brain in VIEWED]
+VIEWED = [brain for brain in BRAINS.values() if study.starts and brain.population == study.starts[0].population]
+VIEWED_ROWS = list(VIEWED)
 for simulation in study.run_simulations:
-    VIEWED_ROWS += simulation.measurements
+    VIEWED_ROWS += study.rows_of(simulation)
+
+
+def halves(row):
+    """Return the hemispheres of a brain, each with its maps."""
+    return [list(pair) for pair in zip(row.hemispheres, row.maps)]
+
+
 SURFACES = {
     "runs": {
-        name: [[row.week, row.halves] for row in simulation.measurements]
+        name: [[row.week, halves(row)] for row in study.rows_of(simulation)]
         for name, simulation in zip(run_names(study.pairs), study.run_simulations)
     },
-    "observed": [
-        [brain.week, brain.measurement.halves] for brain in sorted(VIEWED, key=lambda brain: brain.week)
-    ],
+    "observed": [[brain.week, halves(brain)] for brain in sorted(VIEWED, key=lambda brain: brain.week)],
 }
 
 
@@ -123,9 +133,9 @@ rule html_report:
         warnings=rules.study_records.output.warnings,
         runs=rules.run_tables.output.csv if study.run_simulations else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
-        atlas_brain=study.prediction.atlas_surface if study.prediction else [],
-        intervals=study.prediction.file(ENSEMBLE) if study.prediction and study.prediction.ensemble else [],
-        small=[f"{BRAIN}/figures/small.png".format(brain=brain) for brain in study.brains],
+        atlas_brain=study.atlas_surface(study.prediction) if study.prediction else [],
+        intervals=study.prediction.file(ENSEMBLE) if study.prediction and study.prediction.members else [],
+        small=[f"{BRAIN}/figures/small.png".format(brain=brain) for brain in BRAINS],
         accuracy=PREDICTION_TESTS if study.prediction else [],
         surfaces=[file for row in VIEWED_ROWS for file in (*row.hemispheres, *row.maps)],
         captions=captions_of(SECTIONS, BRAIN_SECTIONS),
@@ -139,16 +149,16 @@ rule html_report:
         viewer=f"{PAGE}/viewer.js",
     output:
         report=f"{REPORT}/report.html",
-        brains=expand(f"{REPORT}/brains/{{brain}}.html", brain=study.brains),
+        brains=expand(f"{REPORT}/brains/{{brain}}.html", brain=BRAINS),
         view=f"{REPORT}/surfaces.json",
     params:
         figures=on_page(SECTIONS),
-        brain_figures={brain: on_page(BRAIN_SECTIONS, brain) for brain in study.brains},
-        brains=DESCRIPTIONS,
-        prediction=study.prediction_facts,
+        brain_figures={brain: on_page(BRAIN_SECTIONS, brain) for brain in BRAINS},
+        brains=lambda w: descriptions(CONFIG.brains),
+        prediction=lambda w: study.prediction_facts,
         surfaces=SURFACES,
         observed_name=observed_name(VIEWED),
-        norm=CONFIG.metrics.norms or observed_name(study.brains[brain] for brain in study.norm_reference),
+        norm=CONFIG.metrics.norms or observed_name(BRAINS[brain] for brain in study.norm_reference),
         config=USED_SETTINGS,
     script:
         "../scripts/html_report.py"

@@ -2,7 +2,7 @@
 # replaced.
 from gyriflow.study.atlases import retrieval_note
 
-ATLAS_FILES = {str(file.path).removeprefix("/"): file for atlas in study.used_atlases for file in atlas.missing}
+ATLAS_FILES = {row.file.removeprefix("/"): row for row in study.downloads.values()}
 
 if TELLS:
     for atlas in study.used_atlases:
@@ -22,8 +22,8 @@ rule atlas_file:
         ENVIRONMENT
     params:
         url=lambda w: ATLAS_FILES[w.file].url,
-        sha256=lambda w: ATLAS_FILES[w.file].record.sha256,
-        size=lambda w: ATLAS_FILES[w.file].record.bytes,
+        sha256=lambda w: ATLAS_FILES[w.file].sha256,
+        size=lambda w: ATLAS_FILES[w.file].bytes,
     script:
         "../scripts/retrieve.py"
 

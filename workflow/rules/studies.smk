@@ -3,13 +3,19 @@
 # results/study/STUDY/ has members (per run: values, resolution, outcome with its cause, time), comparison (distance of
 # each run from each observed brain by each measure) and nearest (the nearest run by each measure). A run that diverged
 # before the week of comparison is only in `members`.
+def sweep_run(wildcards):
+    """Return the run of a sweep from a start brain; runs that share a simulation are compared with the same brains."""
+    rows = SWEEPS[wildcards.study]
+    return next(row for row in rows if (row.run, row.brain) == (wildcards.run, wildcards.brain))
+
+
 def files_of_member(wildcards):
     """Return the files of a run at the week of comparison and of the observed brains; none if it has not reached it."""
-    compared = study.sweeps[wildcards.study]
+    compared = sweep_run(wildcards)
     if not reaches(wildcards.run, wildcards.brain, compared.week):
         return {}
-    simulated, real = simulation_of(wildcards).at(compared.week), compared.observed[wildcards.brain]
-    rows = [simulated, *(brain.measurement for brain in real)]
+    simulated = SIMULATED[wildcards.run, wildcards.brain, compared.week]
+    rows = [simulated, *(BRAINS[brain] for brain in compared.observed)]
     tables = ("metrics", "spectra", "coefficients")
     return {
         **{name: [f"{row.folder}/{name}.csv" for row in rows] for name in tables},
@@ -20,9 +26,7 @@ def files_of_member(wildcards):
 
 def from_members(pattern):
     """Return an input function: a file of each run of a sweep."""
-    return lambda w: [
-        simulation.file(pattern, study=w.study) for simulation, _ in study.sweeps[w.study].members
-    ]
+    return lambda w: [pattern.format(study=w.study, run=row.run, brain=row.brain) for row in SWEEPS[w.study]]
 
 
 rule compare_member:
@@ -34,9 +38,9 @@ rule compare_member:
         table=COMPARED_MEMBER,
         coefficients=MEMBER_COEFFICIENTS,
     params:
-        real=lambda w: {real.id: real.population for real in study.sweeps[w.study].observed[w.brain]},
-        population=lambda w: brain_of(w).population,
-        parts=lambda w: ["whole", *brain_of(w).sides],
+        real=lambda w: {brain: BRAINS[brain].population_name for brain in sweep_run(w).observed},
+        population=lambda w: BRAINS[w.brain].population_name,
+        parts=lambda w: ["whole", *BRAINS[w.brain].sides],
     script:
         "../scripts/compare_member.py"
 
@@ -55,17 +59,16 @@ rule study_tables:
         nearest=f"{SWEEP}/nearest.csv",
     params:
         members=lambda w: [
-            {"run": simulation.run, "subject": simulation.start.id, "values": dict(values)}
-            for simulation, values in study.sweeps[w.study].members
+            {"run": row.run, "subject": row.brain, "values": row.values} for row in SWEEPS[w.study]
         ],
-        week=lambda w: study.sweeps[w.study].week,
+        week=lambda w: SWEEPS[w.study][0].week,
     script:
         "../scripts/study_tables.py"
 
 
 rule studies:
     input:
-        expand(list(rules.study_tables.output), study=study.sweeps),
+        expand(list(rules.study_tables.output), study=SWEEPS),
 
 
 # figures and tables of the paper; observed brains are measured only at the weeks of comparison

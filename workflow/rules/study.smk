@@ -1,9 +1,9 @@
 # Tables of a study: all measured brains and all runs; and the export.
 from gyriflow.study.checks import norm_settings
 
-PLACES = study.measurements.values()
-WITH_WHITE = [brain.id for brain in study.brains.values() if brain.has_white]
-LABELLED = [brain for brain in study.brains.values() if brain.labels]
+PLACES = study.measured.values()
+WITH_WHITE = [brain.id for brain in BRAINS.values() if brain.white]
+LABELLED = [brain for brain in BRAINS.values() if brain.labels]
 METRICS_TABLES = [
     *("metrics", "spectra", "metrics_long", "metrics_wide", "change", "asymmetry"),
     *("norm_curves", "centiles", "spectral_distance"),
@@ -28,14 +28,14 @@ rule metrics_tables:
         **{name: f"{STUDY}/{name}.csv" for name in METRICS_TABLES},
         norms=f"{STUDY}/norms.json",
     params:
-        labelled=[(brain.id, brain.week, brain.sides, brain.labels.scheme) for brain in LABELLED],
+        labelled=[(brain.id, brain.week, brain.sides, label_source(CONFIG, brain).scheme) for brain in LABELLED],
         scans=study.scans,
-        covariates={brain.id: brain.config.covariates for brain in study.brains.values()},
+        covariates={brain.id: brain.covariates for brain in BRAINS.values()},
         reference=study.norm_reference,
         individuals=study.are_individuals(study.norm_reference),
-        subjects={brain.id: brain.subject for brain in study.brains.values()},
+        subjects={brain.id: brain.subject_name for brain in BRAINS.values()},
         made_with=norm_settings(study.config),
-        population=sorted({study.brains[brain].population for brain in study.norm_reference}),
+        population=sorted({BRAINS[brain].population_name for brain in study.norm_reference}),
     script:
         "../scripts/metrics_tables.py"
 
@@ -53,7 +53,7 @@ rule run_tables:
         displacement=f"{STUDY}/displacement.csv",
     params:
         folded=study.pairs,
-        growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
+        growth_of=[simulation.growth_of for simulation in study.run_simulations],
     script:
         "../scripts/run_tables.py"
 
@@ -95,7 +95,7 @@ rule export:
 
 rule metrics:
     input:
-        [f"{brain.measurement.folder}/metrics.csv" for brain in study.brains.values()],
+        [f"{brain.folder}/metrics.csv" for brain in BRAINS.values()],
         rules.metrics_tables.output,
         rules.run_tables.output if study.run_simulations else [],
         rules.validate.input,

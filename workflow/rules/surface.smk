@@ -9,8 +9,8 @@ LIMITS = (
 
 def surface_memory(wildcards):
     """Return the memory (MiB) that a brain's surface may need; for labels it is estimated from their header."""
-    brain = brain_of(wildcards)
-    return surface_memory_mib(brain.labels.path, brain.week) if brain.labels else 4000
+    brain = BRAINS[wildcards.brain]
+    return surface_memory_mib(brain.labels, brain.week) if brain.labels else 4000
 
 
 def surface_settings(*names):
@@ -18,14 +18,16 @@ def surface_settings(*names):
     return CONFIG.surface.model_dump(include=set(names))
 
 
-def pial_source(wildcards):
-    """Return the files that a brain's pial surface is made from, and the surface settings for such data."""
-    brain = brain_of(wildcards)
-    if brain.source == "shape":
-        return [SHAPE.format(brain=brain.id)], {}
-    if brain.labels:
-        return [brain.labels.path], surface_settings("edge_length_mm", "open_sulci")
-    return brain.config.files, surface_settings("edge_length_mm", "max_hole_mm")
+# settings that matter for a brain, by its source
+LABEL_SETTINGS = surface_settings("edge_length_mm", "open_sulci")
+MESH_SETTINGS = surface_settings("edge_length_mm", "max_hole_mm")
+
+
+def pial_settings(brain):
+    """Return the surface settings for the source of a brain; a shape has none."""
+    if brain.shape:
+        return {}
+    return LABEL_SETTINGS if brain.labels else MESH_SETTINGS
 
 
 # a simple shape instead of a brain
@@ -33,17 +35,17 @@ rule shape:
     output:
         SHAPE,
     wildcard_constraints:
-        brain=brains_with(source="shape"),
+        brain=one_of(brain.id for brain in BRAINS.values() if brain.shape),
     params:
-        shape=lambda w: brain_of(w).config.shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
+        shape=lambda w: BRAINS[w.brain].shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
     script:
         "../scripts/shape.py"
 
 
 rule pial:
     input:
-        given=lambda w: pial_source(w)[0],
-        white=lambda w: list(brain_of(w).config.white_files.values()),
+        given=lambda w: BRAINS[w.brain].files or [SHAPE.format(brain=w.brain)],
+        white=lambda w: list(BRAINS[w.brain].white_files.values()),
     output:
         **pial_of(*SIDES),
     log:
@@ -55,15 +57,15 @@ rule pial:
     resources:
         mem_mb=surface_memory,
     params:
-        source=lambda w: brain_of(w).source,
-        week=lambda w: brain_of(w).week,
-        side=lambda w: brain_of(w).sides[0] if len(brain_of(w).sides) == 1 else None,
-        coordinates=lambda w: brain_of(w).config.coordinates,
-        labels=lambda w: brain_of(w).labels,
-        white=lambda w: brain_of(w).config.white_files,
-        checksums=lambda w: brain_of(w).checksums,
-        settings=lambda w: pial_source(w)[1],
-        limits=lambda w: LIMITS if brain_of(w).source == "hemispheres" else {},
+        source=lambda w: BRAINS[w.brain].source,
+        week=lambda w: BRAINS[w.brain].week,
+        side=lambda w: BRAINS[w.brain].sides[0] if len(BRAINS[w.brain].sides) == 1 else None,
+        coordinates=lambda w: BRAINS[w.brain].coordinates,
+        labels=lambda w: label_source(CONFIG, BRAINS[w.brain]),
+        white=lambda w: BRAINS[w.brain].white_files,
+        checksums=lambda w: BRAINS[w.brain].checksums,
+        settings=lambda w: pial_settings(BRAINS[w.brain]),
+        limits=lambda w: LIMITS if BRAINS[w.brain].source == "hemispheres" else {},
     script:
         "../scripts/pial.py"
 

@@ -2,8 +2,8 @@
 # is the baseline.
 rule prepared_surfaces:
     input:
-        observed=lambda w: study.references[w.brain, float(w.week)][0].pial,
-        adjacent=lambda w: study.references[w.brain, float(w.week)][1].pial,
+        observed=lambda w: BRAINS[study.references[w.brain, float(w.week)].observed].pial,
+        adjacent=lambda w: BRAINS[study.references[w.brain, float(w.week)].adjacent].pial,
         start=PIAL["whole"],
     output:
         **PREPARED,
@@ -13,26 +13,31 @@ rule prepared_surfaces:
         "../scripts/prepared_surfaces.py"
 
 
+def observed_of(wildcards):
+    """Return the brains that a run is compared with, by week."""
+    return study.observed(simulation_of(wildcards))
+
+
 def compared_files(wildcards):
     """Return the surfaces of a run and those that they are compared with, by kind, one per week."""
-    run = simulation_of(wildcards)
+    observed = observed_of(wildcards)
     prepared = {
-        name: [file_of(file, brain=wildcards.brain, week=week) for week in run.observed]
+        name: [file_of(file, brain=wildcards.brain, week=week) for week in observed]
         for name, file in PREPARED.items()
     }
     return {
         **prepared,
-        "simulated": [run.at(week).parts["whole"] for week in run.observed],
-        "whole": [real.pial for real in run.observed.values()],
+        "simulated": [SIMULATED[wildcards.run, wildcards.brain, week].pial for week in observed],
+        "whole": [brain.pial for brain in observed.values()],
     }
 
 
 # of both rules that compare a run
 COMPARED = {
     "run": lambda w: w.run,
-    "start_week": lambda w: brain_of(w).week,
-    "weeks": lambda w: list(simulation_of(w).observed),
-    "observed": lambda w: [brain.id for brain in simulation_of(w).observed.values()],
+    "start_week": lambda w: BRAINS[w.brain].week,
+    "weeks": lambda w: list(observed_of(w)),
+    "observed": lambda w: [brain.id for brain in observed_of(w).values()],
     "kind": lambda w: simulation_of(w).kind,
     "curvature_radius_mm": CONFIG.metrics.curvature_radius_mm,
 }
@@ -57,7 +62,7 @@ rule prediction:
     input:
         unpack(compared_files),
         **START_MESH,
-        atlas=lambda w: [brain.pial for brain in study.chains[w.brain, "atlas"].later],
+        atlas=lambda w: [BRAINS[brain].pial for brain in study.chains[w.brain, "atlas"].later],
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         table=PREDICTION,
@@ -72,7 +77,7 @@ rule prediction:
 rule atlas_brain:
     input:
         **START_MESH,
-        predicted=lambda w: simulation_of(w).at(float(w.week)).parts["whole"],
+        predicted=lambda w: SIMULATED[w.run, w.brain, float(w.week)].pial,
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         ATLAS_BRAIN,
@@ -84,22 +89,27 @@ rule atlas_brain:
 
 def deviating(wildcards):
     """Return the start brain, its run at the first week and at another week, and the observed brain of that week."""
-    simulation, week = simulation_of(wildcards), float(wildcards.week)
-    simulated = {"first": simulation.at(simulation.start.week), "expected": simulation.at(week)}
-    return {"start": simulation.start.measurement, **simulated, "real": simulation.observed[week].measurement}
+    start = BRAINS[wildcards.brain]
+    week = float(wildcards.week)
+    return {
+        "start": start,
+        "first": SIMULATED[wildcards.run, start.id, start.week],
+        "expected": SIMULATED[wildcards.run, start.id, week],
+        "real": observed_of(wildcards)[week],
+    }
 
 
 def deviation_labels(wildcards):
     """Return the first columns of the deviation table."""
     week = float(wildcards.week)
-    real = simulation_of(wildcards).observed[week]
+    real = observed_of(wildcards)[week]
     names = {"run": wildcards.run, "start": wildcards.brain, "week": week}
-    return names | {"real": real.id, "subject": real.subject}
+    return names | {"real": real.id, "subject": real.subject_name}
 
 
 rule deviation:
     input:
-        unpack(lambda w: {name: row.parts["whole"] for name, row in deviating(w).items()}),
+        unpack(lambda w: {name: row.pial for name, row in deviating(w).items()}),
         # in the order of the surfaces; only if all of them have one
         thickness=lambda w: (
             [row.thickness for row in deviating(w).values()]
@@ -107,11 +117,11 @@ rule deviation:
             else []
         ),
         sides=lambda w: deviating(w)["expected"].hemispheres,
-        regions=lambda w: list(deviating(w)["expected"].regions.values()),
+        regions=lambda w: deviating(w)["expected"].regions,
     output:
         **DEVIATION,
     params:
-        sides=lambda w: brain_of(w).sides,
+        sides=lambda w: BRAINS[w.brain].sides,
         labels=deviation_labels,
     script:
         "../scripts/deviation.py"
@@ -123,7 +133,7 @@ JOINED = {
     "deviation": [
         simulation.file(DEVIATION["table"], week=week)
         for simulation in study.atlas_predictions
-        for week in simulation.observed
+        for week in study.observed(simulation)
     ],
     "validation": [simulation.file(VALIDATION) for simulation in study.validated],
 }
@@ -140,7 +150,7 @@ rule validation_tables:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
     params:
         individuals=study.are_individuals(
-            {real.id for simulation in study.atlas_predictions for real in simulation.observed.values()}
+            {real.id for simulation in study.atlas_predictions for real in study.observed(simulation).values()}
         ),
     script:
         "../scripts/validation_tables.py"

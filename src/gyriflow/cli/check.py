@@ -55,8 +55,10 @@ from ..settings.terms import (
 )
 from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
+from ..study.brains import label_scheme
 from ..study.loading import load
-from ..study.resolve import label_scheme, resolve
+from ..study.paths import PLAN
+from ..study.resolve import resolve
 from ..study.study import Study
 from ..version import version
 from .init import commented_scans
@@ -155,6 +157,8 @@ def check_study(
         )
     if valid:
         yield "  input files: no problem found", False
+        plan_folder = directory / PLAN
+        yield f"  plan: tables in {plan_folder}, written before the first step", False
         yield from work_of(
             path, directory, cores, ["--cores", str(cores), *stages], study
         )
@@ -273,11 +277,10 @@ def _contents(study: Study) -> str:
         else "measured only"
     )
     parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
-    parts += [
-        f"{len(sweep.members)} of study {name}" for name, sweep in study.sweeps.items()
-    ]
-    if study.calibration is not None:
-        parts.append(f"{len(study.calibration.rounds)} of the calibration")
+    parts += [f"{len(runs)} of study {name}" for name, runs in study.by_sweep.items()]
+    if study.calibration:
+        calibrated = {run for run, _ in study.calibration}
+        parts.append(f"{len(calibrated)} of the calibration")
     return ", ".join(parts)
 
 
@@ -295,7 +298,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         if isinstance(thickness, Varying) and thickness.map:
             continue
         through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(
-            thickness, simulation.start.week
+            thickness, simulation.weeks[0]
         )
         elements = through / mesh.surface_edge_mm
         error, text = element_error(mesh.order, elements)
@@ -307,7 +310,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
             )
         if is_coarse or error > LARGE_ELEMENT_ERROR:
             coarse[f"about {text}{few}; use {remedy}"].append(
-                f"run {simulation.run} from {simulation.start.id}"
+                f"run {simulation.run} from {simulation.brain}"
             )
     yield from (f"{', '.join(names)}: {text}" for text, names in coarse.items())
 
@@ -320,7 +323,7 @@ def deep_curved_folds(study: Study) -> Iterator[str]:
     for simulation in study.run_simulations:
         if simulation.shapes and simulation.settings.end_week > DEEP_FOLDS_GW:
             yield (
-                f"run {simulation.run} from {simulation.start.id}: quadratic elements"
+                f"run {simulation.run} from {simulation.brain}: quadratic elements"
                 f" fold over on the way to shapes later than {DEEP_FOLDS_GW:g} GW; use"
                 " mesh.order: 1"
             )
@@ -331,7 +334,7 @@ def export_problems(study: Study) -> Iterator[str]:
     subjects and runs."""
     try:
         require_bids_names(
-            [brain.subject for brain in study.brains.values()], study.config.runs
+            [brain.subject_name for brain in study.brains.values()], study.config.runs
         )
     except InputError as error:
         yield str(error)
@@ -390,7 +393,7 @@ def _check_files(
     require_checksums({path: checksums[path] for path in files})
     volume = brain.labels
     if volume is not None and Path(volume).is_file():
-        yield from _check_labels(volume, brain, label_scheme(config, brain))
+        yield from _check_labels(volume, brain, label_scheme(config, brain.scheme))
     # takes half a second, which other commands need not wait for
     from .inputs import check_brain_files
 

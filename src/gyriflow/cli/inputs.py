@@ -42,8 +42,9 @@ from ..io.surfaces import (
 )
 from ..io.volumes import read_header, read_label_volume, read_volume_map
 from ..settings.brains import BrainConfig, GivenRegions
-from ..settings.terms import SIDES
+from ..settings.terms import SIDES, AffineSource
 from ..settings.varying import files_of, mean_of_curve
+from ..study.records import mapped_parameters
 from ..study.study import Study
 from .recognition import NATIVE_SPACES, SPACE_NAME
 
@@ -235,14 +236,15 @@ def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], No
     function that checks them."""
     regions = study.config.metrics.regions
     for name, given in ({} if isinstance(regions, str) else regions).items():
-        brain = study.brains[name].config if name in study.brains else None
+        brain = study.brains.get(name)
+        affine_from = brain.affine_from if brain else "auto"
         yield (
             f"regions of {name}",
             [*given.files.values()],
-            partial(_check_regions, given, brain),
+            partial(_check_regions, given, affine_from),
         )
     for simulation in study.run_simulations:
-        for name, value in simulation.mapped.items():
+        for name, value in mapped_parameters(simulation.settings).items():
             files = [*files_of(value.map), *files_of(value.surface)]
             yield (
                 f"{name} of run {simulation.run}",
@@ -251,9 +253,9 @@ def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], No
             )
 
 
-def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:
+def _check_regions(regions: GivenRegions, affine_from: AffineSource) -> None:
     if regions.volume is not None:
-        read_label_volume(regions.volume, brain.affine_from if brain else "auto")
+        read_label_volume(regions.volume, affine_from)
         return
     for side in SIDES:
         path = regions.files[f"{side}_labels"]

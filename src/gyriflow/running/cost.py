@@ -14,7 +14,6 @@ from ..settings.stages import MeshSettings
 from ..settings.terms import SIDES
 from ..study.paths import TARGETS
 from ..study.records import Brain, Simulation
-from ..study.series import Chain
 from ..study.study import Study
 from ..units import ML_PER_MM3, SECONDS_PER_GW
 
@@ -106,7 +105,7 @@ def linear_elements(week: float, mesh: MeshSettings) -> float:
 
 def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     """Predict the cost of a simulation."""
-    run, week = simulation.settings, simulation.start.week
+    run, week = simulation.settings, simulation.weeks[0]
     elements = linear_elements(week, mesh)
     steps = max((run.end_week - week) * SECONDS_PER_GW / run.step_s, 1.0)
     memory = predicted_memory_mib(
@@ -146,7 +145,7 @@ def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
         week = study.brains[wildcards["brain"]].week
         return START_SECONDS + _meshing_seconds(week, settings)
     if rule == "atlas_path":
-        path = _path_from(study, wildcards["brain"])
+        path = study.paths[wildcards["brain"]]
         return START_SECONDS + _series_seconds(
             study, path.weeks, study.config.growth.path_mesh
         )
@@ -174,7 +173,7 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
     volume_stage = next(
         (stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None
     )
-    if volume_stage and brain.config.labels:
+    if volume_stage and brain.labels is not None:
         opening = (
             1.0
             if study.config.surface.open_sulci
@@ -197,7 +196,7 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
         vertices = share * surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
         has_slits = (
             brain.labels is not None
-            and brain.labels.scheme.cortex
+            and brain.thickness is not None
             and study.config.surface.open_sulci
         )
         if has_slits and not is_simulated:
@@ -213,15 +212,6 @@ def _meshing_seconds(week: float, mesh: MeshSettings) -> float:
     return MESHING_SECONDS_PER_ELEMENT[mesh.mesher] * elements
 
 
-def _path_from(study: Study, brain: str) -> Chain:
-    """Return the path of an atlas from its first brain."""
-    return next(
-        chain.path
-        for chain in study.chains.values()
-        if chain.path and chain.path.brains[0].id == brain
-    )
-
-
 def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
     """Predict the time for the shapes that an atlas' growth gives a start brain."""
     chain = study.chains[brain, origin]
@@ -232,7 +222,9 @@ def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
         if simulation.targets == file
     )
     start = chain.weeks[0]
-    later = [week for week in chain.path.weeks if week > start] if chain.path else []
+    later = []
+    if chain.path is not None:
+        later = [week for week in study.paths[chain.path].weeks if week > start]
     # it ends two weeks of the atlas after the end
     weeks = max(later[: bisect_left(later, end) + 2], default=start) - start
     elements = linear_elements(start, study.config.mesh)

@@ -9,10 +9,11 @@ from typing import Any
 from ..code_hash import code_hash
 from ..errors import InputError
 from ..io.registrations import read_path_key, read_weekly_shapes, stored_name
+from ..settings.root import Config
 from ..shipped import SHIPPED
+from ..study.brains import label_source
 from ..study.paths import ATLAS_PATH
-from ..study.records import Brain
-from ..study.series import Chain
+from ..study.records import Brain, Chain
 from ..study.study import Study
 
 RULE_FILES = ("surface", "registration", "mesh")
@@ -28,11 +29,11 @@ def path_origin(study: Study, path: Chain) -> dict[str, Any]:
     fills one of them, with all files that they name; the settings of surfaces and of
     the mesh; and a hash of the rules and scripts.
     """
-    brains = [*path.brains, *_thickness_sources(study, path)]
+    brains = [*study.brains_of(path), *_thickness_sources(study, path)]
     return {
-        "brains": [_description(brain) for brain in brains],
+        "brains": [_description(study.config, brain) for brain in brains],
         # by matched vertices or by registration
-        "correspondences": path.correspondences,
+        "correspondences": path.links,
         "surface": study.config.surface.model_dump(mode="json"),
         "mesh": study.config.growth.path_mesh.model_dump(mode="json"),
         "code": _code(),
@@ -43,19 +44,23 @@ def _thickness_sources(study: Study, path: Chain) -> list[Brain]:
     """Return the brains whose measured thickness fills the surfaces of a path's brains
     to labels."""
     sources: dict[str, Brain] = {}
-    for pair, posed in path.pairs:
-        for brain, is_filled in zip(pair, posed, strict=True):
-            source = study.similar_in_thickness(brain) if is_filled else None
-            if source is not None:
-                sources[source.id] = source
+    for file in path.links:
+        link = study.links[file]
+        for name, is_filled in zip((link.earlier, link.later), link.posed, strict=True):
+            source = study.brains[name].thickness_of
+            if is_filled and source is not None:
+                sources[source] = study.brains[source]
     return list(sources.values())
 
 
-def _description(brain: Brain) -> dict[str, Any]:
+def _description(config: Config, brain: Brain) -> dict[str, Any]:
     """Return everything that a study says of a brain, with the meaning of its
     labels."""
-    scheme = brain.labels.scheme.model_dump(mode="json") if brain.labels else None
-    return {"brain": brain.config.model_dump(mode="json"), "scheme": scheme}
+    labels = label_source(config, brain)
+    return {
+        "brain": config.brain(brain.id).model_dump(mode="json"),
+        "scheme": labels.scheme.model_dump(mode="json") if labels else None,
+    }
 
 
 def _code() -> str:
@@ -78,9 +83,9 @@ def _code() -> str:
 def store_folder(study: Study, path: Chain) -> Path | None:
     """Return the folder for a path of an atlas, next to the files of the atlas; None
     for other brains."""
-    if not all(brain.id in study.atlases for brain in path.brains):
+    if not all(brain.atlas for brain in study.brains_of(path)):
         return None
-    atlas = study.atlases[path.brains[0].id]
+    atlas = study.atlases[path.brain]
     return (
         next(used.folder for used in study.used_atlases if used.atlas is atlas)
         / "paths"
@@ -93,7 +98,7 @@ def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
     folder = store_folder(study, path)
     if folder is None or key is None:
         return None
-    store = folder / stored_name(path.brains[0].id, key)
+    store = folder / stored_name(path.brain, key)
     if not store.exists():
         return None
     try:
@@ -106,5 +111,5 @@ def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
 def has_path(path: Chain, key: str | None) -> bool:
     """Return whether the study in the working directory has a path that was made from
     all that `key` stands for."""
-    file = Path(ATLAS_PATH.format(brain=path.brains[0].id))
+    file = Path(ATLAS_PATH.format(brain=path.brain))
     return key is not None and file.exists() and read_path_key(file) == key

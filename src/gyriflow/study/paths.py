@@ -9,8 +9,11 @@ from ..shipped import SHIPPED
 from ..units import week_tag
 
 BRAIN = "results/brains/{brain}"
+SURFACE = f"{BRAIN}/surface"
+METRICS = f"{BRAIN}/metrics"
 RUN = "results/runs/{run}/{brain}"
 STUDY = "results/study"
+PLAN = "results/plan"
 REPORT = "results/report"
 SWEEP = f"{STUDY}/{{study}}"
 CALIBRATION = f"{STUDY}/calibration"
@@ -42,11 +45,10 @@ def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:
 
 def pial_of(*sides: Side) -> dict[str, str]:
     """Return the surface files of a brain with some hemispheres, for any source."""
-    folder = f"{BRAIN}/surface"
     return {
-        **surfaces_in(folder, sides),
-        "stl": f"{folder}/pial.stl",
-        "report": f"{folder}/surface.json",
+        **surfaces_in(SURFACE, sides),
+        "stl": f"{SURFACE}/pial.stl",
+        "report": f"{SURFACE}/surface.json",
     }
 
 
@@ -77,10 +79,10 @@ def white_of(*sides: Side) -> dict[str, str]:
     their metrics."""
     files = {}
     for side in sides:
-        files[f"{side}_surface"] = f"{BRAIN}/surface/{side}.white.surf.gii"
+        files[f"{side}_surface"] = f"{SURFACE}/{side}.white.surf.gii"
     for side in sides:
-        files[f"{side}_maps"] = f"{BRAIN}/metrics/{side}.white.shape.gii"
-    return files | {"metrics": f"{BRAIN}/metrics/white.csv"}
+        files[f"{side}_maps"] = f"{METRICS}/{side}.white.shape.gii"
+    return files | {"metrics": f"{METRICS}/white.csv"}
 
 
 def region_files(folder: str) -> dict[str, str]:
@@ -88,15 +90,15 @@ def region_files(folder: str) -> dict[str, str]:
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
 
-SHAPE = f"{BRAIN}/surface/shape.surf.gii"
+SHAPE = f"{SURFACE}/shape.surf.gii"
 PIAL = pial_of(*SIDES)
 THICKNESS = {
-    "thickness": f"{BRAIN}/surface/thickness.shape.gii",
+    "thickness": f"{SURFACE}/thickness.shape.gii",
     # NaN where it could not be measured
-    "measured": f"{BRAIN}/surface/measured_thickness.shape.gii",
-    "summary": f"{BRAIN}/surface/thickness.json",
+    "measured": f"{SURFACE}/measured_thickness.shape.gii",
+    "summary": f"{SURFACE}/thickness.json",
 }
-FILLED_LABELS = f"{BRAIN}/surface/filled.nii.gz"
+FILLED_LABELS = f"{SURFACE}/filled.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
 REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}"
 REGISTERED = f"{REGISTRATION}.h5"
@@ -154,6 +156,8 @@ DEVIATION = {
     "table": f"{RUN}/metrics/{WEEK}/deviation.csv",
     "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii",
 }
+DESIGN = f"{CALIBRATION}/round-{{round}}.csv"
+SCORE = f"{CALIBRATION}/scores/{{run}}.csv"
 VALIDATION = f"{RUN}/metrics/validation.csv"
 COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}/comparison.csv"
 MEMBER_COEFFICIENTS = f"{SWEEP}/members/{{run}}/{{brain}}/coefficients.csv"

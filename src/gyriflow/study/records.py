@@ -1,106 +1,91 @@
-"""Records of a study: brains, simulations and sweeps as the configuration defines them,
-with their files."""
+"""Rows of the tables of a plan: brains, simulations, what they are compared with, and
+maps between brains, with their files.
+
+`docs/outputs.md` describes the tables.
+"""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
-from ..io.volumes import LabelSource
-from ..settings.brains import BrainConfig
+from ..settings.brains import ShapeSettings
+from ..settings.ensemble import Variation
 from ..settings.folding import VARYING
 from ..settings.growth import Origin
-from ..settings.runs import Run, members_of
-from ..settings.schemes import FILLED
-from ..settings.terms import MEASURED, OBSERVED_BRAIN, Side
+from ..settings.runs import Run
+from ..settings.terms import OBSERVED_BRAIN, AffineSource, Coordinates, Side
 from ..settings.varying import Varying
 from . import paths
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """The files of one measured brain, observed or simulated.
+@dataclass(frozen=True, kw_only=True)
+class MeasuredBrain:
+    """A brain that is measured, observed or simulated; rows of `simulated.csv` are
+    simulated brains at a week.
 
-    `where` is the folder of its metrics under `results`, `surfaces` that of its
-    surfaces. `subject` is the brain's id, for a simulated brain that of the start;
-    `run` is "real" for observed brains. Files of thickness, report (volumes of tissues)
-    and regions (by side) are empty if they are not made.
+    `id` is the brain's, of a simulated one that of the start; `run` is "real" for
+    observed brains. `pial` is the surface of the whole brain, `hemispheres` those of
+    its `sides`; `maps` and `regions` lie at their vertices. `folder` has its tables.
     """
 
-    where: str
-    subject: str
+    id: str
     run: str
     week: float
     sides: tuple[Side, ...]
-    surfaces: str
-    thickness: str | list[str]
-    report: str | list[str]
-    regions: Mapping[str, str]
+    pial: str
+    hemispheres: tuple[str, ...]
+    thickness: str | None
+    folder: str
+    maps: tuple[str, ...]
+    regions: tuple[str, ...]
 
     @property
-    def folder(self) -> str:
-        return f"results/{self.where}"
-
-    @property
-    def spectra(self) -> str:
-        return f"{self.folder}/spectra.csv"
-
-    @property
-    def labels(self) -> dict[str, Any]:
+    def columns(self) -> dict[str, Any]:
         """The first columns of its tables, with values."""
-        return {"subject": self.subject, "run": self.run, "week": self.week}
+        return {"subject": self.id, "run": self.run, "week": self.week}
 
     @property
     def parts(self) -> dict[str, str]:
-        """The files of its surfaces: whole, left, right."""
-        return paths.surfaces_in(self.surfaces, self.sides)
+        """Its surfaces: whole, left, right."""
+        sides = zip(self.sides, self.hemispheres, strict=True)
+        return {"whole": self.pial, **dict(sides)}
 
     @property
-    def hemispheres(self) -> list[str]:
-        return [self.parts[side] for side in self.sides]
-
-    @property
-    def maps(self) -> list[str]:
-        """The files with the vertex maps of its hemispheres."""
-        return [f"{self.folder}/{side}.shape.gii" for side in self.sides]
-
-    @property
-    def halves(self) -> list[list[str]]:
-        """Its hemispheres, each with its maps."""
-        return _pairs(self.hemispheres, self.maps)
-
-    @property
-    def halves_with_regions(self) -> list[list[str]]:
-        """Its hemispheres, each with its regions."""
-        return _pairs(self.hemispheres, self.regions.values())
+    def place(self) -> str:
+        """The wildcard `where` of its folder."""
+        return self.folder.removeprefix("results/")
 
 
-def _pairs(surfaces: Iterable[str], files: Iterable[str]) -> list[list[str]]:
-    pairs = zip(surfaces, files, strict=True)
-    return [list(pair) for pair in pairs]
+@dataclass(frozen=True, kw_only=True)
+class Brain(MeasuredBrain):
+    """An observed brain, or a shape in place of one: a row of `brains.csv`.
 
-
-@dataclass(frozen=True, eq=False)
-class Brain:
-    """A brain of the study; `config` is its entry in the configuration.
-
-    `labels` is None if it is defined by surfaces. `has_thickness`, `has_white`: there
-    are results for its cortical thickness and its white surfaces, from labels or from
-    white surfaces of the configuration. `regions_from` is the source of its regions:
-    given for this brain, carried from another brain, or None without regions.
+    `files` are given, `white_files` by part of the brain; `white` and
+    `white_maps` are results. `regions_of` is the brain whose regions
+    it has, `thickness_of` that whose thickness fills its surface to labels.
     `checksums` has atlas and SHA-256 of its files that belong to an atlas, by path.
     """
 
-    config: BrainConfig
-    labels: LabelSource | None
-    has_thickness: bool
-    has_white: bool
-    regions_from: Literal["given", "carried"] | None
+    subject: str | None
+    population: str | None
+    source: str
+    files: tuple[str, ...]
+    labels: str | None
+    scheme: str | None
+    affine_from: AffineSource
+    image: str | None
+    white_files: Mapping[str, str]
+    coordinates: Coordinates
+    shape: ShapeSettings | None
+    report: str
+    white: tuple[str, ...]
+    white_maps: tuple[str, ...]
+    thickness_of: str | None
+    regions_of: str | None
+    group: str | None
+    atlas: str | None
     checksums: Mapping[str, tuple[str, str]]
-
-    @property
-    def id(self) -> str:
-        return self.config.id
+    covariates: Mapping[str, str]
 
     @property
     def names(self) -> dict[str, str]:
@@ -108,90 +93,31 @@ class Brain:
         return {"brain": self.id}
 
     @property
-    def week(self) -> float:
-        return self.config.week
+    def subject_name(self) -> str:
+        """Its subject in tables; its own id if none is named."""
+        return self.subject or self.id
 
     @property
-    def sides(self) -> tuple[Side, ...]:
-        return self.config.sides
-
-    @property
-    def source(self) -> str:
-        return self.config.source
-
-    @property
-    def subject(self) -> str:
-        """The subject that was scanned; the brain's own id if none is named."""
-        return self.config.subject or self.id
-
-    @property
-    def population(self) -> str:
+    def population_name(self) -> str:
         """Its population in tables; "synthetic" or "unknown" if none is named."""
-        if self.config.population is not None:
-            return self.config.population
-        return "synthetic" if self.config.synthetic else "unknown"
+        default = "unknown" if self.shape is None else "synthetic"
+        return self.population or default
 
-    def comparable(self, brains: Iterable["Brain"]) -> list["Brain"]:
-        """Return the brains with the same hemispheres, population and subject.
 
-        A brain without a population or subject, as of an atlas, may be compared with
-        any.
-        """
-        population = self.config.population
-        subject = self.config.subject
-        comparable = []
-        for brain in brains:
-            is_of_population = population in (None, brain.config.population)
-            is_of_subject = subject is None or brain.config.subject in (None, subject)
-            if brain.sides == self.sides and is_of_population and is_of_subject:
-                comparable.append(brain)
-        return comparable
-
-    @property
-    def registered(self) -> LabelSource:
-        """The volume for its registration: its labels, or those that its surfaces are
-        filled with."""
-        if self.labels is not None:
-            return self.labels
-        filled = paths.FILLED_LABELS.format(brain=self.id)
-        return LabelSource(filled, "auto", FILLED)
-
-    @property
-    def pial(self) -> str:
-        return paths.PIAL["whole"].format(brain=self.id)
-
-    @property
-    def report(self) -> str:
-        """The report of its surface, which contains its pose."""
-        return paths.PIAL["report"].format(brain=self.id)
-
-    @property
-    def has_regions(self) -> bool:
-        """Whether its metrics are also measured by region."""
-        return self.regions_from is not None
-
-    @property
-    def regions(self) -> Mapping[str, str]:
-        if not self.has_regions:
-            return {}
-        return paths.region_files(f"results/brains/{self.id}/metrics")
-
-    @cached_property
-    def measurement(self) -> Measurement:
-        thickness: str | list[str] = []
-        if self.has_thickness:
-            thickness = paths.THICKNESS["measured"].format(brain=self.id)
-        return Measurement(
-            where=f"brains/{self.id}/metrics",
-            subject=self.id,
-            run=MEASURED,
-            week=self.week,
-            sides=self.sides,
-            surfaces=f"results/brains/{self.id}/surface",
-            thickness=thickness,
-            report=self.report,
-            regions=self.regions,
-        )
+def measured_files(
+    sides: tuple[Side, ...], surfaces: str, folder: str, regions: str | None
+) -> dict[str, Any]:
+    """Return the files of a brain that is measured: in the folder of its surfaces, that
+    of its tables and maps, and that of its regions if it has any."""
+    pial, *hemispheres = paths.surfaces_in(surfaces, sides).values()
+    return {
+        "sides": sides,
+        "pial": pial,
+        "hemispheres": tuple(hemispheres),
+        "folder": folder,
+        "maps": tuple(f"{folder}/{side}.shape.gii" for side in sides),
+        "regions": tuple(paths.region_files(regions).values()) if regions else (),
+    }
 
 
 def observed_name(brains: Iterable[Brain]) -> str:
@@ -204,10 +130,10 @@ def observed_name(brains: Iterable[Brain]) -> str:
     weeks: dict[str, list[float]] = {}
     shapes = set()
     for brain in brains:
-        if brain.config.shape is not None:
-            shapes.add(brain.config.shape.kind)
+        if brain.shape is not None:
+            shapes.add(brain.shape.kind)
         else:
-            name = brain.config.population or OBSERVED_BRAIN
+            name = brain.population or OBSERVED_BRAIN
             weeks.setdefault(name, []).append(brain.week)
     names = list(weeks)
     if len(names) > 1:
@@ -222,34 +148,55 @@ def observed_name(brains: Iterable[Brain]) -> str:
     return " or ".join(names) or OBSERVED_BRAIN
 
 
-@dataclass(frozen=True, eq=False)
+# simulations
+
+
+@dataclass(frozen=True, kw_only=True)
 class Simulation:
-    """A run from one start brain.
+    """A run from one start brain: a row of `simulations.csv`.
 
-    The first of the output `weeks` is that of the start brain. `series` is the growth
-    series with curves of sizes for the start. `base` is the run whose maps it uses: its
-    own or the calibration's.
-
-    `observed_brains` are the observed brains of its later weeks, by week, scans of the
-    start's own subject first. `observed`: the brain each week is compared with. `kind`
-    is `explained` if that brain's growth was an input, else `predicted`.
-    `is_atlas_prediction`: growth came from another population only, without later
-    brains of the start's. A member of an ensemble is a simulation itself, with
-    `member_of` the name of its run.
+    The first of the output `weeks` is that of the start brain. `kind` is `explained` if
+    growth of the observed brains was an input, else `predicted`; `is_atlas_prediction`:
+    growth came from another population only, without later brains of the start's.
+    `growth_of` describes whose measured growth it follows. `series` is the growth
+    series with curves of sizes for the start, `curves` their table if it follows them.
+    `chain` is the name of the brains that its growth is measured on (see `Chain`),
+    `targets` the file with the shapes that it grows towards. `base` is the run whose
+    `maps` it uses: its own or the calibration's. `members` are the runs of its
+    ensemble, `member_of` is the run whose ensemble has it. Runs of sweeps, of the
+    calibration and of ensembles `may_diverge` without stopping the study.
     """
 
     run: str
-    start: Brain
-    settings: Run
+    brain: str
     weeks: tuple[float, ...]
-    series: str | None
-    base: str
-    observed_brains: Mapping[float, tuple[Brain, ...]]
-    observed: Mapping[float, Brain]
     kind: Literal["explained", "predicted"]
     is_atlas_prediction: bool
+    growth_of: str
+    series: str | None
+    curves: str | None
+    chain: str | None
+    targets: str | None
+    base: str
+    maps: str | None
+    members: tuple[str, ...]
+    member_of: str | None
     has_regions: bool
-    member_of: str | None = None
+    may_diverge: bool
+    settings: Run
+
+    @property
+    def key(self) -> tuple[str, str]:
+        return self.run, self.brain
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The values of its wildcards."""
+        return {"run": self.run, "brain": self.brain}
+
+    def file(self, pattern: str, **wildcards: str | float) -> str:
+        """Return a file of this simulation for a pattern."""
+        return paths.file_of(pattern, **self.names, **wildcards)
 
     @property
     def shapes(self) -> Origin | None:
@@ -263,178 +210,180 @@ class Simulation:
         return "growth_rate_per_s" in self.settings.growth.definition.rates
 
     @property
-    def curves(self) -> str | list[str]:
-        """The table of the curves of measured sizes, if it follows one."""
-        if self.settings.growth.follows_sizes:
-            return paths.CURVES["curves"]
-        return []
-
-    @property
-    def ensemble(self) -> tuple[str, ...]:
-        """The names of its members."""
-        return tuple(members_of(self.run, self.settings))
-
-    @property
-    def chain(self) -> str | None:
-        """The name of the brains that its growth is measured on, or None (see
-        `Study.chains`)."""
-        if self.shapes and self.member_of:
-            return f"{self.shapes}.{self.run}"
-        return self.shapes
-
-    @property
-    def names(self) -> dict[str, str]:
-        """The values of its wildcards."""
-        return {"run": self.run, "brain": self.start.id}
-
-    def file(self, pattern: str, **wildcards: str | float) -> str:
-        """Return a file of this simulation for a pattern."""
-        return paths.file_of(pattern, **self.names, **wildcards)
-
-    @property
-    def observed_with_start(self) -> dict[float, Brain]:
-        """The first observed brain of each week, with the start brain at its own
-        week."""
-        observed = {week: brains[0] for week, brains in self.observed_brains.items()}
-        return {self.weeks[0]: self.start} | observed
-
-    @property
-    def followed_series(self) -> str | None:
-        """The growth series whose curves it follows, or None."""
-        return self.series if self.curves else None
-
-    @property
-    def targets(self) -> str | list[str]:
-        """The file with the shapes that the run grows towards; empty if there are
-        none."""
-        if self.chain is None:
-            return []
-        return paths.TARGETS.format(brain=self.start.id, origin=self.chain)
-
-    @property
-    def atlas_surface(self) -> str:
-        """The file with the atlas' own brain in the last week of a prediction."""
-        return self.file(paths.ATLAS_BRAIN, week=self.weeks[-1])
-
-    @property
     def has_growth_maps(self) -> bool:
         """Whether maps of the growth that it found can be written."""
         return self.shapes is not None and "growth" in self.settings.fields
 
-    @property
-    def mapped(self) -> dict[str, Varying]:
-        """Its parameters that have a map."""
-        mapped = {}
-        for name in VARYING:
-            value = getattr(self.settings, name)
-            if isinstance(value, Varying) and value.map is not None:
-                mapped[name] = value
-        return mapped
+
+def mapped_parameters(settings: Run) -> dict[str, Varying]:
+    """Return the parameters of a run that have a map."""
+    mapped = {}
+    for name in VARYING:
+        value = getattr(settings, name)
+        if isinstance(value, Varying) and value.map is not None:
+            mapped[name] = value
+    return mapped
+
+
+def parameters(settings: Run) -> dict[str, Any]:
+    """Return the settings of a run for its `params.yaml`. A map has the name of its
+    parameter.
+
+    The number of ranks is left out, since results do not depend on it.
+    """
+    plain = settings.model_dump(mode="json", exclude={"ranks", "start", "ensemble"})
+    plain["growth"] = settings.growth.own_keys()
+    mapped = mapped_parameters(settings)
+    for name in VARYING:
+        value = getattr(settings, name)
+        if isinstance(value, Varying):
+            plain[name] = {"weeks": value.weeks} if value.weeks else {}
+        if name in mapped:
+            plain[name]["map"] = name
+    return plain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A later week of a simulation with an observed brain: a row of `compared.csv`.
+
+    `shown` is the first brain of the week, scans of the start's own subject before
+    others. `observed` is the one that the simulation is compared with, no shape;
+    `adjacent` is the latest comparable brain of an earlier week.
+    """
+
+    run: str
+    brain: str
+    week: float
+    shown: str
+    observed: str | None
+    adjacent: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepRun:
+    """A run of a sweep (key `studies`) from one start brain, with its varied values: a
+    row of `sweeps.csv`.
+
+    `member` is its name, `run` the run that simulates it, as equal runs are simulated
+    once. `observed` are the brains that it is compared with at the `week` of the sweep.
+    """
+
+    sweep: str
+    member: str
+    week: float
+    run: str
+    brain: str
+    values: Mapping[str, Any]
+    observed: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationRun:
+    """A run of the calibration from one start brain: a row of `calibration.csv`.
+
+    Its parameters are in the `design` of its `round`, and depend on the scores of
+    earlier rounds. `observed` are the brains that it is compared with.
+    """
+
+    run: str
+    round: int
+    design: str
+    score: str
+    brain: str
+    observed: tuple[str, ...]
+
+
+# growth
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A map between two brains: a row of `links.csv`.
+
+    It is by vertices (`is_matched`), or by registration with a factor of its
+    `smoothing` and labels perturbed with a `seed` (0: unchanged). `posed` is for each
+    of both whether the map refers to the pose of its surface, as for masks made from
+    surfaces; otherwise it refers to the world coordinates of its files.
+    """
+
+    file: str
+    earlier: str
+    later: str
+    is_matched: bool
+    smoothing: float
+    seed: int
+    posed: tuple[bool, bool]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain:
+    """The brains through which the mesh of the first is carried, one for each week: a
+    row of `chains.csv`.
+
+    `links` are the files that map each brain to the next. `name` is the origin of
+    growth, with the member of an ensemble if it has a `variation`.
+
+    Growth of an atlas is that along its `path`, the chain `path` of all its weeks from
+    its own first brain, which is named here; only the first link leads there, from the
+    start to the atlas' brain of its week. Shapes are also computed for `further_weeks`.
+    """
+
+    brain: str
+    name: str
+    origin: Origin
+    brains: tuple[str, ...]
+    weeks: tuple[float, ...]
+    links: tuple[str, ...]
+    further_weeks: tuple[float, ...] = ()
+    variation: Variation | None = None
+    path: str | None = None
 
     @property
-    def maps(self) -> str | list[str]:
-        """The file with the maps of its parameters and its target shapes; empty if it
-        has neither."""
-        if self.shapes or self.mapped:
-            return paths.MAPS.format(run=self.base, brain=self.start.id)
-        return []
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """The settings for its `params.yaml`. A map has the name of its parameter.
-
-        The number of ranks is left out, since results do not depend on it.
-        """
-        settings = self.settings.model_dump(
-            mode="json", exclude={"ranks", "start", "ensemble"}
-        )
-        settings["growth"] = self.settings.growth.own_keys()
-        for name in VARYING:
-            value = getattr(self.settings, name)
-            if isinstance(value, Varying):
-                settings[name] = {"weeks": value.weeks} if value.weeks else {}
-            if name in self.mapped:
-                settings[name]["map"] = name
-        return settings
-
-    def at(self, week: float) -> Measurement:
-        """Return the measurement of the simulated brain at a week."""
-        metrics = f"runs/{self.run}/{self.start.id}/metrics"
-        week_folder = paths.file_of(paths.WEEK, week=week)
-        surfaces = f"{self.file(paths.RUN)}/surfaces/{week_folder}"
-        # the regions of a run are the same at all its weeks
-        regions = paths.region_files(f"results/{metrics}") if self.has_regions else {}
-        return Measurement(
-            where=f"{metrics}/{week_folder}",
-            subject=self.start.id,
-            run=self.run,
-            week=week,
-            sides=self.start.sides,
-            surfaces=surfaces,
-            thickness=f"{surfaces}/thickness.shape.gii",
-            report=[],
-            regions=regions,
-        )
-
-    @property
-    def measurements(self) -> list[Measurement]:
-        return [self.at(week) for week in self.weeks]
-
-    @property
-    def surfaces(self) -> dict[float, str]:
-        """The surfaces of the simulated brains by week."""
-        return {row.week: row.parts["whole"] for row in self.measurements}
+    def later(self) -> tuple[str, ...]:
+        return self.brains[1:]
 
 
-@dataclass(frozen=True)
-class Sweep:
-    """A sweep (key `studies`): runs that differ in a few parameters, compared with
-    observed brains of one week.
+@dataclass(frozen=True, kw_only=True)
+class GrowthSeries:
+    """The brains of a growth series in the order of weeks: a row of `series.csv`.
 
-    `members` are its simulations with the varied values, in order. `observed` are the
-    brains that simulations from a start brain are compared with, by the id of the start
-    brain.
+    `has_rates`: its differences between weeks are growth. `unmatched` is the reason why
+    surfaces of the series are not matched by their vertices.
     """
 
     name: str
-    week: float
-    members: tuple[tuple[Simulation, Mapping[str, Any]], ...]
-    observed: Mapping[str, tuple[Brain, ...]]
-
-    @property
-    def names(self) -> dict[str, str]:
-        return {"study": self.name, "week": f"{self.week:g}"}
-
-    @property
-    def first_start(self) -> Brain:
-        """The start brain of the first run."""
-        simulation, _ = self.members[0]
-        return simulation.start
-
-    @property
-    def first_observed(self) -> tuple[Brain, ...]:
-        """The first brain that runs from this start are compared with, if any."""
-        return self.observed[self.first_start.id][:1]
+    brains: tuple[str, ...]
+    has_rates: bool
+    unmatched: str | None
 
 
-@dataclass(frozen=True)
-class CalibrationRuns:
-    """Rounds of runs that differ from `base`. The parameters of a round depend on the
-    scores of earlier rounds.
+# brains that are left out
 
-    `rounds` has the round of each run, `observed` the target brains by the id of the
-    start brain.
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """A brain that is left out, with its cause: a row of `left_out.csv`.
+
+    `why`: it was `refused`, a row of a table that `cannot be used`, or a start brain
+    that is `not folded`.
     """
 
-    base: tuple[Simulation, ...]
-    rounds: Mapping[str, int]
-    observed: Mapping[str, tuple[Brain, ...]]
+    brain: str
+    why: Literal["refused", "cannot be used", "not folded"]
+    week: float | None
+    cause: str
 
-    def scores_before(self, number: int) -> list[str]:
-        """Return the score files of all runs in earlier rounds."""
-        earlier = [run for run, of_run in self.rounds.items() if of_run < number]
-        return [f"{paths.CALIBRATION}/scores/{run}.csv" for run in earlier]
 
-    def design(self, run: str) -> str:
-        """Return the table with the parameters of all runs in the round of a run."""
-        return f"{paths.CALIBRATION}/round-{self.rounds[run]}.csv"
+# files of atlases
+
+
+@dataclass(frozen=True, kw_only=True)
+class Download:
+    """A file of an atlas that is missing, with the address, size and checksum from its
+    description: a row of `downloads.csv`."""
+
+    file: str
+    url: str | None
+    bytes: int | None
+    sha256: str | None

@@ -2,15 +2,12 @@
 sweep."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ..errors import InputError
-from ..io.volumes import LabelSource
-from ..io.yaml_files import SCHEMES
-from ..settings.brains import BrainConfig
 from ..settings.folding import output_weeks
-from ..settings.growth import BEFORE_GW
+from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
 from ..settings.runs import (
     ComparisonSettings,
@@ -20,12 +17,26 @@ from ..settings.runs import (
     starts_of,
     variants,
 )
-from ..settings.schemes import LabelScheme
-from ..settings.terms import SIDES
-from .atlases import known_checksums, used_atlases
-from .records import Brain, CalibrationRuns, Simulation, Sweep
-from .series import (
+from . import paths
+from .atlases import UsedAtlas, used_atlases
+from .brains import comparable, plan_brains
+from .records import (
+    Brain,
+    CalibrationRun,
     Chain,
+    Comparison,
+    Download,
+    GrowthSeries,
+    LeftOut,
+    Link,
+    MeasuredBrain,
+    Simulation,
+    SweepRun,
+    mapped_parameters,
+    measured_files,
+)
+from .series import (
+    PATH,
     Series,
     chains_of,
     later_observed_weeks,
@@ -33,7 +44,7 @@ from .series import (
     series_of,
     several_subjects,
 )
-from .study import Study
+from .study import Study, study_of
 
 Chains = dict[tuple[str, str], Chain]
 
@@ -57,25 +68,22 @@ class _Folded:
     settings: Run
 
 
-def resolve(config: Config, refused: Collection[str] = ()) -> Study:
-    """Return the study of a configuration, without the brains that are `refused`.
+def resolve(config: Config, refused: Mapping[str, str] | None = None) -> Study:
+    """Return the study of a configuration, without the brains that are `refused`, by
+    id, each with its cause.
 
     No other brain replaces a refused start brain. A start brain whose growth needs
-    refused brains is not folded either (see `Study.unreachable`). InputError if a run
-    lacks brains to grow towards and none is refused.
+    refused brains is not folded either. InputError if a run lacks brains to grow
+    towards and none is refused.
     """
+    refused = refused or {}
     # their descriptions and folders are read once
     atlases = used_atlases(config)
-    checksums = known_checksums(atlases)
-    brains = {}
-    for settings in config.brains:
-        if settings.id not in refused:
-            brains[settings.id] = _brain(settings, config, refused, checksums)
-    accepted = list(brains.values())
+    brains = plan_brains(config, refused, atlases)
     series = series_of(config, brains, atlases)
     swept = _variants(config)
     folded = list(_folded(config, brains, series, swept))
-    chains = _chains(folded, series, accepted)
+    chains = _chains(folded, series, list(brains.values()))
     unreachable: dict[str, InputError] = {}
     for one in folded:
         error = _missing_brains(one, series, chains)
@@ -84,64 +92,138 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     if unreachable and not refused:
         raise next(iter(unreachable.values()))
     folded = [one for one in folded if one.start.id not in unreachable]
-    chains = {key: chain for key, chain in chains.items() if key[0] not in unreachable}
-    planned = _Simulations(config, series, chains, accepted)
+    planned = _Simulations(config, series, chains, brains)
     planned._add_runs(folded)
     names = planned._add_variants(folded, swept)
-    simulations = planned.simulations.values()
-    return Study(
-        config=config,
-        used_atlases=atlases,
-        checksums=checksums,
-        brains=brains,
-        series=series,
-        simulations=planned.simulations,
-        chains=chains,
-        sweeps=_sweeps(config, swept, names, simulations, accepted),
-        calibration=_calibration(config, simulations, accepted),
-        unreachable=unreachable,
-    )
+    simulations = list(planned.simulations.values())
+    followed = _followed_chains(simulations, chains, series)
+    links = _links(config, brains, series, followed.values())
+    rows: dict[str, Iterable[Any]] = {
+        "brains": brains.values(),
+        "series": _series_rows(config, brains, series, followed, simulations),
+        "simulations": simulations,
+        "simulated": planned.simulated,
+        "compared": planned.compared,
+        "links": links,
+        "chains": followed.values(),
+        "sweeps": _sweeps(config, swept, names, simulations, brains),
+        "calibration": _calibration(config, simulations, brains),
+        "left_out": _left_out(config, refused, unreachable),
+        "downloads": _downloads(atlases),
+    }
+    return study_of(config, rows)
 
 
-def label_scheme(config: Config, brain: BrainConfig) -> LabelScheme:
-    """Return the scheme of a brain's labels; KeyError if it has none."""
-    name = str(brain.scheme)
-    if name not in config.schemes:
-        return SCHEMES[name]
-    return LabelScheme(name=name, **config.schemes[name].model_dump())
+def _downloads(atlases: Iterable[UsedAtlas]) -> list[Download]:
+    """Return the files of atlases that are missing."""
+    rows = []
+    for used in atlases:
+        for file in used.missing:
+            row = Download(
+                file=str(file.path),
+                url=file.url,
+                bytes=file.record.bytes,
+                sha256=file.record.sha256,
+            )
+            rows.append(row)
+    return rows
 
 
-def _brain(
-    settings: BrainConfig,
+def _left_out(
+    config: Config, refused: Mapping[str, str], unreachable: Mapping[str, InputError]
+) -> list[LeftOut]:
+    rows = []
+    for brain in config.brains:
+        if brain.id in refused:
+            cause = refused[brain.id]
+            rows.append(
+                LeftOut(brain=brain.id, why="refused", week=brain.week, cause=cause)
+            )
+        elif brain.id in unreachable:
+            cause = str(unreachable[brain.id])
+            rows.append(
+                LeftOut(brain=brain.id, why="not folded", week=brain.week, cause=cause)
+            )
+    for scan, facts in config.left_out.items():
+        rows.append(LeftOut(brain=scan, why="cannot be used", **facts))
+    return rows
+
+
+# links, chains and growth series
+
+
+def _followed_chains(
+    simulations: Iterable[Simulation], chains: Chains, series: Series
+) -> Chains:
+    """Return the chains that simulations follow, and the paths of atlases in them."""
+    followed = {}
+    for simulation in simulations:
+        if simulation.chain is not None:
+            key = (simulation.brain, simulation.chain)
+            followed[key] = chains[key]
+    for chain in list(followed.values()):
+        if chain.path is not None:
+            followed[chain.path, PATH] = series.paths[chain.path]
+    return followed
+
+
+def _links(
     config: Config,
-    refused: Collection[str],
-    checksums: Mapping[str, tuple[str, str]],
-) -> Brain:
-    labels = None
-    if settings.labels is not None:
-        scheme = label_scheme(config, settings)
-        labels = LabelSource(settings.labels, settings.affine_from, scheme)
-    has_cortex = labels is not None and bool(labels.scheme.cortex)
-    has_white_files = bool(settings.white_files)
-    has_thickness = has_white_files or has_cortex
-    measures_all_white = config.metrics.white_surfaces == "all"
-    with_regions = set(config.metrics.regions) - set(refused)
-    regions_from: Literal["given", "carried"] | None = None
-    if len(settings.sides) == len(SIDES):
-        if settings.id in with_regions:
-            regions_from = "given"
-        elif with_regions and not settings.synthetic:
-            regions_from = "carried"
-    return Brain(
-        config=settings,
-        labels=labels,
-        has_thickness=has_thickness,
-        has_white=has_white_files or (has_thickness and measures_all_white),
-        regions_from=regions_from,
-        checksums={
-            path: checksums[path] for path in settings.files if path in checksums
-        },
-    )
+    brains: Mapping[str, Brain],
+    series: Series,
+    chains: Iterable[Chain],
+) -> list[Link]:
+    """Return the maps between brains: of chains, to carry regions, and to move maps to
+    the template."""
+    files: list[str] = []
+    for chain in chains:
+        files += chain.links
+    template = brains.get(config.metrics.template or "")
+    for brain in brains.values():
+        if brain.regions_of not in (None, brain.id):
+            files.append(series.link(brains[str(brain.regions_of)], brain))
+        if template is not None and template is not brain:
+            files.append(series.link(template, brain))
+    return [series.links[file] for file in files]
+
+
+def _series_rows(
+    config: Config,
+    brains: Mapping[str, Brain],
+    series: Series,
+    chains: Chains,
+    simulations: Iterable[Simulation],
+) -> list[GrowthSeries]:
+    """Return the growth series. Differences between weeks are growth in a
+    series of a subject, of an atlas, or used by a run."""
+    starts = set()
+    used = set()
+    for simulation in simulations:
+        starts.add(simulation.brain)
+        if simulation.curves:
+            used.add(simulation.series)
+        if simulation.chain and simulation.member_of is None:
+            for brain in chains[simulation.brain, simulation.chain].later:
+                used.add(series.with_brain(brains[brain]))
+    rows = []
+    for name, members in series.brains.items():
+        by_week = sorted(members, key=lambda brain: brain.week)
+        ids = tuple(brain.id for brain in by_week)
+        # brains without a subject may be different fetuses
+        is_one = (
+            members[0].subject is not None
+            or all(brain.atlas for brain in members)
+            or not starts.isdisjoint(ids)
+        )
+        is_growth = is_one and not several_subjects(members)
+        row = GrowthSeries(
+            name=name,
+            brains=ids,
+            has_rates=is_growth or name in used,
+            unmatched=series.unmatched.get(name),
+        )
+        rows.append(row)
+    return rows
 
 
 # simulations
@@ -189,49 +271,56 @@ def _folded(
 def _chains(
     folded: Iterable[_Folded], series: Series, brains: Sequence[Brain]
 ) -> Chains:
-    ends: dict[Brain, float] = {}
+    starts: dict[str, Brain] = {}
+    ends: dict[str, float] = {}
     for one in folded:
-        ends[one.start] = max(one.settings.end_week, ends.get(one.start, 0.0))
+        name = one.start.id
+        starts[name] = one.start
+        ends[name] = max(one.settings.end_week, ends.get(name, 0.0))
     chains: Chains = {}
-    for start, end in ends.items():
-        chains |= chains_of(start, end, series, brains)
+    for name, start in starts.items():
+        chains |= chains_of(start, ends[name], series, brains)
     return chains
 
 
 @dataclass
 class _Simulations:
-    """The simulations of a study by run and start brain. The chains of members of
-    ensembles are added to `chains`."""
+    """The simulations of a study by run and start brain, with the simulated brains and
+    the comparisons of each. The chains of members of ensembles are added to
+    `chains`."""
 
     config: Config
     series: Series
     chains: Chains
-    brains: Sequence[Brain]
+    brains: Mapping[str, Brain]
     simulations: dict[tuple[str, str], Simulation] = field(default_factory=dict)
+    simulated: list[MeasuredBrain] = field(default_factory=list)
+    compared: list[Comparison] = field(default_factory=list)
 
     def _add_runs(self, folded: Iterable[_Folded]) -> None:
         """Add the simulations of `runs`, and the members of their ensembles."""
+        brains = list(self.brains.values())
         own = [one for one in folded if one.run in self.config.runs]
-        predicted = {one.start for one in own if one.settings.growth.shapes == "atlas"}
+        predicted = set()
+        for one in own:
+            if one.settings.growth.shapes == "atlas":
+                predicted.add(one.start.id)
         for one in own:
             start = one.start
             further: list[float] = []
-            if start in predicted:
-                further = later_observed_weeks(start, self.brains)
+            if start.id in predicted:
+                further = later_observed_weeks(start, brains)
             weeks = _weeks(one.settings, start, further)
             self._add(one, weeks)
             alone = one.settings.model_copy(update={"ensemble": None})
             for name, variation in members_of(one.run, one.settings).items():
-                member = self._add(_Folded(name, start, alone), weeks, one.run)
-                if member.chain is not None:
-                    self.chains[start.id, member.chain] = member_chain(
-                        one.run,
-                        start,
-                        one.settings,
-                        variation,
-                        self.series,
-                        self.brains,
+                if one.settings.growth.shapes:
+                    chain = member_chain(
+                        one.run, start, one.settings, variation, self.series, brains
                     )
+                    chain = replace(chain, name=f"{chain.origin}.{name}")
+                    self.chains[start.id, chain.name] = chain
+                self._add(_Folded(name, start, alone), weeks, one.run)
 
     def _add_variants(
         self, folded: Iterable[_Folded], variants: Sequence[_Variant]
@@ -252,58 +341,148 @@ class _Simulations:
 
     def _add(
         self, folded: _Folded, weeks: Sequence[float], member_of: str | None = None
-    ) -> Simulation:
+    ) -> None:
         """Add a simulation, unless there is one of that name, with the brains that it
         is compared with."""
+        run = folded.run
         start = folded.start
-        growth = folded.settings.growth
+        settings = folded.settings
+        key = (run, start.id)
+        if key in self.simulations:
+            return
+        growth = settings.growth
         # the run is also compared with brains of other subjects if it grows towards
         # them
-        candidates = start.comparable(self.brains)
-        for brain in self.chains[start.id, "self"].later:
-            if brain.sides == start.sides and brain not in candidates:
-                candidates.append(brain)
-        candidates.sort(key=lambda brain: brain.subject != start.subject)
-        observed_brains = {}
-        observed = {}
-        for week in weeks[1:]:
-            same_week = [brain for brain in candidates if brain.week == week]
-            if same_week:
-                observed_brains[week] = tuple(same_week)
-            real = [brain for brain in same_week if not brain.config.synthetic]
-            if real and not start.config.synthetic:
-                observed[week] = real[0]
+        same = comparable(start, self.brains.values())
+        candidates = list(same)
+        ids = {brain.id for brain in candidates}
+        for name in self.chains[start.id, "self"].later:
+            if self.brains[name].sides == start.sides and name not in ids:
+                candidates.append(self.brains[name])
+                ids.add(name)
+        candidates.sort(key=lambda brain: brain.subject_name != start.subject_name)
+        self.compared += _compared(run, start, weeks, candidates, same)
         later = set()
-        for brain in self.brains:
-            is_scan = (
-                start.config.subject is not None and brain.subject == start.subject
-            )
-            if brain.week > start.week and (is_scan or brain in candidates):
-                later.add(brain)
+        for brain in self.brains.values():
+            is_scan = start.subject is not None and brain.subject == start.subject
+            if brain.week > start.week and (is_scan or brain.id in ids):
+                later.add(brain.id)
         atlas_brains = self.chains[start.id, "atlas"].later
         is_atlas_prediction = growth.shapes == "atlas" and later.isdisjoint(
             atlas_brains
         )
         follows_observed = bool(growth.shapes) or growth.follows_sizes
         is_explained = follows_observed and not is_atlas_prediction
-        base = folded.run
-        if self.config.calibrate and folded.run in self.config.calibrate.runs:
+        base = run
+        if self.config.calibrate and run in self.config.calibrate.runs:
             base = self.config.calibrate.base
-        simulation = Simulation(
-            run=folded.run,
-            start=start,
-            settings=folded.settings,
+        curves = None
+        if growth.follows_sizes:
+            curves = paths.CURVES["curves"]
+        chain: str | None = growth.shapes
+        if chain and member_of:
+            chain = f"{chain}.{run}"
+        maps = None
+        if growth.shapes or mapped_parameters(settings):
+            maps = paths.MAPS.format(run=base, brain=start.id)
+        targets = paths.TARGETS.format(brain=start.id, origin=chain) if chain else None
+        self.simulations[key] = Simulation(
+            run=run,
+            brain=start.id,
             weeks=tuple(weeks),
-            series=self.series.for_sizes(start),
-            base=base,
-            member_of=member_of,
-            observed_brains=observed_brains,
-            observed=observed,
             kind="explained" if is_explained else "predicted",
             is_atlas_prediction=is_atlas_prediction,
-            has_regions=start.has_regions and folded.run in self.config.runs,
+            growth_of=self._growth_source(
+                start, growth.shapes, has_curves=bool(curves)
+            ),
+            series=self.series.for_sizes(start),
+            curves=curves,
+            chain=chain,
+            targets=targets,
+            base=base,
+            maps=maps,
+            members=tuple(members_of(run, settings)),
+            member_of=member_of,
+            has_regions=bool(start.regions) and run in self.config.runs,
+            may_diverge=run not in self.config.runs,
+            settings=settings,
         )
-        return self.simulations.setdefault((folded.run, start.id), simulation)
+        self.simulated += _simulated(self.simulations[key], start)
+
+    def _growth_source(
+        self, start: Brain, origin: Origin | None, *, has_curves: bool
+    ) -> str:
+        """Describe whose measured growth a run follows, or return ""."""
+        brains: Sequence[Brain] = ()
+        name = ""
+        if origin:
+            chain = self.chains[start.id, origin]
+            ids = chain.later if origin == "atlas" else chain.brains
+            brains = [self.brains[brain] for brain in ids]
+            name = self.series.with_brain(brains[0])
+        elif has_curves:
+            name = self.series.for_sizes(start) or ""
+            brains = self.series.brains.get(name, ())
+        if several_subjects(brains):
+            return f"population {name}"
+        if start in brains:
+            return "own"
+        return f"series {name}" if brains else ""
+
+
+def _compared(
+    run: str,
+    start: Brain,
+    weeks: Sequence[float],
+    candidates: Sequence[Brain],
+    same: Sequence[Brain],
+) -> list[Comparison]:
+    """Return the comparisons of a run, each with the first candidate of a later week.
+
+    `same` are the brains that are comparable with the start brain itself.
+    """
+    rows = []
+    observed_brains = [brain for brain in candidates if brain.shape is None]
+    if start.shape is not None:
+        observed_brains = []
+    adjacent_brains = [brain for brain in same if brain.shape is None]
+    for week in weeks[1:]:
+        shown = [brain.id for brain in candidates if brain.week == week]
+        observed = [brain.id for brain in observed_brains if brain.week == week]
+        earlier = [brain for brain in adjacent_brains if brain.week < week]
+        adjacent = max(earlier, key=lambda brain: brain.week, default=None)
+        if shown:
+            row = Comparison(
+                run=run,
+                brain=start.id,
+                week=week,
+                shown=shown[0],
+                observed=observed[0] if observed else None,
+                adjacent=adjacent.id if adjacent and observed else None,
+            )
+            rows.append(row)
+    return rows
+
+
+def _simulated(simulation: Simulation, start: Brain) -> list[MeasuredBrain]:
+    """Return the simulated brains of a simulation."""
+    rows = []
+    run_folder = simulation.file(paths.RUN)
+    # the regions of a run are the same at all its weeks
+    regions = f"{run_folder}/metrics" if simulation.has_regions else None
+    for week in simulation.weeks:
+        week_folder = paths.file_of(paths.WEEK, week=week)
+        surfaces = f"{run_folder}/surfaces/{week_folder}"
+        tables = f"{run_folder}/metrics/{week_folder}"
+        row = MeasuredBrain(
+            id=start.id,
+            run=simulation.run,
+            week=week,
+            thickness=f"{surfaces}/thickness.shape.gii",
+            **measured_files(start.sides, surfaces, tables, regions),
+        )
+        rows.append(row)
+    return rows
 
 
 def _shared_runs(
@@ -356,7 +535,7 @@ def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]
 def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
     """Return a run that ends with the last scan if it follows the scans of one
     subject."""
-    if run.growth.shapes != "self" or start.config.subject is None:
+    if run.growth.shapes != "self" or start.subject is None:
         return run
     scans = series.brains.get(series.with_brain(start), ())
     last = max((brain.week for brain in scans), default=start.week)
@@ -376,7 +555,8 @@ def _missing_brains(
     if origin is None:
         return None
     chain = chains[start.id, origin]
-    available = ", ".join(f"{brain.id} ({brain.week:g} GW)" for brain in chain.brains)
+    with_weeks = zip(chain.brains, chain.weeks, strict=True)
+    available = ", ".join(f"{brain} ({week:g} GW)" for brain, week in with_weeks)
     if origin == "self":
         own = series.with_brain(start)
         names = [own] if own else []
@@ -391,9 +571,7 @@ def _missing_brains(
         )
     else:
         names = series.from_other_populations(start)
-        is_complete = (
-            len(chain.brains) > 2 and start.week >= chain.later[0].week - BEFORE_GW
-        )
+        is_complete = len(chain.brains) > 2 and start.week >= chain.weeks[1] - BEFORE_GW
         expected = "one series of another population with the same hemispheres"
         remedy = (
             "Add an atlas of these weeks, or name one of several series in"
@@ -415,13 +593,19 @@ def _missing_brains(
 
 
 def _compared_with(
-    settings: ComparisonSettings, start: Brain, brains: Iterable[Brain]
-) -> tuple[Brain, ...]:
+    settings: ComparisonSettings, start: Brain, brains: Mapping[str, Brain]
+) -> tuple[str, ...]:
+    """Return the brains that runs from a start brain are compared with in a sweep or a
+    calibration."""
     if settings.compare_with is not None:
-        return tuple(brain for brain in brains if brain.id in settings.compare_with)
-    same_week = [brain for brain in brains if brain.week == settings.compare_week]
-    population = start.config.population
-    own = [brain for brain in same_week if brain.config.population == population]
+        return tuple(name for name in brains if name in settings.compare_with)
+    same_week = []
+    own = []
+    for brain in brains.values():
+        if brain.week == settings.compare_week:
+            same_week.append(brain.id)
+            if brain.population == start.population:
+                own.append(brain.id)
     return tuple(own or same_week)
 
 
@@ -430,36 +614,47 @@ def _sweeps(
     variants: Iterable[_Variant],
     names: Mapping[str, str],
     simulations: Collection[Simulation],
-    brains: Sequence[Brain],
-) -> dict[str, Sweep]:
-    members: dict[str, list[tuple[Simulation, Mapping[str, Any]]]] = {}
+    brains: Mapping[str, Brain],
+) -> list[SweepRun]:
+    """Return the runs of all sweeps, each with its varied values."""
+    rows = []
     for variant in variants:
+        settings = config.studies[variant.sweep]
         for simulation in simulations:
             if simulation.run == names[variant.run]:
-                member = (simulation, variant.values)
-                members.setdefault(variant.sweep, []).append(member)
-    sweeps = {}
-    for name, of_sweep in members.items():
-        settings = config.studies[name]
-        observed = {
-            simulation.start.id: _compared_with(settings, simulation.start, brains)
-            for simulation, _ in of_sweep
-        }
-        sweeps[name] = Sweep(name, settings.compare_week, tuple(of_sweep), observed)
-    return sweeps
+                start = brains[simulation.brain]
+                row = SweepRun(
+                    sweep=variant.sweep,
+                    member=variant.run,
+                    week=settings.compare_week,
+                    run=simulation.run,
+                    brain=simulation.brain,
+                    values=variant.values,
+                    observed=_compared_with(settings, start, brains),
+                )
+                rows.append(row)
+    return rows
 
 
 def _calibration(
-    config: Config, simulations: Iterable[Simulation], brains: Sequence[Brain]
-) -> CalibrationRuns | None:
+    config: Config, simulations: Iterable[Simulation], brains: Mapping[str, Brain]
+) -> list[CalibrationRun]:
+    """Return the runs of the calibration, by round."""
     settings = config.calibrate
     if settings is None:
-        return None
-    base = [simulation for simulation in simulations if simulation.run == settings.base]
-    if not base:
-        return None
-    observed = {}
-    for simulation in base:
-        start = simulation.start
-        observed[start.id] = _compared_with(settings, start, brains)
-    return CalibrationRuns(tuple(base), settings.runs, observed)
+        return []
+    rows = []
+    for run, number in settings.runs.items():
+        for simulation in simulations:
+            if simulation.run == settings.base:
+                start = brains[simulation.brain]
+                row = CalibrationRun(
+                    run=run,
+                    round=number,
+                    design=paths.DESIGN.format(round=number),
+                    score=paths.SCORE.format(run=run),
+                    brain=simulation.brain,
+                    observed=_compared_with(settings, start, brains),
+                )
+                rows.append(row)
+    return rows

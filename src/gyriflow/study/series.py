@@ -2,7 +2,7 @@
 measured on."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,9 +13,12 @@ from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
 from ..settings.runs import Run, growing_groups
 from .atlases import UsedAtlas
+from .brains import comparable
 from .paths import MATCHED, REGISTERED, VARIED_REGISTRATION
-from .records import Brain
+from .records import Brain, Chain, Link
 
+PATH = "path"
+"""The name of the chain of all weeks of an atlas."""
 UNVARIED = (1.0, 0)
 """Factor of the smoothing and seed of the perturbed labels of registrations, but for
 those of ensembles."""
@@ -27,13 +30,17 @@ class Series:
 
     `preferred` is the series to choose if several are possible. `matched` has the ids
     of brains with vertex-matched surfaces, by series; `unmatched` has the reasons why
-    other series of surfaces are not matched.
+    other series of surfaces are not matched. `links` are the maps between two brains
+    that chains have needed, by file, and `paths` those of atlases that chains lead
+    along, by the first brain.
     """
 
     brains: Mapping[str, tuple[Brain, ...]]
     preferred: str | None
     matched: Mapping[str, frozenset[str]]
     unmatched: Mapping[str, str]
+    links: dict[str, Link] = field(default_factory=dict)
+    paths: dict[str, Chain] = field(default_factory=dict)
 
     def with_brain(self, brain: Brain) -> str:
         """Return the series that contains a brain (the preferred one of several), or
@@ -71,8 +78,8 @@ class Series:
         for name, brains in self.brains.items():
             if name != self.preferred and self._is_single_subject(name):
                 continue
-            populations = {brain.config.population for brain in brains} - {None}
-            is_own = start in brains or start.config.population in populations
+            populations = {brain.population for brain in brains} - {None}
+            is_own = start in brains or start.population in populations
             if not is_own and all(brain.sides == start.sides for brain in brains):
                 names.append(name)
         names.sort(key=lambda name: name != self.preferred)
@@ -82,46 +89,49 @@ class Series:
 
     def _is_single_subject(self, name: str) -> bool:
         brains = self.brains[name]
-        return brains[0].config.subject is not None and not several_subjects(brains)
+        return brains[0].subject is not None and not several_subjects(brains)
 
     def are_matched(self, *brains: Brain) -> bool:
         """Return whether brains have surfaces with the same vertices."""
         ids = {brain.id for brain in brains}
         return any(ids <= matched for matched in self.matched.values())
 
-    def correspondence(
+    def link(
         self, earlier: Brain, later: Brain, variation: tuple[float, int] = UNVARIED
     ) -> str:
-        """Return the file with the correspondence of two brains, by matched vertices or
-        by registration.
+        """Return the file that maps two brains, by matched vertices or by registration,
+        and add it to the links.
 
         `variation` is the factor of a registration's smoothing, and the seed of its
         perturbed labels.
         """
-        if self.are_matched(earlier, later):
-            file = MATCHED
-        else:
-            file = REGISTERED if variation == UNVARIED else VARIED_REGISTRATION
+        is_matched = self.are_matched(earlier, later)
+        pattern = VARIED_REGISTRATION
+        if is_matched:
+            pattern = MATCHED
+        elif variation == UNVARIED:
+            pattern = REGISTERED
         smoothing, seed = variation
         names = {"earlier": earlier.id, "later": later.id}
-        return file.format(**names, smoothing=smoothing, seed=seed)
-
-    def posed(self, *pair: Brain) -> list[bool]:
-        """Return for each of two brains whether their correspondence refers to the pose
-        of its surface.
-
-        This is the case for masks made from surfaces. Otherwise it refers to the world
-        coordinates of its files.
-        """
-        if self.are_matched(*pair):
-            return [False, False]
-        return [brain.config.labels is None for brain in pair]
+        file = pattern.format(**names, smoothing=smoothing, seed=seed)
+        self.links[file] = Link(
+            file=file,
+            **names,
+            is_matched=is_matched,
+            smoothing=smoothing,
+            seed=seed,
+            posed=(
+                earlier.labels is None and not is_matched,
+                later.labels is None and not is_matched,
+            ),
+        )
+        return file
 
 
 def several_subjects(brains: Iterable[Brain]) -> bool:
     """Return whether brains have different subjects. Brains without a subject, as of an
     atlas, count as one."""
-    return len({brain.config.subject for brain in brains}) > 1
+    return len({brain.subject for brain in brains}) > 1
 
 
 def series_of(
@@ -138,7 +148,7 @@ def series_of(
             if used.atlas.series[file.series].matched:
                 assumed.add(str(file.path))
     series, matched, unmatched = {}, {}, {}
-    configs = [brain.config for brain in brains.values()]
+    configs = [brain for brain in config.brains if brain.id in brains]
     for name, members in growing_groups(configs, config.growth.brains):
         ids = [brain.id for brain in members]
         series[name] = tuple(brains[brain] for brain in ids)
@@ -199,52 +209,12 @@ MAX_BEYOND_ATLAS_GW = 0.5
 older than stated."""
 
 
-@dataclass(frozen=True)
-class Chain:
-    """A start brain and the brains of a growth series through which its mesh is
-    carried, one for each week.
-
-    `correspondences` are the files that map each brain to the next; `posed` is for each
-    of both whether the map refers to its posed surface (True) or to the coordinates of
-    its files. `variation` is that of a member of an ensemble.
-
-    Growth of an atlas is that along its `path`, the chain of all its weeks from its own
-    first brain; only the first correspondence leads there, from the start to the atlas'
-    brain of its week. Shapes are also computed for `further_weeks`.
-    """
-
-    origin: Origin
-    brains: tuple[Brain, ...]
-    correspondences: tuple[str, ...]
-    posed: tuple[list[bool], ...]
-    further_weeks: tuple[float, ...] = ()
-    variation: Variation | None = None
-    path: "Chain | None" = None
-
-    @property
-    def weeks(self) -> list[float]:
-        return [brain.week for brain in self.brains]
-
-    @property
-    def later(self) -> tuple[Brain, ...]:
-        return self.brains[1:]
-
-    @property
-    def pairs(self) -> list[tuple[tuple[Brain, Brain], list[bool]]]:
-        """The pairs of brains that correspond, those of its path included, and whether
-        each map is posed."""
-        pairs = list(zip(pairwise(self.brains), self.posed, strict=False))
-        if self.path is not None:
-            pairs += self.path.pairs
-        return pairs
-
-
 def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
     """Return the weeks of brains, not shapes, that simulations from a start brain are
     compared with."""
     weeks = set()
-    for brain in start.comparable(brains):
-        if brain.week > start.week and not brain.config.synthetic:
+    for brain in comparable(start, brains):
+        if brain.week > start.week and brain.shape is None:
             weeks.add(brain.week)
     return sorted(weeks)
 
@@ -253,7 +223,7 @@ def chains_of(
     start: Brain, end: float, series: Series, brains: Sequence[Brain]
 ) -> dict[tuple[str, str], Chain]:
     """Return the brains on which growth for a start brain is measured up to a week, by
-    its id and their origin."""
+    the id of the first and the name of the chain."""
     own = _chain("self", _own_chain(start, end, series), series)
     atlases = series.from_other_populations(start)
     if len(atlases) == 1:
@@ -283,8 +253,9 @@ def member_chain(
     end = settings.end_week
     varied = (variation.registration_smoothing, variation.seed)
     if settings.growth.shapes == "self":
-        chain = _chain("self", _own_chain(start, end, series), series, varied)
-        if chain.later and chain == _chain("self", chain.brains, series):
+        own = _own_chain(start, end, series)
+        chain = _chain("self", own, series, varied)
+        if chain.later and chain.links == _chain("self", own, series).links:
             raise InputError(
                 f"the members of the ensemble of run {run} would be equal: the surfaces"
                 f" of {start.id} and its later brains are matched by their vertices, so"
@@ -320,12 +291,15 @@ def _chain(
     variation: tuple[float, int] = UNVARIED,
 ) -> Chain:
     """Return a chain, with smoothing and seed of its registrations."""
-    correspondences = []
-    posed = []
-    for earlier, later in pairwise(brains):
-        correspondences.append(series.correspondence(earlier, later, variation))
-        posed.append(series.posed(earlier, later))
-    return Chain(origin, tuple(brains), tuple(correspondences), tuple(posed))
+    links = [series.link(*pair, variation) for pair in pairwise(brains)]
+    return Chain(
+        brain=brains[0].id,
+        name=origin,
+        origin=origin,
+        brains=tuple(brain.id for brain in brains),
+        weeks=tuple(brain.week for brain in brains),
+        links=tuple(links),
+    )
 
 
 def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
@@ -343,14 +317,14 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     # scans of the same subject come first in a population's series
     members = sorted(
         series.brains.get(series.with_brain(start), ()),
-        key=lambda brain: brain.subject != start.subject,
+        key=lambda brain: brain.subject_name != start.subject_name,
     )
     # growth up to the end week needs the first brain at or past it
     last = min((brain.week for brain in members if brain.week >= end), default=end)
     by_week = {start.week: start}
     for brain in members:
-        have_labels = start.config.labels and brain.config.labels
-        if not have_labels and not series.are_matched(start, brain):
+        lack_labels = start.labels is None or brain.labels is None
+        if lack_labels and not series.are_matched(start, brain):
             continue
         if start.week < brain.week <= last:
             by_week.setdefault(brain.week, brain)
@@ -378,7 +352,12 @@ def _along_path(
     ends = [known for known in weeks if known >= end and known > first]
     last = min(ends, default=end)
     used = [by_week[known] for known in weeks if first <= known <= last]
-    brains = (start, *used)
     path = _chain("self", [by_week[known] for known in weeks], series)
-    to_atlas = _chain("atlas", brains[:2], series, variation)
-    return replace(to_atlas, brains=brains, path=path)
+    series.paths[path.brain] = replace(path, name=PATH)
+    to_atlas = _chain("atlas", [start, *used[:1]], series, variation)
+    return replace(
+        to_atlas,
+        brains=(start.id, *(brain.id for brain in used)),
+        weeks=(start.week, *(brain.week for brain in used)),
+        path=path.brain,
+    )

@@ -1,45 +1,64 @@
-"""A resolved study: its records, and selections of them for rules, tables and the
-report."""
+"""The plan of a study: its tables, and selections of their rows for rules and the
+report.
 
-from collections.abc import Iterable, Mapping, Sequence
+The tables are written before rules are read; jobs read them.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from operator import attrgetter
+from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+import yaml
+
 from ..io.exports import ExportedBrain, labels_file
+from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas
 from ..settings.root import Config
-from ..settings.terms import MAX_COLOURS, MEASURED, SIDES, min_norm_subjects
+from ..settings.terms import MEASURED, SIDES, min_norm_subjects
 from . import paths
-from .atlases import UsedAtlas
-from .records import Brain, CalibrationRuns, Measurement, Simulation, Sweep
-from .series import Chain, Series, several_subjects
+from .atlases import UsedAtlas, used_atlases
+from .brains import closest, label_source, registered_source
+from .records import (
+    Brain,
+    CalibrationRun,
+    Chain,
+    Comparison,
+    Download,
+    GrowthSeries,
+    LeftOut,
+    Link,
+    MeasuredBrain,
+    Simulation,
+    SweepRun,
+)
+from .series import PATH
+from .tables import read_rows, write_changed, write_rows
 
 
 @dataclass(frozen=True)
 class Study:
-    """Everything a configuration asks for. Refused brains are in `config`, not in
-    `brains`.
+    """Everything a configuration asks for. Refused brains are in `config` and
+    `left_out`, not in `brains`.
 
-    `checksums` are those of atlas files (see `known_checksums`). `simulations` are
-    those of runs, sweeps and calibration, and of members of ensembles, by run and start
-    brain. `chains` are the brains on which growth for a start brain is measured, by its
-    id and their `chain_name`. `unreachable` has the reasons why start brains are not
-    folded.
+    The rows of each table are by their key (see `TABLES`).
     """
 
     config: Config
-    used_atlases: Sequence[UsedAtlas]
-    checksums: Mapping[str, tuple[str, str]]
     brains: Mapping[str, Brain]
-    series: Series
+    series: Mapping[str, GrowthSeries]
     simulations: Mapping[tuple[str, str], Simulation]
+    simulated: Mapping[tuple[str, str, float], MeasuredBrain]
+    compared: Mapping[tuple[str, str, float], Comparison]
+    links: Mapping[str, Link]
     chains: Mapping[tuple[str, str], Chain]
-    sweeps: Mapping[str, Sweep]
-    calibration: CalibrationRuns | None
-    unreachable: Mapping[str, InputError]
+    sweeps: Mapping[tuple[str, str, str], SweepRun]
+    calibration: Mapping[tuple[str, str], CalibrationRun]
+    left_out: Mapping[tuple[str, str], LeftOut]
+    downloads: Mapping[str, Download]
 
     @cached_property
     def run_simulations(self) -> list[Simulation]:
@@ -48,20 +67,24 @@ class Study:
         return [
             simulation
             for simulation in self.simulations.values()
-            if simulation.run in self.config.runs
+            if not simulation.may_diverge
         ]
 
     @cached_property
     def may_diverge(self) -> list[str]:
         """The runs of sweeps, calibration and ensembles, which may diverge without
         stopping the study."""
-        runs = dict.fromkeys(run for run, _ in self.simulations)
-        return [run for run in runs if run not in self.config.runs]
+        runs = [
+            simulation.run
+            for simulation in self.simulations.values()
+            if simulation.may_diverge
+        ]
+        return list(dict.fromkeys(runs))
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
         return [
-            (simulation.run, simulation.start.id) for simulation in self.run_simulations
+            (simulation.run, simulation.brain) for simulation in self.run_simulations
         ]
 
     def files(self, *patterns: str) -> list[str]:
@@ -74,90 +97,108 @@ class Study:
     @cached_property
     def starts(self) -> list[Brain]:
         """The start brains of `runs`, in the order of `brains`."""
-        starts = {simulation.start for simulation in self.run_simulations}
-        return [brain for brain in self.brains.values() if brain in starts]
+        starts = {simulation.brain for simulation in self.run_simulations}
+        return [brain for brain in self.brains.values() if brain.id in starts]
+
+    def rows_of(self, simulation: Simulation) -> list[MeasuredBrain]:
+        """Return the simulated brains of a simulation, in the order of weeks."""
+        return [self.simulated[*simulation.key, week] for week in simulation.weeks]
+
+    def comparisons(self, simulation: Simulation) -> list[Comparison]:
+        """Return the later weeks of a simulation with an observed brain."""
+        keys = [(*simulation.key, week) for week in simulation.weeks]
+        return [self.compared[key] for key in keys if key in self.compared]
+
+    @cached_property
+    def by_sweep(self) -> dict[str, list[SweepRun]]:
+        """The runs of each sweep, by its name."""
+        runs: dict[str, list[SweepRun]] = {}
+        for row in self.sweeps.values():
+            runs.setdefault(row.sweep, []).append(row)
+        return runs
+
+    @property
+    def paths(self) -> dict[str, Chain]:
+        """The paths of atlases by their first brain."""
+        paths = {}
+        for chain in self.chains.values():
+            if chain.name == PATH:
+                paths[chain.brain] = chain
+        return paths
+
+    def brains_of(self, chain: Chain) -> list[Brain]:
+        """Return the brains of a chain."""
+        return [self.brains[name] for name in chain.brains]
+
+    def link(self, earlier: str, later: str) -> Link:
+        """Return the map between two brains that no member of an ensemble varies."""
+        return self._plain_links[earlier, later]
+
+    @cached_property
+    def _plain_links(self) -> dict[tuple[str, str], Link]:
+        links = {}
+        for link in self.links.values():
+            if link.seed == 0:
+                links[link.earlier, link.later] = link
+        return links
 
     @cached_property
     def growth_brains(self) -> list[tuple[str, Brain]]:
         """All brains that growth is measured on, each with its series, in the order of
         weeks within a series."""
         growth_brains = []
-        for name, brains in self.series.brains.items():
-            by_week = sorted(brains, key=lambda brain: brain.week)
-            growth_brains += [(name, brain) for brain in by_week]
+        for series in self.series.values():
+            growth_brains += [
+                (series.name, self.brains[name]) for name in series.brains
+            ]
         return growth_brains
-
-    @cached_property
-    def series_with_rates(self) -> list[str]:
-        """The series whose differences between weeks are growth: of a subject, of an
-        atlas, or used by a run."""
-        starts = set()
-        used = set()
-        for simulation in self.simulations.values():
-            starts.add(simulation.start)
-            used.add(simulation.followed_series)
-            if simulation.shapes:
-                chain = self.chains[simulation.start.id, simulation.shapes]
-                used |= {self.series.with_brain(brain) for brain in chain.later}
-        for name, brains in self.series.brains.items():
-            if several_subjects(brains):
-                continue
-            is_of_atlas = all(brain.id in self.atlases for brain in brains)
-            # brains without a subject may be different fetuses
-            if brains[0].config.subject or is_of_atlas or starts & {*brains}:
-                used.add(name)
-        return [name for name in self.series.brains if name in used]
-
-    def growth_source(self, simulation: Simulation) -> str:
-        """Describe whose measured growth a simulation follows, or return ""."""
-        if simulation.shapes:
-            chain = self.chains[simulation.start.id, simulation.shapes]
-            brains = chain.later if simulation.shapes == "atlas" else chain.brains
-            name = self.series.with_brain(brains[0])
-        else:
-            name = simulation.followed_series or ""
-            brains = self.series.brains.get(name, ())
-        if several_subjects(brains):
-            return f"population {name}"
-        if simulation.start in brains:
-            return "own"
-        return f"series {name}" if brains else ""
 
     @cached_property
     def with_ensemble(self) -> list[Simulation]:
         """The simulations of runs that have an ensemble."""
-        return [
-            simulation for simulation in self.run_simulations if simulation.ensemble
-        ]
+        return [simulation for simulation in self.run_simulations if simulation.members]
 
     def members(self, simulation: Simulation) -> list[Simulation]:
         """Return the members of a simulation's ensemble."""
-        return [
-            self.simulations[name, simulation.start.id] for name in simulation.ensemble
-        ]
+        return [self.simulations[run, simulation.brain] for run in simulation.members]
 
     # comparison with observed brains
+
+    def observed(self, simulation: Simulation) -> dict[float, Brain]:
+        """Return the brain that a simulation is compared with by week."""
+        observed = {}
+        for row in self.comparisons(simulation):
+            if row.observed is not None:
+                observed[row.week] = self.brains[row.observed]
+        return observed
+
+    def shown(self, simulation: Simulation) -> dict[float, Brain]:
+        """Return the brain that figures show for each week of a simulation, the start
+        brain first."""
+        start = self.brains[simulation.brain]
+        shown = {start.week: start}
+        for row in self.comparisons(simulation):
+            shown[row.week] = self.brains[row.shown]
+        return shown
 
     @cached_property
     def validated(self) -> list[Simulation]:
         """The simulations of runs that are compared with an observed brain."""
         return [
-            simulation for simulation in self.run_simulations if simulation.observed
+            simulation
+            for simulation in self.run_simulations
+            if self.observed(simulation)
         ]
 
     @cached_property
-    def references(self) -> dict[tuple[str, float], tuple[Brain, Brain]]:
-        """The observed brain, and the latest comparable one of an earlier week, by
-        start brain and week."""
+    def references(self) -> dict[tuple[str, float], Comparison]:
+        """The comparisons of validated simulations by start brain and week, which are
+        the same for all runs."""
         references = {}
         for simulation in self.validated:
-            start = simulation.start
-            comparable = start.comparable(self.brains.values())
-            candidates = [brain for brain in comparable if not brain.config.synthetic]
-            for week, observed in simulation.observed.items():
-                earlier = [brain for brain in candidates if brain.week < week]
-                latest = max(earlier, key=lambda brain: brain.week)
-                references[start.id, week] = (observed, latest)
+            for row in self.comparisons(simulation):
+                if row.observed is not None:
+                    references[row.brain, row.week] = row
         return references
 
     @cached_property
@@ -182,54 +223,54 @@ class Study:
     def atlas_brain(self, simulation: Simulation) -> Brain:
         """Return the brain of a prediction's atlas that is closest in week to its
         end."""
-        chain = self.chains[simulation.start.id, "atlas"]
-        return _closest(chain.later, simulation.weeks[-1])
+        chain = self.chains[simulation.brain, "atlas"]
+        return closest(self.brains_of(chain)[1:], simulation.weeks[-1])
 
     @cached_property
     def predictions(self) -> list[Simulation]:
         """The `atlas_predictions`, and other predictions from the same start brains."""
-        starts = {simulation.start for simulation in self.atlas_predictions}
+        starts = {simulation.brain for simulation in self.atlas_predictions}
         return [
             simulation
             for simulation in self.validated
-            if simulation.start in starts and simulation.kind == "predicted"
+            if simulation.brain in starts and simulation.kind == "predicted"
         ]
 
     # measurements
 
     @cached_property
-    def measurements(self) -> dict[str, Measurement]:
-        """The measurements in the tables of the study, of observed and simulated
-        brains, by folder."""
-        rows = [brain.measurement for brain in self.brains.values()]
+    def measured(self) -> dict[str, MeasuredBrain]:
+        """The brains in the tables of the study, observed and simulated, by place."""
+        rows: list[MeasuredBrain] = list(self.brains.values())
         for simulation in self.run_simulations:
-            rows += simulation.measurements
-        return {row.where: row for row in rows}
+            rows += self.rows_of(simulation)
+        return {row.place: row for row in rows}
 
     @cached_property
-    def all_measurements(self) -> dict[str, Measurement]:
-        """All measurements by folder, including those of sweeps at their week of
-        comparison."""
-        rows = {}
-        for sweep in self.sweeps.values():
-            for simulation, _ in sweep.members:
-                row = simulation.at(sweep.week)
-                rows[row.where] = row
-        return rows | self.measurements
+    def all_measured(self) -> dict[str, MeasuredBrain]:
+        """All measured brains by place, including those of further simulations."""
+        rows = {row.place: row for row in self.simulated.values()}
+        return rows | self.measured
 
     @property
     def surfaces(self) -> list[str]:
         files = []
         for brain in self.brains.values():
             patterns = [*paths.pial_of(*brain.sides).values()]
-            if brain.has_thickness:
+            if brain.thickness:
                 patterns += paths.THICKNESS.values()
             files += [pattern.format(**brain.names) for pattern in patterns]
         return files
 
     @cached_property
+    def used_atlases(self) -> list[UsedAtlas]:
+        """The atlases of the study, with the files that exist now."""
+        return used_atlases(self.config)
+
+    @cached_property
     def atlases(self) -> dict[str, Atlas]:
-        """The atlas of each brain of an atlas, by the id of the brain."""
+        """The atlas of each brain of an atlas, refused ones too, by the id of the
+        brain."""
         atlases: dict[str, Atlas] = {}
         for used in self.used_atlases:
             atlases |= {file.brain: used.atlas for file in used.files}
@@ -241,8 +282,8 @@ class Study:
         Brains without named subjects at intervals of half a week or more may be the
         averages of an unknown atlas.
         """
-        brains = [self.brains[brain].config for brain in ids]
-        if any(brain.id in self.atlases for brain in brains):
+        brains = [self.brains[brain] for brain in ids]
+        if any(brain.atlas for brain in brains):
             return False
         weeks = sorted(brain.week for brain in brains)
         is_dense = any(late - early < 0.5 for early, late in pairwise(weeks))
@@ -266,13 +307,15 @@ class Study:
         brains = [brain for brain in self.brains.values() if brain.sides == start.sides]
         reference = self.config.metrics.norm_reference
         if reference is not None:
-            return [brain.id for brain in brains if self._is_named(brain, reference)]
-        brains = [brain for brain in brains if not brain.config.synthetic]
-        if len({brain.config.population for brain in brains}) > 1:
-            population = start.config.population
-            brains = [
-                brain for brain in brains if brain.config.population == population
+            # their ids, or that of their atlas
+            return [
+                brain.id
+                for brain in brains
+                if brain.id in reference or brain.atlas in reference
             ]
+        brains = [brain for brain in brains if brain.shape is None]
+        if len({brain.population for brain in brains}) > 1:
+            brains = [brain for brain in brains if brain.population == start.population]
         return [brain.id for brain in brains]
 
     @property
@@ -281,36 +324,9 @@ class Study:
         subjects of this one."""
         if self.config.metrics.norms is not None:
             return True
-        subjects = {self.brains[brain].subject for brain in self.norm_reference}
+        subjects = {self.brains[name].subject_name for name in self.norm_reference}
         are_individuals = self.are_individuals(self.norm_reference)
         return len(subjects) >= min_norm_subjects(individuals=are_individuals)
-
-    def _is_named(self, brain: Brain, names: Iterable[str]) -> bool:
-        """Return whether a brain or its atlas is among names."""
-        atlas = self.atlases.get(brain.id)
-        return brain.id in names or (atlas is not None and atlas.name in names)
-
-    @cached_property
-    def colour_groups(self) -> dict[str, str]:
-        """The group of each observed brain: its value of the covariate that colours
-        show.
-
-        That is the first covariate with 2 to `MAX_COLOURS` values and fewer values than
-        subjects.
-        """
-        brains: dict[str, list[Brain]] = {}
-        for brain in self.brains.values():
-            for name in brain.config.covariates:
-                brains.setdefault(name, []).append(brain)
-        for name, with_value in brains.items():
-            groups = {}
-            for brain in with_value:
-                groups[brain.id] = f"{name}: {brain.config.covariates[name]}"
-            n_groups = len(set(groups.values()))
-            n_subjects = len({brain.subject for brain in with_value})
-            if 1 < n_groups <= MAX_COLOURS and n_groups < n_subjects:
-                return groups
-        return {}
 
     @property
     def scans(self) -> dict[str, list[str]]:
@@ -318,7 +334,7 @@ class Study:
         order of weeks."""
         scans: dict[str, list[Brain]] = {}
         for brain in self.brains.values():
-            if brain.config.subject is not None:
+            if brain.subject is not None:
                 scans.setdefault(brain.subject, []).append(brain)
         several = {}
         for subject in sorted(scans):
@@ -327,22 +343,6 @@ class Study:
                 several[subject] = [brain.id for brain in by_week]
         return several
 
-    def similar_in_thickness(self, brain: Brain) -> Brain | None:
-        """Return the brain whose measured thickness fills another one's pial surface;
-        None if none is measured.
-
-        It is the brain with labels, or else with white surfaces, that is closest in
-        week.
-        """
-        measured = []
-        labelled = []
-        for other in self.brains.values():
-            if other.has_thickness and other is not brain:
-                measured.append(other)
-                if other.labels is not None:
-                    labelled.append(other)
-        return _closest(labelled or measured, brain.week) if measured else None
-
     @property
     def filled(self) -> list[dict[str, Any]]:
         """The brains that are filled to labels for the growth of runs: ids, by source
@@ -350,81 +350,78 @@ class Study:
 
         The source is "white", "measured" (on a similar brain) or "typical".
         """
-        chains = {}
-        for simulation in self.run_simulations:
-            if simulation.shapes:
-                key = (simulation.start.id, simulation.shapes)
-                chains[key] = self.chains[key]
         groups: dict[tuple[str, bool], dict[str, None]] = {}
-        for chain in chains.values():
-            for pair, posed in chain.pairs:
-                by_cortex = all(brain.registered.scheme.cortex for brain in pair)
-                for brain, is_posed in zip(pair, posed, strict=True):
-                    if is_posed:
-                        group = (self._cortex_source(brain), by_cortex)
-                        groups.setdefault(group, {})[brain.id] = None
+        for link in self._followed_links:
+            pair = (self.brains[link.earlier], self.brains[link.later])
+            by_cortex = all(self._has_cortex(brain) for brain in pair)
+            for brain, is_posed in zip(pair, link.posed, strict=True):
+                if is_posed:
+                    group = (self._cortex_source(brain), by_cortex)
+                    groups.setdefault(group, {})[brain.id] = None
         return [
             {"ids": list(ids), "cortex": cortex, "by_cortex": by_cortex}
             for (cortex, by_cortex), ids in groups.items()
         ]
 
+    @property
+    def _followed_links(self) -> list[Link]:
+        """The links of the chains that runs, without their ensembles, follow."""
+        files: list[str] = []
+        for simulation in self.run_simulations:
+            if simulation.chain is not None:
+                chain = self.chains[simulation.brain, simulation.chain]
+                files += chain.links
+                if chain.path is not None:
+                    files += self.chains[chain.path, PATH].links
+        return [self.links[file] for file in files]
+
     def _cortex_source(self, brain: Brain) -> str:
-        if brain.config.white_files:
+        if brain.white_files:
             return "white"
-        return "measured" if self.similar_in_thickness(brain) else "typical"
+        return "measured" if brain.thickness_of else "typical"
 
-    # regions, and maps at the vertices of the template
+    def _has_cortex(self, brain: Brain) -> bool:
+        return bool(registered_source(self.config, brain).scheme.cortex)
 
-    def region_source(self, name: str) -> Brain:
-        """Return the brain with regions of its own that is closest in week to a
-        brain."""
-        sources = [
-            brain for brain in self.brains.values() if brain.regions_from == "given"
-        ]
-        return _closest(sources, self.brains[name].week)
+    # export
 
     @cached_property
     def exported(self) -> list[ExportedBrain]:
         """Each observed or simulated brain for the export."""
         return [
-            self._exported(row, self.brains[row.subject])
-            for row in self.measurements.values()
+            self._exported(row, self.brains[row.id]) for row in self.measured.values()
         ]
 
-    def _exported(self, row: Measurement, brain: Brain) -> ExportedBrain:
+    def _exported(self, row: MeasuredBrain, brain: Brain) -> ExportedBrain:
         is_observed = row.run == MEASURED
         volume: dict[str, Any] = {}
         if brain.labels and not is_observed:
             volume = {
-                "labels": brain.labels,
-                "surface": row.parts["whole"],
+                "labels": label_source(self.config, brain),
+                "surface": row.pial,
                 "thickness": row.thickness,
             }
-        white = {}
-        white_maps = {}
+        white = brain.white if is_observed else ()
+        white_maps = brain.white_maps if is_observed else ()
         template_maps = {}
-        files = paths.white_of(*row.sides)
         template = self.brains.get(self.config.metrics.template or "")
         for side in row.sides:
-            if brain.has_white and is_observed:
-                white[side] = files[f"{side}_surface"].format(**brain.names)
-                white_maps[side] = files[f"{side}_maps"].format(**brain.names)
             # the template may have been refused
             if template is not None and side in template.sides:
-                place = {"where": row.where, "side": side}
+                place = {"where": row.place, "side": side}
                 template_maps[side] = paths.TEMPLATE_MAPS.format(**place)
         return ExportedBrain(
-            brain=row.subject,
+            brain=row.id,
             run=row.run,
             week=row.week,
-            subject=brain.subject,
+            subject=brain.subject_name,
             surfaces=dict(zip(row.sides, row.hemispheres, strict=True)),
             maps=dict(zip(row.sides, row.maps, strict=True)),
-            regions=dict(zip(SIDES, row.regions.values(), strict=False)),
+            regions=dict(zip(SIDES, row.regions, strict=False)),
             report=brain.report,
-            covariates=brain.config.covariates,
-            white=white,
-            white_maps=white_maps,
+            covariates=brain.covariates,
+            white=dict(zip(row.sides, white, strict=False)),
+            white_maps=dict(zip(row.sides, white_maps, strict=False)),
             template=self.config.metrics.template,
             template_maps=template_maps,
             volume=volume,
@@ -439,9 +436,10 @@ class Study:
         simulation = self.prediction
         if simulation is None:
             return None
-        last = simulation.measurements[-1]
+        start = self.brains[simulation.brain]
+        last = self.rows_of(simulation)[-1]
         atlas_brain = self.atlas_brain(simulation)
-        exported = self._exported(last, simulation.start)
+        exported = self._exported(last, start)
         labels = None
         if exported.volume:
             labels = labels_file("results/export", exported, self.exported)
@@ -449,19 +447,79 @@ class Study:
         atlas_keys = {"name", "title", "licence", "reference"}
         return {
             **simulation.names,
-            "start_week": simulation.start.week,
+            "start_week": start.week,
             "week": last.week,
             "atlas_brain": atlas_brain.id,
             "atlas_week": atlas_brain.week,
             # the population whose growth was used
-            "population": atlas_brain.population,
+            "population": atlas_brain.population_name,
             "atlas": atlas and atlas.model_dump(include=atlas_keys),
             "surfaces": [*last.parts.values()],
-            "atlas_surface": simulation.atlas_surface,
+            "atlas_surface": self.atlas_surface(simulation),
             "labels": labels,
         }
 
+    @staticmethod
+    def atlas_surface(prediction: Simulation) -> str:
+        """Return the file with the atlas' own brain in the last week of a
+        prediction."""
+        return prediction.file(paths.ATLAS_BRAIN, week=prediction.weeks[-1])
 
-def _closest(brains: Iterable[Brain], week: float) -> Brain:
-    """Return the first of the brains that are closest to a week."""
-    return min(brains, key=lambda brain: abs(brain.week - week))
+
+# the tables on disk
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the plan: the class of its rows, and the key of a row in the field of
+    `Study` with the table's name."""
+
+    kind: type
+    key: Callable[[Any], Any]
+
+
+TABLES = {
+    "brains": Table(Brain, attrgetter("id")),
+    "simulations": Table(Simulation, attrgetter("run", "brain")),
+    "simulated": Table(MeasuredBrain, attrgetter("run", "id", "week")),
+    "compared": Table(Comparison, attrgetter("run", "brain", "week")),
+    "links": Table(Link, attrgetter("file")),
+    "chains": Table(Chain, attrgetter("brain", "name")),
+    "series": Table(GrowthSeries, attrgetter("name")),
+    "sweeps": Table(SweepRun, attrgetter("sweep", "member", "brain")),
+    "calibration": Table(CalibrationRun, attrgetter("run", "brain")),
+    "left_out": Table(LeftOut, attrgetter("brain", "why")),
+    "downloads": Table(Download, attrgetter("file")),
+}
+
+
+def study_of(config: Config, rows: Mapping[str, Iterable[Any]]) -> Study:
+    """Return the study with the rows of each table."""
+    tables = {}
+    for name, table in TABLES.items():
+        tables[name] = {table.key(row): row for row in rows[name]}
+    return Study(config, **tables)
+
+
+def write_plan(study: Study, folder: Path) -> None:
+    """Write the tables and the configuration of a study, those that have changed."""
+    for name, table in TABLES.items():
+        rows = getattr(study, name).values()
+        write_rows(folder / f"{name}.csv", table.kind, rows)
+    plain = study.config.model_dump(mode="json", exclude_unset=True)
+    text = yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)
+    write_changed(folder / "config.yaml", text)
+
+
+def read_plan(folder: Path) -> Study:
+    """Return the study whose plan is in a folder; InputError if there is none."""
+    rows: dict[str, list[Any]] = {}
+    for name, table in TABLES.items():
+        rows[name] = read_rows(folder / f"{name}.csv", table.kind)
+    # a file of an atlas may be missing
+    awaited: list[str | None] = []
+    for brain in rows["brains"]:
+        awaited += [*brain.files, *brain.white_files.values(), brain.image]
+    context = {"folder": str(folder), "awaited": awaited}
+    plain = read_keys(folder / "config.yaml")
+    return study_of(Config.model_validate(plain, context=context), rows)

@@ -155,9 +155,9 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(
     assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
     study = resolve(config)
     assert [
-        (simulation.start.id, simulation.shapes) for simulation in study.run_simulations
+        (simulation.brain, simulation.shapes) for simulation in study.run_simulations
     ] == [(FOUND, "atlas")]
-    assert [brain.id for brain in study.chains[FOUND, "atlas"].later] == [
+    assert list(study.chains[FOUND, "atlas"].later) == [
         brain.id for brain in config.brains[1:]
     ]
     asked = (tmp_path / "asked.txt").read_text()
@@ -243,9 +243,7 @@ def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(
     )
     study = resolve(load(section))
     assert all(
-        Path(file).is_file()
-        for brain in study.brains.values()
-        for file in brain.config.files
+        Path(file).is_file() for brain in study.brains.values() for file in brain.files
     )
     # growth towards shapes is not by layers
     assert list(coarse_cortices(study)) == []
@@ -444,9 +442,8 @@ def test_a_brain_is_predicted_from_its_surfaces(
     assert yaml.safe_load(plain) == source
     study = resolve(load(section))
     (simulation,) = study.run_simulations
-    assert [
-        brain.week for brain in study.chains[simulation.start.id, "atlas"].later
-    ] == [23, 24, 25]
+    chain = study.chains[simulation.brain, "atlas"]
+    assert chain.weeks[1:] == (23, 24, 25)
     assert [group["ids"] for group in study.filled] == [[entry["id"]]]
 
 

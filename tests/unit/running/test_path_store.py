@@ -61,7 +61,7 @@ def paths(tmp_path):
             "folding": {"preset": "expected", "end_week": 22},
         }
         study = resolve(load(config | settings, tmp_path))
-        return study, study.chains["start", "atlas"].path
+        return study, study.paths[study.chains["start", "atlas"].path]
 
     return path
 
@@ -90,7 +90,7 @@ def test_a_path_is_kept_next_to_its_atlas_until_its_key_or_its_file_is_another(
     study, path = paths()
     folder = path_store.store_folder(study, path)
     assert folder == tmp_path / "paths"
-    store = folder / stored_name(path.brains[0].id, "key")
+    store = folder / stored_name(path.brain, "key")
     assert path_store.kept_path(study, path, "key") is None
     folder.mkdir()
     shapes = WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key")
@@ -107,7 +107,7 @@ def test_a_path_is_kept_next_to_its_atlas_until_its_key_or_its_file_is_another(
 def test_a_study_has_the_path_that_was_made_from_the_same(paths, tmp_path, monkeypatch):
     _, path = paths()
     monkeypatch.chdir(tmp_path)
-    file = tmp_path / ATLAS_PATH.format(brain=path.brains[0].id)
+    file = tmp_path / ATLAS_PATH.format(brain=path.brain)
     assert not path_store.has_path(path, "key")
     file.parent.mkdir(parents=True)
     write_weekly_shapes(
@@ -211,12 +211,13 @@ def test_a_path_has_another_key_after_a_change_of_the_code_behind_its_scripts(
 
 def test_a_path_is_made_from_every_brain_whose_thickness_fills_one_of_its(paths):
     """Also where two of these are of one week."""
-    _, path = paths()
-    first, second, third = path.brains[:3]
-    same_week = third.config.model_copy(update={"week": first.week})
-    third = replace(third, config=same_week)
-    assert third.week == first.week
-    similar = {first.id: third, second.id: first}
-    study = SimpleNamespace(similar_in_thickness=lambda brain: similar[brain.id])
-    pairs = SimpleNamespace(pairs=[((first, second), (True, True))])
-    assert path_store._thickness_sources(study, pairs) == [third, first]
+    study, path = paths()
+    first, second, third = study.brains_of(path)[:3]
+    third = replace(third, week=first.week)
+    first = replace(first, thickness_of=third.id)
+    second = replace(second, thickness_of=first.id)
+    brains = {brain.id: brain for brain in (first, second, third)}
+    link = replace(study.links[path.links[0]], posed=(True, True))
+    study = SimpleNamespace(brains=brains, links={link.file: link})
+    path = replace(path, links=(link.file,))
+    assert path_store._thickness_sources(study, path) == [third, first]

@@ -7,8 +7,7 @@ import pytest
 from configurations import (
     LABELLED,
     problems,
-    series_for,
-    series_of,
+    series_ids,
     touched,
     write_atlas,
 )
@@ -86,8 +85,9 @@ def test_populations_are_named_and_never_share_a_curve(tmp_path):
     assert observed_name([found.brains[operated[0]]]) == OPERATED
     both = observed_name(found.brains[brain] for brain in [*unoperated, operated[0]])
     assert both == Facts(f"{UNOPERATED} (21-25 GW)", f"{OPERATED} (25 GW)")
-    assert series_of(found) == {UNOPERATED: unoperated, OPERATED: operated}
-    assert series_for(found, "spina-bifida-unoperated-21") == UNOPERATED
+    assert series_ids(found) == {UNOPERATED: unoperated, OPERATED: operated}
+    (simulation,) = found.run_simulations
+    assert simulation.series == UNOPERATED
     assert found.norm_reference == unoperated
 
 
@@ -101,7 +101,7 @@ def test_a_growth_curve_across_populations_is_refused(tmp_path):
     found = resolve(
         load(study("spina-bifida", mixed[0], growth={"brains": mixed}), tmp_path)
     )
-    assert series_of(found) == {}
+    assert series_ids(found) == {}
 
 
 def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_path):

@@ -6,8 +6,8 @@ from configurations import LABELLED, keys, problems, study, touched
 from facts import Facts
 
 from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.study.brains import label_scheme
 from gyriflow.study.loading import load
-from gyriflow.study.resolve import label_scheme
 
 MINE = {"cerebrum": [1, 2], "cortex": [2], "known": {9: "outer CSF"}}
 
@@ -179,7 +179,7 @@ def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
     config = load(
         one(labels="a.nii.gz", scheme="mine") | {"schemes": {"mine": MINE}}, folder
     )
-    scheme = label_scheme(config, config.brains[0])
+    scheme = label_scheme(config, config.brains[0].scheme)
     assert (scheme.name, scheme.cerebrum, scheme.cortex, scheme.known) == (
         "mine",
         (1, 2),
@@ -187,7 +187,7 @@ def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
         {9: "outer CSF"},
     )
     plain = load(one(**LABELLED))
-    assert label_scheme(plain, plain.brains[0]) == SCHEMES["spina-bifida-atlas"]
+    assert label_scheme(plain, plain.brains[0].scheme) == SCHEMES["spina-bifida-atlas"]
 
 
 def test_all_mistakes_in_schemes_are_named_at_once():

@@ -5,11 +5,12 @@ import pytest
 from configurations import (
     LABELLED,
     both_kinds,
+    growth_series,
     labelled,
     problems,
     resolved,
     series_for,
-    series_of,
+    series_ids,
     study,
     touched,
 )
@@ -53,7 +54,7 @@ def series(folder, *files, **changes):
         }
         for number, (name, file) in enumerate(zip("abcdef", files, strict=False))
     ]
-    return resolve(load(RUN | {"brains": brains} | changes, folder)).series
+    return growth_series(load(RUN | {"brains": brains} | changes, folder))
 
 
 def test_equal_triangles_in_any_order_are_matched(folder):
@@ -89,18 +90,16 @@ def test_hemispheres_match_side_by_side(folder):
 
 def test_an_atlas_is_believed_until_its_files_are_there(folder):
     named = {"name": "dhcp-surface", "weeks": [21, 22], "folder": str(folder)}
-    found = resolve(
-        load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)
-    ).series
+    config = {"atlas": named, "start": "first", "folding": {"end_week": 22}}
+    found = growth_series(load(config, folder))
     assert list(found.matched.values()) == [{"dhcp-surface-21", "dhcp-surface-22"}]
     for week, file in ((21, "a.gii"), (22, "fine.gii")):
         for side in ("left", "right"):
             (folder / f"fetal.week{week}.{side}.pial.surf.gii").write_bytes(
                 (folder / file).read_bytes()
             )
-    found = resolve(
-        load({"atlas": named, "start": "first", "folding": {"end_week": 22}}, folder)
-    ).series
+    config = {"atlas": named, "start": "first", "folding": {"end_week": 22}}
+    found = growth_series(load(config, folder))
     assert found.matched == {}
     assert list(found.unmatched.values()) == [Facts("dhcp-surface-22", 642, 162)]
 
@@ -114,7 +113,7 @@ def test_an_atlas_is_believed_until_its_files_are_there(folder):
     ],
 )
 def test_growth_is_of_all_brains_or_those_named(growth, brains):
-    assert series_of(resolved(labelled(21, 22, 22), growth=growth)) == {
+    assert series_ids(resolved(labelled(21, 22, 22), growth=growth)) == {
         "volume": brains
     }
 
@@ -123,13 +122,15 @@ def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_followe
     tmp_path,
 ):
     raw = both_kinds(tmp_path, (21, 22))
-    found = resolve(load(raw, tmp_path))
-    assert series_of(found) == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
-    assert (series_for(found, "s21"), series_for(found, "v21")) == ("surface", "volume")
-    named = resolve(load(raw | {"growth": {"series": "volume"}}, tmp_path))
+    config = load(raw, tmp_path)
+    found = series_ids(resolve(config))
+    assert found == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
+    series = (series_for(config, "s21"), series_for(config, "v21"))
+    assert series == ("surface", "volume")
+    named = load(raw | {"growth": {"series": "volume"}}, tmp_path)
     assert series_for(named, "s21") == "volume"
     chosen = resolve(load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path))
-    assert series_of(chosen) == {"volume": ["v21", "v22"]}
+    assert series_ids(chosen) == {"volume": ["v21", "v22"]}
 
 
 def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(
@@ -146,18 +147,16 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
         for week in (24, 25)
     ]
     brains += [{"id": f"p{week}", "week": week, **LABELLED} for week in (24, 25)]
-    found = resolve(
-        load(
-            study(brains, start="left24", folding={"end_week": 26}),
-            touched(tmp_path, "lh.surf.gii"),
-        )
+    config = load(
+        study(brains, start="left24", folding={"end_week": 26}),
+        touched(tmp_path, "lh.surf.gii"),
     )
-    assert series_of(found) == {
+    assert series_ids(resolve(config)) == {
         "left hemisphere, surface": ["left24", "left25"],
         "right hemisphere, surface": ["right24", "right25"],
         "volume": ["p24", "p25"],
     }
-    assert series_for(found, "left24") == "left hemisphere, surface"
+    assert series_for(config, "left24") == "left hemisphere, surface"
 
 
 def test_averages_are_no_individuals():
@@ -212,7 +211,8 @@ def test_charts_are_coloured_by_a_covariate_that_groups_subjects():
         {"id": f"b{n}", "week": 21, "covariates": values, **LABELLED}
         for n, values in enumerate(covariates)
     ]
-    groups = resolve(load({"brains": brains})).colour_groups
+    found = resolve(load({"brains": brains})).brains
+    groups = {name: brain.group for name, brain in found.items()}
     # all are of one site, and each has its own mother
     assert groups == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
 
@@ -243,10 +243,12 @@ def test_only_brains_whose_differences_are_growth_have_rates(keys, changes, name
     ]
     found = resolved(brains, **changes)
     assert len(found.growth_brains) == 3
-    assert found.series_with_rates == names
+    with_rates = [series.name for series in found.series.values() if series.has_rates]
+    assert with_rates == names
 
 
 def test_an_atlas_has_rates_without_runs(folder):
     named = {"name": "spina-bifida", "weeks": [21, 22]}
     found = resolve(load(study(labelled(23, 24), atlas=named, **MEASURED), folder))
-    assert found.series_with_rates == ["spina bifida aperta, unoperated"]
+    with_rates = [series.name for series in found.series.values() if series.has_rates]
+    assert with_rates == ["spina bifida aperta, unoperated"]

@@ -6,6 +6,7 @@ from facts import Facts
 
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
+from gyriflow.study.records import mapped_parameters, parameters
 
 
 def study(folding, **others):
@@ -45,7 +46,7 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
             tmp_path,
         )
     ).run_simulations
-    settings = with_maps.parameters
+    settings = parameters(with_maps.settings)
     assert {name: settings[name] for name in mapped} == {
         "thickness_mm": {"map": "thickness_mm"},
         "growth_rate_per_s": {
@@ -57,9 +58,8 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     }
     assert list(settings["growth_rate_per_s"]["weeks"]) == [21.0, 30.0]
     assert "ranks" not in settings
-    given = {
-        name: (value.map, value.surface) for name, value in with_maps.mapped.items()
-    }
+    mapped = mapped_parameters(with_maps.settings)
+    given = {name: (value.map, value.surface) for name, value in mapped.items()}
     left, right = (str(tmp_path / side) for side in ("left", "right"))
     assert given == {
         "thickness_mm": tuple(
@@ -68,8 +68,8 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
         "growth_rate_per_s": (f"{left}.gii", f"{left}.surf.gii"),
         "shear_modulus_core_pa": (str(tmp_path / "soft.nii.gz"), None),
     }
-    assert plain.mapped == {}
-    assert plain.parameters["thickness_mm"] == 1e-8
+    assert mapped_parameters(plain.settings) == {}
+    assert parameters(plain.settings)["thickness_mm"] == 1e-8
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def resolved(**sections):
 
 
 def members(study, name):
-    return [one.run for one, _ in study.sweeps[name].members]
+    return [row.run for row in study.by_sweep[name]]
 
 
 def refusal(**sections):
@@ -70,7 +70,7 @@ def test_a_study_of_a_run_with_two_start_brains_has_its_members_from_both():
     study = {"base": "reference", "vary": vary, "compare_week": 26}
     brains = [*BRAINS, {"id": "c", "week": 26, **LABELLED}]
     found = resolved(brains=brains, runs=runs, studies={"both": study})
-    starts = [(one.run, one.start.id) for one, _ in found.sweeps["both"].members]
+    starts = [(row.run, row.brain) for row in found.by_sweep["both"]]
     assert sorted(starts) == [
         ("both-1", "a"),
         ("both-1", "b"),
@@ -82,7 +82,9 @@ def test_a_study_of_a_run_with_two_start_brains_has_its_members_from_both():
 def test_a_study_makes_a_run_of_each_combination():
     vary = {"thickness_mm": [1, 2], "max_halvings": [2, 3]}
     found = resolved(studies={"both": THICKNESS | {"vary": vary}})
-    runs = {one.run: one.settings for one, _ in found.sweeps["both"].members}
+    runs = {}
+    for row in found.by_sweep["both"]:
+        runs[row.run] = found.simulations[row.run, row.brain].settings
     assert list(runs) == ["both-1-2", "both-1-3", "both-2-2", "both-2-3"]
     values = [(run.thickness_mm, run.max_halvings) for run in runs.values()]
     assert values == [(1, 2), (1, 3), (2, 2), (2, 3)]
@@ -183,7 +185,7 @@ def test_comparison_prefers_the_starts_population(tmp_path):
         (brains, {"compare_with": ["b"]}, "b"),
     ):
         found = resolved(brains=known, studies={"thickness": THICKNESS | asked})
-        assert [brain.id for brain in found.sweeps["thickness"].observed["a"]] == [real]
+        assert found.by_sweep["thickness"][0].observed == (real,)
 
 
 def test_the_run_of_a_single_value_may_differ_further():
@@ -191,11 +193,12 @@ def test_the_run_of_a_single_value_may_differ_further():
         "fixed": {"shear_modulus_cortex_pa": 3000, "step_s": 86400},
         "fixed_at": {1.5: {"step_s": 43200}},
     }
-    found = [
-        (one.run, one.settings.step_s, values)
-        for one, values in resolved(studies={"s": study}).sweeps["s"].members
-    ]
-    assert found == [
+    found = resolved(studies={"s": study})
+    rows = []
+    for row in found.by_sweep["s"]:
+        settings = found.simulations[row.run, row.brain].settings
+        rows.append((row.run, settings.step_s, row.values))
+    assert rows == [
         ("s-0.8", 86400, {"thickness_mm": 0.8}),
         ("s-1.5", 43200, {"thickness_mm": 1.5}),
     ]
@@ -226,8 +229,8 @@ def test_what_is_wrong_with_a_study_is_said(change, key, facts):
 
 def test_values_that_agree_in_six_digits_are_runs_of_their_own():
     study = THICKNESS | {"vary": {"thickness_mm": [1.0, 1.0000001, 1.0000002]}}
-    found = resolved(studies={"s": study}).sweeps["s"].members
-    assert [(member.run, values["thickness_mm"]) for member, values in found] == [
+    found = resolved(studies={"s": study}).by_sweep["s"]
+    assert [(row.run, row.values["thickness_mm"]) for row in found] == [
         ("s-1", 1.0),
         ("s-1.0000001", 1.0000001),
         ("s-1.0000002", 1.0000002),

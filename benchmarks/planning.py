@@ -1,0 +1,107 @@
+"""Measure how long a study of many brains takes to plan: its tables, a dry run, the
+start of one of its jobs, and with `--check` its check.
+
+    ./run python benchmarks/planning.py [--brains 10 100 1000] [--check] [--out FOLDER]
+
+Each brain is a link to one shipped label volume, each a subject of its own that is
+measured. A check reads the volumes. Times are CPU seconds of all processes. The
+last line is one JSON object.
+"""
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from common import ROOT
+
+from gyriflow.io.yaml_files import write_yaml
+
+LABELS = (
+    ROOT / "atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz"
+)
+WEEKS = (20.5, 21.0, 21.5)
+PLAN = """
+from pathlib import Path
+from gyriflow.io.yaml_files import read_keys
+from gyriflow.study import resolve
+from gyriflow.study.loading import load
+from gyriflow.study.study import write_plan
+write_plan(resolve(load(read_keys("study.yaml"))), Path("results", "plan"))
+"""
+
+
+def main() -> None:
+    """Measure studies of the given sizes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--brains", type=int, nargs="+", default=[10, 100, 1000])
+    parser.add_argument("--check", action="store_true", help="also measure `check`")
+    parser.add_argument("--out", type=Path)
+    arguments = parser.parse_args()
+    with TemporaryDirectory() as scratch:
+        out = arguments.out or Path(scratch)
+        rows = {}
+        for number in arguments.brains:
+            folder = out / str(number)
+            write_study(folder, number)
+            rows[str(number)] = planning_seconds(folder, has_check=arguments.check)
+            print(number, rows[str(number)], flush=True)
+    print(json.dumps(rows))
+
+
+def write_study(folder: Path, number: int) -> None:
+    """Write a study of a number of brains."""
+    folder.mkdir(parents=True, exist_ok=True)
+    brains: list[dict[str, Any]] = []
+    for index in range(number):
+        scan = folder / f"scan-{index:04}.nii.gz"
+        if not scan.is_symlink():
+            scan.symlink_to(LABELS)
+        brain = {
+            "id": f"b{index:04}",
+            "subject": f"s{index:04}",
+            "week": WEEKS[index % len(WEEKS)],
+            "labels": scan.name,
+            "scheme": "spina-bifida-atlas",
+        }
+        brains.append(brain)
+    write_yaml(folder / "study.yaml", {"brains": brains})
+
+
+def planning_seconds(folder: Path, *, has_check: bool) -> dict[str, float]:
+    """Return the CPU seconds of each way to plan a study."""
+    python = [sys.executable, "-P"]
+    snakefile = ["--snakefile", str(ROOT / "Snakefile")]
+    study = ["--configfile", "study.yaml"]
+    launch = [*python, "-m", "gyriflow.running.launch", *study, "--cores", "1"]
+    job = [*python, "-m", "snakemake", *snakefile, "--mode", "subprocess"]
+    seconds = {
+        "plan": cpu_seconds([*python, "-c", PLAN], folder),
+        "dry_run": cpu_seconds([*launch, "--dry-run", "--quiet", "all"], folder),
+        "job_start": cpu_seconds([*job, "--list-rules"], folder),
+    }
+    if has_check:
+        check = [*python, "-m", "gyriflow.cli", "check", "study.yaml"]
+        seconds["check"] = cpu_seconds(check, folder)
+    return seconds
+
+
+def cpu_seconds(command: list[str], folder: Path) -> float:
+    """Run a command in a folder; return the CPU seconds of its processes."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(
+        command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return round(used, 1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+"""Plan the brains of a study: the files and properties that rules read, one row for
+each brain."""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..io.volumes import LabelSource
+from ..io.yaml_files import SCHEMES
+from ..settings.brains import BrainConfig
+from ..settings.root import Config
+from ..settings.schemes import FILLED, LabelScheme
+from ..settings.terms import MAX_COLOURS, MEASURED, SIDES
+from . import paths
+from .atlases import UsedAtlas, known_checksums
+from .records import Brain, measured_files
+
+
+def plan_brains(
+    config: Config, refused: Collection[str], atlases: Iterable[UsedAtlas]
+) -> dict[str, Brain]:
+    """Return the brains of a configuration that are not refused, by id."""
+    atlases = list(atlases)
+    checksums = known_checksums(atlases)
+    names = _atlas_names(atlases)
+    brains: dict[str, Brain] = {}
+    for settings in config.brains:
+        if settings.id not in refused:
+            brain = _brain(config, settings, checksums)
+            brains[brain.id] = replace(brain, atlas=names.get(brain.id))
+    groups = _groups(brains.values())
+    for name, brain in brains.items():
+        brains[name] = replace(brain, group=groups.get(name))
+    _add_regions(config, brains)
+    _add_thickness_sources(brains)
+    return brains
+
+
+def _brain(
+    config: Config,
+    settings: BrainConfig,
+    checksums: Mapping[str, tuple[str, str]],
+) -> Brain:
+    names = {"brain": settings.id}
+    has_cortex = False
+    if settings.labels is not None:
+        has_cortex = bool(label_scheme(config, settings.scheme).cortex)
+    has_thickness = bool(settings.white_files) or has_cortex
+    measures_all_white = config.metrics.white_surfaces == "all"
+    white = []
+    white_maps = []
+    if settings.white_files or (has_cortex and measures_all_white):
+        patterns = paths.white_of(*settings.sides)
+        for side in settings.sides:
+            white.append(patterns[f"{side}_surface"].format(**names))
+            white_maps.append(patterns[f"{side}_maps"].format(**names))
+    files: dict[str, Any] = measured_files(
+        settings.sides,
+        paths.SURFACE.format(**names),
+        paths.METRICS.format(**names),
+        None,
+    )
+    thickness = paths.THICKNESS["measured"].format(**names) if has_thickness else None
+    known = {path: checksums[path] for path in settings.files if path in checksums}
+    return Brain(
+        id=settings.id,
+        run=MEASURED,
+        week=settings.week,
+        subject=settings.subject,
+        population=settings.population,
+        source=settings.source,
+        labels=settings.labels,
+        scheme=settings.scheme,
+        affine_from=settings.affine_from,
+        image=settings.image,
+        white_files=settings.white_files,
+        coordinates=settings.coordinates,
+        shape=settings.shape,
+        report=paths.PIAL["report"].format(**names),
+        thickness=thickness,
+        white=tuple(white),
+        white_maps=tuple(white_maps),
+        thickness_of=None,
+        regions_of=None,
+        group=None,
+        atlas=None,
+        files=tuple(settings.files),
+        checksums=known,
+        covariates=settings.covariates,
+        **files,
+    )
+
+
+def _atlas_names(atlases: Iterable[UsedAtlas]) -> dict[str, str]:
+    """Return the atlas of each brain that belongs to one, by the id of the brain."""
+    names = {}
+    for used in atlases:
+        for file in used.files:
+            names[file.brain] = used.atlas.name
+    return names
+
+
+def _groups(brains: Iterable[Brain]) -> dict[str, str]:
+    """Return the group of each brain: its value of the covariate that colours show.
+
+    That is the first covariate with 2 to `MAX_COLOURS` values and fewer values than
+    subjects.
+    """
+    by_covariate: dict[str, list[Brain]] = {}
+    for brain in brains:
+        for name in brain.covariates:
+            by_covariate.setdefault(name, []).append(brain)
+    for name, with_value in by_covariate.items():
+        groups = {}
+        for brain in with_value:
+            groups[brain.id] = f"{name}: {brain.covariates[name]}"
+        n_groups = len(set(groups.values()))
+        n_subjects = len({brain.subject_name for brain in with_value})
+        if 1 < n_groups <= MAX_COLOURS and n_groups < n_subjects:
+            return groups
+    return {}
+
+
+def _add_regions(config: Config, brains: dict[str, Brain]) -> None:
+    """Add the regions of each whole brain: its own, or those of the brain closest in
+    week that has some."""
+    with_regions = {}
+    for name, brain in brains.items():
+        if name in config.metrics.regions and brain.sides == SIDES:
+            with_regions[name] = brain
+    for name, brain in brains.items():
+        if brain.sides != SIDES or not with_regions:
+            continue
+        if name in with_regions:
+            source = brain
+        elif brain.shape is None:
+            source = closest(with_regions.values(), brain.week)
+        else:
+            continue
+        regions = paths.region_files(brain.folder).values()
+        brains[name] = replace(brain, regions_of=source.id, regions=tuple(regions))
+
+
+def _add_thickness_sources(brains: dict[str, Brain]) -> None:
+    """Add, for each brain without labels, the brain whose measured thickness is taken
+    for its own.
+
+    It is the brain with labels, or else with white surfaces, that is closest in week.
+    """
+    for name, brain in brains.items():
+        if brain.labels is not None:
+            continue
+        measured = []
+        for other in brains.values():
+            if other.thickness is not None and other.id != name:
+                measured.append(other)
+        if measured:
+            labelled = [other for other in measured if other.labels is not None]
+            source = closest(labelled or measured, brain.week)
+            brains[name] = replace(brain, thickness_of=source.id)
+
+
+def closest(brains: Iterable[Brain], week: float) -> Brain:
+    """Return the first of the brains that are closest to a week."""
+    return min(brains, key=lambda brain: abs(brain.week - week))
+
+
+def comparable(brain: Brain, brains: Iterable[Brain]) -> list[Brain]:
+    """Return the brains with the same hemispheres, population and subject.
+
+    A brain without a population or subject, as of an atlas, may be compared with any.
+    """
+    found = []
+    for other in brains:
+        is_of_population = brain.population in (None, other.population)
+        is_of_subject = brain.subject is None or other.subject in (None, brain.subject)
+        if other.sides == brain.sides and is_of_population and is_of_subject:
+            found.append(other)
+    return found
+
+
+# meaning of labels
+
+
+def label_scheme(config: Config, name: str | None) -> LabelScheme:
+    """Return a label scheme by name; KeyError if there is none."""
+    key = str(name)
+    if key not in config.schemes:
+        return SCHEMES[key]
+    settings = config.schemes[key].model_dump()
+    return LabelScheme(name=key, **settings)
+
+
+def label_source(config: Config, brain: Brain) -> LabelSource | None:
+    """Return the label volume of a brain with its meaning; None if it has none."""
+    if brain.labels is None:
+        return None
+    scheme = label_scheme(config, brain.scheme)
+    return LabelSource(brain.labels, brain.affine_from, scheme)
+
+
+def registered_source(config: Config, brain: Brain) -> LabelSource:
+    """Return the volume for the registration of a brain: its labels, or those that its
+    surfaces are filled with."""
+    labels = label_source(config, brain)
+    if labels is not None:
+        return labels
+    filled = paths.FILLED_LABELS.format(**brain.names)
+    return LabelSource(filled, "auto", FILLED)

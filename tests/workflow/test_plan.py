@@ -1,0 +1,28 @@
+"""The plan of a study on disk: a job reads it instead of the configuration."""
+
+import pytest
+from configurations import resolved
+from planned_figures import planned_figures
+from snakemake_interface_executor_plugins.settings import ExecMode
+
+from gyriflow.study.study import write_plan
+
+SHAPES = [{"id": f"b{week}", "week": week, "shape": {}} for week in (21, 22)]
+
+
+@pytest.mark.parametrize("mode", [ExecMode.SUBPROCESS, ExecMode.REMOTE])
+def test_a_job_reads_the_plan_and_not_the_configuration(tmp_path, mode):
+    found = resolved(SHAPES, start="b21", folding={"end_week": 22})
+    write_plan(found, tmp_path / "results" / "plan")
+    # what the configuration says meanwhile is for the next run
+    changed = {"brains": "nonsense"}
+    figures, names = planned_figures(tmp_path, changed, mode=mode)
+    assert list(names["BRAINS"]) == ["b21", "b22"]
+    drawn = {figure.name for figure in figures}
+    assert {"quality_page", "weekly_figure", "metrics_figure"} <= drawn
+
+
+def test_a_job_without_a_plan_ends_with_the_name_of_the_file(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        planned_figures(tmp_path, {"brains": []}, mode=ExecMode.SUBPROCESS)
+    assert "results/plan" in capsys.readouterr().err
