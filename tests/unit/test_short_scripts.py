@@ -177,9 +177,10 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     common = {"hemisphere": "left", "proxy": "mean_curvature", "run": "real"}
     common |= {"complete": True, "resolved": True, "week": 25.0}
     spectra = [bands.assign(subject=brain, **common) for brain in ("b0", "b1")]
-    # all power one octave further
-    shifted = np.roll(np.eye(6)[3], 1)
-    spectra[0][PART_POWERS] = np.eye(6)[3][:, None] * np.ones(16)
+    # nearly all power, one octave further
+    powers = np.eye(6)[3] + 1e-9
+    shifted = np.roll(powers, 1)
+    spectra[0][PART_POWERS] = powers[:, None] * np.ones(16)
     spectra[1][PART_POWERS] = shifted[:, None] * np.ones(16)
     write_table(tmp_path / "spectra.csv", pd.concat(spectra))
     noise = {"metrics": {"area": {"cv": 0.01}}, "distances": {}}

@@ -487,7 +487,7 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
     return (
         unchecked
         if pose.by == "default"
-        else _pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
+        else pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
     )
 
 
@@ -644,10 +644,10 @@ def pose_of_labels(
     by = " and ".join(
         [*hindbrain, *(["the labelled sides"] if sides is not None else [])]
     )
-    return _pose_from_rotation(rotation, by, sides is not None)
+    return pose_from_rotation(rotation, by, sides is not None)
 
 
-def _pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
+def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
     """Return the pose of a volume that an estimated (3, 3) rotation about its origin
     would bring to RAS+.
 

@@ -72,7 +72,7 @@ def run(
             None,
             (
                 message,
-                *_delete_old_checkpoints(out, folder),
+                *delete_old_checkpoints(out, folder),
                 shortened_step_note(parameters),
             ),
         ):
@@ -164,7 +164,7 @@ def simulate(
                     ):
                         log.warning(warning)
                 write_checkpoint(folder / "state.h5", key, state)
-                _report_step(
+                report_step(
                     state,
                     p.end_week,
                     (time.monotonic() - resumed) / (len(state.rows) - resumed_after),
@@ -203,7 +203,7 @@ def _save_frame(folding: Folding, state: State, week: float, folder: Path) -> St
     return replace(state, growth=None, growth_s=0.0)
 
 
-def _report_step(state: State, end_week: float, seconds_per_step: float) -> None:
+def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
     """Print the progress line of the last step: week, iterations, displacement,
     time."""
     row = state.rows[-1]
@@ -315,7 +315,7 @@ def _seconds_to(week: float, parameters: FoldingParameters) -> float:
     return (week - parameters.start_week) * SECONDS_PER_GW
 
 
-def _delete_old_checkpoints(out: Path, own: Path) -> list[str]:
+def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
     """Delete all but the newest two checkpoints of other meshes or parameters, and
     return messages about these two."""
     folders = [path for path in out.glob("checkpoint-*") if path != own]
