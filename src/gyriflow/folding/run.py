@@ -65,7 +65,7 @@ def run(
     key = run_key(mesh, parameters, maps)
     folder = out / f"checkpoint-{key}"
     state, message = comm.bcast(
-        _load_state(folder, key, parameters) if comm.rank == 0 else None, root=0
+        load_state(folder, key, parameters) if comm.rank == 0 else None, root=0
     )
     if comm.rank == 0:
         for note in filter(
@@ -88,7 +88,7 @@ def run(
         reached = parameters.start_week + state.time_s / SECONDS_PER_GW
         weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
         join_frames(
-            out / FRAMES, mesh.tets, [_frame_path(folder, week) for week in weeks]
+            out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks]
         )
         seconds = time.monotonic() - began
         summary = {
@@ -96,7 +96,7 @@ def run(
             "dofs": 3 * len(mesh.vertices),
             "pial_faces": len(zones.facets),
             "ranks": comm.size,
-            **_steps_summary(state.rows),
+            **steps_summary(state.rows),
             "seconds": seconds,
             "cpu_seconds": processor,
             "peak_memory_MiB": memory,
@@ -198,7 +198,7 @@ def _save_frame(folding: Folding, state: State, week: float, folder: Path) -> St
         )
         smoothing = {} if logs is None else {"growth_smoothing_mm": GROWTH_SMOOTHING_MM}
         write_frame(
-            _frame_path(folder, week), week, fields | pressure, elements, smoothing
+            frame_path(folder, week), week, fields | pressure, elements, smoothing
         )
     return replace(state, growth=None, growth_s=0.0)
 
@@ -225,7 +225,7 @@ def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
     )
 
 
-def _steps_summary(rows: Sequence[dict]) -> dict[str, float]:
+def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
     """Return totals over the step table."""
     return {
         "steps": len(rows),
@@ -258,7 +258,7 @@ def quality_note(
     return text, flat > MAX_FLAT_SHARE * len(ratios)
 
 
-def _load_state(
+def load_state(
     folder: Path, key: str, parameters: FoldingParameters
 ) -> tuple[State | None, str]:
     """Return the state to resume from, or None, and a message for the user.
@@ -276,7 +276,7 @@ def _load_state(
         for week in parameters.output_weeks
         if _seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)
     ]
-    if not all(_frame_path(folder, week).exists() for week in passed):
+    if not all(frame_path(folder, week).exists() for week in passed):
         return (
             None,
             (
@@ -305,7 +305,7 @@ def _load_state(
     return replace(state, rows=within), message
 
 
-def _frame_path(folder: Path, week: float) -> Path:
+def frame_path(folder: Path, week: float) -> Path:
     """Return the file of a single frame, which exists until the run has ended."""
     return folder / f"frame-{week_tag(week)}.h5"
 
