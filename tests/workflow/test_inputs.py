@@ -29,7 +29,9 @@ def planned(checkout_copy, tmp_path_factory):
     plans, by output."""
 
     def inputs(config, *targets):
-        workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("planned"))
+        folder = tmp_path_factory.mktemp("planned")
+        (folder / "regions.nii.gz").touch()
+        workflow = Workflow(checkout_copy, folder)
         outcome = workflow.run(
             "-n", *targets, "--configfile", workflow.write("study.yaml", config)
         )
@@ -51,7 +53,7 @@ def jobs(planned):
     """Brains of four weeks, the first folded, beside a sweep; the third has regions, to
     the second maps are brought."""
     brains = population("b", 21, 22, 23, 24)
-    regions = {"b23": {"labels": brains[0]["labels"], "names": {1: "frontal"}}}
+    regions = {"b23": {"labels": "regions.nii.gz", "names": {1: "frontal"}}}
     sweep = {
         "base": "reference",
         "vary": {"thickness_mm": [1.0, 2.0]},

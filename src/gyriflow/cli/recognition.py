@@ -128,6 +128,11 @@ class FoundBrain:
         source = self.entry.get("labels") or self.entry.get("pial")
         return str(source or ", ".join(self.entry["hemispheres"].values()))
 
+    @property
+    def is_whole_surface(self) -> bool:
+        """Whether it is one surface of both hemispheres."""
+        return "pial" in self.entry and "side" not in self.entry
+
 
 @dataclass
 class FoundScans:
@@ -317,7 +322,7 @@ def _brains_of_scan(
         _complete(brain, folder, tables, sessions_of)
         if (
             brain.is_unreadable
-            and "pial" in brain.entry
+            and brain.is_whole_surface
             and not LAYER_NAME.search(brain.file.name)
         ):
             unused[brain.files] = brain.problem
@@ -611,7 +616,7 @@ def _complete(
             brain.fits = scheme_fits(
                 read_label_volume(folder / brain.file, cropped=True).labels
             )
-        elif "pial" in brain.entry:
+        elif brain.is_whole_surface:
             _require_brain(folder / brain.file)
         else:
             for path in (

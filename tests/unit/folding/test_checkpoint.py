@@ -92,13 +92,13 @@ def test_the_key_depends_on_what_decides_a_state_and_on_nothing_else():
     same = [
         {"ranks": 7},
         {"end_week": 23.0, "output_weeks": [21.0, 23.0]},
-        {"solver": {"max_halvings": 2}},
+        {"max_halvings": 2},
     ]
     for change in same:
         assert run_key(mesh, base, {}) == run_key(
             mesh, parameters_from(VALUES | change), {}
         )
-    for change in ({"step_s": 7e4}, {"solver": {"newton_tolerance": 1e-3}}):
+    for change in ({"step_s": 7e4}, {"newton_tolerance": 1e-3}):
         assert run_key(mesh, base, {}) != run_key(
             mesh, parameters_from(VALUES | change), {}
         )
