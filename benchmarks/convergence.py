@@ -16,8 +16,9 @@ material points.
 Runs are done one after another on one rank; finished runs in FOLDER are not repeated.
 Each run prints a JSON line. The last line is one JSON object with `runs`, the values of
 the finest one and the differences from it (`against_finest`). With `--only` some runs
-are done and nothing is compared: to another `--end-week`, or with another rate of
-growth of the core (`--core-growth`). Give such runs a folder of their own.
+are done and nothing is compared: to another `--end-week`, with another rate of growth
+of the core (`--core-growth`), or with a multiple of the contact distance
+(`--contact-distance`). Give such runs a folder of their own.
 """
 
 import argparse
@@ -81,6 +82,15 @@ MEASURED_EDGE_MM = 1.0
 study."""
 CORE_FACTOR = 1.6
 """Node distance inside over that at the surface: meshes differ only in scale."""
+FOLD = """
+import runpy, sys
+from gyriflow.folding import contact
+factor = float(sys.argv.pop(1))
+contact.DISTANCE_PER_MEAN_EDGE *= factor
+contact.DISTANCE_PER_SHORT_EDGE *= factor
+runpy.run_module("gyriflow.folding", run_name="__main__", alter_sys=True)
+"""
+"""Program that folds with a multiple of the contact distance, its first argument."""
 ORDERS = {1: "linear", 2: "quadratic"}
 THICKNESS_MM = 1.5
 DAY_S = 86400.0
@@ -221,7 +231,9 @@ def mesh_file(folder: Path, case: Case) -> Path:
     return file
 
 
-def fold(mesh: Path, out: Path, parameters: dict[str, Any]) -> dict[str, Any]:
+def fold(
+    mesh: Path, out: Path, parameters: dict[str, Any], contact_distance: float
+) -> dict[str, Any]:
     """Run a simulation on one rank unless it is finished, and return its summary.
     Interrupted runs are resumed."""
     if not (out / "summary.json").exists():
@@ -229,8 +241,9 @@ def fold(mesh: Path, out: Path, parameters: dict[str, Any]) -> dict[str, Any]:
         write_yaml(out / "params.yaml", parameters)
         program = [
             sys.executable,
-            "-m",
-            "gyriflow.folding",
+            "-c",
+            FOLD,
+            str(contact_distance),
             str(mesh),
             "--params",
             str(out / "params.yaml"),
@@ -257,7 +270,10 @@ def parameters_until(end_week: float, core_growth_per_s: float) -> dict[str, Any
 
 
 def runs_of_cases(
-    folder: Path, cases: Sequence[Case], parameters: dict[str, Any]
+    folder: Path,
+    cases: Sequence[Case],
+    parameters: dict[str, Any],
+    contact_distance: float,
 ) -> list[dict[str, Any]]:
     """Fold all cases, and return the size and cost of each run."""
     rows = []
@@ -267,6 +283,7 @@ def runs_of_cases(
             mesh,
             folder / "runs" / case.name,
             parameters | {"step_s": case.step_days * DAY_S},
+            contact_distance,
         )
         nodes = len(read_tetrahedral_mesh(mesh).vertices)
         rows.append(
@@ -355,14 +372,17 @@ def main() -> None:
     parser.add_argument(
         "--core-growth", type=float, default=CORE_GROWTH_PER_S, help="rate (1/s)"
     )
+    parser.add_argument(
+        "--contact-distance", type=float, default=1.0, help="multiple of the default"
+    )
     arguments = parser.parse_args()
-    folder = arguments.folder
+    folder, distance = arguments.folder, arguments.contact_distance
     parameters = parameters_until(arguments.end_week, arguments.core_growth)
     if arguments.only:
         cases = [case for case in CASES if case.name in arguments.only]
-        runs_of_cases(folder, cases, parameters)
+        runs_of_cases(folder, cases, parameters, distance)
         return
-    runs = runs_of_cases(folder, CASES, parameters)
+    runs = runs_of_cases(folder, CASES, parameters, distance)
     print(json.dumps({"runs": runs, **against_finest(folder)}), flush=True)
 
 

@@ -353,7 +353,8 @@ class ElasticFit:
         goal = transform_points(shape, motion)
         untangled, faults = self._untangled(start, goal, UNTANGLING_MM)
         smoothed = None if len(faults) else self._valid_near(untangled)
-        changed_mm = rms_length((untangled - goal)[self._used])
+        nearest = untangled if smoothed is None else smoothed
+        changed_mm = rms_length((nearest - goal)[self._used])
         if smoothed is None or changed_mm > MAX_CHANGE_MM:
             text = "smoothing leaves %d faults and changes a shape by %.2f mm%s"
             folds_over = smoothed is None and not len(faults)
@@ -428,14 +429,28 @@ class ElasticFit:
             before, transform_points(self.positions_mm, motion), passed
         )
         # changes around faults flatten elements
-        places = self._opened_after(stops[-1] if stops else before, places)
+        last = stops[-1] if stops else before
+        places = self._opened_after(last, places)
         valid = self.positions_mm
         self.positions_mm = transform_points(places, self._fit(places, valid))
         self._make_valid(valid)
+        self._warn_of_more_faults(last, places)
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
         parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)
         return [(float(part), shape) for part, shape in zip(parts, stops, strict=False)]
+
+    def _warn_of_more_faults(self, before: Floats, places: Floats) -> None:
+        """Warn if the body, whose sides were straightened at `places`, has more faults
+        than these on the way from before."""
+        if self._tets is self._pieces:
+            return
+        motion = self._fit(self.positions_mm, before)
+        reached = transform_points(self.positions_mm, motion)
+        n_faults = len(self._faults_between(before, reached))
+        if n_faults > len(self._faults_between(before, places)):
+            text = "with straight sides %d elements or faces have faults on the way"
+            log.warning(text, n_faults)
 
     def _stops(
         self,

@@ -253,3 +253,34 @@ def test_flat_elements_between_straight_sides_are_opened(monkeypatch, breaks_ano
     assert least_ratio(body.positions_mm) > 0.15
     assert folded_over(body.positions_mm) == 0
     assert body.positions_mm[other] == pytest.approx(places[other])
+
+
+@pytest.mark.parametrize("brings_faults", [False, True])
+def test_faults_that_straight_sides_bring_onto_the_way_are_warned_of(
+    monkeypatch, caplog, brings_faults
+):
+    body = ElasticFit(BODY)
+    bent = waves(6.0)
+
+    def straighten(start):
+        if brings_faults:
+            body.positions_mm = bent
+        return True
+
+    monkeypatch.setattr(body, "_make_valid", straighten)
+    assert body.way_from(BODY.vertices) == []
+    warned = [record for record in caplog.records if "straight sides" in record.message]
+    assert len(warned) == brings_faults
+
+
+def test_a_shape_is_as_far_as_the_valid_one_near_it(monkeypatch):
+    # the smoothed shape is valid only far away, so the body follows
+    shape = waves(0.1)
+    body = ElasticFit(BODY)
+    followed = []
+    follow = body.follow
+    monkeypatch.setattr(body, "_valid_near", lambda places: 1.2 * BODY.vertices)
+    monkeypatch.setattr(body, "follow", lambda goal: followed.append(1) or follow(goal))
+    found = body.move_to(shape)
+    assert followed
+    assert np.linalg.norm((found - shape)[USED], axis=1).mean() < 0.5
