@@ -514,7 +514,8 @@ def verdict(
         ).replace("-", "−")
     serious = list(warnings.loc[warnings["level"] == "error", "message"])
     for _, run in runs.iterrows():
-        serious += _run_doubts(run)
+        # which may be another run than the best one
+        serious += [f"run {run['run']}: {doubt}" for doubt in _run_doubts(run)]
     texts = serious or list(warnings["message"].unique())
     if not texts:
         return f"{sentence} There were no warnings."

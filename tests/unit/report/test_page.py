@@ -255,6 +255,9 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     none = pd.DataFrame({"level": [], "message": []})
     told = verdict(RUNS, VALIDATION, none)
     assert told == Facts("23 GW", "thin", "predicted", 0.57, "0.42 mm", 1.2, 2)
+    # the warning names its run
+    coarse = RUNS.assign(run="coarse")
+    assert verdict(coarse, VALIDATION, none) == Facts("thin", "coarse", 1.2, 2)
     failed = pd.DataFrame(
         {"level": ["warning", "error"], "message": ["holes closed", "a step died."]}
     )
