@@ -115,8 +115,8 @@ def _keep_other(path: Path, text: str) -> Path | None:
     for number in count(1):
         other = path.with_name(f"{path.name}.{number}")
         if not other.exists():
-            return path.rename(other)
-    return None
+            break
+    return path.rename(other)
 
 
 def commented_scans(path: Path) -> list[str]:

@@ -207,8 +207,10 @@ class ElasticFit:
         self._surface, self._used = boundary_surface(mesh)
         self._pieces = pieces
         # with the corners of curved elements: straight sides need these to have volume
-        is_curved = self._tets is not pieces
-        self._kept_open = np.concatenate([pieces, corners]) if is_curved else pieces
+        self._is_curved = self._tets is not pieces
+        self._kept_open = pieces
+        if self._is_curved:
+            self._kept_open = np.concatenate([pieces, corners])
         self._start_volumes = volumes_between(mesh.vertices, self._kept_open)
         is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
         all_outer = self._kept_open[is_outer[self._kept_open].all(axis=1)]
@@ -374,8 +376,10 @@ class ElasticFit:
             log.info("the body is moved to the smoothed shape, which is nearer")
             del self._passed[n_passed:]
         self.positions_mm = smoothed
-        # opened elements and straightened sides may have brought faults onto the way
-        self._moved_straight = not len(self._faults_between(start, smoothed))
+        # opened elements brought none onto the way, but straightened sides may have
+        self._moved_straight = not (
+            self._is_curved and len(self._faults_between(start, smoothed))
+        )
         return self._move(np.linalg.inv(motion))
 
     def _valid_near(self, places: Floats) -> Floats | None:
@@ -443,7 +447,7 @@ class ElasticFit:
     def _warn_of_more_faults(self, before: Floats, places: Floats) -> None:
         """Warn if the body, whose sides were straightened at `places`, has more faults
         than these on the way from before."""
-        if self._tets is self._pieces:
+        if not self._is_curved:
             return
         motion = self._fit(self.positions_mm, before)
         reached = transform_points(self.positions_mm, motion)
@@ -546,7 +550,7 @@ class ElasticFit:
         around those that still do towards a valid `start`; return whether all are valid
         then, or else leave the body there.
         """
-        if self._tets is self._pieces:
+        if not self._is_curved:
             return True
         moved = self.positions_mm
         held = np.empty((0, 3))

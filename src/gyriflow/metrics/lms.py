@@ -9,6 +9,7 @@ restricted likelihood. Scores of new subjects allow for the errors of the curves
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -136,7 +137,7 @@ class WeeklyNorm:
         interval is that of the z which the value has in the population.
         """
         locations, scales = self._bases(weeks)
-        terms = self._terms(locations, scales, values)
+        terms = self._terms_at(locations, scales, values)
         slopes = np.hstack(
             [
                 terms.by_location[:, None] * locations,
@@ -153,7 +154,9 @@ class WeeklyNorm:
         )
         return z, terms.z + INTERVAL_Z * np.stack([-error, error])
 
-    def _terms(self, locations: Floats, scales: Floats, values: ArrayLike) -> "_Terms":
+    def _terms_at(
+        self, locations: Floats, scales: Floats, values: ArrayLike
+    ) -> "_Terms":
         return _terms(
             locations @ self.location,
             scales @ self.scale,
@@ -166,10 +169,11 @@ class WeeklyNorm:
         """Return z (n,) of the norm's own values at weeks over their median absolute
         deviation, of positive metrics with the skewness of the prior: so outliers do
         not hide themselves by a large scale or skewness."""
-        usual = SKEWNESS if self.is_positive else self.skewness
-        locations, scales = self._bases(weeks)
-        norm = replace(self, skewness=usual)
-        z = norm._terms(locations, scales, values).z
+        norm = self
+        if self.is_positive:
+            norm = replace(self, skewness=SKEWNESS)
+        locations, scales = norm._bases(weeks)
+        z = norm._terms_at(locations, scales, values).z
         deviation = stats.median_abs_deviation(z, scale="normal")
         return z / max(float(deviation), MIN_SCATTER)
 
@@ -203,7 +207,7 @@ class WeeklyNorm:
         """Return the norm without the only scan of a subject, by one Newton step from
         the whole."""
         locations, scales = self._bases(week)
-        terms = self._terms(locations, scales, value)
+        terms = self._terms_at(locations, scales, value)
         left = 1 - np.minimum(self._errors(locations, scales)[0], MAX_LEVERAGE)
         slope = _slope(terms, locations, scales, np.ones(1), left)
         step, size = self.covariance @ slope[: len(self.covariance)], len(self.location)
@@ -247,22 +251,16 @@ def fit_norm(
     scans = _Scans.of(people)
     subjects = int(scans.person.max()) + 1
     has_skewness = subjects >= MIN_SUBJECTS_FOR_SKEWNESS
-    model = _Model.of(weeks, scans.weights, subjects, is_positive, has_skewness)
-    size = model.rows.shape[1]
     start = np.log(values) if is_positive else values
-    normal = (model.rows.T * scans.weights) @ model.rows
-    location = np.linalg.solve(
-        normal + model.location_penalty, model.rows.T @ (scans.weights * start)
-    )
-    squares = float(scans.weights @ (start - model.rows @ location) ** 2)
-    scatter = np.sqrt(squares / max(subjects - model.freedom, 1.0))
-    unit = max(float(scatter), MIN_SCATTER)
-    model = replace(model, scatter=unit)
+    model = _Model.of(weeks, start, scans.weights, subjects, is_positive, has_skewness)
+    size = model.rows.shape[1]
+    unit = model.scatter
+    has_scatter = unit > MIN_SCATTER
     # the location is fitted in units of the scatter: then the information of an
     # observation on it is about 1
     rows = unit * model.rows
     fit: Floats = model.mean.copy()
-    fit[:size] = location / unit
+    fit[:size] = model.location / unit
     fit[size] = np.log(unit)
     shift = 0.0
     for number in range(ROUNDS):
@@ -274,7 +272,7 @@ def fit_norm(
             model.scale_rows @ step[size : size + model.scale_rows.shape[1]],
         ]
         shift = float(np.abs(shifts).max())
-        if scatter <= MIN_SCATTER or shift < STEP_TOL:
+        if not has_scatter or shift < STEP_TOL:
             break
         factor = min(1.0, MAX_STEP / shift)
         if has_skewness:
@@ -302,8 +300,13 @@ def fit_norm(
         model.is_spline,
         freedom=float(scans.weights @ state.left) * subjects / float(shared),
         is_skewed=bool(is_few and (is_wide or _are_skewed(state.terms.z))),
-        has_converged=bool(scatter <= MIN_SCATTER or shift <= POOR_STEP),
+        has_converged=bool(not has_scatter or shift <= POOR_STEP),
     )
+
+
+def _usual_skewness(is_positive: bool) -> float:
+    """Return the mean of the prior of the skewness."""
+    return SKEWNESS if is_positive else SIGNED_SKEWNESS
 
 
 def _are_skewed(z: Floats) -> bool:
@@ -318,8 +321,9 @@ class _Model:
 
     `mean` (k,) is that of location, scale and, if it is estimated, skewness;
     `location_penalty` and `scale_penalty` are the inverses of their covariances.
-    `freedom` are the degrees of freedom of the location, `scatter` the scale of all
-    values around it, on which the prior of the skewness depends.
+    `freedom` are the degrees of freedom of the location; `location` are its first
+    coefficients, by least squares, and `scatter` is the scale of all values around it,
+    on which the prior of the skewness depends.
     """
 
     first: float
@@ -332,12 +336,14 @@ class _Model:
     location_penalty: Floats
     scale_penalty: Floats
     freedom: float
-    scatter: float = 1.0
+    location: Floats
+    scatter: float
 
     @classmethod
     def of(
         cls,
         weeks: Floats,
+        values: Floats,
         weights: Floats,
         subjects: int,
         is_positive: bool,
@@ -357,8 +363,8 @@ class _Model:
         ends = _basis(np.array([first, last]), first, last, scale_size, is_spline)
         half_change = 0.5 * np.diff(ends, axis=0) / HALF_CHANGE_SD
         scale_penalty = half_change.T @ half_change
+        normal = (rows.T * weights) @ rows
         if is_spline:
-            normal = (rows.T * weights) @ rows
             lowest, highest = LOCATION_FREEDOM
             freedom = lowest + subjects / SUBJECTS_PER_LOCATION
             freedom = min(freedom, highest, count - 1.0)
@@ -374,6 +380,11 @@ class _Model:
             )
             # the information of an observation on ln S is 2
             scale_penalty += 2.0 * strength * roughness
+        location = np.linalg.solve(
+            normal + location_penalty, rows.T @ (weights * values)
+        )
+        squares = float(weights @ (values - rows @ location) ** 2)
+        scatter = float(np.sqrt(squares / max(subjects - freedom, 1.0)))
         return cls(
             first,
             last,
@@ -385,16 +396,18 @@ class _Model:
             location_penalty,
             scale_penalty,
             freedom,
+            location,
+            max(scatter, MIN_SCATTER),
         )
 
-    @property
+    @cached_property
     def mean(self) -> Floats:
         count = self.rows.shape[1] + self.scale_rows.shape[1]
         mean = np.zeros(count + self.has_skewness)
-        mean[count:] = SKEWNESS if self.is_positive else SIGNED_SKEWNESS
+        mean[count:] = _usual_skewness(self.is_positive)
         return mean
 
-    @property
+    @cached_property
     def penalty(self) -> Floats:
         parts = [self.location_penalty, self.scale_penalty]
         if self.has_skewness:
@@ -408,7 +421,7 @@ class _Model:
         """Return the skewness of parameters (k,)."""
         if self.has_skewness:
             return float(fit[-1])
-        return SKEWNESS if self.is_positive else SIGNED_SKEWNESS
+        return _usual_skewness(self.is_positive)
 
     def state(
         self, rows: Floats, fit: Floats, values: Floats, scans: "_Scans"

@@ -93,8 +93,8 @@ def resolve(config: Config, refused: Mapping[str, str] | None = None) -> Study:
         raise next(iter(unreachable.values()))
     folded = [one for one in folded if one.start.id not in unreachable]
     planned = _Simulations(config, series, chains, brains)
-    planned._add_runs(folded)
-    names = planned._add_variants(folded, swept)
+    planned.add_runs(folded)
+    names = planned.add_variants(folded, swept)
     simulations = list(planned.simulations.values())
     followed = _followed_chains(simulations, chains, series)
     links = _links(config, brains, series, followed.values())
@@ -297,7 +297,7 @@ class _Simulations:
     simulated: list[MeasuredBrain] = field(default_factory=list)
     compared: list[Comparison] = field(default_factory=list)
 
-    def _add_runs(self, folded: Iterable[_Folded]) -> None:
+    def add_runs(self, folded: Iterable[_Folded]) -> None:
         """Add the simulations of `runs`, and the members of their ensembles."""
         brains = list(self.brains.values())
         own = [one for one in folded if one.run in self.config.runs]
@@ -322,7 +322,7 @@ class _Simulations:
                     self.chains[start.id, chain.name] = chain
                 self._add(_Folded(name, start, alone), weeks, one.run)
 
-    def _add_variants(
+    def add_variants(
         self, folded: Iterable[_Folded], variants: Sequence[_Variant]
     ) -> dict[str, str]:
         """Add the simulations of sweeps and of the calibration; return the simulated
