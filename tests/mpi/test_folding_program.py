@@ -188,13 +188,12 @@ def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     }
     done = fold(mesh, tmp_path / "out", 2, **hard)
     assert done.returncode == 4, done.stdout + done.stderr
-    # no step is halved: a whole one fails, or what is left before the first output
-    assert re.search(r"\b(86400|64800) s", done.stderr)
-    assert re.search(r"element \d+ at \[.*\] mm.* vertex \d+", done.stderr)
     assert not (tmp_path / "out" / "frames.h5").exists()
-    # all ranks fail alike
+    # all ranks fail alike; what an aborted rank prints may be lost
     (message,) = read_messages(tmp_path / "out.log")
-    assert f"gyriflow: {message.text}" in done.stderr.splitlines()
+    # no step is halved: a whole one fails, or what is left before the first output
+    assert re.search(r"\b(86400|64800) s", message.text)
+    assert re.search(r"element \d+ at \[.*\] mm.* vertex \d+", message.text)
     assert message.exit_code == 4
     assert "element" in message.found
     assert "max_halvings" in message.remedy

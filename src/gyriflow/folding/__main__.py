@@ -5,6 +5,7 @@ import argparse
 import logging
 import shutil
 import sys
+import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -200,12 +201,15 @@ def _guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         message = error_message(error)
         if message.exit_code == 1:
             traceback.print_exc()
-        print(f"gyriflow: {message.text}", file=sys.stderr, flush=True)
+        # in one write, for ranks that fail at once mix theirs
+        sys.stderr.write(f"gyriflow: {message.text}\n")
         # whatever happens, the other ranks are ended, too
         with suppress(OSError):
             write_message(arguments.log, message)
         sys.stdout.flush()
         if comm.size > 1:
+            # mpiexec loses what it has not read yet from a rank when this is called
+            time.sleep(0.2)
             # they may be waiting in a collective call
             comm.Abort(message.exit_code or 1)
         sys.exit(message.exit_code)
