@@ -28,9 +28,9 @@ SECTIONS = {
     "Resources": ["study_resources"],
 }
 # those of the page of each brain
-BRAIN_SECTIONS = {"Inputs": ["quality_page"], "Metrics": ["brain_maps", "brain_regions"]}
-# the first of these that there is stands at the top of the report
-IN_SUMMARY = ("predicted_figure", "weekly_figure")
+BRAIN_SECTIONS = {"Metrics": ["brain_maps", "brain_regions"], "Quality": ["quality_page"]}
+# the first of these that there is stands at the top of a page
+IN_SUMMARY = ("predicted_figure", "weekly_figure", "brain_maps")
 # collapsed in the report
 TECHNICAL = ("mesh_quality", "run_tables", "study_resources")
 # the files of each figure of this study, and the values of the wildcards in them, of each brain, run or sweep that has one
@@ -507,6 +507,7 @@ rule metrics_charts:
     input:
         metrics=f"{STUDY}/metrics.csv",
         spectra=f"{STUDY}/spectra.csv",
+        atlases=f"{STUDY}/atlas_curves.csv",
     output:
         metrics_figure=multiext(f"{STUDY}/figures/metrics", ".png", ".pdf"),
         spectra_figure=multiext(f"{STUDY}/figures/spectra", ".png", ".pdf"),

@@ -130,6 +130,7 @@ rule html_report:
         quality=rules.quality_table.output[0],
         metrics=f"{STUDY}/metrics.csv",
         centiles=rules.metrics_tables.output.centiles,
+        differences=rules.metrics_tables.output.atlas_differences,
         warnings=rules.study_records.output.warnings,
         runs=rules.run_tables.output.csv if study.run_simulations else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
