@@ -674,17 +674,21 @@ def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose
 
 
 def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
+    """Return the (3, 3) rotation of the offsets of cerebellum and brainstem onto
+    `EXPECTED`, whose order they have; None if they do not determine it."""
     if len(hindbrain) < 2:
         return None
-    theirs, ours = (
-        (np.cross(*pair), unit(pair[0] + pair[1]))
-        for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
-    )
-    # the cross product points to the right. If both lie in the same direction, the
-    # rotation about it is unknown
-    if np.linalg.norm(theirs[0]) < MIN_SPREAD:
+    found = [unit(offset) for offset in hindbrain.values()]
+    expected = list(EXPECTED.values())
+    # both lie in the mid-sagittal plane, so the cross product points to the right
+    to_right = np.cross(found[0], found[1])
+    # the rotation about a common direction is unknown
+    if np.linalg.norm(to_right) < MIN_SPREAD:
         return None
-    return _rotation_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
+    below = unit(found[0] + found[1])
+    expected_below = unit(expected[0] + expected[1])
+    expected_right = unit(np.cross(expected[0], expected[1]))
+    return _rotation_onto([(unit(to_right), expected_right), (below, expected_below)])
 
 
 def _rotation_from_sides(
@@ -713,8 +717,11 @@ def _rotation_from_sides(
 
 
 def _rotation_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
-    ours, theirs = zip(*pairs, strict=True)
-    return np.asarray(Rotation.align_vectors(theirs, ours)[0].as_matrix())
+    """Return the (3, 3) rotation that brings directions nearest to expected ones, given
+    in pairs."""
+    found, expected = zip(*pairs, strict=True)
+    rotation, _ = Rotation.align_vectors(expected, found)
+    return np.asarray(rotation.as_matrix())
 
 
 def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:

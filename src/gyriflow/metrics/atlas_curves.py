@@ -44,7 +44,7 @@ def atlas_curves(
     (`study.checks.norm_settings`). If the atlases were measured with others, there are
     no rows.
     """
-    rows = []
+    rows: list[tuple[str, str, str, float, float]] = []
     for name, value in content["made_with"].items():
         if made_with.get(name) != value:
             return pd.DataFrame(rows, columns=CURVES)
@@ -76,7 +76,8 @@ def atlas_differences(
     comparable = metrics[has_both | (metrics["hemisphere"] != "whole")]
     parts = [pd.DataFrame(columns=DIFFERENCES)]
     by_curve = curves.groupby(["atlas", "hemisphere", "metric"], sort=False)
-    for (atlas, hemisphere, metric), curve in by_curve:
+    for names, curve in by_curve:
+        atlas, hemisphere, metric = map(str, names)
         is_of_curve = (comparable["hemisphere"] == hemisphere) & (
             comparable["metric"] == metric
         )
@@ -85,7 +86,9 @@ def atlas_differences(
         expected = np.interp(rows["week"], curve["week"], curve["value"])
         difference = rows["value"] - expected
         relative = np.nan if METRICS[metric].is_signed else difference / expected
-        noise = np.array([difference_noise(metric, value, record) for value in expected])
+        noise = np.array(
+            [difference_noise(metric, value, record) for value in expected]
+        )
         parts.append(
             rows.assign(
                 atlas=atlas,

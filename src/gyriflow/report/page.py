@@ -262,7 +262,7 @@ def brain_page(
         "verdict": "",
         "alone": True,
         "usual": html_table(every[every.index.isin(main)]),
-        "has_atlases": any(name.startswith(FROM_ATLAS) for name in every),
+        "has_atlases": any(str(name).startswith(FROM_ATLAS) for name in every),
         "numbers": html_table(every),
     }
 
@@ -428,10 +428,8 @@ def scores_table(
     for name, (_, run) in zip(names, runs.iterrows(), strict=True):
         scores: Mapping[Any, Any] = {}
         if validation is not None:
-            own = validation[
-                (validation["run"] == run["run"])
-                & (validation["start_week"] == run["start_week"])
-            ]
+            is_own_run = validation["run"] == run["run"]
+            own = validation[is_own_run & (validation["start"] == run["subject"])]
             scores = own.sort_values("week").iloc[-1] if len(own) else {}
         rows.append({"run": name, "verdict": run_verdict(run), **_scores(scores)})
     return pd.DataFrame(rows)

@@ -1,6 +1,7 @@
 """Pictures of surfaces side by side at one scale, with views, scale bar and colour
 bar."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from string import ascii_lowercase
@@ -111,7 +112,7 @@ def panel_grid(
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
-    widths_in, blocks, inches_per_mm = _columns(rows, FULL_WIDTH_IN - label_in)
+    widths_in, blocks, inches_per_mm = _lay_out_columns(rows, FULL_WIDTH_IN - label_in)
     widest_in = max(widths_in[block].sum() for block in blocks)
     width = _dots(max(SINGLE_COLUMN_IN, label_in + widest_in))
     left = _dots(label_in + (width - label_in - widest_in) / 2)
@@ -214,19 +215,21 @@ def panel_grid(
     return figure
 
 
-def _columns(rows: Sequence[Row], room_in: float) -> tuple[Floats, list[slice], float]:
-    """Return the widths of all columns in inches, the columns of each block, and the
-    scale in inches per mm."""
-    columns = zip(*(row.panels for row in rows), strict=True)
-    widest = np.array(
-        [
-            max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0)
-            for column in columns
-        ]
-    )
-    widths_mm = 2 * _MARGIN * np.maximum(widest, _NARROWEST * widest.max())
+def _lay_out_columns(
+    rows: Sequence[Row], room_in: float
+) -> tuple[Floats, list[slice], float]:
+    """Return the widths of all columns in inches, the columns of each block (at most
+    `MAX_COLUMNS` side by side), and the scale in inches per mm."""
+    half_widths = []
+    for column in zip(*(row.panels for row in rows), strict=True):
+        panels = [half_extents(panel.mesh, panel.view)[0] for panel in column if panel]
+        half_widths.append(max(panels, default=0.0))
+    half_widths_mm = np.array(half_widths)
+    narrowest_mm = _NARROWEST * half_widths_mm.max()
+    widths_mm = 2 * _MARGIN * np.maximum(half_widths_mm, narrowest_mm)
     # blocks with as equal numbers of columns as possible
-    size = -(-len(widths_mm) // -(-len(widths_mm) // MAX_COLUMNS))
+    n_blocks = math.ceil(len(widths_mm) / MAX_COLUMNS)
+    size = math.ceil(len(widths_mm) / n_blocks)
     blocks = [slice(start, start + size) for start in range(0, len(widths_mm), size)]
     inches_per_mm = min(
         _PANEL_IN / widths_mm.max(),

@@ -213,7 +213,7 @@ def _atlas_lines(
     # an atlas may have no brain of these weeks
     names = list(dict.fromkeys(rows["atlas"]))
     for name, line in zip(names, cycle(LINES[1:]), strict=False):
-        style = {
+        style: dict[str, Any] = {
             "color": MUTED_COLOUR,
             "linewidth": 0.8,
             "linestyle": line,

@@ -11,12 +11,12 @@ from matplotlib.patches import Patch
 from pictures import words
 
 from gyriflow.errors import InputError
+from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
 from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
 from gyriflow.report.growth import growth_figure
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.pictures import region_colours
 from gyriflow.report.scores import calibration_figure, nearest_figure, validation_figure
-from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
 from gyriflow.report.tables import brain_table
 from gyriflow.report.weeks import (
     displacement_figure,
@@ -631,13 +631,13 @@ def test_each_parameter_of_a_calibration_has_a_panel():
     assert list(figure.axes[1].get_lines()[0].get_xdata()) == [2.1e-7, 2.1e-7]
 
 
-def gains(runs, weeks=(22, 23, 24)):
+def gains(runs, weeks=(22, 23, 24), start="a"):
     rows = []
     for number, run in enumerate(runs):
         for week in weeks:
             row = {
                 "run": run,
-                "start_week": 21,
+                "start": start,
                 "week": week,
                 "kind": "predicted" if week > 23 else "explained",
             }
@@ -661,6 +661,16 @@ def test_gains_are_drawn_with_their_kind_and_interval():
     bars = np.array(axes.collections[0].get_segments())[:, :, 1]
     np.testing.assert_allclose(
         bars, [[value - 0.02, value + 0.05] for value in (0.01, 0.02, 0.03)]
+    )
+
+
+def test_gains_of_two_start_brains_are_two_lines_beside_each_other():
+    both = pd.concat([gains(["reference"]), gains(["reference"], start="b")])
+    axes = validation_figure(both).axes[0]
+    lines = [np.array(line.get_xdata(), float) for line in axes.lines]
+    weeks = [line for line in lines if len(line) == 3]
+    np.testing.assert_allclose(
+        weeks, [[21.985, 22.985, 23.985], [22.015, 23.015, 24.015]]
     )
 
 

@@ -77,6 +77,7 @@ VALIDATION = pd.DataFrame(
     {
         "run": "thin",
         "kind": "predicted",
+        "start": "young",
         "start_week": 21.0,
         "week": [22.0, 23.0],
         "area_difference": [0.1, -0.0794],
@@ -499,6 +500,10 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     assert row["area (%)"] == "−7.9"
     assert (row["r"], row["gain"]) == ("0.57 (0.51 to 0.61)", "−0.00 (−0.04 to +0.04)")
     assert row["distance (mm)"] == "0.42"
+    # of the same run from another brain of that week
+    other = VALIDATION.assign(start="old", distance_mm=9.0)
+    both = scores_table(RUNS, pd.concat([VALIDATION, other]))
+    assert both["distance (mm)"].tolist() == ["0.42"]
     (alone,) = scores_table(RUNS).to_dict("records")
     assert alone["gain"] == "–"
     assert "GW" not in alone["observed brain"]
