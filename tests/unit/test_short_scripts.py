@@ -187,7 +187,7 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     noise["distances"]["spectral_distance_B4_to_B5"] = 0.07
     write_yaml(tmp_path / "noise.yaml", noise)
     for name, ml in (("first", 2.0), ("second", 3.0)):
-        write_json(tmp_path / f"{name}.json", {"volumes_of_labels_mL": {"7": ml}})
+        write_json(tmp_path / f"{name}.json", {"volumes_by_number_mL": {"7": ml}})
     inputs = {name: [f"{name}.csv"] for name in ("metrics", "spectra", "regions")}
     inputs |= {"labelled": ["first.json", "second.json"], "cohort": []}
     inputs["atlases"] = "atlases.yaml"
@@ -314,7 +314,9 @@ def white_made(folder, inputs, sides=SIDES, **params):
     """Run the script that makes white surfaces; return them by side and the table."""
     params = {"labels": None, "white": {}, "curvature_radius_mm": 5.0} | params
     params["columns"] = {"subject": "a", "run": "real", "week": 22.5}
-    params["surface"] = {"edge_length_mm": 2.0, "max_hole_mm": 3.0}
+    params["surface"] = {"edge_length_mm": 2.0}
+    if params["labels"] is None:
+        params["surface"]["max_hole_mm"] = 3.0
     outputs = {"metrics": "metrics.csv"}
     for side in sides:
         outputs[f"{side}_surface"] = f"{side}.white.gii"

@@ -88,7 +88,7 @@ def files_in_grid(grid):
     return [file for brain in grid for file in (*brain["surfaces"], *brain["maps"])]
 
 
-# brains
+# brains: drawn by rule brain_figures in quality.smk
 
 show(
     {"quality_page": [f"{BRAIN}/figures/quality.png", f"{BRAIN}/figures/quality.pdf"]},
@@ -433,6 +433,7 @@ show(rules.model_figure.output, names_of(BY_RATE))
 
 if study.run_simulations:
 
+    # made by rule run_tables in study.smk
     show({"run_tables": f"{STUDY}/runs.html"})
 
     rule displacement_figure:
@@ -848,6 +849,7 @@ if study.calibration:
     show(rules.calibration_figure.output)
 
 
+# made by rule study_records in report.smk
 show({"study_resources": f"{STUDY}/resources.html"})
 
 

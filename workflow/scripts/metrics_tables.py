@@ -75,7 +75,7 @@ with step(snakemake.log[0]):
         ),
     }
     if files.labelled:
-        reports = [read_json(path)["volumes_of_labels_mL"] for path in files.labelled]
+        reports = [read_json(path)["volumes_by_number_mL"] for path in files.labelled]
         volumes = [
             {int(label): ml for label, ml in report.items()} for report in reports
         ]

@@ -22,7 +22,7 @@ from ..io.files import new_hdf5
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 
-SUBPACKAGES = ("folding", "geometry", "settings", "units")
+SUBPACKAGES = ("folding", "mechanics", "geometry", "settings", "units")
 """Subpackages and modules with the code that determines the results of a run."""
 NOT_IN_KEY = (
     "ranks",
