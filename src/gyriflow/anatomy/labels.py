@@ -2,7 +2,7 @@
 labels, their layout and sides."""
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,10 +55,10 @@ MIN_HEMISPHERE_RATIO = 0.04
 CLOSING_MM = 6.0
 # share of a tissue's neighbours that are cerebrum; in 47 brains ≥ 0.89 for white matter
 # and fluid, ≤ 0.33 outside
-MIN_INSIDE, MAX_OUTSIDE = 0.4, 0.5
+MIN_SHARE_INSIDE, MAX_SHARE_INSIDE = 0.4, 0.5
 # shares of the cerebrum's tissue; in these brains 0.16 to 0.43 is cortex, 0.49 or more
 # white matter
-CORTEX, WHITE, SMALL = (0.03, 0.6), (0.15, 1.0), 0.01
+CORTEX_SHARES, WHITE_SHARES, SMALL_SHARE = (0.03, 0.6), (0.15, 1.0), 0.01
 # limit of the ratio between left and right of cortex over white matter
 MAX_IMBALANCE = 4.0
 # share of the contacts of sided labels that are with the other side; 0.11 or less in 15
@@ -436,88 +436,123 @@ def layout_of(labels: Labels) -> Layout:
 
 def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     """Yield the contradictions between the arrangement of labels and a scheme; none for
-    a scheme without cortex."""
-    cerebrum, cortex, white, fluid, left, right = (
-        np.isin(layout.labels, getattr(scheme, name))
-        for name in (
-            "cerebrum",
-            "cortex",
-            "white_matter",
-            "ventricles",
-            "left",
-            "right",
-        )
-    )
-    if not cortex.any():
+    a volume without cortex."""
+    tissues = {}
+    for name in ("cerebrum", "cortex", "white_matter", "ventricles", "left", "right"):
+        tissues[name] = np.isin(layout.labels, getattr(scheme, name))
+    if not tissues["cortex"].any():
         return
-    outside, counted = ~cerebrum & (layout.labels != HOLE), layout.labels != HOLE
-    size = max(int(layout.count[cerebrum & ~fluid].sum()), 1)
+    yield from _wrong_shares(layout, tissues)
+    yield from _wrong_places(layout, scheme, tissues)
+    yield from _wrong_sides(layout, scheme, tissues)
 
-    def contact_share(tissue: NDArray[np.bool], neighbours: NDArray[np.bool]) -> float:
-        contacts = layout.contact[tissue].sum(axis=0) * (counted & ~tissue)
-        return float(contacts[neighbours].sum() / max(contacts.sum(), 1))
 
-    def with_numbers(tissue: NDArray[np.bool], name: str) -> str:
-        numbers = [str(number) for number in layout.labels[tissue]]
-        if len(numbers) > 4:
-            numbers[4:] = ["…"]
-        return f"{name} ({', '.join(numbers)})"
+def _with_numbers(layout: Layout, is_tissue: Mask, name: str) -> str:
+    """Return the name of a tissue with the numbers of its labels."""
+    numbers = [str(number) for number in layout.labels[is_tissue]]
+    if len(numbers) > 4:
+        numbers[4:] = ["…"]
+    return f"{name} ({', '.join(numbers)})"
 
+
+def _tissue_voxels(layout: Layout, tissues: Mapping[str, Mask]) -> int:
+    """Return the number of voxels of the cerebrum without ventricles, at least 1."""
+    is_tissue = tissues["cerebrum"] & ~tissues["ventricles"]
+    return max(int(layout.count[is_tissue].sum()), 1)
+
+
+def _wrong_shares(layout: Layout, tissues: Mapping[str, Mask]) -> Iterator[str]:
+    """Yield tissues that would be too much or too little of the cerebrum or of its
+    surface."""
+    cerebrum = tissues["cerebrum"]
+    cortex = tissues["cortex"]
+    outside = ~cerebrum & (layout.labels != HOLE)
     surface = layout.contact[np.ix_(cerebrum, outside)].sum(axis=1)
     cortex_share = float(surface[cortex[cerebrum]].sum() / max(surface.sum(), 1))
     if cortex_share < MIN_CORTEX_OUTSIDE:
         yield (
-            f"{with_numbers(cortex, 'cortex')} would cover {cortex_share:.0%} of the"
-            " cerebrum's surface"
+            f"{_with_numbers(layout, cortex, 'cortex')} would cover {cortex_share:.0%}"
+            " of the cerebrum's surface"
         )
-    for tissue, name, (low, high) in (
-        (cortex, "cortex", CORTEX),
-        (white, "white matter", WHITE),
+    for is_tissue, name, (lowest, highest) in (
+        (cortex, "cortex", CORTEX_SHARES),
+        (tissues["white_matter"], "white matter", WHITE_SHARES),
     ):
-        if (
-            tissue.any()
-            and not low <= (share := float(layout.count[tissue].sum() / size)) <= high
-        ):
+        share = float(layout.count[is_tissue].sum() / _tissue_voxels(layout, tissues))
+        if is_tissue.any() and not lowest <= share <= highest:
             yield (
-                f"{with_numbers(tissue, name)} would be {share:.0%} of the cerebrum's"
-                " tissue"
+                f"{_with_numbers(layout, is_tissue, name)} would be {share:.0%} of the"
+                " cerebrum's tissue"
             )
-    for tissue, name, within in (
-        (white, "white matter", cerebrum),
-        (fluid, "ventricles", cerebrum & ~cortex),
+
+
+def _wrong_places(
+    layout: Layout, scheme: LabelScheme, tissues: Mapping[str, Mask]
+) -> Iterator[str]:
+    """Yield inner tissues that would lie outside, and other labels that would lie
+    inside."""
+    cerebrum = tissues["cerebrum"]
+    within_cortex = cerebrum & ~tissues["cortex"]
+    is_counted = layout.labels != HOLE
+
+    def contact_share(is_tissue: Mask, neighbours: Mask) -> float:
+        contacts = layout.contact[is_tissue].sum(axis=0) * (is_counted & ~is_tissue)
+        return float(contacts[neighbours].sum() / max(contacts.sum(), 1))
+
+    for is_tissue, name, around in (
+        (tissues["white_matter"], "white matter", cerebrum),
+        (tissues["ventricles"], "ventricles", within_cortex),
     ):
-        if tissue.any() and (share := contact_share(tissue, within)) < MIN_INSIDE:
+        share = contact_share(is_tissue, around)
+        if is_tissue.any() and share < MIN_SHARE_INSIDE:
             yield (
-                f"{with_numbers(tissue, name)} would lie outside: {share:.0%} of their"
-                " neighbours are inside"
+                f"{_with_numbers(layout, is_tissue, name)} would lie outside:"
+                f" {share:.0%} of their neighbours are inside"
             )
-    for number in layout.labels[outside & (layout.labels != 0)]:
-        tissue, name = layout.labels == number, scheme.labels.get(int(number), "")
-        share = contact_share(tissue, cerebrum & ~cortex)
-        if share > MAX_OUTSIDE and layout.count[tissue].sum() > SMALL * size:
+    smallest = SMALL_SHARE * _tissue_voxels(layout, tissues)
+    is_other = ~cerebrum & is_counted & (layout.labels != 0)
+    for number in layout.labels[is_other]:
+        is_tissue = layout.labels == number
+        share = contact_share(is_tissue, within_cortex)
+        if share > MAX_SHARE_INSIDE and layout.count[is_tissue].sum() > smallest:
+            name = scheme.labels.get(int(number), "")
             yield (
-                f"{with_numbers(tissue, name)} would lie inside: {share:.0%} of its"
-                " neighbours are there"
+                f"{_with_numbers(layout, is_tissue, name)} would lie inside:"
+                f" {share:.0%} of its neighbours are there"
             )
+
+
+def _wrong_sides(
+    layout: Layout, scheme: LabelScheme, tissues: Mapping[str, Mask]
+) -> Iterator[str]:
+    """Yield sides that would be mixed, or have unequal parts of cortex and white
+    matter."""
+    left = tissues["left"]
+    right = tissues["right"]
+    # of both sides: what touches the other one, too
     between = 2 * layout.contact[np.ix_(left, right)].sum()
-    contacts = layout.contact[np.ix_(left | right, cerebrum)].sum()
+    contacts = layout.contact[np.ix_(left | right, tissues["cerebrum"])].sum()
     if between > MAX_BETWEEN * contacts:
         yield (
             f"left and right would be mixed: {between / contacts:.0%} of their contacts"
             " are with the other side"
         )
-    (a, b), (c, d) = (
-        [layout.count[tissue & side].sum() for side in (left, right)]
-        for tissue in (cortex, white)
-    )
+    if not scheme.left or not scheme.white_matter:
+        return
+
+    def voxels(tissue: str, side: Mask) -> int:
+        return int(layout.count[tissues[tissue] & side].sum())
+
+    left_cortex, right_cortex = voxels("cortex", left), voxels("cortex", right)
+    left_white = voxels("white_matter", left)
+    right_white = voxels("white_matter", right)
     # a hemisphere may be small or missing, but with all of its tissues
-    is_unequal = (
-        (a > 0) != (c > 0)
-        or (b > 0) != (d > 0)
-        or max(a * d, b * c) > MAX_IMBALANCE * min(a * d, b * c)
+    is_incomplete = (left_cortex > 0) != (left_white > 0) or (
+        (right_cortex > 0) != (right_white > 0)
     )
-    if scheme.left and scheme.white_matter and is_unequal:
+    products = sorted((left_cortex * right_white, right_cortex * left_white))
+    if is_incomplete or products[1] > MAX_IMBALANCE * products[0]:
         yield (
-            f"left and right would have {a} and {b} voxels of cortex, {c} and {d} of"
-            " white matter"
+            f"left and right would have {left_cortex} and {right_cortex} voxels of"
+            f" cortex, {left_white} and {right_white} of white matter"
         )
