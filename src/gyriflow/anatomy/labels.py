@@ -101,33 +101,17 @@ def read_cerebrum(
     cerebrum's surface.
     """
     mask = cerebrum_mask(labels, scheme)
-    report: dict[str, Any] = {}
-    warnings: list[str] = []
-    absent = np.setdiff1d(scheme.cerebrum, labels)
-    if missing_tissues := [
-        f"{number} {scheme.labels[number]}"
-        for number in scheme.cerebrum
-        if number in absent
-    ]:
-        report["missing_tissues"] = missing_tissues
-        log.info(
-            "tissues that this brain does not have: %s", ", ".join(missing_tissues[:20])
-        )
-    if note := hindbrain_note(labels, scheme):
-        report["hindbrain"] = note
-        log.info(note)
-    warnings += misplaced_cortex(labels, affine, scheme)
+    report = _missing_labels(labels, scheme)
+    warnings = list(misplaced_cortex(labels, affine, scheme))
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = unlabelled_ventricles(labels, scheme, affine)
-    if (
-        scheme.cortex
-        and (share := require_cortex_outside(labels, scheme, min_cortex, unlabelled))
-        < LITTLE_CORTEX
-    ):
-        warnings.append(
-            f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface: check"
-            " the labels"
-        )
+    if scheme.cortex:
+        share = require_cortex_outside(labels, scheme, min_cortex, unlabelled)
+        if share < LITTLE_CORTEX:
+            warnings.append(
+                f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface:"
+                " check the labels"
+            )
     if unlabelled.any():
         warnings.append(
             f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie"
@@ -146,16 +130,11 @@ def read_cerebrum(
         )
         warnings.append(f"{parts} separate parts were dropped: {loss}")
     tissue = np.where(mask & ~main, 0, labels)
-    outer, holes = np.isin(tissue, scheme.cortex), main & ~mask
-    for empty, source in (
-        (holes, mask & main),
-        (holes & unlabelled, mask & main & ~outer),
-    ):
-        if empty.any():
-            nearest = ndimage.distance_transform_edt(
-                ~source, return_distances=False, return_indices=True
-            )
-            tissue[empty] = labels[tuple(nearest[:, empty])]
+    cortex = np.isin(tissue, scheme.cortex)
+    holes = main & ~mask
+    _fill_from_nearest(tissue, holes, mask & main)
+    # not from the cortex
+    _fill_from_nearest(tissue, holes & unlabelled, mask & main & ~cortex)
     fluid_ml = float(open_fluid.sum() * voxel_ml)
     dropped_parts = {"parts": parts, "parts_mL": float(dropped * voxel_ml)}
     report["outside"] = {"ventricles_mL": fluid_ml, "stalks": stalks, **dropped_parts}
@@ -168,7 +147,7 @@ def read_cerebrum(
     fluid = main & (np.isin(labels, scheme.ventricles) | unlabelled)
     volumes = {"cerebrum": main}
     if scheme.cortex:
-        volumes |= {"cortex": outer, "inside_cortex": main & ~fluid & ~outer}
+        volumes |= {"cortex": cortex, "inside_cortex": main & ~fluid & ~cortex}
     if scheme.ventricles or unlabelled.any():
         volumes |= {"tissue": main & ~fluid, "ventricles": fluid}
     report["label_volumes_mL"] = {
@@ -186,6 +165,35 @@ def read_cerebrum(
         report,
         warnings,
     )
+
+
+def _missing_labels(labels: Labels, scheme: LabelScheme) -> dict[str, Any]:
+    """Return what a report says of labels of a scheme that the volume does not have."""
+    report: dict[str, Any] = {}
+    absent = np.setdiff1d(scheme.cerebrum, labels)
+    missing_tissues = [
+        f"{number} {scheme.labels[number]}"
+        for number in scheme.cerebrum
+        if number in absent
+    ]
+    if missing_tissues:
+        report["missing_tissues"] = missing_tissues
+        names = ", ".join(missing_tissues[:20])
+        log.info("tissues that this brain does not have: %s", names)
+    note = hindbrain_note(labels, scheme)
+    if note:
+        report["hindbrain"] = note
+        log.info(note)
+    return report
+
+
+def _fill_from_nearest(labels: Labels, empty: Mask, source: Mask) -> None:
+    """Give empty voxels the label of the nearest one of a source."""
+    if empty.any():
+        nearest = ndimage.distance_transform_edt(
+            ~source, return_distances=False, return_indices=True
+        )
+        labels[empty] = labels[tuple(nearest[:, empty])]
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:

@@ -5,7 +5,7 @@ Left hemispheres are mirrored here and treated as right ones.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,13 +150,9 @@ def pose_of_pair(
         own_right.rotation.T @ mirrored_left.rotation,
     )
     # mean of the right one's own estimate and of that from the left one
-    middle = (
-        Rotation.from_matrix(
-            [own_right.rotation, mirrored_left.rotation @ fit.rotation.T]
-        )
-        .mean()
-        .as_matrix()
-    )
+    from_left = mirrored_left.rotation @ fit.rotation.T
+    both = Rotation.from_matrix([own_right.rotation, from_left])
+    middle = both.mean().as_matrix()
     pair = (
         replace(mirrored_left, rotation=middle @ fit.rotation),
         replace(own_right, rotation=middle),
@@ -170,17 +166,13 @@ def pose_of_pair(
         motions = (CONVENTIONS[frame],) * 2
     sides = [moved.round(DIGITS) for moved in motions]
     whole = sides[0] if together else np.eye(4)
-    evidence = {
-        "coordinates": frame,
-        **{
-            name: {
-                side: round(getattr(shape, name), DIGITS)
-                for side, shape in zip(SIDES, shapes, strict=True)
-            }
-            for name in ("residual", "confidence", "side_ratio")
-        },
-        "mirror_residual": round(fit.residual, DIGITS),
-    }
+    evidence: dict[str, Any] = {"coordinates": frame}
+    for name in ("residual", "confidence", "side_ratio"):
+        evidence[name] = {
+            side: round(getattr(shape, name), DIGITS)
+            for side, shape in zip(SIDES, shapes, strict=True)
+        }
+    evidence["mirror_residual"] = round(fit.residual, DIGITS)
     doubts = []
     if not together:
         angle, shift = _difference(*motions, mirrored_left)
