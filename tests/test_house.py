@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gyriflow.code_hash import imported_modules, room_of
+from gyriflow.code_hash import imported_modules, subpackage_of
 from gyriflow.running.requirements import EXTRAS, LIBRARIES
 from gyriflow.version import RELEASE
 
@@ -129,8 +129,8 @@ OPENING_FUNCTIONS = {
 def rooms_imported(path: Path) -> set[str]:
     """Return the other rooms of gyriflow that a source file imports, at the top or
     inside functions."""
-    return {room_of(module) for module in imported_modules(path)} - {
-        room_of(path),
+    return {subpackage_of(module) for module in imported_modules(path)} - {
+        subpackage_of(path),
         "__init__",
     }
 
@@ -189,10 +189,10 @@ def test_rooms_import_only_what_is_below_them():
     upwards = {
         short(path): forbidden
         for path in SOURCES
-        if room_of(path) != "__init__"
+        if subpackage_of(path) != "__init__"
         if (
             forbidden := rooms_imported(path)
-            - ARROWS[room_of(path)]
+            - ARROWS[subpackage_of(path)]
             - (PROGRAM_ARROWS if is_program(path) else set())
         )
     }
@@ -213,7 +213,7 @@ def test_only_io_and_folding_open_files():
     closed = [
         path
         for path in SOURCES
-        if room_of(path) not in OPENING_ROOMS and not is_program(path)
+        if subpackage_of(path) not in OPENING_ROOMS and not is_program(path)
     ]
     assert [
         f"{short(path)}:{call}" for path in closed for call in opened_files(path)

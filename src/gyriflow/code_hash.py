@@ -77,7 +77,7 @@ def imported_modules(source: Path) -> frozenset[Path]:
     return frozenset(file for name in names for file in _files_of(name))
 
 
-def room_of(module: Path) -> str:
+def subpackage_of(module: Path) -> str:
     """Return the room that a source file belongs to: the folder, or the single module,
     directly under the package."""
     return module.resolve().relative_to(PACKAGE).parts[0].removesuffix(".py")

@@ -105,9 +105,11 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     """Run a step; write what it logs to the file `log`, and its warnings and errors to
     its messages.
 
-    An error ends the program with its exit code and one message, on the terminal and in
-    the log, where an unexpected one has its traceback. The message of an error that
-    names no file begins with the step's `inputs`.
+    An error ends the program with its exit code and one message. It is in the log, with
+    its traceback if it is unexpected; in the messages beside the log, from which
+    `running/terminal.py` shows it; and on stderr, which a launched run keeps in
+    `.snakemake/log`. The message of an error that names no file begins with the step's
+    `inputs`.
     """
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
     handlers = [logging.FileHandler(log, mode="w"), MessageHandler(log)]

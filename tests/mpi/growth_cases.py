@@ -327,3 +327,22 @@ def test_a_free_body_grows_without_drifting(mesh):
         assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(
             x
         ).max() * size * len(x)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "shares"),
+    [
+        (distorted_box(), [1 / 4] * 4),
+        # the means of the shape functions over an element
+        (curved_box(), [-1 / 20] * 4 + [1 / 5] * 6),
+    ],
+    ids=["linear", "quadratic"],
+)
+def test_values_of_tissue_have_their_places(mesh, shares):
+    folding, start = folding_of(mesh, zones_of(mesh))
+    tissue, _ = folding.begin(start, 43200.0)
+    at_points = [tissue.at_points(tissue.places_mm[..., axis]) for axis in range(3)]
+    means = np.stack(at_points, axis=-1).swapaxes(1, 2) @ tissue.elements.points.weights
+    corners_mm = tissue.nodes[tissue.elements.cells] / M_PER_MM
+    centres = np.einsum("k,ckx->cx", shares, corners_mm)
+    np.testing.assert_allclose(means, centres, atol=1e-12)

@@ -187,12 +187,20 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     noise["distances"]["spectral_distance_B4_to_B5"] = 0.07
     write_yaml(tmp_path / "noise.yaml", noise)
     for name, ml in (("first", 2.0), ("second", 3.0)):
-        write_json(tmp_path / f"{name}.json", {"volumes_of_labels_mL": {"7": ml}})
+        write_json(tmp_path / f"{name}.json", {"volumes_by_number_mL": {"7": ml}})
     inputs = {name: [f"{name}.csv"] for name in ("metrics", "spectra", "regions")}
     inputs |= {"labelled": ["first.json", "second.json"], "cohort": []}
+    inputs["atlases"] = "atlases.yaml"
+    values = {"whole": {"area": [200.0, 300.0]}}
+    atlas = {"weeks": [24.0, 26.0], "values": values}
+    made_with = {"edge_length_mm": 1.0}
+    write_yaml(
+        tmp_path / "atlases.yaml", {"made_with": made_with, "atlases": {"one": atlas}}
+    )
     inputs |= {"noise": "noise.yaml", "norms": str(NORMS / "svrtk-volumes.yaml")}
     names = ["metrics_long", "metrics_wide", "change", "asymmetry", "norm_curves"]
     names += ["centiles", "spectral_distance", "volumes", "published_centiles"]
+    names += ["atlas_curves", "atlas_differences"]
     outputs = {name: f"{name}.out.csv" for name in [*names, "metrics"]}
     people = {brain: brain for brain in BRAINS} | {"b0": "one", "b1": "one"}
     params = {
@@ -205,7 +213,7 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
         "reference": BRAINS,
         "individuals": True,
         "subjects": people,
-        "made_with": {"edge_length_mm": 1.0},
+        "made_with": made_with,
         "population": ["normal"],
     }
     outputs["norms"] = "norms.json"
@@ -234,6 +242,9 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     assert set(scores.loc["run", "brains"]) == {11}
     assert scores.loc["run", "subject"].unique().tolist() == ["b0"]
     assert len(tables["norm_curves"]) > 0
+    assert tables["atlas_curves"]["value"].tolist() == [200.0, 300.0]
+    from_atlas = tables["atlas_differences"].set_index(["subject", "run"])
+    assert from_atlas.loc[("b0", "real"), "expected"] == pytest.approx(250.0)
     distances = tables["spectral_distance"].set_index("metric")
     found = distances.loc["spectral_distance_B4_to_B5"]
     assert found["noise"].unique().tolist() == [0.07]
@@ -303,7 +314,9 @@ def white_made(folder, inputs, sides=SIDES, **params):
     """Run the script that makes white surfaces; return them by side and the table."""
     params = {"labels": None, "white": {}, "curvature_radius_mm": 5.0} | params
     params["columns"] = {"subject": "a", "run": "real", "week": 22.5}
-    params["surface"] = {"edge_length_mm": 2.0, "max_hole_mm": 3.0}
+    params["surface"] = {"edge_length_mm": 2.0}
+    if params["labels"] is None:
+        params["surface"]["max_hole_mm"] = 3.0
     outputs = {"metrics": "metrics.csv"}
     for side in sides:
         outputs[f"{side}_surface"] = f"{side}.white.gii"

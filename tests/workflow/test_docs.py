@@ -1,6 +1,7 @@
 """What the documentation says can be done: configurations load, commands name what
 there is, the site is whole."""
 
+import importlib.util
 import re
 import shlex
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 from configurations import labelled, touched
+from facts import Facts
 from processes import ran
 
 from gyriflow.study.loading import load
@@ -15,7 +17,7 @@ from gyriflow.study.loading import load
 CHECKOUT = Path(__file__).parents[2]
 PAGES = [
     CHECKOUT / "README.md",
-    CHECKOUT / "docs" / "tutorial.md",
+    *sorted(CHECKOUT.glob("docs/tutorial*.md")),
     *sorted(CHECKOUT.glob("docs/how-to/*.md")),
 ]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
@@ -101,6 +103,27 @@ def test_targets_and_files_of_commands_that_are_shown_exist():
         ]
     assert shown > 5
     assert unknown == []
+
+
+@pytest.mark.parametrize("name", ["keys.md", "api.md"])
+def test_pages_that_are_made_from_the_code_are_those_of_this_code(name):
+    program = CHECKOUT / "docs" / "reference.py"
+    spec = importlib.util.spec_from_file_location("reference", program)
+    reference = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(reference)
+    # ./run python docs/reference.py
+    assert (CHECKOUT / "docs" / name).read_text() == reference.PAGES[name]()
+
+
+def test_the_examples_in_python_run(tmp_path, monkeypatch, capsys):
+    (tmp_path / "atlases").symlink_to(CHECKOUT / "atlases")
+    monkeypatch.chdir(tmp_path)
+    page = CHECKOUT / "docs" / "how-to" / "python.md"
+    names = {}
+    for block in blocks(page, "python"):
+        exec(block, names)
+    assert capsys.readouterr().out == Facts("mm²", "gyrification_index")
+    assert (tmp_path / "depth.png").stat().st_size > 10_000
 
 
 @pytest.mark.slow

@@ -123,6 +123,7 @@ def tables_of(folder, ids, run, regions, people):
         "labelled": [],
         "norms": "norms.yaml",
         "noise": SHIPPED / "norms/repeatability.yaml",
+        "atlases": SHIPPED / "norms/atlases.yaml",
     }
     run_script("metrics_tables.py", folder, files, outputs, params)
     return {name: (folder / f"out/{name}.csv").read_text() for name in TABLES}

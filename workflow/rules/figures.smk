@@ -28,9 +28,9 @@ SECTIONS = {
     "Resources": ["study_resources"],
 }
 # those of the page of each brain
-BRAIN_SECTIONS = {"Inputs": ["quality_page"], "Metrics": ["brain_maps", "brain_regions"]}
-# the first of these that there is stands at the top of the report
-IN_SUMMARY = ("predicted_figure", "weekly_figure")
+BRAIN_SECTIONS = {"Metrics": ["brain_maps", "brain_regions"], "Quality": ["quality_page"]}
+# the first of these that there is stands at the top of a page
+IN_SUMMARY = ("predicted_figure", "weekly_figure", "brain_maps")
 # collapsed in the report
 TECHNICAL = ("mesh_quality", "run_tables", "study_resources")
 # the files of each figure of this study, and the values of the wildcards in them, of each brain, run or sweep that has one
@@ -88,7 +88,7 @@ def files_in_grid(grid):
     return [file for brain in grid for file in (*brain["surfaces"], *brain["maps"])]
 
 
-# brains
+# brains: drawn by rule brain_figures in quality.smk
 
 show(
     {"quality_page": [f"{BRAIN}/figures/quality.png", f"{BRAIN}/figures/quality.pdf"]},
@@ -433,6 +433,7 @@ show(rules.model_figure.output, names_of(BY_RATE))
 
 if study.run_simulations:
 
+    # made by rule run_tables in study.smk
     show({"run_tables": f"{STUDY}/runs.html"})
 
     rule displacement_figure:
@@ -507,6 +508,7 @@ rule metrics_charts:
     input:
         metrics=f"{STUDY}/metrics.csv",
         spectra=f"{STUDY}/spectra.csv",
+        atlases=f"{STUDY}/atlas_curves.csv",
     output:
         metrics_figure=multiext(f"{STUDY}/figures/metrics", ".png", ".pdf"),
         spectra_figure=multiext(f"{STUDY}/figures/spectra", ".png", ".pdf"),
@@ -847,6 +849,7 @@ if study.calibration:
     show(rules.calibration_figure.output)
 
 
+# made by rule study_records in report.smk
 show({"study_resources": f"{STUDY}/resources.html"})
 
 

@@ -30,7 +30,7 @@ rule brain_figures:
         white_files=lambda w: BRAINS[w.brain].white_files,
         labels=lambda w: label_source(CONFIG, BRAINS[w.brain]),
         columns=lambda w: quality_columns(w.brain),
-        side=lambda w: BRAINS[w.brain].sides[0],
+        sides=lambda w: BRAINS[w.brain].sides,
         log=lambda w: f"{BRAIN}/logs/pial.log".format(brain=w.brain),
     script:
         "../scripts/brain_figures.py"

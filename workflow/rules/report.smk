@@ -9,6 +9,11 @@ from gyriflow.settings.terms import run_names
 USED_SETTINGS = CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
 DESCRIBED = ("id", "week", "population", "source", "synthetic", "covariates")
 PAGE = f"{workflow.basedir}/workflow/report/page"
+# all figures and tables of the report and of the pages of brains
+ON_PAGES = []
+for sections in (SECTIONS, BRAIN_SECTIONS):
+    for names in sections.values():
+        ON_PAGES += names
 
 
 def descriptions(brains):
@@ -25,8 +30,8 @@ def descriptions(brains):
 rule study_records:
     input:
         # logs and records of time and memory are not inputs, since a missing one would repeat its job
-        rules.figures.input,
-        figure_files("brain_maps", "brain_regions", "small_pictures"),
+        # it makes study_resources itself
+        figure_files("small_pictures", *(name for name in ON_PAGES if name != "study_resources")),
         rules.metrics.input,
         rules.quality_table.output,
         run_params=study.files(PARAMETERS),
@@ -123,13 +128,12 @@ SURFACES = {
 
 rule html_report:
     input:
-        rules.figures.input,
+        figure_files(*ON_PAGES),
         rules.metrics.input,
-        rules.influence_figures.input,
-        figure_files("study_resources", "quality_page", "brain_maps", "brain_regions"),
         quality=rules.quality_table.output[0],
         metrics=f"{STUDY}/metrics.csv",
         centiles=rules.metrics_tables.output.centiles,
+        differences=rules.metrics_tables.output.atlas_differences,
         warnings=rules.study_records.output.warnings,
         runs=rules.run_tables.output.csv if study.run_simulations else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],

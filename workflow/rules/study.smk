@@ -6,7 +6,7 @@ WITH_WHITE = [brain.id for brain in BRAINS.values() if brain.white]
 LABELLED = [brain for brain in BRAINS.values() if brain.labels]
 METRICS_TABLES = [
     *("metrics", "spectra", "metrics_long", "metrics_wide", "change", "asymmetry"),
-    *("norm_curves", "centiles", "spectral_distance"),
+    *("norm_curves", "centiles", "spectral_distance", "atlas_curves", "atlas_differences"),
     *(["regions"] if any(row.regions for row in PLACES) else []),
     *(["volumes", "published_centiles"] if LABELLED else []),
 ]
@@ -21,6 +21,7 @@ rule metrics_tables:
         # they contain the volumes of labels
         labelled=[brain.report for brain in LABELLED],
         norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
+        atlases=f"{workflow.basedir}/norms/atlases.yaml",
         noise=f"{workflow.basedir}/norms/repeatability.yaml",
         # norms of another study
         cohort=[CONFIG.metrics.norms] if CONFIG.metrics.norms else [],

@@ -42,6 +42,8 @@ rule shape:
         "../scripts/shape.py"
 
 
+# one rule for each of six kinds of brains, by hemispheres and thickness, as outputs differ. given: the file that
+# params.labels reads, or surfaces
 rule pial:
     input:
         given=lambda w: BRAINS[w.brain].files or [SHAPE.format(brain=w.brain)],

@@ -59,12 +59,12 @@ with step(snakemake.log[0]):
         (read_surface(hemisphere), read_vertex_maps(maps))
         for hemisphere, maps in zip(files.hemispheres, files.maps, strict=True)
     ]
-    maps = brain_maps(halves, week=report["week"])
+    maps = brain_maps(halves, sides=params.sides)
     notes = [report["hindbrain"]] if "hindbrain" in report else []
     page = quality_page(brain, row, warnings, notes)
     write_figure(output.quality, output.quality_pdf, page)
     write_figure(output.maps, output.maps_pdf, maps)
     write_figure(
-        output.small, output.small_pdf, small_pictures(halves, side=params.side)
+        output.small, output.small_pdf, small_pictures(halves, side=params.sides[0])
     )
     write_json(output.row, row)

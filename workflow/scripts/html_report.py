@@ -24,6 +24,7 @@ TABLES = (
     "quality",
     "metrics",
     "centiles",
+    "differences",
     "warnings",
     "runs",
     "validation",

@@ -7,6 +7,7 @@ import pandas as pd
 
 from gyriflow.io.files import read_json, read_tables, write_json, write_table
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.metrics.atlas_curves import atlas_curves, atlas_differences
 from gyriflow.metrics.norms import (
     LabelledBrain,
     cohort_from_plain,
@@ -59,7 +60,10 @@ with step(snakemake.log[0]):
         asymmetry(table.fillna({"region": ""}))
         for table in (metrics.assign(region=""), *regions)
     ]
+    curves = atlas_curves(read_yaml(files.atlases), params.made_with)
     tables |= {
+        "atlas_curves": curves,
+        "atlas_differences": atlas_differences(metrics, curves, noise),
         "metrics_long": (long := long_table([metrics, *regions])),
         "metrics_wide": wide_table(long, params.covariates),
         "change": with_change_noise(change_between_scans(long, params.scans), noise),
@@ -71,7 +75,7 @@ with step(snakemake.log[0]):
         ),
     }
     if files.labelled:
-        reports = [read_json(path)["volumes_of_labels_mL"] for path in files.labelled]
+        reports = [read_json(path)["volumes_by_number_mL"] for path in files.labelled]
         volumes = [
             {int(label): ml for label, ml in report.items()} for report in reports
         ]

@@ -29,7 +29,7 @@ with step(snakemake.log[0], *files, *snakemake.input.white):
         surface = from_labels(
             volume.labels, volume.affine, labels.scheme, params.side, **settings
         )
-        volumes = {"volumes_of_labels_mL": volume.volumes_ml}
+        volumes = {"volumes_by_number_mL": volume.volumes_ml}
     elif params.source == "hemispheres":
         left, right, declared = read_hemispheres(*files)
         settings |= {"coordinates": params.coordinates, **params.limits}

@@ -15,21 +15,18 @@ from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
-labels, settings = params.labels, dict(params.surface)
+labels = params.labels
 with step(snakemake.log[0], *files.given):
     pial = {side: read_surface(files[side]) for side in SIDES if files.get(side)}
     pose = read_pose(files.report)
-    max_hole_mm = settings.pop("max_hole_mm")
     if labels:
         volume = labels.read(cropped=True)
         sides = white_from_labels(
-            volume.labels, volume.affine, labels.scheme, pial, pose, **settings
+            volume.labels, volume.affine, labels.scheme, pial, pose, **params.surface
         )
     else:
         whites = {name: read_surface(path, name) for name, path in params.white.items()}
-        sides = white_from_surfaces(
-            whites, pial, pose, max_hole_mm=max_hole_mm, **settings
-        )
+        sides = white_from_surfaces(whites, pial, pose, **params.surface)
     table, maps = measure_white(sides, params.curvature_radius_mm)
     write_table(
         output.metrics,

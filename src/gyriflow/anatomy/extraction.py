@@ -253,11 +253,10 @@ def without_handles(
                 or _euler_number(changed) <= _euler_number(mask[box])
             ):
                 continue
-            if removed := _change(
-                mask, box, _minimal_change(mask[box], changed, field[box]), closed_by
-            ):
-                remaining -= removed
-                counts[fills] += 1
+            content = _minimal_change(mask[box], changed, field[box])
+            removed = _apply(mask, box, content, closed_by)
+            remaining -= removed
+            counts[fills] += removed > 0
     added, cut = mask & ~original, original & ~mask
     changed = np.where(
         added, 0.5 + CHANGED_STEP, np.where(cut, 0.5 - CHANGED_STEP, field)
@@ -344,9 +343,9 @@ def _patches(
     return sorted(patches, key=size_and_change)
 
 
-def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) -> int:
-    """Change a mask in a box if this removes handles and preserves its parts; return
-    the number of handles removed.
+def _apply(mask: Mask, box: tuple[slice, ...], content: Mask, closed_by: Mask) -> int:
+    """Put new content into a box of a mask if this removes handles and preserves the
+    mask's parts; return the number of handles removed.
 
     Voxels that the change connects or separates may be connected outside the box, so
     ever wider boxes are examined. Cavities are filled; the connectivity `closed_by`
@@ -358,21 +357,26 @@ def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) 
             slice(a.start - b.start, a.stop - b.start)
             for a, b in zip(box, wide, strict=True)
         )
-        before, after = mask[wide], mask[wide].copy()
-        after[inner] = changed
+        before = mask[wide]
+        after = before.copy()
+        after[inner] = content
         after = ndimage.binary_fill_holes(after, closed_by)
         gain = _euler_number(after) - _euler_number(before)
-        # the frame connects everything that reaches the border of the box
-        framed = [
-            ndimage.label(np.pad(state, 1, constant_values=True), INSIDE)[1]
-            for state in (before, after)
-        ]
-        if gain <= 0 or framed[0] < framed[1]:
+        # a part more, even if all that reach the border of the box are one, was cut off
+        if gain <= 0 or _parts_if_framed(after) > _parts_if_framed(before):
             return 0
         if _pieces(before) == _pieces(after):
             mask[wide] = after
             return gain
+        # parts may be connected outside the box
     return 0
+
+
+def _parts_if_framed(mask: Mask) -> int:
+    """Return the number of parts of a mask if all that reach the border of its box are
+    connected."""
+    framed = np.pad(mask, 1, constant_values=True)
+    return int(ndimage.label(framed, INSIDE)[1])
 
 
 def _pieces(mask: Mask) -> tuple[int, int]:
@@ -431,23 +435,28 @@ def _parts_with_gains(
 
 
 def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
-    """Return `after` with voxels restored to `before` where topology allows, those far
-    from one half first.
+    """Return `after` with as many voxels as possible set back to `before`, without a
+    change of topology.
 
-    Of equal ones, those far from the middle of the change come first.
+    Voxels whose field is far from `LEVEL` come first, of equal ones those far from the
+    middle of the change.
     """
     mask = np.pad(after, 1)
     places = np.argwhere(before != after)
-    from_half = np.abs(field[tuple(places.T)] - LEVEL).round(FIELD_DECIMALS)
+    from_level = np.abs(field[tuple(places.T)] - LEVEL).round(FIELD_DECIMALS)
     from_middle = np.linalg.norm(places - places.mean(axis=0), axis=1).round(
         FIELD_DECIMALS
     )
-    places = places[np.lexsort((-from_middle, -from_half))] + 1
+    by_priority = np.lexsort((-from_middle, -from_level))
+    # in the padded mask
+    places = places[by_priority] + 1
     is_progressing = True
     while is_progressing and len(places):
         waiting = []
         for i, j, k in places:
-            if is_simple(mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2].tobytes()):
+            block = mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2]
+            if is_simple(block.tobytes()):
+                # it differs from `before`, so flipping sets it back
                 mask[i, j, k] = ~mask[i, j, k]
             else:
                 waiting.append((i, j, k))

@@ -2,7 +2,7 @@
 labels, their layout and sides."""
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,10 +55,10 @@ MIN_HEMISPHERE_RATIO = 0.04
 CLOSING_MM = 6.0
 # share of a tissue's neighbours that are cerebrum; in 47 brains ≥ 0.89 for white matter
 # and fluid, ≤ 0.33 outside
-MIN_INSIDE, MAX_OUTSIDE = 0.4, 0.5
+MIN_SHARE_INSIDE, MAX_SHARE_INSIDE = 0.4, 0.5
 # shares of the cerebrum's tissue; in these brains 0.16 to 0.43 is cortex, 0.49 or more
 # white matter
-CORTEX, WHITE, SMALL = (0.03, 0.6), (0.15, 1.0), 0.01
+CORTEX_SHARES, WHITE_SHARES, SMALL_SHARE = (0.03, 0.6), (0.15, 1.0), 0.01
 # limit of the ratio between left and right of cortex over white matter
 MAX_IMBALANCE = 4.0
 # share of the contacts of sided labels that are with the other side; 0.11 or less in 15
@@ -101,33 +101,17 @@ def read_cerebrum(
     cerebrum's surface.
     """
     mask = cerebrum_mask(labels, scheme)
-    report: dict[str, Any] = {}
-    warnings: list[str] = []
-    absent = np.setdiff1d(scheme.cerebrum, labels)
-    if missing_tissues := [
-        f"{number} {scheme.labels[number]}"
-        for number in scheme.cerebrum
-        if number in absent
-    ]:
-        report["missing_tissues"] = missing_tissues
-        log.info(
-            "tissues that this brain does not have: %s", ", ".join(missing_tissues[:20])
-        )
-    if note := hindbrain_note(labels, scheme):
-        report["hindbrain"] = note
-        log.info(note)
-    warnings += misplaced_cortex(labels, affine, scheme)
+    report = _missing_labels(labels, scheme)
+    warnings = list(misplaced_cortex(labels, affine, scheme))
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = unlabelled_ventricles(labels, scheme, affine)
-    if (
-        scheme.cortex
-        and (share := require_cortex_outside(labels, scheme, min_cortex, unlabelled))
-        < LITTLE_CORTEX
-    ):
-        warnings.append(
-            f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface: check"
-            " the labels"
-        )
+    if scheme.cortex:
+        share = require_cortex_outside(labels, scheme, min_cortex, unlabelled)
+        if share < LITTLE_CORTEX:
+            warnings.append(
+                f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface:"
+                " check the labels"
+            )
     if unlabelled.any():
         warnings.append(
             f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie"
@@ -146,16 +130,11 @@ def read_cerebrum(
         )
         warnings.append(f"{parts} separate parts were dropped: {loss}")
     tissue = np.where(mask & ~main, 0, labels)
-    outer, holes = np.isin(tissue, scheme.cortex), main & ~mask
-    for empty, source in (
-        (holes, mask & main),
-        (holes & unlabelled, mask & main & ~outer),
-    ):
-        if empty.any():
-            nearest = ndimage.distance_transform_edt(
-                ~source, return_distances=False, return_indices=True
-            )
-            tissue[empty] = labels[tuple(nearest[:, empty])]
+    cortex = np.isin(tissue, scheme.cortex)
+    holes = main & ~mask
+    _fill_from_nearest(tissue, holes, mask & main)
+    # not from the cortex
+    _fill_from_nearest(tissue, holes & unlabelled, mask & main & ~cortex)
     fluid_ml = float(open_fluid.sum() * voxel_ml)
     dropped_parts = {"parts": parts, "parts_mL": float(dropped * voxel_ml)}
     report["outside"] = {"ventricles_mL": fluid_ml, "stalks": stalks, **dropped_parts}
@@ -168,7 +147,7 @@ def read_cerebrum(
     fluid = main & (np.isin(labels, scheme.ventricles) | unlabelled)
     volumes = {"cerebrum": main}
     if scheme.cortex:
-        volumes |= {"cortex": outer, "inside_cortex": main & ~fluid & ~outer}
+        volumes |= {"cortex": cortex, "inside_cortex": main & ~fluid & ~cortex}
     if scheme.ventricles or unlabelled.any():
         volumes |= {"tissue": main & ~fluid, "ventricles": fluid}
     report["label_volumes_mL"] = {
@@ -186,6 +165,35 @@ def read_cerebrum(
         report,
         warnings,
     )
+
+
+def _missing_labels(labels: Labels, scheme: LabelScheme) -> dict[str, Any]:
+    """Return what a report says of labels of a scheme that the volume does not have."""
+    report: dict[str, Any] = {}
+    absent = np.setdiff1d(scheme.cerebrum, labels)
+    missing_tissues = [
+        f"{number} {scheme.labels[number]}"
+        for number in scheme.cerebrum
+        if number in absent
+    ]
+    if missing_tissues:
+        report["missing_tissues"] = missing_tissues
+        names = ", ".join(missing_tissues[:20])
+        log.info("tissues that this brain does not have: %s", names)
+    note = hindbrain_note(labels, scheme)
+    if note:
+        report["hindbrain"] = note
+        log.info(note)
+    return report
+
+
+def _fill_from_nearest(labels: Labels, empty: Mask, source: Mask) -> None:
+    """Give empty voxels the label of the nearest one of a source."""
+    if empty.any():
+        nearest = ndimage.distance_transform_edt(
+            ~source, return_distances=False, return_indices=True
+        )
+        labels[empty] = labels[tuple(nearest[:, empty])]
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
@@ -436,88 +444,123 @@ def layout_of(labels: Labels) -> Layout:
 
 def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     """Yield the contradictions between the arrangement of labels and a scheme; none for
-    a scheme without cortex."""
-    cerebrum, cortex, white, fluid, left, right = (
-        np.isin(layout.labels, getattr(scheme, name))
-        for name in (
-            "cerebrum",
-            "cortex",
-            "white_matter",
-            "ventricles",
-            "left",
-            "right",
-        )
-    )
-    if not cortex.any():
+    a volume without cortex."""
+    tissues = {}
+    for name in ("cerebrum", "cortex", "white_matter", "ventricles", "left", "right"):
+        tissues[name] = np.isin(layout.labels, getattr(scheme, name))
+    if not tissues["cortex"].any():
         return
-    outside, counted = ~cerebrum & (layout.labels != HOLE), layout.labels != HOLE
-    size = max(int(layout.count[cerebrum & ~fluid].sum()), 1)
+    yield from _wrong_shares(layout, tissues)
+    yield from _wrong_places(layout, scheme, tissues)
+    yield from _wrong_sides(layout, scheme, tissues)
 
-    def contact_share(tissue: NDArray[np.bool], neighbours: NDArray[np.bool]) -> float:
-        contacts = layout.contact[tissue].sum(axis=0) * (counted & ~tissue)
-        return float(contacts[neighbours].sum() / max(contacts.sum(), 1))
 
-    def with_numbers(tissue: NDArray[np.bool], name: str) -> str:
-        numbers = [str(number) for number in layout.labels[tissue]]
-        if len(numbers) > 4:
-            numbers[4:] = ["…"]
-        return f"{name} ({', '.join(numbers)})"
+def _with_numbers(layout: Layout, is_tissue: Mask, name: str) -> str:
+    """Return the name of a tissue with the numbers of its labels."""
+    numbers = [str(number) for number in layout.labels[is_tissue]]
+    if len(numbers) > 4:
+        numbers[4:] = ["…"]
+    return f"{name} ({', '.join(numbers)})"
 
+
+def _tissue_voxels(layout: Layout, tissues: Mapping[str, Mask]) -> int:
+    """Return the number of voxels of the cerebrum without ventricles, at least 1."""
+    is_tissue = tissues["cerebrum"] & ~tissues["ventricles"]
+    return max(int(layout.count[is_tissue].sum()), 1)
+
+
+def _wrong_shares(layout: Layout, tissues: Mapping[str, Mask]) -> Iterator[str]:
+    """Yield tissues that would be too much or too little of the cerebrum or of its
+    surface."""
+    cerebrum = tissues["cerebrum"]
+    cortex = tissues["cortex"]
+    outside = ~cerebrum & (layout.labels != HOLE)
     surface = layout.contact[np.ix_(cerebrum, outside)].sum(axis=1)
     cortex_share = float(surface[cortex[cerebrum]].sum() / max(surface.sum(), 1))
     if cortex_share < MIN_CORTEX_OUTSIDE:
         yield (
-            f"{with_numbers(cortex, 'cortex')} would cover {cortex_share:.0%} of the"
-            " cerebrum's surface"
+            f"{_with_numbers(layout, cortex, 'cortex')} would cover {cortex_share:.0%}"
+            " of the cerebrum's surface"
         )
-    for tissue, name, (low, high) in (
-        (cortex, "cortex", CORTEX),
-        (white, "white matter", WHITE),
+    for is_tissue, name, (lowest, highest) in (
+        (cortex, "cortex", CORTEX_SHARES),
+        (tissues["white_matter"], "white matter", WHITE_SHARES),
     ):
-        if (
-            tissue.any()
-            and not low <= (share := float(layout.count[tissue].sum() / size)) <= high
-        ):
+        share = float(layout.count[is_tissue].sum() / _tissue_voxels(layout, tissues))
+        if is_tissue.any() and not lowest <= share <= highest:
             yield (
-                f"{with_numbers(tissue, name)} would be {share:.0%} of the cerebrum's"
-                " tissue"
+                f"{_with_numbers(layout, is_tissue, name)} would be {share:.0%} of the"
+                " cerebrum's tissue"
             )
-    for tissue, name, within in (
-        (white, "white matter", cerebrum),
-        (fluid, "ventricles", cerebrum & ~cortex),
+
+
+def _wrong_places(
+    layout: Layout, scheme: LabelScheme, tissues: Mapping[str, Mask]
+) -> Iterator[str]:
+    """Yield inner tissues that would lie outside, and other labels that would lie
+    inside."""
+    cerebrum = tissues["cerebrum"]
+    within_cortex = cerebrum & ~tissues["cortex"]
+    is_counted = layout.labels != HOLE
+
+    def contact_share(is_tissue: Mask, neighbours: Mask) -> float:
+        contacts = layout.contact[is_tissue].sum(axis=0) * (is_counted & ~is_tissue)
+        return float(contacts[neighbours].sum() / max(contacts.sum(), 1))
+
+    for is_tissue, name, around in (
+        (tissues["white_matter"], "white matter", cerebrum),
+        (tissues["ventricles"], "ventricles", within_cortex),
     ):
-        if tissue.any() and (share := contact_share(tissue, within)) < MIN_INSIDE:
+        share = contact_share(is_tissue, around)
+        if is_tissue.any() and share < MIN_SHARE_INSIDE:
             yield (
-                f"{with_numbers(tissue, name)} would lie outside: {share:.0%} of their"
-                " neighbours are inside"
+                f"{_with_numbers(layout, is_tissue, name)} would lie outside:"
+                f" {share:.0%} of their neighbours are inside"
             )
-    for number in layout.labels[outside & (layout.labels != 0)]:
-        tissue, name = layout.labels == number, scheme.labels.get(int(number), "")
-        share = contact_share(tissue, cerebrum & ~cortex)
-        if share > MAX_OUTSIDE and layout.count[tissue].sum() > SMALL * size:
+    smallest = SMALL_SHARE * _tissue_voxels(layout, tissues)
+    is_other = ~cerebrum & is_counted & (layout.labels != 0)
+    for number in layout.labels[is_other]:
+        is_tissue = layout.labels == number
+        share = contact_share(is_tissue, within_cortex)
+        if share > MAX_SHARE_INSIDE and layout.count[is_tissue].sum() > smallest:
+            name = scheme.labels.get(int(number), "")
             yield (
-                f"{with_numbers(tissue, name)} would lie inside: {share:.0%} of its"
-                " neighbours are there"
+                f"{_with_numbers(layout, is_tissue, name)} would lie inside:"
+                f" {share:.0%} of its neighbours are there"
             )
+
+
+def _wrong_sides(
+    layout: Layout, scheme: LabelScheme, tissues: Mapping[str, Mask]
+) -> Iterator[str]:
+    """Yield sides that would be mixed, or have unequal parts of cortex and white
+    matter."""
+    left = tissues["left"]
+    right = tissues["right"]
+    # of both sides: what touches the other one, too
     between = 2 * layout.contact[np.ix_(left, right)].sum()
-    contacts = layout.contact[np.ix_(left | right, cerebrum)].sum()
+    contacts = layout.contact[np.ix_(left | right, tissues["cerebrum"])].sum()
     if between > MAX_BETWEEN * contacts:
         yield (
             f"left and right would be mixed: {between / contacts:.0%} of their contacts"
             " are with the other side"
         )
-    (a, b), (c, d) = (
-        [layout.count[tissue & side].sum() for side in (left, right)]
-        for tissue in (cortex, white)
-    )
+    if not scheme.left or not scheme.white_matter:
+        return
+
+    def voxels(tissue: str, side: Mask) -> int:
+        return int(layout.count[tissues[tissue] & side].sum())
+
+    left_cortex, right_cortex = voxels("cortex", left), voxels("cortex", right)
+    left_white = voxels("white_matter", left)
+    right_white = voxels("white_matter", right)
     # a hemisphere may be small or missing, but with all of its tissues
-    is_unequal = (
-        (a > 0) != (c > 0)
-        or (b > 0) != (d > 0)
-        or max(a * d, b * c) > MAX_IMBALANCE * min(a * d, b * c)
+    is_incomplete = (left_cortex > 0) != (left_white > 0) or (
+        (right_cortex > 0) != (right_white > 0)
     )
-    if scheme.left and scheme.white_matter and is_unequal:
+    products = sorted((left_cortex * right_white, right_cortex * left_white))
+    if is_incomplete or products[1] > MAX_IMBALANCE * products[0]:
         yield (
-            f"left and right would have {a} and {b} voxels of cortex, {c} and {d} of"
-            " white matter"
+            f"left and right would have {left_cortex} and {right_cortex} voxels of"
+            f" cortex, {left_white} and {right_white} of white matter"
         )

@@ -9,7 +9,7 @@ from scipy import ndimage
 from ..geometry.deformations import transform_points
 from ..settings.schemes import LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import INSIDE, OUTSIDE, Floats, Mask
+from .extraction import INSIDE, OUTSIDE, Floats, Mask, shifted_affine
 
 # Limits are from 47 label volumes of three atlases, 21 to 38 GW
 # (`benchmarks/misplaced_cortex.py`). no cortex lies further from the tissue inside it;
@@ -29,37 +29,36 @@ def misplaced_cortex(
     cannot be.
 
     `labels` (i, j, k) have a (4, 4) affine to the coordinates in mm of places in
-    messages. Nothing is yielded for a scheme without cortex.
+    messages. Nothing is yielded for a volume without cortex, or with nothing else.
     """
-    cerebrum, cortex = np.isin(labels, scheme.cerebrum), np.isin(labels, scheme.cortex)
+    cerebrum = np.isin(labels, scheme.cerebrum)
+    cortex = np.isin(labels, scheme.cortex)
     if not cortex.any() or cortex.sum() == cerebrum.sum():
         return
-    # the last voxels of a volume have no neighbours outside
     box = ndimage.find_objects(cerebrum.astype(np.uint8))[0]
+    # with a margin: voxels at the border of the volume would have no neighbours outside
     first = np.array([side.start - 1 for side in box])
-    numbers, cerebrum, cortex = (
-        np.pad(values[box], 1) for values in (labels, cerebrum, cortex)
-    )
-    fluid = np.isin(numbers, scheme.ventricles)
-    grid = affine.copy()
-    grid[:3, 3] += grid[:3, :3] @ first
+    cropped_labels = np.pad(labels[box], 1)
+    cerebrum = np.pad(cerebrum[box], 1)
+    cortex = np.pad(cortex[box], 1)
+    cropped_affine = shifted_affine(affine, first)
+    fluid = np.isin(cropped_labels, scheme.ventricles)
 
     size = np.linalg.norm(affine[:3, :3], axis=0)
     core = cerebrum & ~cortex & ~fluid
     outside = ~ndimage.binary_fill_holes(cerebrum)
-    enclosed = _pieces_apart_from(outside, cortex)
-    far = cortex & (
-        ndimage.distance_transform_edt(~core, sampling=size) > MAX_FROM_CORE_MM
-    )
-    far |= _pieces_apart_from(core, cortex)
-    if found := _pieces_in_words(far & ~enclosed, grid):
+    enclosed = _cortex_not_touching(outside, cortex)
+    from_core_mm = ndimage.distance_transform_edt(~core, sampling=size)
+    is_far = cortex & (from_core_mm > MAX_FROM_CORE_MM)
+    detached = is_far | _cortex_not_touching(core, cortex)
+    if found := _pieces_in_words(detached & ~enclosed, cropped_affine):
         limit = (
             "apart from the tissue inside the cortex, or further than"
             f" {MAX_FROM_CORE_MM:g} mm from it"
         )
         yield f"{found} of cortex lie {limit}: {_suspect(labels, scheme)}"
 
-    if found := _pieces_in_words(enclosed, grid):
+    if found := _pieces_in_words(enclosed, cropped_affine):
         yield (
             f"{found} of cortex lie inside the cerebrum, apart from its surface: is"
             " other tissue labelled as cortex?"
@@ -106,7 +105,7 @@ def _missing_hindbrain(labels: np.ndarray, scheme: LabelScheme) -> list[str]:
     ]
 
 
-def _pieces_apart_from(tissue: Mask, cortex: Mask) -> Mask:
+def _cortex_not_touching(tissue: Mask, cortex: Mask) -> Mask:
     """Return the connected pieces of the cortex that do not touch a tissue."""
     number, _ = ndimage.label(cortex, INSIDE)
     touching = np.unique(number[ndimage.binary_dilation(tissue, INSIDE)])

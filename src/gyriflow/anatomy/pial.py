@@ -200,14 +200,14 @@ def _read_volume(
     if not side:
         brain.warn(scheme_contradictions(layout_of(labels), scheme))
         if len(sides) == 1:
-            problem = f"the volume has labels of the {sides[0]} hemisphere only"
-            remedy = (
-                "If there is one hemisphere, give it under `hemisphere`, with its side."
-                " If both have these "
-            )
-            remedy += "labels, name their scheme, which is without left and right."
             raise InputError(
-                problem, expected="labels of both hemispheres", remedy=remedy
+                f"the volume has labels of the {sides[0]} hemisphere only",
+                expected="labels of both hemispheres",
+                remedy=(
+                    "If there is one hemisphere, give its side, as `side: left`. If"
+                    " both have these labels, name their scheme, which is without left"
+                    " and right."
+                ),
             )
         field = extraction.smooth_mask(cerebrum.mask)
         # parts that are removed below because of their size do not count
@@ -327,22 +327,15 @@ def _with_sulci(
     side_mm: NDArray[np.float32] | None,
     brain: _Brain,
 ) -> tuple[NDArray[np.float32], Floats, float]:
-    """Open fused sulci; return the field, its affine, and the volume removed (mL)."""
-    grid = cerebrum.affine
-    if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
-        report: dict[str, Any] = {"stays_fused": "the labels have no white matter"}
-    elif (
-        voxels := voxels_through_cortex(cerebrum.mask, border(core, grid), grid)
-    ) < MIN_VOXELS:
-        fused = (
-            f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks"
-            " like two banks"
-        )
-        report = {"stays_fused": fused}
+    """Open fused sulci; return the field, its affine, and the volume removed (mL), less
+    what closing handles added."""
+    reason = _reason_not_to_open(cerebrum, core, scheme)
+    if reason:
+        report: dict[str, Any] = {"stays_fused": reason}
     else:
         # handles are found faster before voxels are refined
         simple, repaired = extraction.make_simple(field, cerebrum.smallest_part)
-        opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
+        opened, fine_affine, report = open_fused_sulci(simple, affine, core, side_mm)
     brain.report["sulci"] = report
     if not report.get("sheets"):
         if "stays_fused" in report and brain.week > FUSED_AFTER_GW:
@@ -350,9 +343,23 @@ def _with_sulci(
         return field, affine, 0.0
     report["repaired_before"] = repaired
     brain.warn(repair.filled_warning(repaired, affine))
-    gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
-    gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
-    return opened, fine, report["opened_mL"] - gained_ml
+    n_filled = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
+    voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
+    return opened, fine_affine, report["opened_mL"] - n_filled * voxel_ml
+
+
+def _reason_not_to_open(cerebrum: Cerebrum, core: Mask, scheme: LabelScheme) -> str:
+    """Return why labels do not show where sulci are fused; or ''."""
+    if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
+        return "the labels have no white matter"
+    inner_border = border(core, cerebrum.affine)
+    voxels = voxels_through_cortex(cerebrum.mask, inner_border, cerebrum.affine)
+    if voxels < MIN_VOXELS:
+        return (
+            f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks"
+            " like two banks"
+        )
+    return ""
 
 
 def from_hemispheres(

@@ -5,7 +5,7 @@ Left hemispheres are mirrored here and treated as right ones.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,13 +150,9 @@ def pose_of_pair(
         own_right.rotation.T @ mirrored_left.rotation,
     )
     # mean of the right one's own estimate and of that from the left one
-    middle = (
-        Rotation.from_matrix(
-            [own_right.rotation, mirrored_left.rotation @ fit.rotation.T]
-        )
-        .mean()
-        .as_matrix()
-    )
+    from_left = mirrored_left.rotation @ fit.rotation.T
+    both = Rotation.from_matrix([own_right.rotation, from_left])
+    middle = both.mean().as_matrix()
     pair = (
         replace(mirrored_left, rotation=middle @ fit.rotation),
         replace(own_right, rotation=middle),
@@ -170,17 +166,13 @@ def pose_of_pair(
         motions = (CONVENTIONS[frame],) * 2
     sides = [moved.round(DIGITS) for moved in motions]
     whole = sides[0] if together else np.eye(4)
-    evidence = {
-        "coordinates": frame,
-        **{
-            name: {
-                side: round(getattr(shape, name), DIGITS)
-                for side, shape in zip(SIDES, shapes, strict=True)
-            }
-            for name in ("residual", "confidence", "side_ratio")
-        },
-        "mirror_residual": round(fit.residual, DIGITS),
-    }
+    evidence: dict[str, Any] = {"coordinates": frame}
+    for name in ("residual", "confidence", "side_ratio"):
+        evidence[name] = {
+            side: round(getattr(shape, name), DIGITS)
+            for side, shape in zip(SIDES, shapes, strict=True)
+        }
+    evidence["mirror_residual"] = round(fit.residual, DIGITS)
     doubts = []
     if not together:
         angle, shift = _difference(*motions, mirrored_left)
@@ -674,17 +666,21 @@ def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose
 
 
 def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
+    """Return the (3, 3) rotation of the offsets of cerebellum and brainstem onto
+    `EXPECTED`, whose order they have; None if they do not determine it."""
     if len(hindbrain) < 2:
         return None
-    theirs, ours = (
-        (np.cross(*pair), unit(pair[0] + pair[1]))
-        for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
-    )
-    # the cross product points to the right. If both lie in the same direction, the
-    # rotation about it is unknown
-    if np.linalg.norm(theirs[0]) < MIN_SPREAD:
+    found = [unit(offset) for offset in hindbrain.values()]
+    expected = list(EXPECTED.values())
+    # both lie in the mid-sagittal plane, so the cross product points to the right
+    to_right = np.cross(found[0], found[1])
+    # the rotation about a common direction is unknown
+    if np.linalg.norm(to_right) < MIN_SPREAD:
         return None
-    return _rotation_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
+    below = unit(found[0] + found[1])
+    expected_below = unit(expected[0] + expected[1])
+    expected_right = unit(np.cross(expected[0], expected[1]))
+    return _rotation_onto([(unit(to_right), expected_right), (below, expected_below)])
 
 
 def _rotation_from_sides(
@@ -713,8 +709,11 @@ def _rotation_from_sides(
 
 
 def _rotation_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
-    ours, theirs = zip(*pairs, strict=True)
-    return np.asarray(Rotation.align_vectors(theirs, ours)[0].as_matrix())
+    """Return the (3, 3) rotation that brings directions nearest to expected ones, given
+    in pairs."""
+    found, expected = zip(*pairs, strict=True)
+    rotation, _ = Rotation.align_vectors(expected, found)
+    return np.asarray(rotation.as_matrix())
 
 
 def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:

@@ -465,9 +465,10 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
     document = remeshing.in_meshlab(
         TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches]))
     )
-    document.compute_selection_by_condition_per_face(
-        condselect=f"fi >= {len(mesh.faces)}"
-    )
+    # the patches: fi is MeshLab's number of a face. Faces that replace them stay
+    # selected
+    n_faces = len(mesh.faces)
+    document.compute_selection_by_condition_per_face(condselect=f"fi >= {n_faces}")
     length = remeshing.pymeshlab.PureValue(triangles.mean_length(mesh.vertices, rims))
     document.meshing_isotropic_explicit_remeshing(
         iterations=remeshing.REMESHING_ROUNDS,
@@ -476,9 +477,8 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
         checksurfdist=False,
         selectedonly=True,
     )
-    return remeshing.from_meshlab(document), np.asarray(
-        document.current_mesh().face_selection_array(), dtype=bool
-    )
+    is_cap = np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
+    return remeshing.from_meshlab(document), is_cap
 
 
 def surface_without_stalks(

@@ -15,7 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ..code_hash import modules_behind, room_of
+from ..code_hash import modules_behind, subpackage_of
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..io.files import new_hdf5
@@ -24,6 +24,15 @@ from ..settings.varying import Maps
 
 SUBPACKAGES = ("folding", "mechanics", "geometry", "settings", "units")
 """Subpackages and modules with the code that determines the results of a run."""
+NOT_IN_KEY = (
+    "ranks",
+    "end_week",
+    "output_weeks",
+    "output_every_gw",
+    "max_halvings",
+)
+"""Parameters that determine the end of a run, its output, its ranks, or how long the
+solver tries, but not its states."""
 ARRAYS = ("positions", "last", "before_last", "stretch", "growth")
 
 
@@ -129,18 +138,12 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) ->
     earlier end or more halvings.
     """
     values = parameters.model_dump(mode="json")
-    for name in (
-        "ranks",
-        "end_week",
-        "output_weeks",
-        "output_every_gw",
-        "max_halvings",
-    ):
+    for name in NOT_IN_KEY:
         del values[name]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
-    solver = modules_behind(Path(__file__).with_name("__main__.py"))
-    for source in sorted(module for module in solver if room_of(module) in SUBPACKAGES):
-        digest.update(source.read_bytes())
+    for module in sorted(modules_behind(Path(__file__).with_name("__main__.py"))):
+        if subpackage_of(module) in SUBPACKAGES:
+            digest.update(module.read_bytes())
     digest.update(mesh.vertices.tobytes())
     digest.update(mesh.tets.tobytes())
     for name in sorted(parameters.maps):

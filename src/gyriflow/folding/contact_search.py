@@ -123,12 +123,13 @@ class ContactSearch:
         self._owned = owned
         self._rest = rest_mm
         self._distance = distance_mm
-        self._part: tuple[SurfacePart, SearchRange] | None = (
-            previous._part if previous else None
-        )
-        self._candidates: tuple[ipctk.Candidates, SearchRange] | None = (
-            previous._candidates if previous else None
-        )
+        # each with the range of positions for which it holds
+        self._part: tuple[SurfacePart, SearchRange] | None = None
+        self._candidates: tuple[ipctk.Candidates, SearchRange] | None = None
+        if previous is not None:
+            self._part = previous._part
+            self._candidates = previous._candidates
+        # of each step its own: it has the areas at the step's start
         self._mesh: ipctk.CollisionMesh | None = None
         self._broad_phase = ipctk.LBVH()
 
@@ -260,10 +261,11 @@ def _drop_distant_parallel_edges(
     last: Floats,
 ) -> ipctk.Candidates:
     """Return the candidates without those of parallel edges that cannot meet between
-    positions `first` and `last`.
+    positions `first` and `last` (p, 3).
 
-    Positions are (p, 3). Parallel edges are as far apart as their ends, and cannot meet
-    if their vertices move less than half of that, apart from their mean displacement.
+    The collision detection may compute the distance of parallel edges as zero, and then
+    allows no step. Their distance is the smallest one from an end to the other edge:
+    they cannot meet if no end moves half of it, apart from the mean displacement.
     """
     pairs = candidates.ee_candidates
     are_parallel = _parallel_edges(pairs, edges, first)

@@ -122,8 +122,11 @@ class NonlinearProblem:
         )
 
     def _plane_energy(self, zones: Zones) -> ufl.Form | int:
-        """Return ε/2 ⟨penetration⟩² per area: the left hemisphere stays below its
-        plane, the right one above."""
+        """Return the form of the energy of the fissure's planes, ε/2 ⟨penetration⟩²
+        integrated over the walls; 0 without walls.
+
+        The left hemisphere stays below its plane, the right one above.
+        """
         if not len(zones.vertices_of(LEFT_CONTACT, RIGHT_CONTACT)):
             return 0
         mesh = self.domain.mesh
@@ -137,8 +140,11 @@ class NonlinearProblem:
             subdomain_data=tags,
             metadata={"quadrature_degree": FACET_DEGREE[self.domain.order]},
         )
-        x = ufl.SpatialCoordinate(mesh)[0] + self._u[0]
-        penetrations = (x - left, LEFT_CONTACT), (right - x, RIGHT_CONTACT)
+        current_x = ufl.SpatialCoordinate(mesh)[0] + self._u[0]
+        penetrations = (
+            (current_x - left, LEFT_CONTACT),
+            (right - current_x, RIGHT_CONTACT),
+        )
         return sum(
             penalty / 2 * ufl.max_value(depth, 0) ** 2 * ds(tag)
             for depth, tag in penetrations

@@ -64,18 +64,12 @@ def run(
     folding = Folding(comm, mesh, zones, parameters, maps)
     key = run_key(mesh, parameters, maps)
     folder = out / f"checkpoint-{key}"
-    state, message = comm.bcast(
-        load_state(folder, key, parameters) if comm.rank == 0 else None, root=0
-    )
+    loaded = load_state(folder, key, parameters) if comm.rank == 0 else None
+    state, message = comm.bcast(loaded, root=0)
     if comm.rank == 0:
-        for note in filter(
-            None,
-            (
-                message,
-                *delete_old_checkpoints(out, folder),
-                shortened_step_note(parameters),
-            ),
-        ):
+        notes = [message, *delete_old_checkpoints(out, folder)]
+        notes.append(shortened_step_note(parameters))
+        for note in filter(None, notes):
             print_line(note)
     if state is None:
         state = State.at_start(folding.start, parameters.step_s)
@@ -84,54 +78,48 @@ def run(
     state, diverged = simulate(folding, state, folder, key, may_diverge=may_diverge)
     memory = comm.reduce(_peak_memory_mib(), op=MPI.SUM, root=0)
     processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
-    if comm.rank == 0:
-        reached = parameters.start_week + state.time_s / SECONDS_PER_GW
-        weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
-        join_frames(
-            out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks]
-        )
-        seconds = time.monotonic() - began
-        summary = {
-            "tets": len(mesh.tets),
-            "dofs": 3 * len(mesh.vertices),
-            "pial_faces": len(zones.facets),
-            "ranks": comm.size,
-            **steps_summary(state.rows),
-            "seconds": seconds,
-            "cpu_seconds": processor,
-            "peak_memory_MiB": memory,
-            "weeks": weeks,
-            "radius_ratio_01": [
-                float(
-                    np.quantile(
-                        radius_ratios(
-                            TetrahedralMesh(
-                                read_positions(out / FRAMES, week), mesh.tets
-                            )
-                        ),
-                        0.01,
-                    )
-                )
-                for week in weeks
-            ],
-            "reached_week": reached,
-            "diverged": diverged,
-            "resumed_after_step": resumed_after,
-        }
-        write_table(out / STEPS, pd.DataFrame(list(state.rows)))
-        write_json(out / SUMMARY, summary)
-        shutil.rmtree(folder)
-        quality, is_bad = quality_note(mesh, state.positions * MM_PER_M, reached)
-        for note, is_warning in (
-            (shrinkage_note(state.rows), False),
-            (quality, is_bad),
-        ):
-            if note:
-                (log.warning if is_warning else print_line)(note)
-        if diverged is not None:
-            log.warning("the run diverges and ends at GW %.3f: %s", reached, diverged)
-        ended = f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s"
-        print_line(ended)
+    if comm.rank != 0:
+        return
+    reached = parameters.start_week + state.time_s / SECONDS_PER_GW
+    weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
+    join_frames(out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks])
+    seconds = time.monotonic() - began
+    summary = {
+        "tets": len(mesh.tets),
+        "dofs": 3 * len(mesh.vertices),
+        "pial_faces": len(zones.facets),
+        "ranks": comm.size,
+        **steps_summary(state.rows),
+        "seconds": seconds,
+        "cpu_seconds": processor,
+        "peak_memory_MiB": memory,
+        "weeks": weeks,
+        "radius_ratio_01": [_low_radius_ratio(mesh, out, week) for week in weeks],
+        "reached_week": reached,
+        "diverged": diverged,
+        "resumed_after_step": resumed_after,
+    }
+    write_table(out / STEPS, pd.DataFrame(list(state.rows)))
+    write_json(out / SUMMARY, summary)
+    shutil.rmtree(folder)
+    shrinkage = shrinkage_note(state.rows)
+    if shrinkage:
+        print_line(shrinkage)
+    quality, is_bad = quality_note(mesh, state.positions * MM_PER_M, reached)
+    if is_bad:
+        log.warning(quality)
+    elif quality:
+        print_line(quality)
+    if diverged is not None:
+        log.warning("the run diverges and ends at GW %.3f: %s", reached, diverged)
+    print_line(f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s")
+
+
+def _low_radius_ratio(mesh: TetrahedralMesh, out: Path, week: float) -> float:
+    """Return the radius ratio that 1 % of the elements are below at an output week."""
+    positions = read_positions(out / FRAMES, week)
+    ratios = radius_ratios(TetrahedralMesh(positions, mesh.tets))
+    return float(np.quantile(ratios, 0.01))
 
 
 def simulate(

@@ -96,6 +96,16 @@ class Tissue:
         )
         return cls(elements, nodes, depth, pial, nearest, weight, growing, maps)
 
+    @property
+    def places_mm(self) -> Floats:
+        """The positions (k, 3) or (c, q, 3) in mm that `weight` and the others are
+        at."""
+        nodes_mm = self.nodes * MM_PER_M
+        if self.elements.points.order == 1:
+            return nodes_mm
+        interpolation = self.elements.points.interpolation
+        return np.asarray(interpolation @ nodes_mm[self.elements.cells])
+
     def at_points(self, values: Floats) -> Floats:
         """Return (..., c, q) values at the integration points from values like
         `weight`."""

@@ -67,14 +67,15 @@ def diffuse(
 
 
 def _implicit_step(
-    vertices: Floats, cells: Indices, time: float
+    vertices: Floats, cells: Indices, time_mm2: float
 ) -> tuple[Floats, sparse.csr_matrix]:
-    """Return the (n,) lumped masses, and the matrix of an implicit step of the heat
-    equation."""
+    """Return the (n,) lumped masses M, and the matrix M + t K of an implicit step of
+    the heat equation over the time t."""
     mass = vertex_sizes(vertices, cells)
+    # vertices without cells have empty rows, and keep their values
     mass[mass <= 0] = 1.0
     stiffness = stiffness_matrix(vertices, cells)
-    return mass, sparse.csr_matrix(sparse.diags(mass) + time * stiffness)
+    return mass, sparse.csr_matrix(sparse.diags(mass) + time_mm2 * stiffness)
 
 
 def integrals_at_vertices(vertices: Floats, cells: Indices, values: Floats) -> Floats:
@@ -95,11 +96,12 @@ def smooth_integrals(
     """Return (n, k) smooth values at the vertices from their integrals around them, by
     one implicit step of diffusion.
 
-    The step has longer tails than a Gaussian of the standard deviation `length_mm`. Its
-    relative error is `SMOOTH_TOL`.
+    The step has longer tails than a Gaussian of the standard deviation `length_mm`. It
+    is solved to the relative tolerance `SMOOTH_TOL`.
     """
-    sizes, matrix = _implicit_step(vertices, cells, length_mm**2 / 2)
-    return _solve(matrix, integrals, integrals / sizes[:, None], SMOOTH_TOL)
+    mass, matrix = _implicit_step(vertices, cells, length_mm**2 / 2)
+    means = integrals / mass[:, None]
+    return _solve(matrix, integrals, means, SMOOTH_TOL)
 
 
 def harmonic_continuation(

@@ -55,26 +55,25 @@ def picture_addresses(
     """Return pictures as data addresses (WebP) that together fit `budget_bytes`, and
     their widths in print (inches)."""
     for width in WIDTHS:
-        coded = [_coded(path, width) for path in paths]
+        coded = [_data_address(path, width) for path in paths]
         if sum(len(address) for address, _ in coded) <= budget_bytes:
             break
     return coded
 
 
-def _coded(path: AnyPath, width: int) -> tuple[str, float]:
+def _data_address(path: AnyPath, width: int) -> tuple[str, float]:
+    """Return a picture as a data address (WebP), at most so many pixels wide, and its
+    width in print in inches."""
     with Image.open(path) as picture:
         image = picture.convert("RGB")
-        inches = float(picture.width / picture.info["dpi"][0])
+        width_in = float(picture.width / picture.info["dpi"][0])
     if image.width > width:
-        image = image.resize(
-            (width, round(image.height * width / image.width)), Image.Resampling.LANCZOS
-        )
+        height = round(image.height * width / image.width)
+        image = image.resize((width, height), Image.Resampling.LANCZOS)
     content = BytesIO()
     image.save(content, "WEBP", quality=QUALITY, method=4)
-    return (
-        f"data:image/webp;base64,{b64encode(content.getvalue()).decode('ascii')}",
-        inches,
-    )
+    text = b64encode(content.getvalue()).decode("ascii")
+    return f"data:image/webp;base64,{text}", width_in
 
 
 def read_body(path: AnyPath) -> str:

@@ -248,64 +248,65 @@ def refuse_bad_mesh(
     It has the number of bad elements and the worst place. `path` is where the mesh can
     be looked at.
     """
-    faults = []
+    found = []
+    expected = []
     for name, values, least in (
         ("radius ratio", tetrahedra.radius_ratios(mesh), min_radius_ratio),
         ("ratio of Jacobians", jacobian_ratios(mesh), MIN_JACOBIAN_RATIO),
     ):
-        bad, worst = values < least, values.argmin()
+        bad = values < least
         if bad.any():
-            place = np.round(
-                mesh.vertices[mesh.corners[worst]].mean(axis=0), 1
-            ).tolist()
-            fault = (
-                f"{int(bad.sum())} of {len(bad)} elements with {name} to"
-                f" {values[worst]:.4g} at {place} mm"
-            )
-            faults.append((fault, f"{name} at least {least:g}"))
+            found.append(_worst_element(mesh, name, values, bad))
+            expected.append(f"{name} at least {least:g}")
     change = summary["volume_change"]
-    distance = summary["surface_distance_mm"]["hausdorff99"]
     if abs(change) > max_volume_change:
-        fault = (
+        found.append(
             f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} %"
             " against the surface's"
         )
-        faults.append((fault, f"at most {100 * max_volume_change:g} %"))
+        expected.append(f"at most {100 * max_volume_change:g} %")
+    distance = summary["surface_distance_mm"]["hausdorff99"]
     if distance > max_surface_distance_mm:
-        fault = (
+        found.append(
             f"a surface {distance:.3f} mm from the one that was filled (99 % of it is"
             " nearer)"
         )
-        faults.append(
-            (
-                fault,
-                (
-                    f"at most {max_surface_distance_mm:g} mm"
-                    " (mesh.max_surface_distance_mm)"
-                ),
-            )
+        expected.append(
+            f"at most {max_surface_distance_mm:g} mm (mesh.max_surface_distance_mm)"
         )
-    if summary["gap_kept"] is not None and summary["gap_kept"] < MIN_GAP_KEPT:
-        fault = (
+    gap_kept = summary["gap_kept"]
+    if gap_kept is not None and gap_kept < MIN_GAP_KEPT:
+        found.append(
             "narrow gaps, such as the fissure, open along"
-            f" {100 * summary['gap_kept']:.0f} % of their walls"
+            f" {100 * gap_kept:.0f} % of their walls"
         )
-        faults.append((fault, f"at least {100 * MIN_GAP_KEPT:g} %"))
+        expected.append(f"at least {100 * MIN_GAP_KEPT:g} %")
     if summary["crossing_faces"]:
-        faults.append(
-            (
-                f"{summary['crossing_faces']} faces of its surface that cross others",
-                "none that cross",
-            )
+        found.append(
+            f"{summary['crossing_faces']} faces of its surface that cross others"
         )
-    if faults:
+        expected.append("none that cross")
+    if found:
         raise MeshError(
             "the mesh is not good enough",
             path=path,
-            found="; ".join(fault for fault, _ in faults),
-            expected="; ".join(expected for _, expected in faults),
+            found="; ".join(found),
+            expected="; ".join(expected),
             remedy=(
                 "Mesh with other edge lengths or another mesh.mesher, or raise"
                 " mesh.max_surface_distance_mm."
             ),
         )
+
+
+def _worst_element(
+    mesh: TetrahedralMesh, name: str, values: Floats, bad: NDArray[np.bool_]
+) -> str:
+    """Return the number of bad elements by a measure, and the value and place of the
+    worst."""
+    worst = values.argmin()
+    centre = mesh.vertices[mesh.corners[worst]].mean(axis=0)
+    return (
+        f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at"
+        f" {np.round(centre, 1).tolist()} mm"
+    )

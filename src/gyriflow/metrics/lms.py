@@ -208,8 +208,9 @@ class WeeklyNorm:
         the whole."""
         locations, scales = self._bases(week)
         terms = self._terms_at(locations, scales, value)
-        left = 1 - np.minimum(self._errors(locations, scales)[0], MAX_LEVERAGE)
-        slope = _slope(terms, locations, scales, np.ones(1), left)
+        leverage, _ = self._errors(locations, scales)
+        remaining = 1 - np.minimum(leverage, MAX_LEVERAGE)
+        slope = _slope(terms, locations, scales, np.ones(1), remaining)
         step, size = self.covariance @ slope[: len(self.covariance)], len(self.location)
         location = self.location - step[:size]
         scale = self.scale - step[size : size + len(self.scale)]
@@ -298,7 +299,7 @@ def fit_norm(
         covariance,
         subjects,
         model.is_spline,
-        freedom=float(scans.weights @ state.left) * subjects / float(shared),
+        freedom=float(scans.weights @ state.remaining) * subjects / float(shared),
         is_skewed=bool(is_few and (is_wide or _are_skewed(state.terms.z))),
         has_converged=bool(not has_scatter or shift <= POOR_STEP),
     )
@@ -434,16 +435,16 @@ class _Model:
         terms = _terms(rows @ fit[:size], log_scale, skewness, values, self.is_positive)
         scans = scans.correlated(terms.z)
         expected = _expected(log_scale, skewness, self.is_positive)
-        information, left = _information(
+        information, remaining = _information(
             rows, self.scale_rows, expected, scans, self.penalty
         )
         count = len(fit)
-        slope = _slope(terms, rows, self.scale_rows, scans.weights, left)[:count]
+        slope = _slope(terms, rows, self.scale_rows, scans.weights, remaining)[:count]
         return _State(
             terms,
             log_scale,
             expected,
-            left,
+            remaining,
             slope - self.penalty @ (fit - self.mean),
             information[:count, :count] + self.penalty,
             scans,
@@ -469,7 +470,7 @@ class _Model:
         e = state.expected
         expected = [
             [e.location, e.location_scale, e.location_skewness],
-            [e.location_scale, e.scale * state.left, e.scale_skewness],
+            [e.location_scale, e.scale * state.remaining, e.scale_skewness],
             [e.location_skewness, e.scale_skewness, e.skewness],
         ]
         powers = [[1, 2, 1], [2, 2, 2], [1, 2, 3]]
@@ -489,7 +490,7 @@ class _State:
     terms: "_Terms"
     log_scale: Floats
     expected: "_Expected"
-    left: Floats
+    remaining: Floats
     slope: Floats
     information: Floats
     scans: "_Scans"
@@ -597,34 +598,41 @@ def _information(
     scans: "_Scans",
     penalty: Floats,
 ) -> tuple[Floats, Floats]:
-    """Return the expected information on all parameters, and what the location leaves
-    of each observation's scatter."""
-    size, weights = rows.shape[1], scans.weights
+    """Return the expected information (k, k) on location, ln scale and skewness, the
+    last also if it is not estimated, and what the location leaves of each observation's
+    scatter (n,): 1 − its leverage."""
+    weights = scans.weights
+    n_location = rows.shape[1]
     location = (rows.T * (weights * expected.location)) @ rows
-    own = np.sqrt(expected.location)[:, None] * rows
-    inverse = np.linalg.inv(location + penalty[:size, :size])
-    leverage = np.einsum("ij,ij->i", own @ inverse, scans.spread(own)) / weights
-    left = 1 - np.minimum(leverage, MAX_LEVERAGE)
-    scale = (scale_rows.T * (weights * expected.scale * left)) @ scale_rows
-    both = (rows.T * (weights * expected.location_scale)) @ scale_rows
+    covariance = np.linalg.inv(location + penalty[:n_location, :n_location])
+    scaled_rows = np.sqrt(expected.location)[:, None] * rows
+    spread_rows = scans.spread(scaled_rows)
+    leverage = np.einsum("ij,ij->i", scaled_rows @ covariance, spread_rows) / weights
+    remaining = 1 - np.minimum(leverage, MAX_LEVERAGE)
+    scale = (scale_rows.T * (weights * expected.scale * remaining)) @ scale_rows
+    location_scale = (rows.T * (weights * expected.location_scale)) @ scale_rows
     location_skewness = rows.T @ (weights * expected.location_skewness)[:, None]
     scale_skewness = scale_rows.T @ (weights * expected.scale_skewness)[:, None]
     skewness = np.array([[weights @ expected.skewness]])
     blocks = [
-        [location, both, location_skewness],
-        [both.T, scale, scale_skewness],
+        [location, location_scale, location_skewness],
+        [location_scale.T, scale, scale_skewness],
         [location_skewness.T, scale_skewness.T, skewness],
     ]
-    return np.block(blocks), left
+    return np.block(blocks), remaining
 
 
 def _slope(
-    terms: "_Terms", rows: Floats, scale_rows: Floats, weights: Floats, left: Floats
+    terms: "_Terms",
+    rows: Floats,
+    scale_rows: Floats,
+    weights: Floats,
+    remaining: Floats,
 ) -> Floats:
     """Return the slope of the restricted log-likelihood by location, ln scale and
     skewness."""
     location = (weights * terms.slope_location) @ rows
-    scale = (weights * (terms.slope_scale - left)) @ scale_rows
+    scale = (weights * (terms.slope_scale - remaining)) @ scale_rows
     return np.concatenate([location, scale, [weights @ terms.slope_skewness]])
 
 

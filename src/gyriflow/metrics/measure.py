@@ -448,21 +448,20 @@ def measure_white(
     of the only hemisphere.
 
     They are measured as pial ones are. The table has hemisphere, metric, value and unit
-    of the metrics that are shown of white surfaces, the names with `white_` in front;
-    the maps are those of `Folds` per hemisphere.
+    of the metrics of `Shown.WHITE`, named `white_…`; the maps are those of `Folds` per
+    hemisphere.
     """
     folds = {
-        name: measure_folds(mesh, curvature_radius_mm) for name, mesh in sides.items()
+        side: measure_folds(mesh, curvature_radius_mm) for side, mesh in sides.items()
     }
+    parts_of = {"whole": list(folds.values())}
+    for side, part in folds.items():
+        parts_of[side] = [part]
     metrics = {}
-    for name, parts in {
-        "whole": list(folds.values()),
-        **{name: [part] for name, part in folds.items()},
-    }.items():
-        values = {
-            "area": sum(area(part.mesh) for part in parts) * CM2_PER_MM2
-        } | folding_metrics(parts)
-        metrics[name] = {
+    for hemisphere, parts in parts_of.items():
+        area_mm2 = sum(area(part.mesh) for part in parts)
+        values = {"area": area_mm2 * CM2_PER_MM2} | folding_metrics(parts)
+        metrics[hemisphere] = {
             f"white_{metric}": values[metric] for metric in metrics_shown(Shown.WHITE)
         }
-    return _table(metrics), {name: part.maps for name, part in folds.items()}
+    return _table(metrics), {side: part.maps for side, part in folds.items()}

@@ -29,6 +29,7 @@ from ..settings.terms import (
 )
 from .labels import metric_title, plain, week_label
 from .tables import (
+    FROM_ATLAS,
     VERDICTS,
     accuracy_table,
     brain_table,
@@ -122,8 +123,9 @@ def sections(
 class Tables:
     """The tables of a study on its pages.
 
-    `quality`, `metrics` and `centiles` are as for `brain_rows`; `warnings` has the
-    columns subject, run, step, level, message. `runs` and `validation` are as for
+    `quality`, `metrics` and `centiles` are as for `brain_rows`, `differences` those of
+    `metrics.atlas_curves`; `warnings` has the columns subject, run, step, level,
+    message. `runs` and `validation` are as for
     `scores_table`, None if nothing was simulated; `intervals` those of the ensemble of
     the one prediction, if any.
     """
@@ -131,6 +133,7 @@ class Tables:
     quality: pd.DataFrame
     metrics: pd.DataFrame
     centiles: pd.DataFrame
+    differences: pd.DataFrame
     warnings: pd.DataFrame
     runs: pd.DataFrame | None = None
     validation: pd.DataFrame | None = None
@@ -211,6 +214,8 @@ def study_page(
         "prediction": prediction,
         "folded": [] if runs is None else runs.to_dict("records"),
         "alone": False,
+        "usual": "",
+        "has_atlases": False,
         "numbers": "",
         "runs": scores,
         "brains": brain_rows(
@@ -239,10 +244,10 @@ def brain_page(
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the page of an observed brain;
     parameters as for `study_page`."""
-    metrics, warnings = (
-        table[table["subject"] == brain["id"]]
-        for table in (tables.metrics, tables.warnings)
-    )
+    metrics = tables.metrics[tables.metrics["subject"] == brain["id"]]
+    # those of simulations are in the report of the study
+    is_own = tables.warnings["subject"] == brain["id"]
+    warnings = tables.warnings[is_own & tables.warnings["run"].isna()]
     page = study_page(
         [brain],
         replace(tables, warnings=warnings, runs=None),
@@ -250,9 +255,16 @@ def brain_page(
         norm=norm,
         pictures={},
     )
-    numbers = html_table(brain_table(metrics, tables.centiles))
-    title = f"Measured cortical folding, {brain['id']}"
-    return page | {"title": title, "verdict": "", "alone": True, "numbers": numbers}
+    every = brain_table(metrics, tables.centiles, tables.differences)
+    main = [metric_title(name) for name in metrics_shown(Shown.BRAINS)]
+    return page | {
+        "title": f"Cortical folding of {brain['id']}",
+        "verdict": "",
+        "alone": True,
+        "usual": html_table(every[every.index.isin(main)]),
+        "has_atlases": any(str(name).startswith(FROM_ATLAS) for name in every),
+        "numbers": html_table(every),
+    }
 
 
 def report_page(
@@ -416,10 +428,8 @@ def scores_table(
     for name, (_, run) in zip(names, runs.iterrows(), strict=True):
         scores: Mapping[Any, Any] = {}
         if validation is not None:
-            own = validation[
-                (validation["run"] == run["run"])
-                & (validation["start_week"] == run["start_week"])
-            ]
+            is_own_run = validation["run"] == run["run"]
+            own = validation[is_own_run & (validation["start"] == run["subject"])]
             scores = own.sort_values("week").iloc[-1] if len(own) else {}
         rows.append({"run": name, "verdict": run_verdict(run), **_scores(scores)})
     return pd.DataFrame(rows)

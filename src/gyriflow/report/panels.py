@@ -1,7 +1,8 @@
 """Pictures of surfaces side by side at one scale, with views, scale bar and colour
 bar."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from string import ascii_lowercase
 from typing import Any
@@ -111,99 +112,63 @@ def panel_grid(
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
-    widths_in, blocks, inches_per_mm = _columns(rows, FULL_WIDTH_IN - label_in)
-    widest_in = max(widths_in[block].sum() for block in blocks)
+    widths_in, blocks, inches_per_mm = _lay_out_columns(rows, FULL_WIDTH_IN - label_in)
+    widest_in = max(widths_in[part].sum() for part in blocks)
     width = _dots(max(SINGLE_COLUMN_IN, label_in + widest_in))
-    left = _dots(label_in + (width - label_in - widest_in) / 2)
-    heads = [
-        wrap(head, int(panel / _LETTER_IN))
-        for head, panel in zip(columns, widths_in, strict=True)
-    ]
+    left_in = _dots(label_in + (width - label_in - widest_in) / 2)
+    heads = []
+    for head, panel_in in zip(columns, widths_in, strict=True):
+        heads.append(wrap(head, int(panel_in / _LETTER_IN)))
     head_in = 0.2 + 0.12 * max(head.count("\n") for head in heads)
-    # without rows that are empty in a block
-    drawn = [
-        [row for row in rows if row.absent or any(row.panels[block])]
-        for block in blocks
-    ]
-    heights_in = [
-        _dots(
-            [
-                head_in,
-                *(
-                    height
-                    for row in block_rows
-                    for height in _heights_in(row, block, inches_per_mm)
-                ),
-            ]
-        )
-        for block, block_rows in zip(blocks, drawn, strict=True)
-    ]
+    drawn = []
+    for part in blocks:
+        # without rows that are empty in this block
+        shown = [row for row in rows if row.absent or any(row.panels[part])]
+        heights_in = [head_in]
+        for row in shown:
+            heights_in += _heights_in(row, part, inches_per_mm)
+        drawn.append(_Block(part, shown, _dots(heights_in)))
     legend_columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
-    foot_in = max(
-        0.66 if colour_bar or legend else 0.46,
-        0.15 * -(-len(legend) // legend_columns) + 0.16,
-    )
-    total = _TOP_IN + _dots(foot_in) + sum(heights.sum() for heights in heights_in)
+    legend_in = 0.15 * math.ceil(len(legend) / legend_columns) + 0.16
+    foot_in = max(0.66 if colour_bar or legend else 0.46, legend_in)
+    total = _TOP_IN + _dots(foot_in) + sum(block.height_in for block in drawn)
     figure = Figure(figsize=(width, total))
-    top = total - _TOP_IN
+    top_in = total - _TOP_IN
     letters = iter(ascii_lowercase)
-    for block, block_rows, heights in zip(blocks, drawn, heights_in, strict=True):
-        ends = {
-            "left": left / width,
-            "right": (left + widths_in[block].sum()) / width,
-            "top": top / total,
-        }
-        top -= heights.sum()
-        ratios = {
-            "width_ratios": widths_in[block],
-            "height_ratios": heights,
-            "hspace": 0,
-            "wspace": 0,
-        }
+    for block in drawn:
+        # a letter for each row, or for each panel of a single row
+        per_row = 1 if len(rows) > 1 else len(columns) if len(columns) > 1 else 0
         grid = GridSpec(
-            len(heights),
-            len(heads[block]),
+            len(block.heights_in),
+            len(heads[block.columns]),
             figure,
-            bottom=top / total,
-            **ends,
-            **ratios,
+            left=left_in / width,
+            right=(left_in + widths_in[block.columns].sum()) / width,
+            top=top_in / total,
+            bottom=(top_in - block.height_in) / total,
+            width_ratios=widths_in[block.columns],
+            height_ratios=block.heights_in,
+            hspace=0,
+            wspace=0,
         )
-        for number, row in enumerate(block_rows):
+        top_in -= block.height_in
+        for number, row in enumerate(block.rows):
             # pictures are between the headings or captions above and the captions below
+            line = 2 * number + 1
             cells = [
-                figure.add_subplot(grid[2 * number + 1, column])
-                for column in range(len(heads[block]))
+                figure.add_subplot(grid[line, column])
+                for column in range(len(heads[block.columns]))
             ]
             widths_mm = [
-                float(width_in / inches_per_mm) for width_in in widths_in[block]
+                float(part / inches_per_mm) for part in widths_in[block.columns]
             ]
-            height_mm = float(heights[2 * number + 1] / inches_per_mm)
-            _draw_row(
-                cells, row, row.panels[block], widths_mm, height_mm, inches_per_mm
-            )
-            # a letter for each row, or for each panel of a single row
-            lettered = cells[:1] if len(rows) > 1 else cells if len(columns) > 1 else []
-            for axes, letter in zip(lettered, letters, strict=False):
-                # next to the row's label, or above the letters of the ends
-                is_labelled = row.label and axes is cells[0]
-                align = (
-                    {"ha": "right", "va": "top"}
-                    if is_labelled
-                    else {"ha": "left", "va": "bottom"}
-                )
-                _write(
-                    axes,
-                    letter,
-                    (0.0, 1.0),
-                    (-2, 2),
-                    fontsize=9,
-                    fontweight="bold",
-                    **align,
-                )
-            for axes, head in zip(
-                cells if number == 0 else [], heads[block], strict=False
-            ):
-                _write(axes, head, (0.5, 1.0), (0, 36 * head_in), va="center")
+            height_mm = float(block.heights_in[line] / inches_per_mm)
+            panels = row.panels[block.columns]
+            _draw_row(cells, row, panels, widths_mm, height_mm, inches_per_mm)
+            _write_letters(cells[:per_row], letters, is_labelled=bool(row.label))
+            if number == 0:
+                for axes, head in zip(cells, heads[block.columns], strict=True):
+                    _write(axes, head, (0.5, 1.0), (0, 36 * head_in), va="center")
     _draw_scale_bar(figure, rows, foot_in, widths_in.max(), inches_per_mm)
     if colour_bar:
         _draw_colour_bar(figure, *colour_bar)
@@ -214,19 +179,51 @@ def panel_grid(
     return figure
 
 
-def _columns(rows: Sequence[Row], room_in: float) -> tuple[Floats, list[slice], float]:
-    """Return the widths of all columns in inches, the columns of each block, and the
-    scale in inches per mm."""
-    columns = zip(*(row.panels for row in rows), strict=True)
-    widest = np.array(
-        [
-            max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0)
-            for column in columns
-        ]
-    )
-    widths_mm = 2 * _MARGIN * np.maximum(widest, _NARROWEST * widest.max())
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Columns of a grid that stand side by side, with their rows.
+
+    `heights_in` are those of the headings, and of the pictures and the captions of each
+    row.
+    """
+
+    columns: slice
+    rows: Sequence[Row]
+    heights_in: Floats
+
+    @property
+    def height_in(self) -> float:
+        return float(self.heights_in.sum())
+
+
+def _write_letters(
+    cells: Sequence[Axes], letters: Iterator[str], *, is_labelled: bool
+) -> None:
+    """Write the next letters at the upper left of panels: next to the row's label, or
+    above the letters of the ends."""
+    for axes, letter in zip(cells, letters, strict=False):
+        align = {"ha": "left", "va": "bottom"}
+        if is_labelled and axes is cells[0]:
+            align = {"ha": "right", "va": "top"}
+        bold = {"fontsize": 9, "fontweight": "bold"}
+        _write(axes, letter, (0.0, 1.0), (-2, 2), **bold, **align)
+
+
+def _lay_out_columns(
+    rows: Sequence[Row], room_in: float
+) -> tuple[Floats, list[slice], float]:
+    """Return the widths of all columns in inches, the columns of each block (at most
+    `MAX_COLUMNS` side by side), and the scale in inches per mm."""
+    half_widths = []
+    for column in zip(*(row.panels for row in rows), strict=True):
+        panels = [half_extents(panel.mesh, panel.view)[0] for panel in column if panel]
+        half_widths.append(max(panels, default=0.0))
+    half_widths_mm = np.array(half_widths)
+    narrowest_mm = _NARROWEST * half_widths_mm.max()
+    widths_mm = 2 * _MARGIN * np.maximum(half_widths_mm, narrowest_mm)
     # blocks with as equal numbers of columns as possible
-    size = -(-len(widths_mm) // -(-len(widths_mm) // MAX_COLUMNS))
+    n_blocks = math.ceil(len(widths_mm) / MAX_COLUMNS)
+    size = math.ceil(len(widths_mm) / n_blocks)
     blocks = [slice(start, start + size) for start in range(0, len(widths_mm), size)]
     inches_per_mm = min(
         _PANEL_IN / widths_mm.max(),

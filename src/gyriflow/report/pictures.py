@@ -51,6 +51,7 @@ Halves = Sequence[SurfaceMaps]
 SIDE_VIEWS = ("left", "top")
 OUTER_VIEWS = ("left", "top", "bottom")
 ROUND_VIEWS = ("left", "right", "top", "bottom")
+BRAIN_VIEWS = ("left", "right", "top", "left medial", "right medial")
 MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
 ROUNDING = 1e-9
 DIRECTION_QUANTILE = 0.9
@@ -342,11 +343,20 @@ def shape_maps(grid: Grid) -> Figure:
 
 
 @styled
-def brain_maps(halves: Halves, *, week: float) -> Figure:
-    """Draw the shape index of a brain from four sides."""
-    return brain_grid(
-        in_views([GridBrain("", week, halves)], ROUND_VIEWS), "shape_index"
-    )
+def brain_maps(halves: Halves, *, sides: Sequence[str]) -> Figure:
+    """Draw the shape index of a brain from outside, from above, and on the inner face
+    of each hemisphere; `sides` are those of its `halves`."""
+    grid = []
+    for name in BRAIN_VIEWS:
+        view = VIEWS[name]
+        shown = [
+            half
+            for side, half in zip(sides, halves, strict=True)
+            if view.hemisphere in ("", side)
+        ]
+        if shown:
+            grid.append(GridBrain("", name, shown, view=view))
+    return brain_grid(grid, "shape_index")
 
 
 @styled

@@ -191,41 +191,8 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         points[..., normal] = at[plane]
         points[..., right] = dots[right]
         points[..., up] = dots[up][:, None]
-        style: dict[str, Any] = {
-            "origin": "lower",
-            "extent": (*ends[right], *ends[up]),
-            "interpolation": "none",
-        }
-        if brain.image:
-            values, affine = brain.image
-            lit = values[np.isfinite(values) & (values > 0)]
-            brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
-            grey = map_coordinates(
-                np.nan_to_num(values), voxel_index(points, affine), order=1
-            )
-            axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **style)
-        if brain.tissues:
-            groups, affine = brain.tissues
-            index = voxel_index(points, affine)
-            if not brain.image:
-                tissues = map_coordinates(groups, index, order=0, mode="constant")
-                axes.imshow(
-                    tissues,
-                    cmap=ListedColormap(TISSUE_COLOURS),
-                    vmin=-0.5,
-                    vmax=4.5,
-                    **style,
-                )
-            inside = map_coordinates(
-                np.isin(groups, (2, 3)).astype(np.float32), index, order=1
-            )
-            if (groups == 1).any() and inside.min() < 0.5 < inside.max():
-                grid = [
-                    np.linspace(*ends[axis], len(dots[axis])) for axis in (right, up)
-                ]
-                axes.contour(
-                    *grid, inside, levels=[0.5], colors=INNER_COLOUR, linewidths=0.6
-                )
+        edges = (ends[right], ends[up])
+        _draw_volumes(axes, brain, points, edges)
         if brain.white is not None:
             draw_outline(axes, brain.white, plane, at[plane], INNER_COLOUR)
         draw_outline(axes, brain.pial, plane, at[plane], PIAL_COLOUR)
@@ -261,6 +228,49 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         fontsize=6,
         handlelength=1.0,
     )
+
+
+def _draw_volumes(
+    axes: Axes,
+    brain: QualityBrain,
+    points: Floats,
+    edges: tuple[tuple[float, float], tuple[float, float]],
+) -> None:
+    """Draw the image, or else the labels, at the points (h, w, 3) of a plane, and the
+    inner border of cortex labels."""
+    (left, right), (bottom, top) = edges
+    style: dict[str, Any] = {
+        "origin": "lower",
+        "extent": (left, right, bottom, top),
+        "interpolation": "none",
+    }
+    if brain.image:
+        values, affine = brain.image
+        lit = values[np.isfinite(values) & (values > 0)]
+        brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
+        index = voxel_index(points, affine)
+        grey = map_coordinates(np.nan_to_num(values), index, order=1)
+        axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **style)
+    if not brain.tissues:
+        return
+    groups, affine = brain.tissues
+    index = voxel_index(points, affine)
+    if not brain.image:
+        tissues = map_coordinates(groups, index, order=0, mode="constant")
+        colours = ListedColormap(TISSUE_COLOURS)
+        axes.imshow(tissues, cmap=colours, vmin=-0.5, vmax=4.5, **style)
+    is_inside = np.isin(groups, (2, 3)).astype(np.float32)
+    inside = map_coordinates(is_inside, index, order=1)
+    if (groups == 1).any() and inside.min() < 0.5 < inside.max():
+        height, width = inside.shape
+        across = np.linspace(left, right, width)
+        upward = np.linspace(bottom, top, height)
+        border: dict[str, Any] = {
+            "levels": [0.5],
+            "colors": INNER_COLOUR,
+            "linewidths": 0.6,
+        }
+        axes.contour(across, upward, inside, **border)
 
 
 def _draw_views(

@@ -45,18 +45,18 @@ def validation_figure(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
     Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open
     ones predicted.
 
-    `validation` has the columns run, start_week, week, kind, and gain_…, gain_low_… and
-    gain_high_… of each of `COMPARED_MAPS`.
+    `validation` has the columns run, start (the start brain), week, kind, and gain_…,
+    gain_low_… and gain_high_… of each of `COMPARED_MAPS`.
     """
     colours = run_colours(validation["run"], runs)
+    simulations = validation.groupby(["run", "start"], sort=False)
     figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
     for axes, measure in zip(panels, COMPARED_MAPS, strict=True):
-        for number, ((run, _), rows) in enumerate(
-            validation.groupby(["run", "start_week"], sort=False)
-        ):
-            line = rows.sort_values("week")
-            shift = 0.03 * (number - (len(colours) - 1) / 2)
-            _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
+        for number, ((run, _), rows) in enumerate(simulations):
+            rows = rows.sort_values("week")
+            # side by side, so that their bars do not hide each other
+            shift_gw = 0.03 * (number - (simulations.ngroups - 1) / 2)
+            _gain_line(axes, rows["week"] + shift_gw, rows, measure, colours[str(run)])
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
         axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])

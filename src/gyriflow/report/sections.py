@@ -155,6 +155,27 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
     return figure
 
 
+def _aligned(
+    grid: Grid,
+) -> tuple[dict[float, TriangleMesh], str, dict[str, dict[float, TriangleMesh]]]:
+    """Return the observed brains of the last weeks of a grid, their name, and by run
+    its brains of these weeks, aligned with them."""
+    observed = {}
+    name = ""
+    for brain in grid:
+        if not brain.is_simulated:
+            observed[brain.column] = brain.surface
+            name = brain.row
+    last = {week: observed[week] for week in sorted(observed)[-MAX_WEEKS:]}
+    runs: dict[str, dict[float, TriangleMesh]] = {}
+    for brain in grid:
+        if brain.is_simulated:
+            aligned = runs.setdefault(brain.row, {})
+            if brain.column in last:
+                aligned[brain.column] = align(brain.surface, last[brain.column])
+    return last, name, runs
+
+
 @styled
 def outlines_figure(grid: Grid) -> Figure:
     """Draw the outlines of runs over those of the observed brain, a row per plane, a
@@ -166,26 +187,12 @@ def outlines_figure(grid: Grid) -> Figure:
     brains, by week; those of runs are aligned rigidly with the observed brain of their
     week.
     """
-    observed = {}
-    observed_name = ""
-    for brain in grid:
-        if not brain.is_simulated:
-            observed[brain.column] = brain.surface
-            observed_name = brain.row
-    weeks = sorted(observed)[-MAX_WEEKS:]
-    runs: dict[str, dict[float, TriangleMesh]] = {}
-    for brain in grid:
-        if brain.is_simulated:
-            aligned = runs.setdefault(brain.row, {})
-            if brain.column in weeks:
-                aligned[brain.column] = align(brain.surface, observed[brain.column])
+    observed, observed_name, runs = _aligned(grid)
+    weeks = sorted(observed)
     colours = run_colours(runs)
-    drawn = [
-        brains[week]
-        for brains in (observed, *runs.values())
-        for week in weeks
-        if week in brains
-    ]
+    drawn = [*observed.values()]
+    for brains in runs.values():
+        drawn += brains.values()
     low = np.min([mesh.vertices.min(axis=0) for mesh in drawn], axis=0) - 1
     high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1
     wide = max((high - low)[right] for _, right, _ in PLANES.values())
@@ -205,11 +212,8 @@ def outlines_figure(grid: Grid) -> Figure:
         # a sagittal plane in the middle would only show the fissure
         part = 0.75 if plane == "sagittal" else 0.5
         for axes, week in zip(row, weeks, strict=True):
-            ends = (
-                observed[week].vertices[:, normal].min(),
-                observed[week].vertices[:, normal].max(),
-            )
-            at = float(ends[0] + part * (ends[1] - ends[0]))
+            along = observed[week].vertices[:, normal]
+            at = float(along.min() + part * np.ptp(along))
             # wide enough to stay visible under a run
             draw_outline(axes, observed[week], plane, at, OBSERVED_COLOUR, 1.7)
             for run in runs:

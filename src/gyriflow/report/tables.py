@@ -27,6 +27,10 @@ from .labels import (
 )
 from .style import run_colours, runs_by_name
 
+FROM_ATLAS = "difference from"
+"""Beginning of the names of columns with differences from an atlas."""
+MIN_TIMES_NOISE = 2.0
+"""A difference below so many times the noise of measuring is none."""
 VERDICTS = ("fine", "needs review", "refused")
 _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+| %| \([+−][\d.]+\))?|–")
@@ -165,24 +169,29 @@ def centile_text(centiles: pd.DataFrame) -> list[str]:
     ]
 
 
-def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
-    """Return the metrics of an observed brain, whole and by hemisphere, and the
-    centiles of the whole brain.
+def brain_table(
+    metrics: pd.DataFrame, centiles: pd.DataFrame, differences: pd.DataFrame
+) -> pd.DataFrame:
+    """Return the metrics of an observed brain, whole and by hemisphere; of the whole
+    brain also the differences from the average brains of atlases, and the centiles.
 
     `metrics` has the columns hemisphere, metric, value, unit, of this brain;
     `centiles`, of the study, subject, run, hemisphere, metric, value, expected, z,
-    centile, flag.
+    centile, flag; `differences` are those of `metrics.atlas_curves`, of the study.
     """
     rows = _reported(metrics).assign(name=_named)
     wide = rows.pivot_table("value", "name", "hemisphere", aggfunc="first").reindex(
         rows["name"].unique()
     )
     table = wide[[part for part in ("whole", *SIDES) if part in wide]]
-    own = (centiles["subject"] == metrics["subject"].iloc[0]) & (
-        centiles["run"] == MEASURED
-    )
-    scores = centiles[own & (centiles["hemisphere"] == "whole")].assign(name=_named)
-    if len(scores):
+    brain = metrics["subject"].iloc[0]
+    from_atlases = _of_whole(differences, brain)
+    for atlas, rows_of_atlas in from_atlases.groupby("atlas", sort=False):
+        texts = rows_of_atlas.assign(text=_difference_text).set_index("name")["text"]
+        table = table.assign(**{f"{FROM_ATLAS} {atlas}": texts})
+    scores = _of_whole(centiles, brain)
+    # without a norm there are only flags
+    if scores["expected"].notna().any():
         scores = scores.assign(text=centile_text(scores)).set_index("name")
         columns = {
             "centile (90 % interval), z; or difference": scores["text"],
@@ -190,6 +199,29 @@ def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
         }
         table = table.assign(norm=scores["expected"], **columns)
     return table.dropna(how="all").rename_axis("metric")
+
+
+def _of_whole(table: pd.DataFrame, brain: str) -> pd.DataFrame:
+    """Return the rows of an observed brain as a whole, with titles as `name`."""
+    is_own = (table["subject"] == brain) & (table["run"] == MEASURED)
+    return table[is_own & (table["hemisphere"] == "whole")].assign(name=_named)
+
+
+def _difference_text(rows: pd.DataFrame) -> list[str]:
+    """Return differences from an atlas in %, or in the metric's unit if it may be
+    negative, and as multiples of the noise of measuring."""
+    texts = []
+    for row in rows.to_dict("records"):
+        text = _signed(100 * row["relative_difference"], " %")
+        if np.isnan(row["relative_difference"]):
+            text = f"{row['difference']:+.2g}".replace("-", "−")
+        times = abs(row["times_noise"])
+        if times < MIN_TIMES_NOISE:
+            text += " (within noise)"
+        elif np.isfinite(times):
+            text += f" ({times:.0f} × noise)"
+        texts.append(text)
+    return texts
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:

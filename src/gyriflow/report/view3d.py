@@ -77,57 +77,50 @@ def surfaces_view(
     box = low, float((high - low).max())
     scales = {}
     for name in _DRAWN:
-        if values := [maps[name] for _, _, maps in everything if name in maps]:
+        values = [maps[name] for _, _, maps in everything if name in maps]
+        if values:
             every = np.concatenate(values)
             scales[name] = scale_of(name, every[np.isfinite(every)])
     groups: list[dict[str, Any]] = []
     for run, frames in simulated.items():
         vertices_kept, faces = thin_out(frames[-1][1], vertices)
-        style = {
+        group = {
             "name": run,
             "kind": "simulated",
             "colour": SIMULATED_SURFACE_COLOUR,
             "faces": _text(faces, "<u2"),
+            "frames": [_frame(frame, vertices_kept, box, scales) for frame in frames],
         }
-        groups.append(
-            style
-            | {
-                "frames": [
-                    _frame(frame, vertices_kept, box, scales) for frame in frames
-                ]
-            }
-        )
+        groups.append(group)
     if observed_frames:
         drawn = []
         for frame in observed_frames:
             vertices_kept, faces = thin_out(frame[1], vertices)
-            drawn.append(
-                _frame(frame, vertices_kept, box, scales)
-                | {"faces": _text(faces, "<u2")}
-            )
-        groups.append(
-            {
-                "name": observed_name,
-                "kind": "real",
-                "colour": OBSERVED_SURFACE_COLOUR,
-                "frames": drawn,
-            }
-        )
-    maps = []
-    for name, scale in scales.items():
-        bottom, top = scale.get_clim()
-        levels = np.linspace(bottom, top, _VALUE_LEVELS + 1)
-        colours = scale.to_rgba(levels, bytes=True)[:, :3]
-        maps.append(
-            {
-                "name": name,
-                "label": map_title(name),
-                "low": bottom,
-                "high": top,
-                "colours": _text(colours, "u1"),
-            }
-        )
+            own_faces = {"faces": _text(faces, "<u2")}
+            drawn.append(_frame(frame, vertices_kept, box, scales) | own_faces)
+        group = {
+            "name": observed_name,
+            "kind": "real",
+            "colour": OBSERVED_SURFACE_COLOUR,
+            "frames": drawn,
+        }
+        groups.append(group)
+    maps = [_drawn_map(name, scale) for name, scale in scales.items()]
     return {"low": low.tolist(), "size": box[1], "groups": groups, "maps": maps}
+
+
+def _drawn_map(name: str, scale: ScalarMappable) -> dict[str, Any]:
+    """Return the title and the colours of a map."""
+    low, high = scale.get_clim()
+    levels = np.linspace(low, high, _VALUE_LEVELS + 1)
+    colours = scale.to_rgba(levels, bytes=True)[:, :3]
+    return {
+        "name": name,
+        "label": map_title(name),
+        "low": low,
+        "high": high,
+        "colours": _text(colours, "u1"),
+    }
 
 
 def _timed(week: float, halves: Halves) -> Timed:

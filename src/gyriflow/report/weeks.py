@@ -49,6 +49,8 @@ NO_SUBJECTS: Mapping[str, str] = {}
 LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
 JOINED: Mapping[str, Any] = {"color": MUTED_COLOUR, "linewidth": 0.8, "zorder": 2.5}
 """Line through the scans of a subject."""
+NEAR_GW = 2.0
+"""The lines of atlases go on so far beyond the brains of a chart."""
 MANY_BRAINS = 30
 """Number of reference brains above which their marks are small."""
 _FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
@@ -194,9 +196,40 @@ def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str,
     )
 
 
+def _atlas_lines(
+    atlases: pd.DataFrame, titles: Mapping[str, str], weeks: pd.Series
+) -> tuple[list[Layer], list[Artist]]:
+    """Return the thin lines of atlases over the weeks of a chart, and their legend
+    entries."""
+    is_drawn = (
+        (atlases["hemisphere"] == "whole")
+        & atlases["metric"].isin(titles)
+        & atlases["week"].between(weeks.min() - NEAR_GW, weeks.max() + NEAR_GW)
+    )
+    rows = atlases[is_drawn]
+    rows = rows.assign(panel=rows["metric"])
+    layers = []
+    entries: list[Artist] = []
+    # an atlas may have no brain of these weeks
+    names = list(dict.fromkeys(rows["atlas"]))
+    for name, line in zip(names, cycle(LINES[1:]), strict=False):
+        style: dict[str, Any] = {
+            "color": MUTED_COLOUR,
+            "linewidth": 0.8,
+            "linestyle": line,
+            "zorder": 1.5,
+        }
+        layers.append(Layer(rows[rows["atlas"] == name], style))
+        entries.append(
+            Line2D([], [], label=f"{name}: average of many fetuses", **style)
+        )
+    return layers, entries
+
+
 @styled
 def metrics_figure(
     metrics: pd.DataFrame,
+    atlases: pd.DataFrame,
     *,
     runs: Sequence[str] = (),
     observed_name: str = OBSERVED_BRAIN,
@@ -207,7 +240,8 @@ def metrics_figure(
     brains as black stars.
 
     The scans of a subject are joined. Subjects have markers if there are at most eight;
-    groups of brains have colours. Metrics that the table lacks are left out.
+    groups of brains have colours. Metrics that the table lacks are left out. Thin lines
+    are the average brains of `atlases`, the table of `metrics.atlas_curves`.
 
     `metrics` has the columns subject, run, week, hemisphere, metric, value, unit; `run`
     is "real" for observed brains. InputError if the table has none of the metrics.
@@ -220,7 +254,9 @@ def metrics_figure(
     markers = _subject_markers(whole, subjects)
     shades, entries = _group_shades(groups, colours)
     marks = _observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
-    figure, _ = weeks_chart(titles, [*_run_lines(rows, colours), *marks], whole["week"])
+    lines, names = _atlas_lines(atlases, titles, whole["week"])
+    layers = [*lines, *_run_lines(rows, colours), *marks]
+    figure, _ = weeks_chart(titles, layers, whole["week"])
     named = [*(subjects if markers else ()), *shades]
     has_stars = not observed["subject"].isin(named).all()
     run_legend(
@@ -228,7 +264,7 @@ def metrics_figure(
         colours,
         observed_name=observed_name if has_stars else "",
         markers=markers,
-        extra=entries,
+        extra=[*entries, *names],
     )
     return figure
 

@@ -174,12 +174,12 @@ class Growth(Settings):
         )
 
     def unused_keys(self, used: Collection[str]) -> Problems:
-        """Yield the problems of keys that are given but not among those used."""
+        """Yield a problem for each key that differs from its default but is not among
+        those used."""
         for key, field in type(self).model_fields.items():
             if key in ("model", *used) or getattr(self, key) == field.default:
                 continue
-            models = GROWTH_MODELS.items()
-            users = [name for name, model in models if key in model.keys]
+            users = [name for name, model in GROWTH_MODELS.items() if key in model.keys]
             yield KeyProblem(
                 f"is not used by the growth model {self.model}; remove it, or use the"
                 f" model {' or '.join(users)}",

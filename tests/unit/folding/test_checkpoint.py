@@ -121,7 +121,7 @@ def test_a_checkpoint_is_not_used_after_the_source_has_changed(
     (tmp_path / "folding").mkdir()
     source, path = tmp_path / "folding" / name, tmp_path / "state.h5"
     monkeypatch.setattr(checkpoint, "modules_behind", lambda program: {source})
-    monkeypatch.setattr(checkpoint, "room_of", lambda module: module.parent.name)
+    monkeypatch.setattr(checkpoint, "subpackage_of", lambda module: module.parent.name)
     keys = []
     for text in ("tolerance = 1e-4", "tolerance = 1e-3", "tolerance = 1e-4"):
         source.write_text(text)

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 from pictures import words
 
 from gyriflow.errors import InputError
+from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
 from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
 from gyriflow.report.growth import growth_figure
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
@@ -97,6 +98,10 @@ def spectrum_rows(
     ]
 
 
+NO_ATLASES = pd.DataFrame(columns=CURVES)
+NO_DIFFERENCES = pd.DataFrame(columns=DIFFERENCES)
+
+
 def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
     """Draw the spectra of a study with one member at 28 GW."""
     values = {"thin": {"thickness_mm": 1.5}}
@@ -114,7 +119,7 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
         )
     ]
     subjects = {"a1": "sub-a", "a2": "sub-a", "b1": "sub-b"}
-    figure = metrics_figure(pd.concat(parts), subjects=subjects)
+    figure = metrics_figure(pd.concat(parts), NO_ATLASES, subjects=subjects)
     drawn = [
         (line.get_marker(), line.get_linestyle(), line.get_xdata().tolist())
         for line in figure.axes[0].lines
@@ -130,6 +135,7 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
     # a covariate has colours beside the markers
     figure = metrics_figure(
         pd.concat(parts),
+        NO_ATLASES,
         subjects=subjects,
         groups={"a1": "sex: F", "a2": "sex: F", "b1": "sex: M"},
     )
@@ -143,7 +149,9 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
     # more than a legend holds share the star
     many = pd.concat([parts[0].assign(subject=f"s{number}") for number in range(9)])
     figure = metrics_figure(
-        many, subjects={f"s{number}": f"sub-{number}" for number in range(9)}
+        many,
+        NO_ATLASES,
+        subjects={f"s{number}": f"sub-{number}" for number in range(9)},
     )
     assert {line.get_marker() for line in figure.axes[0].lines} == {"*"}
     assert "sub-1" not in words(figure)
@@ -160,7 +168,7 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
             ),
         ]
     )
-    figure = metrics_figure(metrics)
+    figure = metrics_figure(metrics, NO_ATLASES)
     area, curvedness = figure.axes
     assert area.get_title() == "pial area (cm²)"
     drawn = {line.get_marker(): line.get_xydata().tolist() for line in area.lines}
@@ -171,7 +179,32 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
 
 def test_a_table_without_metrics_is_refused():
     with pytest.raises(InputError, check=Facts("spam")):
-        metrics_figure(metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""))
+        metrics_figure(
+            metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""), NO_ATLASES
+        )
+
+
+def test_atlases_are_thin_lines_near_the_weeks_of_the_brains():
+    metrics = metric_rows("real", "whole", "area", {25.0: 100.0, 26.0: 110.0}, "cm2")
+    rows = [
+        (atlas, side, metric, week, factor * week)
+        for atlas, factor in (("one", 4.0), ("two", 5.0))
+        for side in ("whole", "left")
+        for metric in ("area", "volume")
+        for week in np.arange(20.0, 39.0)
+    ]
+    rows += [("late", "whole", "area", week, 300.0) for week in (36.0, 37.0)]
+    figure = metrics_figure(metrics, pd.DataFrame(rows, columns=CURVES))
+    (area,) = figure.axes
+    lines = [line.get_xydata() for line in area.lines if line.get_linestyle() != "None"]
+    weeks = np.arange(23.0, 29.0)
+    assert [line[:, 0].tolist() for line in lines] == [weeks.tolist()] * 2
+    assert [line[:, 1].tolist() for line in lines] == [
+        (4 * weeks).tolist(),
+        (5 * weeks).tolist(),
+    ]
+    names = " ".join(words(figure))
+    assert ("one" in names, "two" in names, "late" in names) == (True, True, False)
 
 
 def test_spectra_bars_are_the_relative_powers_of_each_side():
@@ -308,24 +341,42 @@ def test_norms_of_averages_have_a_curve_without_a_band(metrics_with_norms):
 def test_a_brain_has_its_numbers_with_where_they_stand(metrics_with_norms):
     own = metrics_with_norms[metrics_with_norms["subject"] == "case"]
     cohort = cohort_norms(metrics_with_norms, REFERENCE)
-    row = brain_table(own, measured_scores(metrics_with_norms, REFERENCE, cohort)).loc[
-        "pial area (cm²)"
-    ]
+    scores = measured_scores(metrics_with_norms, REFERENCE, cohort)
+    row = brain_table(own, scores, NO_DIFFERENCES).loc["pial area (cm²)"]
     assert (row["whole"], row["note"], row.iloc[-2]) == (
         252.0,
         "few brains",
         "95 (95 to 95), +1.6",
     )
     averages = cohort_norms(metrics_with_norms, REFERENCE, individuals=False)
-    row = brain_table(
-        own, measured_scores(metrics_with_norms, REFERENCE, averages)
-    ).loc["pial area (cm²)"]
+    scores = measured_scores(metrics_with_norms, REFERENCE, averages)
+    row = brain_table(own, scores, NO_DIFFERENCES).loc["pial area (cm²)"]
     assert row["norm"] == pytest.approx(250, abs=0.5)
     assert row.iloc[-2] in ("+0.8 %", "+0.9 %", "+0.7 %")
     assert row["note"] == SPREAD_UNKNOWN
-    assert list(brain_table(own, measured_scores(own, [], cohort_norms(own, [])))) == [
-        "whole"
-    ]
+    scores = measured_scores(own, [], cohort_norms(own, []))
+    assert list(brain_table(own, scores, NO_DIFFERENCES)) == ["whole"]
+
+
+def test_a_brain_has_its_differences_from_atlases_beside_the_noise(metrics_with_norms):
+    own = metrics_with_norms[metrics_with_norms["subject"] == "case"]
+    differences = pd.DataFrame(
+        {
+            "subject": ["case", "case", "case", "case", "s1"],
+            "run": ["real", "real", "real", "predicted", "real"],
+            "hemisphere": "whole",
+            "metric": "area",
+            "atlas": ["one", "two", "three", "one", "one"],
+            "difference": 1.0,
+            "relative_difference": [-0.031, 0.001, np.nan, 0.5, 0.5],
+            "times_noise": [-22.2, 1.9, 3.0, 9.0, 9.0],
+        }
+    )
+    scores = measured_scores(own, [], cohort_norms(own, []))
+    row = brain_table(own, scores, differences).loc["pial area (cm²)"]
+    assert row["difference from one"] == Facts("−3.1 %", 22)
+    assert row["difference from two"] == Facts("+0.1 %", "within noise")
+    assert row["difference from three"] == Facts("+1", 3)
 
 
 def edges(axes, number: int) -> list[list[float]]:
@@ -580,13 +631,13 @@ def test_each_parameter_of_a_calibration_has_a_panel():
     assert list(figure.axes[1].get_lines()[0].get_xdata()) == [2.1e-7, 2.1e-7]
 
 
-def gains(runs, weeks=(22, 23, 24)):
+def gains(runs, weeks=(22, 23, 24), start="a"):
     rows = []
     for number, run in enumerate(runs):
         for week in weeks:
             row = {
                 "run": run,
-                "start_week": 21,
+                "start": start,
                 "week": week,
                 "kind": "predicted" if week > 23 else "explained",
             }
@@ -610,6 +661,16 @@ def test_gains_are_drawn_with_their_kind_and_interval():
     bars = np.array(axes.collections[0].get_segments())[:, :, 1]
     np.testing.assert_allclose(
         bars, [[value - 0.02, value + 0.05] for value in (0.01, 0.02, 0.03)]
+    )
+
+
+def test_gains_of_two_start_brains_are_two_lines_beside_each_other():
+    both = pd.concat([gains(["reference"]), gains(["reference"], start="b")])
+    axes = validation_figure(both).axes[0]
+    lines = [np.array(line.get_xdata(), float) for line in axes.lines]
+    weeks = [line for line in lines if len(line) == 3]
+    np.testing.assert_allclose(
+        weeks, [[21.985, 22.985, 23.985], [22.015, 23.015, 24.015]]
     )
 
 

@@ -10,6 +10,7 @@ from facts import Facts
 from markupsafe import Markup, escape
 
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.metrics.atlas_curves import DIFFERENCES
 from gyriflow.report.page import (
     NOT_COMPARED,
     Tables,
@@ -76,6 +77,7 @@ VALIDATION = pd.DataFrame(
     {
         "run": "thin",
         "kind": "predicted",
+        "start": "young",
         "start_week": 21.0,
         "week": [22.0, 23.0],
         "area_difference": [0.1, -0.0794],
@@ -92,7 +94,7 @@ VALIDATION = pd.DataFrame(
 )
 
 
-NO_WARNINGS = pd.DataFrame({"subject": [], "level": [], "message": []})
+NO_WARNINGS = pd.DataFrame({"subject": [], "run": [], "level": [], "message": []})
 QUALITY = pd.DataFrame(
     {
         "subject": ["young", "old"],
@@ -121,6 +123,7 @@ CENTILES = METRICS.iloc[:2].assign(
     flag=["ok", SPREAD_UNKNOWN],
 )
 MEASURES = {"quality": QUALITY, "metrics": METRICS, "centiles": CENTILES}
+MEASURES["differences"] = pd.DataFrame(columns=DIFFERENCES)
 PROVENANCE = {
     "commit": "abc-dirty",
     "recorded": "2026-01-01T12:30:00+00:00",
@@ -410,7 +413,8 @@ def test_paths_are_hidden():
 
 
 def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
-    young, old = brain_rows(BRAINS, **MEASURES, linked=PICTURES)
+    measures = (QUALITY, METRICS, CENTILES)
+    young, old = brain_rows(BRAINS, *measures, linked=PICTURES)
     assert (young["verdict"], young["cause"]) == ("needs review", "a bridge was cut")
     assert (old["verdict"], old["cause"]) == ("refused", "cropped")
     assert young["facts"] == ["21 GW", "healthy", "sex: F", "CC0 1.0"]
@@ -450,19 +454,28 @@ def test_a_page_says_what_its_centiles_are_worth():
 def test_a_brain_has_a_page_of_its_own():
     warnings = pd.DataFrame(
         {
-            "subject": ["young"],
-            "run": np.nan,
+            "subject": ["young", "young", "old"],
+            "run": [np.nan, "thin", np.nan],
             "step": "s",
             "level": "warning",
-            "message": "own",
+            "message": ["own", "of a run", "of another"],
         }
     )
-    tables = Tables(**TABLES | {"warnings": warnings})
+    differences = METRICS[1:2].assign(
+        atlas="crl", relative_difference=-0.1, difference=-10.0, times_noise=-40.0
+    )
+    tables = Tables(**TABLES | {"warnings": warnings, "differences": differences})
     text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert 'href="../report.html"' in text
-    assert text.index(">own<") < text.index("<h2>quality") < text.index("<th>left</th>")
-    # both hemispheres and where the brain stands
-    assert re.search(r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 %", text)
+    assert text.index("<th>left</th>") < text.index(">own<") < text.index("<h2>quality")
+    assert ("of a run" in text, "of another" in text) == (False, False)
+    # first both hemispheres, and where the brain stands
+    before, _, _ = text.partition("<h2>quality")
+    assert re.search(r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 % \(40 ×", before)
+    assert "medical device" in before
+    tables = Tables(**TABLES)
+    text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
+    assert "no atlas to compare with" in text
 
 
 def test_a_measured_study_begins_with_how_many_brains_have_which_verdict():
@@ -487,6 +500,10 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     assert row["area (%)"] == "−7.9"
     assert (row["r"], row["gain"]) == ("0.57 (0.51 to 0.61)", "−0.00 (−0.04 to +0.04)")
     assert row["distance (mm)"] == "0.42"
+    # of the same run from another brain of that week
+    other = VALIDATION.assign(start="old", distance_mm=9.0)
+    both = scores_table(RUNS, pd.concat([VALIDATION, other]))
+    assert both["distance (mm)"].tolist() == ["0.42"]
     (alone,) = scores_table(RUNS).to_dict("records")
     assert alone["gain"] == "–"
     assert "GW" not in alone["observed brain"]

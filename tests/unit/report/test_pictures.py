@@ -14,6 +14,7 @@ from gyriflow.report.panels import LINES_MM, direction_lines
 from gyriflow.report.pictures import (
     GridBrain,
     brain_grid,
+    brain_maps,
     displacement_maps,
     expected_figure,
     growth_grid,
@@ -432,3 +433,25 @@ def test_outlines_are_those_of_both_brains_at_one_scale_laid_onto_each_other():
     assert np.ptp(simulated[:, 0]) == pytest.approx(40.0, rel=0.01)
     assert simulated.mean(axis=0) == pytest.approx(real.mean(axis=0), abs=0.5)
     assert {"thin", "observed brain", "21 GW", "22 GW"} <= words(figure)
+
+
+@pytest.mark.parametrize(("sides", "inner"), [("lr", 2), ("l", 1), ("r", 1)])
+def test_a_brain_is_shown_from_outside_and_each_hemisphere_from_within(sides, inner):
+    halves = {
+        "l": box((20, 30, 20), (-11, 0, 0)),
+        "r": box((20, 30, 20), (11, 0, 0)),
+    }
+    # the inner face of a half is a sulcus, its outer one a gyrus
+    maps = []
+    for name in sides:
+        x = halves[name].vertices[:, 0]
+        is_inner = np.abs(x) < 2
+        maps.append((halves[name], {"shape_index": np.where(is_inner, -0.5, 0.5)}))
+    names = {"l": "left", "r": "right"}
+    figure = brain_maps(maps, sides=[names[side] for side in sides])
+    count = len(pictures(figure))
+    assert count == 3 + inner
+    tones = [tone(picture(figure, number)) for number in range(count)]
+    # outside red, inside blue
+    assert all(red > blue for red, _, blue in (tones[0], tones[1]) if sides == "lr")
+    assert all(blue > red for red, _, blue in tones[3:])

@@ -222,7 +222,7 @@ def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
         "columns": LABELS,
         "labels": None,
         "white_files": {},
-        "side": "left",
+        "sides": ["left", "right"],
         "log": tmp_path / "surface.log",
     }
     run_script("brain_figures.py", tmp_path, inputs, outputs, params)

@@ -152,6 +152,7 @@ def pictured(text):
 def pages(folder):
     """Return the report and the pages of both brains."""
     tables = ("quality", "warnings", "metrics", "centiles", "runs", "validation")
+    tables = (*tables, "differences")
     inputs = {name: f"{name}.csv" for name in tables} | {
         name: PAGE / file for name, file in PARTS.items()
     }
