@@ -116,7 +116,7 @@ rule brain_regions:
     output:
         brain_regions=multiext(f"{BRAIN}/figures/regions", ".png", ".pdf"),
     wildcard_constraints:
-        brain=one_of(brain.id for brain in WITH_REGIONS),
+        brain=brains_where(lambda brain: brain.regions),
     params:
         **drawn_by("pictures"),
         grid=lambda w: brain_regions_grid(BRAINS[w.brain]),

@@ -26,8 +26,9 @@ rule study_records:
     input:
         # logs and records of time and memory are not inputs, since a missing one would repeat its job
         rules.figures.input,
-        figure_files("brain_maps", "brain_regions", "small_pictures"),
+        figure_files("brain_regions"),
         rules.metrics.input,
+        # made from a row of each brain, with which its figures are made
         rules.quality_table.output,
         run_params=study.files(PARAMETERS),
         summaries=study.files(FOLDING["summary"]),
@@ -80,17 +81,24 @@ rule study_records:
         "../scripts/study_records.py"
 
 
-def on_page(sections, brain=None):
-    """Return the figures of the page of the study or of a brain: their file, place, and names in title and caption."""
+def on_page(sections):
+    """Return the figures of the sections of a page: their file, place, and names in title and caption."""
     figures = []
     for section, names in sections.items():
         for name in names:
             drawn = FIGURES.get(name, {"files": [], "names": []})
             look = {"first": name in IN_SUMMARY, "technical": name in TECHNICAL}
             for values in drawn["names"]:
-                if brain in (None, values.get("brain")):
-                    path = drawn["files"][0].format(**values)
-                    figures.append({"name": name, "section": section, "path": path, "names": values, **look})
+                path = drawn["files"][0].format(**values)
+                figures.append({"name": name, "section": section, "path": path, "names": values, **look})
+    return figures
+
+
+def on_brain_pages():
+    """Return the figures of the page of each brain."""
+    figures = {brain: [] for brain in BRAINS}
+    for figure in on_page(BRAIN_SECTIONS):
+        figures[figure["names"]["brain"]].append(figure)
     return figures
 
 
@@ -153,7 +161,7 @@ rule html_report:
         view=f"{REPORT}/surfaces.json",
     params:
         figures=on_page(SECTIONS),
-        brain_figures={brain: on_page(BRAIN_SECTIONS, brain) for brain in BRAINS},
+        brain_figures=on_brain_pages(),
         brains=lambda w: descriptions(CONFIG.brains),
         prediction=lambda w: study.prediction_facts,
         surfaces=SURFACES,
@@ -166,5 +174,5 @@ rule html_report:
 
 rule report:
     input:
-        rules.html_report.output,
-        rules.study_records.output,
+        rules.html_report.output.report,
+        rules.study_records.output.report,

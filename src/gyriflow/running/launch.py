@@ -49,6 +49,7 @@ from .planning import (
     hide_results,
     keep_contents,
     link_results,
+    listing,
     made_plan,
     no_plan,
     restore_results,
@@ -99,11 +100,20 @@ MANAGING_OPTIONS = (
     "generate_unit_tests",
 )
 """Options that ask for something else than running steps."""
+PARTIAL_OPTIONS = ("until", "omit_from", "batch")
+"""Options that select some of the planned jobs."""
+SNAKEMAKE_LISTS = (
+    *(name for name in VERBOSE_OPTIONS if name != "quiet"),
+    *PARTIAL_OPTIONS,
+)
+"""Options with which Snakemake itself lists the jobs of a dry run. It plans twice
+then."""
 BY_MANIFEST = ("--rerun-triggers", "mtime", "--debug-dag")
 """Options with which Snakemake lists all jobs, and compares none with its own records.
 Dates do not count, either, as all inputs are `ancient`."""
-PLANNING = (*BY_MANIFEST, "--quiet", "rules", "progress", "--rerun-incomplete", "-n")
-"""Options with which Snakemake only lists the jobs that it plans."""
+PLANNING = ("-n", "--rerun-incomplete", "--quiet", "rules", "progress")
+"""Options with which Snakemake only finds the jobs that it plans. With exactly these
+two words after `--quiet`, it ends before it goes through them in turn."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 """Environment variable: continue after a failed step, or after a row of a table that
 cannot be used."""
@@ -129,6 +139,8 @@ SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefil
 """Where Snakemake finds a workflow by itself."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: list[IO[str]] = []
+call_targets: list[str] = []
+"""The rules and files that the call asks for."""
 received_signals: list[int] = []
 """Signals that have interrupted the run of this process."""
 
@@ -473,9 +485,9 @@ def call_snakemake(
         rules = [
             path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")
         ]
-        targets = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
+        stages = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
         raise InputError(
-            f"no stage or result is named {name}; {did_you_mean(name, targets)}"
+            f"no stage or result is named {name}; {did_you_mean(name, stages)}"
         )
     return 128 + received_signals[0] if code and received_signals else code
 
@@ -519,9 +531,9 @@ class Call:
         return is_plain and not self.has_any(MANAGING_OPTIONS)
 
     @property
-    def targets(self) -> list[str]:
-        """The rules and files that it asks for."""
-        return self.options.targets or ["all"]
+    def quiet(self) -> list[str]:
+        """The words after `--quiet`."""
+        return [item.name.lower() for item in self.options.quiet or []]
 
     @property
     def is_forced(self) -> bool:
@@ -532,8 +544,8 @@ class Call:
         """Return the rules and files of planned jobs that run again in any case."""
         if self.options.forceall:
             return [job.rule for job in jobs]
-        targets = self.targets if self.options.force else []
-        return [*(self.options.forcerun or []), *targets]
+        wanted = call_targets if self.options.force else []
+        return [*(self.options.forcerun or []), *wanted]
 
 
 def plan_and_run(call: Call, *, is_again: bool = False) -> int:
@@ -553,12 +565,13 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     events = Events()
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
-    code = call_snakemake([*PLANNING, *call.arguments, *profile], events, is_error)
+    arguments = [*BY_MANIFEST, *call.arguments, *profile, *PLANNING]
+    code = call_snakemake(arguments, events, is_error)
     if code:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
         forced = call.forced(events.jobs.values())
-        plan = made_plan(events, call.targets, forced)
+        plan = made_plan(events, call_targets, forced)
         if call.runs:
             keep_contents(plan)
     if call.take_plan:
@@ -568,6 +581,9 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     if events.nothing and not plan.reasons:
         if not is_again:
             say_nothing_runs(call, events.nothing)
+        return 0
+    if not (call.runs or call.has_any(SNAKEMAKE_LISTS)):
+        print(listing(plan, call.quiet), end="")
         return 0
     if call.runs:
         hide_results(call.directory, plan.outdated)
@@ -610,11 +626,10 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
         with suppress(StorageError):
             write_manifest(job, plan.found)
 
-    quiet = [item.name.lower() for item in call.options.quiet or []]
-    if "progress" in quiet:
+    if "progress" in call.quiet:
         # Snakemake would not name the jobs that have finished
-        quiet.remove("progress")
-        arguments += ["--quiet", *(quiet or ["host"])]
+        others = [word for word in call.quiet if word != "progress"]
+        arguments += ["--quiet", *(others or ["host"])]
         is_wanted = is_no_progress
     output: AbstractContextManager[None] = nullcontext()
     if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
@@ -651,6 +666,7 @@ def main(
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)
     check_options(unknown, parser.format_usage())
+    call_targets[:] = options.targets or ["all"]
     directory = options.directory or Path()
     is_second_pass = REFUSED_FILE_VAR in os.environ
     if not (options.configfile or options.snakefile or is_second_pass):

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ..code_hash import code_hash
+from ..errors import InputError
 from ..io.files import contents
 from ..io.origins import joined_contents
+from ..settings.base import did_you_mean
 from ..study.paths import log_of
 from .manifest import recorded_results
 
@@ -68,6 +70,22 @@ def remove_stale(rules: Collection[Any], *folders: str) -> None:
         is_unchanged = present.get(name) == content
         if is_result and is_unchanged and not _is_made(name, rules):
             path.unlink()
+
+
+def check_brains(
+    targets: Iterable[str], rules: Iterable[Any], brains: Collection[str]
+) -> None:
+    """Raise InputError if a file that a call asks for is of none of the `brains`."""
+    for target in targets:
+        for rule in rules:
+            if not rule.is_producer(target):
+                continue
+            brain = rule.get_wildcards(target).get("brain")
+            if brain is not None and brain not in brains:
+                raise InputError(
+                    f"no stage or result is named {target}; the study has no brain"
+                    f" {brain}; {did_you_mean(brain, brains)}"
+                )
 
 
 def _is_made(path: str, rules: Collection[Any]) -> bool:

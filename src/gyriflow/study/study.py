@@ -252,16 +252,6 @@ class Study:
         rows = {row.place: row for row in self.simulated.values()}
         return rows | self.measured
 
-    @property
-    def surfaces(self) -> list[str]:
-        files = []
-        for brain in self.brains.values():
-            patterns = [*paths.pial_of(*brain.sides).values()]
-            if brain.thickness:
-                patterns += paths.THICKNESS.values()
-            files += [pattern.format(**brain.names) for pattern in patterns]
-        return files
-
     @cached_property
     def used_atlases(self) -> list[UsedAtlas]:
         """The atlases of the study, with the files that exist now."""

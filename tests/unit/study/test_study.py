@@ -328,15 +328,6 @@ def test_a_brain_of_the_last_week_is_one_that_is_compared(of_two):
     assert found.chains["own22", "atlas"].further_weeks == (22.7, 23.6)
 
 
-def test_the_surfaces_of_a_study_are_those_of_all_its_brains(of_two):
-    found = study(of_two(22, 23), **EXPECTED)
-    for name in found.brains:
-        folder = f"results/brains/{name}/surface"
-        files = {file for file in found.surfaces if file.startswith(folder)}
-        expected = {"pial.surf.gii", "left.pial.surf.gii", "thickness.shape.gii"}
-        assert {f"{folder}/{file}" for file in expected} <= files
-
-
 @pytest.mark.parametrize("surfaces", ["start", "atlas", "both"])
 def test_brains_without_labels_are_filled_with_their_own_cortex_or_a_similar_brain_s(
     of_two, files, surfaces
