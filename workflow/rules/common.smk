@@ -143,14 +143,12 @@ def brains_with(*sides, has_thickness=None):
     Brains of one hemisphere have fewer files. They have rules of their own (`use rule … as …_left with:`), since all
     output files of a rule are made by each of its jobs.
     """
-    return brains_where(
-        lambda brain: brain.sides == sides and has_thickness in (None, bool(brain.thickness))
-    )
+    return brains_where(lambda brain: brain.sides == sides and has_thickness in (None, bool(brain.thickness)))
 
 
 wildcard_constraints:
-    brain=ANY_BRAIN,
     **dict.fromkeys(("earlier", "later"), one_of(BRAINS)),
+    brain=ANY_BRAIN,
     study=one_of(SWEEPS),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",
