@@ -2,7 +2,7 @@
 # and tables of `figures.smk`.
 from itertools import takewhile
 
-from gyriflow.running.snakemake_internals import usage_patterns
+from gyriflow.running.snakemake_internals import message_patterns
 from gyriflow.settings.terms import run_names
 
 # the configuration; brains of atlases and of the table of participants are already among its brains
@@ -16,15 +16,15 @@ def descriptions(brains):
     described = []
     for brain in brains:
         facts = {name: getattr(brain, name) for name in DESCRIBED}
-        atlas = study.atlases.get(brain.id)
-        described.append(facts | {"licence": atlas.licence.name if atlas else None})
+        used = study.atlases.get(brain.id)
+        described.append(facts | {"licence": used.atlas.licence.name if used else None})
     return described
 
 
 # also of the report's own tables, so that they exist if the page cannot be made
 rule study_records:
     input:
-        # logs and records of time and memory are not inputs, since a missing one would repeat its job
+        # logs and messages, with time and memory, are not inputs, since a missing one would repeat its job
         rules.figures.input,
         figure_files("brain_regions"),
         rules.metrics.input,
@@ -64,8 +64,8 @@ rule study_records:
             for path in paths
         ],
         folded=study.pairs,
-        # pattern of the records of time and memory of each rule; those of earlier configurations do not match
-        benchmarks=lambda w: usage_patterns(
+        # pattern of the messages of each rule, with time and memory; those of earlier configurations do not match
+        messages=lambda w: message_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)
         ),
         growth_of=[simulation.growth_of for simulation in study.run_simulations],

@@ -43,7 +43,7 @@ from ..settings.terms import (
     is_too_coarse,
 )
 from ..settings.varying import Varying, curve_at
-from ..study.atlases import atlas_brains, known_checksums, used_atlases
+from ..study.atlases import atlas_by_brain, known_checksums, used_atlases
 from ..study.brains import label_scheme
 from ..study.loading import load
 from ..study.paths import PLAN
@@ -357,17 +357,14 @@ def _memory_doubts(brain: BrainConfig) -> list[str]:
 def _scans(
     config: Config, problems: Sequence[tuple[str, str, bool]]
 ) -> Iterator[ScanRow]:
-    atlases = {
-        brain["id"]: used.atlas.name
-        for used in used_atlases(config)
-        for brain in atlas_brains(used)
-    }
+    atlases = atlas_by_brain(used_atlases(config))
     for brain in config.brains:
         is_bad = {bad for name, _, bad in problems if name == brain.id}
         verdict = "refused" if True in is_bad else "warning" if is_bad else "ok"
-        source = config.age_sources.get(brain.id) or atlases.get(
-            brain.id, "configuration"
-        )
+        default = "configuration"
+        if brain.id in atlases:
+            default = atlases[brain.id].atlas.name
+        source = config.age_sources.get(brain.id) or default
         data = ", ".join(Path(file).name for file in brain.files) or brain.source
         yield ScanRow(
             brain.id, f"{brain.week:g}", source, data, brain.scheme or "–", verdict
@@ -438,14 +435,7 @@ def _path_lines(
     where it will be kept."""
     for job, path_s in zip(jobs, seconds, strict=True):
         brain = job.wildcards.get("brain", "")
-        used = next(
-            (
-                used
-                for used in study.used_atlases
-                if used.atlas is study.atlases.get(brain)
-            ),
-            None,
-        )
+        used = study.atlases.get(brain)
         name = used.atlas.name if used else brain
         if job.rule == "kept_path":
             yield f"path of {name}: kept from an earlier study"

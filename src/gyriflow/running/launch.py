@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import (
     AbstractContextManager,
     chdir,
@@ -27,7 +27,7 @@ from contextlib import (
     nullcontext,
     suppress,
 )
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
@@ -102,6 +102,8 @@ MANAGING_OPTIONS = (
 """Options that ask for something else than running steps."""
 PARTIAL_OPTIONS = ("until", "omit_from", "batch")
 """Options that select some of the planned jobs."""
+FORCE_OPTIONS = ("--force", "-f", "--forceall", "-F")
+"""Options without values that force jobs to run."""
 SNAKEMAKE_LISTS = (
     *(name for name in VERBOSE_OPTIONS if name != "quiet"),
     *PARTIAL_OPTIONS,
@@ -535,11 +537,6 @@ class Call:
         """The words after `--quiet`."""
         return [item.name.lower() for item in self.options.quiet or []]
 
-    @property
-    def is_forced(self) -> bool:
-        """Whether some jobs run again in any case."""
-        return self.has_any(("force", "forceall", "forcerun"))
-
     def forced(self, jobs: Iterable[Job]) -> list[str]:
         """Return the rules and files of planned jobs that run again in any case."""
         if self.options.forceall:
@@ -547,14 +544,21 @@ class Call:
         wanted = call_targets if self.options.force else []
         return [*(self.options.forcerun or []), *wanted]
 
+    def without_force(self) -> "Call":
+        """Return the call without arguments that force jobs to run: the plan has them,
+        and Snakemake would leave out some behind a checkpoint."""
+        arguments = [word for word in self.arguments if word not in FORCE_OPTIONS]
+        # the last of several counts
+        return replace(self, arguments=[*arguments, "--forcerun"])
 
-def plan_and_run(call: Call, *, is_again: bool = False) -> int:
+
+def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     """Have Snakemake plan, and call it again without the results that are outdated;
     return its exit code.
 
     Snakemake leaves out the jobs behind one that ends while it looks at what a
     checkpoint has made. So it plans again if planned jobs are left, as long as others
-    have ended.
+    have ended. `left` are their keys.
     """
     if call.runs:
         # of a run that was killed
@@ -562,6 +566,7 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     if not call.is_planned:
         code, _ = run_jobs(call, no_plan())
         return code
+    call = call.without_force()
     events = Events()
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
@@ -570,7 +575,7 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     if code:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
-        forced = call.forced(events.jobs.values())
+        forced = call.forced(events.jobs.values()) if left is None else left
         plan = made_plan(events, call_targets, forced)
         if call.runs:
             keep_contents(plan)
@@ -579,7 +584,7 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     if not call.is_shown:
         return 0
     if events.nothing and not plan.reasons:
-        if not is_again:
+        if left is None:
             say_nothing_runs(call, events.nothing)
         return 0
     if not (call.runs or call.has_any(SNAKEMAKE_LISTS)):
@@ -592,10 +597,9 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     os.environ[PLANNED_VAR] = "1"
     try:
         code, ended = run_jobs(call, plan)
-        is_left = not ended.issuperset(plan.reasons)
-        # forced jobs would run again each time
-        if call.runs and code == 0 and ended and is_left and not call.is_forced:
-            return plan_and_run(call, is_again=True)
+        still_left = set(plan.reasons) - ended
+        if call.runs and code == 0 and ended and still_left:
+            return plan_and_run(call, left=still_left)
         return code
     finally:
         os.environ.pop(PLANNED_VAR, None)

@@ -92,17 +92,12 @@ def _is_made(path: str, rules: Collection[Any]) -> bool:
     return any(rule.is_producer(path) for rule in rules)
 
 
-def usage_patterns(rules: Iterable[Any]) -> dict[str, str]:
-    """Return the regular expression of the records of time and memory of each rule,
-    with wildcards as groups.
-
-    They are named like the rule's log (see `step.record_usage`).
-    """
+def message_patterns(rules: Iterable[Any]) -> dict[str, str]:
+    """Return the regular expression of the messages of each rule, which lie beside its
+    log, with wildcards as groups."""
     patterns = {}
     for rule in rules:
         if rule.log:
             log = rule.log[0].regex().pattern
-            patterns[rule.name] = log.replace("/logs/", "/benchmarks/").replace(
-                r"\.log", r"\.tsv"
-            )
+            patterns[rule.name] = log.replace(r"\.log", r"\.jsonl")
     return patterns
