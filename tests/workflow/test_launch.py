@@ -227,9 +227,9 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
     }
     fifty = {"fifty": {"base": "reference", "vary": vary, "compare_week": 22}}
     name = workflow.write(
-        "study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "studies": fifty}
+        "study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "sweeps": fifty}
     )
-    outcome = gyriflow(workflow, "check", name, "--stage", "studies", "--cores", "1000")
+    outcome = gyriflow(workflow, "check", name, "--stage", "sweeps", "--cores", "1000")
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     said = outcome.stdout
     assert said.splitlines()[0] == Facts("study.yaml:", 2, 1, "reference", 50, "fifty")

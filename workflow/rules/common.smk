@@ -149,7 +149,7 @@ def brains_with(*sides, has_thickness=None):
 wildcard_constraints:
     **dict.fromkeys(("earlier", "later"), one_of(BRAINS)),
     brain=ANY_BRAIN,
-    study=one_of(SWEEPS),
+    sweep=one_of(SWEEPS),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

@@ -250,7 +250,7 @@ def _contents(study: Study) -> str:
         else "measured only"
     )
     parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
-    parts += [f"{len(runs)} of study {name}" for name, runs in study.by_sweep.items()]
+    parts += [f"{len(runs)} of sweep {name}" for name, runs in study.by_sweep.items()]
     if study.calibration:
         calibrated = {run for run, _ in study.calibration}
         parts.append(f"{len(calibrated)} of the calibration")

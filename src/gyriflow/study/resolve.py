@@ -231,7 +231,7 @@ def _series_rows(
 def _variants(config: Config) -> list[_Variant]:
     """Return the runs of all sweeps. They have no ensembles."""
     found = []
-    for name, sweep in config.studies.items():
+    for name, sweep in config.sweeps.items():
         base = config.runs[sweep.base]
         for run, values in variants(name, sweep):
             changes = {**sweep.changes(values), "ensemble": None}
@@ -256,7 +256,7 @@ def _folded(
         for start in starts[name]:
             yield _Folded(name, start, _up_to_last_scan(run, start, series))
     for variant in variants:
-        for start in starts[config.studies[variant.sweep].base]:
+        for start in starts[config.sweeps[variant.sweep].base]:
             yield _Folded(variant.run, start, variant.settings)
     calibrate = config.calibrate
     if calibrate is not None:
@@ -618,7 +618,7 @@ def _sweeps(
     """Return the runs of all sweeps, each with its varied values."""
     rows = []
     for variant in variants:
-        settings = config.studies[variant.sweep]
+        settings = config.sweeps[variant.sweep]
         for simulation in simulations:
             if simulation.run == names[variant.run]:
                 start = brains[simulation.brain]
