@@ -12,6 +12,7 @@ sys.path.insert(0, SOURCE)
 from gyriflow.code_hash import code_hash
 from gyriflow.running.requirements import SOLVER, require_for
 from gyriflow.running.snakemake_internals import (
+    check_brains,
     complete_rules,
     remove_stale,
     rerun_on_code_changes,
@@ -45,7 +46,7 @@ include: "workflow/rules/ensemble.smk"
 include: "workflow/rules/regions.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/study.smk"
-include: "workflow/rules/studies.smk"
+include: "workflow/rules/sweeps.smk"
 include: "workflow/rules/calibration.smk"
 include: "workflow/rules/quality.smk"
 include: "workflow/rules/report.smk"
@@ -68,6 +69,10 @@ rule all:
 complete_rules(workflow.rules, ENVIRONMENT)
 SCRIPTS = Path(workflow.basedir, "workflow", "scripts")
 rerun_on_code_changes(workflow.rules, SCRIPTS)
+try:
+    check_brains(call_targets, workflow.rules, BRAINS)
+except GyriflowError as error:
+    end_with(error)
 if RUNS and study.left_out:
     remove_stale(workflow.rules, STUDY, REPORT)
 

@@ -21,7 +21,9 @@ from typing import NamedTuple
 import pandas as pd
 
 from gyriflow.io.yaml_files import read_keys
+from gyriflow.messages import read_rows
 from gyriflow.running.cost import job_seconds
+from gyriflow.running.jobs import usage_in
 from gyriflow.settings.base import folder_of
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
@@ -29,7 +31,7 @@ from gyriflow.study.study import Study
 
 PLACE = re.compile(
     r"results/(?:brains/(?P<brain>[^/]+)|runs/(?P<run>[^/]+)/(?P<start>[^/]+)|study|report)/"
-    r"(?:metrics/)?(?:week-(?P<week>[^/]+)/)?(?:.*/)?benchmarks/(?P<name>.+)\.tsv"
+    r"(?:metrics/)?(?:week-(?P<week>[^/]+)/)?(?:.*/)?logs/(?P<name>.+)\.jsonl"
 )
 """The record of a step: the brain, or the run and its start brain, the week, and the
 rule with further wildcards."""
@@ -45,7 +47,7 @@ class Step(NamedTuple):
 
 def finished_steps(study: Study) -> Iterator[Step]:
     """Yield the steps of which there are records in the working directory."""
-    for path in sorted(Path("results").glob("**/benchmarks/**/*.tsv")):
+    for path in sorted(Path("results").glob("**/logs/**/*.jsonl")):
         place = PLACE.fullmatch(path.as_posix())
         if place is None:
             continue
@@ -64,8 +66,9 @@ def finished_steps(study: Study) -> Iterator[Step]:
                 if study.chains[wildcards["brain"], names].path
                 else rule
             )
-        cpu_s = float(pd.read_csv(path, sep="\t")["cpu_s"].iloc[0])
-        yield Step(rule, wildcards, cpu_s)
+        used = usage_in(read_rows(path))
+        if used:
+            yield Step(rule, wildcards, used["cpu_s"])
 
 
 def pair_in(names: str, study: Study) -> dict[str, str]:

@@ -1,11 +1,13 @@
 """Measure how long a study of many brains takes to plan: its tables, a dry run, the
-start of one of its jobs, and with `--check` its check.
+start of one of its jobs, a run of which everything is up to date, and with `--check`
+its first and its second check.
 
     ./run python benchmarks/planning.py [--brains 10 100 1000] [--check] [--out FOLDER]
 
 Each brain is a link to one shipped label volume, each a subject of its own that is
-measured. A check reads the volumes. Times are CPU seconds of all processes. The
-last line is one JSON object.
+measured. The first check reads the volumes. The results that are up to date are empty
+files with their manifests. Times are CPU seconds of all processes. The last line is one
+JSON object.
 """
 
 import argparse
@@ -33,6 +35,22 @@ from gyriflow.study import resolve
 from gyriflow.study.loading import load
 from gyriflow.study.study import write_plan
 write_plan(resolve(load(read_keys("study.yaml"))), Path("results", "plan"))
+"""
+MADE = """
+import sys
+from pathlib import Path
+from gyriflow.running.launch import main
+from gyriflow.running.manifest import write_manifest
+
+def make(plan):
+    for job in plan.jobs:
+        for file in job.outputs:
+            Path(file).parent.mkdir(parents=True, exist_ok=True)
+            Path(file).touch()
+    for job in plan.jobs:
+        write_manifest(job, plan.found)
+
+main([*sys.argv[1:], "--dry-run"], make, is_shown=False)
 """
 
 
@@ -85,15 +103,22 @@ def planning_seconds(folder: Path, *, has_check: bool) -> dict[str, float]:
         "dry_run": cpu_seconds([*launch, "--dry-run", "--quiet", "all"], folder),
         "job_start": cpu_seconds([*job, "--list-rules"], folder),
     }
+    cpu_seconds([*python, "-c", MADE, *launch[4:]], folder)
+    # the first one records the contents of the results
+    cpu_seconds(launch, folder)
+    seconds["up_to_date"] = cpu_seconds(launch, folder)
     if has_check:
         check = [*python, "-m", "gyriflow.cli", "check", "study.yaml"]
         seconds["check"] = cpu_seconds(check, folder)
+        seconds["check_again"] = cpu_seconds(check, folder)
     return seconds
 
 
 def cpu_seconds(command: list[str], folder: Path) -> float:
     """Run a command in a folder; return the CPU seconds of its processes."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    # nothing that an earlier call has kept
+    own = {"PYTHONPATH": str(ROOT / "src"), "XDG_CACHE_HOME": str(folder / "cache")}
+    environment = os.environ | own
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(
         command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL

@@ -37,7 +37,7 @@ COMMANDS = {
     "demo": ["run", "-s", "folding", "-s", "metrics"],
     "measure": ["measure"],
     "prediction": ["run", "-s", "folding", "-s", "metrics", "-s", "export"],
-    "sweep": ["run", "-s", "folding", "-s", "studies", "-s", "calibrate"],
+    "sweep": ["run", "-s", "folding", "-s", "sweeps", "-s", "calibrate"],
 }
 """The command for each configuration in `benchmarks/regression`."""
 IGNORED = {

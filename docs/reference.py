@@ -83,7 +83,7 @@ SECTIONS = {
     },
     "Sweeps and calibration": {
         "Both have": ComparisonSettings,
-        "studies: by name": SweepSettings,
+        "sweeps: by name": SweepSettings,
         "calibrate:": CalibrationSettings,
     },
     "Metrics": {"metrics:": MetricsSettings, "regions: by brain": GivenRegions},

@@ -1,5 +1,6 @@
 """Messages of steps as data: warnings and errors, one JSON object a line, in a file
-beside the step's log. The progress of a simulation is in the same file."""
+beside the step's log. Time and memory of the step, and the progress of a simulation are
+in the same file."""
 
 import json
 import logging
@@ -16,6 +17,7 @@ INTERRUPTED = 130
 KILLED = 137
 """Exit codes of programs that were interrupted or killed."""
 STOPPED = "it was stopped"
+OUT_OF_MEMORY = "it was killed, most probably because memory ran out"
 OWN_LOGGERS = ("root", "gyriflow", "__main__")
 FOLDERS = {"brains": ["brain"], "runs": ["run", "brain"]}
 """What the folders around a log name, by folder in `results`."""
@@ -75,12 +77,19 @@ def write_message(log: str | Path, message: Message) -> None:
         keys = FOLDERS.get(kind, [])
         row |= zip(keys, names, strict=False)
     known = {name: value for name, value in row.items() if value}
-    _append(log, known)
+    write_event(log, known)
+
+
+def write_event(log: str | Path, row: Mapping[str, Any]) -> None:
+    """Add a line to those of the step that has this log; one that is no message has the
+    key `event`."""
+    with messages_file(log).open("a") as file:
+        file.write(json.dumps(row) + "\n")
 
 
 def read_rows(log: str | Path) -> list[dict[str, Any]]:
-    """Return the lines that the step with this log has written, messages and progress;
-    progress has the key `event`."""
+    """Return the lines that the step with this log has written, messages and
+    events."""
     rows = []
     # a step may have written none yet
     with suppress(OSError):
@@ -139,11 +148,6 @@ class MessageHandler(logging.Handler):
             if isinstance(data, Message):
                 write_message(self.log, data)
             elif data:
-                _append(self.log, data)
+                write_event(self.log, data)
         except OSError:
             self.handleError(record)
-
-
-def _append(log: str | Path, row: Mapping[str, Any]) -> None:
-    with messages_file(log).open("a") as file:
-        file.write(json.dumps(row) + "\n")

@@ -20,11 +20,13 @@ from .errors import StorageError
 from .messages import (
     INTERRUPTED,
     KILLED,
+    OUT_OF_MEMORY,
     STOPPED,
     Message,
     MessageHandler,
     error_message,
     read_messages,
+    write_event,
     write_message,
 )
 
@@ -34,18 +36,17 @@ BUS_ERROR = Message(
     " MPI needs 6 MB of it for each rank. In a container: --shm-size 1g",
     exit_code=StorageError.exit_code,
 )
-OUT_OF_MEMORY = Message(
+OUT_OF_MEMORY_MESSAGE = Message(
     "error",
-    "the program was killed, most probably because memory ran out; see the memory"
-    " predicted above",
+    f"{OUT_OF_MEMORY}; see the memory predicted above",
     exit_code=KILLED,
 )
 ENDINGS = {
     # of mpiexec the numbers of signals, of a shell 128 more
     7: BUS_ERROR,
-    9: OUT_OF_MEMORY,
+    9: OUT_OF_MEMORY_MESSAGE,
     128 + 7: BUS_ERROR,
-    KILLED: OUT_OF_MEMORY,
+    KILLED: OUT_OF_MEMORY_MESSAGE,
     INTERRUPTED: Message("error", STOPPED, exit_code=INTERRUPTED),
 }
 """Messages of programs that could leave none, by their exit codes."""
@@ -63,7 +64,7 @@ class Usage(NamedTuple):
 
 
 USAGE_COLUMNS = ("wall_s", "cpu_s", "memory_MiB")
-"""Columns of the table of a step's `Usage`."""
+"""Names of a step's `Usage` in its messages and in tables."""
 
 
 def usage() -> Usage:
@@ -85,19 +86,12 @@ def usage() -> Usage:
 
 
 def record_usage(log: str | Path, used: Usage) -> None:
-    """Write what a step has used to a table, which lies in the folder `benchmarks` next
-    to that of its log."""
-    log = Path(log)
-    # no step of the workflow has its log elsewhere
-    folder = next((folder for folder in log.parents if folder.name == "logs"), None)
-    if folder is None:
-        return
-    path = folder.with_name("benchmarks") / log.relative_to(folder).with_suffix(".tsv")
-    rows = ["\t".join(USAGE_COLUMNS), "\t".join(f"{value:.2f}" for value in used)]
+    """Add what a step has used to its messages."""
+    values = [round(value, 2) for value in used]
+    row = {"event": "usage"} | dict(zip(USAGE_COLUMNS, values, strict=True))
     # a step that has made its results does not fail for this
     with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("\n".join(rows) + "\n")
+        write_event(log, row)
 
 
 @contextmanager

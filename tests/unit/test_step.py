@@ -13,8 +13,14 @@ from processes import ran
 
 from gyriflow import step as step_module
 from gyriflow.errors import MeshError
-from gyriflow.messages import STOPPED, Message, read_messages, write_message
-from gyriflow.step import OUT_OF_MEMORY, end_shell_step, step
+from gyriflow.messages import (
+    STOPPED,
+    Message,
+    read_messages,
+    read_rows,
+    write_message,
+)
+from gyriflow.step import OUT_OF_MEMORY_MESSAGE, end_shell_step, step
 
 
 def test_a_known_error_is_one_message_and_its_code(tmp_path, capsys):
@@ -109,14 +115,14 @@ def test_a_killed_program_is_said_to_have_run_out_of_memory(tmp_path):
     assert end.returncode == 137
     assert log.read_text() == Facts("before", "gyriflow:", "memory")
     (message,) = read_messages(log)
-    assert (message.text, message.exit_code) == (OUT_OF_MEMORY.text, 137)
+    assert (message.text, message.exit_code) == (OUT_OF_MEMORY_MESSAGE.text, 137)
 
 
 @pytest.mark.parametrize(
     ("code", "printed", "ended", "expected"),
     [
         (7, "x", 5, Facts("/dev/shm")),
-        (9, "EXIT STRING: Killed", 137, OUT_OF_MEMORY.text),
+        (9, "EXIT STRING: Killed", 137, OUT_OF_MEMORY_MESSAGE.text),
         (130, "step 3", 130, STOPPED),
         (255, "mpiexec: one\n\ntwo\n", 255, "mpiexec: one\ntwo"),
         (127, "", 127, Facts(127)),
@@ -162,15 +168,14 @@ def test_a_step_records_the_processor_time_of_itself_and_its_children_next_to_it
     (tmp_path / "a" / "logs").mkdir(parents=True)
     with step(str(tmp_path / "a" / "logs" / "one.week-21.00.log")):
         pass
-    head, row = (
-        (tmp_path / "a" / "benchmarks" / "one.week-21.00.tsv").read_text().splitlines()
-    )
-    assert head.split("\t") == ["wall_s", "cpu_s", "memory_MiB"]
-    assert [float(value) for value in row.split("\t")[1:]] == [12.75, 3072]
+    (row,) = read_rows(tmp_path / "a" / "logs" / "one.week-21.00.log")
+    assert list(row) == ["event", "wall_s", "cpu_s", "memory_MiB"]
+    assert [row["event"], row["cpu_s"], row["memory_MiB"]] == ["usage", 12.75, 3072]
 
 
 def test_a_step_that_fails_records_no_time(tmp_path):
     (tmp_path / "logs").mkdir()
     with pytest.raises(SystemExit), step(str(tmp_path / "logs" / "one.log")):
         raise MeshError("has a hole")
-    assert not (tmp_path / "benchmarks").exists()
+    (row,) = read_rows(tmp_path / "logs" / "one.log")
+    assert row["level"] == "error"

@@ -42,7 +42,7 @@ EXPECTED = {
         },
     ),
     "simple-shapes": ("all", {"shape": 1, "pial": 1, "simulate": 2}),
-    # twelve members: one is the reference, one is in both studies; the observed brain
+    # twelve members: one is the reference, one is in both sweeps; the observed brain
     # of 28 and 29 GW
     "paper": (
         "paper",
@@ -50,7 +50,7 @@ EXPECTED = {
             "simulate": 2,
             "simulate_member": 10,
             "compare_member": 12,
-            "study_tables": 2,
+            "sweep_tables": 2,
             "tetrahedralise": 1,
         }
         | {"measure": 2},

@@ -35,7 +35,7 @@ SHAPES = {
     "start": "a",
     "folding": {"end_week": 22},
     "runs": {"thin": {}, "thick": {}},
-    "studies": {"rate": SWEEP},
+    "sweeps": {"rate": SWEEP},
     "calibrate": {
         "base": "thin",
         "parameters": {"growth_rate_per_s": [1e-7, 4e-7]},

@@ -65,10 +65,10 @@ def jobs(planned):
         "brains": brains,
         "start": "b21",
         "folding": {"end_week": 24},
-        "studies": {"thick": sweep},
+        "sweeps": {"thick": sweep},
     }
     study |= {"metrics": {"regions": regions, "template": "b22"}, "runs": runs}
-    return planned(study, "all", "export", "studies")
+    return planned(study, "all", "export", "sweeps")
 
 
 def test_a_run_is_validated_by_the_real_brains_of_its_weeks(jobs):

@@ -11,7 +11,7 @@ from facts import Facts
 from processes import all_end, below, command_of, kill
 
 from gyriflow.io.files import read_json
-from gyriflow.step import OUT_OF_MEMORY
+from gyriflow.step import OUT_OF_MEMORY_MESSAGE
 
 from .conftest import SMALL_STUDY
 
@@ -74,7 +74,7 @@ def test_a_killed_rank_is_reported_as_memory_and_an_interrupted_folding_resumes(
     assert process.returncode == 137, printed
     assert re.search(r"\d+ elements, .* \d+ MiB", printed)
     assert printed == Facts("simulate", "memory")
-    assert OUT_OF_MEMORY.text in (workflow.directory / LOG).read_text()
+    assert OUT_OF_MEMORY_MESSAGE.text in (workflow.directory / LOG).read_text()
     assert not (workflow.directory / SUMMARY).exists()
 
     process = started(workflow, until="step   12")

@@ -15,6 +15,7 @@ from facts import Facts
 from mpi4py import MPI
 from processes import ran
 
+from gyriflow.errors import InputError
 from gyriflow.folding.__main__ import locked
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
@@ -226,9 +227,9 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
     }
     fifty = {"fifty": {"base": "reference", "vary": vary, "compare_week": 22}}
     name = workflow.write(
-        "study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "studies": fifty}
+        "study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "sweeps": fifty}
     )
-    outcome = gyriflow(workflow, "check", name, "--stage", "studies", "--cores", "1000")
+    outcome = gyriflow(workflow, "check", name, "--stage", "sweeps", "--cores", "1000")
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     said = outcome.stdout
     assert said.splitlines()[0] == Facts("study.yaml:", 2, 1, "reference", 50, "fifty")
@@ -236,3 +237,15 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
     assert float(re.search(r" [\d.e+]+ core hours, ([\d.]+)%", said)[1]) > 50
     # the memory of a cluster is not that of this machine
     assert len(re.findall(r"\b[MG]i?B", re.search(r"\nmemory .*", said)[0])) == 1
+
+
+def test_a_result_of_an_unknown_brain_is_refused_with_the_name_of_a_similar_one(
+    workflow,
+):
+    name = workflow.write("study.yaml", SMALL_STUDY)
+    metrics = "results/brains/{}/metrics/metrics.csv".format
+    call = ("--configfile", name, "-n", "--quiet", "rules")
+    assert workflow.run(metrics("a"), *call).returncode == 0
+    outcome = workflow.run(metrics("aa"), *call)
+    assert outcome.returncode == InputError.exit_code
+    assert outcome.stderr == Facts(metrics("aa"), "no brain aa", "did you mean a?")

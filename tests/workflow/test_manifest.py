@@ -273,6 +273,9 @@ def test_results_behind_a_checkpoint_are_made_again_where_it_still_leads_to_them
     scan.write_text("a")
     assert ran_steps(workflow) == ["split", "part a", "join"]
     assert ran_steps(workflow) == []
+    for force in (["--forceall"], ["--forcerun", "split"]):
+        assert ran_steps(workflow, *force) == ["split", "part a", "join"]
+    assert ran_steps(workflow) == []
     joined = workflow.directory / "results" / "joined.txt"
     assert joined.read_text() == "a"
 

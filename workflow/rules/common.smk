@@ -20,6 +20,7 @@ from gyriflow.running.launch import (
     PLANNED_VAR,
     hold_lock,
     refused_brains,
+    call_targets,
 )
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.running.snakemake_internals import remove_stale
@@ -126,22 +127,29 @@ def simulation_of(wildcards):
     return study.simulations[wildcards.run, wildcards.brain]
 
 
+# any brain: Snakemake reads the constraint of a wildcard for each file, which takes long for the ids of many brains
+ANY_BRAIN = "[^/]+"
+
+
+def brains_where(condition):
+    """Return a regular expression for the ids of the brains that meet a condition."""
+    ids = [brain.id for brain in BRAINS.values() if condition(brain)]
+    return ANY_BRAIN if len(ids) == len(BRAINS) else one_of(ids)
+
+
 def brains_with(*sides, has_thickness=None):
     """Return a regular expression for the ids of the brains with exactly these hemispheres, with or without thickness.
 
     Brains of one hemisphere have fewer files. They have rules of their own (`use rule … as …_left with:`), since all
     output files of a rule are made by each of its jobs.
     """
-    ids = []
-    for brain in BRAINS.values():
-        if brain.sides == sides and has_thickness in (None, bool(brain.thickness)):
-            ids.append(brain.id)
-    return one_of(ids)
+    return brains_where(lambda brain: brain.sides == sides and has_thickness in (None, bool(brain.thickness)))
 
 
 wildcard_constraints:
-    **dict.fromkeys(("brain", "earlier", "later"), one_of(BRAINS)),
-    study=one_of(SWEEPS),
+    **dict.fromkeys(("earlier", "later"), one_of(BRAINS)),
+    brain=ANY_BRAIN,
+    sweep=one_of(SWEEPS),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

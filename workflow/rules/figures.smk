@@ -5,7 +5,7 @@
 # caption are in `workflow/report/captions/`, the place in the report is in `SECTIONS`.
 from gyriflow.code_hash import code_hash
 from gyriflow.settings.terms import run_names
-from gyriflow.study.records import observed_name
+from gyriflow.sweep.records import observed_name
 
 # the figures and tables of the report by section, in its order
 SECTIONS = {
@@ -24,7 +24,7 @@ SECTIONS = {
         *("validation_figure", "prediction_figure", "prediction_table"),
         *("expected_figure", "deviation_figure"),
     ],
-    "Studies": ["influence_figure", "influence_spectra", "nearest_figure"],
+    "Sweeps": ["influence_figure", "influence_spectra", "nearest_figure"],
     "Resources": ["study_resources"],
 }
 # those of the page of each brain
@@ -116,7 +116,7 @@ rule brain_regions:
     output:
         brain_regions=multiext(f"{BRAIN}/figures/regions", ".png", ".pdf"),
     wildcard_constraints:
-        brain=one_of(brain.id for brain in WITH_REGIONS),
+        brain=brains_where(lambda brain: brain.regions),
     params:
         **drawn_by("pictures"),
         grid=lambda w: brain_regions_grid(BRAINS[w.brain]),
@@ -711,7 +711,7 @@ rule deviation_figure:
 
 show(rules.deviation_figure.output, DEVIATIONS)
 
-# sweeps (key `studies`): the runs from the start brain of the first run
+# sweeps: the runs from the start brain of the first run
 
 
 def first_members(sweep):
@@ -732,7 +732,7 @@ def first_values(sweep):
 
 def names_of_sweeps(sweeps):
     """Return the names of sweeps with their weeks."""
-    return [{"study": sweep, "week": f"{SWEEPS[sweep][0].week:g}"} for sweep in sweeps]
+    return [{"sweep": sweep, "week": f"{SWEEPS[sweep][0].week:g}"} for sweep in sweeps]
 
 
 def influence_grid(sweep):
@@ -750,13 +750,13 @@ def influence_grid(sweep):
 
 rule influence_figure:
     input:
-        grid=lambda w: files_in_grid(influence_grid(w.study)),
+        grid=lambda w: files_in_grid(influence_grid(w.sweep)),
     output:
         influence_figure=multiext(f"{SWEEP}/figures/influence", ".png", ".pdf"),
     params:
         **drawn_by("pictures"),
-        grid=lambda w: influence_grid(w.study),
-        values=lambda w: first_values(w.study),
+        grid=lambda w: influence_grid(w.sweep),
+        values=lambda w: first_values(w.sweep),
     script:
         "../scripts/figures.py"
 
@@ -768,7 +768,7 @@ def member_spectra(wildcards):
     """Return the spectra of the runs of a sweep that reached its week."""
     return [
         f"{SIMULATED[run, member.brain, member.week].folder}/spectra.csv"
-        for run, member in first_members(wildcards.study).items()
+        for run, member in first_members(wildcards.sweep).items()
         if reaches(run, member.brain, member.week)
     ]
 
@@ -776,14 +776,14 @@ def member_spectra(wildcards):
 rule influence_spectra:
     input:
         members=member_spectra,
-        observed=lambda w: [f"{brain.folder}/spectra.csv" for brain in first_observed(w.study)],
+        observed=lambda w: [f"{brain.folder}/spectra.csv" for brain in first_observed(w.sweep)],
     output:
         influence_spectra=multiext(f"{SWEEP}/figures/spectra", ".png", ".pdf"),
     params:
         **drawn_by("weeks"),
-        values=lambda w: first_values(w.study),
-        week=lambda w: SWEEPS[w.study][0].week,
-        observed_name=lambda w: observed_name(first_observed(w.study)),
+        values=lambda w: first_values(w.sweep),
+        week=lambda w: SWEEPS[w.sweep][0].week,
+        observed_name=lambda w: observed_name(first_observed(w.sweep)),
     script:
         "../scripts/figures.py"
 
@@ -793,7 +793,7 @@ show(rules.influence_spectra.output, names_of_sweeps(SWEEPS))
 
 def has_nearest(sweep):
     """Return whether the runs of a sweep are compared over one parameter with numbers."""
-    vary = CONFIG.studies[sweep].vary
+    vary = CONFIG.sweeps[sweep].vary
     values = next(iter(vary.values()))
     are_numbers = all(isinstance(value, int | float) for value in values)
     return bool(first_observed(sweep)) and len(vary) == 1 and are_numbers
@@ -808,13 +808,13 @@ rule nearest_figure:
     output:
         nearest_figure=multiext(f"{SWEEP}/figures/nearest", ".png", ".pdf"),
     wildcard_constraints:
-        study=one_of(OVER_NUMBERS),
+        sweep=one_of(OVER_NUMBERS),
     params:
         **drawn_by("scores"),
-        varied=lambda w: next(iter(CONFIG.studies[w.study].vary)),
-        subject=lambda w: SWEEPS[w.study][0].brain,
-        observed=lambda w: [brain.id for brain in first_observed(w.study)],
-        week=lambda w: SWEEPS[w.study][0].week,
+        varied=lambda w: next(iter(CONFIG.sweeps[w.sweep].vary)),
+        subject=lambda w: SWEEPS[w.sweep][0].brain,
+        observed=lambda w: [brain.id for brain in first_observed(w.sweep)],
+        week=lambda w: SWEEPS[w.sweep][0].week,
     script:
         "../scripts/figures.py"
 
@@ -860,4 +860,4 @@ rule figures:
 
 rule influence_figures:
     input:
-        figure_files(*SECTIONS["Studies"]),
+        figure_files(*SECTIONS["Sweeps"]),

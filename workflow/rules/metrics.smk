@@ -41,7 +41,7 @@ rule measure_simulated:
 
 def white_brains(*sides):
     """Return a regular expression for the ids of the brains of these hemispheres that have white surfaces."""
-    return one_of(brain.id for brain in BRAINS.values() if brain.white and brain.sides == sides)
+    return brains_where(lambda brain: brain.white and brain.sides == sides)
 
 
 rule white:

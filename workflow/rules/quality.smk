@@ -53,5 +53,5 @@ rule quality_table:
 
 rule quality:
     input:
-        expand(list(rules.brain_figures.output), brain=BRAINS),
+        expand(rules.brain_figures.output.row, brain=BRAINS),
         rules.quality_table.output,

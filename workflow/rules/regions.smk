@@ -9,7 +9,7 @@ rule given_regions:
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
-        brain=one_of(brain.id for brain in BRAINS.values() if brain.regions_of == brain.id),
+        brain=brains_where(lambda brain: brain.regions_of == brain.id),
     params:
         affine_from=lambda w: BRAINS[w.brain].affine_from,
         names=lambda w: CONFIG.metrics.regions[w.brain].names,
@@ -40,7 +40,7 @@ rule carried_regions:
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
-        brain=one_of(brain.id for brain in BRAINS.values() if brain.regions_of not in (None, brain.id)),
+        brain=brains_where(lambda brain: brain.regions_of not in (None, brain.id)),
     params:
         posed=lambda w: region_link(w).posed,
     script:
@@ -56,7 +56,7 @@ rule simulated_regions:
     output:
         **region_files(f"{RUN}/metrics"),
     wildcard_constraints:
-        brain=one_of(brain.id for brain in WITH_REGIONS),
+        brain=brains_where(lambda brain: brain.regions),
     script:
         "../scripts/simulated_regions.py"
 

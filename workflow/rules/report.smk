@@ -2,7 +2,7 @@
 # and tables of `figures.smk`.
 from itertools import takewhile
 
-from gyriflow.running.snakemake_internals import usage_patterns
+from gyriflow.running.snakemake_internals import message_patterns
 from gyriflow.settings.terms import run_names
 
 # the configuration; brains of atlases and of the table of participants are already among its brains
@@ -21,18 +21,22 @@ def descriptions(brains):
     described = []
     for brain in brains:
         facts = {name: getattr(brain, name) for name in DESCRIBED}
-        atlas = study.atlases.get(brain.id)
-        described.append(facts | {"licence": atlas.licence.name if atlas else None})
+        used = study.atlases.get(brain.id)
+        described.append(facts | {"licence": used.atlas.licence.name if used else None})
     return described
+
+
+# figures that need not be asked for: of this rule, and those that are made with the rows of the quality table
+MADE_WITH_OTHERS = ("study_resources", "quality_page", "brain_maps")
 
 
 # also of the report's own tables, so that they exist if the page cannot be made
 rule study_records:
     input:
-        # logs and records of time and memory are not inputs, since a missing one would repeat its job
-        # it makes study_resources itself
-        figure_files("small_pictures", *(name for name in ON_PAGES if name != "study_resources")),
+        # logs and messages, with time and memory, are not inputs, since a missing one would repeat its job
+        figure_files(*(name for name in ON_PAGES if name not in MADE_WITH_OTHERS)),
         rules.metrics.input,
+        # made from a row of each brain, with which its figures are made
         rules.quality_table.output,
         run_params=study.files(PARAMETERS),
         summaries=study.files(FOLDING["summary"]),
@@ -68,8 +72,8 @@ rule study_records:
             for path in paths
         ],
         folded=study.pairs,
-        # pattern of the records of time and memory of each rule; those of earlier configurations do not match
-        benchmarks=lambda w: usage_patterns(
+        # pattern of the messages of each rule, with time and memory; those of earlier configurations do not match
+        messages=lambda w: message_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)
         ),
         growth_of=[simulation.growth_of for simulation in study.run_simulations],
@@ -85,17 +89,24 @@ rule study_records:
         "../scripts/study_records.py"
 
 
-def on_page(sections, brain=None):
-    """Return the figures of the page of the study or of a brain: their file, place, and names in title and caption."""
+def on_page(sections):
+    """Return the figures of the sections of a page: their file, place, and names in title and caption."""
     figures = []
     for section, names in sections.items():
         for name in names:
             drawn = FIGURES.get(name, {"files": [], "names": []})
             look = {"first": name in IN_SUMMARY, "technical": name in TECHNICAL}
             for values in drawn["names"]:
-                if brain in (None, values.get("brain")):
-                    path = drawn["files"][0].format(**values)
-                    figures.append({"name": name, "section": section, "path": path, "names": values, **look})
+                path = drawn["files"][0].format(**values)
+                figures.append({"name": name, "section": section, "path": path, "names": values, **look})
+    return figures
+
+
+def on_brain_pages():
+    """Return the figures of the page of each brain."""
+    figures = {brain: [] for brain in BRAINS}
+    for figure in on_page(BRAIN_SECTIONS):
+        figures[figure["names"]["brain"]].append(figure)
     return figures
 
 
@@ -157,7 +168,7 @@ rule html_report:
         view=f"{REPORT}/surfaces.json",
     params:
         figures=on_page(SECTIONS),
-        brain_figures={brain: on_page(BRAIN_SECTIONS, brain) for brain in BRAINS},
+        brain_figures=on_brain_pages(),
         brains=lambda w: descriptions(CONFIG.brains),
         prediction=lambda w: study.prediction_facts,
         surfaces=SURFACES,
@@ -170,5 +181,5 @@ rule html_report:
 
 rule report:
     input:
-        rules.html_report.output,
-        rules.study_records.output,
+        rules.html_report.output.report,
+        rules.study_records.output.report,

@@ -35,7 +35,7 @@ rule shape:
     output:
         SHAPE,
     wildcard_constraints:
-        brain=one_of(brain.id for brain in BRAINS.values() if brain.shape),
+        brain=brains_where(lambda brain: brain.shape),
     params:
         shape=lambda w: BRAINS[w.brain].shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
     script:
@@ -113,4 +113,4 @@ use rule pial as pial_right_with_thickness with:
 
 rule surface:
     input:
-        study.surfaces,
+        [brain.pial for brain in BRAINS.values()],

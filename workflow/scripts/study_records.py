@@ -24,7 +24,7 @@ from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
-LEFT_OUT = ("logs", "benchmarks", FOLDER, "provenance.json")
+LEFT_OUT = ("logs", FOLDER, "provenance.json")
 
 
 def _results_in(folder):
@@ -34,7 +34,7 @@ def _results_in(folder):
 
 with step(snakemake.log[0]):
     names = dict(zip(map(tuple, params.folded), run_names(params.folded), strict=True))
-    jobs = read_usage(".", params.benchmarks)
+    jobs = read_usage(".", params.messages)
     # simulations are listed one by one, other jobs by rule
     jobs["run"] = [
         names.get((run, brain)) if rule == "simulate" else None

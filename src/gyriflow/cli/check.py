@@ -1,7 +1,6 @@
 """Check a study before it is run: its configuration, its files, what will run, and what
 that will take."""
 
-import logging
 import math
 import shutil
 import sys
@@ -9,23 +8,14 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import chdir, contextmanager
 from functools import cache
-from logging.handlers import BufferingHandler
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
 from typing import NamedTuple
 
-from ..anatomy.labels import (
-    MIN_CORTEX_OUTSIDE,
-    layout_of,
-    read_cerebrum,
-    scheme_contradictions,
-)
-from ..anatomy.plausible import require_plausible_size
-from ..errors import GyriflowError, InputError
+from ..errors import InputError
 from ..grouping import grouped
-from ..io.downloads import require_checksums
-from ..io.volumes import read_header, read_label_volume
+from ..io.volumes import read_header
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
 from ..running.cost import (
@@ -46,7 +36,6 @@ from ..running.status import format_duration
 from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
-from ..settings.schemes import LabelScheme
 from ..settings.terms import (
     ELEMENTS_NEEDED,
     LARGE_ELEMENT_ERROR,
@@ -54,7 +43,7 @@ from ..settings.terms import (
     is_too_coarse,
 )
 from ..settings.varying import Varying, curve_at
-from ..study.atlases import atlas_brains, known_checksums, used_atlases
+from ..study.atlases import atlas_by_brain, known_checksums, used_atlases
 from ..study.brains import label_scheme
 from ..study.loading import load
 from ..study.paths import PLAN
@@ -62,7 +51,7 @@ from ..study.resolve import resolve
 from ..study.study import Study
 from ..version import version
 from .init import commented_scans
-from .recognition import require_fit, scheme_fits
+from .readings import ScanFiles, collected_warnings, readings
 from .scans import ScanRow, scan_lines
 
 NAMED_RUNS = 6
@@ -100,7 +89,7 @@ def check_study(
 
     `name` stands for a temporary configuration.
     """
-    with _read_study(path, directory) as study, _collected_warnings() as logged:
+    with _read_study(path, directory) as study, collected_warnings() as logged:
         config, problems = study.config, list(input_problems(study.config))
         valid = not any(bad for *_, bad in problems)
         volumes = [
@@ -164,22 +153,6 @@ def check_study(
         )
     yield from ((f"not used: {line}", False) for line in commented_scans(path))
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
-
-
-@contextmanager
-def _collected_warnings() -> Iterator[list[logging.LogRecord]]:
-    """Collect the warnings that readers log, which would be printed each time that a
-    file is read."""
-    logger, collector = logging.getLogger("gyriflow"), BufferingHandler(sys.maxsize)
-    collector.setLevel(logging.WARNING)
-    propagate = logger.propagate
-    logger.addHandler(collector)
-    logger.propagate = False
-    try:
-        yield collector.buffer
-    finally:
-        logger.removeHandler(collector)
-        logger.propagate = propagate
 
 
 @contextmanager
@@ -277,7 +250,7 @@ def _contents(study: Study) -> str:
         else "measured only"
     )
     parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
-    parts += [f"{len(runs)} of study {name}" for name, runs in study.by_sweep.items()]
+    parts += [f"{len(runs)} of sweep {name}" for name, runs in study.by_sweep.items()]
     if study.calibration:
         calibrated = {run for run, _ in study.calibration}
         parts.append(f"{len(calibrated)} of the calibration")
@@ -347,82 +320,55 @@ def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
     Unreadable files and labels of another scheme are problems; an unusual size for the
     week is a warning.
     """
+    # takes half a second, which other commands need not wait for
+    from .inputs import doubts_about_files
+
     checksums = known_checksums(used_atlases(config))
+    scans = []
     for brain in config.brains:
-        doubts: list[str] = []
-        refusals = []
-        with _collected_warnings() as logged:
-            try:
-                doubts.extend(_check_files(brain, config, checksums))
-            except GyriflowError as error:
-                refusals.append(str(error))
-        texts = [record.getMessage() for record in logged]
-        for text in dict.fromkeys([*texts, *doubts]):
+        files = [*brain.files, *brain.white_files.values()]
+        if brain.image:
+            files.append(brain.image)
+        scheme = label_scheme(config, brain.scheme) if brain.labels else None
+        sums = {path: checksums[path] for path in files if path in checksums}
+        scans.append(ScanFiles(files, (brain, scheme, sums)))
+    found = readings(doubts_about_files, scans)
+    for brain, reading in zip(config.brains, found, strict=True):
+        texts = [*reading.warnings, *_memory_doubts(brain), *reading.values]
+        for text in dict.fromkeys(texts):
             yield brain.id, text, False
-        yield from ((brain.id, text, True) for text in refusals)
+        if reading.error:
+            yield brain.id, reading.error, True
+
+
+def _memory_doubts(brain: BrainConfig) -> list[str]:
+    if brain.labels is None:
+        return []
+    memory = surface_memory_mib(brain.labels, brain.week)
+    available = available_memory_mib()
+    if memory <= max(available, MIN_SURFACE_MIB):
+        return []
+    return [
+        f"needs about {_gib(memory)} of memory, {_gib(available)} are here:"
+        " resample it to larger voxels"
+    ]
 
 
 def _scans(
     config: Config, problems: Sequence[tuple[str, str, bool]]
 ) -> Iterator[ScanRow]:
-    atlases = {
-        brain["id"]: used.atlas.name
-        for used in used_atlases(config)
-        for brain in atlas_brains(used)
-    }
+    atlases = atlas_by_brain(used_atlases(config))
     for brain in config.brains:
         is_bad = {bad for name, _, bad in problems if name == brain.id}
         verdict = "refused" if True in is_bad else "warning" if is_bad else "ok"
-        source = config.age_sources.get(brain.id) or atlases.get(
-            brain.id, "configuration"
-        )
+        default = "configuration"
+        if brain.id in atlases:
+            default = atlases[brain.id].atlas.name
+        source = config.age_sources.get(brain.id) or default
         data = ", ".join(Path(file).name for file in brain.files) or brain.source
         yield ScanRow(
             brain.id, f"{brain.week:g}", source, data, brain.scheme or "–", verdict
         )
-
-
-def _check_files(
-    brain: BrainConfig, config: Config, checksums: dict[str, tuple[str, str]]
-) -> Iterator[str]:
-    files = [
-        path
-        for path in (*brain.files, brain.image)
-        if path in checksums and Path(path).is_file()
-    ]
-    require_checksums({path: checksums[path] for path in files})
-    volume = brain.labels
-    if volume is not None and Path(volume).is_file():
-        yield from _check_labels(volume, brain, label_scheme(config, brain.scheme))
-    # takes half a second, which other commands need not wait for
-    from .inputs import check_brain_files
-
-    yield from check_brain_files(brain)
-
-
-def _check_labels(
-    volume: str, brain: BrainConfig, scheme: LabelScheme
-) -> Iterator[str]:
-    memory, available = surface_memory_mib(volume, brain.week), available_memory_mib()
-    if memory > max(available, MIN_SURFACE_MIB):
-        yield (
-            f"needs about {_gib(memory)} of memory, {_gib(available)} are here:"
-            " resample it to larger voxels"
-        )
-    read = read_label_volume(volume, brain.affine_from, cropped=True)
-    # the wall of a hemisphere that is alone may have no cortex
-    whole = brain.side is None
-    cerebrum = read_cerebrum(
-        read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0
-    )
-    yield from cerebrum.warnings
-    if whole and (
-        doubts := list(scheme_contradictions(layout_of(read.labels), scheme))
-    ):
-        require_fit(scheme_fits(read.labels), scheme.name, volume, "; ".join(doubts))
-        yield from doubts
-    if whole:
-        yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
 
 
 def _needs(
@@ -489,14 +435,7 @@ def _path_lines(
     where it will be kept."""
     for job, path_s in zip(jobs, seconds, strict=True):
         brain = job.wildcards.get("brain", "")
-        used = next(
-            (
-                used
-                for used in study.used_atlases
-                if used.atlas is study.atlases.get(brain)
-            ),
-            None,
-        )
+        used = study.atlases.get(brain)
         name = used.atlas.name if used else brain
         if job.rule == "kept_path":
             yield f"path of {name}: kept from an earlier study"

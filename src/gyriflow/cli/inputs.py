@@ -2,13 +2,19 @@
 would refuse minutes later."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..anatomy.labels import (
+    MIN_CORTEX_OUTSIDE,
+    layout_of,
+    read_cerebrum,
+    scheme_contradictions,
+)
 from ..anatomy.plausible import (
     require_left_and_right,
     require_plausible_size,
@@ -31,6 +37,7 @@ from ..geometry.triangles import (
     signed_volume,
     transformed,
 )
+from ..io.downloads import require_checksums
 from ..io.surfaces import (
     load_gifti,
     read_hemispheres,
@@ -42,11 +49,12 @@ from ..io.surfaces import (
 )
 from ..io.volumes import read_header, read_label_volume, read_volume_map
 from ..settings.brains import BrainConfig, GivenRegions
+from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES, AffineSource
 from ..settings.varying import files_of, mean_of_curve
 from ..study.records import mapped_parameters
 from ..study.study import Study
-from .recognition import NATIVE_SPACES, SPACE_NAME
+from .recognition import NATIVE_SPACES, SPACE_NAME, require_fit, scheme_fits
 
 SUBJECT_NAME = re.compile(r"(?<![A-Za-z0-9])sub-([A-Za-z0-9]+)")
 TEMPLATE_SPACES = ("mni", "mni_152", "talairach", "template")
@@ -108,7 +116,7 @@ def input_facts(study: Study) -> Iterator[str]:
         for path in files:
             owners.setdefault(path, []).append(owner)
     for path, names in owners.items():
-        # problems are those of `check_brain_files` and `check_other_files`; files of
+        # problems are those of `doubts_about_files` and `check_other_files`; files of
         # atlases may be missing yet
         if Path(path).is_file():
             try:
@@ -120,12 +128,45 @@ def input_facts(study: Study) -> Iterator[str]:
                 continue
 
 
-def check_brain_files(brain: BrainConfig) -> Iterator[str]:
-    """Yield doubts about a brain's surfaces and images; InputError for what a run would
-    refuse.
+def doubts_about_files(
+    files: Sequence[str],
+    brain: BrainConfig,
+    scheme: LabelScheme | None,
+    checksums: Mapping[str, tuple[str, str]],
+) -> Iterator[str]:
+    """Yield doubts about a brain's files; InputError for what a run would refuse.
 
-    Labels are checked elsewhere.
+    `checksums` has atlas and SHA-256 of files of atlases. Missing `files` are left out.
     """
+    present = {path for path in files if Path(path).is_file()}
+    require_checksums({path: checksums[path] for path in checksums if path in present})
+    if brain.labels in present and scheme is not None:
+        yield from _check_labels(brain.labels, brain, scheme)
+    yield from _check_surfaces(brain)
+
+
+def _check_labels(
+    volume: str, brain: BrainConfig, scheme: LabelScheme
+) -> Iterator[str]:
+    read = read_label_volume(volume, brain.affine_from, cropped=True)
+    # the wall of a hemisphere that is alone may have no cortex
+    whole = brain.side is None
+    cerebrum = read_cerebrum(
+        read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0
+    )
+    yield from cerebrum.warnings
+    if not whole:
+        return
+    doubts = list(scheme_contradictions(layout_of(read.labels), scheme))
+    if doubts:
+        require_fit(scheme_fits(read.labels), scheme.name, volume, "; ".join(doubts))
+        yield from doubts
+    yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
+
+
+def _check_surfaces(brain: BrainConfig) -> Iterator[str]:
+    """Yield doubts about a brain's surfaces and its image, and about the names of all
+    its files."""
     for path in (*brain.files, *brain.white_files.values()):
         yield from _named_otherwise(path, brain)
     if brain.image and Path(brain.image).is_file():

@@ -1,6 +1,7 @@
 """Recognise the scans of a folder by file names, labels, and the tables of participants
 and sessions."""
 
+import logging
 import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -36,6 +37,9 @@ from ..study.ages import (
     week_in_name,
 )
 from ..study.participants import TABLE_NAME, ScanTables, covariates, data_set_of
+from .readings import ScanFiles, readings
+
+log = logging.getLogger(__name__)
 
 LABEL_NAME = re.compile(
     r"(?!.*probseg).*(label|seg|parcellation|tissue)", re.IGNORECASE
@@ -246,13 +250,21 @@ def recognise(
             remedy = "Labels must be equal, with their zeros and case."
             raise InputError(problem, path=folder, found=names, remedy=remedy)
     unused: dict[str, str] = {}
-    brains: list[FoundBrain] = []
+    preferred: dict[str, list[FoundBrain]] = {}
+    to_read: list[FoundBrain] = []
     for name, group in found.items():
         if not any(
             labels and _label(group[0].file, entity) not in labels
             for entity, labels in selected.items()
         ):
-            brains += _brains_of_scan(folder, name, group, tables, sessions_of, unused)
+            preferred[name] = _preferred_files(group, unused)
+            for brain in preferred[name]:
+                _complete(brain, folder, tables, sessions_of)
+            to_read += preferred[name]
+    _read_files(to_read, folder)
+    brains: list[FoundBrain] = []
+    for name, files_of_scan in preferred.items():
+        brains += _brains_of_scan(name, found[name], files_of_scan, unused)
     # templates among subjects are not scans
     if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (
         0,
@@ -308,18 +320,15 @@ def _rejection(file: Path) -> str:
 
 
 def _brains_of_scan(
-    folder: Path,
     name: str,
     group: Sequence[FoundBrain],
-    tables: ScanTables,
-    sessions_of: Mapping[str | None, set[str | None]],
+    preferred: Sequence[FoundBrain],
     unused: dict[str, str],
 ) -> list[FoundBrain]:
-    """Return a brain for each file of a scan that may be used; of several, one must be
-    kept. Add to the `unused`."""
+    """Return a brain for each file of a scan that may be used, of the `preferred` ones
+    of all its `group`; of several, one must be kept. Add to the `unused`."""
     brains = []
-    for brain in _preferred_files(group, unused):
-        _complete(brain, folder, tables, sessions_of)
+    for brain in preferred:
         if (
             brain.is_unreadable
             and brain.is_whole_surface
@@ -565,8 +574,8 @@ def _complete(
     tables: ScanTables,
     sessions_of: Mapping[str | None, set[str | None]],
 ) -> None:
-    """Add the age, the subject and its other values to a scan, read its files, and add
-    why it cannot be used."""
+    """Add the age, the subject and its other values to a scan, and why it cannot be
+    used."""
     subject = _label(brain.file, "sub")
     owners = _owners(brain.file, tables) if subject is None else [subject]
     facts = _facts(brain.file, owners, folder, tables, sessions_of)
@@ -609,25 +618,50 @@ def _complete(
         brain.warnings.append(
             "a surface on a template's mesh is used, since no native one was found"
         )
-    if brain.problem:
-        return
-    try:
-        if "labels" in brain.entry:
-            brain.fits = scheme_fits(
-                read_label_volume(folder / brain.file, cropped=True).labels
-            )
-        elif brain.is_whole_surface:
-            _require_brain(folder / brain.file)
-        else:
-            for path in (
-                folder / file
-                for file in (*brain.files.split(", "), *brain.entry.get("white", ()))
-            ):
-                with reading(path, "a surface"), path.open("rb") as file:
-                    if not file.read(1):
-                        raise InputError("is empty", path=path, expected="a surface")
-    except InputError as error:
-        brain.problem, brain.is_unreadable = str(error), True
+
+
+def _read_files(brains: Sequence[FoundBrain], folder: Path) -> None:
+    """Read the files of scans, and add the schemes that fit labels, or why a scan
+    cannot be read."""
+    whole = []
+    for brain in brains:
+        if brain.problem:
+            continue
+        if "labels" in brain.entry or brain.is_whole_surface:
+            whole.append(brain)
+            continue
+        names = [*brain.files.split(", "), *brain.entry.get("white", ())]
+        try:
+            for name in names:
+                _require_some_content(folder / name)
+        except InputError as error:
+            brain.problem, brain.is_unreadable = str(error), True
+    scans = [ScanFiles([str((folder / brain.file).absolute())]) for brain in whole]
+    for brain, found in zip(whole, readings(fits_of_file, scans), strict=True):
+        for text in found.warnings:
+            log.warning("%s", text)
+        if found.error:
+            brain.problem, brain.is_unreadable = found.error, True
+        elif "labels" in brain.entry:
+            (brain.fits,) = found.values
+
+
+def _require_some_content(path: Path) -> None:
+    with reading(path, "a surface"), path.open("rb") as file:
+        if not file.read(1):
+            raise InputError("is empty", path=path, expected="a surface")
+
+
+def fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
+    """Yield what `scheme_fits` returns for a label volume; nothing for a surface.
+
+    InputError if it cannot be read, or if the surface is no whole brain.
+    """
+    (file,) = files
+    if is_volume(file):
+        yield scheme_fits(read_label_volume(file, cropped=True).labels)
+    else:
+        _require_brain(Path(file))
 
 
 def _require_brain(path: Path, *, whole: bool = False) -> None:

@@ -77,9 +77,9 @@ def page_figures(
         names, content = figure["names"], contents[figure["path"]]
         # if all figures of a kind are of one brain, the page's title names it
         keys = (
-            ("run", "study", "brain")
+            ("run", "sweep", "brain")
             if len(brains[figure["name"]]) > 1
-            else ("run", "study")
+            else ("run", "sweep")
         )
         title = figure["title"].format(
             **{key: plain(name.removesuffix("_mm")) for key, name in names.items()}

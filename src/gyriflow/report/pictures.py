@@ -106,7 +106,8 @@ class GridBrain:
 
     @property
     def surface(self) -> TriangleMesh:
-        return merged(*(half for half, _ in self.halves))
+        mesh, _ = whole_maps(self.halves, [])
+        return mesh
 
     def surface_map(self, quantity: str) -> SurfaceMap:
         """Return its whole surface and a map; NaN on a hemisphere that lacks it."""
@@ -328,9 +329,7 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
         )
         for name in names
     }
-    return (
-        merged(*(mesh for mesh, _ in halves)) if len(halves) > 1 else halves[0][0]
-    ), values
+    return merged(*(mesh for mesh, _ in halves)), values
 
 
 # maps

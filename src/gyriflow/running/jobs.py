@@ -1,14 +1,14 @@
 """Gather what jobs wrote: messages of a study, time and memory of steps."""
 
-import logging
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from ..io.files import AnyPath
-from ..messages import study_messages
+from ..messages import read_rows, study_messages
 from ..step import USAGE_COLUMNS
 
 REPORT_STEP = "html_report"
@@ -40,33 +40,27 @@ def read_usage(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
     """Return time and memory of jobs as their steps have recorded them, in the order of
     the rules.
 
-    `patterns` are regular expressions for the paths of each rule's records, with the
-    groups `run` and `brain` (None if not applicable). Values are NaN if a record is
-    incomplete.
+    `patterns` are regular expressions for the paths of each rule's messages, with the
+    groups `run` and `brain` (None if not applicable).
     """
     folder = Path(folder)
-    paths = sorted(
-        path.relative_to(folder).as_posix()
-        for path in folder.glob("results/**/benchmarks/*.tsv")
-    )
+    paths = sorted((folder / "results").rglob("logs/**/*.jsonl"))
+    names = {path.relative_to(folder).as_posix(): path for path in paths}
     rows = []
     for rule, pattern in patterns.items():
-        for path in paths:
-            if match := re.fullmatch(pattern, path):
-                wildcards = {
-                    name: match.groupdict().get(name) for name in ("run", "brain")
-                }
-                rows.append({"rule": rule, **wildcards, **_read_record(folder / path)})
+        for name, path in names.items():
+            match = re.fullmatch(pattern, name)
+            used = usage_in(read_rows(path)) if match else None
+            if match and used:
+                places = {key: match.groupdict().get(key) for key in ("run", "brain")}
+                rows.append({"rule": rule, **places, **used})
     return pd.DataFrame(rows, columns=["rule", "run", "brain", *USAGE_COLUMNS])
 
 
-def _read_record(path: Path) -> dict[str, float]:
-    try:
-        table = pd.read_csv(path, sep="\t", dtype=str)
-    except (OSError, ValueError) as error:
-        logging.warning("%s cannot be read: %s", path, error)
-        table = pd.DataFrame()
-    numbers = table.reindex(columns=list(USAGE_COLUMNS), index=[0]).apply(
-        pd.to_numeric, errors="coerce"
-    )
-    return numbers.loc[0].to_dict()
+def usage_in(rows: Iterable[Mapping[str, Any]]) -> dict[str, float] | None:
+    """Return time and memory among the lines that a step has written; None if it has
+    not ended."""
+    for row in rows:
+        if row.get("event") == "usage":
+            return {name: float(row[name]) for name in USAGE_COLUMNS}
+    return None

@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import (
     AbstractContextManager,
     chdir,
@@ -27,7 +27,7 @@ from contextlib import (
     nullcontext,
     suppress,
 )
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
@@ -49,6 +49,7 @@ from .planning import (
     hide_results,
     keep_contents,
     link_results,
+    listing,
     made_plan,
     no_plan,
     restore_results,
@@ -99,11 +100,22 @@ MANAGING_OPTIONS = (
     "generate_unit_tests",
 )
 """Options that ask for something else than running steps."""
+PARTIAL_OPTIONS = ("until", "omit_from", "batch")
+"""Options that select some of the planned jobs."""
+FORCE_OPTIONS = ("--force", "-f", "--forceall", "-F")
+"""Options without values that force jobs to run."""
+SNAKEMAKE_LISTS = (
+    *(name for name in VERBOSE_OPTIONS if name != "quiet"),
+    *PARTIAL_OPTIONS,
+)
+"""Options with which Snakemake itself lists the jobs of a dry run. It plans twice
+then."""
 BY_MANIFEST = ("--rerun-triggers", "mtime", "--debug-dag")
 """Options with which Snakemake lists all jobs, and compares none with its own records.
 Dates do not count, either, as all inputs are `ancient`."""
-PLANNING = (*BY_MANIFEST, "--quiet", "rules", "progress", "--rerun-incomplete", "-n")
-"""Options with which Snakemake only lists the jobs that it plans."""
+PLANNING = ("-n", "--rerun-incomplete", "--quiet", "rules", "progress")
+"""Options with which Snakemake only finds the jobs that it plans. With exactly these
+two words after `--quiet`, it ends before it goes through them in turn."""
 KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
 """Environment variable: continue after a failed step, or after a row of a table that
 cannot be used."""
@@ -129,6 +141,8 @@ SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefil
 """Where Snakemake finds a workflow by itself."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: list[IO[str]] = []
+call_targets: list[str] = []
+"""The rules and files that the call asks for."""
 received_signals: list[int] = []
 """Signals that have interrupted the run of this process."""
 
@@ -473,9 +487,9 @@ def call_snakemake(
         rules = [
             path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")
         ]
-        targets = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
+        stages = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
         raise InputError(
-            f"no stage or result is named {name}; {did_you_mean(name, targets)}"
+            f"no stage or result is named {name}; {did_you_mean(name, stages)}"
         )
     return 128 + received_signals[0] if code and received_signals else code
 
@@ -519,30 +533,32 @@ class Call:
         return is_plain and not self.has_any(MANAGING_OPTIONS)
 
     @property
-    def targets(self) -> list[str]:
-        """The rules and files that it asks for."""
-        return self.options.targets or ["all"]
-
-    @property
-    def is_forced(self) -> bool:
-        """Whether some jobs run again in any case."""
-        return self.has_any(("force", "forceall", "forcerun"))
+    def quiet(self) -> list[str]:
+        """The words after `--quiet`."""
+        return [item.name.lower() for item in self.options.quiet or []]
 
     def forced(self, jobs: Iterable[Job]) -> list[str]:
         """Return the rules and files of planned jobs that run again in any case."""
         if self.options.forceall:
             return [job.rule for job in jobs]
-        targets = self.targets if self.options.force else []
-        return [*(self.options.forcerun or []), *targets]
+        wanted = call_targets if self.options.force else []
+        return [*(self.options.forcerun or []), *wanted]
+
+    def without_force(self) -> "Call":
+        """Return the call without arguments that force jobs to run: the plan has them,
+        and Snakemake would leave out some behind a checkpoint."""
+        arguments = [word for word in self.arguments if word not in FORCE_OPTIONS]
+        # the last of several counts
+        return replace(self, arguments=[*arguments, "--forcerun"])
 
 
-def plan_and_run(call: Call, *, is_again: bool = False) -> int:
+def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     """Have Snakemake plan, and call it again without the results that are outdated;
     return its exit code.
 
     Snakemake leaves out the jobs behind one that ends while it looks at what a
     checkpoint has made. So it plans again if planned jobs are left, as long as others
-    have ended.
+    have ended. `left` are their keys.
     """
     if call.runs:
         # of a run that was killed
@@ -550,15 +566,17 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     if not call.is_planned:
         code, _ = run_jobs(call, no_plan())
         return code
+    call = call.without_force()
     events = Events()
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
-    code = call_snakemake([*PLANNING, *call.arguments, *profile], events, is_error)
+    arguments = [*BY_MANIFEST, *call.arguments, *profile, *PLANNING]
+    code = call_snakemake(arguments, events, is_error)
     if code:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
-        forced = call.forced(events.jobs.values())
-        plan = made_plan(events, call.targets, forced)
+        forced = call.forced(events.jobs.values()) if left is None else left
+        plan = made_plan(events, call_targets, forced)
         if call.runs:
             keep_contents(plan)
     if call.take_plan:
@@ -566,8 +584,11 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     if not call.is_shown:
         return 0
     if events.nothing and not plan.reasons:
-        if not is_again:
+        if left is None:
             say_nothing_runs(call, events.nothing)
+        return 0
+    if not (call.runs or call.has_any(SNAKEMAKE_LISTS)):
+        print(listing(plan, call.quiet), end="")
         return 0
     if call.runs:
         hide_results(call.directory, plan.outdated)
@@ -576,10 +597,9 @@ def plan_and_run(call: Call, *, is_again: bool = False) -> int:
     os.environ[PLANNED_VAR] = "1"
     try:
         code, ended = run_jobs(call, plan)
-        is_left = not ended.issuperset(plan.reasons)
-        # forced jobs would run again each time
-        if call.runs and code == 0 and ended and is_left and not call.is_forced:
-            return plan_and_run(call, is_again=True)
+        still_left = set(plan.reasons) - ended
+        if call.runs and code == 0 and ended and still_left:
+            return plan_and_run(call, left=still_left)
         return code
     finally:
         os.environ.pop(PLANNED_VAR, None)
@@ -610,11 +630,10 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
         with suppress(StorageError):
             write_manifest(job, plan.found)
 
-    quiet = [item.name.lower() for item in call.options.quiet or []]
-    if "progress" in quiet:
+    if "progress" in call.quiet:
         # Snakemake would not name the jobs that have finished
-        quiet.remove("progress")
-        arguments += ["--quiet", *(quiet or ["host"])]
+        others = [word for word in call.quiet if word != "progress"]
+        arguments += ["--quiet", *(others or ["host"])]
         is_wanted = is_no_progress
     output: AbstractContextManager[None] = nullcontext()
     if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
@@ -651,6 +670,7 @@ def main(
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)
     check_options(unknown, parser.format_usage())
+    call_targets[:] = options.targets or ["all"]
     directory = options.directory or Path()
     is_second_pass = REFUSED_FILE_VAR in os.environ
     if not (options.configfile or options.snakefile or is_second_pass):

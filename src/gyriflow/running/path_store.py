@@ -85,11 +85,7 @@ def store_folder(study: Study, path: Chain) -> Path | None:
     for other brains."""
     if not all(brain.atlas for brain in study.brains_of(path)):
         return None
-    atlas = study.atlases[path.brain]
-    return (
-        next(used.folder for used in study.used_atlases if used.atlas is atlas)
-        / "paths"
-    )
+    return study.atlases[path.brain].folder / "paths"
 
 
 def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:

@@ -8,13 +8,16 @@ as outdated ones are hidden from it.
 import logging
 import os
 import shutil
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+
+from tabulate import tabulate
 
 from ..errors import InputError, StorageError
 from ..io.files import files_below, read_json, write_json
@@ -40,15 +43,14 @@ UPDATED = " (update)"
 
 def job_from(job: Any) -> Job:
     """Return a job of Snakemake's own."""
-    inputs = {}
-    named: set[str] = set()
+    named = {}
     for name, files in job.input.items():
         paths = [files] if isinstance(files, str) else files
-        inputs[name] = [str(path) for path in paths]
-        named.update(inputs[name])
-    unnamed = [str(path) for path in job.input if str(path) not in named]
-    if unnamed:
-        inputs[UNNAMED] = unnamed
+        named[name] = [str(path) for path in paths]
+    with_name = set(chain.from_iterable(named.values()))
+    unnamed = [str(path) for path in job.input if str(path) not in with_name]
+    # a rule has these first
+    inputs = {UNNAMED: unnamed, **named} if unnamed else named
     outputs = [str(file) for file in job.output]
     # a fetched file of an atlas is an input
     is_recorded = bool(job.log and outputs) and not Path(outputs[0]).is_absolute()
@@ -167,7 +169,7 @@ def made_plan(
         elif why := _outdated_by_itself(job, manifests[key], found):
             reasons[key] = why
     producers = _producers(jobs)
-    for file in _required(jobs.values(), targets):
+    for file in _required(jobs, producers, targets):
         if file in producers and not Path(file).exists():
             reasons.setdefault(producers[file], f"{MISSING}: {file}")
     _spread(reasons, jobs, producers)
@@ -194,14 +196,22 @@ def _producers(jobs: Mapping[str, Job]) -> dict[str, str]:
     return producers
 
 
-def _required(jobs: Iterable[Job], targets: Collection[str]) -> list[str]:
-    """Return the files that a call asks for."""
+def _required(
+    jobs: Mapping[str, Job], producers: Mapping[str, str], targets: Collection[str]
+) -> list[str]:
+    """Return the files that a call asks for.
+
+    A rule without results, such as `all`, asks for all results of the jobs that make
+    its inputs: it names one of each, as each file costs Snakemake time.
+    """
     files = list(targets)
-    for job in jobs:
+    asked = {key: job for key, job in jobs.items() if job.rule in targets}
+    for job in jobs.values():
         if not job.outputs:
-            files += job.files
-        elif job.rule in targets:
-            files += job.outputs
+            makers = [producers[file] for file in job.files if file in producers]
+            asked |= {key: jobs[key] for key in makers}
+    for job in asked.values():
+        files += job.outputs
     return files
 
 
@@ -264,6 +274,35 @@ def keep_contents(plan: Plan) -> None:
     if copied:
         with suppress(StorageError):
             write_json(COPIES, copied)
+
+
+def listing(plan: Plan, quiet: Collection[str] = ()) -> str:
+    """Return the jobs that would run as text: each with its files and its reason, and
+    their number by rule.
+
+    `quiet` are words of Snakemake's option of this name: without single jobs for
+    "rules", nothing at all for "all".
+    """
+    if "all" in quiet:
+        return ""
+    counts = Counter(job.rule for job, _ in plan.reasoned_jobs)
+    rows = [*sorted(counts.items()), ("total", counts.total())]
+    text = f"Job stats:\n{tabulate(rows, headers=('job', 'count'))}\n"
+    if "rules" in quiet:
+        return text
+    for job, reason in plan.reasoned_jobs:
+        names = [f"{name}={value}" for name, value in job.wildcards.items()]
+        facts = {
+            "input": ", ".join(job.files),
+            "output": ", ".join(job.outputs),
+            "wildcards": ", ".join(names),
+            "reason": reason,
+        }
+        text += f"\nrule {job.rule}:\n"
+        for name, value in facts.items():
+            if value:
+                text += f"    {name}: {value}\n"
+    return text
 
 
 def hide_results(directory: Path, files: Iterable[str]) -> None:

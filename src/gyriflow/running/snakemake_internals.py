@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ..code_hash import code_hash
+from ..errors import InputError
 from ..io.files import contents
 from ..io.origins import joined_contents
+from ..settings.base import did_you_mean
 from ..study.paths import log_of
 from .manifest import recorded_results
 
@@ -70,21 +72,32 @@ def remove_stale(rules: Collection[Any], *folders: str) -> None:
             path.unlink()
 
 
+def check_brains(
+    targets: Iterable[str], rules: Iterable[Any], brains: Collection[str]
+) -> None:
+    """Raise InputError if a file that a call asks for is of none of the `brains`."""
+    for target in targets:
+        for rule in rules:
+            if not rule.is_producer(target):
+                continue
+            brain = rule.get_wildcards(target).get("brain")
+            if brain is not None and brain not in brains:
+                raise InputError(
+                    f"no stage or result is named {target}; the study has no brain"
+                    f" {brain}; {did_you_mean(brain, brains)}"
+                )
+
+
 def _is_made(path: str, rules: Collection[Any]) -> bool:
     return any(rule.is_producer(path) for rule in rules)
 
 
-def usage_patterns(rules: Iterable[Any]) -> dict[str, str]:
-    """Return the regular expression of the records of time and memory of each rule,
-    with wildcards as groups.
-
-    They are named like the rule's log (see `step.record_usage`).
-    """
+def message_patterns(rules: Iterable[Any]) -> dict[str, str]:
+    """Return the regular expression of the messages of each rule, which lie beside its
+    log, with wildcards as groups."""
     patterns = {}
     for rule in rules:
         if rule.log:
             log = rule.log[0].regex().pattern
-            patterns[rule.name] = log.replace("/logs/", "/benchmarks/").replace(
-                r"\.log", r"\.tsv"
-            )
+            patterns[rule.name] = log.replace(r"\.log", r"\.jsonl")
     return patterns

@@ -19,6 +19,7 @@ from ..grouping import Kinds
 from ..io.files import write_json
 from ..messages import (
     KILLED,
+    OUT_OF_MEMORY,
     STOPPED,
     Message,
     messages_file,
@@ -48,10 +49,6 @@ SLURM = re.compile(
     r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL
 )
 SIGNAL = re.compile(r"died with <Signals\.(\w+)")
-OUT_OF_MEMORY = (
-    "it was killed, most probably because memory ran out: its log ends without a"
-    " message"
-)
 SIGNAL_CAUSES = {
     "SIGKILL": OUT_OF_MEMORY,
     **dict.fromkeys(("SIGTERM", "SIGINT", "SIGHUP"), STOPPED),

@@ -14,14 +14,14 @@ from .runs import (
     Run,
     RunName,
     Start,
-    StudyName,
+    SweepName,
     SweepSettings,
     complete_runs,
 )
 from .schemes import SchemeSettings
 from .stages import MeshSettings, MetricsSettings, SurfaceSettings
 
-FOLDING_SECTIONS = ("start", "folding", "runs", "studies", "calibrate")
+FOLDING_SECTIONS = ("start", "folding", "runs", "sweeps", "calibrate")
 """Sections that are absent if a study only measures."""
 
 
@@ -53,8 +53,8 @@ class Config(Settings):
     runs: dict[RunName, Run] = Field({})
     """Runs by name, each with its `start` and what differs from `folding`; `{}`: one
     run named `reference`."""
-    studies: dict[StudyName, SweepSettings] = Field({})
-    """Studies by name: runs that differ in a few parameters, compared with real
+    sweeps: dict[SweepName, SweepSettings] = Field({})
+    """Sweeps by name: runs that differ in a few parameters, compared with observed
     brains."""
     calibrate: CalibrationSettings | None = None
     """A search for the parameters that meet a real brain best."""

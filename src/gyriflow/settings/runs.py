@@ -25,7 +25,7 @@ Start = Annotated[tuple[str, ...] | str, FirstIf(list | tuple)]
 """The id of a brain, a list of ids, `first` or `all`."""
 
 RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=MAX_NAME_LENGTH)]
-StudyName = Annotated[str, Field(pattern=r"^[^\W_][\w-]*$", max_length=MAX_NAME_LENGTH)]
+SweepName = Annotated[str, Field(pattern=r"^[^\W_][\w-]*$", max_length=MAX_NAME_LENGTH)]
 """Names that are used as folder names: letters, digits and these marks, beginning with
 a letter or digit."""
 
@@ -251,7 +251,7 @@ def _n_weeks(brains: Sequence[BrainConfig]) -> int:
     return len({brain.week for brain in brains})
 
 
-# studies and calibration
+# sweeps and calibration
 
 Value = Annotated[str | float, FirstIf(str)]
 """A value of a parameter that a sweep varies."""

@@ -237,6 +237,15 @@ def used_atlases(config: Config) -> list[UsedAtlas]:
     ]
 
 
+def atlas_by_brain(atlases: Iterable[UsedAtlas]) -> dict[str, UsedAtlas]:
+    """Return the atlas of each brain that belongs to one, by the id of the brain."""
+    by_brain = {}
+    for used in atlases:
+        for file in used.files:
+            by_brain[file.brain] = used
+    return by_brain
+
+
 def known_checksums(atlases: Iterable[UsedAtlas]) -> dict[str, tuple[str, str]]:
     """Return the atlas and the SHA-256 of each atlas file whose checksum is known, by
     the file's path."""

@@ -12,7 +12,7 @@ from ..settings.root import Config
 from ..settings.schemes import FILLED, LabelScheme
 from ..settings.terms import MAX_COLOURS, MEASURED, SIDES
 from . import paths
-from .atlases import UsedAtlas, known_checksums
+from .atlases import UsedAtlas, atlas_by_brain, known_checksums
 from .records import Brain, measured_files
 
 
@@ -22,12 +22,14 @@ def plan_brains(
     """Return the brains of a configuration that are not refused, by id."""
     atlases = list(atlases)
     checksums = known_checksums(atlases)
-    names = _atlas_names(atlases)
+    atlas_of = atlas_by_brain(atlases)
     brains: dict[str, Brain] = {}
     for settings in config.brains:
         if settings.id not in refused:
             brain = _brain(config, settings, checksums)
-            brains[brain.id] = replace(brain, atlas=names.get(brain.id))
+            if brain.id in atlas_of:
+                brain = replace(brain, atlas=atlas_of[brain.id].atlas.name)
+            brains[brain.id] = brain
     groups = _groups(brains.values())
     for name, brain in brains.items():
         brains[name] = replace(brain, group=groups.get(name))
@@ -89,15 +91,6 @@ def _brain(
         covariates=settings.covariates,
         **files,
     )
-
-
-def _atlas_names(atlases: Iterable[UsedAtlas]) -> dict[str, str]:
-    """Return the atlas of each brain that belongs to one, by the id of the brain."""
-    names = {}
-    for used in atlases:
-        for file in used.files:
-            names[file.brain] = used.atlas.name
-    return names
 
 
 def _groups(brains: Iterable[Brain]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Checks of sections against each other: names, starts, runs, growth, metrics, studies,
+"""Checks of sections against each other: names, starts, runs, growth, metrics, sweeps,
 calibration."""
 
 import re
@@ -48,7 +48,7 @@ RESULT_COLUMNS = re.compile(
     + ")"
 )
 """Columns of `metrics_wide.csv`, which covariates stand in as well."""
-RESERVED_STUDIES = (
+RESERVED_SWEEPS = (
     "benchmarks",
     "calibration",
     "figures",
@@ -73,7 +73,7 @@ def problems_between(config: Config) -> list[KeyProblem]:
         _starts,
         _runs,
         _growth,
-        _studies,
+        _sweeps,
         _calibration,
         _metrics,
     )
@@ -84,7 +84,7 @@ def problems_between(config: Config) -> list[KeyProblem]:
 
 
 def _names(config: Config) -> Problems:
-    """Yield problems with the names of brains, runs, studies and schemes. Folders have
+    """Yield problems with the names of brains, runs, sweeps and schemes. Folders have
     the names of brains and runs."""
     if not config.brains and not config.atlas:
         yield KeyProblem(
@@ -105,11 +105,11 @@ def _names(config: Config) -> Problems:
             " their folders; rename one",
             ("brains",),
         )
-    for first, second in merged_names(config.studies, folder_name):
+    for first, second in merged_names(config.sweeps, folder_name):
         yield KeyProblem(
-            f"differs from the study {first} only in case, so some disks mix up their"
+            f"differs from the sweep {first} only in case, so some disks mix up their"
             " folders; rename one",
-            ("studies", second),
+            ("sweeps", second),
         )
     taken: list[Key] = []
     if MEASURED in config.runs:
@@ -117,9 +117,9 @@ def _names(config: Config) -> Problems:
     for name in sorted(config.schemes):
         if name in SCHEMES:
             taken.append(("schemes", name))
-    for name in config.studies:
-        if folder_name(name) in RESERVED_STUDIES:
-            taken.append(("studies", name))
+    for name in config.sweeps:
+        if folder_name(name) in RESERVED_SWEEPS:
+            taken.append(("sweeps", name))
     for key in taken:
         yield KeyProblem("the name is taken; choose another", key)
     yield from _covariates(config)
@@ -240,9 +240,9 @@ def _named_runs(config: Config) -> Iterator[tuple[str, str, Key]]:
             yield name, f"the ensemble of {run}", ("runs", run)
     for name in config.runs:
         yield name, "the section runs", ("runs", name)
-    for study, sweep in config.studies.items():
-        for name, values in variants(study, sweep):
-            yield name, f"the study {study} ({values})", ("studies", study)
+    for sweep, settings in config.sweeps.items():
+        for name, values in variants(sweep, settings):
+            yield name, f"the sweep {sweep} ({values})", ("sweeps", sweep)
 
 
 def _growth(config: Config) -> Problems:
@@ -382,47 +382,47 @@ def _metrics(config: Config) -> Problems:
             )
 
 
-def _studies(config: Config) -> Problems:
-    """Yield problems between the studies, the runs and the brains."""
-    for name, study in config.studies.items():
-        problems = [*_comparison_problems(study, config)]
-        if study.base in config.runs:
-            problems += _member_problems(study, config.runs[study.base])
+def _sweeps(config: Config) -> Problems:
+    """Yield problems between the sweeps, the runs and the brains."""
+    for name, sweep in config.sweeps.items():
+        problems = [*_comparison_problems(sweep, config)]
+        if sweep.base in config.runs:
+            problems += _member_problems(sweep, config.runs[sweep.base])
         for problem in problems:
-            yield problem.inside("studies", name)
+            yield problem.inside("sweeps", name)
 
 
-def _member_problems(study: SweepSettings, base: Run) -> Problems:
-    if not study.vary:
+def _member_problems(sweep: SweepSettings, base: Run) -> Problems:
+    if not sweep.vary:
         yield KeyProblem(
             "found nothing; expected keys of folding with lists of values", ("vary",)
         )
-    first_values = next(iter(study.vary.values()), ())
-    for value in study.fixed_at:
+    first_values = next(iter(sweep.vary.values()), ())
+    for value in sweep.fixed_at:
         if value not in first_values:
             yield KeyProblem(
                 f"found {value:g}; expected a value of the first varied key",
                 ("fixed_at",),
             )
-    for varied, values in study.vary.items():
+    for varied, values in sweep.vary.items():
         if not values or len(set(values)) < len(values):
             yield KeyProblem(
                 f"found {list(values)}; expected one or more values, each once",
                 ("vary", varied),
             )
-    sections = dict.fromkeys(study.vary, "vary")
-    sections |= dict.fromkeys(study.fixed, "fixed")
-    for settings in study.fixed_at.values():
+    sections = dict.fromkeys(sweep.vary, "vary")
+    sections |= dict.fromkeys(sweep.fixed, "fixed")
+    for settings in sweep.fixed_at.values():
         sections |= dict.fromkeys(settings, "fixed_at")
     for name, section in sections.items():
         if name in NOT_VARIED:
             yield KeyProblem(
-                "cannot differ within a study; choose another base", (section, name)
+                "cannot differ within a sweep; choose another base", (section, name)
             )
             return
-    for _, combination in variants("", study):
+    for _, combination in variants("", sweep):
         try:
-            run = changed(base, study.changes(combination))
+            run = changed(base, sweep.changes(combination))
         except KeyError as error:
             name = error.args[0]
             yield KeyProblem(NO_FOLDING_KEY, (sections[name], name))

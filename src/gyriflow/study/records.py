@@ -262,7 +262,7 @@ class Comparison:
 
 @dataclass(frozen=True, kw_only=True)
 class SweepRun:
-    """A run of a sweep (key `studies`) from one start brain, with its varied values: a
+    """A run of a sweep from one start brain, with its varied values: a
     row of `sweeps.csv`.
 
     `member` is its name, `run` the run that simulates it, as equal runs are simulated

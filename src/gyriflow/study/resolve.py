@@ -3,7 +3,7 @@ sweep."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 from ..errors import InputError
 from ..settings.folding import output_weeks
@@ -132,18 +132,17 @@ def _downloads(atlases: Iterable[UsedAtlas]) -> list[Download]:
 def _left_out(
     config: Config, refused: Mapping[str, str], unreachable: Mapping[str, InputError]
 ) -> list[LeftOut]:
+    causes: dict[Literal["refused", "not folded"], Mapping[str, Any]] = {
+        "refused": refused,
+        "not folded": unreachable,
+    }
     rows = []
     for brain in config.brains:
-        if brain.id in refused:
-            cause = refused[brain.id]
-            rows.append(
-                LeftOut(brain=brain.id, why="refused", week=brain.week, cause=cause)
-            )
-        elif brain.id in unreachable:
-            cause = str(unreachable[brain.id])
-            rows.append(
-                LeftOut(brain=brain.id, why="not folded", week=brain.week, cause=cause)
-            )
+        for why, of_brains in causes.items():
+            if brain.id in of_brains:
+                cause = str(of_brains[brain.id])
+                row = LeftOut(brain=brain.id, why=why, week=brain.week, cause=cause)
+                rows.append(row)
     for scan, facts in config.left_out.items():
         rows.append(LeftOut(brain=scan, why="cannot be used", **facts))
     return rows
@@ -232,7 +231,7 @@ def _series_rows(
 def _variants(config: Config) -> list[_Variant]:
     """Return the runs of all sweeps. They have no ensembles."""
     found = []
-    for name, sweep in config.studies.items():
+    for name, sweep in config.sweeps.items():
         base = config.runs[sweep.base]
         for run, values in variants(name, sweep):
             changes = {**sweep.changes(values), "ensemble": None}
@@ -257,7 +256,7 @@ def _folded(
         for start in starts[name]:
             yield _Folded(name, start, _up_to_last_scan(run, start, series))
     for variant in variants:
-        for start in starts[config.studies[variant.sweep].base]:
+        for start in starts[config.sweeps[variant.sweep].base]:
             yield _Folded(variant.run, start, variant.settings)
     calibrate = config.calibrate
     if calibrate is not None:
@@ -619,7 +618,7 @@ def _sweeps(
     """Return the runs of all sweeps, each with its varied values."""
     rows = []
     for variant in variants:
-        settings = config.studies[variant.sweep]
+        settings = config.sweeps[variant.sweep]
         for simulation in simulations:
             if simulation.run == names[variant.run]:
                 start = brains[simulation.brain]

@@ -16,11 +16,10 @@ import yaml
 
 from ..io.exports import ExportedBrain, labels_file
 from ..io.yaml_files import read_keys
-from ..settings.atlas import Atlas
 from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, min_norm_subjects
 from . import paths
-from .atlases import UsedAtlas, used_atlases
+from .atlases import UsedAtlas, atlas_by_brain, used_atlases
 from .brains import closest, label_source, registered_source
 from .records import (
     Brain,
@@ -252,29 +251,16 @@ class Study:
         rows = {row.place: row for row in self.simulated.values()}
         return rows | self.measured
 
-    @property
-    def surfaces(self) -> list[str]:
-        files = []
-        for brain in self.brains.values():
-            patterns = [*paths.pial_of(*brain.sides).values()]
-            if brain.thickness:
-                patterns += paths.THICKNESS.values()
-            files += [pattern.format(**brain.names) for pattern in patterns]
-        return files
-
     @cached_property
     def used_atlases(self) -> list[UsedAtlas]:
         """The atlases of the study, with the files that exist now."""
         return used_atlases(self.config)
 
     @cached_property
-    def atlases(self) -> dict[str, Atlas]:
+    def atlases(self) -> dict[str, UsedAtlas]:
         """The atlas of each brain of an atlas, refused ones too, by the id of the
         brain."""
-        atlases: dict[str, Atlas] = {}
-        for used in self.used_atlases:
-            atlases |= {file.brain: used.atlas for file in used.files}
-        return atlases
+        return atlas_by_brain(self.used_atlases)
 
     def are_individuals(self, ids: Iterable[str]) -> bool:
         """Return whether brains are individuals, not averages of an atlas.
@@ -443,7 +429,7 @@ class Study:
         labels = None
         if exported.volume:
             labels = labels_file("results/export", exported, self.exported)
-        atlas = self.atlases.get(atlas_brain.id)
+        used = self.atlases.get(atlas_brain.id)
         atlas_keys = {"name", "title", "licence", "reference"}
         return {
             **simulation.names,
@@ -453,7 +439,7 @@ class Study:
             "atlas_week": atlas_brain.week,
             # the population whose growth was used
             "population": atlas_brain.population_name,
-            "atlas": atlas and atlas.model_dump(include=atlas_keys),
+            "atlas": used and used.atlas.model_dump(include=atlas_keys),
             "surfaces": [*last.parts.values()],
             "atlas_surface": self.atlas_surface(simulation),
             "labels": labels,

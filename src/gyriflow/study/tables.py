@@ -9,6 +9,7 @@ import io
 import json
 from collections.abc import Iterable
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -52,9 +53,13 @@ def _cell(value: Any, kind: Any) -> str:
         return ""
     if _is_text(kind):
         return str(value)
-    adapter = TypeAdapter(kind)
-    plain = adapter.dump_python(value, mode="json", exclude_unset=True)
+    plain = _adapter(kind).dump_python(value, mode="json", exclude_unset=True)
     return json.dumps(plain, ensure_ascii=False)
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter:
+    return TypeAdapter(kind)
 
 
 def _value(text: str, kind: Any) -> Any:

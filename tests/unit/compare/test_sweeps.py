@@ -220,7 +220,7 @@ def test_comparisons_without_rows_keep_their_columns():
 
 def member(run, thickness, through=2.0, diverged=None, growth="rates"):
     return member_row(
-        {"study": "thickness", "run": run, "subject": "a", "compare_week": 28},
+        {"sweep": "thickness", "run": run, "subject": "a", "compare_week": 28},
         {"thickness_mm": thickness},
         {
             "thickness_mm": thickness,
@@ -419,12 +419,12 @@ def test_the_script_joins_each_run_with_its_own_files_and_finds_the_nearest(tmp_
     ]
     names = ("members", "comparison", "nearest")
     run_script(
-        "study_tables.py",
+        "sweep_tables.py",
         tmp_path,
         inputs | {"noise": "noise.yaml"},
         {name: f"{name}.csv" for name in names},
         {"members": members, "week": 28.0},
-        wildcards=SimpleNamespace(study="thickness"),
+        wildcards=SimpleNamespace(sweep="thickness"),
     )
     members, comparison, nearest = (read_table(tmp_path / f"{n}.csv") for n in names)
     assert members["run"].tolist() == ["thin", "thick"]

@@ -3,22 +3,20 @@ programs depend."""
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from gyriflow import code_hash as sources
 from gyriflow.code_hash import code_hash, modules_behind
 from gyriflow.messages import Message, write_message
 from gyriflow.running.jobs import gather_messages, read_usage
-from gyriflow.step import USAGE_COLUMNS
+from gyriflow.step import Usage, record_usage
 
-HEAD = "\t".join(USAGE_COLUMNS)
 PATTERNS = {
     "pial_from_labels": (
-        r"results/brains/(?P<brain>a|b)/benchmarks/pial_from_labels\.tsv$"
+        r"results/brains/(?P<brain>a|b)/logs/pial_from_labels\.jsonl$"
     ),
-    "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/benchmarks/simulate\.tsv$",
-    "run_tables": r"results/study/benchmarks/run_tables\.tsv$",
+    "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/logs/simulate\.jsonl$",
+    "run_tables": r"results/study/logs/run_tables\.jsonl$",
 }
 
 
@@ -57,27 +55,24 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path, monkeypatch):
     assert gather_messages(tmp_path / "empty", ["a"], []).empty
 
 
-def write(folder, name, *lines, head=HEAD):
-    write_lines(folder / "results" / name, head, *lines)
-
-
-def line(seconds, memory, cpu):
-    return f"{seconds}\t{cpu}\t{memory}"
+def record(folder, name, *used):
+    """Have a step record what it has used, after a warning."""
+    log = folder / "results" / f"{name}.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    write_message(log, Message("warning", "a warning"))
+    if used:
+        record_usage(log, Usage(*used))
 
 
 def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
-    write(
-        tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(10.5, 200.25, 9.75)
-    )
-    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line(11, 210, 10))
-    write(
-        tmp_path,
-        "runs/two/a/benchmarks/simulate.tsv",
-        line("100.00", "1000.00", "190.00"),
-    )
+    record(tmp_path, "brains/a/logs/pial_from_labels", 10.5, 9.75, 200.25)
+    record(tmp_path, "brains/b/logs/pial_from_labels", 11, 10, 210)
+    record(tmp_path, "runs/two/a/logs/simulate", 100, 190, 1000)
     # of an earlier configuration
-    write(tmp_path, "brains/c/benchmarks/pial_from_labels.tsv", line(1, 1, 1))
-    write(tmp_path, "runs/three/a/benchmarks/simulate.tsv", line(1, 1, 1))
+    record(tmp_path, "brains/c/logs/pial_from_labels", 1, 1, 1)
+    record(tmp_path, "runs/three/a/logs/simulate", 1, 1, 1)
+    # it has failed
+    record(tmp_path, "study/logs/run_tables")
     jobs = read_usage(tmp_path, PATTERNS)
     assert jobs.fillna("").to_numpy().tolist() == [
         ["pial_from_labels", "", "a", 10.5, 9.75, 200.25],
@@ -86,17 +81,11 @@ def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
     ]
 
 
-def test_what_could_not_be_measured_is_nan(tmp_path):
-    # a full disk may leave a part
-    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", "0.3")
-    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", "x")
-    write(tmp_path, "runs/one/a/benchmarks/simulate.tsv", head="")
-    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", "5.0", head="wall_s\tcpu")
-    write(tmp_path, "study/benchmarks/run_tables.tsv")
-    jobs = read_usage(tmp_path, PATTERNS)
-    assert len(jobs) == 5
-    np.testing.assert_array_equal(jobs["wall_s"], [0.3, np.nan, np.nan, 5.0, np.nan])
-    assert jobs[["cpu_s", "memory_MiB"]].isna().all(axis=None)
+def test_half_a_line_that_a_full_disk_left_is_no_record(tmp_path):
+    record(tmp_path, "brains/a/logs/pial_from_labels", 10.5, 9.75, 200.25)
+    path = tmp_path / "results" / "brains" / "a" / "logs" / "pial_from_labels.jsonl"
+    path.write_text(path.read_text()[:-5])
+    assert read_usage(tmp_path, PATTERNS).empty
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 
 import pytest
+from facts import Facts
 
 from gyriflow.running import launch
 from gyriflow.running.manifest import COPIES, Contents, Job, manifest_of, write_manifest
@@ -17,6 +18,7 @@ from gyriflow.running.planning import (
     hide_results,
     keep_contents,
     link_results,
+    listing,
     made_plan,
     no_plan,
     restore_results,
@@ -113,6 +115,39 @@ def test_what_depends_on_a_forced_job_runs_again(study):
     again = reasons(plan(), forced=["mesh"])
     assert again == {"mesh": FORCED, "run": f"{BY_ANOTHER_JOB}: mesh"}
     assert set(reasons(plan(), forced=["results/run"])) == {"run"}
+
+
+def test_a_dry_run_lists_the_jobs_that_run_with_files_and_reason_and_counts_them(study):
+    made = made_plan(plan(), ["all"], ["mesh"])
+    text = listing(made)
+    _, mesh, run = text.split("\nrule ")
+    assert mesh == Facts("mesh:", "input: results/surface", "output: results/mesh")
+    assert mesh == Facts(f"reason: {FORCED}")
+    assert run == Facts("run:", f"reason: {BY_ANOTHER_JOB}: mesh")
+    counts = listing(made, ["rules"])
+    assert text.startswith(counts)
+    assert [line.split() for line in counts.splitlines()[-3:]] == [
+        ["mesh", "1"],
+        ["run", "1"],
+        ["total", "2"],
+    ]
+    assert listing(made, ["rules", "all"]) == ""
+
+
+def test_a_rule_without_results_asks_for_all_results_of_the_jobs_that_it_names(study):
+    events = plan()
+    job = replace(
+        events.jobs["results/metrics"], outputs=["results/metrics", "results/maps"]
+    )
+    (study / "results" / "maps").write_text("maps")
+    events.jobs[job.key] = job
+    write_manifest(job, Contents({}, {}))
+    assert reasons(events) == {}
+    (study / "results" / "maps").unlink()
+    assert reasons(events) == {"metrics": f"{MISSING}: results/maps"}
+    # Snakemake is asked for the other one, which it does not see
+    assert made_plan(events, ["all"], []).outdated == ["results/metrics"]
+    assert reasons(events, targets=["results/metrics"]) == reasons(events)
 
 
 def test_an_asked_for_file_is_made(study):

@@ -11,12 +11,12 @@ from facts import Facts
 
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, write_json
-from gyriflow.messages import Message, read_messages, write_message
+from gyriflow.messages import OUT_OF_MEMORY, Message, read_messages, write_message
 from gyriflow.running import terminal
 from gyriflow.running.launch import hold_lock
 from gyriflow.running.provenance import check_results_belong_to, input_contents
 from gyriflow.running.status import STATE, status
-from gyriflow.running.terminal import OUT_OF_MEMORY, RunDisplay
+from gyriflow.running.terminal import RunDisplay
 from gyriflow.study.loading import load
 
 STEP = '{{"event": "step", "week": {week}, "end_week": 23, "left_s": {left}}}\n'

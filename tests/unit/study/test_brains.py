@@ -145,11 +145,9 @@ def test_studies_that_differ_only_in_case_are_refused(pair):
     }
     first, second = pair
     text = problems(
-        study(
-            studies={first: sweep, second: sweep | {"vary": {"thickness_mm": [3, 4]}}}
-        )
+        study(sweeps={first: sweep, second: sweep | {"vary": {"thickness_mm": [3, 4]}}})
     )
-    assert text == [Facts(f"studies.{second}:", first)]
+    assert text == [Facts(f"sweeps.{second}:", first)]
 
 
 def test_one_scan_of_a_subject_is_of_each_week():

@@ -107,7 +107,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     regions = {"b23": {"labels": str(files / "map.nii.gz"), "names": {1: "frontal"}}}
     twin = real[3] | {"id": "twin"}
     asked = {
-        "studies": {"thick": varied, "one": varied | {"base": "late"}},
+        "sweeps": {"thick": varied, "one": varied | {"base": "late"}},
         "runs": {
             "reference": {"start": ["b21", "b22"]},
             "late": {"start": "b22", "poisson_ratio": 0.3},
@@ -140,7 +140,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
         "score": {"size": 1},
         "compare_week": 24,
     }
-    empty = study(real, ["b21"], studies={"thick": varied}, calibrate=search)
+    empty = study(real, ["b21"], sweeps={"thick": varied}, calibrate=search)
     assert empty.run_simulations == empty.norm_reference == [] == list(empty.sweeps)
     assert empty.calibration == {}
 
@@ -303,7 +303,7 @@ def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(
     of_two, preset
 ):
     runs, later = {"runs": {"a": {"preset": preset}}}, {"base": "a", "compare_week": 26}
-    varied = {"studies": {"late": later | {"vary": {"thickness_mm": [1.0, 2.0]}}}}
+    varied = {"sweeps": {"late": later | {"vary": {"thickness_mm": [1.0, 2.0]}}}}
     search = {
         "calibrate": (
             later | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}
@@ -326,15 +326,6 @@ def test_a_brain_of_the_last_week_is_one_that_is_compared(of_two):
         folding={"end_week": 23.6},
     )
     assert found.chains["own22", "atlas"].further_weeks == (22.7, 23.6)
-
-
-def test_the_surfaces_of_a_study_are_those_of_all_its_brains(of_two):
-    found = study(of_two(22, 23), **EXPECTED)
-    for name in found.brains:
-        folder = f"results/brains/{name}/surface"
-        files = {file for file in found.surfaces if file.startswith(folder)}
-        expected = {"pial.surf.gii", "left.pial.surf.gii", "thickness.shape.gii"}
-        assert {f"{folder}/{file}" for file in expected} <= files
 
 
 @pytest.mark.parametrize("surfaces", ["start", "atlas", "both"])
@@ -438,7 +429,7 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
     )
 
 
-# studies and calibration
+# sweeps and calibration
 
 
 # what is measured

@@ -57,7 +57,7 @@ def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
     assert f"runs.{name}: " in refusal(study(runs={name: {}}))
     vary = {"base": "reference", "compare_week": 22, "vary": {"step_s": [3600, 7200]}}
     later = labelled(21, 22)
-    assert f"studies.{name}: " in refusal(study(studies={name: vary}, brains=later))
+    assert f"sweeps.{name}: " in refusal(study(sweeps={name: vary}, brains=later))
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "a\n"])
@@ -195,7 +195,7 @@ STUDY = {
     },
     "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
     "metrics": {"norm_reference": ["a"]},
-    "studies": {
+    "sweeps": {
         "s": {"base": "thick", "compare_week": 22.5, "vary": {"step_s": [3600, 7200]}}
     },
 }

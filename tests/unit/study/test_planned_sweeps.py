@@ -1,4 +1,4 @@
-"""Studies and calibrations in a configuration: the runs that they make, and what is
+"""Sweeps and calibrations in a configuration: the runs that they make, and what is
 refused."""
 
 import re
@@ -69,7 +69,7 @@ def test_a_study_of_a_run_with_two_start_brains_has_its_members_from_both():
     runs = {"reference": {"preset": "fetalfoldsim", "start": ["a", "b"]}}
     study = {"base": "reference", "vary": vary, "compare_week": 26}
     brains = [*BRAINS, {"id": "c", "week": 26, **LABELLED}]
-    found = resolved(brains=brains, runs=runs, studies={"both": study})
+    found = resolved(brains=brains, runs=runs, sweeps={"both": study})
     starts = [(row.run, row.brain) for row in found.by_sweep["both"]]
     assert sorted(starts) == [
         ("both-1", "a"),
@@ -81,7 +81,7 @@ def test_a_study_of_a_run_with_two_start_brains_has_its_members_from_both():
 
 def test_a_study_makes_a_run_of_each_combination():
     vary = {"thickness_mm": [1, 2], "max_halvings": [2, 3]}
-    found = resolved(studies={"both": THICKNESS | {"vary": vary}})
+    found = resolved(sweeps={"both": THICKNESS | {"vary": vary}})
     runs = {}
     for row in found.by_sweep["both"]:
         runs[row.run] = found.simulations[row.run, row.brain].settings
@@ -96,7 +96,7 @@ def test_a_study_makes_a_run_of_each_combination():
 
 def test_equal_runs_are_solved_once():
     found = resolved(
-        studies={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS}
+        sweeps={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS}
     )
     # 1500 Pa is the reference, 3000 Pa stands in the other study too
     assert members(found, "stiffness") == [
@@ -151,14 +151,14 @@ def test_runs_are_equal_only_where_no_key_that_changes_shapes_differs():
 
 def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
     brains = [*BRAINS, {"id": "c", "week": 24.5, **LABELLED}]
-    studies = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
-    simulations = resolved(brains=brains, studies=studies).simulations
+    sweeps = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
+    simulations = resolved(brains=brains, sweeps=sweeps).simulations
     assert simulations["thickness-1.5", "a"].settings.end_week == 25
     assert simulations["thickness-1.5", "a"].weeks == (21, 22, 23, 24, 24.5, 25)
     assert simulations["thickness-0.8", "a"].weeks[-1] == 24.5
     # the reference itself has no surface of that week, so that it cannot stand in
     other = resolved(
-        brains=brains, studies={"stiffness": STIFFNESS | {"compare_week": 24.5}}
+        brains=brains, sweeps={"stiffness": STIFFNESS | {"compare_week": 24.5}}
     )
     assert members(other, "stiffness")[1] == "stiffness-1500"
 
@@ -184,7 +184,7 @@ def test_comparison_prefers_the_starts_population(tmp_path):
         (brains[:2], {}, "b"),
         (brains, {"compare_with": ["b"]}, "b"),
     ):
-        found = resolved(brains=known, studies={"thickness": THICKNESS | asked})
+        found = resolved(brains=known, sweeps={"thickness": THICKNESS | asked})
         assert found.by_sweep["thickness"][0].observed == (real,)
 
 
@@ -193,7 +193,7 @@ def test_the_run_of_a_single_value_may_differ_further():
         "fixed": {"shear_modulus_cortex_pa": 3000, "step_s": 86400},
         "fixed_at": {1.5: {"step_s": 43200}},
     }
-    found = resolved(studies={"s": study})
+    found = resolved(sweeps={"s": study})
     rows = []
     for row in found.by_sweep["s"]:
         settings = found.simulations[row.run, row.brain].settings
@@ -222,14 +222,14 @@ def test_the_run_of_a_single_value_may_differ_further():
     ],
 )
 def test_what_is_wrong_with_a_study_is_said(change, key, facts):
-    assert refusal(studies={"s": THICKNESS | change}) == Facts(
-        1, f"studies.s.{key}:", *facts
+    assert refusal(sweeps={"s": THICKNESS | change}) == Facts(
+        1, f"sweeps.s.{key}:", *facts
     )
 
 
 def test_values_that_agree_in_six_digits_are_runs_of_their_own():
     study = THICKNESS | {"vary": {"thickness_mm": [1.0, 1.0000001, 1.0000002]}}
-    found = resolved(studies={"s": study}).by_sweep["s"]
+    found = resolved(sweeps={"s": study}).by_sweep["s"]
     assert [(row.run, row.values["thickness_mm"]) for row in found] == [
         ("s-1", 1.0),
         ("s-1.0000001", 1.0000001),
@@ -241,13 +241,13 @@ def test_values_that_agree_in_six_digits_are_runs_of_their_own():
     ("changes", "key", "facts"),
     [
         (
-            {"studies": {"s": THICKNESS}, "runs": RUNS | {"S-0.8": {}}},
-            "studies.s",
+            {"sweeps": {"s": THICKNESS}, "runs": RUNS | {"S-0.8": {}}},
+            "sweeps.s",
             ["s-0.8", "S-0.8", "runs"],
         ),
         (
             {
-                "studies": {
+                "sweeps": {
                     "s": (
                         THICKNESS
                         | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}}
@@ -255,7 +255,7 @@ def test_values_that_agree_in_six_digits_are_runs_of_their_own():
                     "s-1": THICKNESS | {"vary": {"poisson_ratio": [0.3, 0.4]}},
                 }
             },
-            "studies.s-1",
+            "sweeps.s-1",
             ["s-1-0.3", "study s", "study s-1"],
         ),
         (
@@ -286,12 +286,12 @@ def test_folders_of_results_are_no_names_of_studies():
     assert folders > {"logs", "figures", "calibration", "registration"}
     # records of time and memory are named like logs
     for folder in folders | {"benchmarks"}:
-        assert refusal(studies={folder: THICKNESS}) == Facts(f"studies.{folder}:")
-        assert refusal(studies={folder.upper(): THICKNESS}) == Facts(
-            f"studies.{folder.upper()}:"
+        assert refusal(sweeps={folder: THICKNESS}) == Facts(f"sweeps.{folder}:")
+        assert refusal(sweeps={folder.upper(): THICKNESS}) == Facts(
+            f"sweeps.{folder.upper()}:"
         )
-    assert refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts(
-        "studies.s:", "s-0.8"
+    assert refusal(sweeps={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts(
+        "sweeps.s:", "s-0.8"
     )
 
 
@@ -346,8 +346,8 @@ def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
             "results/brains/{brain}/logs/rule.{origin}.log",
         ),
         (
-            "results/study/{study}/members/{run}.csv",
-            "results/study/{study}/logs/rule.{run}.log",
+            "results/study/{sweep}/members/{run}.csv",
+            "results/study/{sweep}/logs/rule.{run}.log",
         ),
         (
             "results/study/matched/{earlier}/{later}.h5",

@@ -47,10 +47,10 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
         "compare_week": 28,
     }
     brains = ellipsoids(27, [28, 36, 25], [29, 37, 26])
-    study = STUDY | brains | {"studies": {"rate": rates}}
+    study = STUDY | brains | {"sweeps": {"rate": rates}}
     name = workflow.write("study.yaml", study)
     outcome = workflow.run(
-        "studies", "--cores", "2", "--configfile", name, timeout_s=900
+        "sweeps", "--cores", "2", "--configfile", name, timeout_s=900
     )
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     folder = workflow.directory / "results" / "study"
@@ -67,10 +67,10 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
             "rate-1e-07"
         }
     # nothing is left to do, and only what a change concerns runs again
-    assert workflow.jobs("studies", "--configfile", name) == {}
-    study["studies"]["rate"] = rates | {"vary": {"growth_rate_per_s": [1e-7, 1.5e-7]}}
-    jobs = workflow.jobs("studies", "--configfile", workflow.write("other.yaml", study))
-    assert (jobs["simulate_member"], jobs["study_tables"]) == (1, 1)
+    assert workflow.jobs("sweeps", "--configfile", name) == {}
+    study["sweeps"]["rate"] = rates | {"vary": {"growth_rate_per_s": [1e-7, 1.5e-7]}}
+    jobs = workflow.jobs("sweeps", "--configfile", workflow.write("other.yaml", study))
+    assert (jobs["simulate_member"], jobs["sweep_tables"]) == (1, 1)
     assert "tetrahedralise" not in jobs
 
 

@@ -1,11 +1,11 @@
-# Sweeps (key `studies`): runs that differ from a base run in a few parameters, compared with observed brains at a week.
+# Sweeps: runs that differ from a base run in a few parameters, compared with observed brains at a week.
 #
-# results/study/STUDY/ has members (per run: values, resolution, outcome with its cause, time), comparison (distance of
+# results/study/SWEEP/ has members (per run: values, resolution, outcome with its cause, time), comparison (distance of
 # each run from each observed brain by each measure) and nearest (the nearest run by each measure). A run that diverged
 # before the week of comparison is only in `members`.
 def sweep_run(wildcards):
     """Return the run of a sweep from a start brain; runs that share a simulation are compared with the same brains."""
-    rows = SWEEPS[wildcards.study]
+    rows = SWEEPS[wildcards.sweep]
     return next(row for row in rows if (row.run, row.brain) == (wildcards.run, wildcards.brain))
 
 
@@ -26,7 +26,7 @@ def files_of_member(wildcards):
 
 def from_members(pattern):
     """Return an input function: a file of each run of a sweep."""
-    return lambda w: [pattern.format(study=w.study, run=row.run, brain=row.brain) for row in SWEEPS[w.study]]
+    return lambda w: [pattern.format(sweep=w.sweep, run=row.run, brain=row.brain) for row in SWEEPS[w.sweep]]
 
 
 rule compare_member:
@@ -45,7 +45,7 @@ rule compare_member:
         "../scripts/compare_member.py"
 
 
-rule study_tables:
+rule sweep_tables:
     input:
         comparisons=from_members(COMPARED_MEMBER),
         coefficients=from_members(MEMBER_COEFFICIENTS),
@@ -59,16 +59,16 @@ rule study_tables:
         nearest=f"{SWEEP}/nearest.csv",
     params:
         members=lambda w: [
-            {"run": row.run, "subject": row.brain, "values": row.values} for row in SWEEPS[w.study]
+            {"run": row.run, "subject": row.brain, "values": row.values} for row in SWEEPS[w.sweep]
         ],
-        week=lambda w: SWEEPS[w.study][0].week,
+        week=lambda w: SWEEPS[w.sweep][0].week,
     script:
-        "../scripts/study_tables.py"
+        "../scripts/sweep_tables.py"
 
 
-rule studies:
+rule sweeps:
     input:
-        expand(list(rules.study_tables.output), study=SWEEPS),
+        expand(list(rules.sweep_tables.output), sweep=SWEEPS),
 
 
 # figures and tables of the paper; observed brains are measured only at the weeks of comparison
@@ -78,4 +78,4 @@ rule paper:
         figure_files("zones_figure", "model_figure", "run_tables", "paper_displacement_figure"),
         figure_files("influence_figure", "influence_spectra", "paper_nearest_figure"),
         rules.growth_rates.output if study.growth_brains else [],
-        rules.studies.input,
+        rules.sweeps.input,

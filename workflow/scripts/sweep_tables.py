@@ -21,7 +21,7 @@ with step(snakemake.log[0]):
         params.members, files.params, files.zones, files.summaries, strict=True
     ):
         labels = {
-            "study": snakemake.wildcards.study,
+            "sweep": snakemake.wildcards.sweep,
             "run": member["run"],
             "subject": member["subject"],
         }

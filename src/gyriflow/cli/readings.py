@@ -1,0 +1,149 @@
+"""Read the files of many scans on all cores, and keep what was found in the user's
+cache folder: reading a scan takes a second, at each call."""
+
+import logging
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from logging.handlers import BufferingHandler
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from ..code_hash import code_hash
+from ..errors import GyriflowError
+from ..io.files import contents
+from ..io.kept_results import keep_result, kept_result, remove_old_results
+from ..io.origins import joined_contents, origin_key
+from ..running.machine import available_cores
+from ..settings.schemes import SCHEME_FILES
+from ..version import version
+
+KIND = "readings"
+"""The folder in the cache folder."""
+MIN_IN_POOL = 16
+"""From so many scans on they are read by several processes, each of which takes two
+seconds to start."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What reading the files of a scan has found, until an `error` refused them;
+    `warnings` are those of the log."""
+
+    values: list[Any] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class ScanFiles:
+    """The files of a scan, and plain settings or models with which they are read."""
+
+    files: Sequence[str]
+    settings: tuple[Any, ...] = ()
+
+
+def readings(
+    read: Callable[..., Iterable[Any]], scans: Sequence[ScanFiles]
+) -> list[Reading]:
+    """Return what a function finds in the files of each scan.
+
+    `read` is a function of a module. It takes the files of a scan and each of its
+    settings, yields plain values, and raises GyriflowError for files that it refuses.
+    What was found in the same files by the same code is not read again.
+    """
+    keys = _keys(read, scans)
+    results: list[Reading | None] = [_kept(key) for key in keys]
+    missing = [number for number, result in enumerate(results) if result is None]
+    work = partial(_reading, read)
+    new = _on_all_cores(work, [scans[number] for number in missing])
+    for number, result in zip(missing, new, strict=True):
+        results[number] = result
+        key = keys[number]
+        if key is not None:
+            keep_result(KIND, key, asdict(result))
+    if missing:
+        remove_old_results(KIND)
+    return [result for result in results if result is not None]
+
+
+def _keys(
+    read: Callable[..., Iterable[Any]], scans: Sequence[ScanFiles]
+) -> list[str | None]:
+    """Return the key of what is found in each scan: of the contents and names of its
+    files, its settings and the code; None if a file cannot be read."""
+    schemes = [str(path) for path in SCHEME_FILES.values()]
+    files = dict.fromkeys(schemes)
+    for scan in scans:
+        files |= dict.fromkeys(scan.files)
+    found = joined_contents(contents(files, {}))
+    module = Path(sys.modules[read.__module__].__file__ or "")
+    code = [read.__module__, read.__name__, version(), code_hash(module, module)]
+    keys = []
+    for scan in scans:
+        origin = {
+            "code": [*code, *schemes],
+            # messages have the names of files
+            "files": {path: path for path in scan.files},
+            "settings": [_plain(value) for value in scan.settings],
+        }
+        keys.append(origin_key(origin, found))
+    return keys
+
+
+def _plain(value: Any) -> Any:
+    return value.model_dump(mode="json") if isinstance(value, BaseModel) else value
+
+
+def _kept(key: str | None) -> Reading | None:
+    kept = {} if key is None else kept_result(KIND, key)
+    # another program may have changed the file
+    with suppress(TypeError):
+        return Reading(**kept) if kept else None
+    return None
+
+
+def _on_all_cores(
+    work: Callable[[ScanFiles], Reading], scans: Sequence[ScanFiles]
+) -> list[Reading]:
+    cores = available_cores() if len(scans) >= MIN_IN_POOL else 1
+    if cores < 2:
+        return [work(scan) for scan in scans]
+    # threads of libraries do not stand a fork
+    with ProcessPoolExecutor(cores, mp_context=get_context("spawn")) as pool:
+        return list(pool.map(work, scans))
+
+
+def _reading(read: Callable[..., Iterable[Any]], scan: ScanFiles) -> Reading:
+    """Return what a function finds in the files of a scan."""
+    values: list[Any] = []
+    error = ""
+    with collected_warnings() as logged:
+        try:
+            for value in read(scan.files, *scan.settings):
+                values.append(value)
+        except GyriflowError as problem:
+            error = str(problem)
+    return Reading(values, [record.getMessage() for record in logged], error)
+
+
+@contextmanager
+def collected_warnings() -> Iterator[list[logging.LogRecord]]:
+    """Collect the warnings that readers log, which would be printed each time that a
+    file is read."""
+    logger, collector = logging.getLogger("gyriflow"), BufferingHandler(sys.maxsize)
+    collector.setLevel(logging.WARNING)
+    propagate = logger.propagate
+    logger.addHandler(collector)
+    logger.propagate = False
+    try:
+        yield collector.buffer
+    finally:
+        logger.removeHandler(collector)
+        logger.propagate = propagate
