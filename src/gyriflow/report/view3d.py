@@ -108,7 +108,7 @@ def surfaces_view(
         groups.append(
             {
                 "name": observed_name,
-                "kind": "real",
+                "kind": "observed",
                 "colour": OBSERVED_SURFACE_COLOUR,
                 "frames": drawn,
             }

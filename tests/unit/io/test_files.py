@@ -159,7 +159,7 @@ def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
         "subject",
         "run",
         "region",
-        "real",
+        "observed",
         "start",
         "series",
         "page",

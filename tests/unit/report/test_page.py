@@ -104,7 +104,7 @@ QUALITY = pd.DataFrame(
 METRICS = pd.DataFrame(
     {
         "subject": "young",
-        "run": "real",
+        "run": "observed",
         "week": 21.0,
         "hemisphere": ["whole", "whole", "left"],
         "metric": ["volume", "area", "area"],
