@@ -25,7 +25,7 @@ from scipy import stats
 from gyriflow.geometry.triangles import Floats
 from gyriflow.metrics.lms import fit_norm
 from gyriflow.metrics.norms import cohort_norms, measured_scores, outlying_brains
-from gyriflow.settings.terms import MEASURED
+from gyriflow.settings.terms import OBSERVED
 
 FIRST, LAST = 21.0, 37.0
 SIZES = (10, 15, 20, 29, 30, 60, 100, 200, 500)
@@ -192,7 +192,7 @@ def as_table(
     """Return the table of a metric of scans, and their names."""
     names = [f"s{scan}" for scan in range(len(weeks))]
     metric, unit = ("area", "cm2") if case.is_positive else ("mean_shape_index", "1")
-    scans = {"subject": names, "run": MEASURED, "week": weeks, "hemisphere": "whole"}
+    scans = {"subject": names, "run": OBSERVED, "week": weeks, "hemisphere": "whole"}
     measured = {"metric": metric, "value": values, "unit": unit}
     return pd.DataFrame(scans | measured), names
 

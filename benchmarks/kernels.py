@@ -21,7 +21,7 @@ from common import ROOT, print_rows, run_workflow
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.metrics.repeatability import difference_noise
 from gyriflow.quantities import METRICS
-from gyriflow.settings.terms import MEASURED
+from gyriflow.settings.terms import OBSERVED
 from gyriflow.shipped import SHIPPED
 
 KEYS = ["subject", "run", "week", "hemisphere", "metric"]
@@ -55,7 +55,7 @@ def main() -> None:
     table = pd.DataFrame({"value": first, "difference": (second - first).abs()})
     table = table.reset_index()
     table["brains"] = table["run"].map(
-        lambda run: "measured" if run == MEASURED else "simulated"
+        lambda run: "measured" if run == OBSERVED else "simulated"
     )
     rows = []
     for (brains, metric), values in table.groupby(["brains", "metric"], sort=False):

@@ -73,7 +73,7 @@ def main() -> None:
         compared = list(pool.map(compare_pair, pairwise(measured)))
     table = pd.concat([found.table for _, found in measured], ignore_index=True)
     spectra = [
-        found.spectra.assign(subject=str(i), run="real", week=0.0)
+        found.spectra.assign(subject=str(i), run="observed", week=0.0)
         for i, (_, found) in enumerate(measured)
     ]
     spectral = (

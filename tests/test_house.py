@@ -63,7 +63,9 @@ ARROWS = {
             "version",
         }
     ),
-    "cli": PLAIN | {"running", "study", "anatomy", "io", "shipped", "version"},
+    "cli": (
+        PLAIN | {"code_hash", "running", "study", "anatomy", "io", "shipped", "version"}
+    ),
 }
 """The rooms, and what each may import besides itself. Siblings meet in plain geometry,
 settings and files."""

@@ -245,7 +245,7 @@ def name_in_interval(name: str, before: float, week: float) -> str:
 
 
 COMPARED_MAPS = ("shape_index", "mean_curvature")
-"""The maps by which a simulated brain is correlated with a real one."""
+"""The maps by which a simulated brain is correlated with an observed one."""
 
 _SIZES = (
     Metric(

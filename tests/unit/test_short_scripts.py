@@ -134,7 +134,7 @@ def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
         write_vertex_labels(tmp_path / f"{side}.label.gii", labels, names)
         inputs |= {side: f"{side}.gii", f"{side}_maps": f"{side}.shape.gii"}
         inputs[f"{side}_regions"] = f"{side}.label.gii"
-    labels = {"labels": {"subject": "a", "run": "real", "week": 22.5}}
+    labels = {"labels": {"subject": "a", "run": "observed", "week": 22.5}}
     run_script("region_metrics.py", tmp_path, inputs, {0: "regions.csv"}, labels)
     table = read_table(tmp_path / "regions.csv")
     assert list(table)[:4] == ["subject", "run", "week", "hemisphere"]
@@ -154,7 +154,7 @@ WEEKS = 25.0 + 0.1 * np.arange(12)
 BRAINS = [f"b{number}" for number in range(12)]
 
 
-def metrics_of(brain, week, area_cm2, run="real"):
+def metrics_of(brain, week, area_cm2, run="observed"):
     """Return the areas of the sides of a brain, the left one the larger by a tenth."""
     sides = {"whole": 1.0, "left": 11 / 21, "right": 10 / 21}
     table = pd.DataFrame({"hemisphere": list(sides), "metric": "area", "unit": "cm2"})
@@ -174,7 +174,7 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     bands = pd.DataFrame({"band": range(1, 7)})
     bands[PART_POWERS] = 1.0
     bands = bands.assign(wavelength_max_mm=256 / 2.0 ** bands["band"], is_open=False)
-    common = {"hemisphere": "left", "proxy": "mean_curvature", "run": "real"}
+    common = {"hemisphere": "left", "proxy": "mean_curvature", "run": "observed"}
     common |= {"complete": True, "resolved": True, "week": 25.0}
     spectra = [bands.assign(subject=brain, **common) for brain in ("b0", "b1")]
     # nearly all power, one octave further
@@ -227,24 +227,28 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     assert len(long) == 3 * 15
     assert long["region"].dropna().unique().tolist() == ["insula"]
     wide = tables["metrics_wide"].set_index(["subject", "run", "week"])
-    assert wide.loc[("b1", "real", 25.1), "sex"] == "F"
-    assert wide.loc[("b0", "real", 25.0), "left_insula_area_cm2"] == pytest.approx(11.0)
+    assert wide.loc[("b1", "observed", 25.1), "sex"] == "F"
+    assert wide.loc[("b0", "observed", 25.0), "left_insula_area_cm2"] == pytest.approx(
+        11.0
+    )
     change = tables["change"].query("hemisphere == 'whole'").set_index("run")
-    assert change.loc["real", "change"] == pytest.approx(areas[1] - areas[0])
+    assert change.loc["observed", "change"] == pytest.approx(areas[1] - areas[0])
     assert change.loc["run", "change"] == pytest.approx(11.0)
-    assert change.loc["real", "noise"] == pytest.approx(np.sqrt(2) * 0.01 * areas[0])
+    assert change.loc["observed", "noise"] == pytest.approx(
+        np.sqrt(2) * 0.01 * areas[0]
+    )
     difference = tables["asymmetry"].set_index(["subject", "run", "week", "region"])
-    assert difference.loc[("b0", "real", 25.0, "insula"), "difference"] == 1.0
+    assert difference.loc[("b0", "observed", 25.0, "insula"), "difference"] == 1.0
     assert len(difference) == 15
     scores = tables["centiles"].query("hemisphere == 'whole'").set_index("run")
     # eleven people: those of the other scan, and all for a run
-    assert set(scores.loc["real", "brains"]) == {10}
+    assert set(scores.loc["observed", "brains"]) == {10}
     assert set(scores.loc["run", "brains"]) == {11}
     assert scores.loc["run", "subject"].unique().tolist() == ["b0"]
     assert len(tables["norm_curves"]) > 0
     assert tables["atlas_curves"]["value"].tolist() == [200.0, 300.0]
     from_atlas = tables["atlas_differences"].set_index(["subject", "run"])
-    assert from_atlas.loc[("b0", "real"), "expected"] == pytest.approx(250.0)
+    assert from_atlas.loc[("b0", "observed"), "expected"] == pytest.approx(250.0)
     distances = tables["spectral_distance"].set_index("metric")
     found = distances.loc["spectral_distance_B4_to_B5"]
     assert found["noise"].unique().tolist() == [0.07]
@@ -313,7 +317,7 @@ def write_halves(folder):
 def white_made(folder, inputs, sides=SIDES, **params):
     """Run the script that makes white surfaces; return them by side and the table."""
     params = {"labels": None, "white": {}, "curvature_radius_mm": 5.0} | params
-    params["columns"] = {"subject": "a", "run": "real", "week": 22.5}
+    params["columns"] = {"subject": "a", "run": "observed", "week": 22.5}
     params["surface"] = {"edge_length_mm": 2.0}
     if params["labels"] is None:
         params["surface"]["max_hole_mm"] = 3.0
@@ -439,14 +443,14 @@ def test_an_export_has_the_tables_of_the_study_and_covariates_as_they_are(tmp_pa
     }
     report = str(tmp_path / "surface.json")
     brain = ExportedBrain(
-        "a", "real", 22.5, "a", **files, regions={}, report=report, covariates={}
+        "a", "observed", 22.5, "a", **files, regions={}, report=report, covariates={}
     )
     brains = [brain._replace(covariates={"field": "07"})]
     brains.append(brain._replace(brain="b", subject="b", covariates={"field": "1.50"}))
     long = pd.DataFrame(
         {
             "subject": ["a", "b"],
-            "run": "real",
+            "run": "observed",
             "week": 22.5,
             "hemisphere": "whole",
             "region": "",

@@ -30,7 +30,7 @@ KEYS = (
     "subject",
     "run",
     "week",
-    "real",
+    "observed",
     "hemisphere",
     "region",
     "metric",
@@ -44,7 +44,7 @@ def write_tables(folder, ids, run, regions):
     """Write metrics, spectra and regions of twelve observed brains of as many weeks,
     and of a run of the first."""
     random, rows, by_region, spectra = np.random.default_rng(1), [], [], []
-    places = [(name, "real", 22.0 + number) for number, name in enumerate(ids)] + [
+    places = [(name, "observed", 22.0 + number) for number, name in enumerate(ids)] + [
         (ids[0], run, 23.0)
     ]
     for name, what, week in places:
@@ -148,7 +148,14 @@ def test_a_cohort_with_names_like_numbers_has_the_tables_of_one_with_letters(
         expected = read_table(tmp_path / f"plain/out/{name}.csv")
         assert len(found) == len(expected) > 0, name
         regions = {"NA": "front", "7": "back"}
-        for column in ("subject", "run", "real", "from_brain", "to_brain", "region"):
+        for column in (
+            "subject",
+            "run",
+            "observed",
+            "from_brain",
+            "to_brain",
+            "region",
+        ):
             if column in found:
                 table = regions if column == "region" else names
                 found[column] = found[column].map(

@@ -129,7 +129,7 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
     assert area["asymmetry_index"].abs().max() < 0.1
 
     change = pd.read_csv(results / "study" / "change.csv").fillna({"region": ""})
-    assert set(change["run"]) == {"real", "reference"}
+    assert set(change["run"]) == {"observed", "reference"}
     grown = change[(change["metric"] == "area") & (change["region"] == "front")]
     assert len(grown) == 4
     assert (grown["change"] > 0).all()
@@ -153,7 +153,7 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
     assert set(white.index) == {
         (brain, part) for brain in ("p21", "p22") for part in ("whole", *SIDES)
     }
-    measured = whole[:, "real"].droplevel("week").reindex(white.index)
+    measured = whole[:, "observed"].droplevel("week").reindex(white.index)
     assert (white / measured).between(0.6, 0.95).all()
 
 

@@ -66,7 +66,7 @@ rule calibration_score:
         regions=from_bases(REGIONS["mesh"]),
         data=from_bases(REGIONS["data"]),
         summaries=from_bases(FOLDING["summary"]),
-        real=lambda w: [BRAINS[brain].pial for start in STARTS for brain in start.observed],
+        observed=lambda w: [BRAINS[brain].pial for start in STARTS for brain in start.observed],
         spectra=OBSERVED_SPECTRA,
         design=lambda w: ROUNDS[w.run].design,
     output:

@@ -5,7 +5,7 @@
 # caption are in `workflow/report/captions/`, the place in the report is in `SECTIONS`.
 from gyriflow.code_hash import code_hash
 from gyriflow.settings.terms import run_names
-from gyriflow.sweep.records import observed_name
+from gyriflow.study.records import observed_name
 
 # the figures and tables of the report by section, in its order
 SECTIONS = {

@@ -62,34 +62,34 @@ rule simulated_regions:
 
 
 # observed and simulated brains that are measured, by the place of their tables
-MEASURED = study.all_measured
+ALL_MEASURED = study.all_measured
 
 
 rule region_metrics:
     input:
-        unpack(lambda w: MEASURED[w.where].parts),
-        left_regions=lambda w: MEASURED[w.where].regions[0],
-        right_regions=lambda w: MEASURED[w.where].regions[1],
+        unpack(lambda w: ALL_MEASURED[w.where].parts),
+        left_regions=lambda w: ALL_MEASURED[w.where].regions[0],
+        right_regions=lambda w: ALL_MEASURED[w.where].regions[1],
         left_maps=f"{PLACE}/left.shape.gii",
         right_maps=f"{PLACE}/right.shape.gii",
     output:
         f"{PLACE}/regions.csv",
     wildcard_constraints:
-        where=one_of(place for place, row in MEASURED.items() if row.regions),
+        where=one_of(place for place, row in ALL_MEASURED.items() if row.regions),
     params:
-        labels=lambda w: MEASURED[w.where].columns,
+        labels=lambda w: ALL_MEASURED[w.where].columns,
     script:
         "../scripts/region_metrics.py"
 
 
 def on_template(wildcards):
     """Return the template, and the brain whose maps are moved to its vertices."""
-    return BRAINS[CONFIG.metrics.template], BRAINS[MEASURED[wildcards.where].id]
+    return BRAINS[CONFIG.metrics.template], BRAINS[ALL_MEASURED[wildcards.where].id]
 
 
 def mapped_surface(wildcards):
     """Return the hemisphere with a brain's maps; for a simulated brain that of its start, with the same vertices."""
-    row = MEASURED[wildcards.where]
+    row = ALL_MEASURED[wildcards.where]
     if row.run in CONFIG.runs:
         row = SIMULATED[row.run, row.id, BRAINS[row.id].week]
     return row.parts[wildcards.side]

@@ -38,7 +38,7 @@ rule compare_member:
         table=COMPARED_MEMBER,
         coefficients=MEMBER_COEFFICIENTS,
     params:
-        real=lambda w: {brain: BRAINS[brain].population_name for brain in sweep_run(w).observed},
+        observed=lambda w: {brain: BRAINS[brain].population_name for brain in sweep_run(w).observed},
         population=lambda w: BRAINS[w.brain].population_name,
         parts=lambda w: ["whole", *BRAINS[w.brain].sides],
     script:

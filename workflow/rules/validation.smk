@@ -95,16 +95,16 @@ def deviating(wildcards):
         "start": start,
         "first": SIMULATED[wildcards.run, start.id, start.week],
         "expected": SIMULATED[wildcards.run, start.id, week],
-        "real": observed_of(wildcards)[week],
+        "observed": observed_of(wildcards)[week],
     }
 
 
 def deviation_labels(wildcards):
     """Return the first columns of the deviation table."""
     week = float(wildcards.week)
-    real = observed_of(wildcards)[week]
+    observed = observed_of(wildcards)[week]
     names = {"run": wildcards.run, "start": wildcards.brain, "week": week}
-    return names | {"real": real.id, "subject": real.subject_name}
+    return names | {"observed": observed.id, "subject": observed.subject_name}
 
 
 rule deviation:
@@ -150,7 +150,7 @@ rule validation_tables:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
     params:
         individuals=study.are_individuals(
-            {real.id for simulation in study.atlas_predictions for real in study.observed(simulation).values()}
+            {brain.id for simulation in study.atlas_predictions for brain in study.observed(simulation).values()}
         ),
     script:
         "../scripts/validation_tables.py"

@@ -44,7 +44,7 @@ with step(snakemake.log[0]):
             yield from ((simulation, brain) for brain in islice(observed, count))
 
     brains = (
-        observed_brain(path, read_surface(path), radius_mm) for path in files.real
+        observed_brain(path, read_surface(path), radius_mm) for path in files.observed
     )
     pairs = pair_up((whole for whole, _, _ in simulated), brains)
     simulated_spectra = (

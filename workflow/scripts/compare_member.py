@@ -5,7 +5,7 @@ from itertools import batched
 
 import pandas as pd
 
-from gyriflow.compare.sweeps import COEFFICIENTS, comparison_table, joined_comparisons
+from gyriflow.compare.sweeps import COEFFICIENTS, joined_comparisons, member_comparison
 from gyriflow.io.files import read_tables, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.step import step
@@ -25,10 +25,10 @@ with step(snakemake.log[0]):
             read_tables, (files.metrics, files.spectra, files.coefficients)
         )
         observed = map(parts, batched(files.measured, len(params.parts)))
-        observed = dict(zip(params.real, observed, strict=True))
-        populations = {names.brain: params.population, **params.real}
+        observed = dict(zip(params.observed, observed, strict=True))
+        populations = {names.brain: params.population, **params.observed}
         simulated = parts(files.simulated)
-        table = comparison_table(
+        table = member_comparison(
             names.run, names.brain, populations, metrics, spectra, simulated, observed
         )
     write_table(snakemake.output.table, table)

@@ -21,7 +21,7 @@ from gyriflow.step import step
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     start, first, surface, observed = map(
-        read_surface, (files.start, files.first, files.expected, files.real)
+        read_surface, (files.start, files.first, files.expected, files.observed)
     )
     expected = align(surface, observed)
     fitted = TriangleMesh(fit_onto_surface(expected, observed), expected.faces)

@@ -144,7 +144,7 @@ def pose_of_pair(
         ]
         return poses[0]
     mirrored_left, own_right = shapes
-    fit = template.register(
+    fit = template.register_shape(
         mirrored_left.shape,
         [own_right.shape],
         own_right.rotation.T @ mirrored_left.rotation,
@@ -298,7 +298,7 @@ def axes_of_file(to_ras: Floats) -> str:
 def _pose_as_ras(shape: PosedShape, name: str) -> Pose:
     """Return the file's pose for a shape that fits several; InputError if it fits
     clearly worse near RAS+."""
-    fit = template.register(
+    fit = template.register_shape(
         shape.shape, template.template_shapes(shape.kind), np.eye(3)
     )
     fits_ras = (

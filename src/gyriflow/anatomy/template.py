@@ -116,7 +116,7 @@ def template_shapes(kind: str) -> tuple[PointCloud, ...]:
     )
 
 
-def register(
+def register_shape(
     shape: PointCloud,
     targets: Sequence[PointCloud],
     rotation: Floats,
@@ -143,7 +143,7 @@ def register_from_all_sides(
     fits = alignment.fits_from_all_sides(
         CUBE_ROTATIONS,
         lambda start: _descend(shape, middle, start, None, COARSE, 12, 8),
-        lambda fit: register(shape, targets, fit.rotation, fit.shift),
+        lambda fit: register_shape(shape, targets, fit.rotation, fit.shift),
         N_REFINED,
         DISTINCT_DEG,
     )

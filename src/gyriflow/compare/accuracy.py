@@ -251,7 +251,7 @@ def interval_table(
     Columns week, metric, unit, run (its value), members (number of values; one that did
     not reach a week has none), mean, sd (NaN for one), tests, tested_starts,
     largest_error, bias (fractions, of `error_in_tests`; NaN without tests), low, high,
-    observed (NaN without a brain) and contains_observed.
+    observed_value (NaN without a brain) and contains_observed.
     """
     keys, names = ["week", "metric"], metrics_shown(Shown.INTERVALS)
     own, varied, brains = (
@@ -295,14 +295,15 @@ def interval_table(
         .merge(pd.DataFrame(rows), "left", keys)
     )
     table = table.merge(
-        brains.groupby(keys)["value"].first().rename("observed").reset_index(),
+        brains.groupby(keys)["value"].first().rename("observed_value").reset_index(),
         "left",
         keys,
     )
-    inside = table["observed"].between(table["low"], table["high"]).astype("boolean")
+    values = table["observed_value"]
+    inside = values.between(table["low"], table["high"]).astype("boolean")
     return table.assign(
         members=table["members"].fillna(0).astype(int),
-        contains_observed=inside.mask(table["observed"].isna() | table["low"].isna()),
+        contains_observed=inside.mask(values.isna() | table["low"].isna()),
     )
 
 

@@ -19,7 +19,7 @@ from ..metrics.spangy import spectral_distances
 from ..settings.terms import (
     AMPLITUDE,
     FOLD_BANDS,
-    MEASURED,
+    OBSERVED,
     PROXIES,
     SPECTRAL_SCORES,
     STIFFNESS_RATIO,
@@ -245,7 +245,7 @@ def spectral_scores(
     Both have the columns hemisphere, proxy, band, power, relative_power, complete,
     resolved.
     """
-    tables = [simulated.assign(run=""), observed.assign(run=MEASURED)]
+    tables = [simulated.assign(run=""), observed.assign(run=OBSERVED)]
     both = pd.concat(tables, ignore_index=True).assign(subject="", week=0.0)
     distances = (
         spectral_distances(both)
@@ -257,7 +257,7 @@ def spectral_scores(
     shares = both[both["proxy"] == PROXIES[0]].pivot_table(
         "relative_power", ["hemisphere", "band"], "run"
     )
-    differences = (shares[""] - shares[MEASURED]).abs().groupby("band").mean()
+    differences = (shares[""] - shares[OBSERVED]).abs().groupby("band").mean()
     scores = {
         f"relative_power_b{band}": float(differences.get(band, np.nan))
         for band in FOLD_BANDS

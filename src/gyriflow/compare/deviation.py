@@ -19,7 +19,7 @@ from ..geometry.triangles import (
 from ..metrics.norms import cohort_norms, measured_scores
 from ..metrics.tables import region_metrics
 from ..metrics.thickness import at_part
-from ..settings.terms import MEASURED
+from ..settings.terms import OBSERVED
 
 SMOOTHING_MM = 3.0
 """Standard deviation of the Gaussian that smooths areas before they are compared."""
@@ -125,7 +125,7 @@ def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataF
         # scores are computed by hemisphere, so each region is passed as a hemisphere of
         # its own
         parts = table["hemisphere"] + " " + table["region"].fillna("")
-        rows = table.assign(run=MEASURED, hemisphere=parts)
+        rows = table.assign(run=OBSERVED, hemisphere=parts)
         subjects = list(table["subject"])
         scores = measured_scores(
             rows, subjects, cohort_norms(rows, subjects, individuals=individuals)

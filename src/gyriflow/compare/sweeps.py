@@ -11,7 +11,7 @@ from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
 from ..quantities import Shown, metrics_shown
 from ..settings.growth import GROWTH_MODELS
-from ..settings.terms import FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES, is_too_coarse
+from ..settings.terms import FOLD_BANDS, OBSERVED, SPECTRUM_PREFIXES, is_too_coarse
 from .comparison import aligned_distances
 
 WEYL_NUMBER = "weyl_number"
@@ -64,7 +64,7 @@ Parts = Mapping[str, TriangleMesh]
 """Surfaces of a brain in mm: the "whole" and its hemispheres."""
 
 
-def comparison_table(
+def member_comparison(
     run: str,
     subject: str,
     populations: Mapping[str, str],
@@ -77,7 +77,7 @@ def comparison_table(
 
     `run` and `subject` name the run and its start brain; `populations` are those of the
     start brain and of the observed brains, by id. Metrics and spectra have the rows of
-    the simulated brain and of the observed ones, whose `run` is "real". The observed
+    the simulated brain and of the observed ones, whose `run` is so named. The observed
     surfaces by id have the same parts as the simulated ones.
 
     Columns are `COMPARISON_COLUMNS`; flag is "ok" or the reason why the value is not
@@ -122,9 +122,11 @@ def comparison_table(
     sizes["distance"] = distance.where(~sizes["measure"].isin(WITHOUT_DISTANCE))
 
     spectral = spectral_distances(spectra)
-    spectral = spectral[(spectral["run"] != MEASURED) & spectral["real"].isin(observed)]
+    spectral = spectral[
+        (spectral["run"] != OBSERVED) & spectral["observed"].isin(observed)
+    ]
     spectral = spectral.rename(
-        columns={"real": "observed", "metric": "measure", "value": "distance"}
+        columns={"metric": "measure", "value": "distance"}
     ).assign(unit="1")
 
     surfaces = [
@@ -175,7 +177,7 @@ def joined_comparisons(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
 def _pairs(table: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     """Join the rows of the simulated brain with those of each observed one
     (`observed`), whose columns end so."""
-    is_observed = table["run"] == MEASURED
+    is_observed = table["run"] == OBSERVED
     pairs = table[~is_observed].merge(
         table[is_observed], on=keys, suffixes=("", "_observed")
     )
@@ -227,7 +229,7 @@ def with_common_cut(
     keys = rows[["run", "subject", "hemisphere"]].assign(
         band=rows["measure"].map(bands)
     )
-    observed_keys = keys.assign(run=MEASURED, subject=rows["observed"])
+    observed_keys = keys.assign(run=OBSERVED, subject=rows["observed"])
     values = (
         pd.concat(shares).loc[list(pairs.itertuples(index=False))].to_numpy()
         for pairs in (keys, observed_keys)

@@ -95,7 +95,7 @@ def carry(deformation: Deformation, points: Floats) -> Floats:
     return transform_points(moved, deformation.matrix)
 
 
-def determinants(deformation: Deformation) -> Floats:
+def volume_changes(deformation: Deformation) -> Floats:
     """Return the (i, j, k) local change of volume on the map's grid (central
     differences); ≤ 0 where it folds."""
     displacement = deformation.displacement.astype(np.float64)

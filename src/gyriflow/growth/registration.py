@@ -28,7 +28,12 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.alignment import angle_deg, motion
-from ..geometry.deformations import Deformation, carry, determinants, transform_points
+from ..geometry.deformations import (
+    Deformation,
+    carry,
+    transform_points,
+    volume_changes,
+)
 from ..geometry.poses import LPS_TO_RAS
 from ..geometry.triangles import Floats, Indices, Mask
 
@@ -409,7 +414,7 @@ def measure_quality(
     inside_mm = transform_points(inside, earlier.affine)
     on_grid = transform_points(inside_mm, np.linalg.inv(deformation.affine)).T
     growth = map_coordinates(
-        determinants(deformation), on_grid, order=1, mode="nearest"
+        volume_changes(deformation), on_grid, order=1, mode="nearest"
     )
     lengths = np.linalg.norm(deformation.displacement, axis=-1)
     lengths_inside = map_coordinates(lengths, on_grid, order=1, mode="nearest")

@@ -15,7 +15,7 @@ from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
 from ..names import bids_label, bids_subject, folder_name, require_bids_names
 from ..quantities import VERTEX_MAPS
-from ..settings.terms import MEASURED, STRUCTURES, Side
+from ..settings.terms import OBSERVED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
 from .made_files import making_files, require_own_data_set
 from .surfaces import (
@@ -69,7 +69,7 @@ OWN_COLUMNS = ("participant_id", "session_id", "gestational_age", "brain")
 """The columns of the tables of people that are not covariates."""
 COLUMNS = {
     "brain": PEOPLE["brain"],
-    "run": {"Description": f"Run of the simulation; {MEASURED}: the observed brain"},
+    "run": {"Description": f"Run of the simulation; {OBSERVED}: the observed brain"},
     "week": {"Description": "Gestational age", "Units": "weeks"},
 }
 COLUMNS_OF_NUMBERS = {
@@ -94,7 +94,7 @@ sessions."""
 class ExportedBrain(NamedTuple):
     """A brain at a week and its files by side; regions may be empty.
 
-    The run is "real" for observed brains; simulated ones have brain, subject and
+    The run is "observed" for observed brains; simulated ones have brain, subject and
     covariates of their start. `template_maps` are at another brain's vertices.
     Simulated brains of labels have a `volume`: the start's `labels`, whose grid is
     used, and `surface` and `thickness` of the whole brain.
@@ -133,7 +133,7 @@ def export_bids(
     one name.
     """
     folder = Path(folder)
-    observed = [brain for brain in brains if brain.run == MEASURED]
+    observed = [brain for brain in brains if brain.run == OBSERVED]
     require_bids_names(
         [brain.subject for brain in observed], [brain.run for brain in brains]
     )
@@ -203,7 +203,7 @@ def labels_file(
     """Return the file to which `export_bids` writes the labels of a simulated brain,
     given all brains."""
     names = _subjects_and_sessions(
-        [observed for observed in brains if observed.run == MEASURED]
+        [observed for observed in brains if observed.run == OBSERVED]
     )
     return LABELS_FILE.format(*_places(Path(folder), [brain], names)[0])
 
@@ -219,7 +219,7 @@ def _places(
         simulated = f"_desc-{bids_label(brain.run)}gw{brain.week:.2f}".replace(".", "")
         place = (
             folder / subject / (session or "") / "anat" / stem,
-            "" if brain.run == MEASURED else simulated,
+            "" if brain.run == OBSERVED else simulated,
         )
         places.append(place)
         on_disk = folder_name(stem), folder_name(place[1])

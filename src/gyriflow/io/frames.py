@@ -19,7 +19,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from ..geometry.triangles import TriangleMesh
 from ..units import week_tag
 from .files import AnyPath, new_hdf5, reading_hdf5, write_text
-from .tetmeshes import document, grid
+from .tetmeshes import document, xdmf_grid
 
 POSITIONS = "positions"
 CELL_FIELDS = "cell_fields"
@@ -84,7 +84,7 @@ def _time_series(data_name: str, file: h5py.File) -> str:
         cells = (tets, f"{data_name}:/tets")
         points = (frame[POSITIONS], f"{where}/{POSITIONS}")
         grids.append(
-            grid(
+            xdmf_grid(
                 name,
                 cells,
                 points,

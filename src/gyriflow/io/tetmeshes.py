@@ -28,7 +28,7 @@ Stored = tuple[NDArray, str]
 """Values, and where they are stored ("file.h5:/name")."""
 
 
-def grid(
+def xdmf_grid(
     name: str,
     cells: Stored,
     points: Stored,
@@ -89,7 +89,7 @@ def write_tetrahedral_mesh(
             file[f"Cell/{name}"] = values
     cells = (mesh.tets, f"{data.name}:/tets")
     points = (mesh.vertices, f"{data.name}:/vertices")
-    write_text(path, document(grid("mesh", cells, points, {}, fields)))
+    write_text(path, document(xdmf_grid("mesh", cells, points, {}, fields)))
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
@@ -157,7 +157,7 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
             for field, values in fields.items()
         }
         points = regions.mesh.vertices, f"{data.name}:/vertices"
-        return grid(
+        return xdmf_grid(
             name, (cells[kind], f"{data.name}:/{kind}"), points, vertex_data, cell_data
         )
 

@@ -13,7 +13,7 @@ from scipy import stats
 from ..geometry.triangles import Floats
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
-from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side, min_norm_subjects
+from ..settings.terms import OBSERVED, SIDES, SPREAD_UNKNOWN, Side, min_norm_subjects
 from .lms import WeeklyNorm, fit_norm, norm_from_plain
 from .tables import BRAIN
 
@@ -168,12 +168,12 @@ def volume_tables(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return the volumes of all labels of brains, and their `published_scores`.
 
-    Columns subject, run ("real"), week, label, tissue, volume_mL.
+    Columns subject, run ("observed"), week, label, tissue, volume_mL.
     """
     rows = [
         (
             brain.subject,
-            MEASURED,
+            OBSERVED,
             brain.week,
             label,
             brain.scheme.labels.get(label, ""),
@@ -326,7 +326,7 @@ def measured_scores(
     sides = metrics.groupby(BRAIN)["hemisphere"].transform(
         lambda names: " ".join(sorted(set(names)))
     )
-    is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
+    is_reference = (metrics["run"] == OBSERVED) & metrics["subject"].isin(reference)
     expected = (
         sides[is_reference]
         if len(reference)
@@ -340,7 +340,7 @@ def measured_scores(
         if brains is None and key not in cohort.norms:
             continue
         is_own = (
-            row["run"] == MEASURED
+            row["run"] == OBSERVED
             and brains is not None
             and (brains["person"] == row["person"]).any()
         )
@@ -435,7 +435,7 @@ def _by_metric(
     metrics: pd.DataFrame, reference: Sequence[str]
 ) -> list[tuple[Any, pd.DataFrame]]:
     rows = _with_norm(
-        metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)]
+        metrics[(metrics["run"] == OBSERVED) & metrics["subject"].isin(reference)]
     )
     return list(rows.groupby(["hemisphere", "metric"], sort=False))
 

@@ -18,8 +18,8 @@ from ..geometry.remeshing import decimate
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, vertex_areas
 from ..settings.terms import (
     FOLD_BANDS,
-    MEASURED,
     MIN_KEPT_CURVATURE,
+    OBSERVED,
     PROXIES,
     LastBand,
     MassMatrix,
@@ -290,11 +290,11 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     There is one up to B4, up to B5 and up to B6, each between all pairs whose bands are
     complete and resolved in both.
 
-    Spectra have the columns subject, run ("real" for measured brains), week,
+    Spectra have the columns subject, run ("observed" for observed brains), week,
     hemisphere, proxy, and those of `Spectrum.bands`; those of mean curvature are
     compared. A measured brain is not compared with itself.
 
-    Columns subject, run, week, hemisphere, real (the measured brain), real_week, proxy,
+    Columns subject, run, week, hemisphere, observed (the brain), observed_week, proxy,
     metric (spectral_distance_B4, spectral_distance_B4_to_B5,
     spectral_distance_B4_to_B6), value, unit, flag ("ok", `OPEN_AND_CLOSED`, or the
     reason for a missing value: "B5 B6 not resolved" or "B6 cut off", not complete, in
@@ -317,15 +317,15 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
         (*key, other[0], other[2], PROXIES[0], *row)
         for key, profile in profiles.items()
         for other, observed in profiles.items()
-        if other[1] == MEASURED and other[3] == key[3] and key != other
+        if other[1] == OBSERVED and other[3] == key[3] and key != other
         for row in _distances(profile, observed)
     ]
     return pd.DataFrame(
         found,
         columns=[
             *HEMISPHERE,
-            "real",
-            "real_week",
+            "observed",
+            "observed_week",
             "proxy",
             "metric",
             "value",

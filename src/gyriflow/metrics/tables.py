@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, vertex_areas
 from ..names import column_part
 from ..quantities import METRICS, VERTEX_MAPS
-from ..settings.terms import MEASURED, NO_REGION, SIDES
+from ..settings.terms import NO_REGION, OBSERVED, SIDES
 from ..units import CM2_PER_MM2
 
 BRAIN = ["subject", "run", "week"]
@@ -157,7 +157,7 @@ def change_between_scans(
     unit, and region where they are of regions; scans are the brains of each subject, by
     week.
 
-    Columns subject, run ("real", or a run that began at the earlier scan), from_brain,
+    Columns subject, run (observed, or one that began at the earlier scan), from_brain,
     to_brain, from_week, to_week, hemisphere, region ("" for whole hemispheres), metric,
     unit, from_value, to_value, change, change_per_week, relative_change
     (change/abs(from_value)), measured_change (between the scans), difference (to_value
@@ -188,12 +188,12 @@ def change_between_scans(
     parts = [pd.DataFrame(columns=columns)]
     for subject, brains in scans.items():
         for first, second in pairwise(brains):
-            later = table[(table["subject"] == second) & (table["run"] == MEASURED)]
+            later = table[(table["subject"] == second) & (table["run"] == OBSERVED)]
             began = table[table["subject"] == first]
-            from_week = float(began.loc[began["run"] == MEASURED, "week"].iloc[0])
+            from_week = float(began.loc[began["run"] == OBSERVED, "week"].iloc[0])
             to_week = float(later["week"].iloc[0])
             starts = began[began["week"] == from_week]
-            ends = began[(began["run"] != MEASURED) & (began["week"] == to_week)]
+            ends = began[(began["run"] != OBSERVED) & (began["week"] == to_week)]
             part, start = (
                 rows[["run", *what, "value"]].rename(columns={"value": name})
                 for name, rows in (
@@ -205,17 +205,19 @@ def change_between_scans(
                 subset=["from_value", "to_value"]
             )
             keys = pd.MultiIndex.from_frame(part[what])
-            real = [
+            observed = [
                 rows.set_index(what)["value"]
-                for rows in (later, starts[starts["run"] == MEASURED])
+                for rows in (later, starts[starts["run"] == OBSERVED])
             ]
             part["change"] = part["to_value"] - part["from_value"]
             part["change_per_week"] = part["change"] / (to_week - from_week)
             part["relative_change"] = part["change"] / part["from_value"].abs().replace(
                 0.0, np.nan
             )
-            part["measured_change"] = (real[0] - real[1]).reindex(keys).to_numpy()
-            part["difference"] = part["to_value"] - real[0].reindex(keys).to_numpy()
+            part["measured_change"] = (
+                (observed[0] - observed[1]).reindex(keys).to_numpy()
+            )
+            part["difference"] = part["to_value"] - observed[0].reindex(keys).to_numpy()
             part = part.assign(subject=subject, from_brain=first, to_brain=second)
             parts.append(part.assign(from_week=from_week, to_week=to_week)[columns])
     return pd.concat(parts[1:] or parts, ignore_index=True)

@@ -20,7 +20,7 @@ from ..settings.growth import GROWTH_MODELS
 from ..settings.terms import (
     ELEMENTS_NEEDED,
     LARGE_ELEMENT_ERROR,
-    MEASURED,
+    OBSERVED,
     SPREAD_UNKNOWN,
     element_error,
     is_too_coarse,
@@ -203,7 +203,7 @@ def study_page(
             "accuracy_table": html_table(accuracy),
         }
         prediction["individuals"] = norm if has_centiles else ""
-    centiles = centiles[centiles["run"] == MEASURED]
+    centiles = centiles[centiles["run"] == OBSERVED]
     own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
     flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
     # an atlas has too few brains for centiles among themselves
@@ -353,7 +353,7 @@ def brain_rows(
     judged = quality.set_index("subject").fillna("")
     measured, rated = (
         table[
-            (table["run"] == MEASURED)
+            (table["run"] == OBSERVED)
             & (table["hemisphere"] == "whole")
             & table["value"].notna()
         ]

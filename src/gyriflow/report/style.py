@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..quantities import DISTINCT_COLOURS
-from ..settings.terms import MEASURED, run_names
+from ..settings.terms import OBSERVED, run_names
 
 SINGLE_COLUMN_IN = 3.5
 """Width of one column of a journal page, in inches."""
@@ -132,7 +132,7 @@ def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
     pairs = list(zip(table["run"], table["subject"], strict=True))
     simulated = []
     for run, subject in dict.fromkeys(pairs):
-        if run != MEASURED:
+        if run != OBSERVED:
             simulated.append((run, subject))
     names = dict(zip(simulated, run_names(simulated), strict=True))
     named = []
@@ -150,8 +150,8 @@ def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, A
     """
     present = list(present)
     names = list(dict.fromkeys([*runs, *present]))
-    if MEASURED in names:
-        names.remove(MEASURED)
+    if OBSERVED in names:
+        names.remove(OBSERVED)
     colours: dict[str, Any] = {}
     for i, name in enumerate(names):
         if name not in present:

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.terms import (
-    MEASURED,
+    OBSERVED,
     OBSERVED_BRAIN,
     SIDES,
     element_error,
@@ -105,7 +105,7 @@ def metrics_table(
 
     The week is the last that runs and observed brains share, or the last of all.
     Quantiles and metrics of the measurement itself are left out. `metrics` has the
-    columns subject, run, week, hemisphere, metric, value, unit; `run` is "real" for
+    columns subject, run, week, hemisphere, metric, value, unit; `run` is "observed" for
     observed brains, several of which in a week give their mean. `observed_name` is the
     heading of their column.
 
@@ -113,7 +113,7 @@ def metrics_table(
     difference "–".
     """
     rows = runs_by_name(_reported(metrics[metrics["hemisphere"] == "whole"]))
-    observed = rows["run"] == MEASURED
+    observed = rows["run"] == OBSERVED
     week = max(
         set(rows.loc[observed, "week"]) & set(rows.loc[~observed, "week"])
         or set(rows["week"])
@@ -125,7 +125,7 @@ def metrics_table(
     # of what may be zero, a difference in per cent is meaningless
     is_signed = wide.index.isin(rows.loc[_signed_metrics(rows), "name"])
     observed_values = (
-        wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
+        wide[OBSERVED] if OBSERVED in wide else pd.Series(np.nan, index=wide.index)
     )
     columns = {observed_name: observed_values}
     for run in run_colours(rows["run"]):
@@ -203,7 +203,7 @@ def brain_table(
 
 def _of_whole(table: pd.DataFrame, brain: str) -> pd.DataFrame:
     """Return the rows of an observed brain as a whole, with titles as `name`."""
-    is_own = (table["subject"] == brain) & (table["run"] == MEASURED)
+    is_own = (table["subject"] == brain) & (table["run"] == OBSERVED)
     return table[is_own & (table["hemisphere"] == "whole")].assign(name=_named)
 
 
@@ -388,7 +388,7 @@ def predicted_table(
     brains = {
         f"start, {week_label(prediction['start_week'])}": (
             "brain",
-            MEASURED,
+            OBSERVED,
             "start_week",
         ),
         f"predicted, {week_label(prediction['week'])}": (
@@ -398,7 +398,7 @@ def predicted_table(
         ),
         f"the atlas' own brain, {week_label(prediction['atlas_week'])}": (
             "atlas_brain",
-            MEASURED,
+            OBSERVED,
             "atlas_week",
         ),
     }

@@ -100,7 +100,7 @@ def surfaces_view(
             drawn.append(_frame(frame, vertices_kept, box, scales) | own_faces)
         group = {
             "name": observed_name,
-            "kind": "real",
+            "kind": "observed",
             "colour": OBSERVED_SURFACE_COLOUR,
             "frames": drawn,
         }

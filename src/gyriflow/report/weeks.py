@@ -23,7 +23,7 @@ from matplotlib.transforms import Transform
 
 from ..errors import InputError
 from ..quantities import METRICS, Shown, metrics_shown
-from ..settings.terms import FOLD_BANDS, MEASURED, OBSERVED_BRAIN, PROXIES, SIDES
+from ..settings.terms import FOLD_BANDS, OBSERVED, OBSERVED_BRAIN, PROXIES, SIDES
 from .labels import SIMPLER_PREDICTIONS, metric_title, plain, value_labels
 from .pictures import region_colours
 from .style import (
@@ -145,7 +145,7 @@ def _observed_marks(
 def _subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
     """Return the marker of each subject with observed brains; none if there are more
     subjects than markers."""
-    brains = rows.loc[rows["run"] == MEASURED, "subject"]
+    brains = rows.loc[rows["run"] == OBSERVED, "subject"]
     people = list(
         dict.fromkeys(subjects[brain] for brain in brains if brain in subjects)
     )
@@ -244,13 +244,13 @@ def metrics_figure(
     are the average brains of `atlases`, the table of `metrics.atlas_curves`.
 
     `metrics` has the columns subject, run, week, hemisphere, metric, value, unit; `run`
-    is "real" for observed brains. InputError if the table has none of the metrics.
+    is "observed" for observed brains. InputError if the table has none of the metrics.
     `subjects` are the subjects of brains, if known, `groups` their values of a
     covariate, both by brain.
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     rows, titles = _shown(whole, Shown.CHART)
-    colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == MEASURED]
+    colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == OBSERVED]
     markers = _subject_markers(whole, subjects)
     shades, entries = _group_shades(groups, colours)
     marks = _observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
@@ -274,7 +274,7 @@ def intervals_figure(ensemble: pd.DataFrame) -> Figure:
     """Draw the intervals of an ensemble over the weeks, a panel per metric, with its
     run and the observed brains.
 
-    `ensemble` has columns week, metric, run, low, high, observed.
+    `ensemble` has columns week, metric, run, low, high, observed_value.
     """
     rows, titles = _shown(ensemble, Shown.INTERVALS)
     layers = [
@@ -283,12 +283,13 @@ def intervals_figure(ensemble: pd.DataFrame) -> Figure:
         Layer(
             rows,
             {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""},
-            "observed",
+            "observed_value",
         ),
     ]
     figure, _ = weeks_chart(titles, layers, rows["week"], per_row=2)
     extra: list[Artist] = [Patch(color=NEUTRAL_COLOUR, label="interval")]
-    extra += [star(OBSERVED_BRAIN)] if ensemble["observed"].notna().any() else []
+    if ensemble["observed_value"].notna().any():
+        extra.append(star(OBSERVED_BRAIN))
     run_legend(figure, {"run": RUN_COLOURS[0]}, extra=extra)
     return figure
 
@@ -327,7 +328,7 @@ def norms_figure(
     colours = run_colours(whole["run"], runs)
     markers = _subject_markers(whole, subjects)
     shades, extra = _group_shades(groups, colours)
-    observed = rows[rows["run"] == MEASURED]
+    observed = rows[rows["run"] == OBSERVED]
     own, others = (
         observed[observed["subject"].isin(reference) == is_own]
         for is_own in (True, False)
@@ -396,7 +397,7 @@ def regions_chart(
     titles["asymmetry"] = "asymmetry of area, 2 (L − R)/(L + R)"
     layers = []
     for (region, run), part in rows.groupby(["region", "run"], sort=False):
-        if run == MEASURED:
+        if run == OBSERVED:
             layers += _observed_marks(part, colours[str(region)], markersize=6)
         elif run in lines:
             layers.append(
@@ -618,7 +619,7 @@ def _spectra_legend(
     untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
     label = "band cut off or not resolved"
     extra: list[Artist] = []
-    if untrusted - {MEASURED}:
+    if untrusted - {OBSERVED}:
         hatched = Patch(
             facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label
         )
@@ -626,10 +627,10 @@ def _spectra_legend(
             label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white"
         )
         extra.append(hatched if bars else hollow)
-    if MEASURED in untrusted:
+    if OBSERVED in untrusted:
         words = "the same, observed brain" if extra else label
         extra.append(star(words, markersize=8, markerfacecolor="white"))
-    name = name if (rows["run"] == MEASURED).any() else ""
+    name = name if (rows["run"] == OBSERVED).any() else ""
     run_legend(figure, colours, observed_name=name, bars=bars, extra=[*groups, *extra])
 
 
@@ -666,7 +667,7 @@ def spectra_figure(
     sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
     shades, entries = _group_shades(groups, colours)
     layers = _run_lines(rows, colours) + _observed_marks(
-        rows[rows["run"] == MEASURED], subjects=subjects, shades=shades
+        rows[rows["run"] == OBSERVED], subjects=subjects, shades=shades
     )
     cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}
     heads = [f"B{band}, {_FOLDS[band]} folds" for band in bands]
@@ -711,7 +712,7 @@ def influence_spectra(
     it. A band without any power is labelled as beyond the modes.
 
     `members` are tables as for `spectra_figure` of the runs that reached the week,
-    `observed` those of observed brains, whose run is "real". `values` are by run the
+    `observed` those of observed brains, whose run is so named. `values` are by run the
     varied parameters with their values, in the order of the sweep.
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
@@ -743,7 +744,7 @@ def influence_spectra(
             for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
                 if not trusted:
                     bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
-        for _, row in side[side["run"] == MEASURED].iterrows():
+        for _, row in side[side["run"] == OBSERVED].iterrows():
             centre, power = FOLD_BANDS.index(row["band"]), row["relative_power"]
             axes.hlines(
                 power,

@@ -2,7 +2,7 @@
 results so far."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import chdir, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +10,13 @@ from tabulate import tabulate
 
 from ..errors import InputError, StorageError
 from ..io.files import read_json
-from ..io.yaml_files import read_keys
-from ..messages import read_rows
-from ..settings.base import folder_of
+from ..messages import read_rows as read_lines
 from ..shipped import CONFIG
-from ..study import resolve
-from ..study.loading import load
+from ..study.paths import PLAN
+from ..study.records import Simulation
+from ..study.tables import read_rows
 from ..units import week_tag
 from .launch import hold_lock
-from .provenance import STUDY_RECORD
 
 STATE = Path(".snakemake", "gyriflow-run.json")
 """State of the live or last run, in the working directory."""
@@ -42,7 +40,7 @@ def status(directory: Path) -> Iterator[str]:
     results, state = directory / "results", None
     with suppress(InputError):
         state = read_json(directory / STATE)
-    configured = _configured(directory)
+    planned = _planned(directory)
     if not results.is_dir() and state is None and not (directory / CONFIG).is_file():
         raise InputError(
             "contains no study",
@@ -73,7 +71,7 @@ def status(directory: Path) -> Iterator[str]:
     }
     runs = [
         _row(run, results / "runs" / run / brain)
-        for run, brain in [*configured, *sorted(started - set(configured))]
+        for run, brain in [*planned, *sorted(started - set(planned))]
     ]
     for rows in (brains, runs):
         if rows:
@@ -113,15 +111,12 @@ def find_report(directory: Path) -> Path:
     )
 
 
-def _configured(directory: Path) -> list[tuple[str, str]]:
-    # problems of the configuration are reported when it is run; its paths may be
-    # relative to the working directory
-    with suppress(InputError), chdir(directory if directory.is_dir() else Path()):
-        path = Path(CONFIG).absolute()
-        if STUDY_RECORD.is_file():
-            path = Path(read_json(STUDY_RECORD)["configuration"][-1])
-        if path.is_file():
-            return resolve(load(read_keys(path), folder_of(path))).pairs
+def _planned(directory: Path) -> list[tuple[str, str]]:
+    """Return run and start brain of each planned simulation of `runs`."""
+    # there is no plan before the first run, or one of another version
+    with suppress(InputError, ValueError, KeyError):
+        simulations = read_rows(directory / PLAN / "simulations.csv", Simulation)
+        return [row.key for row in simulations if not row.may_diverge]
     return []
 
 
@@ -174,7 +169,7 @@ def _simulation_progress(folder: Path) -> str:
         return f"done, GW {week_tag(summary['weeks'][-1])}"
     steps = [
         row
-        for row in read_rows(folder / "logs" / "simulate.log")
+        for row in read_lines(folder / "logs" / "simulate.log")
         if row.get("event") == "step"
     ]
     return format_progress(steps[-1]) if steps else MISSING

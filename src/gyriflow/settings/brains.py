@@ -83,7 +83,7 @@ class BrainConfig(Settings):
     week: Week
     """Gestational age, such as `24.3` or `24+2`; rounded to two decimals. [GW]"""
     population: str | None = Field(None, min_length=1)
-    """Population in figures and tables, such as `spina bifida aperta`; `null`: real
+    """Population in figures and tables, such as `spina bifida aperta`; `null`: observed
     brain."""
     subject: str | None = Field(None, min_length=1)
     """Subject, if several brains are scans of one. Changes between scans are tabulated,

@@ -57,7 +57,7 @@ class Config(Settings):
     """Sweeps by name: runs that differ in a few parameters, compared with observed
     brains."""
     calibrate: CalibrationSettings | None = None
-    """A search for the parameters that meet a real brain best."""
+    """A search for the parameters that meet an observed brain best."""
     metrics: MetricsSettings = MetricsSettings()
     """Metrics."""
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)

@@ -96,7 +96,7 @@ LARGE_ELEMENT_ERROR = 10.0
 MAX_NAME_LENGTH = 100
 """Longest name of a brain, run or study; file names are limited to 255 bytes."""
 
-MEASURED = "real"
+OBSERVED = "observed"
 """The run of observed brains in tables."""
 OBSERVED_BRAIN = "observed brain"
 """Name of an observed brain of unknown population in figures."""

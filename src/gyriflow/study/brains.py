@@ -10,7 +10,7 @@ from ..io.yaml_files import SCHEMES
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.schemes import FILLED, LabelScheme
-from ..settings.terms import MAX_COLOURS, MEASURED, SIDES
+from ..settings.terms import MAX_COLOURS, OBSERVED, SIDES
 from . import paths
 from .atlases import UsedAtlas, atlas_by_brain, known_checksums
 from .records import Brain, measured_files
@@ -66,7 +66,7 @@ def _brain(
     known = {path: checksums[path] for path in settings.files if path in checksums}
     return Brain(
         id=settings.id,
-        run=MEASURED,
+        run=OBSERVED,
         week=settings.week,
         subject=settings.subject,
         population=settings.population,

@@ -31,7 +31,7 @@ from ..settings.runs import (
     starts_of,
     variants,
 )
-from ..settings.terms import AMPLITUDE, MEASURED, STIFFNESS_RATIO
+from ..settings.terms import AMPLITUDE, OBSERVED, STIFFNESS_RATIO
 from ..settings.varying import Varying
 from ..version import RELEASE
 from .atlases import used_atlases
@@ -112,8 +112,8 @@ def _names(config: Config) -> Problems:
             ("sweeps", second),
         )
     taken: list[Key] = []
-    if MEASURED in config.runs:
-        taken.append(("runs", MEASURED))
+    if OBSERVED in config.runs:
+        taken.append(("runs", OBSERVED))
     for name in sorted(config.schemes):
         if name in SCHEMES:
             taken.append(("schemes", name))
@@ -240,8 +240,8 @@ def _named_runs(config: Config) -> Iterator[tuple[str, str, Key]]:
             yield name, f"the ensemble of {run}", ("runs", run)
     for name in config.runs:
         yield name, "the section runs", ("runs", name)
-    for sweep, settings in config.sweeps.items():
-        for name, values in variants(sweep, settings):
+    for sweep, varied in config.sweeps.items():
+        for name, values in variants(sweep, varied):
             yield name, f"the sweep {sweep} ({values})", ("sweeps", sweep)
 
 

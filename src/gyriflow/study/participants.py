@@ -60,7 +60,7 @@ SHARED_FOLDERS = ("rawdata", "sourcedata", "derivatives", "phenotype")
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """A row of the table in a file, about the files in the folder `scope`.
 
     It has its place for messages, subject and session without `sub-` and `ses-`, the
@@ -91,7 +91,7 @@ class Table:
     path: Path
     scope: Path
     subject: str | None
-    rows: Sequence[Row] = ()
+    rows: Sequence[TableRow] = ()
     columns: Sequence[str] = ()
     ages: Sequence[AgeColumn] = ()
     problem: str = ""
@@ -147,7 +147,7 @@ def _read_table(path: Path) -> Table:
         place = f"{path.name} row {number}"
         cells = [TableAge(place, column, values[column.name]) for column in ages]
         other_values = {key: text for key, text in values.items() if key in further}
-        row = Row(path, empty.scope, place, name, own_session, other_values, cells)
+        row = TableRow(path, empty.scope, place, name, own_session, other_values, cells)
         rows.append(row)
     return replace(empty, rows=rows, columns=columns, ages=ages)
 
@@ -224,7 +224,7 @@ class ScanTables:
                 self.tables.append(_read_table(path))
             except InputError as error:
                 self.tables.append(replace(_empty_table(path), problem=str(error)))
-        self.rows: dict[str, list[Row]] = {}
+        self.rows: dict[str, list[TableRow]] = {}
         self.cells: list[TableAge] = []
         for table in self.tables:
             for row in table.rows:
@@ -492,9 +492,9 @@ def _session_tables(table: Table) -> Iterator[Path]:
             yield folder / file
 
 
-def _difference(rows: Iterable[Row]) -> str:
+def _difference(rows: Iterable[TableRow]) -> str:
     """Return how several rows of one scan in a table differ, or ""."""
-    first_rows: dict[Path, Row] = {}
+    first_rows: dict[Path, TableRow] = {}
     for row in rows:
         first = first_rows.setdefault(row.path, row)
         for column, text in row.values.items():

@@ -23,7 +23,7 @@ class MeasuredBrain:
     """A brain that is measured, observed or simulated; rows of `simulated.csv` are
     simulated brains at a week.
 
-    `id` is the brain's, of a simulated one that of the start; `run` is "real" for
+    `id` is the brain's, of a simulated one that of the start; `run` is "observed" for
     observed brains. `pial` is the surface of the whole brain, `hemispheres` those of
     its `sides`; `maps` and `regions` lie at their vertices. `folder` has its tables.
     """

@@ -17,7 +17,7 @@ import yaml
 from ..io.exports import ExportedBrain, labels_file
 from ..io.yaml_files import read_keys
 from ..settings.root import Config
-from ..settings.terms import MEASURED, SIDES, min_norm_subjects
+from ..settings.terms import OBSERVED, SIDES, min_norm_subjects
 from . import paths
 from .atlases import UsedAtlas, atlas_by_brain, used_atlases
 from .brains import closest, label_source, registered_source
@@ -379,7 +379,7 @@ class Study:
         ]
 
     def _exported(self, row: MeasuredBrain, brain: Brain) -> ExportedBrain:
-        is_observed = row.run == MEASURED
+        is_observed = row.run == OBSERVED
         volume: dict[str, Any] = {}
         if brain.labels and not is_observed:
             volume = {

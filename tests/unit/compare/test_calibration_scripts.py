@@ -65,7 +65,7 @@ def score(folder, run, causes):
     factors = [factor for brains in OBSERVED for factor in brains]
     inputs |= {
         "regions": ["regions.xdmf"] * len(SIMULATED),
-        "real": [f"{factor}.gii" for factor in factors],
+        "observed": [f"{factor}.gii" for factor in factors],
         "spectra": [f"{factor}.csv" for factor in factors],
         "design": "design.csv",
     }

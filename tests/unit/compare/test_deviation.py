@@ -165,7 +165,7 @@ def test_the_script_takes_each_surface_with_its_own_thickness(tmp_path):
         "start": (sphere(19.5, 3), 2.0),
         "first": (BALL, 1.0),
         "expected": (sphere(22.0), 1.5),
-        "real": (transformed(sphere(23.0), FAR[0]), 2.7),
+        "observed": (transformed(sphere(23.0), FAR[0]), 2.7),
     }
     inputs = {"thickness": [f"{name}.shape.gii" for name in brains], "regions": []}
     for name, (mesh, thickness_mm) in brains.items():

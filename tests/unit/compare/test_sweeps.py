@@ -13,8 +13,8 @@ from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
     NO_NEAREST,
     WITHIN_NOISE,
-    comparison_table,
     joined_comparisons,
+    member_comparison,
     member_row,
     nearest_runs,
     with_common_cut,
@@ -54,9 +54,9 @@ def with_parts(table):
 METRICS = pd.DataFrame(
     [
         ("sim", "a", "whole", "area", 90.0, "cm2"),
-        ("real", "b", "whole", "area", 100.0, "cm2"),
+        ("observed", "b", "whole", "area", 100.0, "cm2"),
         ("sim", "a", "left", "weyl_number", 600.0, "1"),
-        ("real", "b", "left", "weyl_number", 700.0, "1"),
+        ("observed", "b", "left", "weyl_number", 700.0, "1"),
     ],
     columns=["run", "subject", "hemisphere", "metric", "value", "unit"],
 )
@@ -68,11 +68,14 @@ def parts(radius):
 
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     both = pd.concat(
-        [spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))]
+        [
+            spectra("sim", "a", (0.5, 0.2, 0.1)),
+            spectra("observed", "b", (0.4, 0.3, 0.1)),
+        ]
     )
     both = with_parts(both.assign(power=both["relative_power"]))
     surfaces = [{"whole": sphere(radius, 3)} for radius in (10.0, 11.5)]
-    table = comparison_table(
+    table = member_comparison(
         "sim", "a", {"a": "", "b": ""}, METRICS, both, surfaces[0], {"b": surfaces[1]}
     )
     table = table.set_index(["hemisphere", "measure"])
@@ -102,12 +105,12 @@ def test_a_band_that_one_of_both_has_not_in_full_is_cut_off():
     both = pd.concat(
         [
             spectra("sim", "a", (0.5, 0.2, 0.1)),
-            spectra("real", "b", (0.4, 0.3, 0.1)).assign(complete=False),
+            spectra("observed", "b", (0.4, 0.3, 0.1)).assign(complete=False),
         ]
     )
     both = with_parts(both.assign(power=both["relative_power"]))
     surface = {"whole": sphere(10.0, 2)}
-    table = comparison_table(
+    table = member_comparison(
         "sim", "a", {"a": "", "b": ""}, METRICS, both, surface, {"b": surface}
     )
     (row,) = table[table["measure"] == "relative_power_B4"].to_dict("records")
@@ -124,7 +127,7 @@ def test_the_script_compares_each_part_with_that_of_each_observed_brain(tmp_path
             write_surface(tmp_path / f"{name}.{part}.gii", surface)
     tables = [
         spectra("sim", "a", (0.5, 0.2, 0.1)),
-        *(spectra("real", b, (0.4, 0.3, 0.1)) for b in "bc"),
+        *(spectra("observed", b, (0.4, 0.3, 0.1)) for b in "bc"),
     ]
     both = pd.concat(tables)
     write_table(
@@ -143,7 +146,7 @@ def test_the_script_compares_each_part_with_that_of_each_observed_brain(tmp_path
     inputs |= {"simulated": files["sim"], "measured": [*files["b"], *files["c"]]}
     params = {
         "parts": ["whole", "left"],
-        "real": {"b": "one", "c": "two"},
+        "observed": {"b": "one", "c": "two"},
         "population": "two",
     }
     outputs = {"table": "table.csv", "coefficients": "found.csv"}
@@ -171,8 +174,8 @@ def test_the_script_compares_each_part_with_that_of_each_observed_brain(tmp_path
 def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named():
     tables = [
         spectra("sim", "a", (0.5, 0.2, 0.1)),
-        spectra("real", "b", (0.4, 0.3, 0.1)),
-        spectra("real", "c", (0.1, 0.1, 0.1)),
+        spectra("observed", "b", (0.4, 0.3, 0.1)),
+        spectra("observed", "c", (0.1, 0.1, 0.1)),
     ]
     power = [table.assign(power=table["relative_power"] * 10) for table in tables]
     bands = [
@@ -180,13 +183,13 @@ def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named(
         for table in power
         for band in (1, 2, 3)
     ]
-    rows = [("real", "c", "whole", "area", 180.0, "cm2")]
+    rows = [("observed", "c", "whole", "area", 180.0, "cm2")]
     metrics = pd.concat([METRICS, pd.DataFrame(rows, columns=list(METRICS))])
     populations = {"a": "normal", "b": "normal", "c": "operated"}
     observed = {"b": parts(12.0), "c": parts(15.0)}
     both = pd.concat([*power, *bands], ignore_index=True)
     both = with_parts(both.drop_duplicates(["run", "subject", "proxy", "band"]))
-    table = comparison_table(
+    table = member_comparison(
         "sim", "a", populations, metrics, both, parts(10.0), observed
     )
     assert list(table) == COMPARISON_COLUMNS
@@ -351,7 +354,7 @@ def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared
     modes = [
         coefficients("thin", "a", 4, 4, 5, 5, 6, 6),
         coefficients("few", "a", 4, 5, 5),
-        coefficients("real", "b", 4, 5, 5, 5, 5, 6),
+        coefficients("observed", "b", 4, 5, 5, 5, 5, 6),
     ]
     table = with_common_cut(
         pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.concat(modes)
@@ -382,7 +385,7 @@ def test_the_script_joins_each_run_with_its_own_files_and_finds_the_nearest(tmp_
     compared |= {"observed_population": "", "same_population": True, "unit": "1"}
     share = {"measure": "shape_index_relative_power_B4", "distance": 0.0}
     number = {"measure": "weyl_number", "value": 3.0, "observed_value": 3.0}
-    observed = coefficients("real", "b", 4, 5)
+    observed = coefficients("observed", "b", 4, 5)
     for run, of_run in runs.items():
         settings = {"thickness_mm": of_run["thickness_mm"], "end_week": 28.0}
         write_yaml(tmp_path / f"{run}.yaml", settings | {"growth": {"model": "rates"}})

@@ -66,7 +66,7 @@ def brain(tmp_path):
     write_json(tmp_path / "surface.json", {"pose": Pose(POSE).plain()})
     return ExportedBrain(
         "case_1",
-        "real",
+        "observed",
         22.43,
         "case_1",
         **paths,
@@ -381,7 +381,12 @@ def test_a_data_set_of_another_program_is_left(tmp_path, brain):
 
 TABLES_OF_TWO = {
     "metrics_wide": pd.DataFrame(
-        {"subject": ["sub-01_ses-1"], "run": ["real"], "week": [21.0], "area": [3.5]}
+        {
+            "subject": ["sub-01_ses-1"],
+            "run": ["observed"],
+            "week": [21.0],
+            "area": [3.5],
+        }
     ),
 }
 

@@ -159,7 +159,7 @@ def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
         "subject",
         "run",
         "region",
-        "real",
+        "observed",
         "start",
         "series",
         "page",
@@ -331,3 +331,14 @@ def test_what_is_no_configuration_is_refused(tmp_path, text, facts):
         (tmp_path / "x.yaml").write_text(text)
     with pytest.raises(InputError, check=Facts(tmp_path / "x.yaml", *facts)):
         read_keys(tmp_path / "x.yaml")
+
+
+@pytest.mark.parametrize("opening", ["[", "a: [", "{a: ", "- "])
+def test_values_that_are_nested_deeply_are_refused(tmp_path, opening):
+    """libyaml would end the process."""
+    path = tmp_path / "study.yaml"
+    path.write_text("a: [[1, {b: [2]}]]")
+    assert read_yaml(path) == {"a": [[1, {"b": [2]}]]}
+    path.write_text(opening * 100_000)
+    with pytest.raises(InputError, check=Facts(path)):
+        read_yaml(path)

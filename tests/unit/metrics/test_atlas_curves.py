@@ -31,7 +31,7 @@ def rows(subject, week, **values):
     table = []
     for name, value in values.items():
         hemisphere, metric = name.split("_", 1)
-        table.append((subject, "real", week, hemisphere, metric, value, "cm2"))
+        table.append((subject, "observed", week, hemisphere, metric, value, "cm2"))
     names = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
     return pd.DataFrame(table, columns=names)
 

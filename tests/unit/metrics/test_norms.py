@@ -50,7 +50,7 @@ def table(
     """Return metrics of reference brains and of others (run, week, value), and the
     reference."""
     rows = [
-        (f"s{i}", "real", week, "whole", "area", value, "cm2")
+        (f"s{i}", "observed", week, "whole", "area", value, "cm2")
         for i, (week, value) in enumerate(zip(weeks, values, strict=True))
     ]
     rows += [
@@ -242,7 +242,7 @@ def test_a_run_is_compared_with_all_subjects_and_a_scan_with_the_others() -> Non
         .query("subject == 's5'")
         .set_index("run")
     )
-    assert found["brains"].to_dict() == {"real": 11, "expected": 12}
+    assert found["brains"].to_dict() == {"observed": 11, "expected": 12}
 
 
 def test_the_interval_of_a_median_is_that_of_a_mean() -> None:
@@ -645,10 +645,10 @@ def test_tables_of_volumes_have_the_labels_and_the_structures_of_each_brain():
     ]
     volumes, scores = volume_tables(brains, NORMS)
     assert volumes.to_numpy().tolist() == [
-        ["a", "real", 21.0, 2, "cortex", 8.0],
-        ["a", "real", 21.0, 9, "", 1.5],
-        ["b", "real", 29.0, 7, SCHEMES["dhcp-19"].labels[7], 2.0],
-        ["b", "real", 29.0, 3, SCHEMES["dhcp-19"].labels[3], 9.0],
+        ["a", "observed", 21.0, 2, "cortex", 8.0],
+        ["a", "observed", 21.0, 9, "", 1.5],
+        ["b", "observed", 29.0, 7, SCHEMES["dhcp-19"].labels[7], 2.0],
+        ["b", "observed", 29.0, 3, SCHEMES["dhcp-19"].labels[3], 9.0],
     ]
     assert scores[
         ["subject", "structure", "value", "week", "flag"]
@@ -662,20 +662,20 @@ def test_tables_of_volumes_have_the_labels_and_the_structures_of_each_brain():
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
 METRICS = pd.DataFrame(
     [
-        ("early", "real", 22.0, "whole", "area", 100.0, "cm2"),
-        ("late", "real", 24.0, "whole", "area", 150.0, "cm2"),
+        ("early", "observed", 22.0, "whole", "area", 100.0, "cm2"),
+        ("late", "observed", 24.0, "whole", "area", 150.0, "cm2"),
         ("early", "follows", 22.0, "whole", "area", 98.0, "cm2"),
         ("early", "follows", 23.0, "whole", "area", 120.0, "cm2"),
         ("early", "follows", 24.0, "whole", "area", 140.0, "cm2"),
-        ("other", "real", 24.0, "whole", "area", 160.0, "cm2"),
-        ("other", "real", 24.0, "left", "mean_curvedness", 0.1, "1/mm"),
+        ("other", "observed", 24.0, "whole", "area", 160.0, "cm2"),
+        ("other", "observed", 24.0, "left", "mean_curvedness", 0.1, "1/mm"),
     ],
     columns=COLUMNS,
 )
 REGIONS = pd.DataFrame(
     [
-        ("early", "real", 22.0, "left", "frontal", "area", 20.0, "cm2"),
-        ("late", "real", 24.0, "left", "frontal", "area", 26.0, "cm2"),
+        ("early", "observed", 22.0, "left", "frontal", "area", 20.0, "cm2"),
+        ("late", "observed", 24.0, "left", "frontal", "area", 26.0, "cm2"),
     ],
     columns=[*COLUMNS[:4], "region", *COLUMNS[4:]],
 )
@@ -686,7 +686,7 @@ def test_change_of_scans_and_of_the_simulation_from_the_first() -> None:
     table = change_between_scans(long_table([METRICS, REGIONS]), SCANS).set_index(
         ["run", "region"]
     )
-    scans = table.loc[("real", "")]
+    scans = table.loc[("observed", "")]
     assert (scans["from_value"], scans["to_value"], scans["change"]) == (
         100.0,
         150.0,
@@ -702,15 +702,15 @@ def test_change_of_scans_and_of_the_simulation_from_the_first() -> None:
         50.0,
         -10.0,
     )
-    assert table.loc[("real", "frontal"), "change"] == 6.0
+    assert table.loc[("observed", "frontal"), "change"] == 6.0
     assert ("follows", "frontal") not in table.index
     assert set(table["subject"]) == {"one"}
 
 
 def test_change_of_a_metric_below_zero_over_uneven_weeks() -> None:
     rows = [
-        ("early", "real", 21.5, "right", "mean_shape_index", -0.2, "1"),
-        ("late", "real", 24.0, "right", "mean_shape_index", 0.05, "1"),
+        ("early", "observed", 21.5, "right", "mean_shape_index", -0.2, "1"),
+        ("late", "observed", 24.0, "right", "mean_shape_index", 0.05, "1"),
         ("early", "run", 21.5, "right", "mean_shape_index", -0.4, "1"),
         ("early", "run", 24.0, "right", "mean_shape_index", -0.1, "1"),
     ]
@@ -724,7 +724,7 @@ def test_change_of_a_metric_below_zero_over_uneven_weeks() -> None:
         "measured_change",
         "difference",
     ]
-    assert found.loc["real", names].tolist() == pytest.approx(
+    assert found.loc["observed", names].tolist() == pytest.approx(
         [0.25, 0.1, 1.25, 0.25, 0.0]
     )
     assert found.loc["run", names].tolist() == pytest.approx(
@@ -743,7 +743,7 @@ def test_change_of_a_metric_below_zero_over_uneven_weeks() -> None:
 def test_wide_has_a_row_per_brain_and_week() -> None:
     table = wide_table(long_table([METRICS, REGIONS]), {})
     assert len(table) == 6
-    row = table.set_index(["subject", "run", "week"]).loc[("other", "real", 24.0)]
+    row = table.set_index(["subject", "run", "week"]).loc[("other", "observed", 24.0)]
     assert row["whole_area_cm2"] == 160.0
     assert row["left_mean_curvedness_1_per_mm"] == 0.1
     assert np.isnan(row["left_frontal_area_cm2"])
@@ -768,7 +768,7 @@ def test_regions_of_one_column_are_refused_with_both_names(first, second) -> Non
     rows = [
         {
             "subject": "a",
-            "run": "real",
+            "run": "observed",
             "week": 21.0,
             "hemisphere": "left",
             "region": region,

@@ -221,7 +221,7 @@ EVEN = {50.0: 1.0, 20.0: 1.0, 6.0: 2.0}
 
 
 @pytest.mark.parametrize(
-    ("own", "real", "flags"),
+    ("own", "other", "flags"),
     [
         ({}, {}, ["ok"] * 3),
         ({"cut_off": 5}, {"cut_off": 6}, ["ok", "B5 cut off", "B5 B6 cut off"]),
@@ -231,11 +231,11 @@ EVEN = {50.0: 1.0, 20.0: 1.0, 6.0: 2.0}
     ],
 )
 def test_distances_say_which_bands_they_miss_and_whether_a_hemisphere_is_open(
-    own, real, flags
+    own, other, flags
 ) -> None:
     rows = distances(
         written("a", "sim", EVEN, **own),
-        written("b", "real", {40.0: 1.0, 6.0: 1.0}, **real),
+        written("b", "observed", {40.0: 1.0, 6.0: 1.0}, **other),
     )
     assert rows["metric"].tolist() == [
         f"spectral_distance_{bands}" for bands in ("B4", "B4_to_B5", "B4_to_B6")
@@ -244,21 +244,22 @@ def test_distances_say_which_bands_they_miss_and_whether_a_hemisphere_is_open(
     assert rows["value"].isna().tolist() == [
         flag not in ("ok", OPEN_AND_CLOSED) for flag in flags
     ]
-    assert set(zip(rows["real"], rows["real_week"], rows["unit"], strict=True)) == {
-        ("b", 22.0, "octaves")
-    }
+    assert set(
+        zip(rows["observed"], rows["observed_week"], rows["unit"], strict=True)
+    ) == {("b", 22.0, "octaves")}
 
 
 def test_a_distance_is_how_many_octaves_power_has_to_be_moved() -> None:
     # a quarter of it by an octave and a half, and as a share: not the amount of power
     rows = distances(
         written("a", "sim", {40.0: 3.0, 30.0: 1.0}),
-        written("b", "real", {40.0: 6.0, 30.0 / 2**1.5: 2.0}),
+        written("b", "observed", {40.0: 6.0, 30.0 / 2**1.5: 2.0}),
     )
     np.testing.assert_allclose(rows["value"], 0.25 * 1.5, atol=0.02)
     # beyond the end of B4, 4 mm, only the longer distances see it
     rows = distances(
-        written("a", "sim", {40.0: 3.0, 3.0: 1.0}), written("b", "real", {40.0: 3.0})
+        written("a", "sim", {40.0: 3.0, 3.0: 1.0}),
+        written("b", "observed", {40.0: 3.0}),
     )
     np.testing.assert_allclose(
         rows["value"], [0.0, 0.25 * np.log2(40 / 3), 0.25 * np.log2(40 / 3)], atol=0.03
@@ -270,13 +271,13 @@ def test_a_distance_has_no_edges_between_bands() -> None:
     # elsewhere in their bands
     for longest in (60.0, 64.0, 70.0):
         own = written("a", "sim", {8.1: 1.0, 20.0: 1.0})
-        real = written("b", "real", {7.9: 1.0, 20.0: 1.0}, longest)
+        real = written("b", "observed", {7.9: 1.0, 20.0: 1.0}, longest)
         assert distances(own, real)["value"].iloc[0] < 0.1
 
 
 def test_who_is_compared_with_whom() -> None:
-    right = written("b", "real", EVEN).assign(hemisphere="right")
-    known = [written("a", "real", EVEN), written("b", "real", EVEN), right]
+    right = written("b", "observed", EVEN).assign(hemisphere="right")
+    known = [written("a", "observed", EVEN), written("b", "observed", EVEN), right]
     table = spectral_distances(pd.concat([written("a", "sim", EVEN), *known]))
     pairs = (
         table["subject"]
@@ -285,7 +286,7 @@ def test_who_is_compared_with_whom() -> None:
         + " "
         + table["hemisphere"]
         + ", "
-        + table["real"]
+        + table["observed"]
     )
     assert sorted(set(pairs)) == [
         "a real left, b",

@@ -44,8 +44,8 @@ REGIONS = pd.DataFrame(
             unit,
         )
         for subject, run, week, size in (
-            ("a", "real", 21.0, 10.0),
-            ("b", "real", 22.0, 12.0),
+            ("a", "observed", 21.0, 10.0),
+            ("b", "observed", 22.0, 12.0),
             ("a", "r", 22.0, 11.0),
         )
         for side in ("left", "right")
@@ -55,8 +55,8 @@ REGIONS = pd.DataFrame(
     columns=COLUMNS,
 )
 ASYMMETRY = pd.DataFrame(
-    [("a", "real", 21.0, "area", region, 0.1) for region in ("front", "back")]
-    + [("a", "real", 21.0, "area", "", 0.5)],
+    [("a", "observed", 21.0, "area", region, 0.1) for region in ("front", "back")]
+    + [("a", "observed", 21.0, "area", "", 0.5)],
     columns=["subject", "run", "week", "metric", "region", "asymmetry_index"],
 )
 WEEKS = np.arange(21.0, 31.0)
@@ -110,7 +110,9 @@ def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
 
 def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
     parts = [
-        metric_rows("real", "whole", "area", {week: value}, "cm2").assign(subject=brain)
+        metric_rows("observed", "whole", "area", {week: value}, "cm2").assign(
+            subject=brain
+        )
         for brain, week, value in (
             ("a2", 26.0, 140.0),
             ("a1", 22.0, 100.0),
@@ -161,7 +163,7 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
     metrics = pd.concat(
         [
             metric_rows("thin", "whole", "area", {22.0: 110.0, 21.0: 100.0}, "cm2"),
-            metric_rows("real", "whole", "area", {21.0: 99.0, 22.0: 120.0}, "cm2"),
+            metric_rows("observed", "whole", "area", {21.0: 99.0, 22.0: 120.0}, "cm2"),
             metric_rows("thin", "left", "area", {21.0: 50.0}, "cm2"),
             metric_rows(
                 "thin", "whole", "mean_curvedness", {21.0: 0.1, 22.0: 0.2}, "1/mm"
@@ -185,7 +187,9 @@ def test_a_table_without_metrics_is_refused():
 
 
 def test_atlases_are_thin_lines_near_the_weeks_of_the_brains():
-    metrics = metric_rows("real", "whole", "area", {25.0: 100.0, 26.0: 110.0}, "cm2")
+    metrics = metric_rows(
+        "observed", "whole", "area", {25.0: 100.0, 26.0: 110.0}, "cm2"
+    )
     rows = [
         (atlas, side, metric, week, factor * week)
         for atlas, factor in (("one", 4.0), ("two", 5.0))
@@ -212,7 +216,7 @@ def test_spectra_bars_are_the_relative_powers_of_each_side():
         *spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}),
         *spectrum_rows("thin", 27.0, {4: 0.9}),
     ]
-    figure = study_of(thin, spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15}))
+    figure = study_of(thin, spectrum_rows("observed", 28.0, {4: 0.25, 5: 0.15}))
     assert {"1.5 mm", "observed brain"} <= words(figure)
     left, right, shape_index, _ = figure.axes
     assert "mean curvature" in left.get_title()
@@ -245,10 +249,10 @@ def hatches_and_open_stars(figure: Figure) -> tuple[bool, bool]:
 
 
 @pytest.mark.parametrize(
-    ("run", "shown"), [("thin", (True, False)), ("real", (False, True))]
+    ("run", "shown"), [("thin", (True, False)), ("observed", (False, True))]
 )
 def test_bands_that_are_cut_off_are_marked_and_keyed(run, shown):
-    good = {name: spectrum_rows(name, 28.0, {4: 0.2}) for name in ("thin", "real")}
+    good = {name: spectrum_rows(name, 28.0, {4: 0.2}) for name in ("thin", "observed")}
     cut = good | {
         run: [*good[run], *spectrum_rows(run, 28.0, {5: 0.1}, complete=False)]
     }
@@ -258,10 +262,10 @@ def test_bands_that_are_cut_off_are_marked_and_keyed(run, shown):
         : 1 + shown[0]
     ]
     assert hatches_and_open_stars(study_of(*good.values())) == (False, False)
-    spectra = pd.concat([*cut["thin"], *cut["real"]])
+    spectra = pd.concat([*cut["thin"], *cut["observed"]])
     assert hatches_and_open_stars(spectra_figure(spectra)) == (
         False,
-        run == "real",
+        run == "observed",
     )
 
 
@@ -290,11 +294,11 @@ def test_regions_chart_sums_areas_and_averages_depths():
 @pytest.fixture(scope="module")
 def metrics_with_norms() -> pd.DataFrame:
     rows = [
-        (name, "real", week, "whole", "area", 10 * week + noise, "cm2")
+        (name, "observed", week, "whole", "area", 10 * week + noise, "cm2")
         for name, week, noise in zip(REFERENCE, WEEKS, NOISE, strict=True)
     ]
     rows += [
-        ("case", "real", 25.0, "whole", "area", 252.0, "cm2"),
+        ("case", "observed", 25.0, "whole", "area", 252.0, "cm2"),
         ("s0", "r", 24.0, "whole", "area", 240.0, "cm2"),
     ]
     return pd.DataFrame(
@@ -363,7 +367,7 @@ def test_a_brain_has_its_differences_from_atlases_beside_the_noise(metrics_with_
     differences = pd.DataFrame(
         {
             "subject": ["case", "case", "case", "case", "s1"],
-            "run": ["real", "real", "real", "predicted", "real"],
+            "run": ["observed", "observed", "observed", "predicted", "observed"],
             "hemisphere": "whole",
             "metric": "area",
             "atlas": ["one", "two", "three", "one", "one"],
@@ -404,7 +408,7 @@ def test_bands_of_a_norm_lie_between_its_outer_and_its_inner_centiles():
         }
     )
     other = curves.assign(hemisphere="left", expected=1.0, q05=0.0, q95=2.0)
-    brain = metric_rows("real", "whole", "area", {24.0: 150.0}, "cm2")
+    brain = metric_rows("observed", "whole", "area", {24.0: 150.0}, "cm2")
     axes = norms_figure(
         brain, pd.concat([other, curves]), reference=["s"], brains=["s"]
     ).axes[0]
@@ -460,7 +464,7 @@ def test_spectra_over_weeks_are_by_side_and_band_and_open_where_a_band_is_cut_of
     scans = [
         part.assign(subject=brain)
         for brain, week, power in (("a1", 26.0, {4: 0.25}), ("a2", 27.5, {4: 0.15}))
-        for part in spectrum_rows("real", week, power)
+        for part in spectrum_rows("observed", week, power)
     ]
     figure = spectra_figure(pd.concat([*thin, *scans]), subjects={"a1": "a", "a2": "a"})
     left4, left5, right4, _ = figure.axes

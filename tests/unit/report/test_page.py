@@ -106,7 +106,7 @@ QUALITY = pd.DataFrame(
 METRICS = pd.DataFrame(
     {
         "subject": "young",
-        "run": "real",
+        "run": "observed",
         "week": 21.0,
         "hemisphere": ["whole", "whole", "left"],
         "metric": ["volume", "area", "area"],

@@ -318,14 +318,14 @@ def test_runs_of_a_sweep_stand_in_their_order_with_the_observed_brain_last():
         for name, tall, value in (
             ("thin", 20, -0.9),
             ("thick", 28, 0.9),
-            ("real", 24, 0.1),
+            ("observed", 24, 0.1),
         )
     }
     grid = [
         GridBrain("", "a", halves["thick"], is_simulated=True),
         GridBrain("", "b", is_simulated=True),
         GridBrain("", "c", halves["thin"], is_simulated=True),
-        GridBrain("", "seen", halves["real"]),
+        GridBrain("", "seen", halves["observed"]),
     ]
     values = {
         run: {"thickness_mm": size}

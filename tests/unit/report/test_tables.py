@@ -40,11 +40,11 @@ def test_metrics_of_the_last_common_week_have_a_difference_from_the_measured_bra
         metrics(
             ("thin", 22.0, "area", 110.0),
             ("thin", 23.0, "area", 150.0),
-            ("real", 22.0, "area", 100.0),
-            ("real", 21.0, "area", 90.0),
+            ("observed", 22.0, "area", 100.0),
+            ("observed", 21.0, "area", 90.0),
             ("thin", 22.0, "gyrification_index", 1.2),
             ("thin", 22.0, "mean_shape_index", -0.01),
-            ("real", 22.0, "mean_shape_index", 0.02),
+            ("observed", 22.0, "mean_shape_index", 0.02),
             ("thin", 22.0, "mean_curvature_q05", -0.01),
             ("thin", 22.0, "crossing_faces", 0.0),
         ),
@@ -67,11 +67,11 @@ def test_metrics_of_the_last_common_week_have_a_difference_from_the_measured_bra
 
 def test_a_predicted_brain_is_between_its_start_and_the_atlas_brain_nearest_in_week():
     rows = [
-        ("s", "real", 22.4, "area", 100.0),
+        ("s", "observed", 22.4, "area", 100.0),
         ("s", "a", 29.9, "area", 210.0),
         ("s", "a", 22.4, "area", 101.0),
-        ("atlas30", "real", 30.0, "area", 200.0),
-        ("atlas29", "real", 29.0, "area", 190.0),
+        ("atlas30", "observed", 30.0, "area", 200.0),
+        ("atlas29", "observed", 29.0, "area", 190.0),
         ("s", "a", 29.9, "volume", 150.0),
         ("s", "a", 29.9, "crossing_faces", 0.0),
     ]

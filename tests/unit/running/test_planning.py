@@ -211,7 +211,7 @@ def test_a_view_has_all_but_snakemakes_records_and_can_be_written(study):
         ([], [(0, {"a"}), (0, set())], 0, 2),
         ([], [(4, {"a"})], 4, 1),
         ([], [(0, {"a"}), (4, {"b"})], 4, 2),
-        (["--forceall"], [(0, {"a"})], 0, 1),
+        (["--forceall"], [(0, {"a"}), (0, {"b", "c"})], 0, 2),
     ],
 )
 def test_a_run_that_leaves_planned_jobs_is_planned_again(

@@ -17,7 +17,9 @@ from gyriflow.running.launch import hold_lock
 from gyriflow.running.provenance import check_results_belong_to, input_contents
 from gyriflow.running.status import STATE, status
 from gyriflow.running.terminal import RunDisplay
+from gyriflow.study import resolve
 from gyriflow.study.loading import load
+from gyriflow.study.study import write_plan
 
 STEP = '{{"event": "step", "week": {week}, "end_week": 23, "left_s": {left}}}\n'
 
@@ -348,20 +350,20 @@ def test_what_is_done_of_each_brain_and_run_is_counted(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("content", ["", "- a", "brains: 3", "brains: ["])
-def test_the_status_of_a_configuration_with_mistakes_is_told(tmp_path, content):
-    (tmp_path / "gyriflow.yaml").write_text(content)
+@pytest.mark.parametrize("content", ["", "run,brain", "run,brain\nx,a"])
+def test_a_damaged_plan_is_left_out(tmp_path, content):
+    (tmp_path / "results" / "plan").mkdir(parents=True)
+    (tmp_path / "results" / "plan" / "simulations.csv").write_text(content)
     assert text(tmp_path) == "nothing is running"
 
 
-def test_the_runs_of_a_configuration_are_told_before_they_start_wherever_its_files_are(
-    tmp_path,
-):
-    shape = "{id: a, week: 21, shape: {semi_axes_mm: [20, 20, 20]}}"
-    (tmp_path / "gyriflow.yaml").write_text(
-        f"brains: [{shape}]\nstart: a\nfolding: {{end_week: 22}}\nruns: {{x: {{}}}}"
-    )
-    assert text(tmp_path).splitlines()[-1].split() == ["x", "a", "-", "-", "-", "-"]
+def test_the_runs_of_the_plan_are_told_before_they_start(tmp_path):
+    shape = {"id": "a", "week": 21, "shape": {"semi_axes_mm": [20, 20, 20]}}
+    raw = {"brains": [shape], "start": "a", "folding": {"end_week": 22}}
+    raw["runs"] = {"x": {}, "y": {"ranks": 1}}
+    write_plan(resolve(load(raw)), tmp_path / "results" / "plan")
+    rows = [line.split() for line in text(tmp_path).splitlines()[-2:]]
+    assert rows == [[run, "a", "-", "-", "-", "-"] for run in "xy"]
 
 
 def test_a_folder_without_a_study_is_named(tmp_path):

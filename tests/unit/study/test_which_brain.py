@@ -118,7 +118,7 @@ def test_a_second_hemisphere_is_of_another_series_norm_and_template(side):
     sides = {
         brain.brain: list(brain.template_maps)
         for brain in found.exported
-        if brain.run == "real"
+        if brain.run == "observed"
     }
     assert [name for name, found_sides in sides.items() if found_sides == ["left"]] == [
         "left22",

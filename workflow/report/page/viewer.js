@@ -10,7 +10,7 @@
   const UNKNOWN = 255, GREY = [0.72, 0.72, 0.72];
 
   const simulated = data.groups.filter((group) => group.kind === "simulated");
-  const real = data.groups.find((group) => group.kind === "real");
+  const observed = data.groups.find((group) => group.kind === "observed");
   const maps = data.maps.map((map) => ({ ...map, colours: bytes(map.colours) }));
   const weeks = data.groups.flatMap((group) => group.frames.map((frame) => frame.week));
   const first = Math.min(...weeks), last = Math.max(...weeks);
@@ -119,7 +119,7 @@
     lamp.target.position.set(-x, -y, -z);
     lamps.add(lamp);
   }
-  const panes = real && simulated.length ? [new Pane(), new Pane()] : [new Pane()];
+  const panes = observed && simulated.length ? [new Pane(), new Pane()] : [new Pane()];
   const centre = new THREE.Vector3();
   const half = data.size * 0.52;
   const controls = new THREE.OrbitControls(camera, renderer.domElement);
@@ -216,7 +216,7 @@
       shown.push([`${group.name}, simulated`, panes[pane].run(group, week, map)]);
       pane += 1;
     }
-    if (real && panes[pane]) shown.push([real.name, panes[pane].brain(real, week, map)]);
+    if (observed && panes[pane]) shown.push([observed.name, panes[pane].brain(real, week, map)]);
     shown.forEach(([name, at], index) => { titles[index].textContent = `${name}: ${Number(at.toFixed(2))} GW`; });
     said.textContent = `${Number(week.toFixed(2))} GW`;
     drawBar(map);
