@@ -78,6 +78,11 @@ MESH_MEASURES = {
 }
 """Measures of mesh quality, with their labels."""
 
+ERROR_HEAD = "error of such predictions, of averages"
+INTERVAL_HEAD = "interval of ensemble and tests of averages"
+"""Columns of `predicted_table`. The tested brains are averages of many fetuses, which
+says little of a single one."""
+
 
 def _named(rows: pd.DataFrame) -> pd.Series:
     """Return the title of each row's metric, with its unit."""
@@ -382,7 +387,7 @@ def predicted_table(
                 .set_index("name")
             )
             ends = zip(last["low"], last["high"], strict=True)
-            columns["interval of ensemble and tests"] = pd.Series(
+            columns[INTERVAL_HEAD] = pd.Series(
                 [f"{a:.4g} to {b:.4g}" for a, b in ends], last.index
             )
     predicted, atlas_brain = (columns[head] for head in list(brains)[1:])
@@ -393,7 +398,7 @@ def predicted_table(
         metric_title(metric): text
         for metric, text in prediction["tests"]["errors"].items()
     }
-    columns["error of such predictions"] = predicted.index.to_series().map(errors)
+    columns[ERROR_HEAD] = predicted.index.to_series().map(errors)
     return pd.DataFrame(columns).reindex(predicted.index).rename_axis("metric")
 
 

@@ -101,7 +101,7 @@ def test_a_predicted_brain_is_between_its_start_and_the_atlas_brain_nearest_in_w
         Facts("29.9 GW"),
         Facts("30 GW"),
         Facts("%"),
-        "error of such predictions",
+        Facts("error", "averages"),
     ]
     assert found.loc["pial area (cm²)"].tolist() == [
         100.0,
