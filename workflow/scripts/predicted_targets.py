@@ -45,6 +45,7 @@ with step(snakemake.log[0]):
         varied = params.variation
         options |= {"age_shift_gw": varied.age_shift_gw, "fading_gw": varied.fading_gw}
         options["smoothing_mm"] = varied.difference_smoothing_mm
+        options["lasting"] = varied.lasting
     growth = params.start_week, params.end_week, path, pair, params.atlas_week
     found = predict_shapes(mesh, *growth, ElasticFit, **options)
     sizes, ages = sizes_of(mesh, found.positions), found.ages.table()

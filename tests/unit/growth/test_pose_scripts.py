@@ -376,7 +376,13 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
     if posed == (False, False):
         # a member: older than stated, so it grows as one of the atlas half a week later
         varied = Variation(
-            0, 1, 1.0, age_shift_gw=0.5, difference_smoothing_mm=8.0, fading_gw=4.0
+            0,
+            1,
+            1.0,
+            age_shift_gw=0.5,
+            difference_smoothing_mm=8.0,
+            fading_gw=4.0,
+            lasting=0.5,
         )
         run_script(
             "predicted_targets.py",
