@@ -49,8 +49,15 @@ with step(snakemake.log[0]):
     growth = params.start_week, params.end_week, path, pair, params.atlas_week
     found = predict_shapes(mesh, *growth, ElasticFit, **options)
     sizes, ages = sizes_of(mesh, found.positions), found.ages.table()
-    special = found.shapes.stops, found.between
     shapes = WeeklyShapes(
-        np.array(found.weeks), found.positions, sizes, found.baselines, ages, *special
+        np.array(found.weeks),
+        found.positions,
+        sizes,
+        found.baselines,
+        ages,
+        found.shapes.stops,
+        found.between,
+        kept=found.kept,
+        placed=found.placed,
     )
     write_weekly_shapes(snakemake.output[0], shapes)

@@ -115,7 +115,8 @@ class Prediction:
     `between`. The baselines are simpler predictions of the boundary's vertices (m, 3):
     `atlas`, the atlas' own brain, and `atlas_deformed`, that brain with the whole
     individual difference. `kept` is the table of `Expectation` for the weeks of the
-    atlas.
+    atlas, `placed` (m, 3) the boundary's vertices on the atlas' brain of each stated
+    week.
     """
 
     weeks: list[float]
@@ -125,6 +126,7 @@ class Prediction:
     baselines: Mapping[str, list[Floats]]
     ages: AtlasAges
     kept: pd.DataFrame
+    placed: Mapping[float, Floats]
 
 
 def place_in_atlas(
@@ -309,4 +311,9 @@ def predict_shapes(
         "atlas_deformed": [places[used] for places in deformed],
     }
     positions = np.stack([by_week[week] for week in weeks])
-    return Prediction(weeks, positions, found, between, baselines, ages, expected.kept)
+    placed = {}
+    for number in path.observed:
+        placed[float(path.shapes.weeks[number])] = carried[number][used]
+    return Prediction(
+        weeks, positions, found, between, baselines, ages, expected.kept, placed
+    )

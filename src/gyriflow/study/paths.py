@@ -59,6 +59,12 @@ def folded_of(*sides: Side) -> dict[str, str]:
     return {**surfaces_in(folder, sides), "thickness": f"{folder}/thickness.shape.gii"}
 
 
+def fine_of(*sides: Side) -> dict[str, str]:
+    """Return the surfaces of a predicted brain at a week with the resolution of
+    observed brains."""
+    return surfaces_in(f"{RUN}/surfaces/{WEEK}/fine", sides)
+
+
 def measures_in(folder: str, *sides: Side) -> dict[str, str]:
     """Return the tables of a measured or simulated brain in a folder, and the maps on
     its hemispheres."""

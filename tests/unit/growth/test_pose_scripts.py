@@ -369,6 +369,10 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
     found = read_weekly_shapes(tmp_path / "found.h5")
     assert found.weeks.tolist() == [22.0, 23.0, 24.0]
     assert found.positions[0] == pytest.approx(start.vertices, abs=1e-3)
+    assert found.kept["week"].tolist() == [23.0, 24.0]
+    assert (found.kept["finer_share"] < found.kept["smooth_share"]).all()
+    # on all brains of the atlas
+    assert list(found.placed) == [21.0, 22.0, 23.0, 24.0, 25.0]
     volumes = found.sizes["volume_ml"]
     assert volumes / volumes[0] == pytest.approx(
         1.04 ** (3 * (found.weeks - 22.0)), rel=0.01
