@@ -235,7 +235,7 @@ def predict_shapes(
     *,
     further_weeks: Sequence[float] = (),
     age_shift_gw: float = 0.0,
-    norm_ml: Sequence[float] | Floats = (),
+    others: Sequence[Mapping[float, float]] = (),
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
     fading_gw: float = FADING_GW,
     lasting: float = LASTING,
@@ -252,12 +252,12 @@ def predict_shapes(
     on what else is predicted.
 
     `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm`,
-    `fading_gw` and `lasting` vary in an ensemble; `norm_ml` as for `ages_by_size`.
+    `fading_gw` and `lasting` vary in an ensemble; `others` as for `ages_by_size`.
     """
     atlas_brain = path.mesh(pair_week)
     inside = place_in_atlas(mesh, pair, atlas_brain, make_body, open_sulci=open_sulci)
     carried = path.carry(inside, pair_week)
-    ages = path.ages(norm_ml)
+    ages = path.ages(others)
     grown = resample_by_size(mesh, carried, ages.weeks, ages, path.knots(ages))
     atlas_weeks = ages.weeks - age_shift_gw
     is_later = atlas_weeks > start_week + MIN_AGE_SPACING_GW

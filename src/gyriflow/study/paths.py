@@ -23,6 +23,7 @@ PLACE = "results/{where}"
 PUBLISHED = str(SHIPPED / "workflow" / "published" / "fetalfoldsim.yaml")
 """Values reported by the paper."""
 PREDICTION_TESTS = str(SHIPPED / "norms" / "predictions.yaml")
+NORMAL_VOLUMES = str(SHIPPED / "norms" / "volumes.yaml")
 """Accuracy of predictions of brains with a later scan."""
 
 

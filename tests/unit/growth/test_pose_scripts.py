@@ -356,6 +356,7 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
         "path": "path.h5",
         "reports": ["brain.json", "atlas.json"],
         "norms": None,
+        "volumes": None,
     }
     inputs |= {"correspondence": ["pair.h5"]}
     params = {
@@ -363,6 +364,7 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
         "further_weeks": [],
         "opens_sulci": False,
         "variation": None,
+        "left_out": ["crl"],
     }
     params |= {"start_week": 22.0, "end_week": 23.0, "atlas_week": 22.0}
     run_script("predicted_targets.py", tmp_path, inputs, {0: "found.h5"}, params)
