@@ -83,7 +83,7 @@ from gyriflow.study.paths import ATLAS_PATH, MESH, PIAL, REGISTERED
 PATCH_MM, REACH_MM = 15.0, 4.0
 ERRORS_MM = np.arange(0.0, 1.01, 0.01)
 SHARES = np.linspace(0.0, 1.0, 101)
-SYNTHETIC_WEEKS = (26.0, 30.0, 34.0)
+SYNTHETIC_WEEKS = (26.0, 30.0)
 
 
 @dataclass(frozen=True, eq=False)
