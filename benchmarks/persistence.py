@@ -49,8 +49,9 @@ from individuals import FLOW_STEPS, KEPT_GW, velocity
 from gyriflow.compare.comparison import aligned_distances
 from gyriflow.compare.placement import number_patches
 from gyriflow.compare.shapes import align, prepare_for_comparison, scale_to_volume
+from gyriflow.errors import InputError
 from gyriflow.folding.elastic_fit import ElasticFit
-from gyriflow.geometry.deformations import between_moved
+from gyriflow.geometry.deformations import MatchedSurfaces, between_moved
 from gyriflow.geometry.matching import crossing_faces, match_surface, values_at
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import (
@@ -83,6 +84,8 @@ from gyriflow.study.paths import ATLAS_PATH, MESH, PIAL, REGISTERED
 PATCH_MM, REACH_MM = 15.0, 4.0
 ERRORS_MM = np.arange(0.0, 1.01, 0.01)
 SHARES = np.linspace(0.0, 1.0, 101)
+FETUSES_SD = 0.2
+"""Spread between fetuses of what is left of a difference."""
 SYNTHETIC_WEEKS = (26.0, 30.0)
 
 
@@ -155,11 +158,14 @@ def read_start(row: pd.Series) -> Start:
     mesh = read_tetrahedral_mesh(file_of(MESH["mesh"], brain=row["start"]))
     kept = read_weekly_shapes(file_of(ATLAS_PATH, brain=row["first"]))
     shapes = SeriesShapes(kept.weeks.tolist(), kept.positions, list(kept.stops))
+    assert kept.tets is not None
     path = AtlasPath(kept.tets, shapes)
     brains = row["start"], row["near"]
     poses = [read_pose(file_of(PIAL["report"], brain=brain)).world for brain in brains]
     link = file_of(REGISTERED, earlier=row["start"], later=row["near"])
     pair = between_moved(read_correspondence(link), *poses)
+    if isinstance(pair, MatchedSurfaces):
+        raise InputError("the start is matched, not registered", path=link)
     week = float(row["near"].rsplit("-", 1)[1])
     inside = place_in_atlas(mesh, pair, path.mesh(week), ElasticFit, open_sulci=True)
     return Start(
@@ -191,16 +197,16 @@ def parts_of(start: Start, weeks: list[float]) -> list[Parts]:
     smooth_only = start.predict(weeks, keep_all=True, fading_gw=1e-6).positions
     expected = start.predict(weeks)
     found = []
-    for number, kept in enumerate(expected.kept.itertuples(), 1):
+    for number, kept in enumerate(expected.kept.to_dict("records"), 1):
         finer = whole[number] - smooth_only[number]
         # the atlas and a share of the smooth difference
-        some = expected.positions[number] - kept.finer_share * finer
-        smooth = (smooth_only[number] - some) / (1 - kept.smooth_share)
+        some = expected.positions[number] - kept["finer_share"] * finer
+        smooth = (smooth_only[number] - some) / (1 - kept["smooth_share"])
         part = Parts(
             atlas=start.boundary(smooth_only[number] - smooth),
             smooth=start.boundary(smooth).vertices,
             finer=start.boundary(finer).vertices,
-            difference_mm=kept.difference_mm,
+            difference_mm=kept["difference_mm"],
         )
         found.append(part)
     return found
@@ -278,9 +284,8 @@ def synthetic_rows(
     """Yield the scores of a synthetic individual of the atlas, whose difference is kept
     or fading."""
     kind, size, seed = name.split("-")
-    near = start.path.shapes.weeks.index(
-        min(start.path.shapes.weeks, key=lambda week: abs(week - start.week))
-    )
+    weeks_of_path = np.asarray(start.path.shapes.weeks)
+    near = int(np.argmin(np.abs(weeks_of_path - start.week)))
     body = start.carried[near]
     centre = body.mean(axis=0)
     lengths = body.std(axis=0)
@@ -332,10 +337,12 @@ def match_error(rows: pd.DataFrame) -> float:
     losses = []
     for error_mm in ERRORS_MM:
         loss = 0.0
-        for row in rows.itertuples():
-            kept = Persistence(row.difference_mm, match_error_mm=error_mm)
-            miss = row.difference_mm * (kept.weight(row.weeks_ahead) - row.smooth)
-            loss += miss**2 / (1 + row.smooth_error**2)
+        for row in rows.to_dict("records"):
+            difference_mm = row["difference_mm"]
+            kept = Persistence(difference_mm, match_error_mm=error_mm)
+            weight = kept.weight(row["weeks_ahead"])
+            miss = difference_mm * (weight - row["smooth"])
+            loss += miss**2 / (1 + row["smooth_error"] ** 2)
         losses.append(loss)
     return float(ERRORS_MM[np.argmin(losses)])
 
@@ -344,12 +351,13 @@ def lasting_share(rows: pd.DataFrame, error_mm: float) -> tuple[float, float]:
     """Return mean and standard deviation of the share of differences that lasts, from
     followed fetuses, with a uniform prior."""
     logs = np.zeros(len(SHARES))
-    for row in rows.itertuples():
+    for row in rows.to_dict("records"):
+        # fetuses differ by more than the error of a regression
+        variance = row["smooth_error"] ** 2 + FETUSES_SD**2
         for number, share in enumerate(SHARES):
-            kept = Persistence(row.difference_mm, share, error_mm)
-            miss = kept.weight(row.weeks_ahead) - row.smooth
-            # fetuses differ by more than the error of a regression
-            logs[number] -= 0.5 * miss**2 / (row.smooth_error**2 + 0.2**2)
+            kept = Persistence(row["difference_mm"], share, error_mm)
+            miss = kept.weight(row["weeks_ahead"]) - row["smooth"]
+            logs[number] -= 0.5 * miss**2 / variance
     weights = np.exp(logs - logs.max())
     mean = float(np.average(SHARES, weights=weights))
     spread = float(np.sqrt(np.average((SHARES - mean) ** 2, weights=weights)))
@@ -395,30 +403,30 @@ def main() -> None:
     for _, group in pairs.groupby(["study", "start"], sort=False):
         start = read_start(group.iloc[0])
         if arguments.synthetic:
+            error_mm = arguments.match_error
             for name in arguments.synthetic:
-                found = synthetic_rows(
-                    start, name, list(SYNTHETIC_WEEKS), arguments.match_error
-                )
-                for row in found:
-                    rows.append(row)
-                    print(row, flush=True)
+                for scores in synthetic_rows(
+                    start, name, list(SYNTHETIC_WEEKS), error_mm
+                ):
+                    rows.append(scores)
+                    print(scores, flush=True)
             continue
-        weeks = group["week"].astype(float).tolist()
-        for pair, parts in zip(group.itertuples(), parts_of(start, weeks), strict=True):
-            observed = read_surface(pair.observed)
-            row = {"start": pair.start, "week": pair.week, "kind": pair.kind}
-            row["weeks_ahead"] = pair.week - start.week
-            left.append(row | difference_left(parts, observed))
+        scans = group.to_dict("records")
+        weeks = [float(scan["week"]) for scan in scans]
+        for scan, parts in zip(scans, parts_of(start, weeks), strict=True):
+            labels = {name: scan[name] for name in ("start", "week", "kind")}
+            labels["weeks_ahead"] = scan["week"] - start.week
+            observed = read_surface(scan["observed"])
+            left.append(labels | difference_left(parts, observed))
             print(left[-1], flush=True)
-        if arguments.scores:
-            models = models_of(start, weeks)
-            for pair, surfaces in zip(group.itertuples(), models, strict=True):
-                observed = read_surface(pair.observed)
-                folds = prepare_for_comparison(observed, observed)
-                for model, surface in surfaces.items():
-                    row = {"start": pair.start, "week": pair.week, "model": model}
-                    rows.append(row | scores_of(surface, observed, folds))
-                    print(rows[-1], flush=True)
+        models = models_of(start, weeks) if arguments.scores else iter(())
+        for scan, surfaces in zip(scans, models, strict=False):
+            observed = read_surface(scan["observed"])
+            folds = prepare_for_comparison(observed, observed)
+            for model, surface in surfaces.items():
+                labels = {"start": scan["start"], "week": scan["week"], "model": model}
+                rows.append(labels | scores_of(surface, observed, folds))
+                print(rows[-1], flush=True)
     found = estimates(pd.DataFrame(left)) if left else {}
     print(pd.DataFrame(left).to_string(index=False, float_format="%.3f"))
     print_rows(rows, left=left, **found)
