@@ -64,8 +64,11 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
     The surface is scaled and aligned with the boundary. The remaining displacements of
     the boundary's vertices are averaged around each vertex of the surface, with
     Gaussian weights in space, so that both banks of a sulcus move alike and do not
-    cross. Where faces cross that do not in the observed surface, the average is wider;
-    if that does not help, the boundary itself is returned and a warning is logged.
+    cross. The surface then gets the volume of the boundary, which, being coarser, may
+    have had another one on the observed brain.
+
+    Where faces cross that do not in the observed surface, the average is wider; if that
+    does not help, the boundary itself is returned and a warning is logged.
     """
     before = TriangleMesh(observed.places, boundary.faces)
     areas = vertex_areas(before)
@@ -89,10 +92,17 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
         move = np.einsum("nk,nkj->nj", weights, displacements[neighbours])
         moved = TriangleMesh(surface + move, observed.surface.faces)
         if crossing_faces(moved) <= allowed:
-            return moved
+            return with_volume(moved, signed_volume(boundary))
     log.warning(
         "an observed surface that is moved to the predicted shape crosses itself in %d"
         " faces: the coarser surface of the mesh is used",
         crossing_faces(moved),
     )
     return boundary
+
+
+def with_volume(surface: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+    """Scale a closed surface about its centre to a volume."""
+    centre = np.average(surface.vertices, axis=0, weights=vertex_areas(surface))
+    scale = np.cbrt(volume_mm3 / signed_volume(surface))
+    return TriangleMesh(centre + scale * (surface.vertices - centre), surface.faces)
