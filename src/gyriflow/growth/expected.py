@@ -53,7 +53,7 @@ by benchmarks/persistence.py (docs/science.md)."""
 MATCH_FADING_GW = 1.0
 """Time constant with which this error leaves a predicted shape, which begins as the
 observed brain."""
-LASTING, LASTING_GW = 0.5, 8.0
+LASTING, LASTING_GW = 0.5, 16.0
 """Share of a real individual difference that lasts, and the time constant in weeks with
 which the rest is replaced. A half is a prior, not a measurement: no followed fetuses
 were at hand, and it errs least in the worst case (docs/science.md)."""
