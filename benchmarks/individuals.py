@@ -13,11 +13,11 @@ e^(−weeks/8), and another one of the same size replaces it.
 
 The start brains are predicted with the growth of their atlas, without the synthetic
 later brains, and rigidly aligned with these. Models are the `atlas`' own brain of the
-week scaled to the predicted volume and, for values of DIFFERENCE_SMOOTHING_MM and
-FADING_GW, the predicted shape before a body follows it, at stated weeks: e.g. `8 mm 1
-GW`, or `0 mm` without fading. The values with the best r on the individuals with odd
-seeds are reported on those with even seeds. The map of an individual depends on its
-kind and seed only.
+week scaled to the predicted volume, the predicted shape before a body follows it, with
+the weight of `growth.expected.Persistence` (`predicted`), with all of the smooth
+difference (`whole`) and with all of it (`all`), and the atlas' surface moved to the
+predicted shape (`delivered`), which is what a study measures. The map of an individual
+depends on its kind and seed only.
 
 The last line is one JSON object: `rows` with `grown_by`, `persistence`, `individual`,
 `horizon` (GW), `model`, `distance_mm`, `r_shape_index`.
@@ -41,11 +41,8 @@ from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh
-from gyriflow.growth.expected import (
-    DIFFERENCE_SMOOTHING_MM,
-    FADING_GW,
-    expected_positions,
-)
+from gyriflow.growth.expected import expected_positions
+from gyriflow.growth.fine_surfaces import ObservedSurface, moved_surface
 from gyriflow.growth.series_shapes import follow_series
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
@@ -58,8 +55,6 @@ from gyriflow.study.paths import MESH, PIAL, REGISTERED
 WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
 MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
 KEPT_GW = {"kept": np.inf, "fading": 8.0}
-GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
-FULL, DEFAULT = "0 mm", f"{DIFFERENCE_SMOOTHING_MM:g} mm {FADING_GW:g} GW"
 MESH_SETTINGS = {
     "order": 1,
     "mesher": "tetgen",
@@ -150,7 +145,8 @@ def deformed(
 def targets_of(
     folder: Path, brain: str, atlas: dict[float, str]
 ) -> dict[float, dict[str, TriangleMesh]]:
-    """Return the targets of a start brain along the brains of an atlas, by week."""
+    """Return the predicted surfaces of a start brain along the brains of an atlas, by
+    week and model."""
     chain = [brain, *atlas.values()]
     mesh = read_tetrahedral_mesh(folder / MESH["mesh"].format(brain=brain))
     poses = [
@@ -171,29 +167,21 @@ def targets_of(
     carried = follow_series(
         mesh, [start, *weeks], pairs, surfaces, open_sulci=True
     ).positions[1:]
-    places = {
-        smoothing: expected_positions(
-            mesh, start, carried, weeks, weeks[1:], smoothing_mm=smoothing
-        )
-        for smoothing in (0.0, *dict(GRID))
+    options: dict[str, dict[str, Any]] = {
+        "predicted": {},
+        "whole": {"keep_all": True},
+        "all": {"keep_all": True, "smoothing_mm": 0.0},
     }
-    (boundary, used), unsmoothed = boundary_surface(mesh), places[0.0]
-    result: dict[float, dict[str, TriangleMesh]] = {}
-    for number, week in enumerate(weeks):
-        shapes = {FULL: unsmoothed[number]}
-        for smoothing, fading in GRID if week > start else []:
-            # linear in the faded part of the finer differences
-            faded, faded_by_default = (
-                -np.expm1((start - week) / time) for time in (fading, FADING_GW)
-            )
-            change = places[smoothing][number] - unsmoothed[number]
-            shapes[f"{smoothing:g} mm {fading:g} GW"] = (
-                unsmoothed[number] + faded / faded_by_default * change
-            )
-        result[week] = {
-            name: TriangleMesh(points[used], boundary.faces)
-            for name, points in shapes.items()
-        }
+    boundary, used = boundary_surface(mesh)
+    result: dict[float, dict[str, TriangleMesh]] = {week: {} for week in weeks[1:]}
+    for model, option in options.items():
+        found = expected_positions(mesh, start, carried, weeks, weeks[1:], **option)
+        for week, positions in zip(weeks[1:], found.positions[1:], strict=True):
+            result[week][model] = TriangleMesh(positions[used], boundary.faces)
+    for number, week in enumerate(weeks[1:], 1):
+        observed = ObservedSurface(surfaces[number], carried[number][used])
+        shape = result[week]["predicted"]
+        result[week]["delivered"] = moved_surface(observed, shape)
     return result
 
 
@@ -217,7 +205,7 @@ def scores_of(
             folder / PIAL["whole"].format(brain=f"{atlas}-{week}")
         )
         models = targets[week] | {
-            "atlas": scale_to_volume(atlas_brain, targets[week][DEFAULT])
+            "atlas": scale_to_volume(atlas_brain, targets[week]["predicted"])
         }
         folds = prepare_for_comparison(observed, observed)
         for model, surface in models.items():
@@ -235,27 +223,6 @@ def scores_of(
                 row | {"r_shape_index": r_shape_index(surface, observed, folds)}
             )
     return rows
-
-
-def print_chosen(scores: pd.DataFrame) -> None:
-    """Print the values that are best for odd seeds, and their scores for even seeds."""
-    odd = scores["individual"].str.split("-").str[-1].astype(int) % 2 == 1
-    if odd.all() or not odd.any():
-        print("all seeds are odd or all are even: no values are chosen")
-        return
-    grid = scores["model"].str.endswith(" GW")
-    means = scores[odd & grid].groupby("model")[["r_shape_index", "distance_mm"]].mean()
-    best = means["r_shape_index"].idxmax()
-    print(
-        f"best r of shape index for odd seeds: {best}",
-        means.to_string(float_format="%.3f"),
-        sep="\n",
-    )
-    even_scores = scores[~odd & scores["model"].isin([best, DEFAULT, "atlas"])]
-    print("for even seeds:")
-    rows = ["grown_by", "persistence", "individual", "horizon"]
-    table = even_scores.pivot_table(["r_shape_index", "distance_mm"], rows, "model")
-    print(table.to_string(float_format="%.3f"))
 
 
 def run_study(
@@ -363,7 +330,9 @@ def main() -> None:
             rows += [
                 row for found in pool.map(score, arguments.individuals) for row in found
             ]
-    print_chosen(pd.DataFrame(rows))
+    means = pd.DataFrame(rows).groupby(["persistence", "horizon", "model"])
+    columns = ["distance_mm", "r_shape_index"]
+    print(means[columns].mean().to_string(float_format="%.3f"))
     print_rows(rows)
 
 

@@ -104,6 +104,32 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
         assert value == pytest.approx(-np.log1p(errors[week]), abs=0.05)
 
 
+def test_a_prediction_is_measured_and_compared_by_surfaces_of_observed_brains(workflow):
+    brains = [
+        *brains_of(workflow, "a", 1, 21, 22, 23),
+        *brains_of(workflow, "b", 2, 21.5, 23),
+    ]
+    study = STUDY | {"brains": brains, "start": "b21.5"}
+    name = workflow.write("study.yaml", study)
+    folder = "results/runs/expected/b21.5"
+    targets = [
+        f"{folder}/metrics/week-23.00/metrics.csv",
+        f"{folder}/surfaces/week-22.50/pial.surf.gii",
+    ]
+    jobs = workflow.jobs(*targets, "--configfile", name)
+    assert jobs["fine_surface"] == jobs["measure_simulated"] == 2
+    jobs = workflow.jobs("results/study/prediction.csv", "--configfile", name)
+    assert jobs["fine_surface"] >= 1
+    # growth at a rate needs none
+    own = study | {"runs": {"own": {}}}
+    jobs = workflow.jobs(
+        "results/runs/own/b21.5/metrics/week-23.00/metrics.csv",
+        "--configfile",
+        workflow.write("own.yaml", own),
+    )
+    assert "fine_surface" not in jobs
+
+
 @pytest.mark.slow
 def test_a_surface_in_another_pose_is_carried_through_the_labels_of_an_atlas(workflow):
     brains = []

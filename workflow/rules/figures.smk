@@ -236,7 +236,7 @@ def predicted_grid(simulation):
     atlas_brain = study.atlas_brain(simulation)
     return [
         placed("", f"start\n{start.week:g} GW", [start.pial]),
-        placed("", f"predicted\n{predicted.week:g} GW", [predicted.pial], simulated=True),
+        placed("", f"predicted\n{predicted.week:g} GW", [study.measured_parts(predicted)["whole"]], simulated=True),
         placed("", f"atlas' own brain\n{atlas_brain.week:g} GW", [atlas_brain.pial]),
     ]
 
@@ -276,7 +276,7 @@ def weekly_grid(brain):
     grid = []
     for simulation in simulations:
         for row in study.rows_of(simulation):
-            grid.append(placed(simulation.run, row.week, [row.pial], simulated=True))
+            grid.append(placed(simulation.run, row.week, [study.measured_parts(row)["whole"]], simulated=True))
     name = observed_name(observed.values())
     for week, brain in observed.items():
         grid.append(placed(name, week, [brain.pial]))
@@ -651,7 +651,7 @@ def expected_grid(simulation):
     grid = []
     for row in study.rows_of(simulation):
         if row.week in weeks:
-            grid.append(placed("expected", row.week, [row.pial], simulated=True))
+            grid.append(placed("expected", row.week, [study.measured_parts(row)["whole"]], simulated=True))
     for week, brain in observed.items():
         if week in weeks:
             grid.append(placed(name, week, [brain.pial]))

@@ -20,11 +20,51 @@ rule measure:
         "../scripts/measure.py"
 
 
+# of predictions, which are measured and compared by surfaces as fine as those of observed brains
+FINE = [simulation for simulation in study.simulations.values() if study.has_fine_surfaces(simulation)]
+
+
+def atlas_brains_of(wildcards):
+    """Return the brains of the atlas, one of which is moved to the predicted shape."""
+    return study.atlas_brains_near(simulation_of(wildcards), float(wildcards.week))
+
+
+rule fine_surface:
+    input:
+        **START_MESH,
+        frames=FOLDING["frames"],
+        targets=lambda w: simulation_of(w).targets,
+        start=lambda w: list(BRAINS[w.brain].parts.values()),
+        atlas=lambda w: [file for brain in atlas_brains_of(w) for file in brain.parts.values()],
+    output:
+        **fine_of(*SIDES),
+    wildcard_constraints:
+        run=one_of(dict.fromkeys(simulation.run for simulation in FINE)),
+        brain=one_of(dict.fromkeys(simulation.brain for simulation in FINE)),
+    params:
+        week=lambda w: float(w.week),
+        # of the atlas' brain
+        age=lambda w: float(w.week) + study.age_shift_gw(simulation_of(w)),
+        atlas_parts=lambda w: [list(brain.parts.values()) for brain in atlas_brains_of(w)],
+        atlas_weeks=lambda w: [brain.week for brain in atlas_brains_of(w)],
+    script:
+        "../scripts/fine_surface.py"
+
+
+def fine_parts(wildcards):
+    """Return the surfaces that a simulated brain is measured by, if these are not its own."""
+    if not study.has_fine_surfaces(simulation_of(wildcards)):
+        return []
+    row = SIMULATED[wildcards.run, wildcards.brain, float(wildcards.week)]
+    return list(study.measured_parts(row).values())
+
+
 # also writes the surfaces: the facets of the start brain's hemispheres
 rule measure_simulated:
     input:
         **START_REGIONS,
         frames=FOLDING["frames"],
+        fine=fine_parts,
     output:
         **folded_of(*SIDES),
         **measures_in(f"{RUN}/metrics/{WEEK}", *SIDES),

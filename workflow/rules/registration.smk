@@ -181,6 +181,21 @@ def atlas_of(wildcards):
     return BRAINS[chain_of(wildcards).later[0]]
 
 
+NORMAL = "neurotypical"
+
+
+def normal_volumes(wildcards):
+    """Return the volumes of normal populations, if the atlas is of one."""
+    population = BRAINS[chain_of(wildcards).path].population_name
+    return NORMAL_VOLUMES if population.startswith(NORMAL) else []
+
+
+def populations_left_out(wildcards):
+    """Return the atlases of a prediction: the growing one has its own volumes, and the start's are to be predicted."""
+    brains = [wildcards.brain, chain_of(wildcards).path]
+    return [BRAINS[brain].atlas for brain in brains if BRAINS[brain].atlas]
+
+
 # shapes that a start brain would have in later weeks if it grew as an atlas
 rule predicted_targets:
     input:
@@ -188,8 +203,9 @@ rule predicted_targets:
         path=lambda w: ATLAS_PATH.format(brain=chain_of(w).path),
         correspondence=lambda w: chain_of(w).links,
         reports=lambda w: [PIAL["report"], atlas_of(w).report],
-        # norms of another study, whose volumes the curve of the atlas follows as well
+        # norms of another study, and other populations, with whose growth the volume of the atlas grows as well
         norms=CONFIG.metrics.norms or [],
+        volumes=normal_volumes,
     output:
         TARGETS,
     log:
@@ -207,5 +223,6 @@ rule predicted_targets:
         posed=lambda w: posed_links(chain_of(w))[0],
         opens_sulci=CONFIG.surface.open_sulci,
         variation=lambda w: chain_of(w).variation,
+        left_out=populations_left_out,
     script:
         "../scripts/predicted_targets.py"

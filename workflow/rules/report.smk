@@ -152,6 +152,7 @@ rule html_report:
         intervals=study.prediction.file(ENSEMBLE) if study.prediction and study.prediction.members else [],
         small=[f"{BRAIN}/figures/small.png".format(brain=brain) for brain in BRAINS],
         accuracy=PREDICTION_TESTS if study.prediction else [],
+        targets=study.prediction.targets if study.prediction else [],
         surfaces=[file for row in VIEWED_ROWS for file in (*row.hemispheres, *row.maps)],
         captions=captions_of(SECTIONS, BRAIN_SECTIONS),
         provenance=rules.study_records.output.report,

@@ -19,7 +19,7 @@ def files_of_member(wildcards):
     tables = ("metrics", "spectra", "coefficients")
     return {
         **{name: [f"{row.folder}/{name}.csv" for row in rows] for name in tables},
-        "simulated": list(simulated.parts.values()),
+        "simulated": list(study.measured_parts(simulated).values()),
         "measured": [path for row in rows[1:] for path in row.parts.values()],
     }
 

@@ -27,7 +27,9 @@ def compared_files(wildcards):
     }
     return {
         **prepared,
-        "simulated": [SIMULATED[wildcards.run, wildcards.brain, week].pial for week in observed],
+        "simulated": [
+            study.measured_parts(SIMULATED[wildcards.run, wildcards.brain, week])["whole"] for week in observed
+        ],
         "whole": [brain.pial for brain in observed.values()],
     }
 
@@ -77,7 +79,7 @@ rule prediction:
 rule atlas_brain:
     input:
         **START_MESH,
-        predicted=lambda w: SIMULATED[w.run, w.brain, float(w.week)].pial,
+        predicted=lambda w: study.measured_parts(SIMULATED[w.run, w.brain, float(w.week)])["whole"],
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         ATLAS_BRAIN,

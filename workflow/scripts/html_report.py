@@ -5,6 +5,7 @@ from pathlib import Path
 from gyriflow.compare.accuracy import prediction_facts
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml, yaml_text
 from gyriflow.report.page import (
@@ -93,7 +94,8 @@ with step(snakemake.log[0]):
         tests = prediction_facts(
             accuracy["rows"], prediction["start_week"], prediction["week"]
         )
-        prediction = prediction | {"accuracy": accuracy, "tests": tests}
+        kept = read_weekly_shapes(files.targets).kept
+        prediction = prediction | {"accuracy": accuracy, "tests": tests, "kept": kept}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
     page = study_page(params.brains, tables, _with_content(params.figures), **about)
     runs, observed = params.surfaces["runs"], params.surfaces["observed"]

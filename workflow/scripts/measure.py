@@ -2,6 +2,7 @@
 surfaces and thickness."""
 
 from gyriflow.folding.folded_surfaces import folded_surfaces
+from gyriflow.geometry.matching import match_surface, values_at
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.frames import read_positions
 from gyriflow.io.surfaces import (
@@ -39,6 +40,15 @@ with step(snakemake.log[0]):
         read_surface(brain[side]) if brain.get(side) else None for side in SIDES
     )
     found = measure_brain(read_surface(brain.whole), left, right, **settings)
+    maps = found.maps
+    if files.get("fine"):
+        # tables are of the finer surfaces, maps of those of the mesh, whose vertices
+        # are the same in all weeks
+        mesh_surface = read_surface(brain.whole)
+        whole, left, right = map(read_surface, files.fine)
+        match = match_surface(whole, mesh_surface)
+        settings["thickness_mm"] = values_at(match, settings["thickness_mm"])
+        found = measure_brain(whole, left, right, **settings)
     for name, table in (
         ("metrics", found.table),
         ("spectra", found.spectra),
@@ -48,5 +58,5 @@ with step(snakemake.log[0]):
             output[name],
             table.assign(**params.labels)[[*params.labels, *table.columns]],
         )
-    for side, maps in found.maps.items():
-        write_vertex_maps(output[f"{side}_maps"], maps, STRUCTURES[side])
+    for side, values in maps.items():
+        write_vertex_maps(output[f"{side}_maps"], values, STRUCTURES[side])

@@ -5,7 +5,7 @@ import numpy as np
 
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
-from gyriflow.growth.atlas_path import AtlasPath
+from gyriflow.growth.atlas_path import AtlasPath, other_volumes
 from gyriflow.growth.expected import predict_shapes
 from gyriflow.growth.series_shapes import SeriesShapes, sizes_of
 from gyriflow.io.files import read_json
@@ -17,6 +17,7 @@ from gyriflow.io.registrations import (
 )
 from gyriflow.io.surfaces import read_pose
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.norms import cohort_from_plain
 from gyriflow.step import step
 
@@ -38,18 +39,30 @@ with step(snakemake.log[0]):
         "further_weeks": params.further_weeks,
         "open_sulci": bool(params.opens_sulci and opened),
     }
+    others = []
     if files.norms:
-        weeks = [kept.weeks[number] for number in path.observed]
-        options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(weeks)
+        norms = cohort_from_plain(read_json(files.norms))
+        others.append(norms.volumes_by_week(kept.weeks[path.observed]))
+    if files.volumes:
+        others += other_volumes(read_yaml(files.volumes), params.left_out)
+    options["others"] = others
     if params.variation:
         varied = params.variation
         options |= {"age_shift_gw": varied.age_shift_gw, "fading_gw": varied.fading_gw}
         options["smoothing_mm"] = varied.difference_smoothing_mm
+        options["lasting"] = varied.lasting
     growth = params.start_week, params.end_week, path, pair, params.atlas_week
     found = predict_shapes(mesh, *growth, ElasticFit, **options)
     sizes, ages = sizes_of(mesh, found.positions), found.ages.table()
-    special = found.shapes.stops, found.between
     shapes = WeeklyShapes(
-        np.array(found.weeks), found.positions, sizes, found.baselines, ages, *special
+        np.array(found.weeks),
+        found.positions,
+        sizes,
+        found.baselines,
+        ages,
+        found.shapes.stops,
+        found.between,
+        kept=found.kept,
+        placed=found.placed,
     )
     write_weekly_shapes(snakemake.output[0], shapes)

@@ -8,8 +8,9 @@ does is carried by it: each vertex keeps its place in the atlas' body.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import igl
 import numpy as np
@@ -63,28 +64,34 @@ class AtlasAges:
 def ages_by_size(
     weeks: Sequence[float],
     volumes_ml: Sequence[float],
-    norm_ml: Sequence[float] | Floats = (),
+    others: Sequence[Mapping[float, float]] = (),
 ) -> AtlasAges:
     """Return the ages by size of an atlas' brains with volumes in mL at two or more
     ascending weeks.
 
     The curve of volume is monotone and robust against single brains (`curves.fitted`).
-    It is fitted to the atlas' volumes and, with the same weight, to the medians of a
-    norm at these weeks, `norm_ml`, NaN where it has none. Each brain gets the week at
-    which the curve has its volume; ages that do not ascend are replaced by their
-    nearest ascending ones (isotonic regression). InputError if the atlas shrinks.
+    It has the level of the atlas. Its growth is also that of `others`, volumes in mL by
+    week of populations with levels of their own, between the atlas' first and last
+    week. Each brain gets the week at which the curve has its volume; ages that do not
+    ascend are replaced by their nearest ascending ones (isotonic regression).
+    InputError if the atlas shrinks.
     """
     stated = np.asarray(weeks, dtype=float)
     volumes = np.asarray(volumes_ml, dtype=float)
-    points = pd.DataFrame({"week": stated, "volume": volumes})
-    if len(norm_ml):
-        norm = points.assign(volume=norm_ml).dropna()
-        points = pd.concat([points, norm]).sort_values("week", kind="stable")
+    points = [(week, volume, 0) for week, volume in zip(stated, volumes, strict=True)]
+    source = 0
+    for other in others:
+        inside = [week for week in other if stated[0] <= week <= stated[-1]]
+        if inside:
+            source += 1
+            points += [(week, other[week], source) for week in inside]
+    all_weeks, all_volumes, sources = zip(*points, strict=True)
     fit = fitted(
-        points["week"].tolist(),
-        points["volume"].tolist(),
+        all_weeks,
+        all_volumes,
         name="volume of the atlas",
         keeps_first=True,
+        sources=sources,
     )
     curve = fit.curve
     logs = np.log(curve.values)
@@ -110,6 +117,19 @@ def ages_by_size(
     return AtlasAges(stated, volumes, curve, ages)
 
 
+def other_volumes(
+    content: Mapping[str, Any], left_out: Collection[str]
+) -> list[dict[float, float]]:
+    """Return the volumes in mL by week of the sources of `norms/volumes.yaml`, without
+    those that are named."""
+    tables = []
+    for name, source in content["sources"].items():
+        if name not in left_out:
+            volumes = source["volume_ml"]
+            tables.append({float(week): volumes[week] for week in volumes})
+    return tables
+
+
 @dataclass(frozen=True, eq=False)
 class AtlasPath:
     """Shapes (k, n, 3) in mm of the mesh with `tets` at k ascending `weeks`, each in
@@ -131,8 +151,8 @@ class AtlasPath:
         """The numbers of the weeks with a brain of the atlas."""
         return np.flatnonzero(~np.isin(self.shapes.weeks, self.shapes.stops))
 
-    def ages(self, norm_ml: Sequence[float] | Floats = ()) -> AtlasAges:
-        """Return the ages by size of the atlas' brains in all its weeks; `norm_ml` as
+    def ages(self, others: Sequence[Mapping[float, float]] = ()) -> AtlasAges:
+        """Return the ages by size of the atlas' brains in all its weeks; `others` as
         for `ages_by_size`."""
         shapes = self.shapes
         weeks = [shapes.weeks[number] for number in self.observed]
@@ -140,7 +160,7 @@ class AtlasPath:
         mesh = self.mesh(weeks[0])
         sizes = sizes_of(mesh, positions)
         volumes = sizes["volume_ml"].tolist()
-        return ages_by_size(weeks, volumes, norm_ml)
+        return ages_by_size(weeks, volumes, others)
 
     def knots(self, ages: AtlasAges) -> Floats:
         """Return the age by size of each shape, stops between those of their

@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 
 from .. import splines
 from ..errors import InputError
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Mask
 from ..settings.folding import target_map
 from ..settings.growth import SIZES
 
@@ -118,6 +118,7 @@ def fitted(
     name: str = "curve",
     degrees_of_freedom: float = DEGREES_OF_FREEDOM,
     keeps_first: bool = False,
+    sources: Sequence[int] | None = None,
 ) -> CurveFit:
     """Fit a smooth curve to measured weeks, robust against single outliers.
 
@@ -130,10 +131,19 @@ def fitted(
     reference of all growth. The standard deviation is Bayesian (Wahba 1983), from the
     scatter of the weeks about the curve.
 
+    With `sources` (n,), from 0, the values are of several populations, each with a
+    level of its own and all with one growth (a mixed model with fixed levels). The
+    curve has the level of source 0.
+
     At least two different weeks and positive sizes are needed; several brains may share
     a week. InputError for other values, and if the sizes decrease.
     """
     weeks_, values_ = _checked(weeks, values, name)
+    order = np.argsort(np.asarray(weeks, dtype=float), kind="stable")
+    source = (
+        np.zeros(len(weeks_), int) if sources is None else np.asarray(sources)[order]
+    )
+    n_levels = int(source.max())
     count = len(np.unique(weeks_))
     degrees = min(degrees_of_freedom, max(count - 1.0, 2.0))
     ends = weeks_[0], weeks_[-1]
@@ -141,11 +151,19 @@ def fitted(
     design = splines.design(weeks_, *ends, KNOT_INTERVALS)
     penalty = splines.penalty(*ends, KNOT_INTERVALS, order=2 if degrees >= 3 else 1)
     strength = splines.strength(design.T @ design, penalty, degrees, name)
-    weights = _robust_weights(design, logs, penalty, strength, degrees)
+    # columns of the levels of the other sources, which are not penalised
+    levels = source[:, None] == np.arange(1, n_levels + 1)
+    design = np.column_stack([design, levels])
+    penalty = np.pad(penalty, (0, n_levels))
+    degrees += n_levels
+    weights = _robust_weights(
+        design, logs, penalty, strength, degrees, source == 0, n_levels
+    )
     if keeps_first:
         weights[weeks_ == weeks_[0]] = 1.0
-    coefficients = _solve(design, logs, weights, strength * penalty)
-    if coefficients[1:].max() < 1e-6:
+    coefficients = _solve(design, logs, weights, strength * penalty, n_levels)
+    rates = slice(1, len(coefficients) - n_levels)
+    if coefficients[rates].max() < 1e-6:
         _refuse_shrinking(name, weeks_)
     residual_degrees = weights.sum() - degrees
     squares = (weights * (logs - design @ coefficients) ** 2).sum()
@@ -153,15 +171,16 @@ def fitted(
     count = round((weeks_[-1] - weeks_[0]) / SPACING_WEEKS) + 1
     at = np.linspace(*ends, max(2, count))
     rows = splines.design(at, *ends, KNOT_INTERVALS)
+    rows = np.pad(rows, ((0, 0), (0, n_levels)))
     # rates at their bound of 0 are not free
     free = np.ones(len(coefficients), dtype=bool)
-    free[1:] = coefficients[1:] > 1e-8
+    free[rates] = coefficients[rates] > 1e-8
     normal = (design.T * weights) @ design + strength * penalty
     covariance = np.linalg.pinv(normal[np.ix_(free, free)])
     free_rows = rows[:, free]
     variance = np.einsum("ij,jk,ik->i", free_rows, covariance, free_rows)
     sd = spread * np.sqrt(np.maximum(variance, 0.0))
-    outliers = weeks_[weights < 0.5]
+    outliers = weeks_[(weights < 0.5) & (source == 0)]
     if len(outliers):
         log.warning("%s: weeks %s are outliers of the curve", name, _listed(outliers))
     curve = Curve(at, np.exp(rows @ coefficients), sd)
@@ -213,7 +232,11 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats) -> Floats:
+def _solve(
+    design: Floats, logs: Floats, weights: Floats, penalty: Floats, n_levels: int
+) -> Floats:
+    """Return the coefficients of a first value, rates that are not negative, and
+    levels."""
     # eigenvalues of a strong penalty that should be 0 are not, because of round-off
     sizes, directions = np.linalg.eigh(penalty)
     sizes = np.clip(sizes, 1e-10, None)
@@ -225,6 +248,7 @@ def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats) -> Fl
     right = np.concatenate([factors * logs, no_rates])
     lowest = np.zeros(design.shape[1])
     lowest[0] = -np.inf
+    lowest[len(lowest) - n_levels :] = -np.inf
     found = lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls")
     return np.asarray(found.x)
 
@@ -235,22 +259,25 @@ def _robust_weights(
     penalty: Floats,
     strength: float,
     degrees: float,
+    is_first: Mask,
+    n_levels: int,
 ) -> Floats:
     count = len(logs)
     weights = np.ones(count)
     if count < MIN_WEEKS_PER_DEGREE * degrees:
         return weights
     for _ in range(ROUNDS):
-        coefficients = _solve(design, logs, weights, strength * penalty)
+        coefficients = _solve(design, logs, weights, strength * penalty, n_levels)
         residuals = logs - design @ coefficients
         weights = 1.0 / np.maximum(np.abs(residuals), MIN_SCATTER)
         weights *= count / weights.sum()
     for _ in range(ROUNDS):
-        scatter = 1.4826 * float(np.median(np.abs(residuals)))
+        # of the first source: a smooth norm has none, and would make outliers of it
+        scatter = 1.4826 * float(np.median(np.abs(residuals[is_first])))
         scatter *= np.sqrt(count / (count - degrees))
         scale = TUKEY * max(scatter, MIN_SCATTER)
         weights = np.clip(1 - (residuals / scale) ** 2, 0, None) ** 2
-        coefficients = _solve(design, logs, weights, strength * penalty)
+        coefficients = _solve(design, logs, weights, strength * penalty, n_levels)
         residuals = logs - design @ coefficients
     return weights
 

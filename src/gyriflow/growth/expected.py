@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
@@ -18,7 +19,7 @@ from ..geometry.diffusion import (
 )
 from ..geometry.paths import path_through
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
-from ..geometry.triangles import Floats, TriangleMesh, rms_length
+from ..geometry.triangles import Floats, TriangleMesh, rms_length, vertex_areas
 from ..settings.growth import BEFORE_GW
 from .atlas_path import (
     MIN_AGE_SPACING_GW,
@@ -45,6 +46,65 @@ not predict later folds."""
 FADING_GW = 4.0
 """Time constant with which finer differences fade: of 1, 4 and 16 weeks the best for
 synthetic individuals (docs/science.md)."""
+MATCH_ERROR_MM = 0.3
+"""Root mean square of the smooth individual difference that is no individual's: the
+error of the match to the atlas, and of the atlas as an average. From pairs of averages
+by benchmarks/persistence.py (docs/science.md)."""
+MATCH_FADING_GW = 1.0
+"""Time constant with which this error leaves a predicted shape, which begins as the
+observed brain."""
+LASTING, LASTING_GW = 0.5, 16.0
+"""Share of a real individual difference that lasts, and the time constant in weeks with
+which the rest is replaced. A half is a prior, not a measurement: no followed fetuses
+were at hand, and it errs least in the worst case (docs/science.md)."""
+
+
+@dataclass(frozen=True)
+class Persistence:
+    """How much of an individual difference a prediction keeps.
+
+    Of a smooth difference of `difference_mm` (root mean square over the boundary) the
+    part beyond `match_error_mm` is real. Of this, `lasting` stays for ever, and the
+    rest fades within `LASTING_GW`.
+    """
+
+    difference_mm: float
+    lasting: float = LASTING
+    match_error_mm: float = MATCH_ERROR_MM
+
+    @property
+    def reliability(self) -> float:
+        """The share of the mean square of the difference that is real, from 0 to 1."""
+        if not self.match_error_mm:
+            return 1.0
+        if self.difference_mm <= self.match_error_mm:
+            return 0.0
+        return 1 - (self.match_error_mm / self.difference_mm) ** 2
+
+    def weight(self, weeks_ahead: float) -> float:
+        """Return the weight w of the difference after some weeks, 1 at the start.
+
+        It is the best linear predictor: persistence times the reliability of the match.
+        """
+        persistence = self.lasting + (1 - self.lasting) * np.exp(
+            -weeks_ahead / LASTING_GW
+        )
+        error = (1 - self.reliability) * np.exp(-weeks_ahead / MATCH_FADING_GW)
+        return float(persistence * (self.reliability + error))
+
+
+WHOLE = Persistence(difference_mm=np.inf, lasting=1.0)
+"""All of an individual difference is kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """The positions (w + 1, n, 3) in mm of a mesh at its start and at w later weeks,
+    and the table `kept`: week, smooth_share and finer_share of the individual
+    difference, and its difference_mm at the start."""
+
+    positions: Floats
+    kept: pd.DataFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +114,9 @@ class Prediction:
     A path through the `shapes`, stops included, also gives those at the weeks
     `between`. The baselines are simpler predictions of the boundary's vertices (m, 3):
     `atlas`, the atlas' own brain, and `atlas_deformed`, that brain with the whole
-    individual difference.
+    individual difference. `kept` is the table of `Expectation` for the weeks of the
+    atlas, `placed` (m, 3) the boundary's vertices on the atlas' brain of each stated
+    week.
     """
 
     weeks: list[float]
@@ -63,6 +125,8 @@ class Prediction:
     between: list[float]
     baselines: Mapping[str, list[Floats]]
     ages: AtlasAges
+    kept: pd.DataFrame
+    placed: Mapping[float, Floats]
 
 
 def place_in_atlas(
@@ -101,14 +165,16 @@ def expected_positions(
     *,
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
     fading_gw: float = FADING_GW,
-) -> Floats:
-    """Return the (w + 1, n, 3) positions in mm of a mesh at its start and those
-    predicted for w later weeks.
+    lasting: float = LASTING,
+    keep_all: bool = False,
+) -> Expectation:
+    """Predict the positions of a mesh for w later weeks.
 
     The brain moves as the atlas does from the atlas' shape at the start week. Its
-    individual difference from the atlas grows in proportion to the size as far as it is
-    smooth (SD `smoothing_mm`; all of it with 0); finer differences fade with the time
-    constant `fading_gw`.
+    individual difference from the atlas grows in proportion to the size and is kept
+    with the weight of `Persistence`, of which `lasting` is a part. Differences that are
+    finer than the smooth ones (SD `smoothing_mm`; none with 0) also fade with the time
+    constant `fading_gw`. `keep_all` keeps all of the smooth difference for ever.
 
     `mesh` is that of the start brain in mm, `atlas` (k, n, 3) the positions of its
     vertices in the atlas' k ascending `atlas_weeks`.
@@ -140,14 +206,22 @@ def expected_positions(
     difference = mesh.vertices - start
     smooth = diffuse(mesh.vertices, pieces, difference, smoothing_mm)
     size = cell_sizes(start, pieces).sum()
+    boundary, used = boundary_surface(mesh)
+    squares = (smooth[used] ** 2).sum(axis=1)
+    difference_mm = np.sqrt(np.average(squares, weights=vertex_areas(boundary)))
+    persistence = WHOLE if keep_all else Persistence(float(difference_mm), lasting)
     positions = [mesh.vertices]
+    kept = []
     for week in weeks:
         places = positions_at(week, atlas, atlas_weeks, sizes)
         scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
-        fading = np.exp((start_week - week) / fading_gw)
-        remaining = smooth + fading * (difference - smooth)
+        smooth_share = persistence.weight(week - start_week)
+        finer_share = smooth_share * float(np.exp((start_week - week) / fading_gw))
+        remaining = smooth_share * smooth + finer_share * (difference - smooth)
         positions.append(aligned(places, start) + scale * remaining)
-    return np.stack(positions)
+        kept.append((week, smooth_share, finer_share, difference_mm))
+    columns = ["week", "smooth_share", "finer_share", "difference_mm"]
+    return Expectation(np.stack(positions), pd.DataFrame(kept, columns=columns))
 
 
 def predict_shapes(
@@ -161,9 +235,10 @@ def predict_shapes(
     *,
     further_weeks: Sequence[float] = (),
     age_shift_gw: float = 0.0,
-    norm_ml: Sequence[float] | Floats = (),
+    others: Sequence[Mapping[float, float]] = (),
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
     fading_gw: float = FADING_GW,
+    lasting: float = LASTING,
     open_sulci: bool = False,
 ) -> Prediction:
     """Predict the shapes of a mesh from its week to that of the atlas after the end
@@ -176,13 +251,13 @@ def predict_shapes(
     and the path ends two weeks of the atlas after the end: so a shape does not depend
     on what else is predicted.
 
-    `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm`
-    and `fading_gw` vary in an ensemble; `norm_ml` as for `ages_by_size`.
+    `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm`,
+    `fading_gw` and `lasting` vary in an ensemble; `others` as for `ages_by_size`.
     """
     atlas_brain = path.mesh(pair_week)
     inside = place_in_atlas(mesh, pair, atlas_brain, make_body, open_sulci=open_sulci)
     carried = path.carry(inside, pair_week)
-    ages = path.ages(norm_ml)
+    ages = path.ages(others)
     grown = resample_by_size(mesh, carried, ages.weeks, ages, path.knots(ages))
     atlas_weeks = ages.weeks - age_shift_gw
     is_later = atlas_weeks > start_week + MIN_AGE_SPACING_GW
@@ -196,13 +271,14 @@ def predict_shapes(
         later,
         smoothing_mm=smoothing_mm,
         fading_gw=fading_gw,
+        lasting=lasting,
     )
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
     body = make_body(mesh)
     shapes = [WeekShape(start_week, mesh.vertices)]
     _, used = boundary_surface(mesh)
     misfits_mm = {}
-    for week, shape in zip(later, expected[1:], strict=True):
+    for week, shape in zip(later, expected.positions[1:], strict=True):
         body.move_to(shape)
         shapes += with_stops(shapes[-1], week, body)
         reached = shapes[-1].positions[used]
@@ -227,12 +303,17 @@ def predict_shapes(
         atlas_weeks,
         weeks[1:],
         smoothing_mm=0,
-        fading_gw=fading_gw,
-    )
+        keep_all=True,
+    ).positions
     atlas = [positions_at(week, carried, path.shapes.weeks, sizes) for week in weeks]
     baselines = {
         "atlas": [places[used] for places in atlas],
         "atlas_deformed": [places[used] for places in deformed],
     }
     positions = np.stack([by_week[week] for week in weeks])
-    return Prediction(weeks, positions, found, between, baselines, ages)
+    placed = {}
+    for number in path.observed:
+        placed[float(path.shapes.weeks[number])] = carried[number][used]
+    return Prediction(
+        weeks, positions, found, between, baselines, ages, expected.kept, placed
+    )

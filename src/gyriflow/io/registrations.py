@@ -70,7 +70,9 @@ class WeeklyShapes:
 
     `positions` (w, n, 3) are in mm, in any pose; `sizes` ("area_cm2", "volume_ml":
     (w,)) those of the boundary; `surfaces` by name w arrays (m, 3), in mm, of simpler
-    predictions of it. `ages` is the table of an atlas' ages by size, if used. `stops`
+    predictions of it. `ages` is the table of an atlas' ages by size, if used, `kept`
+    that of the individual difference that a prediction keeps; `placed` has for each
+    stated week of the atlas the boundary's places (m, 3) on its brain. `stops`
     are weeks without an observed brain, `between` those on the path through the others.
     `tets` are the elements of a mesh without a file. `made_from` stands for everything
     that an atlas' path is made from.
@@ -85,6 +87,8 @@ class WeeklyShapes:
     between: Sequence[float] = ()
     tets: NDArray[np.int64] | None = None
     made_from: str = ""
+    kept: pd.DataFrame | None = None
+    placed: Mapping[float, Floats] = field(default_factory=dict)
 
     @property
     def passed(self) -> NDArray[np.integer]:
@@ -107,7 +111,7 @@ class WeeklyShapes:
 
 def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
     """Write the data sets weeks, stops, between, positions, tets, sizes/{name},
-    surfaces/{name} and ages/{column}.
+    surfaces/{name}, placed/{week}, ages/{column} and kept/{column}.
 
     `made_from` is an attribute of the file.
     """
@@ -121,6 +125,8 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
         places = {"positions": shapes.positions} | {
             f"surfaces/{name}": at for name, at in shapes.surfaces.items()
         }
+        for week, at in shapes.placed.items():
+            places[f"placed/{week!r}"] = at
         for name, values in places.items():
             file.create_dataset(
                 name,
@@ -134,9 +140,10 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
             )
         for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
-        if shapes.ages is not None:
-            for column in shapes.ages:
-                file[f"ages/{column}"] = shapes.ages[column].to_numpy(dtype=np.float64)
+        for group, table in {"ages": shapes.ages, "kept": shapes.kept}.items():
+            if table is not None:
+                for column in table:
+                    file[f"{group}/{column}"] = table[column].to_numpy(dtype=np.float64)
         file.attrs["made_from"] = shapes.made_from
 
 
@@ -152,11 +159,15 @@ def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
             name: list(at[:].astype(np.float64))
             for name, at in file.get("surfaces", {}).items()
         }
-        ages = (
-            pd.DataFrame({name: values[:] for name, values in file["ages"].items()})
-            if "ages" in file
-            else None
-        )
+        placed = {
+            float(week): at[:].astype(np.float64)
+            for week, at in file.get("placed", {}).items()
+        }
+        tables = {}
+        for group in ("ages", "kept"):
+            if group in file:
+                columns = {name: values[:] for name, values in file[group].items()}
+                tables[group] = pd.DataFrame(columns)
         positions = file["positions"][:].astype(np.float64)
         stops, between = (file[name][:].tolist() for name in ("stops", "between"))
         tets = file["tets"][:] if "tets" in file else None
@@ -166,11 +177,13 @@ def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
             positions,
             sizes,
             surfaces,
-            ages,
+            tables.get("ages"),
             stops,
             between,
             tets,
             made_from,
+            tables.get("kept"),
+            placed,
         )
 
 

@@ -201,17 +201,16 @@ class CohortNorms:
     individuals: bool
     made_with: Mapping[str, Any]
 
-    def volumes_ml(self, weeks: Sequence[float]) -> Floats:
-        """Return the median volumes (k,) of whole brains in mL at weeks, NaN outside
-        those of the norm."""
+    def volumes_by_week(self, weeks: Sequence[float] | Floats) -> dict[float, float]:
+        """Return the median volumes of whole brains in mL at those of some weeks that
+        the norm has."""
         if ("whole", "volume") not in self.norms:
-            return np.full(len(weeks), np.nan)
+            return {}
         _, norm = self.norms["whole", "volume"]
         wanted = np.asarray(weeks, dtype=float)
-        known = wanted.clip(norm.first, norm.last)
+        known = wanted[(norm.first <= wanted) & (wanted <= norm.last)]
         medians = norm.values(known, 0.0)
-        medians[known != wanted] = np.nan
-        return medians
+        return dict(zip(known.tolist(), medians.tolist(), strict=True))
 
     @property
     def plain(self) -> dict[str, Any]:

@@ -35,6 +35,8 @@ from .tables import (
     brain_table,
     centile_text,
     html_table,
+    kept_sentence,
+    kept_table,
     predicted_table,
     range_text,
 )
@@ -202,6 +204,9 @@ def study_page(
             "numbers": html_table(numbers),
             "accuracy_table": html_table(accuracy),
         }
+        kept = prediction["kept"]
+        prediction["kept_table"] = html_table(kept_table(kept, prediction["week"]))
+        prediction["kept_sentence"] = kept_sentence(kept, prediction["week"])
         prediction["individuals"] = norm if has_centiles else ""
     centiles = centiles[centiles["run"] == OBSERVED]
     own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]

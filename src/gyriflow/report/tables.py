@@ -82,6 +82,14 @@ MESH_MEASURES = {
 }
 """Measures of mesh quality, with their labels."""
 
+ATLAS_ALONE = 0.2
+"""Share of the individual difference below which a prediction is called nearly the
+atlas' own brain."""
+ERROR_HEAD = "error of such predictions, of averages"
+INTERVAL_HEAD = "interval of ensemble and tests of averages"
+"""Columns of `predicted_table`. The tested brains are averages of many fetuses, which
+says little of a single one."""
+
 
 def _named(rows: pd.DataFrame) -> pd.Series:
     """Return the title of each row's metric, with its unit."""
@@ -414,7 +422,7 @@ def predicted_table(
                 .set_index("name")
             )
             ends = zip(last["low"], last["high"], strict=True)
-            columns["interval of ensemble and tests"] = pd.Series(
+            columns[INTERVAL_HEAD] = pd.Series(
                 [f"{a:.4g} to {b:.4g}" for a, b in ends], last.index
             )
     predicted, atlas_brain = (columns[head] for head in list(brains)[1:])
@@ -425,8 +433,45 @@ def predicted_table(
         metric_title(metric): text
         for metric, text in prediction["tests"]["errors"].items()
     }
-    columns["error of such predictions"] = predicted.index.to_series().map(errors)
+    columns[ERROR_HEAD] = predicted.index.to_series().map(errors)
     return pd.DataFrame(columns).reindex(predicted.index).rename_axis("metric")
+
+
+def kept_table(kept: pd.DataFrame, end_week: float) -> pd.DataFrame:
+    """Return how much of the individual difference a prediction keeps: a row per week
+    of the atlas up to the first one from `end_week` on.
+
+    `kept` has week, smooth_share and finer_share of that difference
+    (`growth.expected.Expectation`).
+    """
+    last = int(np.searchsorted(kept["week"], end_week - 1e-6)) + 1
+    rows = kept.head(last)
+    percent = {
+        "smooth difference kept (w)": 100 * rows["smooth_share"],
+        "finer differences kept": 100 * rows["finer_share"],
+    }
+    table = pd.DataFrame(percent).round().astype(int).astype(str) + " %"
+    return table.set_index(rows["week"].map(week_label).rename("predicted for"))
+
+
+def kept_sentence(kept: pd.DataFrame, end_week: float) -> str:
+    """Describe how much of the individual difference a prediction keeps."""
+    weeks = kept["week"].to_numpy()
+    smooth = np.interp(end_week, weeks, kept["smooth_share"])
+    finer = np.interp(end_week, weeks, kept["finer_share"])
+    difference_mm = kept["difference_mm"].iloc[0]
+    words = (
+        f"The start differs from the atlas at its week by {difference_mm:.2f} mm (root"
+        f" mean square, smoothed). Of this {100 * smooth:.0f} % is kept at"
+        f" {week_label(end_week)}, and {100 * finer:.0f} % of finer differences; the"
+        " rest of the prediction is the atlas."
+    )
+    if smooth < ATLAS_ALONE:
+        words += (
+            " So small a difference is hardly more than the error of the match, and the"
+            " prediction is nearly the atlas' own brain with the same volume curve."
+        )
+    return words
 
 
 def accuracy_table(accuracy: Mapping[str, Any]) -> pd.DataFrame:

@@ -27,7 +27,8 @@ class Variation:
     `number` counts the members from 0, `seed` is the random seed of the label
     perturbation, `registration_smoothing` a factor of the registration's smoothing.
     Predictions only: `age_shift_gw` is added to the start brain's age; for
-    `difference_smoothing_mm` and `fading_gw` see `growth.expected`.
+    `difference_smoothing_mm`, `fading_gw` and `lasting` see `growth.expected`; the
+    last is from 0 to 1, since no measurement says how much lasts.
     """
 
     number: int
@@ -36,6 +37,7 @@ class Variation:
     age_shift_gw: float
     difference_smoothing_mm: float
     fading_gw: float
+    lasting: float
 
 
 def variations(members: int) -> list[Variation]:
@@ -55,6 +57,7 @@ def variations(members: int) -> list[Variation]:
     smoothing = between(*SMOOTHING_RANGE)
     difference_mm = between(*DIFFERENCE_RANGE_MM)
     fading_gw = between(*FADING_RANGE_GW)
+    lasting = quantiles()
     return [
         Variation(
             number=number,
@@ -63,6 +66,7 @@ def variations(members: int) -> list[Variation]:
             age_shift_gw=round(age_shift_gw[number], 2),
             difference_smoothing_mm=float(difference_mm[number]),
             fading_gw=float(fading_gw[number]),
+            lasting=round(float(lasting[number]), 2),
         )
         for number in range(members)
     ]

@@ -23,6 +23,7 @@ PLACE = "results/{where}"
 PUBLISHED = str(SHIPPED / "workflow" / "published" / "fetalfoldsim.yaml")
 """Values reported by the paper."""
 PREDICTION_TESTS = str(SHIPPED / "norms" / "predictions.yaml")
+NORMAL_VOLUMES = str(SHIPPED / "norms" / "volumes.yaml")
 """Accuracy of predictions of brains with a later scan."""
 
 
@@ -57,6 +58,12 @@ def folded_of(*sides: Side) -> dict[str, str]:
     thickness."""
     folder = f"{RUN}/surfaces/{WEEK}"
     return {**surfaces_in(folder, sides), "thickness": f"{folder}/thickness.shape.gii"}
+
+
+def fine_of(*sides: Side) -> dict[str, str]:
+    """Return the surfaces of a predicted brain at a week with the resolution of
+    observed brains."""
+    return surfaces_in(f"{RUN}/surfaces/{WEEK}/fine", sides)
 
 
 def measures_in(folder: str, *sides: Side) -> dict[str, str]:

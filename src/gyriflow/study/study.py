@@ -37,6 +37,10 @@ from .records import (
 from .series import PATH
 from .tables import read_rows, write_changed, write_rows
 
+MAX_AGE_OFF_GW = 2.0
+"""Difference between the stated week of an atlas' brain and its age by size up to which
+the brain may be the nearest to a predicted week."""
+
 
 @dataclass(frozen=True)
 class Study:
@@ -218,6 +222,38 @@ class Study:
             if simulation.is_atlas_prediction:
                 return simulation
         return None
+
+    def has_fine_surfaces(self, simulation: Simulation) -> bool:
+        """Return whether a simulation is measured and compared by surfaces with the
+        resolution of observed brains: a prediction of a brain with both
+        hemispheres."""
+        start = self.brains[simulation.brain]
+        return simulation.is_atlas_prediction and start.sides == SIDES
+
+    def measured_parts(self, row: MeasuredBrain) -> dict[str, str]:
+        """Return the surfaces that a brain is measured and compared by: whole, left,
+        right."""
+        simulation = self.simulations.get((row.run, row.id))
+        if simulation is None or not self.has_fine_surfaces(simulation):
+            return row.parts
+        parts = paths.fine_of(*row.sides)
+        return {
+            name: simulation.file(file, week=row.week) for name, file in parts.items()
+        }
+
+    def age_shift_gw(self, simulation: Simulation) -> float:
+        """Return by how much a start brain is older than stated, in an ensemble."""
+        variation = self.chains[simulation.brain, str(simulation.chain)].variation
+        return variation.age_shift_gw if variation else 0.0
+
+    def atlas_brains_near(self, simulation: Simulation, week: float) -> list[Brain]:
+        """Return the brains of a prediction's atlas that may have the age of a week,
+        those within `MAX_AGE_OFF_GW` of it or else the nearest."""
+        assert simulation.chain is not None
+        path = self.paths[str(self.chains[simulation.brain, simulation.chain].path)]
+        brains = self.brains_of(path)
+        near = [brain for brain in brains if abs(brain.week - week) <= MAX_AGE_OFF_GW]
+        return near or [closest(brains, week)]
 
     def atlas_brain(self, simulation: Simulation) -> Brain:
         """Return the brain of a prediction's atlas that is closest in week to its
@@ -440,7 +476,7 @@ class Study:
             # the population whose growth was used
             "population": atlas_brain.population_name,
             "atlas": used and used.atlas.model_dump(include=atlas_keys),
-            "surfaces": [*last.parts.values()],
+            "surfaces": [*self.measured_parts(last).values()],
             "atlas_surface": self.atlas_surface(simulation),
             "labels": labels,
         }

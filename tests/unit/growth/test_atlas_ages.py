@@ -8,9 +8,12 @@ from shapes import ellipsoid_mesh
 from gyriflow.growth.atlas_path import (
     MIN_AGE_SPACING_GW,
     ages_by_size,
+    other_volumes,
     resample_by_size,
 )
 from gyriflow.growth.series_shapes import sizes_of
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.shipped import SHIPPED
 
 WEEKS = np.arange(21.0, 33.0)
 SMOOTH = 60 * np.exp(0.1 * (WEEKS - 21) - 0.002 * (WEEKS - 21) ** 2)
@@ -40,17 +43,25 @@ def test_a_week_that_jumps_in_size_is_taken_for_the_age_of_its_size():
     assert (np.diff(ages.ages) >= MIN_AGE_SPACING_GW - 1e-9).all()
 
 
-def test_the_curve_also_follows_the_norm_where_it_has_volumes():
-    weeks = np.arange(22.0, 31.0)
-    small = 50 * np.exp(0.12 * (weeks - 22))
-    norm = np.where(weeks < 29, 1.2 * small, np.nan)
-    found = ages_by_size(weeks, small, norm)
-    assert found.volume(25) == pytest.approx(np.sqrt(1.2) * small[3], rel=0.02)
-    # a brain that is smaller than the curve is younger
-    assert found.ages[3] == pytest.approx(25 - np.log(1.2) / 2 / 0.12, abs=0.1)
-    assert ages_by_size(weeks, small, np.full(len(weeks), np.nan)).volume(
-        25
-    ) == pytest.approx(small[3], rel=0.01)
+def test_one_growth_is_that_of_all_populations_and_the_level_that_of_the_atlas():
+    weeks = np.arange(22.0, 35.0)
+    true = 50 * np.exp(0.12 * (weeks - 22) - 0.002 * (weeks - 22) ** 2)
+    # one atlas grows more slowly by 6 % in all, and the other as much faster
+    slow = true * np.exp(-0.06 * (weeks - 22) / 12)
+    fast = 1.5 * true * np.exp(0.06 * (weeks - 22) / 12)
+    # known in other weeks too
+    larger = dict(zip(weeks.tolist(), fast.tolist(), strict=True))
+    others = [larger | {20.0: 1.0, 40.0: 1000.0}]
+    found = ages_by_size(weeks, slow, others)
+    wanted = true[11] / true[1]
+    assert found.volume(33) / found.volume(23) == pytest.approx(wanted, rel=0.01)
+    middle = (weeks == 28).argmax()
+    assert found.volume(28) == pytest.approx(slow[middle], rel=0.02)
+    assert found.curve.weeks[[0, -1]].tolist() == [22.0, 34.0]
+    # whatever level the others have
+    tenth = [{week: 0.1 * volume for week, volume in others[0].items()}]
+    again = ages_by_size(weeks, slow, tenth)
+    assert again.curve.values == pytest.approx(found.curve.values, rel=1e-6)
 
 
 def test_shape_follows_the_ages_and_size_the_curve():
@@ -104,3 +115,15 @@ def test_the_first_brain_keeps_its_weight_and_ages_far_from_the_stated_ones_are_
     late = weeks[np.abs(jumping.ages - weeks) > 1.0]
     assert [Facts(f"{week:g} GW") == caplog.text for week in late] == [True] * len(late)
     assert len(late) > 0
+
+
+def test_the_volumes_of_other_populations_are_read_without_those_left_out():
+    content = {
+        "sources": {
+            "crl": {"volume_ml": {21: 51.9, 22: 60.3}},
+            "chinese": {"volume_ml": {22: 60.1}},
+        }
+    }
+    assert other_volumes(content, ["crl", "mine"]) == [{22.0: 60.1}]
+    shipped = read_yaml(SHIPPED / "norms" / "volumes.yaml")
+    assert [len(volumes) for volumes in other_volumes(shipped, [])] == [18, 14]

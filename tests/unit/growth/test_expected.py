@@ -28,6 +28,9 @@ from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_area
 from gyriflow.growth.atlas_path import AtlasPath, resample_by_size
 from gyriflow.growth.expected import (
     FADING_GW,
+    LASTING_GW,
+    WHOLE,
+    Persistence,
     expected_positions,
     place_in_atlas,
     predict_shapes,
@@ -222,7 +225,7 @@ def without_pose(found, wanted, mesh=BALL):
 
 def test_a_brain_that_is_the_atlas_ends_as_the_atlas():
     plain, posed = atlas_of(BALL.vertices)
-    positions = expected_positions(BALL, 22.0, posed, WEEKS, WEEKS[1:])
+    positions = expected_positions(BALL, 22.0, posed, WEEKS, WEEKS[1:]).positions
     assert positions[0] == pytest.approx(BALL.vertices)
     for found, wanted in zip(positions, plain, strict=True):
         assert without_pose(found, wanted) < 1e-6
@@ -234,12 +237,15 @@ def test_a_brain_between_two_weeks_has_gone_a_part_of_the_way():
     places = BALL.vertices * [1.0, 1.2, 0.9]
     atlas = np.stack([places * (1 + 0.1 * (week - 22)) for week in WEEKS])
     start = TetrahedralMesh(places * 1.04, BALL.tets)
-    positions = expected_positions(start, 22.4, atlas, WEEKS, [23.0, 23.5, 24.0])
+    weeks = [23.0, 23.5, 24.0]
+    positions = expected_positions(start, 22.4, atlas, WEEKS, weeks).positions
     for found, factor in zip(positions[1:], (1.1, 1.15, 1.2), strict=True):
         assert without_pose(found, places * factor) < 1e-6
     # as of the week before it would be a brain too large, all its life
-    early = expected_positions(start, 22.0, atlas, WEEKS, [24.0], smoothing_mm=0)[-1]
-    assert early == pytest.approx(1.04 * 1.2 * places, abs=1e-6)
+    early = expected_positions(
+        start, 22.0, atlas, WEEKS, [24.0], smoothing_mm=0, keep_all=True
+    )
+    assert early.positions[-1] == pytest.approx(1.04 * 1.2 * places, abs=1e-6)
 
 
 def test_small_bumps_of_a_brain_fade_wherever_the_atlas_begins_and_its_size_stays():
@@ -251,7 +257,10 @@ def test_small_bumps_of_a_brain_fade_wherever_the_atlas_begins_and_its_size_stay
     for first in (20.0, 22.0):
         weeks = np.arange(first, 24.1)
         atlas = np.stack([mesh.vertices * (1 + 0.1 * (week - 22)) for week in weeks])
-        found.append(expected_positions(start, 22.0, atlas, weeks, WEEKS[1:]))
+        expected = expected_positions(
+            start, 22.0, atlas, weeks, WEEKS[1:], keep_all=True
+        )
+        found.append(expected.positions)
     assert found[0] == pytest.approx(found[1], abs=1e-9)
     left = [
         np.sqrt(((at - a) ** 2).mean()) for at, a in zip(found[1], atlas, strict=True)
@@ -267,7 +276,36 @@ def test_a_brain_before_or_after_the_atlas_is_refused(week):
         expected_positions(BALL, week, np.stack([BALL.vertices] * 3), WEEKS, [26.0])
     assert expected_positions(
         BALL, 21.0, np.stack([BALL.vertices] * 3), WEEKS, WEEKS
-    ) == pytest.approx(np.stack([BALL.vertices] * 4))
+    ).positions == pytest.approx(np.stack([BALL.vertices] * 4))
+
+
+def test_a_real_difference_is_kept_as_far_as_it_lasts_and_an_error_is_not():
+    atlas = np.stack([BALL.vertices] * 2)
+    # 1.5 mm at the surface of a ball of 20 mm, and 0.15 mm
+    for factor, low, high in ((1.075, 0.75, 0.95), (1.0075, 0.0, 0.14)):
+        start = TetrahedralMesh(BALL.vertices * factor, BALL.tets)
+        found = expected_positions(
+            start, 22.0, atlas, [22.0, 40.0], [24.0, 28.0], smoothing_mm=0
+        )
+        at_2, at_6 = found.kept["smooth_share"]
+        assert low <= at_6 < at_2 <= high
+        for places, share in zip(found.positions, (1.0, at_2, at_6), strict=True):
+            scale = 1 + (factor - 1) * share
+            assert places == pytest.approx(BALL.vertices * scale, abs=1e-6)
+        finer = found.kept["finer_share"] / found.kept["smooth_share"]
+        assert finer.tolist() == pytest.approx(np.exp([-2 / FADING_GW, -6 / FADING_GW]))
+
+
+def test_persistence_is_reliability_times_what_lasts():
+    known = Persistence(0.6, lasting=0.4, match_error_mm=0.3)
+    assert known.reliability == pytest.approx(0.75)
+    assert known.weight(0.0) == pytest.approx(1.0)
+    assert known.weight(1000.0) == pytest.approx(0.75 * 0.4)
+    assert known.weight(8.0) == pytest.approx(
+        (0.4 + 0.6 * np.exp(-8 / LASTING_GW)) * (0.75 + 0.25 * np.exp(-8.0))
+    )
+    assert Persistence(0.2).weight(12.0) < 1e-5
+    assert WHOLE.weight(12.0) == 1.0
 
 
 def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
@@ -323,8 +361,14 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     assert size(known - wanted) > 0.5 * size(wanted)
     for smoothing_mm, least, most in ((0.0, 0.0, 0.05), (8.0, 0.05, 0.1)):
         positions = expected_positions(
-            mesh, 22.0, carried, [22.0, 23.0], [23.0], smoothing_mm=smoothing_mm
-        )
+            mesh,
+            22.0,
+            carried,
+            [22.0, 23.0],
+            [23.0],
+            smoothing_mm=smoothing_mm,
+            keep_all=True,
+        ).positions
         found = growth(x, positions[1])
         assert least * size(wanted) <= size(found - wanted) < most * size(wanted)
 
@@ -466,7 +510,7 @@ def test_a_brain_that_is_older_than_stated_grows_as_one_of_that_age(prediction):
 
 
 def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(prediction):
-    start, found = prediction(25.0, further_weeks=[24.5])
+    start, found = prediction(25.0, further_weeks=[24.5], lasting=1.0)
     assert found.shapes.weeks == [22.3, 23.0, 24.0, 25.0, 26.0]
     volumes = sizes_of(start, found.shapes.positions)["volume_ml"]
     wanted = np.array(
@@ -475,8 +519,8 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
             for week in found.shapes.weeks
         ]
     )
-    # a part of the difference in size is smoothed away
-    assert volumes / volumes[0] == pytest.approx(wanted / wanted[0], rel=0.04)
+    # a part of the difference in size is smoothed away, and a part taken for an error
+    assert volumes / volumes[0] == pytest.approx(wanted / wanted[0], rel=0.06)
     assert set(found.baselines) == {"atlas", "atlas_deformed"}
     assert found.weeks == [22.3, 23.0, 24.0, 24.5, 25.0, 26.0]
     boundary, _ = boundary_surface(start)
@@ -491,7 +535,7 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
     )
     # the atlas' own brain is smaller by 5 % in each direction, the one with the whole
     # difference is not
-    assert deformed[[0, 1, 2, 4, 5]] == pytest.approx(volumes, rel=0.04)
+    assert deformed[[0, 1, 2, 4, 5]] == pytest.approx(volumes, rel=0.06)
     assert own[1] / deformed[1] == pytest.approx(1.05**-3, rel=0.03)
     assert (cell_sizes(found.positions[3], start.tets) > 0).all()
 

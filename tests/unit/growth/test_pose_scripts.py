@@ -356,6 +356,7 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
         "path": "path.h5",
         "reports": ["brain.json", "atlas.json"],
         "norms": None,
+        "volumes": None,
     }
     inputs |= {"correspondence": ["pair.h5"]}
     params = {
@@ -363,12 +364,17 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
         "further_weeks": [],
         "opens_sulci": False,
         "variation": None,
+        "left_out": ["crl"],
     }
     params |= {"start_week": 22.0, "end_week": 23.0, "atlas_week": 22.0}
     run_script("predicted_targets.py", tmp_path, inputs, {0: "found.h5"}, params)
     found = read_weekly_shapes(tmp_path / "found.h5")
     assert found.weeks.tolist() == [22.0, 23.0, 24.0]
     assert found.positions[0] == pytest.approx(start.vertices, abs=1e-3)
+    assert found.kept["week"].tolist() == [23.0, 24.0]
+    assert (found.kept["finer_share"] < found.kept["smooth_share"]).all()
+    # on all brains of the atlas
+    assert list(found.placed) == [21.0, 22.0, 23.0, 24.0, 25.0]
     volumes = found.sizes["volume_ml"]
     assert volumes / volumes[0] == pytest.approx(
         1.04 ** (3 * (found.weeks - 22.0)), rel=0.01
@@ -376,7 +382,13 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
     if posed == (False, False):
         # a member: older than stated, so it grows as one of the atlas half a week later
         varied = Variation(
-            0, 1, 1.0, age_shift_gw=0.5, difference_smoothing_mm=8.0, fading_gw=4.0
+            0,
+            1,
+            1.0,
+            age_shift_gw=0.5,
+            difference_smoothing_mm=8.0,
+            fading_gw=4.0,
+            lasting=0.5,
         )
         run_script(
             "predicted_targets.py",

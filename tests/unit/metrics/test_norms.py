@@ -420,12 +420,10 @@ def test_a_norm_gives_median_volumes_within_its_weeks() -> None:
     whole = metrics.assign(
         metric="volume", hemisphere="whole", person=metrics["subject"]
     )
-    found = cohort_norms(whole, reference).volumes_ml([21.0, 24.0, 30.0])
-    assert found[1:] == pytest.approx([480, 600], rel=0.02)
-    assert np.isnan(found[0])
-    assert np.isnan(
-        cohort_norms(whole.assign(metric="area"), reference).volumes_ml([24.0])
-    ).all()
+    found = cohort_norms(whole, reference).volumes_by_week([21.0, 24.0, 30.0])
+    assert found == pytest.approx({24.0: 480, 30.0: 600}, rel=0.02)
+    area = cohort_norms(whole.assign(metric="area"), reference)
+    assert area.volumes_by_week([24.0]) == {}
 
 
 def test_norms_are_of_subjects_and_not_of_their_scans() -> None:

@@ -312,6 +312,14 @@ def foretold(weeks: float) -> dict:
             "starts": ["crl 22 GW"],
             "advantage": "",
         },
+        "kept": pd.DataFrame(
+            {
+                "week": [23.0, 30.0, 34.0],
+                "smooth_share": [0.9, 0.6, 0.5],
+                "finer_share": [0.7, 0.1, 0.0],
+                "difference_mm": 0.71,
+            }
+        ),
         "surfaces": ["results/a.surf.gii"],
         "atlas_surface": "results/atlas.surf.gii",
         "labels": "results/a_dseg.nii.gz",
@@ -335,6 +343,7 @@ def test_the_report_of_a_prediction_says_what_it_is_how_accurate_and_in_which_fi
         str(escape(accuracy_sentence(foretold(7.5)))),
         "210.5",
         "largest error in 4 tests",
+        "0.71 mm",
         "crl 22 GW",
         "norms/predictions.yaml",
         "results/a.surf.gii",

@@ -13,6 +13,8 @@ from gyriflow.report.tables import (
     accuracy_table,
     centile_text,
     html_table,
+    kept_sentence,
+    kept_table,
     mesh_quality,
     metrics_table,
     predicted_table,
@@ -101,7 +103,7 @@ def test_a_predicted_brain_is_between_its_start_and_the_atlas_brain_nearest_in_w
         Facts("29.9 GW"),
         Facts("30 GW"),
         Facts("%"),
-        "error of such predictions",
+        Facts("error", "averages"),
     ]
     assert found.loc["pial area (cm²)"].tolist() == [
         100.0,
@@ -161,6 +163,24 @@ def test_what_predictions_were_worth_stands_by_horizon_with_what_the_starts_span
         ("volume (%)", "–"),
         (SIMPLER_PREDICTIONS["atlas"], Facts("0.50", "0.70 mm", "r", "0.40")),
     ]
+
+
+def test_what_a_prediction_keeps_is_said_up_to_its_end():
+    kept = pd.DataFrame(
+        {
+            "week": [24.0, 26.0, 28.0],
+            "smooth_share": [0.8, 0.6, 0.5],
+            "finer_share": [0.4, 0.2, 0.1],
+            "difference_mm": 0.9,
+        }
+    )
+    table = kept_table(kept, 25.0)
+    assert table.index.tolist() == ["24 GW", "26 GW"]
+    assert table.to_numpy().tolist() == [["80 %", "40 %"], ["60 %", "20 %"]]
+    assert Facts("0.90 mm", "25 GW", "70 %", "30 %") == kept_sentence(kept, 25.0)
+    assert "error of the match" not in kept_sentence(kept, 25.0)
+    small = kept.assign(smooth_share=0.1)
+    assert "error of the match" in kept_sentence(small, 25.0)
 
 
 def test_runs_table_puts_what_differs_first():

@@ -17,6 +17,7 @@ INPUTS = (
     "registration_smoothing",
     "difference_smoothing_mm",
     "fading_gw",
+    "lasting",
 )
 
 
@@ -38,7 +39,8 @@ def test_members_differ_in_each_input_by_itself():
 
 
 def test_each_input_fills_its_range():
-    shifts, *factors = values_of(64).T
+    shifts, *factors, lasting = values_of(64).T
+    assert np.sort(lasting) == pytest.approx((np.arange(64) + 0.5) / 64, abs=0.02)
     # quantiles of a normal distribution, to two decimals
     assert shifts.mean() == pytest.approx(0.0, abs=0.02)
     assert shifts.std() == pytest.approx(AGE_SD_GW, rel=0.06)

@@ -414,10 +414,19 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         # a series of one's own is no atlas with a licence
         "population": "atlas",
         "atlas": None,
-        "surfaces": [f"{at}/pial.surf.gii"],
+        "surfaces": [f"{at}/fine/pial.surf.gii"],
         "atlas_surface": f"{at}/atlas.pial.surf.gii",
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
+    (simulation,) = found.run_simulations
+    # the brains that may have the age of a week, or the nearest one
+    near = [brain.id for brain in found.atlas_brains_near(simulation, 23.9)]
+    assert near == ["b22", "b23", "b24", "b25"]
+    assert [b.id for b in found.atlas_brains_near(simulation, 30.0)] == ["b25"]
+    # growth of the brain itself is measured on the mesh's surface
+    own = study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}})
+    row = own.rows_of(own.run_simulations[0])[-1]
+    assert own.measured_parts(row) == row.parts
     # no prediction is one that its own later brains explain, or a study of several runs
     assert (
         study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}}).prediction_facts

@@ -1,0 +1,91 @@
+"""Surfaces of predictions: observed ones, moved by a mesh that is coarser."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from facts import Facts
+from shapes import ellipsoid_mesh, rigid, sphere
+
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.matching import crossing_faces, nearest_on
+from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh, signed_volume
+from gyriflow.growth.fine_surfaces import (
+    ObservedSurface,
+    finer_share,
+    moved_surface,
+    nearest_in_age,
+)
+
+MESH = ellipsoid_mesh(8, (20.0, 20.0, 20.0))
+COARSE, USED = boundary_surface(MESH)
+
+
+def folded(height_mm=0.8):
+    """Return a fine surface with waves that the coarse mesh does not resolve."""
+    ball = sphere(20.0, 5)
+    x, y, z = ball.vertices.T
+    waves = np.sin(1.5 * x) * np.cos(1.5 * y) + np.sin(1.5 * z)
+    return TriangleMesh(
+        ball.vertices * (1 + height_mm * waves / 40)[:, None], ball.faces
+    )
+
+
+def grown(points):
+    """Grow (n, 3) points by a fifth, unevenly, and turn them."""
+    uneven = np.column_stack(
+        [
+            1.2 * points[:, 0] + 0.4 * np.sin(points[:, 1] / 9),
+            1.15 * points[:, 1],
+            1.25 * points[:, 2] + 0.3 * np.cos(points[:, 0] / 8),
+        ]
+    )
+    return transform_points(uneven, rigid(20, -10, 40, shift=(5.0, -3.0, 8.0)))
+
+
+def test_folds_finer_than_the_mesh_move_with_it():
+    fine = folded()
+    _, _, places = nearest_on(COARSE.vertices, fine)
+    boundary = TriangleMesh(grown(places), COARSE.faces)
+    moved = moved_surface(ObservedSurface(fine, places), boundary)
+    assert len(moved.vertices) == len(fine.vertices)
+    misses = np.linalg.norm(moved.vertices - grown(fine.vertices), axis=1)
+    assert misses.mean() < 0.25
+    # the body's volume, which is that of the coarser surface
+    assert signed_volume(moved) == pytest.approx(signed_volume(boundary))
+    assert signed_volume(moved) < 0.99 * signed_volume(fine) * 1.2 * 1.15 * 1.25
+    # the mesh itself cuts the folds off
+    missed_by_mesh, _, _ = nearest_on(grown(fine.vertices), boundary)
+    assert missed_by_mesh.mean() > 0.2
+
+
+def test_a_surface_that_would_cross_itself_is_that_of_the_mesh(caplog):
+    fine = folded()
+    _, _, places = nearest_on(COARSE.vertices, fine)
+    shaken = places + np.random.default_rng(0).normal(scale=60.0, size=places.shape)
+    # of one size, since only the displacements matter
+    boundary = TriangleMesh(shaken, COARSE.faces)
+    assert moved_surface(ObservedSurface(fine, places), boundary) is boundary
+    assert Facts("crosses itself", "mesh") == caplog.text
+    still = moved_surface(
+        ObservedSurface(fine, places), TriangleMesh(places, COARSE.faces)
+    )
+    assert crossing_faces(still) == crossing_faces(fine)
+    scale = np.cbrt(signed_volume(still) / signed_volume(fine))
+    assert 0.97 < scale < 1
+    assert still.vertices == pytest.approx(scale * fine.vertices, abs=0.02)
+
+
+def test_the_brain_of_the_nearest_age_is_moved_whatever_its_stated_week():
+    ages = pd.DataFrame(
+        {"stated_week": [22.0, 24.0, 25.0, 26.0], "age_by_size": [22, 23.6, 25.9, 26.8]}
+    )
+    assert nearest_in_age(ages, [24.0, 25.0, 26.0], 25.0) == 1
+    assert nearest_in_age(ages, [24.0, 25.0, 26.0], 24.5) == 0
+    assert nearest_in_age(ages, [25.0, 26.0], 26.5) == 1
+
+
+def test_the_share_of_finer_differences_begins_with_all_of_them():
+    kept = pd.DataFrame({"week": [24.0, 26.0], "finer_share": [0.6, 0.2]})
+    shares = [finer_share(kept, 22.0, week) for week in (22.0, 23.0, 24.0, 25.0, 30.0)]
+    assert shares == pytest.approx([1.0, 0.8, 0.6, 0.4, 0.2])
