@@ -347,7 +347,7 @@ def hint_for_missing(path: Path) -> str:
         return f"; {hint}"
     try:
         if path.is_symlink() and not path.exists():
-            if os.path.islink(path.resolve()):
+            if path.resolve().is_symlink():
                 return f"; it is a link to {path.readlink()}, which leads back to it"
             return f"; it is a link to {path.readlink()}, which does not exist"
         if path.is_dir():
