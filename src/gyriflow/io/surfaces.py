@@ -157,6 +157,13 @@ def read_hemispheres(
     for path, (_, _, structure), side in zip((left, right), read, SIDES, strict=True):
         _require_side(path, structure, side)
     meshes, spaces, _ = zip(*read, strict=True)
+    points = meshes[0].vertices, meshes[1].vertices
+    if points[0].shape == points[1].shape and np.allclose(*points, atol=1e-3):
+        raise InputError(
+            "both hemispheres have the same surface",
+            found=f"{left} and {right}",
+            expected="one file of the left and one of the right hemisphere",
+        )
     if spaces[0] != spaces[1]:
         words = " and ".join(
             f"{path} {space or 'no space'}"

@@ -262,6 +262,17 @@ def test_maps_and_labels_of_the_other_hemisphere_are_refused(tmp_path, ball):
         read_vertex_labels(tmp_path / "left.label.gii", "right")
 
 
+def test_one_surface_is_not_both_hemispheres(tmp_path, ball):
+    left, copy, other = (tmp_path / f"{name}.surf.gii" for name in "abc")
+    write_surface(left, ball)
+    write_surface(copy, ball)
+    write_surface(other, moved(ball, 40.0))
+    for right in (left, copy):
+        with pytest.raises(InputError, check=Facts(left, right, "same surface")):
+            read_hemispheres(left, right)
+    assert read_hemispheres(left, other)[2]
+
+
 def test_hemispheres_whose_files_name_different_spaces_are_told(tmp_path, ball, caplog):
     files = [
         in_spaces(tmp_path / "a.gii", ball, (U, SCANNER, TURN)),
