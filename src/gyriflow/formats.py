@@ -54,6 +54,10 @@ ALL_SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.all_suffixes)
 READ_COMPRESSED = tuple(suffix for suffix in ALL_SUFFIXES if suffix.endswith(".gz"))
 FOREIGN_VOLUME_SUFFIXES = (".nrrd", ".nhdr", ".mha", ".mhd", ".mnc", ".gipl")
 """Ends of names of volumes in formats that are not read."""
+FOREIGN_TABLE = re.compile(
+    r"(.*_)?(participants|sessions|scans)\.(xlsx?|ods|txt)", re.IGNORECASE
+)
+"""Names of tables of participants and sessions in formats that are not read."""
 
 
 CIFTI_NAME = re.compile(
@@ -114,6 +118,7 @@ GZIP_START = b"\x1f\x8b"
 TO_NIFTI = (
     "Save it as NIfTI (.nii.gz), for example with 3D Slicer, ITK-SNAP or SimpleITK."
 )
+TO_TABLE = "Save it as text separated by tabs (.tsv)."
 UNPACK = "Unpack it; a workbook of Excel has to be saved as text separated by tabs."
 FOREIGN_FORMATS = (
     ForeignFormat(rb"NRRD\d{4}", "an NRRD volume", TO_NIFTI),
@@ -126,11 +131,7 @@ FOREIGN_FORMATS = (
         "Convert the series to NIfTI, for example with dcm2niix.",
     ),
     ForeignFormat(rb"PK\x03\x04", "an Excel workbook or another ZIP archive", UNPACK),
-    ForeignFormat(
-        rb"\xd0\xcf\x11\xe0",
-        "an Excel workbook",
-        "Save it as text separated by tabs (.tsv).",
-    ),
+    ForeignFormat(rb"\xd0\xcf\x11\xe0", "an Excel workbook", TO_TABLE),
     ForeignFormat(
         rb"(?i)\s*(<!doctype html|<html)",
         "a web page",

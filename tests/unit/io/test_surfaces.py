@@ -187,14 +187,14 @@ def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
             read_surface(tmp_path / name, "left")
     # the matrix of a file is told once
     files = [
-        in_spaces(tmp_path / name, ball, (U, SCANNER, TURN))
-        for name in ("b.gii", "c.gii")
+        in_spaces(tmp_path / name, mesh, (U, SCANNER, TURN))
+        for name, mesh in (("b.gii", ball), ("c.gii", moved(ball, 30.0)))
     ]
     assert read_hemispheres(*files)[2]
     assert caplog.messages == [
         Facts(file, "NIFTI_XFORM_SCANNER_ANAT") for file in files
     ]
-    write_surface(tmp_path / "d.stl", ball)
+    write_surface(tmp_path / "d.stl", moved(ball, 30.0))
     assert not read_hemispheres(files[0], tmp_path / "d.stl")[2]
 
 
