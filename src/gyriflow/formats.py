@@ -5,6 +5,7 @@ Each format has a reader of its `name` in `io.surfaces` or `io.volumes`.
 """
 
 import re
+import zlib
 from dataclasses import dataclass
 from os import PathLike
 from typing import Literal, NamedTuple
@@ -50,6 +51,13 @@ VOLUME_SUFFIXES = tuple(
     suffix for form in FORMATS if form.content == "volume" for suffix in form.suffixes
 )
 ALL_SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.all_suffixes)
+READ_COMPRESSED = tuple(suffix for suffix in ALL_SUFFIXES if suffix.endswith(".gz"))
+FOREIGN_VOLUME_SUFFIXES = (".nrrd", ".nhdr", ".mha", ".mhd", ".mnc", ".gipl")
+"""Ends of names of volumes in formats that are not read."""
+FOREIGN_TABLE = re.compile(
+    r"(.*_)?(participants|sessions|scans)\.(xlsx?|ods|txt)", re.IGNORECASE
+)
+"""Names of tables of participants and sessions in formats that are not read."""
 
 
 CIFTI_NAME = re.compile(
@@ -106,10 +114,12 @@ class ForeignFormat(NamedTuple):
 
 START_BYTES = 512
 """Number of bytes that identify the format of a file."""
+GZIP_START = b"\x1f\x8b"
 TO_NIFTI = (
     "Save it as NIfTI (.nii.gz), for example with 3D Slicer, ITK-SNAP or SimpleITK."
 )
 TO_TABLE = "Save it as text separated by tabs (.tsv)."
+UNPACK = "Unpack it; a workbook of Excel has to be saved as text separated by tabs."
 FOREIGN_FORMATS = (
     ForeignFormat(rb"NRRD\d{4}", "an NRRD volume", TO_NIFTI),
     ForeignFormat(
@@ -120,7 +130,7 @@ FOREIGN_FORMATS = (
         "a DICOM file",
         "Convert the series to NIfTI, for example with dcm2niix.",
     ),
-    ForeignFormat(rb"PK\x03\x04", "an Excel workbook or another ZIP archive", TO_TABLE),
+    ForeignFormat(rb"PK\x03\x04", "an Excel workbook or another ZIP archive", UNPACK),
     ForeignFormat(rb"\xd0\xcf\x11\xe0", "an Excel workbook", TO_TABLE),
     ForeignFormat(
         rb"(?i)\s*(<!doctype html|<html)",
@@ -128,7 +138,21 @@ FOREIGN_FORMATS = (
         "Download the file itself; it may need a login.",
     ),
     ForeignFormat(
-        rb"\x1f\x8b", "compressed by gzip", "Add .gz to its name.", (".gz", ".mgz")
+        rb"#!ascii",
+        "a FreeSurfer surface as text",
+        "Convert it with mris_convert, for example to .surf.gii.",
+    ),
+    ForeignFormat(
+        rb"\xfd7zXZ|\x28\xb5\x2f\xfd",
+        "compressed by xz or zstd",
+        "Uncompress it, or compress it with gzip instead.",
+    ),
+    ForeignFormat(
+        rb"\x1f\x8b",
+        "compressed by gzip",
+        "Uncompress it with gunzip. NIfTI and GIFTI may stay compressed if .gz is added"
+        " to the name, MGH if it is named .mgz.",
+        (*READ_COMPRESSED, ".mgz"),
     ),
     ForeignFormat(
         rb".{344}(n\+1|ni1)\0",
@@ -136,15 +160,42 @@ FOREIGN_FORMATS = (
         "Name it .nii.",
         (".nii", ".hdr"),
     ),
+    ForeignFormat(
+        rb"\x00\x00\x00\x01\x00", "MGH without compression", "Name it .mgh.", (".mgh",)
+    ),
+)
+TWICE = ForeignFormat(
+    rb"\x1f\x8b", "compressed by gzip twice", "Uncompress it once, with gunzip."
 )
 
 
 def foreign_format(path: str | PathLike[str], start: bytes) -> ForeignFormat | None:
     """Return the format that a file's first `START_BYTES` show, None if its name has
-    the same one or it is unknown."""
+    the same one or it is unknown.
+
+    A compressed file shows that of its content.
+    """
     name = str(path).lower()
+    form = _shown_format(name, start)
+    if form is not None or not start.startswith(GZIP_START):
+        return form
+    content = _uncompressed(start)
+    if content.startswith(GZIP_START):
+        return TWICE
+    return _shown_format(name.replace(".mgz", ".mgh").removesuffix(".gz"), content)
+
+
+def _shown_format(name: str, start: bytes) -> ForeignFormat | None:
     for form in FOREIGN_FORMATS:
         is_shown = re.match(form.start, start, re.DOTALL)
         if is_shown and not name.endswith(form.suffixes):
             return form
     return None
+
+
+def _uncompressed(start: bytes) -> bytes:
+    """Return what can be read of a file's content from its first compressed bytes."""
+    try:
+        return zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(start)
+    except zlib.error:
+        return b""

@@ -1,9 +1,13 @@
 """Names that become one: in folders, labels and columns, where two things must not
 share a name."""
 
+import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 
 from .errors import InputError
+
+DEVICE = re.compile(r"(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?", re.IGNORECASE)
 
 
 def merged_names(
@@ -19,8 +23,15 @@ def merged_names(
 
 
 def folder_name(name: str) -> str:
-    """Return a name as disks that ignore case see it."""
-    return name.casefold()
+    """Return a name as disks see it that ignore case, dots and spaces at its end, and
+    which of several forms of a letter with accents it has."""
+    return unicodedata.normalize("NFC", name).casefold().rstrip(". ")
+
+
+def is_device(name: str) -> bool:
+    """Return whether Windows takes a name for a device, so that its disks have no
+    folder of that name."""
+    return DEVICE.fullmatch(name) is not None
 
 
 def column_part(name: str) -> str:

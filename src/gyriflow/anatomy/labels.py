@@ -15,7 +15,7 @@ from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from . import extraction
 from .extraction import Floats, Mask
-from .misplaced import hindbrain_note, misplaced_cortex
+from .misplaced import bare_surface, hindbrain_note, misplaced_cortex
 
 log = logging.getLogger(__name__)
 
@@ -103,6 +103,9 @@ def read_cerebrum(
     mask = cerebrum_mask(labels, scheme)
     report = _missing_labels(labels, scheme)
     warnings = list(misplaced_cortex(labels, affine, scheme))
+    # the wall of a hemisphere that is alone may have no cortex
+    if min_cortex:
+        warnings += bare_surface(labels, affine, scheme)
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = unlabelled_ventricles(labels, scheme, affine)
     if scheme.cortex:
@@ -132,6 +135,14 @@ def read_cerebrum(
     tissue = np.where(mask & ~main, 0, labels)
     cortex = np.isin(tissue, scheme.cortex)
     holes = main & ~mask
+    other = holes & ~unlabelled
+    if other.sum() > REPORTED_LOSS * main.sum():
+        numbers = _listed(map(int, np.unique(labels[other])), scheme)
+        warnings.append(
+            f"{other.sum() * voxel_ml:.2f} mL inside the cerebrum have labels outside"
+            f" it, {numbers}, and were filled with the tissue around: is tissue of the"
+            " cerebrum labelled as these?"
+        )
     _fill_from_nearest(tissue, holes, mask & main)
     # not from the cortex
     _fill_from_nearest(tissue, holes & unlabelled, mask & main & ~cortex)
@@ -404,7 +415,7 @@ def border_share(mask: Mask) -> float:
 
 def _listed(numbers: Iterable[int], scheme: LabelScheme | None = None) -> str:
     names = [
-        f"{number} {scheme.labels[number]}" if scheme else str(number)
+        f"{number} {scheme.labels.get(number, '')}".strip() if scheme else str(number)
         for number in numbers
     ]
     text = ", ".join(names[:30])

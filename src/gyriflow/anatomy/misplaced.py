@@ -1,5 +1,5 @@
 """Find cortex labels where no cerebral cortex can be: beyond the brain, inside it,
-around the ventricles."""
+around the ventricles; and other tissue at its surface where cortex has to be."""
 
 from collections.abc import Iterator
 
@@ -20,6 +20,10 @@ MIN_PIECE_ML = 0.05
 # share of the ventricles' surface that may be cortex: 3.3 % or less in these volumes,
 # 58 % or more with a faulty layer
 MAX_AT_VENTRICLES = 0.05
+# at most 0.3 % of the surface of 14 of these volumes is further than this from cortex;
+# 1.7 % or more where cerebellum or brainstem have a label of the cerebrum
+MAX_TO_CORTEX_MM = 8.0
+MAX_BARE_SHARE = 0.01
 
 
 def misplaced_cortex(
@@ -74,6 +78,48 @@ def misplaced_cortex(
         yield f"{found}: is tissue around or in the ventricles labelled as cortex?"
 
 
+def bare_surface(
+    labels: np.ndarray, affine: Floats, scheme: LabelScheme
+) -> Iterator[str]:
+    """Yield a warning, with place and labels, if much of a whole cerebrum's surface is
+    far from cortex.
+
+    Ventricles that are open, and what the border of the volume cuts, do not count. The
+    (4, 4) affine leads from voxels (i, j, k) to the mm of the place.
+    """
+    cerebrum = np.pad(np.isin(labels, scheme.cerebrum), 1)
+    cortex = np.pad(np.isin(labels, scheme.cortex), 1)
+    if not cortex.any() or cortex.sum() == cerebrum.sum():
+        return
+    box = ndimage.find_objects(cerebrum.astype(np.uint8))[0]
+    around = tuple(slice(side.start - 1, side.stop + 1) for side in box)
+    first = np.array([side.start - 1 for side in around])
+    filled = ndimage.binary_fill_holes(cerebrum[around])
+    surface = filled & ~ndimage.binary_erosion(filled)
+
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    to_cortex_mm = ndimage.distance_transform_edt(~cortex[around], sampling=size)
+    is_inner = np.zeros(cortex.shape, dtype=bool)
+    is_inner[2:-2, 2:-2, 2:-2] = True
+    numbers = np.pad(labels, 1)[around]
+    is_counted = is_inner[around] & ~np.isin(numbers, scheme.ventricles)
+    is_bare = surface & is_counted & (to_cortex_mm > MAX_TO_CORTEX_MM)
+    share = is_bare.sum() / surface.sum()
+    if share > MAX_BARE_SHARE:
+        piece, _ = ndimage.label(is_bare, OUTSIDE)
+        largest = np.argwhere(piece == np.bincount(piece[is_bare]).argmax())
+        place = _place_in_words(largest, shifted_affine(affine, first))
+        found = []
+        for number in np.unique(numbers[is_bare]):
+            found.append(f"{number} {scheme.labels.get(int(number), '')}".strip())
+        yield (
+            f"{100 * share:.1f} % of the cerebrum's surface, most of it around"
+            f" {place}, lie more than {MAX_TO_CORTEX_MM:g} mm from cortex, at most"
+            f" 0.3 % in atlases; found {', '.join(found)} there: is cortex not"
+            " labelled, or is other tissue, such as the cerebellum, labelled as this?"
+        )
+
+
 def hindbrain_note(labels: np.ndarray, scheme: LabelScheme) -> str:
     """Return a note if the scheme has labels of cerebellum or brainstem and the volume
     has none of these; else ''."""
@@ -123,7 +169,10 @@ def _pieces_in_words(mask: Mask, affine: Floats) -> str:
     if not len(pieces_ml):
         return ""
     largest = np.argwhere(number == volumes_ml.argmax())
-    place = transform_points(largest.mean(axis=0, keepdims=True), affine)[0]
-    return (
-        f"{pieces_ml.sum():.2f} mL around ({', '.join(f'{x:.0f}' for x in place)}) mm"
-    )
+    return f"{pieces_ml.sum():.2f} mL around {_place_in_words(largest, affine)}"
+
+
+def _place_in_words(voxels: Floats, affine: Floats) -> str:
+    """Return the centre in mm of (n, 3) voxels."""
+    place = transform_points(voxels.mean(axis=0, keepdims=True), affine)[0]
+    return f"({', '.join(f'{x:.0f}' for x in place)}) mm"

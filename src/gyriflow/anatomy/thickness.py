@@ -66,6 +66,12 @@ CUT_TOL_MM = 1e-3
 this."""
 
 
+OWN_WHITE = (
+    "Give each side its own white surface, in the coordinates of its pial one: they are"
+    " swapped, both of one side, or in other coordinates."
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Thickness:
     """Cortical thickness on a surface; the report has means and shares, in plain values
@@ -273,31 +279,9 @@ def thickness_from_white(
                 expected=(
                     f"{'<' if side == 'left' else '>'} {fissure_x_mm:.1f} mm (RAS+)"
                 ),
-                remedy=(
-                    "Give each side its own white surface, in the coordinates of its"
-                    " pial one: they are swapped, both of one side, or in other"
-                    " coordinates."
-                ),
+                remedy=OWN_WHITE,
             )
-        outside = (
-            igl.fast_winding_number(surface.vertices, surface.faces, white.vertices)
-            < 0.5
-        )
-        distance, _, _ = nearest_on(white.vertices, surface)
-        crossing = outside & (distance > OUTSIDE_MM)
-        share = float(areas[crossing].sum() / areas.sum())
-        if share > MAX_OUTSIDE_SHARE:
-            raise InputError(
-                f"the white surface ({side}) crosses the pial one",
-                found=(
-                    f"{100 * share:.0f} % of its area outside, by up to"
-                    f" {distance[crossing].max():.1f} mm"
-                ),
-                expected=(
-                    f"at most {100 * MAX_OUTSIDE_SHARE:.0f} % by more than"
-                    f" {OUTSIDE_MM} mm"
-                ),
-            )
+        require_inside(surface, white, side)
     inner = merged(*posed.values())
     values = layer_thickness(surface, inner)
     is_measured = values >= MIN_MM
@@ -310,6 +294,28 @@ def thickness_from_white(
     return Thickness(
         values, is_measured, summary(values, is_measured, vertex_areas(surface))
     )
+
+
+def require_inside(pial: TriangleMesh, white: TriangleMesh, side: str) -> None:
+    """Raise InputError if a white surface crosses the closed pial surface of its side
+    ("whole": of the brain)."""
+    outside = igl.fast_winding_number(pial.vertices, pial.faces, white.vertices) < 0.5
+    distance, _, _ = nearest_on(white.vertices, pial)
+    crossing = outside & (distance > OUTSIDE_MM)
+    areas = vertex_areas(white)
+    share = float(areas[crossing].sum() / areas.sum())
+    if share > MAX_OUTSIDE_SHARE:
+        raise InputError(
+            f"the white surface ({side}) crosses the pial one",
+            found=(
+                f"{100 * share:.0f} % of its area outside, by up to"
+                f" {distance[crossing].max():.1f} mm"
+            ),
+            expected=(
+                f"at most {100 * MAX_OUTSIDE_SHARE:.0f} % by more than {OUTSIDE_MM} mm"
+            ),
+            remedy=OWN_WHITE,
+        )
 
 
 def posed_whites(

@@ -27,6 +27,7 @@ from ..anatomy.pose import (
     pose_of_surface,
     require_coordinates,
 )
+from ..anatomy.thickness import require_inside
 from ..errors import GyriflowError, InputError
 from ..formats import is_volume
 from ..geometry.poses import CONVENTIONS
@@ -173,13 +174,15 @@ def _check_surfaces(brain: BrainConfig) -> Iterator[str]:
         read_volume_map(brain.image, brain.affine_from)
     if brain.labels or not all(Path(path).is_file() for path in brain.files):
         return
-    for side, path in brain.white_files.items():
-        read_surface(path, side)
+    whites = {
+        side: read_surface(path, side) for side, path in brain.white_files.items()
+    }
     if brain.hemispheres is not None:
         left, right, declared = read_hemispheres(
             brain.hemispheres.left, brain.hemispheres.right
         )
         yield from _check_pair(brain, left, right, declared=declared)
+        _check_whites({"left": left, "right": right}, whites)
     elif brain.files:
         own_side = brain.side
         mesh = _outward(read_surface(brain.files[0], own_side))
@@ -189,6 +192,18 @@ def _check_surfaces(brain: BrainConfig) -> Iterator[str]:
             yield from pose_of_hemisphere(mesh, own_side, brain.coordinates).warnings
         elif is_closed(mesh):
             yield from pose_of_surface(mesh, brain.coordinates).warnings
+        _check_whites(dict.fromkeys(whites, mesh), whites)
+
+
+def _check_whites(
+    pials: Mapping[str, TriangleMesh], whites: Mapping[str, TriangleMesh]
+) -> None:
+    """Raise InputError if a white surface is not inside the pial one of its side."""
+    for side, white in whites.items():
+        # the walls of open surfaces are capped by their repair
+        pial = _outward(pials[side])
+        if is_closed(pial):
+            require_inside(pial, white, side)
 
 
 def _check_pair(

@@ -16,8 +16,12 @@ from ..anatomy.labels import cerebrum_mask, layout_of, scheme_contradictions
 from ..errors import InputError
 from ..formats import (
     CIFTI_NAME,
+    FOREIGN_TABLE,
+    FOREIGN_VOLUME_SUFFIXES,
     SIDE_NAME,
     SURFACE_SUFFIXES,
+    TO_NIFTI,
+    TO_TABLE,
     VOLUME_SUFFIXES,
     format_of,
     is_volume,
@@ -249,7 +253,7 @@ def recognise(
             )
             remedy = "Labels must be equal, with their zeros and case."
             raise InputError(problem, path=folder, found=names, remedy=remedy)
-    unused: dict[str, str] = {}
+    unused = _in_other_formats(files)
     preferred: dict[str, list[FoundBrain]] = {}
     to_read: list[FoundBrain] = []
     for name, group in found.items():
@@ -306,8 +310,31 @@ def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
     )
 
 
+def _in_other_formats(files: Sequence[Path]) -> dict[str, str]:
+    """Return why label volumes and tables are not used whose formats are not read,
+    unless they are there in another format, too."""
+    reasons = {}
+    read = {file.with_name(file.name.split(".")[0]) for file in files if _is_read(file)}
+    for file in files:
+        if file.with_name(file.name.split(".")[0]) in read:
+            continue
+        if FOREIGN_TABLE.fullmatch(file.name):
+            reasons[str(file)] = f"tables of this format are not read. {TO_TABLE}"
+        elif file.name.lower().endswith(FOREIGN_VOLUME_SUFFIXES) and LABEL_NAME.match(
+            file.name
+        ):
+            reasons[str(file)] = f"volumes of this format are not read. {TO_NIFTI}"
+    return reasons
+
+
+def _is_read(file: Path) -> bool:
+    return is_volume(file) or TABLE_NAME.fullmatch(file.name) is not None
+
+
 def _rejection(file: Path) -> str:
     name = file.name.lower()
+    if name.endswith(FOREIGN_VOLUME_SUFFIXES):
+        return f"volumes of this format are not read. {TO_NIFTI}"
     if CIFTI_NAME.search(name):
         return "a CIFTI file, with values at grayordinates and no volume of labels"
     if name.endswith(VOLUME_SUFFIXES):

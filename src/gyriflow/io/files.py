@@ -133,10 +133,15 @@ def reading(
         if isinstance(error, InputError):
             raise
         # of a pair, the missing file
-        path = getattr(error, "filename", None) or path
-        is_missing = isinstance(error, FileNotFoundError | IsADirectoryError)
-        reason = f"no such file{hint_for_missing(Path(path))}" if is_missing else error
-        if foreign := foreign_format(path, _start_of(path)):
+        path = Path(getattr(error, "filename", None) or path)
+        reason: object = error
+        if isinstance(error, PermissionError):
+            reason, remedy = "permission denied", None
+        elif not path.is_file():
+            reason, remedy = f"no such file{hint_for_missing(path)}", None
+        elif not path.stat().st_size:
+            reason = "it is empty"
+        elif foreign := foreign_format(path, _start_of(path)):
             reason, remedy = f"it is {foreign.name}", foreign.remedy
         raise InputError(
             f"cannot be read as {kind}: {reason}",

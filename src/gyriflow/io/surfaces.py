@@ -5,6 +5,7 @@ Coordinates are transformed to scanner space if the file defines their space.
 """
 
 import hashlib
+import itertools
 import logging
 import re
 import warnings
@@ -34,7 +35,7 @@ from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
 from ..quantities import DISTINCT_COLOURS
 from ..settings.terms import NO_REGION, SIDES, STRUCTURES, Side
-from .files import AnyPath, atomic_write, read_json, reading, require_finite
+from .files import AGAIN, AnyPath, atomic_write, read_json, reading, require_finite
 from .vtk_files import read_vtk
 
 log = logging.getLogger(__name__)
@@ -79,6 +80,8 @@ def surface_space_structure(
     # FreeSurfer's files have many endings
     read = SURFACE_READERS[found.name if found else "FreeSurfer"]
     with reading(path, "a surface", SURFACE_NAMES):
+        if not path.stat().st_size:
+            raise InputError("is empty", path=path, expected="a surface", remedy=AGAIN)
         vertices, faces, space, structure = read(path)
     if (
         vertices.ndim != 2
@@ -97,6 +100,7 @@ def surface_space_structure(
             path=path,
             found=shapes,
             expected="(n, 3) points and (m, 3) faces",
+            remedy=AGAIN,
         )
     require_finite(vertices, path, "coordinates", "vertices")
     if not (
@@ -153,6 +157,13 @@ def read_hemispheres(
     for path, (_, _, structure), side in zip((left, right), read, SIDES, strict=True):
         _require_side(path, structure, side)
     meshes, spaces, _ = zip(*read, strict=True)
+    points = meshes[0].vertices, meshes[1].vertices
+    if points[0].shape == points[1].shape and np.allclose(*points, atol=1e-3):
+        raise InputError(
+            "both hemispheres have the same surface",
+            found=f"{left} and {right}",
+            expected="one file of the left and one of the right hemisphere",
+        )
     if spaces[0] != spaces[1]:
         words = " and ".join(
             f"{path} {space or 'no space'}"
@@ -371,9 +382,10 @@ def _read_gifti_surface(path: Path) -> RawSurface:
     matrix, space = _to_scanner_space(_coordinate_systems(path), path)
     if space is None:
         _warn_of_tkr_ras(points[0].meta, path)
-    vertices = (
-        np.asarray(points[0].data, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
-    )
+    vertices = np.asarray(points[0].data, dtype=float)
+    # other shapes are refused by the caller
+    if vertices.shape[1:] == (3,):
+        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
     return vertices, np.asarray(triangles[0].data), space, structure_of(image, path)
 
 
@@ -384,10 +396,46 @@ def _read_with_trimesh(path: Path) -> RawSurface:
 
     # process=True joins equal vertices: STL stores each corner of each face
     is_stl = path.suffix.lower() == ".stl"
+    _require_all_lines(path)
     body = trimesh.load_mesh(path, process=is_stl)
     vertices = np.asarray(body.vertices, dtype=float)
     faces = np.asarray(body.faces)
     return vertices, faces, None, None
+
+
+PLY_HEADER = re.compile(rb"ply\s.*?format\s+ascii.*?end_header\r?\n?", re.DOTALL)
+PLY_ELEMENT = re.compile(rb"^element\s+\w+\s+(\d+)", re.MULTILINE)
+OFF_HEADER = re.compile(rb"\w*OFF\s+(\d+)\s+(\d+)\s+\d+", re.IGNORECASE)
+COMMENT = re.compile(rb"#[^\r\n]*")
+
+
+def _require_all_lines(path: Path) -> None:
+    """Raise InputError if a PLY or OFF file of text has fewer lines than its header
+    specifies, each of a vertex or a face.
+
+    Trimesh takes such a file for a surface with fewer faces.
+    """
+    content = path.read_bytes()
+    ending = path.suffix.lower()
+    numbers: list[bytes] = []
+    if ending == ".ply" and (head := PLY_HEADER.match(content)):
+        numbers = PLY_ELEMENT.findall(head[0])
+    elif ending == ".off":
+        content = COMMENT.sub(b"", content)
+        head = OFF_HEADER.match(content)
+        numbers = list(head.groups()) if head else []
+    if not numbers or head is None:
+        return
+    expected = sum(map(int, numbers))
+    lines = [line for line in content[head.end() :].splitlines() if line.strip()]
+    if len(lines) < expected:
+        raise InputError(
+            "is shorter than its header specifies",
+            path=path,
+            found=f"{len(lines)} lines of vertices and faces",
+            expected=expected,
+            remedy=AGAIN,
+        )
 
 
 MNI_OBJ = re.compile(rb"\s*P\s+[\d.]")
@@ -402,7 +450,36 @@ def _read_obj(path: Path) -> RawSurface:
         problem = "is a binary .obj file of the MNI"
         expected = "its form as text, or another format such as GIFTI"
         raise InputError(problem, path=path, expected=expected)
-    return _read_mni_obj(path) if MNI_OBJ.match(start) else _read_with_trimesh(path)
+    return _read_mni_obj(path) if MNI_OBJ.match(start) else _read_wavefront(path)
+
+
+def _read_wavefront(path: Path) -> RawSurface:
+    """Return the vertices of a Wavefront file, in its order, and its faces as
+    triangles.
+
+    Trimesh would give a vertex with several normals or texture coordinates once for
+    each.
+    """
+    points: list[list[str]] = []
+    faces: list[tuple[int, int, int]] = []
+    text = path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
+    for line in text.splitlines():
+        kind, *words = line.split() or [""]
+        if kind == "v":
+            points.append(words[:3])
+        elif kind == "f":
+            first, *others = (_corner(word, len(points)) for word in words)
+            for second, third in itertools.pairwise(others):
+                faces.append((first, second, third))
+    vertices = np.array(points, dtype=float)
+    return vertices, np.array(faces, dtype=np.int64), None, None
+
+
+def _corner(word: str, n_points: int) -> int:
+    """Return the vertex of a corner such as `5/2/7`; negative numbers count from the
+    last vertex so far."""
+    number = int(word.partition("/")[0])
+    return number + n_points if number < 0 else number - 1
 
 
 def _read_mni_obj(path: Path) -> RawSurface:

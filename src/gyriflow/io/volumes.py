@@ -4,7 +4,7 @@ with axes in that order."""
 import gzip
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +32,8 @@ MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 # two header matrices agree if they place every corner within this share of a voxel
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
+# relative difference of sizes of voxels in a header that gives a warning
+SIZE_TOL = 0.01
 WHICH_MATRIX = (
     "Find out which one holds, for example from the scan that was labelled, and name it"
     " with the brain's affine_from: qform or sform. The wrong one may exchange left and"
@@ -160,6 +162,7 @@ def read_values(
     with reading(path, "an image", _expected(content)):
         if nib.is_proxy(image.dataobj):
             _require_its_size(image, path)
+            _require_values_after_header(image, path)
         values = _stored_values(image, path)
     shape = tuple(n for axis, n in enumerate(values.shape) if axis < 3 or n != 1)
     if len(shape) != 3 or values.dtype.kind not in "biuf":
@@ -275,6 +278,24 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
         )
 
 
+def _require_values_after_header(image: SpatialImage, path: AnyPath) -> None:
+    """Raise InputError if the values of a single NIfTI file begin in its header, which
+    shifts them."""
+    header: Any = image.header
+    if not isinstance(image, nib.Nifti1Image) or not header.is_single:
+        return
+    first = int(image.dataobj.offset)
+    least = int(header.single_vox_offset)
+    if first < least:
+        raise InputError(
+            "says that its values begin within its header, so they would be shifted",
+            path=path,
+            found=f"vox_offset {first}",
+            expected=f"{least} or more",
+            remedy="Write the file again with the program that made it.",
+        )
+
+
 def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
     """Return the values of an image; compressed files are read to the end, so that
     checksums are verified."""
@@ -321,7 +342,17 @@ def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Fl
             path=path,
             expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)",
         )
-    if isinstance(image, nib.MGHImage) and not _has_directions(path):
+    if not isinstance(image, nib.MGHImage):
+        return image.affine
+    sizes = image.header.get_zooms()[:3]
+    if not min(sizes) > 0:
+        raise InputError(
+            "has voxels without a positive size, so left and right are unknown",
+            path=path,
+            found=f"{_sizes_in_words(sizes)} mm",
+            expected="sizes above 0",
+        )
+    if not _has_directions(path):
         problem = "has no valid directions (goodRASFlag), so left and right are unknown"
         remedy = (
             "Set them as in the scan that was labelled, for example with mri_convert"
@@ -361,6 +392,8 @@ def _nifti_affine(
         log.info("%s: no unit of length in the header, mm taken", path)
     # row by row: a product of matrices would take 0 times infinite entries
     scale = np.array([[MM_PER_NIFTI_UNIT[unit]]] * 3 + [[1.0]])
+    if (affine_from == "auto" and codes["sform"] > 0) or affine_from == "sform":
+        _warn_of_other_sizes(header, matrices["sform"], unit, path)
     if affine_from != "auto":
         return scale * matrices[affine_from]
     present = [name for name, code in codes.items() if code > 0]
@@ -385,6 +418,31 @@ def _nifti_affine(
             )
             raise InputError(problem, path=path, found=f"{both}\n", remedy=WHICH_MATRIX)
     return scale * matrices[present[0]]
+
+
+def _warn_of_other_sizes(
+    header: nib.Nifti1Header, sform: Floats, unit: str, path: AnyPath
+) -> None:
+    """Warn if the sizes of voxels in the header (pixdim), which programs may show, are
+    not those of the sform, which counts."""
+    in_header = np.abs(header["pixdim"][1:4])
+    in_sform = np.linalg.norm(sform[:3, :3], axis=0)
+    # a broken sform is refused
+    if not in_sform.all() or not np.isfinite(in_sform).all():
+        return
+    if np.abs(in_header / in_sform - 1.0).max() > SIZE_TOL:
+        log.warning(
+            "%s: the sizes of its voxels disagree: found pixdim %s and sform %s %s; the"
+            " sform is used. Is it the one of the scan that was labelled?",
+            path,
+            _sizes_in_words(in_header),
+            _sizes_in_words(in_sform),
+            {"unknown": "mm"}.get(unit, unit),
+        )
+
+
+def _sizes_in_words(sizes: Iterable[float]) -> str:
+    return " x ".join(f"{size:.3g}" for size in sizes)
 
 
 def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +41,16 @@ def read_vtk(path: Path) -> tuple[NDArray, NDArray]:
             f"VTK's reader ended with code {process.returncode}",
             *process.stderr.decode().splitlines(),
         ]
+        remedy = (
+            "Save its surface as triangles, for example with ParaView (Extract Surface,"
+            " Triangulate). The file may also be truncated."
+        )
         raise InputError(
-            "holds no surface", path=path, found=words, expected="triangles (PolyData)"
+            "holds no surface of triangles alone",
+            path=path,
+            found=words,
+            expected="triangles (PolyData)",
+            remedy=remedy,
         )
     with np.load(io.BytesIO(process.stdout)) as arrays:
         return arrays["points"], arrays["faces"]
@@ -71,6 +80,24 @@ def _little_endian_surface(content: bytes) -> tuple[NDArray, NDArray] | None:
     return points.reshape(-1, 3), cells[:, 1:]
 
 
+def _in_words(data: Any) -> str:
+    """Return what a file holds instead of triangles."""
+    kind = type(data).__name__
+    if kind != "PolyData":
+        return kind
+    offsets = data.GetPolys().GetOffsetsArray()
+    corners = np.diff([offsets.GetValue(n) for n in range(offsets.GetNumberOfTuples())])
+    n_others = int((corners != 3).sum())
+    counts = {
+        "points": data.n_points,
+        "faces with other than three corners": n_others,
+        "strips of triangles": data.n_strips,
+        "lines": data.n_lines,
+        "single points": data.n_verts,
+    }
+    return ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+
+
 def _send_surface(path: str) -> None:
     output = os.dup(1)
     os.dup2(2, 1)  # what VTK prints must not mix with the arrays
@@ -83,7 +110,7 @@ def _send_surface(path: str) -> None:
         or not data.n_points
         or not data.is_all_triangles
     ):
-        sys.exit(type(data).__name__)
+        sys.exit(_in_words(data))
     sent = io.BytesIO()
     np.savez(sent, points=data.points, faces=data.regular_faces)
     with os.fdopen(output, "wb") as stream:

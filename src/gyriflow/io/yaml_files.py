@@ -2,7 +2,8 @@
 schemes of the folder `schemes`."""
 
 import re
-from collections.abc import Iterator, Mapping
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ def _has_valid_depth(text: str) -> bool:
 
 def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
     first: dict[str, int] = {}
+    equal: dict[Any, str] = {}
     for key, _ in node.value:
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode):
@@ -72,11 +74,37 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
             problem = f"duplicate key {key.value!r} (first on line {first[key.value]})"
             raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
         first[str(key.value)] = line
+        # 1 and 1.0 are one key of a dictionary
+        value = key.value if kind == "merge" else loader.construct_object(key)
+        other = equal.setdefault(value, key.value)
+        if other != key.value:
+            problem = (
+                f"the keys {other} and {key.value} are one number to YAML; write them"
+                " in quotes if they are names"
+            )
+            raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
     loader.flatten_mapping(node)
     return loader.construct_mapping(node, deep=True)
 
 
+def _number(loader: _StrictLoader, node: yaml.ScalarNode) -> int | float:
+    """Return a number as it is written; YAML would read 023 as 19, and 23:4 as 1384."""
+    kind = node.tag.rpartition(":")[2]
+    read = (
+        loader.construct_yaml_int if kind == "int" else loader.construct_yaml_float
+    )(node)
+    if ":" in node.value or re.match(r"[-+]?0[0-7_]+$", node.value):
+        problem = (
+            f"{node.value} is {read:g} to YAML; write a decimal number without zeros"
+            " before it, or text in quotes"
+        )
+        raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
+    return read
+
+
 _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+for _kind in ("int", "float"):
+    _StrictLoader.add_constructor(f"tag:yaml.org,2002:{_kind}", _number)
 
 
 def read_yaml(path: AnyPath) -> Any:
@@ -90,13 +118,23 @@ def read_yaml(path: AnyPath) -> Any:
             raise InputError(problem, path=path, expected="a configuration")
         content = yaml.load(text, Loader=_StrictLoader)
         size = _size(content, {})
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise InputError("cannot be read", path=path, found=error) from error
+    except UnicodeDecodeError as error:
+        raise InputError(
+            "is not text in UTF-8",
+            path=path,
+            found=f"byte {error.object[error.start]:#x} at {error.start}",
+            remedy="Save it as UTF-8 in an editor.",
+        ) from error
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f", line {mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error)
-        raise InputError(f"is not valid YAML{line}: {problem}", path=path) from error
+        remedy = _remedy(str(mark.buffer or "").splitlines(), mark.line) if mark else ""
+        raise InputError(
+            f"is not valid YAML{line}: {problem}", path=path, remedy=remedy or None
+        ) from error
     except (ValueError, LookupError, TypeError, AttributeError) as error:
         # words that look like a date or a number and are none, such as 2001-99-99 or 0b
         problem = f"has a value that YAML cannot read: {error}"
@@ -109,6 +147,20 @@ def read_yaml(path: AnyPath) -> Any:
             expected=MAX_VALUES,
         )
     return content
+
+
+INVISIBLE = re.compile(r"[\t\u00a0\u200b-\u200d\u2028\ufeff]")
+"""Tabs and other spaces that cannot be seen, as texts from other programs have them."""
+
+
+def _remedy(lines: Sequence[str], number: int) -> str:
+    """Return what to do if a line with a mistake, or the one before it, has characters
+    that YAML does not take for spaces."""
+    for line in lines[max(number - 1, 0) : number + 1]:
+        if found := INVISIBLE.search(line):
+            name = unicodedata.name(found[0], "TAB")
+            return f"Write spaces instead of {name} in: {line.strip()}"
+    return ""
 
 
 def read_keys(path: AnyPath) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
@@ -113,7 +114,10 @@ class Settings(BaseModel):
         # YAML reads `on`, `yes` and the like as true, which would pass as 1.0
         kind = cls.model_fields[str(info.field_name)].annotation
         if isinstance(value, bool) and bool not in (kind, *get_args(kind)):
-            raise ValueError("should be a number or text, not true or false")
+            raise ValueError(
+                "should be a number or text, not true or false, as YAML also reads yes,"
+                " no, on and off; write text in quotes"
+            )
         # which ends a path or an argument for the system
         inner = [value]
         if isinstance(value, dict):
@@ -180,6 +184,17 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f"did you mean {' or '.join(near)}?"
 
 
+NUMBER_EXPECTED = "should be a number without a unit"
+IN_WORDS = {
+    **dict.fromkeys(("tuple_type", "list_type"), "should be a list, with - entries"),
+    **dict.fromkeys(("dict_type", "model_type"), "should be keys with values"),
+    **dict.fromkeys(("float_type", "float_parsing", "int_parsing"), NUMBER_EXPECTED),
+    "string_type": "should be text",
+}
+"""What is expected, by pydantic's types of errors whose texts name types of Python."""
+DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+")
+
+
 def _problem(details: ErrorDetails, kind: type[BaseModel]) -> KeyProblem:
     # pydantic puts tags into the path: of a union's member, here in parentheses, and
     # `[key]` for a wrong key
@@ -192,10 +207,14 @@ def _problem(details: ErrorDetails, kind: type[BaseModel]) -> KeyProblem:
     if details["type"] == "extra_forbidden":
         text = _unknown_key(kind, path)
     elif details["type"] not in (PROBLEM, "missing"):
-        text += f"; found {details['input']!r}"
-    # YAML reads 021 as the number 17
-    if details["type"] == "string_type" and isinstance(details["input"], int | float):
-        text += "; write it in quotes"
+        value = details["input"]
+        # YAML reads 2026-11-29 as a date
+        found = str(value) if isinstance(value, date) else repr(value)
+        text = f"{IN_WORDS.get(details['type'], text)}; found {found}"
+        if details["type"] == "string_type" and isinstance(value, int | float | date):
+            text += "; write it in quotes"
+        elif isinstance(value, str) and DECIMAL_COMMA.fullmatch(value):
+            text += f"; write {value.replace(',', '.')}"
     return KeyProblem(text, path)
 
 
@@ -347,6 +366,8 @@ def hint_for_missing(path: Path) -> str:
         return f"; {hint}"
     try:
         if path.is_symlink() and not path.exists():
+            if path.resolve().is_symlink():
+                return f"; it is a link to {path.readlink()}, which leads back to it"
             return f"; it is a link to {path.readlink()}, which does not exist"
         if path.is_dir():
             content = _listed(" with", sorted(path.iterdir()))

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
-from ..names import column_part, folder_name, merged_names
+from ..names import column_part, folder_name, is_device, merged_names
 from ..quantities import METRICS
 from ..settings.base import Key, KeyProblem, Problems, did_you_mean, problems_in
 from ..settings.folding import VARYING, value_problems
@@ -62,6 +62,10 @@ RESERVED_SWEEPS = (
 )
 """Names that sweeps may not have, since other results of the study have folders of
 these names."""
+MIXED_UP = (
+    "differ only in case, accents' forms or dots at the end, so some disks mix up their"
+    " folders"
+)
 NO_FOLDING_KEY = "is not a key of folding"
 
 
@@ -97,20 +101,27 @@ def _names(config: Config) -> Problems:
             yield KeyProblem(
                 f"{count} brains have the id {name}; ids are unique", ("brains",)
             )
-        if name in RESERVED_BRAINS:
+        if folder_name(name) in RESERVED_BRAINS:
             yield KeyProblem(f"the id {name} is reserved; choose another", ("brains",))
     for first, second in merged_names(counts, folder_name):
         yield KeyProblem(
-            f"the ids {first} and {second} differ only in case, so some disks mix up"
-            " their folders; rename one",
-            ("brains",),
+            f"the ids {first} and {second} {MIXED_UP}; rename one", ("brains",)
         )
     for first, second in merged_names(config.sweeps, folder_name):
         yield KeyProblem(
-            f"differs from the sweep {first} only in case, so some disks mix up their"
-            " folders; rename one",
+            f"the sweeps {first} and {second} {MIXED_UP}; rename one",
             ("sweeps", second),
         )
+    named: list[tuple[str, Key]] = [(name, ("brains",)) for name in counts]
+    named += [(name, ("runs", name)) for name in config.runs]
+    named += [(name, ("sweeps", name)) for name in config.sweeps]
+    for name, key in named:
+        if is_device(name):
+            yield KeyProblem(
+                f"found {name}, a device on Windows, whose disks have no folder of this"
+                " name; choose another",
+                key,
+            )
     taken: list[Key] = []
     if OBSERVED in config.runs:
         taken.append(("runs", OBSERVED))
@@ -223,8 +234,8 @@ def _run_names(config: Config) -> Problems:
         first = earlier.setdefault(folder_name(name), run)
         if first != run:
             yield KeyProblem(
-                f"{run} and {first} would share a folder; choose names that differ, not"
-                " only in case",
+                f"{run} and {first} would share a folder; choose names that differ in"
+                " more than case, accents' forms or dots at the end",
                 key,
             )
 

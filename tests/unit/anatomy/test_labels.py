@@ -123,6 +123,12 @@ def test_what_is_left_out_or_filled_is_told_with_its_volume():
     hollow = np.where(radius < 6.0, 0, ball)
     told = read_cerebrum(hollow, AFFINE, ATLAS).warnings
     assert Facts(f"{(radius < 6.0).sum() * voxel_ml:.2f} mL") in told
+    # or other labels there, beside a ventricle that has its own
+    ventricle = np.where(radius < 3.0, 2, ball)
+    x = np.indices(ball.shape)[0]
+    inside = (radius >= 3.0) & (radius < 9.0) & (x < 24)
+    filled = read_cerebrum(np.where(inside, 3, ventricle), AFFINE, ATLAS)
+    assert Facts(f"{inside.sum() * voxel_ml:.2f} mL", "3 cerebellum") in filled.warnings
     # a smaller ball that hangs on a stalk
     mask, large = body(1.0)
     inner = ndimage.binary_erosion(mask, iterations=3)

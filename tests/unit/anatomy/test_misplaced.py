@@ -1,6 +1,8 @@
 """Cortex where none can be is warned of with its volume and place; cortex around white
 matter is not."""
 
+import re
+
 import numpy as np
 import pytest
 from facts import Facts
@@ -8,7 +10,7 @@ from phantoms import BRAINSTEM, CEREBELLUM, CORTEX, CSF, DEEP_GREY, VENTRICLES, 
 from shapes import rigid
 
 from gyriflow.anatomy.labels import read_cerebrum
-from gyriflow.anatomy.misplaced import hindbrain_note, misplaced_cortex
+from gyriflow.anatomy.misplaced import bare_surface, hindbrain_note, misplaced_cortex
 from gyriflow.io.yaml_files import SCHEMES
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
@@ -68,6 +70,40 @@ def test_cerebellum_and_brainstem_labelled_as_cortex_are_named(brain):
     cerebrum = read_cerebrum(faulty, AFFINE, ATLAS)
     assert any("cerebellum" in warning for warning in cerebrum.warnings)
     assert "cerebellum" in cerebrum.report["hindbrain"]
+
+
+@pytest.mark.parametrize(
+    ("tissue", "label", "name"),
+    [
+        (CEREBELLUM, WHITE, "white matter"),
+        (BRAINSTEM, DEEP_GREY, "deep grey matter"),
+    ],
+)
+def test_hindbrain_labelled_as_inner_tissue_is_named_with_its_place(
+    brain, tissue, label, name
+):
+    assert list(bare_surface(brain, AFFINE, ATLAS)) == []
+    faulty = np.where(brain == tissue, label, brain)
+    (found,) = bare_surface(faulty, AFFINE, ATLAS)
+    assert found == Facts("8 mm", f"{label} {name}")
+    # check and the surface take their warnings from here, but for a hemisphere
+    assert found in read_cerebrum(faulty, AFFINE, ATLAS, 0.5).warnings
+    assert found not in read_cerebrum(faulty, AFFINE, ATLAS).warnings
+
+
+@pytest.mark.parametrize("label", [WHITE, CSF])
+def test_cortex_that_lacks_a_label_on_one_side_is_named(brain, label):
+    x_mm = np.arange(len(brain))[:, None, None] * SIZE[0]
+    missing = (brain == CORTEX) & (x_mm < CENTRE[0] - 8.0)
+    (found,) = bare_surface(np.where(missing, label, brain), AFFINE, ATLAS)
+    assert found == Facts("1 white matter", "cortex")
+    x, y, z = re.search(r"\((-?\d+), (-?\d+), (-?\d+)\) mm", found).groups()
+    assert [int(x), int(y), int(z)] == pytest.approx(place(missing), abs=6)
+
+
+def test_a_cut_by_the_border_of_a_volume_is_no_bare_surface(brain):
+    half = len(brain) // 2
+    assert list(bare_surface(brain[:half], AFFINE, ATLAS)) == []
 
 
 def test_a_blob_outside_has_its_volume_and_place(brain):

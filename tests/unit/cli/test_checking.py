@@ -13,7 +13,7 @@ import yaml
 from atlas_brains import atlas_halves
 from configurations import LABELLED, labelled, resolved
 from facts import Facts
-from shapes import hemisphere
+from shapes import hemisphere, inner, moved
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.cli import check as checking
@@ -100,6 +100,30 @@ def test_the_surface_of_one_hemisphere_is_of_its_side(tmp_path):
     assert problems(tmp_path, pial="r.surf.gii", side="right") == []
     found = problems(tmp_path, pial="r.surf.gii", side="left")
     assert found == [Facts(tmp_path / "r.surf.gii", "CortexRight", "CortexLeft")]
+
+
+def test_white_surfaces_outside_their_pial_ones_are_refused_before_a_run(tmp_path):
+    pial = hemisphere(-1), hemisphere(1)
+    for n, mesh in enumerate(pial):
+        write_surface(tmp_path / f"pial{n}.surf.gii", mesh)
+        write_surface(tmp_path / f"white{n}.surf.gii", inner(mesh, 1.5))
+        write_surface(tmp_path / f"shifted{n}.surf.gii", moved(inner(mesh, 1.5), 6.0))
+    brain = {
+        "hemispheres": {"left": "pial0.surf.gii", "right": "pial1.surf.gii"},
+        "coordinates": "ras",
+    }
+
+    def found(*names):
+        return problems(tmp_path, **brain, white=[f"{name}.surf.gii" for name in names])
+
+    assert found("white0", "white1") == []
+    outside = Facts("white surface (left)", "100 %", "swapped")
+    assert found("white1", "white0") == [outside]
+    assert found("white1", "white1") == [outside]
+    # as where FreeSurfer's centre of the volume was added to one of them
+    assert found("shifted0", "shifted1") == [
+        Facts("white surface (left)", "coordinates")
+    ]
 
 
 def checked(folder, monkeypatch, **keys):

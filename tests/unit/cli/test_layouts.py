@@ -403,3 +403,29 @@ def test_labels_of_other_participants_are_not_read(tmp_path, monkeypatch):
     assert list(brains(tmp_path, participants=["01"])) == ["sub-01"]
     ((_, _, cause),) = brains(tmp_path, participants=["02"]).values()
     assert cause == Facts("sub-02_week25_dseg.nii.gz")
+
+
+def test_scans_and_tables_in_formats_that_are_not_read_are_named(tmp_path):
+    make_tree(
+        tmp_path,
+        labels=["case1_week24_seg.nii.gz", "case2_week25_seg.nii.gz"],
+        text={
+            "case3_week26.seg.nrrd": "NRRD0005",
+            "case4_week27_label.mha": "NDims = 3",
+            # exported, too
+            "case1_week24_seg.seg.nrrd": "NRRD0005",
+            "image.nrrd": "NRRD0005",
+            "participants.xlsx": "PK",
+        },
+    )
+    found = recognise(tmp_path)
+    assert [brain.entry["week"] for brain in found.brains] == [24, 25]
+    assert found.unused == {
+        "case3_week26.seg.nrrd": Facts("NIfTI"),
+        "case4_week27_label.mha": Facts("NIfTI"),
+        "participants.xlsx": Facts(".tsv"),
+    }
+    for path in tmp_path.glob("*.nii.gz"):
+        path.unlink()
+    with pytest.raises(InputError, check=Facts("case3_week26.seg.nrrd", "NIfTI")):
+        recognise(tmp_path)

@@ -210,6 +210,53 @@ def test_keys_that_yaml_reads_as_something_else_are_refused(tmp_path, key):
     assert list(read_keys(tmp_path / "a.yaml")["runs"]) == [key, 1, 21.5]
 
 
+@pytest.mark.parametrize(
+    ("first", "second"), [("1", "1.0"), ("21", "21.0"), ("21.5", "21.50")]
+)
+def test_keys_that_are_one_number_are_not_merged(tmp_path, first, second):
+    path = tmp_path / "a.yaml"
+    path.write_text(f"runs:\n  {first}: {{}}\n  {second}: {{end_week: 24}}\n")
+    with pytest.raises(InputError, check=Facts(path, "line 3", first, second)):
+        read_keys(path)
+    path.write_text(f'runs:\n  "{first}": {{}}\n  "{second}": {{}}\n')
+    assert list(read_keys(path)["runs"]) == [first, second]
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [("023", 19), ("-017", -15), ("23:4", 1384), ("12:00:00", 43200), ("1:30.5", 90.5)],
+)
+def test_numbers_are_not_read_otherwise_than_written(tmp_path, text, number):
+    path = tmp_path / "a.yaml"
+    path.write_text(f"brains:\n  - week: {text}\n")
+    with pytest.raises(InputError, check=Facts(path, "line 2", text, number)):
+        read_keys(path)
+    path.write_text(f"a: '{text}'\nb: [0, 0.5, -3, 1_000, 23.0, 1.0e+3]\n")
+    assert read_keys(path) == {"a": text, "b": [0, 0.5, -3, 1000, 23.0, 1000.0]}
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("a:\n\t- b: 1\n", "TAB"),
+        ("start:\u00a0a\nb: 1\n", "NO-BREAK SPACE"),
+        ("a: 1\n\u200bb:2\nc: 3\n", "ZERO WIDTH SPACE"),
+    ],
+)
+def test_spaces_that_yaml_does_not_take_for_spaces_are_named(tmp_path, text, name):
+    path = tmp_path / "a.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, check=Facts(path, name)):
+        read_keys(path)
+
+
+def test_a_configuration_of_another_encoding_says_so(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_bytes("# Müller\nstart: a\n".encode("latin-1"))
+    with pytest.raises(InputError, check=Facts(path, "UTF-8", "0xfc")):
+        read_keys(path)
+
+
 def test_contents_are_read_again_only_where_size_or_times_changed(
     tmp_path, monkeypatch
 ):

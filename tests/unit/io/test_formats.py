@@ -175,3 +175,113 @@ def test_a_single_hemisphere_with_a_scheme_may_be_any_volume(suffix):
     assert BrainConfig(**one, scheme="feta-7").labels == f"a{suffix}"
     with pytest.raises(ValidationError, match="scheme"):
         BrainConfig(**one)
+
+
+CORNERS = {
+    "positive": lambda corner, number: f"{corner + 1}",
+    "from the end": lambda corner, number: f"{corner - len(BALL.vertices)}",
+    "textured": lambda corner, number: f"{corner + 1}/{number % 2 + 1}",
+    "with normals": lambda corner, number: f"{corner + 1}//{number + 1}",
+    "with both": lambda corner, number: f"{corner + 1}/{number % 2 + 1}/{number + 1}",
+}
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+def test_an_obj_file_keeps_its_vertices_however_it_names_corners(tmp_path, corners):
+    lines = ["mtllib none.mtl", "vt 0 0", "vt 1 1"]
+    lines += ["v " + " ".join(map(str, point)) for point in BALL.vertices]
+    lines += ["vn 0 0 1"] * len(BALL.faces)
+    for number, face in enumerate(BALL.faces):
+        lines.append(f"usemtl colour{number % 3}")
+        words = [CORNERS[corners](int(corner), number) for corner in face]
+        lines.append("f " + " ".join(words))
+    path = tmp_path / "a.obj"
+    path.write_text("\n".join(lines))
+    found = read_surface(path)
+    assert found.vertices == pytest.approx(BALL.vertices)
+    assert (found.faces == BALL.faces).all()
+
+
+def test_polygons_of_an_obj_file_are_triangles(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nf 1 2 3 4\n")
+    assert read_surface(path).faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+PLY_HEAD = (
+    "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
+    "property float z\nelement face {}\nproperty list uchar int vertex_indices\n"
+    "end_header"
+)
+HEADS = {"a.ply": PLY_HEAD, "a.off": "OFF # made by hand\n\n{} {} 0"}
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_a_truncated_surface_of_text_is_not_one_with_fewer_faces(tmp_path, name):
+    lines = [HEADS[name].format(len(BALL.vertices), len(BALL.faces))]
+    lines += [" ".join(map(str, point)) for point in BALL.vertices]
+    lines += [f"3 {a} {b} {c}" for a, b, c in BALL.faces]
+    path = tmp_path / name
+    path.write_text("\n".join(lines))
+    assert (read_surface(path).faces == BALL.faces).all()
+    path.write_text("\n".join(lines[:-2]))
+    total = len(BALL.vertices) + len(BALL.faces)
+    with pytest.raises(InputError, check=Facts(path, total - 2, total, "truncated")):
+        read_surface(path)
+
+
+VTK_CELLS = {
+    "POLYGONS 1 5\n4 0 1 3 2": ["1 faces"],
+    "TRIANGLE_STRIPS 1 5\n4 0 1 2 3": ["1 strips"],
+    "LINES 1 3\n2 0 1\nPOLYGONS 2 8\n3 0 1 2\n3 1 3 2": ["1 lines"],
+}
+
+
+@pytest.mark.parametrize("cells", VTK_CELLS)
+def test_cells_of_a_vtk_file_that_are_no_triangles_are_named(tmp_path, cells):
+    path = tmp_path / "a.vtk"
+    path.write_text(
+        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n"
+        f"0 0 0\n9 0 0\n0 9 0\n9 9 0\n{cells}\n"
+    )
+    with pytest.raises(InputError, check=Facts(path, "Triangulate", *VTK_CELLS[cells])):
+        read_surface(path)
+
+
+SURFACE_FILES = [form.suffixes[0] for form in FORMATS if form.content == "surface"]
+
+
+@pytest.mark.parametrize("suffix", SURFACE_FILES)
+def test_what_is_no_file_with_content_is_named_in_each_format(tmp_path, suffix):
+    empty, folder, link = (tmp_path / f"{name}{suffix}" for name in "abc")
+    empty.touch()
+    folder.mkdir()
+    link.symlink_to(link)
+    with pytest.raises(InputError, check=Facts(empty, "is empty")):
+        read_surface(empty)
+    with pytest.raises(InputError, check=Facts(folder, "folder")) as caught:
+        read_surface(folder)
+    assert "truncated" not in str(caught.value)
+    with pytest.raises(InputError, check=Facts(link, "back to it")):
+        read_surface(link)
+
+
+def test_a_surface_of_freesurfer_as_text_is_named(tmp_path):
+    path = tmp_path / "lh.pial.asc"
+    path.write_text("#!ascii version of lh.pial\n3 1\n0 0 0 0\n")
+    with pytest.raises(InputError, check=Facts(path, "as text", "mris_convert")):
+        read_surface(path)
+
+
+def test_the_shape_of_transposed_points_is_named(tmp_path):
+    points = nib.gifti.GiftiDataArray(
+        BALL.vertices.T.astype(np.float32), intent="NIFTI_INTENT_POINTSET"
+    )
+    faces = nib.gifti.GiftiDataArray(
+        BALL.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE"
+    )
+    path = tmp_path / "a.surf.gii"
+    nib.save(nib.gifti.GiftiImage(darrays=[points, faces]), path)
+    shape = f"(3, {len(BALL.vertices)})"
+    with pytest.raises(InputError, check=Facts(path, shape, "(n, 3)")):
+        read_surface(path)

@@ -187,14 +187,14 @@ def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
             read_surface(tmp_path / name, "left")
     # the matrix of a file is told once
     files = [
-        in_spaces(tmp_path / name, ball, (U, SCANNER, TURN))
-        for name in ("b.gii", "c.gii")
+        in_spaces(tmp_path / name, mesh, (U, SCANNER, TURN))
+        for name, mesh in (("b.gii", ball), ("c.gii", moved(ball, 30.0)))
     ]
     assert read_hemispheres(*files)[2]
     assert caplog.messages == [
         Facts(file, "NIFTI_XFORM_SCANNER_ANAT") for file in files
     ]
-    write_surface(tmp_path / "d.stl", ball)
+    write_surface(tmp_path / "d.stl", moved(ball, 30.0))
     assert not read_hemispheres(files[0], tmp_path / "d.stl")[2]
 
 
@@ -260,6 +260,17 @@ def test_maps_and_labels_of_the_other_hemisphere_are_refused(tmp_path, ball):
     assert len(read_vertex_labels(tmp_path / "left.label.gii", "left")[0]) == 162
     with pytest.raises(InputError, check=facts):
         read_vertex_labels(tmp_path / "left.label.gii", "right")
+
+
+def test_one_surface_is_not_both_hemispheres(tmp_path, ball):
+    left, copy, other = (tmp_path / f"{name}.surf.gii" for name in "abc")
+    write_surface(left, ball)
+    write_surface(copy, ball)
+    write_surface(other, moved(ball, 40.0))
+    for right in (left, copy):
+        with pytest.raises(InputError, check=Facts(left, right, "same surface")):
+            read_hemispheres(left, right)
+    assert read_hemispheres(left, other)[2]
 
 
 def test_hemispheres_whose_files_name_different_spaces_are_told(tmp_path, ball, caplog):

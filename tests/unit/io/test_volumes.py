@@ -114,6 +114,7 @@ def test_a_broken_qform_is_not_read_where_the_sform_holds(tmp_path, labels):
     path = saved(tmp_path / "a.nii", labels)
     image = nib.load(path)
     image.header["quatern_b"] = image.header["quatern_c"] = 0.9
+    image.header["vox_offset"] = 352
     content = bytearray(path.read_bytes())
     content[:348] = image.header.binaryblock
     path.write_bytes(content)
@@ -323,6 +324,14 @@ FOREIGN = {
     "a.dcm": (b"\0" * 128 + b"DICM" + b"\0" * 400, ["DICOM", "dcm2niix"]),
     "a.nii.gz": (b"<!DOCTYPE html>\n<html>", ["web page"]),
     "packed.nii": (gzip.compress(b"\0" * 500), ["gzip", ".gz"]),
+    "twice.nii.gz": (gzip.compress(gzip.compress(b"\0" * 500)), ["twice", "gunzip"]),
+    "a.nii.xz": (b"\xfd7zXZ\0" + b"\0" * 500, ["xz", "Uncompress"]),
+    "a.nii.zst": (b"\x28\xb5\x2f\xfd" + b"\0" * 500, ["zstd", "Uncompress"]),
+    "zip.nii.gz": (b"PK\3\4" + b"\0" * 500, ["ZIP", "Unpack it"]),
+    "nrrd.nii.gz": (gzip.compress(b"NRRD0004\n"), ["NRRD", "NIfTI"]),
+    "plain.mgz": (b"\0\0\0\1\0\0\0\4" + b"\0" * 500, ["MGH", ".mgh"]),
+    "packed.mgh": (gzip.compress(b"\0\0\0\1\0"), ["gzip", ".mgz"]),
+    "empty.nii.gz": (b"", ["is empty"]),
     "plain.nii.gz": (
         b"\0" * 344 + b"n+1\0" + b"\0" * 500,
         ["without compression", ".nii."],
@@ -336,6 +345,39 @@ def test_files_of_other_formats_are_named_with_what_to_do(tmp_path, name):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, check=Facts(f"{name}:", *facts)):
         read_label_volume(tmp_path / name)
+
+
+def test_values_that_begin_in_the_header_are_not_read(tmp_path, labels):
+    path = saved(tmp_path / "a.nii", labels)
+    content = bytearray(path.read_bytes())
+    content[108:112] = np.float32(0).tobytes()
+    path.write_bytes(content)
+    with pytest.raises(InputError, check=Facts(path, "vox_offset 0", 352)):
+        read_label_volume(path)
+
+
+def test_a_freesurfer_volume_with_negative_sizes_of_voxels_is_refused(tmp_path, labels):
+    path = tmp_path / "aseg.mgh"
+    nib.save(nib.MGHImage(labels.astype(np.int32), AFFINE), path)
+    content = bytearray(path.read_bytes())
+    content[30:42] = np.array([-0.8, 0.9, 1.0], ">f4").tobytes()
+    path.write_bytes(content)
+    with pytest.raises(InputError, check=Facts(path, "-0.8 x 0.9 x 1 mm")):
+        read_label_volume(path)
+
+
+def test_sizes_of_voxels_that_disagree_in_a_header_are_told(tmp_path, labels, caplog):
+    path = saved(tmp_path / "a.nii", labels, qform=0)
+    read_label_volume(path)
+    assert not caplog.records
+    content = bytearray(path.read_bytes())
+    content[80:92] = np.array([0.5, 0.5, 0.5], "<f4").tobytes()
+    path.write_bytes(content)
+    volume = read_label_volume(path)
+    (record,) = caplog.records
+    found = "0.5 x 0.5 x 0.5", "0.8 x 0.9 x 1 mm"
+    assert record.getMessage() == Facts(path, *found, "sform")
+    assert np.diag(volume.affine)[:3] == pytest.approx([0.8, 0.9, 1.0])
 
 
 def test_a_volume_of_numbers_keeps_fractions_nan_and_its_oblique_affine(tmp_path):

@@ -128,12 +128,40 @@ def test_what_is_wrong_with_a_brain_is_said(folder, brain, key, facts):
 
 
 def test_ids_are_unique_and_no_folder_of_the_results():
-    brains = [{"id": name, "week": 22, **LABELLED} for name in ("a", "study", "A", "a")]
+    brains = [{"id": name, "week": 22, **LABELLED} for name in ("a", "Study", "A", "a")]
     assert problems(study(brains=brains)) == [
         Facts("brains:", 2, "a"),
-        Facts("brains:", "study"),
+        Facts("brains:", "Study"),
         Facts("brains:", "a", "A"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [("a.", "a"), ("a..", "A"), ("sub-1", "sub-1.")]
+)
+def test_ids_that_are_one_folder_on_some_disks_are_refused(first, second):
+    brains = [{"id": name, "week": 22, **LABELLED} for name in (first, second)]
+    found = problems(study(brains=brains, start=first))
+    assert found == [Facts("brains:", first, second)]
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [("x", "x."), ("é", "e\u0301"), ("Straße", "STRASSE")]
+)
+def test_runs_that_are_one_folder_on_some_disks_are_refused(first, second):
+    runs = {first: {"end_week": 23}, second: {"end_week": 24}}
+    assert problems(study(runs=runs)) == [Facts(f"runs.{second}:", first)]
+
+
+@pytest.mark.parametrize("name", ["con", "NUL", "aux.1", "Lpt9"])
+def test_names_of_devices_of_windows_are_refused(name):
+    brains = [{"id": name, "week": 22, **LABELLED}]
+    assert problems(study(brains=brains, start=name, runs={name: {}})) == [
+        Facts("brains:", name),
+        Facts(f"runs.{name}:", name),
+    ]
+    allowed = [{"id": f"x{name}", "week": 22, **LABELLED}]
+    assert problems(study(brains=allowed, start=f"x{name}")) == []
 
 
 @pytest.mark.parametrize("pair", [("s", "S"), ("w8", "W8")])

@@ -4,6 +4,7 @@ named."""
 import json
 import math
 import re
+from datetime import date
 from pathlib import Path
 
 import jsonschema
@@ -114,6 +115,27 @@ def test_an_impossible_value_is_refused_with_its_key_and_the_bound(folding, key,
     assert problems(study(folding={"end_week": 24} | folding)) == [
         Facts(f"folding.{key}:", *facts)
     ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "facts"),
+    [
+        ({"brains": {"id": "a"}}, "brains", ["list"]),
+        ({"brains": ["l.nii.gz"]}, "brains[0]", ["keys"]),
+        ({"runs": [{"name": "x"}]}, "runs", ["keys"]),
+        ({"mesh": [{"order": 2}]}, "mesh", ["keys"]),
+        ({"mesh": {"surface_edge_mm": "0,8"}}, "mesh.surface_edge_mm", ["write 0.8"]),
+        ({"mesh": {"surface_edge_mm": "0.8 mm"}}, "mesh.surface_edge_mm", ["number"]),
+        ({"start": date(2026, 11, 29)}, "start", ["2026-11-29", "quotes"]),
+        ({"start": False}, "start", ["no", "off", "quotes"]),
+        ({"start": 17}, "start", [17, "quotes"]),
+    ],
+)
+def test_a_wrong_type_is_named_in_words_of_yaml(changes, key, facts):
+    (found,) = [text for text in problems(study(**changes)) if text.startswith(key)]
+    assert found == Facts(f"{key}:", *facts)
+    for word in ("tuple", "dictionary", "instance", "datetime"):
+        assert word not in found
 
 
 def test_what_is_allowed_by_name_or_missing():
