@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
+from recording import DIGITS, numbers_in, table_of
 from xdist.scheduler import LoadScopeScheduling
 
 # dolfinx, PETSc and MPI in the order that their wheels need
@@ -31,6 +32,28 @@ class Sets(LoadScopeScheduling):
 def default_logging_level():
     """Start each test at the default level, which scripts run in this process lower."""
     logging.getLogger().setLevel(logging.WARNING)
+
+
+@pytest.fixture
+def recorded(dataframe_regression, caplog, monkeypatch):
+    """A function that compares results by their names with the table beside the test,
+    and the numbers of all warnings with them.
+
+    `rtol` is the relative tolerance of all numbers, `--force-regen` renews the table.
+    """
+
+    monkeypatch.setattr(type(dataframe_regression), "DISPLAY_PRECISION", DIGITS)
+
+    def check(results, rtol=1e-4):
+        warnings = [
+            numbers_in(record.getMessage())
+            for record in caplog.records
+            if record.name.startswith("gyriflow") and record.levelname == "WARNING"
+        ]
+        table = table_of({**results, "warnings": warnings})
+        dataframe_regression.check(table, default_tolerance={"rtol": rtol, "atol": 0.0})
+
+    return check
 
 
 def pytest_collection_modifyitems(items):
