@@ -6,12 +6,14 @@ so that files stay small.
 
 import dataclasses
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from scipy import sparse
+
+from gyriflow.errors import GyriflowError
 
 SMALL = 9
 """Arrays of at most so many values are recorded whole."""
@@ -120,3 +122,17 @@ def _without_noise(number: float, size: float) -> float:
     if abs(number) < ZERO * size:
         return 0.0
     return float(number)
+
+
+def answer_of(function: Callable, *values: object, **more: object) -> object:
+    """Return what a function returns, or the name and numbers of the error that it
+    raises; numbers only of messages."""
+    try:
+        answer = function(*values, **more)
+    except GyriflowError as error:
+        return f"{type(error).__name__} {numbers_in(str(error))}"
+    if isinstance(answer, Iterator | list) and not isinstance(answer, str):
+        return [
+            numbers_in(item) if isinstance(item, str) else item for item in answer
+        ]
+    return answer
