@@ -5,7 +5,8 @@ import os
 from pathlib import Path
 
 import pytest
-from recording import DIGITS, numbers_in, table_of
+from recording import DIGITS, contents, numbers_in, table_of
+from scripts import OUTPUTS
 from xdist.scheduler import LoadScopeScheduling
 
 # dolfinx, PETSc and MPI in the order that their wheels need
@@ -54,6 +55,19 @@ def recorded(dataframe_regression, caplog, monkeypatch):
         dataframe_regression.check(table, default_tolerance={"rtol": rtol, "atol": 0.0})
 
     return check
+
+
+@pytest.fixture
+def recorded_outputs(recorded, request):
+    """Compare all that the scripts of a test write with the table beside the test."""
+    OUTPUTS.clear()
+    yield
+    is_remeshed = request.node.get_closest_marker("remeshed") is not None
+    files = {}
+    for name, path in OUTPUTS.items():
+        if path.is_file():
+            files[name] = contents(path, is_remeshed)
+    recorded(files, rtol=1e-2 if is_remeshed else 1e-3)
 
 
 def pytest_collection_modifyitems(items):

@@ -1,19 +1,25 @@
 """Recorded tables: all numbers of some results, compared with a file beside the test.
 
-A table has a row a number: what it is of, the number, or a text. Arrays are summarised,
-so that files stay small.
+A table has a row a number, text or array. Arrays are summarised, so that files stay
+small.
 """
 
 import dataclasses
+import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+import h5py
+import nibabel as nib
 import numpy as np
 import pandas as pd
+import yaml
 from scipy import sparse
 
 from gyriflow.errors import GyriflowError
+from gyriflow.geometry.triangles import area_cm2, corners, volume_ml
+from gyriflow.io.surfaces import read_surface
 
 SMALL = 9
 """Arrays of at most so many values are recorded whole."""
@@ -23,7 +29,22 @@ ZERO = 1e-6
 """What is smaller than this share of its array's size is zero, as rounding decides
 it."""
 
-Row = tuple[str, float, str]
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """A row of a table: a text, a number, or an array's shape, its mean and what is
+    measured from there."""
+
+    quantity: str
+    text: str = ""
+    number: float = np.nan
+    spread: float = np.nan
+    least: float = np.nan
+    largest: float = np.nan
+    weighted: float = np.nan
+    first: float = np.nan
+    a_third: float = np.nan
+    last: float = np.nan
 
 
 def table_of(results: Mapping[str, object]) -> pd.DataFrame:
@@ -31,8 +52,7 @@ def table_of(results: Mapping[str, object]) -> pd.DataFrame:
     rows = []
     for name, value in results.items():
         rows.extend(_rows(name, value))
-    table = pd.DataFrame(rows, columns=["quantity", "number", "text"])
-    return table.set_index("quantity")
+    return pd.DataFrame(map(dataclasses.asdict, rows)).set_index("quantity")
 
 
 def numbers_in(message: str) -> str:
@@ -40,11 +60,62 @@ def numbers_in(message: str) -> str:
     return " ".join(re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?", message))
 
 
+def contents(path: Path, is_remeshed: bool = False) -> object:
+    """Return the numbers and texts of a file: a table, JSON, YAML, GIFTI, NIfTI or
+    HDF5; None of others.
+
+    Of maps on a surface that was remeshed, whose vertices rounding decides, only the
+    quartiles are returned.
+    """
+    if path.name.endswith(".csv"):
+        return pd.read_csv(path, dtype={"subject": str})
+    if path.name.endswith(".json"):
+        return json.loads(path.read_text())
+    if path.name.endswith(".yaml"):
+        return yaml.safe_load(path.read_text())
+    if _has_triangles(path):
+        mesh = read_surface(path)
+        # remeshing decides by rounding how many vertices there are
+        return {
+            "area cm2": area_cm2(mesh),
+            "volume mL": volume_ml(mesh),
+            "centre": corners(mesh).mean(axis=(0, 1)),
+            "extents": np.ptp(mesh.vertices, axis=0),
+        }
+    if path.name.endswith(".gii"):
+        maps = {}
+        for number, array in enumerate(nib.load(path).darrays):
+            name = f"{number} {array.meta.get('Name', '')}"
+            quartiles = np.nanquantile(array.data, [0.25, 0.5, 0.75])
+            maps[name] = quartiles if is_remeshed else array.data
+        return maps
+    if path.name.endswith((".nii", ".nii.gz")):
+        image = nib.load(path)
+        return {"voxels": np.asarray(image.dataobj), "affine": image.affine}
+    if path.name.endswith(".h5"):
+        found = {}
+
+        def take(name: str, item: object) -> None:
+            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu":
+                found[name] = item[()]
+
+        with h5py.File(path) as file:
+            file.visititems(take)
+        return found
+    return None
+
+
+def _has_triangles(path: Path) -> bool:
+    if not path.name.endswith(".gii"):
+        return False
+    return bool(nib.load(path).get_arrays_from_intent("NIFTI_INTENT_TRIANGLE"))
+
+
 def _rows(name: str, value: object) -> Iterator[Row]:
     if value is None or isinstance(value, str | bool | np.bool_):
-        yield name, np.nan, str(value)
+        yield Row(name, str(value))
     elif isinstance(value, Path):
-        yield name, np.nan, value.name
+        yield Row(name, value.name)
     elif sparse.issparse(value):
         yield from _array_rows(name, _products(value))
     elif isinstance(value, pd.Series | pd.Index):
@@ -82,39 +153,53 @@ def _products(matrix: sparse.sparray) -> np.ndarray:
 
 def _array_rows(name: str, values: np.ndarray) -> Iterator[Row]:
     if not np.issubdtype(values.dtype, np.number) and values.dtype != bool:
-        values = pd.Series(values.ravel()).fillna("").astype(str)
-        yield name, np.nan, " ".join(values)
+        texts = pd.Series(values.ravel()).fillna("").astype(str)
+        if texts.size > SMALL:
+            counts = texts.value_counts(sort=False)
+            texts = [f"{count} x {text}" for text, count in counts.items()]
+        yield Row(name, " | ".join(texts))
         return
     values = values.astype(float)
-    finite = values[np.isfinite(values)]
     if values.size <= SMALL:
-        size = np.abs(finite).max(initial=0.0)
+        size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
         for index in np.ndindex(values.shape):
             place = list(index) if index else ""
-            yield f"{name}{place}", _without_noise(values[index], size), ""
-        return
-    yield name, np.nan, "shape " + " ".join(map(str, values.shape))
-    summary = {"finite": finite.size}
-    # a place far from the origin is not to hide what is small
-    is_points = values.ndim == 2 and values.shape[1] <= 4
-    means = np.nanmean(values, axis=0) if is_points else np.nanmean(values)
-    centred = values - means
-    spread = np.sqrt(np.nanmean(centred**2))
-    for column, mean in enumerate(np.atleast_1d(means)):
-        summary[f"mean {column}"] = mean
-    summary["spread"] = spread
-    summary["least"] = np.nanmin(centred)
-    summary["largest"] = np.nanmax(centred)
-    # changes with the order of the values
-    summary["weighted"] = np.nanmean(
-        np.linspace(1.0, 2.0, values.size) * centred.ravel()
-    )
-    for part in (0.0, 0.3, 0.8):
-        index = int(part * values.size)
-        summary[f"at {index}"] = centred.ravel()[index]
-    for key, number in summary.items():
-        size = np.abs(values[np.isfinite(values)]).max() if "mean" in key else spread
-        yield f"{name}: {key}", _without_noise(number, size), ""
+            yield Row(f"{name}{place}", "", _without_noise(values[index], size))
+    elif values.ndim == 2 and values.shape[1] <= 4:
+        for column in range(values.shape[1]):
+            yield _summary(f"{name}[:, {column}]", values[:, column])
+    else:
+        yield _summary(name, values)
+
+
+def _summary(name: str, values: np.ndarray) -> Row:
+    """Return the row of an array's numbers: the mean, and all others from there, so
+    that a place far from the origin hides nothing."""
+    shape = "x".join(map(str, values.shape))
+    is_finite = np.isfinite(values)
+    lacking = values.size - int(is_finite.sum())
+    if lacking:
+        shape += f", {lacking} lacking"
+    if lacking == values.size:
+        return Row(name, shape)
+    mean = values[is_finite].mean()
+    flat = (values - mean).ravel()
+    finite = flat[is_finite.ravel()]
+    spread = finite.std()
+    numbers = {
+        "spread": spread,
+        "least": finite.min(),
+        "largest": finite.max(),
+        # changes with the order of the values
+        "weighted": np.nanmean(np.linspace(1.0, 2.0, flat.size) * flat),
+        "first": flat[0],
+        "a_third": flat[flat.size // 3],
+        "last": flat[-1],
+    }
+    for key, number in numbers.items():
+        numbers[key] = _without_noise(number, spread)
+    largest = np.abs(values[is_finite]).max()
+    return Row(name, shape, _without_noise(mean, largest), **numbers)
 
 
 def _without_noise(number: float, size: float) -> float:
@@ -132,7 +217,5 @@ def answer_of(function: Callable, *values: object, **more: object) -> object:
     except GyriflowError as error:
         return f"{type(error).__name__} {numbers_in(str(error))}"
     if isinstance(answer, Iterator | list) and not isinstance(answer, str):
-        return [
-            numbers_in(item) if isinstance(item, str) else item for item in answer
-        ]
+        return [numbers_in(item) if isinstance(item, str) else item for item in answer]
     return answer

@@ -48,6 +48,7 @@ from gyriflow.settings.terms import SIDES
 from gyriflow.shipped import SHIPPED
 from gyriflow.units import SECONDS_PER_GW
 
+pytestmark = pytest.mark.usefixtures("recorded_outputs")
 NORMS = SHIPPED / "norms"
 AREA = "area_growth_percent_per_gw"
 
@@ -322,6 +323,7 @@ def white_made(folder, inputs, sides=SIDES, **params):
     return found, table.set_index(["hemisphere", "metric"])["value"]
 
 
+@pytest.mark.remeshed
 def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
     write_halves(tmp_path)
     size = np.array(LONG_MM)
@@ -344,6 +346,7 @@ def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
         assert values[side, "white_area"] == pytest.approx(area(mesh) / 100)
 
 
+@pytest.mark.remeshed
 def test_white_surfaces_of_files_are_posed_as_files_are(tmp_path):
     write_halves(tmp_path)
     given = {"left": ellipsoid((8.0, 14.0, 12.0), 3), "right": sphere(7.0, 3)}
@@ -403,6 +406,7 @@ def test_labels_are_filled_with_the_brain_s_cortex_or_that_of_a_similar_one(
     assert core == pytest.approx(volume_ml(sphere(PIAL_MM - depth_mm, 5)), rel=0.04)
 
 
+@pytest.mark.remeshed
 def test_a_shape_has_the_given_axes(tmp_path):
     shape = {"semi_axes_mm": (10.0, 13.0, 8.0), "edge_length_mm": 1.6, "noise_mm": 0.0}
     run_script("shape.py", tmp_path, {}, {0: "shape.gii"}, {"shape": shape})

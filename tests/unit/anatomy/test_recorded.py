@@ -135,7 +135,7 @@ def test_numbers_of_a_fissure(recorded):
     side_mm = fissure.side_distance(mask, core, affine, between)
     hidden = fissure.hidden_fissure(side_mm, mask, core, affine)
     bridges = fissure.hidden_fissure(side_mm, mask, core, affine, bridges=True)
-    x, y, z = np.indices(mask.shape)
+    x, y, _ = np.indices(mask.shape)
     some = (x + y > 40) & (np.abs(side_mm) < 4.0)
     far = np.where(some, 0.0, 3.0).astype(np.float32)
     heights = fissure.sample(side_mm, affine, corners(surface()).mean(axis=1))

@@ -49,6 +49,7 @@ from gyriflow.settings.ensemble import Variation
 from gyriflow.settings.schemes import LabelScheme
 from gyriflow.settings.terms import LEFT, RIGHT, SIDES
 
+pytestmark = pytest.mark.usefixtures("recorded_outputs")
 FIRST, SECOND = (Pose(world) for world in FAR)
 GROWN = rigid(5.0, -4.0, 8.0, shift=(6.0, -3.0, 2.0)) @ scaling(1.1)
 """From the files of the first brain to those of the second: larger and turned a
