@@ -26,11 +26,13 @@ from gyriflow.anatomy import (
 )
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import (
+    TriangleMesh,
     corners,
     merged,
     submesh,
     transformed,
     vertex_areas,
+    vertex_normals,
 )
 from gyriflow.io.yaml_files import SCHEMES
 
@@ -291,6 +293,22 @@ def test_numbers_of_thickness(recorded):
         },
         rtol=ROUGH,
     )
+
+
+def test_numbers_of_filled_labels(recorded):
+    whole = shapes.uneven_surface(4)
+    middle = float(whole.vertices[:, 0].mean())
+    sides = fissure.split(whole, middle)
+    depth = 1.0 + 1.5 * shapes.smooth_field(whole.vertices, 25.0)
+    points = whole.vertices - depth[:, None] * vertex_normals(whole)
+    white = TriangleMesh(points, whole.faces)
+    volume, affine = thickness.filled_labels(
+        whole, sides, middle, whites=[white], voxel_mm=1.2
+    )
+    plain, _ = thickness.filled_labels(
+        whole, [sides[0]], middle, thickness_mm=2.5, voxel_mm=1.5
+    )
+    recorded({"labels": volume, "affine": affine, "plain": plain}, rtol=ROUGH)
 
 
 def test_numbers_of_repairs(recorded):
