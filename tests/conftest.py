@@ -45,7 +45,7 @@ def recorded(dataframe_regression, caplog, monkeypatch):
 
     monkeypatch.setattr(type(dataframe_regression), "DISPLAY_PRECISION", DIGITS)
 
-    def check(results, rtol=1e-4, atol=0.0):
+    def check(results, rtol=1e-4, atol=1e-11):
         warnings = [
             numbers_in(record.getMessage())
             for record in caplog.records

@@ -79,7 +79,7 @@ def contents(path: Path, is_remeshed: bool = False) -> object:
         return {
             "area cm2": area_cm2(mesh),
             "volume mL": volume_ml(mesh),
-            "centre": corners(mesh).mean(axis=(0, 1)),
+            "centre": np.round(corners(mesh).mean(axis=(0, 1)), 3),
             "extents": np.ptp(mesh.vertices, axis=0),
         }
     if path.name.endswith(".gii"):

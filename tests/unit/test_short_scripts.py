@@ -48,7 +48,7 @@ from gyriflow.settings.terms import SIDES
 from gyriflow.shipped import SHIPPED
 from gyriflow.units import SECONDS_PER_GW
 
-pytestmark = pytest.mark.usefixtures("recorded_outputs")
+ALL_OUTPUTS = pytest.mark.usefixtures("recorded_outputs")
 NORMS = SHIPPED / "norms"
 AREA = "area_growth_percent_per_gw"
 
@@ -73,6 +73,7 @@ def write_frames(path, growth_by_week):
             group["cell_fields/J"] = np.ones(1)
 
 
+@ALL_OUTPUTS
 def test_growth_maps_are_of_each_interval_and_their_deviation_is_of_the_members(
     tmp_path,
 ):
@@ -95,6 +96,7 @@ def test_growth_maps_are_of_each_interval_and_their_deviation_is_of_the_members(
     assert found == pytest.approx(np.std(of_members, ddof=1), rel=1e-5)
 
 
+@ALL_OUTPUTS
 def test_a_kept_path_is_copied_whole(tmp_path):
     random = np.random.default_rng(5)
     weeks = np.array([21.0, 22.0, 24.5])
@@ -121,6 +123,7 @@ def test_a_kept_path_is_copied_whole(tmp_path):
     assert copy.ages["week"].tolist() == weeks.tolist()
 
 
+@ALL_OUTPUTS
 def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
     tmp_path,
 ):
@@ -161,6 +164,7 @@ def metrics_of(brain, week, area_cm2, run="real"):
     return table.assign(subject=brain, run=run, week=week, value=values)
 
 
+@ALL_OUTPUTS
 def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     """Twelve brains, of which the first two are scans of one subject, and a run."""
     areas = 10 * WEEKS + np.tile([1.0, -1.0], 6)
@@ -243,6 +247,7 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     assert read_json(tmp_path / "copied.json")["population"] == ["normal"]
 
 
+@ALL_OUTPUTS
 @pytest.mark.parametrize("individuals", [True, False])
 def test_tables_of_all_runs_are_joined_and_individuals_have_centiles(
     tmp_path, individuals
@@ -310,6 +315,7 @@ def white_made(folder, inputs, sides=SIDES, **params):
     return found, table.set_index(["hemisphere", "metric"])["value"]
 
 
+@ALL_OUTPUTS
 @pytest.mark.remeshed
 def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
     write_halves(tmp_path)
@@ -333,6 +339,7 @@ def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
         assert values[side, "white_area"] == pytest.approx(area(mesh) / 100)
 
 
+@ALL_OUTPUTS
 @pytest.mark.remeshed
 def test_white_surfaces_of_files_are_posed_as_files_are(tmp_path):
     write_halves(tmp_path)
@@ -356,6 +363,7 @@ def test_white_surfaces_of_files_are_posed_as_files_are(tmp_path):
     assert set(values.index.get_level_values(0)) == {"right", "whole"}
 
 
+@ALL_OUTPUTS
 @pytest.mark.parametrize(
     ("has_white", "similar", "voxel_mm"),
     [(True, None, 0.8), (False, {"mean_mm": 4.0, "voxel_mm": 1.5}, 1.5)],
@@ -393,6 +401,7 @@ def test_labels_are_filled_with_the_brain_s_cortex_or_that_of_a_similar_one(
     assert core == pytest.approx(volume_ml(sphere(PIAL_MM - depth_mm, 5)), rel=0.04)
 
 
+@ALL_OUTPUTS
 @pytest.mark.remeshed
 def test_a_shape_has_the_given_axes(tmp_path):
     shape = {"semi_axes_mm": (10.0, 13.0, 8.0), "edge_length_mm": 1.6, "noise_mm": 0.0}
@@ -449,6 +458,7 @@ def test_an_export_has_the_tables_of_the_study_and_covariates_as_they_are(tmp_pa
     assert not (tmp_path / "export" / "metrics_wide.csv").exists()
 
 
+@ALL_OUTPUTS
 def test_a_file_is_fetched_only_with_its_checksum_and_room_for_it(
     tmp_path, monkeypatch
 ):

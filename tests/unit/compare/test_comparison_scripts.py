@@ -128,6 +128,7 @@ def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
 
 
 @pytest.mark.usefixtures("recorded_outputs")
+@pytest.mark.remeshed
 def test_surfaces_are_prepared_for_the_observed_brain_each_under_its_name(tmp_path):
     surfaces = {
         "observed": bumpy(1),
@@ -165,6 +166,7 @@ def test_surfaces_are_prepared_for_the_observed_brain_each_under_its_name(tmp_pa
 
 
 @pytest.mark.usefixtures("recorded_outputs")
+@pytest.mark.remeshed
 def test_the_atlas_own_brain_is_that_of_the_week_at_the_predicted_size(tmp_path):
     mesh = ellipsoid_mesh(8, (20.0, 24.0, 22.0))
     boundary, _ = boundary_surface(mesh)
