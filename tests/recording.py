@@ -101,6 +101,7 @@ def contents(path: Path, is_remeshed: bool = False) -> object:
 
         with h5py.File(path) as file:
             file.visititems(take)
+            found |= {name: file.attrs[name] for name in sorted(file.attrs)}
         return found
     return None
 
