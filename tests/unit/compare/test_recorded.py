@@ -64,7 +64,7 @@ def test_numbers_of_a_comparison(recorded, observed):
             "baselines": observed.baseline_correlations,
         },
         rtol=5e-2,
-        atol=2e-2,
+        atol=5e-2,
     )
 
 
@@ -96,7 +96,7 @@ def test_numbers_of_resamplings(recorded, observed):
             ),
         },
         rtol=5e-2,
-        atol=2e-2,
+        atol=5e-2,
     )
 
 
@@ -123,7 +123,7 @@ def test_numbers_of_simple_predictions(recorded):
             "table": comparison.add_curves(table, sizes),
         },
         rtol=5e-2,
-        atol=2e-2,
+        atol=5e-2,
     )
 
 
@@ -226,7 +226,7 @@ def test_numbers_of_a_calibration(recorded, observed):
             ),
         },
         rtol=5e-2,
-        atol=2e-2,
+        atol=5e-2,
     )
 
 
@@ -257,7 +257,7 @@ def test_numbers_of_deviations(recorded):
             "averages": deviation.deviation_scores(brains, individuals=False),
         },
         rtol=5e-2,
-        atol=2e-2,
+        atol=5e-2,
     )
 
 
@@ -306,5 +306,5 @@ def test_numbers_of_sweeps(recorded):
             ),
         },
         rtol=5e-2,
-        atol=2e-2,
+        atol=5e-2,
     )

@@ -246,6 +246,7 @@ def test_numbers_of_a_registration(recorded):
             "quality": quality,
         },
         rtol=2e-3,
+        atol=2e-4,
     )
 
 
