@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from mpi4py import MPI
 from recording import contents
-from shapes import smooth_field, uneven_body
+from shapes import box, rigid, smooth_field, uneven_body
 
 from gyriflow.folding import (
     elastic_fit,
@@ -22,6 +22,7 @@ from gyriflow.folding import (
 )
 from gyriflow.folding.checks import zone_report
 from gyriflow.folding.contact import contact_distance_mm, small_gap_mm, stiffening
+from gyriflow.folding.contact_search import ContactSearch
 from gyriflow.folding.domain import bisect_points
 from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.folding.start_regions import start_regions
@@ -29,7 +30,7 @@ from gyriflow.folding.tangent import part_arms, rigid_motions
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.tetrahedra import boundary_surface, quadratic
-from gyriflow.geometry.triangles import corners
+from gyriflow.geometry.triangles import corners, merged, transformed
 from gyriflow.io.files import read_json
 from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import ELEMENT_FIELDS, VertexField
@@ -239,3 +240,22 @@ def test_numbers_of_an_elastic_fit(recorded):
     followed = elastic_fit.ElasticFit(mesh).follow(target(mesh))
     near = elastic_fit.nearness(mesh.vertices, mesh.vertices[::40], 3.0)
     recorded({"drawn": drawn, "followed": followed, "nearness": near}, rtol=5e-3)
+
+
+def test_each_pair_in_contact_belongs_to_one_rank():
+    below = box((8.0, 6.0, 2.0), subdivisions=3)
+    above = transformed(box((7.0, 6.5, 2.0), subdivisions=3), rigid(2.0, 1.0, 20.0))
+    mesh = merged(below, transformed(above, rigid(shift=(0.4, 0.3, 2.2))))
+    x = mesh.vertices[:, 0]
+    masks = [x < -1.0, (x >= -1.0) & (x < 2.0), x >= 2.0]
+
+    def pairs_of(owned):
+        search = ContactSearch(mesh.faces, owned, mesh.vertices, 0.6)
+        found = search.near(mesh.vertices).pairs
+        kinds = (found.vv_collisions, found.ev_collisions)
+        kinds += (found.ee_collisions, found.fv_collisions)
+        return np.array([len(pairs) for pairs in kinds])
+
+    every = pairs_of(np.ones(len(x), dtype=bool))
+    assert (every > 3).sum() >= 3
+    assert sum(map(pairs_of, masks)).tolist() == every.tolist()
