@@ -5,6 +5,7 @@ from recording import answer_of
 from shapes import (
     FAR,
     LONG_MM,
+    box,
     rigid,
     scaling,
     smooth_field,
@@ -62,17 +63,24 @@ def test_numbers_of_quality(recorded):
     places = bent.vertices.copy()
     places[len(mesh.vertices) :] += 0.4 * np.sin(places[len(mesh.vertices) :])
     bent = TetrahedralMesh(places, bent.tets)
-    other = transformed(surface, rigid(shift=(45.0, 6.0, 4.0)))
-    walls = quality.gap_walls(merged(surface, other))
+    below = box((8.0, 6.0, 2.0), subdivisions=3)
+    above = box((7.0, 6.5, 2.0), (0.4, 0.3, 2.6), subdivisions=3)
+    near = transformed(above, rigid(shift=(0.0, 0.0, -0.35)))
+    part = box((3.0, 3.0, 2.0), (0.4, 0.3, 2.6))
+    apart = merged(below, above)
+    walls = quality.gap_walls(apart)
     summary = quality.quality_summary(mesh, surface)
     recorded(
         {
             "summary": summary,
             "of bent": quality.quality_summary(bent, surface),
             "fidelity": quality.fidelity(boundary, surface),
-            "walls": walls,
+            "walls": {name: np.round(part, 3) for name, part in vars(walls).items()},
             "gaps": quality.gap_summary(walls),
-            "kept": quality.gap_kept(walls, merged(surface, other)),
+            "kept": [
+                quality.gap_kept(walls, merged(below, other))
+                for other in (above, near, part)
+            ],
             "Jacobians": quality.jacobian_ratios(bent),
             "angles": quality.dihedral_angles(mesh),
             "curved": curved,
