@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 
 import pytest
+from recording import DIGITS, contents, numbers_in, table_of
+from scripts import OUTPUTS
 from xdist.scheduler import LoadScopeScheduling
 
 # dolfinx, PETSc and MPI in the order that their wheels need
@@ -31,6 +33,46 @@ class Sets(LoadScopeScheduling):
 def default_logging_level():
     """Start each test at the default level, which scripts run in this process lower."""
     logging.getLogger().setLevel(logging.WARNING)
+
+
+@pytest.fixture
+def recorded(dataframe_regression, caplog, monkeypatch):
+    """A function that compares results by their names with the table beside the test,
+    and the numbers of all warnings with them.
+
+    `rtol` is the relative tolerance of all numbers, `--force-regen` renews the table.
+    """
+
+    monkeypatch.setattr(type(dataframe_regression), "DISPLAY_PRECISION", DIGITS)
+
+    def check(results, rtol=1e-4, atol=1e-11):
+        warnings = [
+            numbers_in(record.getMessage())
+            for record in caplog.records
+            if record.name.startswith("gyriflow") and record.levelname == "WARNING"
+        ]
+        table = table_of({**results, "warnings": warnings})
+        dataframe_regression.check(
+            table, default_tolerance={"rtol": rtol, "atol": atol}
+        )
+
+    return check
+
+
+@pytest.fixture
+def recorded_outputs(recorded, request):
+    """Compare all that the scripts of a test write with the table beside the test."""
+    OUTPUTS.clear()
+    yield
+    is_remeshed = request.node.get_closest_marker("remeshed") is not None
+    files = {}
+    for name, path in OUTPUTS.items():
+        if path.is_file():
+            files[name] = contents(path, is_remeshed)
+    if is_remeshed:
+        recorded(files, rtol=1e-2, atol=5e-3)
+    else:
+        recorded(files, rtol=1e-3)
 
 
 def pytest_collection_modifyitems(items):

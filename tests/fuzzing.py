@@ -10,7 +10,7 @@ from gyriflow.errors import GyriflowError
 
 # drawn from a fixed seed; the machine's speed does not decide
 BOUNDED = settings(
-    max_examples=20,
+    max_examples=10,
     derandomize=True,
     deadline=None,
     database=None,

@@ -4,6 +4,8 @@ import runpy
 from pathlib import Path
 from types import SimpleNamespace
 
+OUTPUTS: dict[str, Path] = {}
+"""Files that scripts have written in the current test, by script and name."""
 SCRIPTS = Path(__file__).parents[1] / "workflow" / "scripts"
 
 
@@ -41,3 +43,8 @@ def run_script(name, folder, inputs, outputs, params=(), **more):
         **more,
     )
     runpy.run_path(str(SCRIPTS / name), init_globals={"snakemake": job})
+    for key, file in outputs.items():
+        paths = file if isinstance(file, list) else [file]
+        for number, path in enumerate(paths):
+            if path:
+                OUTPUTS[f"{name} {key} {number}"] = Path(path)

@@ -23,6 +23,7 @@ from gyriflow.geometry.triangles import (
     face_normals,
     flipped,
     submesh,
+    transformed,
     vertex_normals,
 )
 
@@ -258,6 +259,34 @@ def ellipsoid_mesh(
     points = shell * round_ + (1 - shell) * x
     vertices = points * np.array(semi_axes) + np.asarray(centre)
     return TetrahedralMesh(vertices, cube.tets)
+
+
+@cache
+def uneven_surface(subdivisions: int = 3, pose: int = 0) -> TriangleMesh:
+    """Return a closed surface without a symmetry, far from the origin: unequal axes and
+    triangles, and bumps on one side."""
+    ball = uneven(sphere(1.0, subdivisions))
+    x, y, z = ball.vertices.T
+    height = 1.0 + 0.15 * np.sin(4.0 * x + y) * (1.0 + z)
+    shape = height[:, None] * ball.vertices * [16.0, 24.0, 19.0]
+    return transformed(TriangleMesh(shape, ball.faces), FAR[pose])
+
+
+@cache
+def uneven_body(cells: int = 4) -> TetrahedralMesh:
+    """Return a body of linear elements without a symmetry, far from the origin: unequal
+    axes and elements."""
+    mesh = ellipsoid_mesh(cells, (16.0, 24.0, 19.0))
+    x, y, z = mesh.vertices.T
+    drawn = mesh.vertices * (1.0 + 0.01 * (x + 0.5 * y + 0.3 * z))[:, None]
+    turned = drawn @ FAR[0][:3, :3].T + FAR[0][:3, 3]
+    return TetrahedralMesh(turned, mesh.tets)
+
+
+def smooth_field(points: np.ndarray, period_mm: float = 40.0) -> np.ndarray:
+    """Return (n,) values between 0.5 and 2.5 that change along all three axes."""
+    x, y, z = (points / period_mm).T
+    return 1.5 + np.sin(x + 2.0 * y) * np.cos(3.0 * z - x)
 
 
 def inner_edges_of_the_surface(mesh: TetrahedralMesh) -> set[tuple[int, int]]:

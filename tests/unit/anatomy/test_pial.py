@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import odd_brains
 import pytest
 import shapes
 from atlas_brains import atlas_halves
@@ -40,7 +41,7 @@ from gyriflow.geometry.triangles import (
     transformed,
 )
 from gyriflow.io.surfaces import read_surface, write_surface
-from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.volumes import LabelSource, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.mesh.maps import move_to_mesh
 from gyriflow.metrics.measure import measure_brain
@@ -351,6 +352,35 @@ def test_the_files_of_hemispheres_are_the_left_and_the_right_one_in_turn(tmp_pat
         assert found.mean() == pytest.approx(given.vertices[:, 0].mean(), abs=1.5)
 
 
+@pytest.mark.remeshed
+@pytest.mark.usefixtures("recorded_outputs")
+def test_labels_of_a_hemisphere_give_its_surface_and_thickness(tmp_path):
+    labels, affine = shapes.phantom(24.0, (1.9, 2.1, 2.4))
+    scheme = SCHEMES["dhcp-19"]
+    sided = odd_brains.add_sides(labels, affine)
+    left = odd_brains.one_hemisphere(sided, affine, "left")
+    shapes.save_labels(tmp_path / "labels.nii.gz", left, shapes.FAR[0] @ affine)
+    outputs = {name: f"{name}.gii" for name in ("whole", "left", "thickness")}
+    outputs |= {"measured": "measured.gii", "report": "report.json"}
+    outputs |= {"summary": "summary.json"}
+    params = {
+        "source": "labels",
+        "week": 24.0,
+        "side": "left",
+        "labels": LabelSource(str(tmp_path / "labels.nii.gz"), "auto", scheme),
+        "checksums": {},
+        "settings": {"edge_length_mm": 3.0},
+    }
+    run_script("pial.py", tmp_path, {"given": [], "white": []}, outputs, params)
+    surface = read_surface(tmp_path / "whole.gii")
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["side"] == "left"
+    # on the left of the mid-plane
+    assert surface.vertices[:, 0].max() < report["fissure_x_mm"]
+    mean_mm = json.loads((tmp_path / "summary.json").read_text())["mean_mm"]
+    assert mean_mm == pytest.approx(2.0, abs=0.5)
+
+
 def test_overlapping_hemispheres_are_moved_apart(halves):
     left = TriangleMesh(halves[0].vertices - [-2.5, 0, 0], halves[0].faces)
     surface = from_hemispheres(left, halves[1], week=24.0, **QUICK)
@@ -545,7 +575,7 @@ def test_a_wide_hole_elsewhere_is_refused_with_its_size():
     ):
         from_hemispheres(lateral, merged(right, flipped(wall)), **COARSE)
     with pytest.raises(MeshError, match=r"mm across", check=Facts("3 mm")):
-        from_surface(whole, week=24.0)
+        from_surface(whole, **COARSE)
 
 
 def test_split_gives_bulges_back_to_their_hemisphere(phantom):

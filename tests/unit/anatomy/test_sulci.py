@@ -144,6 +144,7 @@ def test_holes_in_the_white_matter_open_nothing_more():
     np.testing.assert_array_equal(*fields)
 
 
+@pytest.mark.slow
 def test_a_hemisphere_alone_has_its_sulcus_opened():
     labels, affine = phantom(voxel_mm=0.8)
     scheme = SCHEMES["dhcp-19"]

@@ -114,6 +114,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_a_run_s_score_is_the_mean_over_each_simulation_and_each_of_its_brains(
     folder, monkeypatch
 ):
@@ -158,6 +159,7 @@ def designed(folder, runs, scores):
     return read_table(folder / "design.csv")
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_rounds_are_designed_by_all_scores_before_and_end_in_the_best_run(tmp_path):
     first = designed(tmp_path, ["r1", "r2", "r3", "r4"], [])
     assert first["run"].tolist() == ["r1", "r2", "r3", "r4"]

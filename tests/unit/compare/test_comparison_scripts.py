@@ -34,6 +34,7 @@ def smaller(mesh):
     return TriangleMesh(0.6 * mesh.vertices, mesh.faces)
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
     """The run is the observed brain of each week; the start has the opposite folds, the
     brain before equal ones."""
@@ -81,6 +82,7 @@ def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
     assert table["r_mean_curvature"].tolist() == pytest.approx([1, 1], abs=0.002)
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
     """The brain grows by 10 % a week, along the path that the run follows."""
     mesh = ellipsoid_mesh(8, (12.0, 14.0, 13.0))
@@ -125,6 +127,8 @@ def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
     assert table["area_difference"].abs().max() < 1e-4
 
 
+@pytest.mark.usefixtures("recorded_outputs")
+@pytest.mark.remeshed
 def test_surfaces_are_prepared_for_the_observed_brain_each_under_its_name(tmp_path):
     surfaces = {
         "observed": bumpy(1),
@@ -161,6 +165,8 @@ def test_surfaces_are_prepared_for_the_observed_brain_each_under_its_name(tmp_pa
         assert heights[0] == pytest.approx(heights[1], rel=0.15)
 
 
+@pytest.mark.usefixtures("recorded_outputs")
+@pytest.mark.remeshed
 def test_the_atlas_own_brain_is_that_of_the_week_at_the_predicted_size(tmp_path):
     mesh = ellipsoid_mesh(8, (20.0, 24.0, 22.0))
     boundary, _ = boundary_surface(mesh)

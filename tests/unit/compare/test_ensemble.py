@@ -192,6 +192,7 @@ def test_spread_is_that_of_places_after_rigid_alignment():
     assert set(slight["gyrus_probability"]) == {0.0}
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_the_scripts_read_run_members_and_observed_brain_of_both_sides(tmp_path):
     for name, area in (("run", 100), ("one", 99), ("two", 101)):
         write_table(tmp_path / f"{name}.csv", metrics(24.0, area))

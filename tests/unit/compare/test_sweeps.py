@@ -118,6 +118,7 @@ def test_a_band_that_one_of_both_has_not_in_full_is_cut_off():
     assert np.isnan([row["value"], row["observed_value"], row["distance"]]).all()
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_the_script_compares_each_part_with_that_of_each_observed_brain(tmp_path):
     """Parts of unequal size of two observed brains, a millimetre and three larger than
     the simulated one."""
@@ -375,6 +376,7 @@ def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared
     assert table.loc[("few", "shape_index_relative_power_B4_weyl"), "flag"] == "cut off"
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_the_script_joins_each_run_with_its_own_files_and_finds_the_nearest(tmp_path):
     """The coarse run is the nearer one by area and within the noise of the other."""
     runs = {

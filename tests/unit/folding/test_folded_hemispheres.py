@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from ellipsoid import CENTRE_MM, RUN, SEMI_AXES, brain_mesh
 from facts import Facts
+from recording import contents
 from scripts import run_script
 from shapes import ellipsoid
 
@@ -104,6 +105,11 @@ def test_the_folded_hemispheres_are_the_facets_that_were_theirs_at_the_start(mad
         theirs = positions[regions.facets[regions.facet_tags["hemisphere"] == tag]]
         np.testing.assert_allclose(corners(side), theirs, atol=1e-4)
     np.testing.assert_allclose(corners(whole), positions[regions.facets], atol=1e-4)
+
+
+def test_numbers_of_the_folded_brain(made, recorded):
+    files = sorted(made.glob("*.gii")) + sorted(made.glob("*.csv"))
+    recorded({path.name: contents(path) for path in files}, rtol=1e-3)
 
 
 def test_metrics_of_the_folded_brain_are_of_its_week_and_its_surfaces(made):

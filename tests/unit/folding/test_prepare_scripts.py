@@ -40,6 +40,9 @@ def thickness_at(points):
     return 2.5 + (points - CENTRE_MM) @ SLOPE
 
 
+pytestmark = pytest.mark.usefixtures("recorded_outputs")
+
+
 @pytest.fixture
 def folder(tmp_path):
     """A folder with the mesh of a brain, its hemispheres, and the pose that it was

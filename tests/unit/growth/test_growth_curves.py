@@ -361,6 +361,7 @@ def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean(
     assert table["to_week"].tolist() == [22, 23]
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
     for name, radius_mm, tissue_ml in zip(
         "abcd", (20.0, 22.0, 20.0, 21.0), (30.0, 40.0, None, None), strict=True
@@ -402,6 +403,7 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
     assert rates["cortex_ratio"].isna().all()
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_curves_of_each_series_are_written_with_the_errors_of_its_own(tmp_path) -> None:
     tables = []
     for name, factor in (("mine", 1.0), ("atlas", 1.4)):

@@ -28,11 +28,14 @@ from gyriflow.geometry.triangles import (
     submesh,
     transformed,
 )
+from gyriflow.io import origins
 from gyriflow.io.files import write_json
 from gyriflow.io.registrations import (
     WeeklyShapes,
     read_correspondence,
+    read_path_key,
     read_weekly_shapes,
+    stored_name,
     write_correspondence,
     write_weekly_shapes,
 )
@@ -49,6 +52,7 @@ from gyriflow.settings.ensemble import Variation
 from gyriflow.settings.schemes import LabelScheme
 from gyriflow.settings.terms import LEFT, RIGHT, SIDES
 
+pytestmark = pytest.mark.usefixtures("recorded_outputs")
 FIRST, SECOND = (Pose(world) for world in FAR)
 GROWN = rigid(5.0, -4.0, 8.0, shift=(6.0, -3.0, 2.0)) @ scaling(1.1)
 """From the files of the first brain to those of the second: larger and turned a
@@ -280,7 +284,8 @@ def test_a_registration_leads_from_the_earlier_brain_to_the_later_one(tmp_path):
     assert carry(found, at[None])[0] == pytest.approx(later_at, abs=1.0)
 
 
-def test_a_series_is_followed_through_the_poses_of_its_brains(tmp_path):
+def test_a_series_is_followed_through_the_poses_of_its_brains(tmp_path, monkeypatch):
+    monkeypatch.setattr(origins, "present_key", lambda origin: f"key-of-{origin}")
     worlds = [*FAR, FAR[1] @ FAR[0]]
     mesh = ellipsoid_mesh(5, (14.0, 20.0, 16.0))
     shapes = [mesh.vertices, 1.04 * mesh.vertices, 1.08 * mesh.vertices]
@@ -316,8 +321,11 @@ def test_a_series_is_followed_through_the_poses_of_its_brains(tmp_path):
         "posed": [(False, False), (True, False)],
         "opens_sulci": False,
     }
-    params |= {"code": "", "origin": None, "store": None}
-    run_script("targets.py", tmp_path, inputs, {0: "targets.h5"}, params)
+    params |= {"code": "", "origin": "atlas", "store": str(tmp_path)}
+    brain = SimpleNamespace(brain="first")
+    run_script(
+        "targets.py", tmp_path, inputs, {0: "targets.h5"}, params, wildcards=brain
+    )
     found = read_weekly_shapes(tmp_path / "targets.h5")
     assert found.weeks.tolist() == [21.0, 22.0, 23.0]
     for places, expected in zip(found.positions, posed, strict=True):
@@ -325,6 +333,10 @@ def test_a_series_is_followed_through_the_poses_of_its_brains(tmp_path):
     assert found.sizes["volume_ml"] / found.sizes["volume_ml"][0] == pytest.approx(
         [1, 1.04**3, 1.08**3], rel=0.01
     )
+    # the path is kept for other studies, which ask what it was made from
+    assert read_path_key(tmp_path / "targets.h5") == "key-of-atlas"
+    kept = read_weekly_shapes(tmp_path / stored_name("first", "key-of-atlas"))
+    assert kept.positions == pytest.approx(found.positions)
 
 
 @pytest.mark.parametrize("posed", [(False, False), (True, False), (False, True)])

@@ -123,6 +123,7 @@ PLACES = CENTILES.PLACES
 COHORTS, SEED = 30, 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("subjects", [12, 100])
 @pytest.mark.parametrize("name", sorted(CENTILES.CASES.keys() - {"5 % outliers"}))
 def test_of_new_normal_subjects_5_percent_are_below_the_5th_centile(

@@ -337,6 +337,7 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
         }
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_tables_tell_runs_apart(folder):
     files = {"params": "params.yaml", "steps": "folding/steps.csv"}
     files |= {

@@ -1,0 +1,261 @@
+"""All numbers of short simulations of an uneven body far from the origin, and of the
+room's functions on it."""
+
+from typing import get_args
+
+import numpy as np
+import pandas as pd
+import pytest
+from mpi4py import MPI
+from recording import contents
+from shapes import box, rigid, smooth_field, uneven_body
+
+from gyriflow.folding import (
+    elastic_fit,
+    growth,
+    layers,
+    output,
+    run,
+    steering,
+    step_fields,
+    stretches,
+)
+from gyriflow.folding.checks import zone_report
+from gyriflow.folding.contact import contact_distance_mm, small_gap_mm, stiffening
+from gyriflow.folding.contact_search import ContactSearch
+from gyriflow.folding.domain import bisect_points
+from gyriflow.folding.predicted_memory import predicted_memory_mib
+from gyriflow.folding.start_regions import start_regions
+from gyriflow.folding.tangent import part_arms, rigid_motions
+from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.jacobians import SLOPES
+from gyriflow.geometry.tetrahedra import boundary_surface, quadratic
+from gyriflow.geometry.triangles import corners, merged, transformed
+from gyriflow.io.files import read_json
+from gyriflow.settings.folding import parameters_from
+from gyriflow.settings.terms import ELEMENT_FIELDS, VertexField
+
+CENTRE_MM = uneven_body().vertices.mean(axis=0)
+RUN = {
+    "start_week": 21.0,
+    "end_week": 22.0,
+    "output_weeks": [21.0, 21.4, 22.0],
+    "fissure_x_mm": float(CENTRE_MM[0]),
+    "step_s": 172800.0,
+    "thickness_mm": {"weeks": {21.0: 4.0, 22.0: 5.0}},
+    "core_growth_rate_per_s": 5e-8,
+    "radial_growth_rate_per_s": 4e-8,
+    "newton_tolerance": 1e-8,
+    "support": "free",
+    "no_growth": "none",
+}
+KINDS = {
+    "rates, planes, ellipsoid": {
+        "contact": "planes",
+        "support": "ellipsoid",
+        "no_growth": "ellipsoid",
+        "stress_memory_gw": 1.5,
+        "material": "compressible-neo-hookean",
+    },
+    "rates, global contact, quadratic": {"contact": "global"},
+    "sizes": {
+        "contact": "none",
+        "growth": {
+            "model": "sizes",
+            "area_cm2": {21.0: 44.0, 22.0: 50.0},
+            "volume_ml": {21.0: 24.0, 22.0: 27.0},
+        },
+    },
+    "shapes": {
+        "contact": "none",
+        "growth": {
+            "model": "shapes",
+            "area_cm2": {21.0: 44.0, 22.0: 50.0},
+            "volume_ml": {21.0: 24.0, 22.0: 27.0},
+        },
+        "targets": {22.0: "target"},
+    },
+}
+"""Settings of short simulations."""
+FIELDS = [name for name in get_args(VertexField) if name != "contact_pressure"]
+FIELDS += ELEMENT_FIELDS
+SOLVER = {"newton", "krylov", "rung", "residual"}
+"""What rounding decides of a step."""
+
+
+def target(mesh):
+    """Return the places of a body that has grown and bent."""
+    offset = mesh.vertices - CENTRE_MM
+    bent = 0.5 * np.sin(offset[:, [1, 2, 0]] / 8.0)
+    return CENTRE_MM + offset * [1.05, 1.03, 1.08] + bent
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_numbers_of_a_simulation(recorded, tmp_path, kind):
+    mesh = uneven_body(4)
+    if "quadratic" in kind:
+        mesh = quadratic(mesh)
+    settings = {"fields": FIELDS if "rates" in kind else ["displacement", "growth"]}
+    parameters = parameters_from(RUN | KINDS[kind] | settings)
+    maps = {}
+    if "shapes" in kind:
+        for axis, values in zip("xyz", target(mesh).T, strict=True):
+            maps[f"target_{axis}"] = values
+    zones = zones_of_run(mesh, parameters)
+    run.run(MPI.COMM_SELF, mesh, zones, parameters, maps, tmp_path)
+    steps = pd.read_csv(tmp_path / "steps.csv")
+    untold = [name for name in steps if "seconds" in name or name.endswith("_mib")]
+    summary = read_json(tmp_path / "summary.json")
+    told = ("steps", "reached_week", "radius_ratio_01", "weeks", "missed")
+    recorded(
+        {
+            "steps": steps.drop(columns=[*untold, *SOLVER.intersection(steps)]),
+            "summary": {name: summary[name] for name in told if name in summary},
+            "frames": contents(tmp_path / "frames.h5"),
+        },
+        rtol=5e-3,
+    )
+
+
+def test_numbers_of_layers_and_zones(recorded):
+    mesh = uneven_body(6)
+    parameters = parameters_from(RUN)
+    planes = parameters_from(RUN | KINDS["rates, planes, ellipsoid"])
+    search = layers.PialSearch(mesh.vertices, zones_of_run(mesh, parameters).facets)
+    distance, normals = search.distance_and_normals(mesh.vertices)
+    thickness = 2.0 + smooth_field(mesh.vertices)
+    weight = layers.cortical_weight(distance, thickness)
+    zones = zones_of_run(mesh, planes, 2.0)
+    names = ["distance", "cortex_weight", "shear_modulus", "growth", "zone"]
+    maps = {"thickness_mm": thickness}
+    growths = growth.increments_at(parameters, weight, zones.growth, {}, 21.5, 1e5)
+    inputs = growth.GrowthInputs(mesh, zones, {})
+    before = inputs.size(mesh.vertices)
+    after = inputs.size(mesh.vertices * 1.01)
+    is_left = x_of(mesh) < CENTRE_MM[0]
+    recorded(
+        {
+            "distance": distance,
+            "normals": normals,
+            "weight": weight,
+            "modulus": layers.shear_modulus(parameters, weight, maps, 21.5),
+            "zones": zones,
+            "free zones": zones_of_run(mesh, parameters),
+            "report": zone_report(mesh, zones, 4.0),
+            "fields": output.layer_fields(
+                mesh.vertices, zones, planes, {}, 21.5, names[:4]
+            ),
+            "increments": growths,
+            "sizes": [before, after],
+            "rates": before.rates_to(after, 1e5),
+            "free growth": steering.free_growth(
+                parameters, mesh.vertices, inputs, 21.5
+            ),
+            "regions": start_regions(mesh, planes, {}, lambda _: is_left),
+        },
+        rtol=1e-3,
+    )
+
+
+def x_of(mesh):
+    """Return the x of the centres of a body's boundary facets."""
+    return corners(boundary_surface(mesh)[0])[:, :, 0].mean(axis=1)
+
+
+def test_numbers_of_steering(recorded):
+    curve = {21.0: 100.0, 22.0: 110.0, 24.0: 121.0}
+    results = {}
+    for week in (21.0, 21.6, 23.0):
+        results[f"{week}"] = steering.blended(curve, 93.0, 21.0, week)
+    made = np.array([[2.0, 0.3], [1.2, 1.75]])
+    for required in ((0.9, 1.1), (2.5, 0.1), (0.01, 3.0)):
+        results[f"{required}"] = steering.steered_rates(
+            np.array(required), made, (0.0, 1.0)
+        )
+    row = {"week": 23.0, "area_cm2": 97.0, "area_aim_cm2": 100.0}
+    row |= {"volume_ml": 52.0, "volume_aim_ml": 50.0}
+    results["missed"] = steering.missed_curves(row)
+    recorded(results)
+
+
+def test_numbers_of_tensors(recorded):
+    mesh = uneven_body(3)
+    gradients = stretches.deformation_gradients(
+        mesh.vertices, target(mesh), mesh.tets, SLOPES[None]
+    )
+    stress = gradients @ np.swapaxes(gradients, -1, -2) * 300.0
+    normal = np.broadcast_to([0.6, 0.0, 0.8], (len(gradients.reshape(-1, 9)), 3))
+    flat = gradients.reshape(-1, 3, 3)
+    inverse, is_limited = stretches.inverse_stretch(flat, 0.7, 0.05)
+    logs = stretches.log_stretch(flat, limit=0.06)
+    recorded(
+        {
+            "gradients": flat,
+            "packed": stretches.packed(logs),
+            "unpacked": stretches.unpacked(stretches.packed(logs)),
+            "inverse": inverse,
+            "limited": is_limited,
+            "left logs": stretches.log_stretch(flat, left=True),
+            "left": stretches.left_stretch(flat, 0.4),
+            "relaxed": stretches.relaxed(stretches.left_stretch(flat), 0.3, 1.2),
+            "pressure": step_fields.pressure(stress),
+            "von Mises": step_fields.von_mises(stress),
+            "principal": step_fields.principal_stretches(flat),
+            "Hencky": step_fields.hencky_equivalent(flat),
+            "Green": step_fields.green_lagrange_maximum(flat),
+            "area": step_fields.areal_stretch(flat, normal),
+            "exponential": elastic_fit.exponential(logs, 0.1),
+            "logarithm": elastic_fit.inverse_exponential(logs),
+        },
+        rtol=1e-3,
+    )
+
+
+def test_numbers_of_parts_and_contact(recorded):
+    mesh = uneven_body(4)
+    part = bisect_points(mesh.vertices, 5)
+    arms = part_arms(mesh.vertices, part)
+    lengths = np.linspace(0.3, 2.0, 50) ** 2
+    recorded(
+        {
+            "parts": part,
+            "arms": arms,
+            "motions": rigid_motions(arms),
+            "distance": contact_distance_mm(lengths),
+            "small gap": small_gap_mm(lengths),
+            "stiffening": [stiffening(gap) for gap in (0.01, 0.3, 0.9)],
+            "memory": [
+                predicted_memory_mib(250_000, 2, "global"),
+                predicted_memory_mib(250_000, 4, "planes", 2),
+            ],
+        }
+    )
+
+
+def test_numbers_of_an_elastic_fit(recorded):
+    mesh = uneven_body(4)
+    body = elastic_fit.ElasticFit(mesh)
+    goals = body.boundary.vertices + 0.8 * np.sin(body.boundary.vertices / 5.0)
+    drawn = body.draw(goals)
+    followed = elastic_fit.ElasticFit(mesh).follow(target(mesh))
+    near = elastic_fit.nearness(mesh.vertices, mesh.vertices[::40], 3.0)
+    recorded({"drawn": drawn, "followed": followed, "nearness": near}, rtol=5e-3)
+
+
+def test_each_pair_in_contact_belongs_to_one_rank():
+    below = box((8.0, 6.0, 2.0), subdivisions=3)
+    above = transformed(box((7.0, 6.5, 2.0), subdivisions=3), rigid(2.0, 1.0, 20.0))
+    mesh = merged(below, transformed(above, rigid(shift=(0.4, 0.3, 2.2))))
+    x = mesh.vertices[:, 0]
+    masks = [x < -1.0, (x >= -1.0) & (x < 2.0), x >= 2.0]
+
+    def pairs_of(owned):
+        search = ContactSearch(mesh.faces, owned, mesh.vertices, 0.6)
+        found = search.near(mesh.vertices).pairs
+        kinds = (found.vv_collisions, found.ev_collisions)
+        kinds += (found.ee_collisions, found.fv_collisions)
+        return np.array([len(pairs) for pairs in kinds])
+
+    every = pairs_of(np.ones(len(x), dtype=bool))
+    assert (every > 3).sum() >= 3
+    assert sum(map(pairs_of, masks)).tolist() == every.tolist()
