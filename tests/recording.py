@@ -184,7 +184,7 @@ def _summary(name: str, values: np.ndarray) -> Row:
     if lacking == values.size:
         return Row(name, shape)
     mean = values[is_finite].mean()
-    flat = (values - mean).ravel()
+    flat = np.where(is_finite, values, np.nan).ravel() - mean
     finite = flat[is_finite.ravel()]
     spread = finite.std()
     numbers = {

@@ -278,7 +278,7 @@ def test_numbers_of_sweeps(recorded):
             )
         parts = {"left": body(0.9 + 0.05 * size)}
         tables.append(
-            sweeps.comparison_table(
+            sweeps.member_comparison(
                 run,
                 "a",
                 {"a": "p", "b": "p", "c": "q"},

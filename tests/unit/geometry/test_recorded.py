@@ -166,7 +166,7 @@ def test_numbers_of_correspondences_and_poses(recorded, surface):
     recorded(
         {
             "carried": deformations.carry(pair, surface.vertices),
-            "determinants": deformations.determinants(pair),
+            "determinants": deformations.volume_changes(pair),
             "index": deformations.voxel_index(surface.vertices, pair.affine),
             "moved": moved,
             "surfaces": deformations.between_moved(matched, FAR[0], FAR[1]),

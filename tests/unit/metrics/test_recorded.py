@@ -190,7 +190,7 @@ def test_numbers_of_tables(recorded):
     metrics = cohort()
     regions = metrics[::5].assign(region="insula", value=metrics["value"] / 9)
     long = tables.long_table([metrics, regions])
-    scans = {"one": ["s2", "s3"], "two": ["s8", "s12", "s17"]}
+    scans = {"one": ["s2", "s5"], "two": ["s8", "s12", "s17"]}
     record = {"metrics": {}, "distances": {}}
     for number, metric in enumerate(sorted(METRICS), start=1):
         record["metrics"][metric] = {"cv": 0.01 * number, "sd": 0.1 * number}

@@ -256,7 +256,7 @@ def test_values_that_agree_in_six_digits_are_runs_of_their_own():
                 }
             },
             "sweeps.s-1",
-            ["s-1-0.3", "study s", "study s-1"],
+            ["s-1-0.3", "sweep s", "sweep s-1"],
         ),
         (
             {"calibrate": CALIBRATION, "runs": RUNS | {"Calibration-01": {}}},
@@ -376,7 +376,7 @@ def test_ids_with_the_marks_of_file_names_have_files_of_their_own(patterns):
     for first in names:
         for second in names:
             values = {
-                "study": "s",
+                "sweep": "s",
                 "run": first,
                 "brain": second,
                 "earlier": first,
