@@ -35,6 +35,7 @@ from gyriflow.geometry.triangles import (
     euler_number,
     flipped,
     is_closed,
+    mean_edge_length,
     merged,
     signed_volume,
     submesh,
@@ -298,6 +299,8 @@ def test_a_surface_in_voxel_indices_is_told(phantom):
 def test_hemispheres_are_merged_apart_and_whole(halves):
     surface = from_hemispheres(*halves, week=24.0, **QUICK)
     require_sound(surface, surfaces=2)
+    # in triangles of the length that is asked for
+    assert mean_edge_length(surface.whole) == pytest.approx(2.0, rel=0.2)
     assert surface.report["moved_apart_mm"] == 0.0
     assert is_closed(surface.left)
     assert signed_volume(surface.whole) == pytest.approx(
