@@ -49,7 +49,6 @@ RESULT_COLUMNS = re.compile(
 )
 """Columns of `metrics_wide.csv`, which covariates stand in as well."""
 RESERVED_SWEEPS = (
-    "benchmarks",
     "calibration",
     "figures",
     "growth",

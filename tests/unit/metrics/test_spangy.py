@@ -289,10 +289,10 @@ def test_who_is_compared_with_whom() -> None:
         + table["observed"]
     )
     assert sorted(set(pairs)) == [
-        "a real left, b",
+        "a observed left, b",
         "a sim left, a",
         "a sim left, b",
-        "b real left, a",
+        "b observed left, a",
     ]
     assert len(table) == 3 * 4
 

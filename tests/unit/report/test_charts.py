@@ -438,7 +438,7 @@ def test_intervals_are_around_the_run_and_observed_brains_are_stars():
         {
             "week": [22.0, 27.5, 24.0],
             "unit": "1",
-            "observed": [np.nan, 18.5, 12.0],
+            "observed_value": [np.nan, 18.5, 12.0],
             **ends,
         }
     )

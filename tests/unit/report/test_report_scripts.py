@@ -25,6 +25,7 @@ from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.surfaces import write_surface, write_vertex_maps
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.messages import Message, write_message
+from gyriflow.step import Usage, record_usage
 
 from .test_page import (
     BRAINS,
@@ -118,13 +119,10 @@ def folder(tmp_path, monkeypatch):
             )
         frames = [f"{at}/{week}.h5" for week in (22.0, 23.0)]
         join_frames(f"{at}/folding/frames.h5", np.array([[0, 1, 2, 3]]), frames)
-        write_text(
-            f"{at}/benchmarks/simulate.tsv",
-            f"wall_s\tcpu_s\tmemory_MiB\n{3600 + 3600 * number}\t7200\t100\n",
-        )
         log = Path(at, "logs", "simulate.log")
         log.parent.mkdir()
         write_message(log, Message("warning", f"of {run}"))
+        record_usage(log, Usage(3600 + 3600 * number, 7200, 100))
     return tmp_path
 
 
@@ -287,8 +285,8 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
     }
     params["files"] = [(brain["id"], "labels", brain["labels"]) for brain in brains]
     params["known_brains"] = ["young", "old"]
-    params["benchmarks"] = {
-        "simulate": r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/benchmarks/simulate\.tsv"
+    params["messages"] = {
+        "simulate": r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/logs/simulate\.jsonl"
     }
     run_script(
         "study_records.py",

@@ -269,7 +269,7 @@ def test_runs_of_all_sections_have_folders_of_their_own(changes, key, facts):
     assert refusal(**changes) == Facts(1, f"{key}:", *facts)
 
 
-def test_folders_of_results_are_no_names_of_studies():
+def test_folders_of_results_are_no_names_of_sweeps():
     sources = [
         *ROOT.glob("workflow/rules/*.smk"),
         *ROOT.glob("src/gyriflow/study/*.py"),
@@ -284,8 +284,7 @@ def test_folders_of_results_are_no_names_of_studies():
         for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)
     }
     assert folders > {"logs", "figures", "calibration", "registration"}
-    # records of time and memory are named like logs
-    for folder in folders | {"benchmarks"}:
+    for folder in folders:
         assert refusal(sweeps={folder: THICKNESS}) == Facts(f"sweeps.{folder}:")
         assert refusal(sweeps={folder.upper(): THICKNESS}) == Facts(
             f"sweeps.{folder.upper()}:"
