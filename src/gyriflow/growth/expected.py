@@ -46,8 +46,8 @@ not predict later folds."""
 FADING_GW = 4.0
 """Time constant with which finer differences fade: of 1, 4 and 16 weeks the best for
 synthetic individuals (docs/science.md)."""
-MATCH_ERROR_MM = 0.3
-"""Root mean square of the smooth individual difference that is no individual's: the
+MATCH_ERROR_MM = 0.5
+"""Root mean square of the individual difference that is no individual's: the
 error of the match to the atlas, and of the atlas as an average. From pairs of averages
 by benchmarks/persistence.py (docs/science.md)."""
 MATCH_FADING_GW = 1.0
@@ -63,9 +63,9 @@ were at hand, and it errs least in the worst case (docs/science.md)."""
 class Persistence:
     """How much of an individual difference a prediction keeps.
 
-    Of a smooth difference of `difference_mm` (root mean square over the boundary) the
-    part beyond `match_error_mm` is real. Of this, `lasting` stays for ever, and the
-    rest fades within `LASTING_GW`.
+    Of a difference of `difference_mm` (root mean square over the boundary) the part
+    beyond `match_error_mm` is real. Of this, `lasting` stays for ever, and the rest
+    fades within `LASTING_GW`.
     """
 
     difference_mm: float
@@ -207,7 +207,7 @@ def expected_positions(
     smooth = diffuse(mesh.vertices, pieces, difference, smoothing_mm)
     size = cell_sizes(start, pieces).sum()
     boundary, used = boundary_surface(mesh)
-    squares = (smooth[used] ** 2).sum(axis=1)
+    squares = (difference[used] ** 2).sum(axis=1)
     difference_mm = np.sqrt(np.average(squares, weights=vertex_areas(boundary)))
     persistence = WHOLE if keep_all else Persistence(float(difference_mm), lasting)
     positions = [mesh.vertices]

@@ -20,7 +20,7 @@ from ..geometry.triangles import Floats, TriangleMesh, signed_volume, vertex_are
 
 log = logging.getLogger(__name__)
 
-SPREADS_MM = (2.0, 4.0, 8.0)
+SPREADS_MM = (1.0, 2.0, 4.0, 8.0)
 """Widths (SD) of the mean of displacements; the first without crossing faces counts."""
 N_NEIGHBOURS = 100
 """Vertices of the mesh whose displacements are averaged at most."""

@@ -462,7 +462,7 @@ def kept_sentence(kept: pd.DataFrame, end_week: float) -> str:
     difference_mm = kept["difference_mm"].iloc[0]
     words = (
         f"The start differs from the atlas at its week by {difference_mm:.2f} mm (root"
-        f" mean square, smoothed). Of this {100 * smooth:.0f} % is kept at"
+        f" mean square). Of what is smooth {100 * smooth:.0f} % is kept at"
         f" {week_label(end_week)}, and {100 * finer:.0f} % of finer differences; the"
         " rest of the prediction is the atlas."
     )
