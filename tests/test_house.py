@@ -481,3 +481,13 @@ def test_buffers_in_memory_are_no_files(tmp_path):
         "sent = io.BytesIO()\nnp.savez(sent, a=1)\nnp.load(io.BytesIO(b''))"
     )
     assert opened_files(source) == []
+
+
+def test_text_is_read_in_utf_8_whatever_the_locale():
+    sources = [*(ROOT / "src").rglob("*.py"), *(ROOT / "workflow").rglob("*.py")]
+    without = [
+        source.name
+        for source in sources
+        if ".read_text()" in source.read_text(encoding="utf-8")
+    ]
+    assert without == []

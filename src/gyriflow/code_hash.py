@@ -64,7 +64,7 @@ def imported_modules(source: Path) -> frozenset[Path]:
         else []
     )
     names: list[str] = []
-    for dots, module, imported in IMPORT.findall(source.read_text()):
+    for dots, module, imported in IMPORT.findall(source.read_text(encoding="utf-8")):
         base = here[: len(here) - len(dots) + 1] if dots else []
         start = ".".join([*base, module] if module else base)
         names += [

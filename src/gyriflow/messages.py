@@ -93,7 +93,7 @@ def read_rows(log: str | Path) -> list[dict[str, Any]]:
     rows = []
     # a step may have written none yet
     with suppress(OSError):
-        for line in messages_file(log).read_text().splitlines():
+        for line in messages_file(log).read_text(encoding="utf-8").splitlines():
             # a full disk may leave half a line
             with suppress(ValueError):
                 rows.append(json.loads(line))
@@ -136,7 +136,7 @@ class MessageHandler(logging.Handler):
     def __init__(self, log: str | Path) -> None:
         super().__init__()
         self.log = log
-        messages_file(log).write_text("")
+        messages_file(log).write_text("", encoding="utf-8")
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record."""

@@ -136,7 +136,11 @@ def end_shell_step(code: int, log: str) -> int:
     elif any(row.level == "error" for row in read_messages(log)):
         return code
     else:
-        lines = [line for line in Path(log).read_text().splitlines() if line.strip()]
+        lines = [
+            line
+            for line in Path(log).read_text(encoding="utf-8").splitlines()
+            if line.strip()
+        ]
         text = "\n".join(lines[-N_LAST_LINES:]) or f"it ended with exit code {code}"
         message = Message("error", text, exit_code=code)
     write_message(log, message)

@@ -203,7 +203,11 @@ def write_prediction(
     config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
     load(config)
     text = yaml.safe_dump(config, sort_keys=False)
-    if shown_path.exists() and shown_path.read_text() != text and not force:
+    if (
+        shown_path.exists()
+        and shown_path.read_text(encoding="utf-8") != text
+        and not force
+    ):
         remedy = "Choose another --directory, or add --force."
         raise InputError(
             "already exists with different content", path=shown_path, remedy=remedy

@@ -35,7 +35,7 @@ def processor() -> str:
     """Return a text that differs between processors for which -march=native gives
     different code."""
     cpuinfo = Path("/proc/cpuinfo")
-    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
+    lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
     return next(
         (line for line in lines if line.startswith(("flags", "Features"))),
         platform.processor(),

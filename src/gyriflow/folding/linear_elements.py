@@ -29,7 +29,9 @@ class LinearElements:
 
     def __init__(self, domain: Domain, material: Material) -> None:
         self._domain, self._bulk_to_shear = domain, material.bulk_to_shear_ratio
-        code = energy_code(material) + Path(__file__).with_suffix(".c").read_text()
+        code = energy_code(material) + Path(__file__).with_suffix(".c").read_text(
+            encoding="utf-8"
+        )
         self._interface, self._code = compiled(domain.comm, DECLARATION, code)
         self._places: NDArray[np.int32] | None = None
         self.weight: Floats

@@ -32,7 +32,9 @@ void multiply_blocks(long count, void *blocks, void *x, void *y);
 @cache
 def _library() -> tuple[Any, Any]:
     return compiled(
-        MPI.COMM_SELF, DECLARATION, Path(__file__).with_suffix(".c").read_text()
+        MPI.COMM_SELF,
+        DECLARATION,
+        Path(__file__).with_suffix(".c").read_text(encoding="utf-8"),
     )
 
 

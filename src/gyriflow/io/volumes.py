@@ -284,7 +284,8 @@ def _require_values_after_header(image: SpatialImage, path: AnyPath) -> None:
     header: Any = image.header
     if not isinstance(image, nib.Nifti1Image) or not header.is_single:
         return
-    first = int(image.dataobj.offset)
+    values: Any = image.dataobj
+    first = int(values.offset)
     least = int(header.single_vox_offset)
     if first < least:
         raise InputError(

@@ -485,7 +485,8 @@ def call_snakemake(
         end_scheduler_timers()
     for name in unknown_targets:
         rules = [
-            path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")
+            path.read_text(encoding="utf-8")
+            for path in (SHIPPED / "workflow" / "rules").glob("*.smk")
         ]
         stages = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
         raise InputError(

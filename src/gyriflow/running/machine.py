@@ -54,7 +54,7 @@ def _cgroup_limits(cgroups: Path, own: Path) -> Iterator[int]:
     # version 2 has one tree, version 1 a tree for each kind of limit; in a container,
     # its group is the root
     groups = (
-        [line.split(":", 2) for line in own.read_text().splitlines()]
+        [line.split(":", 2) for line in own.read_text(encoding="utf-8").splitlines()]
         if own.exists()
         else []
     )
@@ -65,4 +65,4 @@ def _cgroup_limits(cgroups: Path, own: Path) -> Iterator[int]:
                 # without a limit: "max" in version 2, a number larger than any memory
                 # in version 1
                 with suppress(OSError, ValueError):
-                    yield int((folder / limit).read_text())
+                    yield int((folder / limit).read_text(encoding="utf-8"))

@@ -67,14 +67,17 @@ def _code() -> str:
     """Return a hash of the rules and scripts that make paths, and of the code behind
     the scripts."""
     workflow = SHIPPED / "workflow"
-    rules = [(workflow / "rules" / f"{name}.smk").read_text() for name in RULE_FILES]
+    rules = [
+        (workflow / "rules" / f"{name}.smk").read_text(encoding="utf-8")
+        for name in RULE_FILES
+    ]
     scripts = [
         workflow / "scripts" / name
         for name in sorted(set(SCRIPT.findall("".join(rules))))
     ]
     texts = [
         *rules,
-        *(script.read_text() for script in scripts),
+        *(script.read_text(encoding="utf-8") for script in scripts),
         *map(code_hash, scripts),
     ]
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()

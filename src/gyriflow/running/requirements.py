@@ -98,7 +98,7 @@ def packages_behind(program: Path) -> list[str]:
     imported: set[str] = set()
     for source in {program, *modules_behind(program)}:
         if source.suffix == ".py":
-            imported.update(IMPORT.findall(source.read_text()))
+            imported.update(IMPORT.findall(source.read_text(encoding="utf-8")))
     return [name for name in EXTRAS if name in imported]
 
 

@@ -30,7 +30,7 @@ def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
         if rule.script and not hasattr(rule.params, "code"):
             rule.set_params(code=code_hash(script))
         if rule.script or rule.shellcmd:
-            text = rule.shellcmd or script.read_text()
+            text = rule.shellcmd or script.read_text(encoding="utf-8")
             rule.set_params(
                 command=f"code {hashlib.sha256(text.encode()).hexdigest()[:12]}"
             )
