@@ -52,11 +52,12 @@ class InputPath(click.Path):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        """Return the path."""
+        """Return the path; BadParameter with a hint if there is none."""
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
             if Path(value).exists():
+                # it is of the wrong kind, which click says
                 raise
             # settings take a while to import
             from ..settings.base import hint_for_missing

@@ -283,21 +283,24 @@ def follow_series(
     """
     boundary, used = boundary_surface(mesh)
     pieces = linear_pieces(mesh)
-    extend = harmonic_continuation(mesh.vertices, pieces, used)
+    extend_at_start = harmonic_continuation(mesh.vertices, pieces, used)
     shapes = earlier.by_week() if earlier else [WeekShape(weeks[0], mesh.vertices)]
-    n_done = sum(not shape.is_stop for shape in shapes) - 1
+    n_later_done = sum(not shape.is_stop for shape in shapes) - 1
     if earlier:
         log.info("going on after GW %g", shapes[-1].week)
     if body is not None:
         body.positions_mm = shapes[-1].positions
+    # lazy: each week is carried from the last of `shapes`, which this loop extends
     carried = _carried(boundary, used, shapes, pairs, surfaces, open_sulci)
-    for week, (places, goals, target) in zip(weeks[n_done + 1 :], carried, strict=True):
+    later_weeks = weeks[n_later_done + 1 :]
+    for week, (places, goals, target) in zip(later_weeks, carried, strict=True):
         before = shapes[-1]
         if target is not None:
+            surface, inner = target
             moved = TriangleMesh(goals, boundary.faces)
-            goals = fit_onto_surface(moved, target[0], PULL_MM, target[1])
+            goals = fit_onto_surface(moved, surface, PULL_MM, inner)
         if body is None:
-            shape = places + extend(goals - places[used])
+            shape = places + extend_at_start(goals - places[used])
             shapes.append(WeekShape(week, shape))
         else:
             # on the shape of the week before, which has no inverted elements
@@ -323,8 +326,12 @@ def _carried(
     surfaces: Sequence[TriangleMesh],
     open_sulci: bool,
 ) -> Iterator[tuple[Floats, Floats, Target | None]]:
-    """Yield for each week that has no shape yet the (n, 3) places of the last shape,
-    the boundary's, and its target."""
+    """Yield for each week that has no shape yet the (n, 3) places of the mesh before
+    its fit, those of its boundary, and the target of the fit, None for matched
+    surfaces.
+
+    Each starts from the last of `shapes` at that time.
+    """
     first = sum(not shape.is_stop for shape in shapes) - 1
     matched = [pair for pair in pairs if isinstance(pair, MatchedSurfaces)]
     if matched:

@@ -83,8 +83,8 @@ def check_results_belong_to(
 ) -> None:
     """Raise InputError if the results in a working directory belong to another study.
 
-    Two studies differ if they share neither configuration files nor a brain, by its
-    entry or the content of its files. So a configuration may be edited, copied or
+    Two studies are the same if their configuration files are, or if they share a brain,
+    by its entry or the content of a file. So a configuration may be edited, copied or
     moved, and data may be renamed. With `record`, this study is recorded as the owner
     of the results.
     """
@@ -97,15 +97,14 @@ def check_results_belong_to(
         "configuration": [str(file.resolve()) for file in files],
         "brains": brains,
     }
-    recorded = read_json(path) if path.is_file() else study
-    existing = [
-        brain[0]
-        for brain in recorded["brains"]
-        if (directory / "results" / "brains" / brain[0]).is_dir()
-    ]
-    is_same_study = recorded["configuration"] == study["configuration"] or any(
-        b in recorded["brains"] for b in brains
-    )
+    is_recorded = path.is_file()
+    recorded = read_json(path) if is_recorded else study
+    folder = directory / "results" / "brains"
+    ids = [brain_id for brain_id, *_ in recorded["brains"]]
+    existing = [brain_id for brain_id in ids if (folder / brain_id).is_dir()]
+    has_same_files = recorded["configuration"] == study["configuration"]
+    shares_brain = any(brain in recorded["brains"] for brain in brains)
+    is_same_study = has_same_files or shares_brain
     if existing and not is_same_study and not _have_recorded_content(directory, config):
         results_of = f"{', '.join(existing)} of {', '.join(recorded['configuration'])}"
         expected = (
@@ -121,7 +120,7 @@ def check_results_belong_to(
         raise InputError(
             problem, path=results, found=results_of, expected=expected, remedy=remedy
         )
-    if record and (recorded != study or not path.is_file()):
+    if record and (recorded != study or not is_recorded):
         write_json(path, study)
 
 

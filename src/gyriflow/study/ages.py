@@ -207,12 +207,16 @@ def read_ages(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanAg
 def require_clear_decimals(
     texts: Iterable[str], notation: WeekNotation | None, path: Path
 ) -> None:
-    """Raise InputError if all decimals of ages in weeks may be days: tenths from 0 to
-    6, not only halves."""
+    """Raise InputError if ages such as 24.3 may mean 24 weeks and 3 days.
+
+    They may without a `notation`, if there are at least `MIN_AMBIGUOUS_AGES` decimals,
+    all are tenths from 0 to 6, and not all are .0 or .5.
+    """
     decimals = [text for text in texts if re.search("[.,]", text)]
-    tenths = [TENTHS.fullmatch(text) for text in decimals]
-    digits = {match[1] if match else "none" for match in tenths}
-    may_be_days = digits <= set("0123456") and not digits <= {"0", "5"}
+    matches = [TENTHS.fullmatch(text) for text in decimals]
+    digits = {match[1] for match in matches if match}
+    are_halves = digits <= {"0", "5"}
+    may_be_days = all(matches) and digits <= set("0123456") and not are_halves
     if notation or len(decimals) < MIN_AMBIGUOUS_AGES or not may_be_days:
         return
     choice = (

@@ -557,11 +557,12 @@ def _missing_brains(
     with_weeks = zip(chain.brains, chain.weeks, strict=True)
     available = ", ".join(f"{brain} ({week:g} GW)" for brain, week in with_weeks)
     if origin == "self":
-        own = series.with_brain(start)
-        names = [own] if own else []
+        own_series = series.with_brain(start)
+        usable_series = [own_series] if own_series else []
+        # the start and a later brain
         is_complete = len(chain.brains) > 1
-        if own in series.unmatched:
-            available += f"; {series.unmatched[own]}"
+        if own_series in series.unmatched:
+            available += f"; {series.unmatched[own_series]}"
         expected = (
             "the start's own growth series with label volumes or matched surfaces"
         )
@@ -569,8 +570,10 @@ def _missing_brains(
             "Add later brains to its series (growth.brains), or grow by sizes or rates."
         )
     else:
-        names = series.from_other_populations(start)
-        is_complete = len(chain.brains) > 2 and start.week >= chain.weeks[1] - BEFORE_GW
+        usable_series = series.from_other_populations(start)
+        # the start and two brains of the atlas, the first not long after the start
+        has_growth = len(chain.brains) > 2
+        is_complete = has_growth and start.week >= chain.weeks[1] - BEFORE_GW
         expected = "one series of another population with the same hemispheres"
         remedy = (
             "Add an atlas of these weeks, or name one of several series in"
@@ -578,13 +581,13 @@ def _missing_brains(
         )
     if is_complete and chain.weeks[-1] >= end:
         return None
-    if not names:
+    if not usable_series:
         available = f"none; the growth series are {', '.join(series.brains)}"
-    elif len(names) > 1:
-        available = f"several series: {', '.join(names)}"
+    elif len(usable_series) > 1:
+        available = f"several series: {', '.join(usable_series)}"
     return InputError(
-        f"run {folded.run} needs later brains to grow {start.id} towards, and there are"
-        " none",
+        f"run {folded.run} needs later brains to grow {start.id} towards, up to"
+        f" {end:g} GW",
         found=available,
         expected=f"brains of {expected}, from {start.week:g} to {end:g} GW",
         remedy=remedy,
@@ -611,27 +614,32 @@ def _compared_with(
 def _sweeps(
     config: Config,
     variants: Iterable[_Variant],
-    names: Mapping[str, str],
+    simulated_by: Mapping[str, str],
     simulations: Collection[Simulation],
     brains: Mapping[str, Brain],
 ) -> list[SweepRun]:
-    """Return the runs of all sweeps, each with its varied values."""
+    """Return the runs of all sweeps with their varied values, a row for each start
+    brain.
+
+    `simulated_by` has for each run of a sweep the run that is simulated for it, as
+    equal ones are simulated once.
+    """
     rows = []
     for variant in variants:
         settings = config.sweeps[variant.sweep]
         for simulation in simulations:
-            if simulation.run == names[variant.run]:
-                start = brains[simulation.brain]
-                row = SweepRun(
-                    sweep=variant.sweep,
-                    member=variant.run,
-                    week=settings.compare_week,
-                    run=simulation.run,
-                    brain=simulation.brain,
-                    values=variant.values,
-                    observed=_compared_with(settings, start, brains),
-                )
-                rows.append(row)
+            if simulation.run != simulated_by[variant.run]:
+                continue
+            row = SweepRun(
+                sweep=variant.sweep,
+                member=variant.run,
+                week=settings.compare_week,
+                run=simulation.run,
+                brain=simulation.brain,
+                values=variant.values,
+                observed=_compared_with(settings, brains[simulation.brain], brains),
+            )
+            rows.append(row)
     return rows
 
 
