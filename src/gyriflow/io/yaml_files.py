@@ -131,7 +131,7 @@ def read_yaml(path: AnyPath) -> Any:
         mark = getattr(error, "problem_mark", None)
         line = f", line {mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error)
-        remedy = _remedy(str(mark.buffer or "").splitlines(), mark.line) if mark else ""
+        remedy = _remedy(text.splitlines(), mark.line) if mark else ""
         raise InputError(
             f"is not valid YAML{line}: {problem}", path=path, remedy=remedy or None
         ) from error

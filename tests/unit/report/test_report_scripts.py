@@ -57,7 +57,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name, colour in COLOURS.items():
         Image.new("RGB", (40, 30), colour).save(f"{name}.png", dpi=(20, 20))
-    later = {"run": "thick", "start_week": 23.0}
+    later = {"run": "thick", "start": "old", "start_week": 23.0}
     warnings = {
         "subject": ["young", "old"],
         "run": "",
