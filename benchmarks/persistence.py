@@ -22,7 +22,7 @@ the smallest squared error of the weighted differences, with each pair left out 
 followed fetuses give LASTING, a share with a uniform prior. Without any, it stays ½.
 
 `--scores` adds distance (mm) and r of the shape index of the scaled start, the shape
-with all of the smooth difference (`whole`, as before 2026-11-30), the atlas' own brain
+with all of the smooth difference (`whole`), the atlas' own brain
 with its volume (`atlas`) and the surface that is delivered (`delivered`), all before a
 body follows the shape.
 
