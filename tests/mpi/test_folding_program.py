@@ -160,7 +160,9 @@ def test_warnings_and_progress_are_printed_and_written_as_data(mesh, tmp_path):
     progress = [row for row in read_rows(tmp_path / "out.log") if "event" in row]
     assert [row["event"] for row in progress[:2]] == ["size", "step"]
     assert (progress[0]["elements"], progress[0]["ranks"]) == (3072, 2)
-    assert progress[-1]["week"] == pytest.approx(progress[-1]["end_week"])
+    last, used = progress[-2:]
+    assert last["week"] == pytest.approx(last["end_week"])
+    assert used["event"] == "usage"
 
 
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_path):

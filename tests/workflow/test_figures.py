@@ -204,6 +204,8 @@ def test_targets_ask_for_figures_that_there_are(figures, rules):
         for names in re.findall(r"figure_files\(([^)]*)\)", path.read_text()):
             asked_for |= set(re.findall(r'"(\w+)"', names))
     assert asked_for - set(rules["SECTIONS"]) <= drawn
+    # in the report's table of brains
+    asked_for.add("small_pictures")
     # no figure is left that no target or page asks for
     assert drawn == asked_for - set(rules["SECTIONS"]) | set(sectioned(rules))
 
@@ -265,7 +267,7 @@ def test_a_prediction_is_drawn_between_its_start_and_the_atlas(figures):
     predicted = only(figures["prediction"], "predicted_figure")
     surfaces = {
         22.4: "results/brains/own22.4/surface/pial.surf.gii",
-        23.9: "results/runs/reference/own22.4/surfaces/week-23.90/pial.surf.gii",
+        23.9: "results/runs/reference/own22.4/surfaces/week-23.90/fine/pial.surf.gii",
         24: "results/brains/atlas24/surface/pial.surf.gii",
     }
     assert [
