@@ -96,8 +96,10 @@ class Events:
                 if key in self.reasons:
                     record.reason = self.reasons[key]
             case "job_finished":
-                key = self._keys.get(event["job_id"], "")
-                self.ended.add(key)
+                # a target has no results, and no key
+                key = self._keys.get(event["job_id"])
+                if key is not None:
+                    self.ended.add(key)
                 if self.finished and key in self.jobs:
                     self.finished(self.jobs[key])
             case None if record.getMessage().startswith("Nothing to be done"):
@@ -141,9 +143,7 @@ class Plan:
     def reasoned_jobs(self) -> list[tuple[Job, str]]:
         """The jobs that run, each with its reason."""
         return [
-            (job, self.reasons[job.key])
-            for job in self.jobs
-            if job.outputs and job.key in self.reasons
+            (job, self.reasons[job.key]) for job in self.jobs if job.key in self.reasons
         ]
 
 
@@ -173,6 +173,8 @@ def made_plan(
         if file in producers and not Path(file).exists():
             reasons.setdefault(producers[file], f"{MISSING}: {file}")
     _spread(reasons, jobs, producers)
+    # targets make nothing, so they never end
+    reasons = {key: why for key, why in reasons.items() if jobs[key].outputs}
     outdated = []
     for key in reasons:
         outdated += [file for file in jobs[key].outputs if Path(file).exists()]
