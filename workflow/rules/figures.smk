@@ -236,7 +236,9 @@ def predicted_grid(simulation):
     atlas_brain = study.atlas_brain(simulation)
     return [
         placed("", f"start\n{start.week:g} GW", [start.pial]),
-        placed("", f"predicted\n{predicted.week:g} GW", [study.measured_parts(predicted)["whole"]], simulated=True),
+        placed(
+            "", f"predicted\n{predicted.week:g} GW", [study.measured_parts(predicted)["whole"]], simulated=True
+        ),
         placed("", f"atlas' own brain\n{atlas_brain.week:g} GW", [atlas_brain.pial]),
     ]
 

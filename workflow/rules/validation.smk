@@ -152,7 +152,11 @@ rule validation_tables:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
     params:
         individuals=study.are_individuals(
-            {brain.id for simulation in study.atlas_predictions for brain in study.observed(simulation).values()}
+            {
+                brain.id
+                for simulation in study.atlas_predictions
+                for brain in study.observed(simulation).values()
+            }
         ),
     script:
         "../scripts/validation_tables.py"
