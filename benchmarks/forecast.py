@@ -21,7 +21,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from gyriflow.io.yaml_files import read_keys
-from gyriflow.messages import read_rows
+from gyriflow.messages import read_events
 from gyriflow.running.cost import job_seconds
 from gyriflow.running.jobs import usage_in
 from gyriflow.settings.base import folder_of
@@ -66,7 +66,7 @@ def finished_steps(study: Study) -> Iterator[Step]:
                 if study.chains[wildcards["brain"], names].path
                 else rule
             )
-        used = usage_in(read_rows(path))
+        used = usage_in(read_events(path))
         if used:
             yield Step(rule, wildcards, used["cpu_s"])
 

@@ -78,7 +78,7 @@ def imported_modules(source: Path) -> frozenset[Path]:
 
 
 def subpackage_of(module: Path) -> str:
-    """Return the room that a source file belongs to: the folder, or the single module,
+    """Return the subpackage of a source file: the folder, or the single module,
     directly under the package."""
     return module.resolve().relative_to(PACKAGE).parts[0].removesuffix(".py")
 

@@ -148,7 +148,7 @@ FOREIGN_FORMATS = (
         "Uncompress it, or compress it with gzip instead.",
     ),
     ForeignFormat(
-        rb"\x1f\x8b",
+        GZIP_START,
         "compressed by gzip",
         "Uncompress it with gunzip. NIfTI and GIFTI may stay compressed if .gz is added"
         " to the name, MGH if it is named .mgz.",
@@ -165,7 +165,7 @@ FOREIGN_FORMATS = (
     ),
 )
 TWICE = ForeignFormat(
-    rb"\x1f\x8b", "compressed by gzip twice", "Uncompress it once, with gunzip."
+    GZIP_START, "compressed by gzip twice", "Uncompress it once, with gunzip."
 )
 
 

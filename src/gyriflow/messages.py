@@ -83,11 +83,11 @@ def write_message(log: str | Path, message: Message) -> None:
 def write_event(log: str | Path, row: Mapping[str, Any]) -> None:
     """Add a line to those of the step that has this log; one that is no message has the
     key `event`."""
-    with messages_file(log).open("a") as file:
+    with messages_file(log).open("a", encoding="utf-8") as file:
         file.write(json.dumps(row) + "\n")
 
 
-def read_rows(log: str | Path) -> list[dict[str, Any]]:
+def read_events(log: str | Path) -> list[dict[str, Any]]:
     """Return the lines that the step with this log has written, messages and
     events."""
     rows = []
@@ -102,7 +102,7 @@ def read_rows(log: str | Path) -> list[dict[str, Any]]:
 
 def read_messages(log: str | Path) -> list[Message]:
     """Return the distinct messages of the step that has this log."""
-    return messages_in(read_rows(log))
+    return messages_in(read_events(log))
 
 
 def messages_in(rows: Iterable[Mapping[str, Any]]) -> list[Message]:

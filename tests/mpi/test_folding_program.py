@@ -22,7 +22,7 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
-from gyriflow.messages import read_messages, read_rows
+from gyriflow.messages import read_events, read_messages
 from gyriflow.settings.folding import parameters_from
 
 pytestmark = pytest.mark.slow
@@ -157,7 +157,7 @@ def test_warnings_and_progress_are_printed_and_written_as_data(mesh, tmp_path):
     assert "poisson_ratio is 0.48" in messages[0].text
     printed = done.stdout.splitlines()
     assert all(f"warning: {message.text}" in printed for message in messages)
-    progress = [row for row in read_rows(tmp_path / "out.log") if "event" in row]
+    progress = [row for row in read_events(tmp_path / "out.log") if "event" in row]
     assert [row["event"] for row in progress[:2]] == ["size", "step"]
     assert (progress[0]["elements"], progress[0]["ranks"]) == (3072, 2)
     last, used = progress[-2:]

@@ -11,8 +11,8 @@ from gyriflow.messages import (
     Message,
     error_message,
     messages_file,
+    read_events,
     read_messages,
-    read_rows,
     study_messages,
     write_message,
 )
@@ -63,8 +63,8 @@ def test_messages_are_distinct_and_apart_from_progress(study):
     texts = [message.text for message in read_messages("x.log")]
     assert texts == ["µ\n\u2028 \udcff", "two", "four"]
     assert read_messages("x.log")[0].first_line == "µ"
-    assert {"event": "step", "week": 21.5} in read_rows("x.log")
-    assert read_messages("none.log") == read_rows("none.log") == []
+    assert {"event": "step", "week": 21.5} in read_events("x.log")
+    assert read_messages("none.log") == read_events("none.log") == []
 
 
 def test_messages_of_a_study_come_in_the_order_of_their_times(study):

@@ -16,8 +16,8 @@ from gyriflow.errors import MeshError
 from gyriflow.messages import (
     STOPPED,
     Message,
+    read_events,
     read_messages,
-    read_rows,
     write_message,
 )
 from gyriflow.step import OUT_OF_MEMORY_MESSAGE, end_shell_step, step
@@ -168,7 +168,7 @@ def test_a_step_records_the_processor_time_of_itself_and_its_children_next_to_it
     (tmp_path / "a" / "logs").mkdir(parents=True)
     with step(str(tmp_path / "a" / "logs" / "one.week-21.00.log")):
         pass
-    (row,) = read_rows(tmp_path / "a" / "logs" / "one.week-21.00.log")
+    (row,) = read_events(tmp_path / "a" / "logs" / "one.week-21.00.log")
     assert list(row) == ["event", "wall_s", "cpu_s", "memory_MiB"]
     assert [row["event"], row["cpu_s"], row["memory_MiB"]] == ["usage", 12.75, 3072]
 
@@ -177,5 +177,5 @@ def test_a_step_that_fails_records_no_time(tmp_path):
     (tmp_path / "logs").mkdir()
     with pytest.raises(SystemExit), step(str(tmp_path / "logs" / "one.log")):
         raise MeshError("has a hole")
-    (row,) = read_rows(tmp_path / "logs" / "one.log")
+    (row,) = read_events(tmp_path / "logs" / "one.log")
     assert row["level"] == "error"

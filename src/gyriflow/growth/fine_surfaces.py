@@ -45,8 +45,10 @@ def nearest_in_age(ages: pd.DataFrame, weeks: Sequence[float], week: float) -> i
     `ages` is the table of `AtlasAges`.
     """
     by_week = ages.set_index("stated_week")["age_by_size"]
-    distance = np.abs(by_week.loc[list(weeks)].to_numpy() - week)
-    return int(np.argmin(distance))
+    of_brains = by_week.loc[list(weeks)].to_numpy()
+    distances = np.abs(of_brains - week)
+    nearest = np.argmin(distances)
+    return int(nearest)
 
 
 def finer_share(kept: pd.DataFrame, start_week: float, week: float) -> float:
@@ -54,7 +56,8 @@ def finer_share(kept: pd.DataFrame, start_week: float, week: float) -> float:
     between those of `Expectation.kept`, 1 at the start."""
     weeks = [start_week, *kept["week"]]
     shares = [1.0, *kept["finer_share"]]
-    return float(np.interp(week, weeks, shares))
+    share = np.interp(week, weeks, shares)
+    return float(share)
 
 
 def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> TriangleMesh:
@@ -92,7 +95,7 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
         move = np.einsum("nk,nkj->nj", weights, displacements[neighbours])
         moved = TriangleMesh(surface + move, observed.surface.faces)
         if crossing_faces(moved) <= allowed:
-            return with_volume(moved, signed_volume(boundary))
+            return scaled_to_volume(moved, signed_volume(boundary))
     log.warning(
         "an observed surface that is moved to the predicted shape crosses itself in %d"
         " faces: the coarser surface of the mesh is used",
@@ -101,8 +104,10 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
     return boundary
 
 
-def with_volume(surface: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+def scaled_to_volume(surface: TriangleMesh, volume_mm3: float) -> TriangleMesh:
     """Scale a closed surface about its centre to a volume."""
-    centre = np.average(surface.vertices, axis=0, weights=vertex_areas(surface))
+    areas = vertex_areas(surface)
+    centre = np.average(surface.vertices, axis=0, weights=areas)
     scale = np.cbrt(volume_mm3 / signed_volume(surface))
-    return TriangleMesh(centre + scale * (surface.vertices - centre), surface.faces)
+    vertices = centre + scale * (surface.vertices - centre)
+    return TriangleMesh(vertices, surface.faces)

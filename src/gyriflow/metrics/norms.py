@@ -208,7 +208,8 @@ class CohortNorms:
             return {}
         _, norm = self.norms["whole", "volume"]
         wanted = np.asarray(weeks, dtype=float)
-        known = wanted[(norm.first <= wanted) & (wanted <= norm.last)]
+        is_known = (norm.first <= wanted) & (wanted <= norm.last)
+        known = wanted[is_known]
         medians = norm.values(known, 0.0)
         return dict(zip(known.tolist(), medians.tolist(), strict=True))
 

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from ..io.files import AnyPath
-from ..messages import read_rows, study_messages
+from ..messages import read_events, study_messages
 from ..step import USAGE_COLUMNS
 
 REPORT_STEP = "html_report"
@@ -50,7 +50,7 @@ def read_usage(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
     for rule, pattern in patterns.items():
         for name, path in names.items():
             match = re.fullmatch(pattern, name)
-            used = usage_in(read_rows(path)) if match else None
+            used = usage_in(read_events(path)) if match else None
             if match and used:
                 places = {key: match.groupdict().get(key) for key in ("run", "brain")}
                 rows.append({"rule": rule, **places, **used})

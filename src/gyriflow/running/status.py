@@ -10,7 +10,7 @@ from tabulate import tabulate
 
 from ..errors import InputError, StorageError
 from ..io.files import read_json
-from ..messages import read_rows as read_lines
+from ..messages import read_events
 from ..shipped import CONFIG
 from ..study.paths import PLAN
 from ..study.records import Simulation
@@ -169,7 +169,7 @@ def _simulation_progress(folder: Path) -> str:
         return f"done, GW {week_tag(summary['weeks'][-1])}"
     steps = [
         row
-        for row in read_lines(folder / "logs" / "simulate.log")
+        for row in read_events(folder / "logs" / "simulate.log")
         if row.get("event") == "step"
     ]
     return format_progress(steps[-1]) if steps else MISSING

@@ -24,8 +24,8 @@ from ..messages import (
     Message,
     messages_file,
     messages_in,
+    read_events,
     read_messages,
-    read_rows,
     write_message,
 )
 from .launch import full_disk, received_signals
@@ -297,7 +297,7 @@ class RunDisplay:
         """Show what a job has written to its messages since."""
         if job.log is None:
             return
-        rows = read_rows(job.log)
+        rows = read_events(job.log)
         for row in rows:
             match row:
                 case {

@@ -250,7 +250,8 @@ class Study:
         """Return the brains of a prediction's atlas that may have the age of a week,
         those within `MAX_AGE_OFF_GW` of it or else the nearest."""
         assert simulation.chain is not None
-        path = self.paths[str(self.chains[simulation.brain, simulation.chain].path)]
+        chain = self.chains[simulation.brain, simulation.chain]
+        path = self.paths[str(chain.path)]
         brains = self.brains_of(path)
         near = [brain for brain in brains if abs(brain.week - week) <= MAX_AGE_OFF_GW]
         return near or [closest(brains, week)]
