@@ -59,7 +59,9 @@ def require_bids_names(subjects: Iterable[str], runs: Iterable[str] = ()) -> Non
 
 
 def _require_labels(
-    kind: str, names: Iterable[str], label: Callable[[str], str]
+    kind: str,
+    names: Iterable[str],
+    label: Callable[[str], str],
 ) -> None:
     names = list(names)
     for name in names:

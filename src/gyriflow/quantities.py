@@ -238,7 +238,11 @@ VERTEX_MAPS = Registry(
 """The maps, by name."""
 
 
-def name_in_interval(name: str, before: float, week: float) -> str:
+def name_in_interval(
+    name: str,
+    before: float,
+    week: float,
+) -> str:
     """Return the name of a map between two weeks, in a file with maps of several
     intervals."""
     return f"{name} {before:g}-{week:g} GW"

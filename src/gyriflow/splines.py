@@ -30,7 +30,12 @@ RIDGE = 1e-13
 """Added to matrices with diagonals of 1 to keep them regular."""
 
 
-def design(weeks: Floats, first: float, last: float, intervals: int) -> Floats:
+def design(
+    weeks: Floats,
+    first: float,
+    last: float,
+    intervals: int,
+) -> Floats:
     """Return the matrix (n, k) that gives a curve's values at weeks (n,) from its
     coefficients."""
     knots = _knots(first, last, intervals)
@@ -44,7 +49,12 @@ def design(weeks: Floats, first: float, last: float, intervals: int) -> Floats:
     return np.column_stack([first_value, changes])
 
 
-def penalty(first: float, last: float, intervals: int, order: int) -> Floats:
+def penalty(
+    first: float,
+    last: float,
+    intervals: int,
+    order: int,
+) -> Floats:
     """Return the penalty (k, k) on differences of the rate, of first order (0 for
     lines) or second (for quadratics).
 
@@ -66,7 +76,10 @@ def penalty(first: float, last: float, intervals: int, order: int) -> Floats:
 
 
 def strength(
-    normal: Floats, penalty: Floats, freedom: float, name: str = "curve"
+    normal: Floats,
+    penalty: Floats,
+    freedom: float,
+    name: str = "curve",
 ) -> float:
     """Return the factor of a penalty with which a fit has the degrees of freedom, by
     its normal matrix (k, k).
@@ -127,6 +140,10 @@ def _data_shares(normal: Floats, penalty: Floats) -> Floats:
     return np.clip(shares, 0.0, 1.0)
 
 
-def _knots(first: float, last: float, intervals: int) -> Floats:
+def _knots(
+    first: float,
+    last: float,
+    intervals: int,
+) -> Floats:
     inner = np.linspace(first, last, intervals + 1)
     return np.concatenate([[first, first], inner, [last, last]])

@@ -107,7 +107,12 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     """
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
     handlers = [logging.FileHandler(log, mode="w"), MessageHandler(log)]
-    logging.basicConfig(level=logging.INFO, format=form, handlers=handlers, force=True)
+    logging.basicConfig(
+        level=logging.INFO,
+        format=form,
+        handlers=handlers,
+        force=True,
+    )
     logging.captureWarnings(True)
     try:
         yield

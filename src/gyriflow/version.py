@@ -41,7 +41,11 @@ def _git(*arguments: str) -> str | None:
     command = ["git", "-c", "safe.directory=*", "-C", str(SHIPPED), *arguments]
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, check=True, timeout=10
+            command,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10,
         )
     except (OSError, subprocess.SubprocessError):
         return None

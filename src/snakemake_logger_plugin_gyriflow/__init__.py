@@ -41,7 +41,9 @@ class LogHandler(LogHandlerBase):
         self.display = RunDisplay(sys.stderr, details)
         # the lock is held while a record is handled, too
         threading.Thread(
-            target=self.display.watch, args=[self.lock], daemon=True
+            target=self.display.watch,
+            args=[self.lock],
+            daemon=True,
         ).start()
 
     def emit(self, record: logging.LogRecord) -> None:

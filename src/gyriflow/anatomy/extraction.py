@@ -152,7 +152,11 @@ def remove_bridges(
     return np.where(slits, np.float32(1.0 - wall_value), field), int(slits.sum())
 
 
-def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats]:
+def refine(
+    field: NDArray,
+    affine: Floats,
+    factor: int,
+) -> tuple[NDArray, Floats]:
     """Interpolate an (i, j, k) field linearly to voxels `factor` times smaller; return
     it and its affine."""
     axes = affine[:3, :3]
@@ -161,7 +165,13 @@ def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats
     # the first fine voxel's centre lies nearer to the first coarse voxel's corner
     to_corner = 0.5 * (1.0 - 1.0 / factor)
     fine[:3, 3] -= axes.sum(axis=1) * to_corner
-    zoomed = ndimage.zoom(field, factor, order=1, grid_mode=True, mode="nearest")
+    zoomed = ndimage.zoom(
+        field,
+        factor,
+        order=1,
+        grid_mode=True,
+        mode="nearest",
+    )
     return zoomed, fine
 
 
@@ -321,7 +331,9 @@ def dilated(mask: Mask, radius: float) -> Mask:
 
 
 def _patches(
-    mask: Mask, field: NDArray[np.float32], radius: float
+    mask: Mask,
+    field: NDArray[np.float32],
+    radius: float,
 ) -> list[tuple[bool, tuple[slice, ...], Mask]]:
     closed = ~dilated(~dilated(mask, radius), radius)
     opened = dilated(~dilated(~mask, radius), radius)
@@ -343,7 +355,12 @@ def _patches(
     return sorted(patches, key=size_and_change)
 
 
-def _apply(mask: Mask, box: tuple[slice, ...], content: Mask, closed_by: Mask) -> int:
+def _apply(
+    mask: Mask,
+    box: tuple[slice, ...],
+    content: Mask,
+    closed_by: Mask,
+) -> int:
     """Put new content into a box of a mask if this removes handles and preserves the
     mask's parts; return the number of handles removed.
 
@@ -434,7 +451,11 @@ def _parts_with_gains(
     return number, gains.astype(np.int64)
 
 
-def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
+def _minimal_change(
+    before: Mask,
+    after: Mask,
+    field: NDArray[np.float32],
+) -> Mask:
     """Return `after` with as many voxels as possible set back to `before`, without a
     change of topology.
 
@@ -480,7 +501,11 @@ def is_simple(block: bytes) -> bool:
     )
 
 
-def _connected(places: int, seeds: int, neighbours: list[int]) -> int:
+def _connected(
+    places: int,
+    seeds: int,
+    neighbours: list[int],
+) -> int:
     """Return the places (bits of an integer) that are connected to the lowest bit of
     `seeds`."""
     reached = new = seeds & -seeds
@@ -544,7 +569,11 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     ]
 
 
-def _contact_mm2(first: Mask, second: Mask, size_mm: Floats) -> float:
+def _contact_mm2(
+    first: Mask,
+    second: Mask,
+    size_mm: Floats,
+) -> float:
     total = 0.0
     for axis in range(3):
         a = np.moveaxis(first, axis, 0)

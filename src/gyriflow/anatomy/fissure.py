@@ -134,7 +134,10 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
 
 
 def _fit_to_fissure(
-    mesh: TriangleMesh, normal: Floats, offset: float, asymmetry: float
+    mesh: TriangleMesh,
+    normal: Floats,
+    offset: float,
+    asymmetry: float,
 ) -> MidPlane:
     fitted = _plane_through(fissure_points(mesh, normal, offset), normal, offset)
     if fitted is None:
@@ -149,7 +152,11 @@ def _fit_to_fissure(
     return MidPlane(*fitted, asymmetry, count)
 
 
-def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
+def fissure_points(
+    mesh: TriangleMesh,
+    normal: Floats,
+    offset: float,
+) -> Floats:
     """Return the (k, 3) points half-way between facing walls of the fissure, a fifth of
     the width around a plane."""
     height = mesh.vertices @ normal - offset
@@ -169,7 +176,11 @@ def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
 
 
 def _middles(
-    mesh: TriangleMesh, height: Floats, wall: Ints, opposite: Ints, normal: Floats
+    mesh: TriangleMesh,
+    height: Floats,
+    wall: Ints,
+    opposite: Ints,
+    normal: Floats,
 ) -> Floats:
     across = np.outer(height, normal)
     in_plane = mesh.vertices - across
@@ -246,14 +257,21 @@ def _symmetry_planes(
 
 
 def _plane_near(
-    x: Floats, base: Floats, tangents: Floats, centre: Floats
+    x: Floats,
+    base: Floats,
+    tangents: Floats,
+    centre: Floats,
 ) -> tuple[Floats, float]:
     normal = np.asarray(base + x[:2] @ tangents, dtype=float)
     normal /= np.linalg.norm(normal)
     return normal, float(normal @ centre) + 10.0 * float(x[2])
 
 
-def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]:
+def _scatter(
+    points: Floats,
+    normal: Floats,
+    offset: float,
+) -> tuple[int, float]:
     distance = points @ normal - offset
     near = distance[np.abs(distance) < 3.0]
     if not len(near):
@@ -262,7 +280,10 @@ def _scatter(points: Floats, normal: Floats, offset: float) -> tuple[int, float]
 
 
 def _mirror_distance(
-    normal: Floats, offset: float, sample: Floats, tree: cKDTree
+    normal: Floats,
+    offset: float,
+    sample: Floats,
+    tree: cKDTree,
 ) -> float:
     mirrored = sample - 2.0 * np.outer(sample @ normal - offset, normal)
     distance, _ = tree.query(mirrored)
@@ -270,7 +291,9 @@ def _mirror_distance(
 
 
 def _plane_through(
-    points: Floats, normal: Floats, offset: float
+    points: Floats,
+    normal: Floats,
+    offset: float,
 ) -> tuple[Floats, float] | None:
     for scale in (10.0, 6.0, 4.0, 3.0, 2.0, 2.0, 2.0):
         distance = points @ normal - offset
@@ -479,7 +502,11 @@ def open_fissure(
     ).astype(np.float32)
 
 
-def sample(field: NDArray[np.floating], affine: Floats, points: Floats) -> Floats:
+def sample(
+    field: NDArray[np.floating],
+    affine: Floats,
+    points: Floats,
+) -> Floats:
     """Return the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear
     between voxels."""
     return ndimage.map_coordinates(
@@ -488,7 +515,10 @@ def sample(field: NDArray[np.floating], affine: Floats, points: Floats) -> Float
 
 
 def plane_between_labels(
-    left: Mask, right: Mask, affine: Floats, brain: Mask
+    left: Mask,
+    right: Mask,
+    affine: Floats,
+    brain: Mask,
 ) -> MidPlane:
     """Fit a plane half-way between (i, j, k) labels of unequal sides, in and around a
     brain."""
@@ -549,7 +579,11 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
     # piece
     main = np.flatnonzero(np.isin(piece, largest))
     _, _, start = dijkstra(
-        adjacent, indices=main, return_predecessors=True, unweighted=True, min_only=True
+        adjacent,
+        indices=main,
+        return_predecessors=True,
+        unweighted=True,
+        min_only=True,
     )
     assigned = side[np.where(start < 0, np.arange(len(side)), start)]
     share = float(areas[assigned != side].sum() / areas.sum())
@@ -566,7 +600,9 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
 
 
 def largest_pieces(
-    mesh: TriangleMesh, sides: Mapping[Side, Mask], to_file: Floats
+    mesh: TriangleMesh,
+    sides: Mapping[Side, Mask],
+    to_file: Floats,
 ) -> tuple[Mask, list[str]]:
     """Return the (m,) mask of the faces of each hemisphere's largest piece, and
     warnings of the pieces left out.
@@ -618,7 +654,11 @@ def cut_share(*sides: TriangleMesh) -> float:
     return cuts / sum(ConvexHull(side.vertices[:, 1:]).volume for side in sides)
 
 
-def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> Mask:
+def nearer_left(
+    mesh: TriangleMesh,
+    left: TriangleMesh,
+    right: TriangleMesh,
+) -> Mask:
     """Return the (m,) mask of the faces of a surface that are nearer to a left
     hemisphere, as by `left_faces`."""
     centres = triangles.corners(mesh).mean(axis=1)
@@ -681,7 +721,10 @@ def smallest_gap(left: TriangleMesh, right: TriangleMesh) -> float:
 
 
 def separate(
-    left: TriangleMesh, right: TriangleMesh, gap_mm: float, to_right: Floats
+    left: TriangleMesh,
+    right: TriangleMesh,
+    gap_mm: float,
+    to_right: Floats,
 ) -> tuple[TriangleMesh, TriangleMesh, float]:
     """Move two hemispheres along `to_right` (3,), a unit vector, until the gap between
     them is `gap_mm`.

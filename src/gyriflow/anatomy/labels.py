@@ -91,7 +91,10 @@ class Cerebrum:
 
 
 def read_cerebrum(
-    labels: Labels, affine: Floats, scheme: LabelScheme, min_cortex: float = 0.0
+    labels: Labels,
+    affine: Floats,
+    scheme: LabelScheme,
+    min_cortex: float = 0.0,
 ) -> Cerebrum:
     """Return the cerebrum without open ventricles, parts on thin stalks and separate
     parts.
@@ -198,7 +201,11 @@ def _missing_labels(labels: Labels, scheme: LabelScheme) -> dict[str, Any]:
     return report
 
 
-def _fill_from_nearest(labels: Labels, empty: Mask, source: Mask) -> None:
+def _fill_from_nearest(
+    labels: Labels,
+    empty: Mask,
+    source: Mask,
+) -> None:
     """Give empty voxels the label of the nearest one of a source."""
     if empty.any():
         nearest = ndimage.distance_transform_edt(
@@ -269,7 +276,10 @@ def require_cortex_outside(
 
 
 def require_sides(
-    labels: Labels, scheme: LabelScheme, affine: Floats, to_right: Floats
+    labels: Labels,
+    scheme: LabelScheme,
+    affine: Floats,
+    to_right: Floats,
 ) -> None:
     """Raise InputError if, along `to_right` (3,) in mm, labels of left lie right of
     those of right, or are mixed."""
@@ -325,7 +335,11 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     return touching
 
 
-def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
+def unlabelled_ventricles(
+    labels: Labels,
+    scheme: LabelScheme,
+    affine: Floats,
+) -> Mask:
     """Return the (i, j, k) mask of unlabelled ventricles; empty if any ventricle is
     labelled.
 
@@ -370,7 +384,9 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
 
 
 def _ray_share(
-    clear: Mask, tissue: Mask, smoothing_voxels: float
+    clear: Mask,
+    tissue: Mask,
+    smoothing_voxels: float,
 ) -> NDArray[np.float32]:
     is_clear = np.pad(clear, 1)
     is_tissue = np.pad(tissue, 1)
@@ -466,7 +482,11 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     yield from _wrong_sides(layout, scheme, tissues)
 
 
-def _with_numbers(layout: Layout, is_tissue: Mask, name: str) -> str:
+def _with_numbers(
+    layout: Layout,
+    is_tissue: Mask,
+    name: str,
+) -> str:
     """Return the name of a tissue with the numbers of its labels."""
     numbers = [str(number) for number in layout.labels[is_tissue]]
     if len(numbers) > 4:
@@ -506,7 +526,9 @@ def _wrong_shares(layout: Layout, tissues: Mapping[str, Mask]) -> Iterator[str]:
 
 
 def _wrong_places(
-    layout: Layout, scheme: LabelScheme, tissues: Mapping[str, Mask]
+    layout: Layout,
+    scheme: LabelScheme,
+    tissues: Mapping[str, Mask],
 ) -> Iterator[str]:
     """Yield inner tissues that would lie outside, and other labels that would lie
     inside."""
@@ -542,7 +564,9 @@ def _wrong_places(
 
 
 def _wrong_sides(
-    layout: Layout, scheme: LabelScheme, tissues: Mapping[str, Mask]
+    layout: Layout,
+    scheme: LabelScheme,
+    tissues: Mapping[str, Mask],
 ) -> Iterator[str]:
     """Yield sides that would be mixed, or have unequal parts of cortex and white
     matter."""

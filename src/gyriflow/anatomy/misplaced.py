@@ -27,7 +27,9 @@ MAX_BARE_SHARE = 0.01
 
 
 def misplaced_cortex(
-    labels: np.ndarray, affine: Floats, scheme: LabelScheme
+    labels: np.ndarray,
+    affine: Floats,
+    scheme: LabelScheme,
 ) -> Iterator[str]:
     """Yield a warning, with volume (mL) and place, for each kind of place where cortex
     cannot be.
@@ -79,7 +81,9 @@ def misplaced_cortex(
 
 
 def bare_surface(
-    labels: np.ndarray, affine: Floats, scheme: LabelScheme
+    labels: np.ndarray,
+    affine: Floats,
+    scheme: LabelScheme,
 ) -> Iterator[str]:
     """Yield a warning, with place and labels, if much of a whole cerebrum's surface is
     far from cortex.

@@ -279,7 +279,10 @@ def _fissure_of_labels(
 
 
 def _with_fissure(
-    field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], core: Mask
+    field: NDArray[np.float32],
+    affine: Floats,
+    side_mm: NDArray[np.float32],
+    core: Mask,
 ) -> tuple[NDArray[np.float32], Floats, float]:
     """Open a hidden fissure as a whole; return the field, its affine, and the volume
     removed (mL).
@@ -348,7 +351,11 @@ def _with_sulci(
     return opened, fine_affine, report["opened_mL"] - n_filled * voxel_ml
 
 
-def _reason_not_to_open(cerebrum: Cerebrum, core: Mask, scheme: LabelScheme) -> str:
+def _reason_not_to_open(
+    cerebrum: Cerebrum,
+    core: Mask,
+    scheme: LabelScheme,
+) -> str:
     """Return why labels do not show where sulci are fused; or ''."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
         return "the labels have no white matter"
@@ -609,7 +616,11 @@ def _pial_surface(
 
 
 def _two_sides(
-    surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, brain: _Brain
+    surface: RepairedSurface,
+    is_left: Mask,
+    plane: MidPlane,
+    pose: Pose,
+    brain: _Brain,
 ) -> PialSurface:
     """Return the pial surface of a brain, upright and cut into its hemispheres."""
     mesh, is_cap, is_kept = _without_islands(
@@ -686,7 +697,10 @@ def _two_sides(
 
 
 def _one_side(
-    surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain
+    surface: RepairedSurface,
+    side: Side,
+    pose: Pose,
+    brain: _Brain,
 ) -> PialSurface:
     """Return the pial surface of a single hemisphere, next to the mid-sagittal
     plane."""
@@ -710,7 +724,10 @@ def _one_side(
 
 
 def _without_islands(
-    surface: RepairedSurface, sides: Mapping[Side, Mask], of_file: Floats, brain: _Brain
+    surface: RepairedSurface,
+    sides: Mapping[Side, Mask],
+    of_file: Floats,
+    brain: _Brain,
 ) -> tuple[TriangleMesh, Mask, Mask]:
     """Remove all but the largest piece of a side; return the surface, masks of its caps
     and of the faces kept."""

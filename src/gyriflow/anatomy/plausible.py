@@ -127,7 +127,11 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
     )
 
 
-def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) -> None:
+def require_plausible_thickness(
+    values: NDArray,
+    factor_mm: float,
+    path: str,
+) -> None:
     """Raise InputError, with probable units, if the median of the positive values is
     not a cortical thickness."""
     known = values[np.isfinite(values) & (values > 0)]
@@ -210,7 +214,9 @@ def require_single_hemisphere(mesh: TriangleMesh) -> None:
 
 
 def require_one_brain(
-    mesh: TriangleMesh, what: str, path: str | PathLike[str] | None = None
+    mesh: TriangleMesh,
+    what: str,
+    path: str | PathLike[str] | None = None,
 ) -> None:
     """Raise InputError if a whole brain's surface, of a "surface" or "volume", consists
     of several whole brains."""
@@ -230,7 +236,12 @@ def require_one_brain(
         )
 
 
-def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> list[str]:
+def require_whole(
+    mesh: TriangleMesh,
+    what: str,
+    *,
+    refuses: bool = True,
+) -> list[str]:
     """Return a warning if a whole brain's surface, a "surface" or "volume", is narrow.
 
     InputError for one hemisphere, and for several brains.
@@ -252,7 +263,9 @@ def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> lis
 
 
 def require_left_and_right(
-    left: TriangleMesh, right: TriangleMesh, coordinates: str
+    left: TriangleMesh,
+    right: TriangleMesh,
+    coordinates: str,
 ) -> None:
     """Raise InputError if the left of two surfaces in RAS+ is not at the smaller x.
 
@@ -283,7 +296,10 @@ def require_left_and_right(
 
 
 def require_pair(
-    left: TriangleMesh, right: TriangleMesh, max_ratio: float, coordinates: str
+    left: TriangleMesh,
+    right: TriangleMesh,
+    max_ratio: float,
+    coordinates: str,
 ) -> list[str]:
     """Return a warning if two surfaces in RAS+ are hardly one brain's; InputError if
     swapped or beyond `max_ratio`."""
@@ -312,7 +328,9 @@ def require_pair(
 
 
 def facing_warnings(
-    left: TriangleMesh, right: TriangleMesh, to_right: Floats
+    left: TriangleMesh,
+    right: TriangleMesh,
+    to_right: Floats,
 ) -> list[str]:
     """Return a warning if hemispheres are shifted along the mid-plane, whose unit
     normal is `to_right` (3,)."""

@@ -124,7 +124,10 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
 
 
 def pose_of_pair(
-    left: TriangleMesh, right: TriangleMesh, *, declared: bool = False
+    left: TriangleMesh,
+    right: TriangleMesh,
+    *,
+    declared: bool = False,
 ) -> Pose:
     """Return the pose of a brain from two closed, outward hemispheres, each in any
     rigid pose.
@@ -326,7 +329,9 @@ def _pose_as_ras(shape: PosedShape, name: str) -> Pose:
 
 
 def _motions(
-    left: PosedShape, right: PosedShape, fit: RigidFit
+    left: PosedShape,
+    right: PosedShape,
+    fit: RigidFit,
 ) -> tuple[Floats, Floats]:
     # offset between the centres of volume of both posed hemispheres, the left one
     # mirrored
@@ -339,7 +344,9 @@ def _motions(
 
 
 def _difference(
-    to_left: Floats, to_right: Floats, left: PosedShape
+    to_left: Floats,
+    to_right: Floats,
+    left: PosedShape,
 ) -> tuple[float, Floats]:
     """Return the angle between two motions, and their shift (3,) in mm at the left
     hemisphere's centre."""
@@ -368,7 +375,10 @@ def _share_coordinates(
 
 
 def _mean_motion(
-    to_left: Floats, to_right: Floats, left: PosedShape, right: PosedShape
+    to_left: Floats,
+    to_right: Floats,
+    left: PosedShape,
+    right: PosedShape,
 ) -> Floats:
     centre = 0.5 * (MIRROR[:3, :3] @ left.shape.centre + right.shape.centre)
     rotation = (
@@ -399,7 +409,9 @@ def _pitch_deg(rotation: Floats) -> float:
 
 
 def require_coordinates(
-    left: TriangleMesh, right: TriangleMesh, coordinates: str
+    left: TriangleMesh,
+    right: TriangleMesh,
+    coordinates: str,
 ) -> list[str]:
     """Return warnings if the shapes of two hemispheres in RAS+ contradict their sides
     or the `coordinates` that the configuration names, "ras" or "lps".
@@ -434,7 +446,9 @@ def require_coordinates(
 
 
 def _are_exchanged_in_other_axes(
-    left: TriangleMesh, right: TriangleMesh, shapes: list[PosedShape]
+    left: TriangleMesh,
+    right: TriangleMesh,
+    shapes: list[PosedShape],
 ) -> bool:
     """Return whether both shapes clearly are the other side's, far from RAS.
 
@@ -484,7 +498,11 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
 
 
 def pose_of_hemisphere(
-    mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False
+    mesh: TriangleMesh,
+    side: str,
+    coordinates: str,
+    *,
+    of_volume: bool = False,
 ) -> Pose:
     """Return the pose of a single, clean hemisphere in coordinates "ras", "lps" or
     "auto".
@@ -533,7 +551,11 @@ def pose_of_hemisphere(
 
 
 def _choose_pose(
-    shape: PosedShape, rotation: Floats, coordinates: str, *, of_volume: bool = False
+    shape: PosedShape,
+    rotation: Floats,
+    coordinates: str,
+    *,
+    of_volume: bool = False,
 ) -> Pose:
     """Return the pose in named coordinates, or that of the shape; `rotation` (3, 3)
     leads to RAS+."""
@@ -579,7 +601,11 @@ def _choose_pose(
     )
 
 
-def _contradiction(coordinates: str, what: str, angle: float) -> str:
+def _contradiction(
+    coordinates: str,
+    what: str,
+    angle: float,
+) -> str:
     check = "check them, and whether an axis is reversed; or set coordinates: auto"
     return (
         f"according to the shape the {what} rotated by {angle:.0f}° from the"
@@ -588,7 +614,9 @@ def _contradiction(coordinates: str, what: str, angle: float) -> str:
 
 
 def pose_of_labels(
-    labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme
+    labels: NDArray[np.integer],
+    affine: Floats,
+    scheme: LabelScheme,
 ) -> Pose | None:
     """Estimate the pose from cerebellum, brainstem and labelled sides; return None if
     too few of them are labelled.
@@ -639,7 +667,11 @@ def pose_of_labels(
     return pose_from_rotation(rotation, by, sides is not None)
 
 
-def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
+def pose_from_rotation(
+    rotation: Floats,
+    evidence: str,
+    has_sides: bool,
+) -> Pose:
     """Return the pose of a volume that an estimated (3, 3) rotation about its origin
     would bring to RAS+.
 
@@ -684,7 +716,9 @@ def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
 
 
 def _rotation_from_sides(
-    hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None
+    hindbrain: dict[str, Floats],
+    sides: Floats,
+    rotation: Floats | None,
 ) -> Floats:
     """Estimate the (3, 3) rotation to RAS+ from labelled sides and hindbrain;
     InputError if they are mirrored."""

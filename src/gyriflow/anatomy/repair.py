@@ -402,7 +402,9 @@ def _main_pieces(
 
 
 def _fill_holes(
-    mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool
+    mesh: TriangleMesh,
+    max_hole_mm: float,
+    caps_walls: bool,
 ) -> tuple[TriangleMesh, dict[str, Any], Mask]:
     by_size = sorted(
         (float(np.ptp(mesh.vertices[loop], axis=0).max()), list(loop))
@@ -565,7 +567,9 @@ def filled_warning(topology: Mapping[str, Any], affine: Floats) -> list[str]:
 
 
 def with_volume(
-    mesh: TriangleMesh, volume_mm3: float, area_mm2: float
+    mesh: TriangleMesh,
+    volume_mm3: float,
+    area_mm2: float,
 ) -> tuple[TriangleMesh, dict[str, Any]]:
     """Move a closed surface along its normals until it encloses a volume; return it and
     a report in plain values.

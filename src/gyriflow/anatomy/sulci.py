@@ -89,7 +89,10 @@ def open_fused_sulci(
         else refine(side_mm[part], affine, every * factor)[0] > 0
     )
     nearest = ndimage.distance_transform_edt(
-        ~solid, sampling=size, return_distances=False, return_indices=True
+        ~solid,
+        sampling=size,
+        return_distances=False,
+        return_indices=True,
     )
     places = np.argwhere(cortex).astype(np.int32)
     depth_mm = np.linalg.norm((nearest[:, cortex].T - places) * size, axis=1)
@@ -149,7 +152,11 @@ def _around_brain(
     return tuple(fine), tuple(large)
 
 
-def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
+def _usual_thickness(
+    points: Floats,
+    surface: Floats,
+    depth: Floats,
+) -> Floats:
     """Return the median depth in mm of the cortex at the surface around (n, 3) points,
     at most that of the brain.
 
@@ -170,7 +177,10 @@ def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
 
 
 def _deep_sheets(
-    sheet: Mask, at_surface: Mask, size_mm: Floats, is_deep: Mask
+    sheet: Mask,
+    at_surface: Mask,
+    size_mm: Floats,
+    is_deep: Mask,
 ) -> tuple[Mask, int]:
     """Return the large parts of a mask from `at_surface` to places where `is_deep` (n,)
     holds, and their number."""
@@ -222,7 +232,10 @@ def _mark_sheet(
 
 
 def _grow_slits(
-    inside: Mask, sheet: Mask, cortex: Mask, distance: NDArray[np.float32]
+    inside: Mask,
+    sheet: Mask,
+    cortex: Mask,
+    distance: NDArray[np.float32],
 ) -> Mask:
     """Return the slits: voxels of a sheet into which the outside grows over simple
     points, widest banks first.

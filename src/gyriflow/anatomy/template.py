@@ -184,7 +184,11 @@ def _descend(
         weights = agrees / (1.0 + (distances / scale) ** 2) ** 2
         return moved, plane, distances, weights
 
-    def is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
+    def is_converged(
+        _: Floats,
+        turn: Floats,
+        move: Floats,
+    ) -> bool:
         return bool(
             np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3
         )

@@ -39,7 +39,9 @@ MIN_COSINE, MIN_SHAPE_RATIO = 0.5, 0.75
 
 
 def without_terraces(
-    mesh: TriangleMesh, voxels: Floats, fixed: NDArray[np.bool_] | bool = False
+    mesh: TriangleMesh,
+    voxels: Floats,
+    fixed: NDArray[np.bool_] | bool = False,
 ) -> TriangleMesh:
     """Remove the terraces of a smoothed mask's surface; `voxels` is the mask's (4, 4)
     affine to mm.
@@ -118,7 +120,9 @@ def _degraded(before: TriangleMesh, after: TriangleMesh) -> NDArray[np.bool_]:
 
 
 def _room(
-    mesh: TriangleMesh, voxels: Floats, max_move_mm: float
+    mesh: TriangleMesh,
+    voxels: Floats,
+    max_move_mm: float,
 ) -> tuple[Floats, Floats]:
     """Return how far vertices may move inward (n,) and outward (n,) until the surface
     meets a voxel's centre."""

@@ -166,7 +166,11 @@ def border(mask: Mask, affine: Floats) -> TriangleMesh:
     )
 
 
-def voxels_through_cortex(cerebrum: Mask, inner: TriangleMesh, affine: Floats) -> float:
+def voxels_through_cortex(
+    cerebrum: Mask,
+    inner: TriangleMesh,
+    affine: Floats,
+) -> float:
     """Return the median cortical thickness, from mask to `inner` surface, over a
     voxel's longest edge."""
     outer = border(cerebrum, affine)
@@ -231,7 +235,11 @@ def thickness_from_labels(
     return thickness
 
 
-def summary(values: Floats, is_measured: Mask, areas: Floats) -> dict[str, Any]:
+def summary(
+    values: Floats,
+    is_measured: Mask,
+    areas: Floats,
+) -> dict[str, Any]:
     """Summarise the thickness; means are weighted by area."""
     values, weights = values[is_measured], areas[is_measured]
     quantiles = np.quantile(
@@ -296,7 +304,11 @@ def thickness_from_white(
     )
 
 
-def require_inside(pial: TriangleMesh, white: TriangleMesh, side: str) -> None:
+def require_inside(
+    pial: TriangleMesh,
+    white: TriangleMesh,
+    side: str,
+) -> None:
     """Raise InputError if a white surface crosses the closed pial surface of its side
     ("whole": of the brain)."""
     outside = igl.fast_winding_number(pial.vertices, pial.faces, white.vertices) < 0.5
@@ -426,7 +438,9 @@ def filled_labels(
 
 
 def _narrow_gaps(
-    inside: NDArray[np.bool_], affine: Floats, fissure_x_mm: float
+    inside: NDArray[np.bool_],
+    affine: Floats,
+    fissure_x_mm: float,
 ) -> NDArray[np.bool_]:
     """Return the mask of the gaps at the fissure up to `FISSURE_MM` and a voxel
     wide."""

@@ -220,7 +220,11 @@ def _why(reason: str, directory: Path) -> str:
 
 
 def plan(
-    config: Path, directory: Path, further: Sequence[str], *, show: bool = False
+    config: Path,
+    directory: Path,
+    further: Sequence[str],
+    *,
+    show: bool = False,
 ) -> list[PlannedJob]:
     """Return the jobs that Snakemake would run, without targets, or exit with its code;
     `show` lists them, too."""
@@ -372,7 +376,10 @@ def _scans(
 
 
 def _needs(
-    jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
+    jobs: Sequence[PlannedJob],
+    study: Study,
+    directory: Path,
+    cores: int,
 ) -> Iterator[tuple[str, bool]]:
     seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
     made_by = {file: number for number, job in enumerate(jobs) for file in job.outputs}
@@ -429,7 +436,10 @@ def _needs(
 
 
 def _path_lines(
-    jobs: Sequence[PlannedJob], seconds: Sequence[float], study: Study, directory: Path
+    jobs: Sequence[PlannedJob],
+    seconds: Sequence[float],
+    study: Study,
+    directory: Path,
 ) -> Iterator[str]:
     """Yield a line on each path of an atlas: whether it is kept or has to be made, and
     where it will be kept."""
@@ -455,7 +465,11 @@ def _reuse(folder: str | None, directory: Path) -> str:
     return f"once for all studies with the folder {folder}"
 
 
-def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:
+def _fits(
+    name: str,
+    mib: float,
+    there_mib: float | None,
+) -> Iterator[tuple[str, bool]]:
     bad = there_mib is not None and mib > there_mib
     here = (
         ", for the foldings that run at the same time"

@@ -38,7 +38,10 @@ class Cores(click.IntRange):
     """A number of cores, or `all` that may be used."""
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self,
+        value: Any,
+        param: click.Parameter | None,
+        ctx: click.Context | None,
     ) -> Any:
         """Return the number."""
         return (
@@ -50,7 +53,10 @@ class InputPath(click.Path):
     """A path, with a hint if there is none."""
 
     def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+        self,
+        value: Any,
+        param: click.Parameter | None,
+        ctx: click.Context | None,
     ) -> Any:
         """Return the path; BadParameter with a hint if there is none."""
         try:
@@ -67,8 +73,16 @@ class InputPath(click.Path):
 
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
-EXISTING_DIR = InputPath(exists=True, file_okay=False, path_type=Path)
-EXISTING_FILE = InputPath(exists=True, dir_okay=False, path_type=Path)
+EXISTING_DIR = InputPath(
+    exists=True,
+    file_okay=False,
+    path_type=Path,
+)
+EXISTING_FILE = InputPath(
+    exists=True,
+    dir_okay=False,
+    path_type=Path,
+)
 directory_option = click.option(
     "-d",
     "--directory",
@@ -172,7 +186,11 @@ def _command_name() -> str:
     )
 
 
-def version(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+def version(
+    context: click.Context,
+    parameter: click.Parameter,
+    value: bool,
+) -> None:
     """Print the version and end."""
     if value and not context.resilient_parsing:
         from ..version import version as own
@@ -233,7 +251,12 @@ def main() -> None:
 @scheme_option
 @files_option
 @notation_option
-def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> None:
+def init(
+    folder: Path,
+    output: Path | None,
+    force: bool,
+    **selection: Any,
+) -> None:
     """Write a configuration for the brains in a FOLDER.
 
     It recognises tissue label volumes (and their label scheme), surfaces, and ages in
@@ -254,7 +277,11 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
 
 
 def _recognise(
-    folder: Path, *, decimal_weeks: bool | None, files: str | None, **selection: Any
+    folder: Path,
+    *,
+    decimal_weeks: bool | None,
+    files: str | None,
+    **selection: Any,
 ) -> "FoundScans":
     from .recognition import recognise, scheme_reasons
 
@@ -294,7 +321,10 @@ def _show_unused(found: "FoundScans") -> None:
 
 @main.command()
 @click.argument(
-    "data", type=click.Path(path_type=Path), required=False, metavar="[FOLDER|CONFIG]"
+    "data",
+    type=click.Path(path_type=Path),
+    required=False,
+    metavar="[FOLDER|CONFIG]",
 )
 @scheme_option
 @files_option
@@ -342,7 +372,11 @@ def check(
         sys.exit(2)
 
 
-def _write_measured(data: Path, config: Path, **selection: Any) -> "FoundScans":
+def _write_measured(
+    data: Path,
+    config: Path,
+    **selection: Any,
+) -> "FoundScans":
     """Write a configuration to measure the brains of a folder, and have this process
     fold nothing."""
     from ..running.launch import MEASURE_ONLY_VAR
@@ -464,7 +498,11 @@ def _run(
 @cores_option
 @dry_run_option
 def measure(
-    data: Path, directory: Path, cores: int, dry_run: bool, **selection: Any
+    data: Path,
+    directory: Path,
+    cores: int,
+    dry_run: bool,
+    **selection: Any,
 ) -> None:
     """Measure brains and write the report, without simulations.
 
@@ -513,8 +551,18 @@ def measure(
     multiple=True,
     help="White surface: one for each pial surface.",
 )
-@click.option("--week", type=float, required=True, help="Gestational week of the scan.")
-@click.option("--until", type=float, required=True, help="Gestational week to predict.")
+@click.option(
+    "--week",
+    type=float,
+    required=True,
+    help="Gestational week of the scan.",
+)
+@click.option(
+    "--until",
+    type=float,
+    required=True,
+    help="Gestational week to predict.",
+)
 @click.option(
     "--atlas",
     help=(
@@ -597,7 +645,11 @@ def predict(
 @scheme_option
 @click.option(
     "--settings",
-    type=click.Path(exists=True, dir_okay=False, resolve_path=True),
+    type=click.Path(
+        exists=True,
+        dir_okay=False,
+        resolve_path=True,
+    ),
     help="Configuration without brains, such as resolution, norms or what to fold.",
 )
 @click.option(

@@ -97,7 +97,12 @@ def write_configuration(
             if several and _have_shapes(series, folder)
             else ""
         )
-        text += _from_template("folding", start=start, end=end, measured=measured_run)
+        text += _from_template(
+            "folding",
+            start=start,
+            end=end,
+            measured=measured_run,
+        )
     kept = _keep_other(path, text)
     write_text(path, text)
     return kept
@@ -280,7 +285,10 @@ def write_bids(
         )
         remedy = choice if "keep one" in causes else None
         raise InputError(
-            "no scan can be used", path=folder, found=causes, remedy=remedy
+            "no scan can be used",
+            path=folder,
+            found=causes,
+            remedy=remedy,
         )
     require_bids_names(
         brain.entry.get("subject", brain.entry["id"]) for brain in brains
@@ -346,7 +354,10 @@ def _weeks(brains: Sequence[FoundBrain]) -> list[float]:
 
 
 def _growth_series(
-    atlas: Atlas, weeks: tuple[float, float], accepted: bool, least_gw: float = 0.0
+    atlas: Atlas,
+    weeks: tuple[float, float],
+    accepted: bool,
+    least_gw: float = 0.0,
 ) -> dict[str, Any]:
     """Return the first series of an atlas that covers a start and an end week, and its
     weeks that are used.
@@ -383,7 +394,11 @@ def _growth_series(
     raise InputError(problem, found="; ".join(spans), remedy=remedy)
 
 
-def _thinned(weeks: Sequence[float], end: float, least_gw: float) -> list[float]:
+def _thinned(
+    weeks: Sequence[float],
+    end: float,
+    least_gw: float,
+) -> list[float]:
     """Return ascending weeks at least so far apart, up to the first one at or past an
     end, or as far as they go."""
     chosen = [weeks[0]]

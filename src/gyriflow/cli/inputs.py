@@ -147,7 +147,9 @@ def doubts_about_files(
 
 
 def _check_labels(
-    volume: str, brain: BrainConfig, scheme: LabelScheme
+    volume: str,
+    brain: BrainConfig,
+    scheme: LabelScheme,
 ) -> Iterator[str]:
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
@@ -207,7 +209,11 @@ def _check_whites(
 
 
 def _check_pair(
-    brain: BrainConfig, left: TriangleMesh, right: TriangleMesh, *, declared: bool
+    brain: BrainConfig,
+    left: TriangleMesh,
+    right: TriangleMesh,
+    *,
+    declared: bool,
 ) -> Iterator[str]:
     left, right = _outward(left), _outward(right)
     yield from _check_size(brain, left, right)

@@ -252,7 +252,12 @@ def recognise(
                 or "none"
             )
             remedy = "Labels must be equal, with their zeros and case."
-            raise InputError(problem, path=folder, found=names, remedy=remedy)
+            raise InputError(
+                problem,
+                path=folder,
+                found=names,
+                remedy=remedy,
+            )
     unused = _in_other_formats(files)
     preferred: dict[str, list[FoundBrain]] = {}
     to_read: list[FoundBrain] = []
@@ -306,7 +311,10 @@ def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
         names.append("\n  …")
     found = f"{len(reasons)} files{''.join(names)}\n"
     return InputError(
-        "no brain was recognised", path=folder, found=found, expected=expected
+        "no brain was recognised",
+        path=folder,
+        found=found,
+        expected=expected,
     )
 
 
@@ -704,7 +712,10 @@ def _require_brain(path: Path, *, whole: bool = False) -> None:
             f" {WHOLE_BRAIN_ML[1]:g} mL"
         )
         raise InputError(
-            "is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected
+            "is not a brain",
+            path=path,
+            found=f"{volume:.3g} mL",
+            expected=expected,
         )
     if not whole:
         return
@@ -779,7 +790,12 @@ def _owners(file: Path, tables: ScanTables) -> list[str]:
     return [subject for subject in tables.ids if subject in file.parts[:-1]]
 
 
-def _similar_ids(subject: str, tables: ScanTables, *, or_first: bool = False) -> str:
+def _similar_ids(
+    subject: str,
+    tables: ScanTables,
+    *,
+    or_first: bool = False,
+) -> str:
     """Return which ids tables have instead of a subject's, or "": those that differ in
     zeros or case, otherwise, if asked, the first five."""
     found = []
@@ -816,7 +832,10 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
 
 
 def require_fit(
-    fits: Mapping[str, str], scheme: str, path: str | Path, found: str
+    fits: Mapping[str, str],
+    scheme: str,
+    path: str | Path,
+    found: str,
 ) -> None:
     """Raise InputError if other schemes fit the labels of a file, and this one does
     not."""
@@ -830,7 +849,9 @@ def require_fit(
 
 
 def recognise_brain(
-    files: Sequence[Path], white: Sequence[Path], scheme: str | None
+    files: Sequence[Path],
+    white: Sequence[Path],
+    scheme: str | None,
 ) -> dict[str, Any]:
     """Return the entry of one brain: from a label volume, one surface, or the left and
     the right pial surface.
@@ -893,7 +914,10 @@ def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
             problem = f"is named as a {'pial' if named[1] else 'white'} surface"
             remedy = "Give pial surfaces first, and white ones each after --white."
             raise InputError(
-                problem, path=file, expected=f"a {layer} surface", remedy=remedy
+                problem,
+                path=file,
+                expected=f"a {layer} surface",
+                remedy=remedy,
             )
     if len(files) == 1 and sides[0]:
         problem = f"is the {sides[0]} hemisphere only, and atlases have whole brains"

@@ -92,7 +92,9 @@ def log_errors(tests: Sequence[Mapping[str, Any]], metric: str) -> pd.DataFrame:
 
 
 def error_in_tests(
-    errors: pd.DataFrame, week: float, horizon: float
+    errors: pd.DataFrame,
+    week: float,
+    horizon: float,
 ) -> ErrorInTests | None:
     """Return the tested error of a prediction of a week over a horizon, from
     `log_errors`; None without tests.
@@ -181,7 +183,9 @@ def atlas_advantage(
 
 
 def prediction_facts(
-    tests: Sequence[Mapping[str, Any]], start_week: float, week: float
+    tests: Sequence[Mapping[str, Any]],
+    start_week: float,
+    week: float,
 ) -> dict[str, Any]:
     """Describe the errors of tests for the report of a prediction of a week.
 
@@ -212,7 +216,13 @@ def prediction_facts(
     return {"errors": errors, "advantage": advantage, "starts": starts}
 
 
-UNTESTED = ErrorInTests(tests=0, starts=0, largest=0.0, bias=0.0, is_beyond=False)
+UNTESTED = ErrorInTests(
+    tests=0,
+    starts=0,
+    largest=0.0,
+    bias=0.0,
+    is_beyond=False,
+)
 """The intervals of a run without tests are those of its members."""
 
 
@@ -308,7 +318,9 @@ def interval_table(
 
 
 def ensemble_maps(
-    run: TriangleMesh, members: Sequence[TriangleMesh], shape_indices: Sequence[Floats]
+    run: TriangleMesh,
+    members: Sequence[TriangleMesh],
+    shape_indices: Sequence[Floats],
 ) -> dict[str, Floats]:
     """Return maps (n,) of the spread of an ensemble at the vertices of a run's
     hemisphere.

@@ -36,7 +36,11 @@ AT_BOUND = 0.01
 bound."""
 
 
-def first_round(bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
+def first_round(
+    bounds: Bounds,
+    count: int,
+    seed: int,
+) -> pd.DataFrame:
     """Spread `count` rows of values evenly over the bounds, by a scrambled Sobol
     sequence (Sobol 1967; Owen 1998).
 
@@ -55,7 +59,10 @@ def first_round(bounds: Bounds, count: int, seed: int) -> pd.DataFrame:
 
 
 def next_round(
-    runs: pd.DataFrame, bounds: Bounds, count: int, seed: int
+    runs: pd.DataFrame,
+    bounds: Bounds,
+    count: int,
+    seed: int,
 ) -> pd.DataFrame:
     """Choose the values of the next `count` runs from all earlier ones.
 
@@ -90,10 +97,14 @@ def _trial(
     parameters = {name: run[name] for name in distributions}
     if np.isnan(run["score"]):
         return create_trial(
-            state=TrialState.PRUNED, params=parameters, distributions=distributions
+            state=TrialState.PRUNED,
+            params=parameters,
+            distributions=distributions,
         )
     return create_trial(
-        value=run["score"], params=parameters, distributions=distributions
+        value=run["score"],
+        params=parameters,
+        distributions=distributions,
     )
 
 
@@ -150,7 +161,9 @@ def find_optimum(runs: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
 
 
 def calibrated_parameters(
-    base: Mapping[str, Any], values: Mapping[str, float], week: float
+    base: Mapping[str, Any],
+    values: Mapping[str, float],
+    week: float,
 ) -> dict[str, Any]:
     """Return the content of `params.yaml` for a run of a calibration that ends at a
     week.
@@ -198,7 +211,9 @@ that they need."""
 
 
 def require_bands(
-    spectra: pd.DataFrame, names: Collection[str], path: str | None = None
+    spectra: pd.DataFrame,
+    names: Collection[str],
+    path: str | None = None,
 ) -> None:
     """Raise InputError unless the bands of spectral scores are complete and resolved.
 

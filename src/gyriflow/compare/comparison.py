@@ -114,7 +114,11 @@ class ObservedBrain:
         return found
 
 
-def observed_brain(name: str, surface: TriangleMesh, radius_mm: float) -> ObservedBrain:
+def observed_brain(
+    name: str,
+    surface: TriangleMesh,
+    radius_mm: float,
+) -> ObservedBrain:
     """Prepare a closed surface in mm as an observed brain without baselines."""
     return ObservedBrain(
         name, surface, prepare_for_comparison(surface, surface, radius_mm)
@@ -232,7 +236,9 @@ def size_columns(predicted: TriangleMesh, observed: TriangleMesh) -> dict[str, f
 
 
 def pairwise_distances(
-    surface: TriangleMesh, observed: TriangleMesh, even: TriangleMesh | None = None
+    surface: TriangleMesh,
+    observed: TriangleMesh,
+    even: TriangleMesh | None = None,
 ) -> list[VertexDistances]:
     """Measure how far the vertices of each of two aligned surfaces are from the other
     one, in mm.
@@ -281,7 +287,10 @@ def aligned_distances(
 
 
 def bootstrap_distances(
-    pair: list[VertexDistances], points: Floats, patch: Ints, drawn: Floats
+    pair: list[VertexDistances],
+    points: Floats,
+    patch: Ints,
+    drawn: Floats,
 ) -> Floats:
     """Return the (k,) mean distances in mm in k bootstrap samples of patches.
 

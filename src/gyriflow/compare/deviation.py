@@ -66,7 +66,11 @@ def thickness_difference(
     one of the week.
     """
 
-    def values_on(mesh: TriangleMesh, surface: TriangleMesh, values: Floats) -> Floats:
+    def values_on(
+        mesh: TriangleMesh,
+        surface: TriangleMesh,
+        values: Floats,
+    ) -> Floats:
         return values_at(match_surface(mesh, surface), values)
 
     surface, start_mm = simulated_start

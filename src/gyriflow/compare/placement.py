@@ -175,7 +175,11 @@ def make_resampling(surface: PreparedSurface) -> Resampling:
     )
 
 
-def correlation(x: Floats, y: Floats, weights: Floats) -> float:
+def correlation(
+    x: Floats,
+    y: Floats,
+    weights: Floats,
+) -> float:
     """Return the weighted Pearson correlation of (n,) values; NaN where one of them is
     constant to rounding."""
     (xx, xy), (_, yy) = np.cov(x, y, aweights=weights)
@@ -206,7 +210,11 @@ def interpolate_measures(
     return values, float(np.average(match.agrees, weights=observed.areas))
 
 
-def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, float]:
+def gain_columns(
+    r: Floats,
+    r_start: Floats,
+    r_adjacent: Floats,
+) -> dict[str, float]:
     """Compare correlations and their bootstrap samples with those of the start brain
     and of the week before.
 
@@ -244,7 +252,11 @@ def mirror_image(surface: PreparedSurface) -> tuple[TriangleMesh, float]:
     )
 
 
-def number_patches(points: Floats, areas: Floats, edge_mm: float) -> Ints:
+def number_patches(
+    points: Floats,
+    areas: Floats,
+    edge_mm: float,
+) -> Ints:
     """Divide (n, 3) points into patches about `edge_mm` wide and return the (n,) number
     of each point's patch.
 

@@ -66,7 +66,9 @@ class PreparedSurface:
 
 
 def prepare_for_comparison(
-    mesh: TriangleMesh, observed: TriangleMesh, radius_mm: float = CURVATURE_RADIUS_MM
+    mesh: TriangleMesh,
+    observed: TriangleMesh,
+    radius_mm: float = CURVATURE_RADIUS_MM,
 ) -> PreparedSurface:
     """Scale a closed surface to the observed brain's volume, remesh it, align it
     rigidly and fit its curvature.

@@ -156,7 +156,11 @@ def member_comparison(
         ]
     )
     population = table["observed"].map(populations)
-    table = table.assign(subject=subject, run=run, observed_population=population)
+    table = table.assign(
+        subject=subject,
+        run=run,
+        observed_population=population,
+    )
     table["same_population"] = population == populations[subject]
     return table.reindex(columns=COMPARISON_COLUMNS).sort_values(
         "observed", kind="stable", ignore_index=True
@@ -275,7 +279,9 @@ def member_row(
 
 
 def nearest_runs(
-    comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]
+    comparison: pd.DataFrame,
+    members: pd.DataFrame,
+    varied: Sequence[str],
 ) -> pd.DataFrame:
     """Find the run that is nearest to each observed brain by each measure, per
     hemisphere.
@@ -326,7 +332,9 @@ def nearest_runs(
 
 
 def _flags(
-    best: Mapping[Hashable, Any], members: pd.DataFrame, varied: Sequence[str]
+    best: Mapping[Hashable, Any],
+    members: pd.DataFrame,
+    varied: Sequence[str],
 ) -> str:
     flags = [] if best["flag"] == "ok" else [f"band {best['flag']}"]
     if best["resolution"] != "ok":

@@ -15,7 +15,10 @@ class MPIFirst:
     """
 
     def find_spec(
-        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+        self,
+        name: str,
+        path: Sequence[str] | None,
+        target: ModuleType | None = None,
     ) -> None:
         """Import MPI if dolfinx or PETSc is about to be imported, and leave finding it
         to the others."""

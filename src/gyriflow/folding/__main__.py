@@ -41,11 +41,21 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
         prog="python -m gyriflow.folding", description=__doc__
     )
     parser.add_argument("mesh", type=Path, help="tetrahedral mesh, RAS+ mm (XDMF)")
-    parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
+    parser.add_argument(
+        "--params",
+        type=Path,
+        required=True,
+        help="parameters (YAML)",
+    )
     parser.add_argument(
         "--maps", type=Path, help="maps of parameters at the mesh's vertices (HDF5)"
     )
-    parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        help="folder of the results",
+    )
     parser.add_argument(
         "--log",
         type=Path,
@@ -84,7 +94,9 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def require_space(
-    out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters
+    out: Path,
+    mesh: TetrahedralMesh,
+    parameters: FoldingParameters,
 ) -> None:
     """Raise StorageError if the disk has no room for the run's frames, which exist
     twice while they are joined."""

@@ -129,7 +129,11 @@ class State:
         )
 
 
-def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) -> str:
+def run_key(
+    mesh: TetrahedralMesh,
+    parameters: FoldingParameters,
+    maps: Maps,
+) -> str:
     """Return a hash of everything that determines the states of a run: mesh,
     parameters, maps and code.
 
@@ -158,7 +162,11 @@ def _checksum(arrays: dict[str, Floats], scalars: str) -> str:
     return digest.hexdigest()
 
 
-def write_checkpoint(path: Path, key: str, state: State) -> None:
+def write_checkpoint(
+    path: Path,
+    key: str,
+    state: State,
+) -> None:
     """Write the state of the run `key`; StorageError where the disk is full or the
     folder cannot be written."""
     values = dict(vars(state))

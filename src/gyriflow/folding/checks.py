@@ -17,7 +17,11 @@ through the cortex, the fastest-growing wave of a slab grows 32 % too slowly at 
 fastest."""
 
 
-def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
+def zone_report(
+    mesh: TetrahedralMesh,
+    zones: Zones,
+    thickness_mm: float,
+) -> dict:
     """Return a report on the zones.
 
     It contains the facets and area of each zone, the clamped share of each hemisphere,
@@ -57,7 +61,9 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
 
 
 def _edge_length_within(
-    mesh: TetrahedralMesh, zones: Zones, thickness_mm: float
+    mesh: TetrahedralMesh,
+    zones: Zones,
+    thickness_mm: float,
 ) -> float:
     """Return the mean edge length in mm of the elements whose centroid is in the
     cortex, or of all if none is."""

@@ -81,7 +81,11 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
         comm.barrier()
 
 
-def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, Any]:
+def compiled(
+    comm: MPI.Comm,
+    declarations: str,
+    code: str,
+) -> tuple[cffi.FFI, Any]:
     """Return the cffi interface and the library of C code, compiled unless cached;
     collective over the ranks."""
     content = repr((code, COMPILER_ARGUMENTS)).encode()

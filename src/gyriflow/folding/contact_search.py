@@ -226,7 +226,9 @@ class ContactSearch:
 
 
 def _drop_parallel_edges(
-    pairs: ipctk.NormalCollisions, edges: NDArray[np.integer], positions: Floats
+    pairs: ipctk.NormalCollisions,
+    edges: NDArray[np.integer],
+    positions: Floats,
 ) -> ipctk.NormalCollisions:
     """Return the pairs without those of two edges (e, 2) that are parallel, at
     positions (p, 3) of their vertices.
@@ -283,7 +285,9 @@ def _drop_distant_parallel_edges(
 
 
 def _parallel_edges(
-    pairs: Sequence[EdgePair], edges: NDArray[np.integer], positions: Floats
+    pairs: Sequence[EdgePair],
+    edges: NDArray[np.integer],
+    positions: Floats,
 ) -> NDArray[np.bool_]:
     """Return for each pair whether its two edges (e, 2) are parallel at (p, 3)
     positions of their vertices."""

@@ -187,7 +187,10 @@ class ContactSurface:
         columns = (3 * self._columns[node] + component).astype(PETSc.IntType)
         size = (3 * self.domain.n_owned, 3 * len(self.domain.positions))
         result = PETSc.Mat().createAIJ(
-            (size, size), bsize=3, csr=(start, columns, rows.data), comm=comm
+            (size, size),
+            bsize=3,
+            csr=(start, columns, rows.data),
+            comm=comm,
         )
         result.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         return result

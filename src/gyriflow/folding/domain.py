@@ -43,7 +43,11 @@ FROM_DOLFINX = {order: np.argsort(nodes) for order, nodes in TO_DOLFINX.items()}
 GRADIENTS_AT_NODES = shape_slopes(NODE_COORDINATES)
 
 
-def gather(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
+def gather(
+    comm: MPI.Comm,
+    values: Floats,
+    order: NDArray[np.int64],
+) -> Floats:
     """Return on every rank the (n, ...) values of all ranks; `order` (n,) has the index
     of each, rank by rank."""
     shape = values.shape[1:]
@@ -104,7 +108,10 @@ class Domain:
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
         # no ghost cells
         self.mesh = dolfinx.mesh.create_mesh(
-            comm, cells=cells, x=points, e=ufl.Mesh(element)
+            comm,
+            cells=cells,
+            x=points,
+            e=ufl.Mesh(element),
         )
         self.space = dolfinx.fem.functionspace(
             self.mesh, ("Lagrange", self.order, (3,))
@@ -232,7 +239,10 @@ class Domain:
         return self.comm.allreduce(float(local_values.min(initial=np.inf)), op=MPI.MIN)
 
     def locate_minimum(
-        self, values: Floats, indices: NDArray, positions: Floats
+        self,
+        values: Floats,
+        indices: NDArray,
+        positions: Floats,
     ) -> tuple[float, int, Floats]:
         """Return the smallest of the local values over all ranks, with its index in the
         file and its position."""

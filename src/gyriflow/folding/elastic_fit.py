@@ -154,7 +154,12 @@ class Springs:
         self._domain, self._vertices = domain, vertices
         self._local, self._rows = domain.owned_rows(vertices)
 
-    def draw_to(self, goals_mm: Floats, areas_mm2: Floats, lengths_mm: Floats) -> None:
+    def draw_to(
+        self,
+        goals_mm: Floats,
+        areas_mm2: Floats,
+        lengths_mm: Floats,
+    ) -> None:
         """Set the (b, 3) goals in mm, for a step from the present positions, and (b,)
         areas and lengths of springs."""
         stiffness = MODULUS_PA / (lengths_mm * M_PER_MM)
@@ -393,7 +398,10 @@ class ElasticFit:
         return found
 
     def _untangled(
-        self, before: Floats, after: Floats, lengths_mm: Sequence[float]
+        self,
+        before: Floats,
+        after: Floats,
+        lengths_mm: Sequence[float],
     ) -> tuple[Floats, Floats]:
         """Return the aligned shape `after`, changed around faults on the straight way
         to it, and those that remain.
@@ -500,7 +508,10 @@ class ElasticFit:
         return int((volumes < MIN_VOLUME_LEFT / 2 * self._start_volumes).sum())
 
     def _halfway(
-        self, before: Floats, after: Floats, passed: Sequence[Floats]
+        self,
+        before: Floats,
+        after: Floats,
+        passed: Sequence[Floats],
     ) -> int | None:
         """Return the number of the valid state that is nearest to the middle between
         two shapes; None without any."""
@@ -515,7 +526,10 @@ class ElasticFit:
         return None
 
     def _faults_between(
-        self, before: Floats, after: Floats, least: float = 0.0
+        self,
+        before: Floats,
+        after: Floats,
+        least: float = 0.0,
     ) -> Floats:
         """Return the (k, 3) places before, of elements that are inverted and faces that
         cross on the straight way."""
@@ -601,7 +615,12 @@ class ElasticFit:
         self.positions_mm = transform_points(self.positions_mm, motion)
         return self.positions_mm
 
-    def _step(self, goals: Floats, lengths: Floats, strain: Floats | None) -> str:
+    def _step(
+        self,
+        goals: Floats,
+        lengths: Floats,
+        strain: Floats | None,
+    ) -> str:
         """Grow by a strain (n, 6) and draw the boundary to goals (b, 3); return why the
         step did not converge, or "".
 
@@ -710,7 +729,11 @@ class ElasticFit:
         return stretches
 
 
-def nearness(places: Floats, faults: Floats, length_mm: float) -> Floats:
+def nearness(
+    places: Floats,
+    faults: Floats,
+    length_mm: float,
+) -> Floats:
     """Return how near (n, 3) places are to (k, 3) faults: 1 there, and falling off as a
     Gaussian with `UNTANGLING_REACH` lengths."""
     distance, _ = cKDTree(faults).query(places)

@@ -161,7 +161,12 @@ class GrowthByRates(StepGrowth):
 
 
 def increments(
-    w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float
+    w: Any,
+    g: Any,
+    tangential: Any,
+    radial: Any,
+    core: Any,
+    step_s: float,
 ) -> tuple[Any, Any]:
     """Return the tangential and radial growth increments dg and dr, as stretches minus
     1.
@@ -178,7 +183,12 @@ def increments(
 
 
 def increments_at(
-    p: FoldingParameters, w: Floats, g: Floats, maps: Maps, week: float, step_s: float
+    p: FoldingParameters,
+    w: Floats,
+    g: Floats,
+    maps: Maps,
+    week: float,
+    step_s: float,
 ) -> tuple[Floats, Floats]:
     """Return the increments of a step by the parameters' rates at a week; `w`, `g` and
     maps are at the same points."""
@@ -194,7 +204,10 @@ def increments_at(
 
 
 def layered_inverse(
-    dg: Floats, dr: Floats, layered: NDArray[np.bool_], normals: Floats
+    dg: Floats,
+    dr: Floats,
+    layered: NDArray[np.bool_],
+    normals: Floats,
 ) -> Floats:
     """Return G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
 

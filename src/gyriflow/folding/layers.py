@@ -38,7 +38,12 @@ def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:
     )
 
 
-def shear_modulus(p: FoldingParameters, w: Floats, maps: Maps, week: float) -> Floats:
+def shear_modulus(
+    p: FoldingParameters,
+    w: Floats,
+    maps: Maps,
+    week: float,
+) -> Floats:
     """Return the shear modulus (k,) in Pa at points with cortical weights w (k,) and
     values (k,) of maps."""
     core, cortex = (
@@ -66,7 +71,10 @@ class PialSearch:
         )
 
     def distance(
-        self, points: Floats, reach: float = np.inf, to_vertex: Floats | None = None
+        self,
+        points: Floats,
+        reach: float = np.inf,
+        to_vertex: Floats | None = None,
     ) -> Floats:
         """Return the distances of (k, 3) points to the pial triangles.
 

@@ -38,7 +38,10 @@ class LinearElements:
         self.H: Floats
 
     def assemble(
-        self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None
+        self,
+        u: Floats,
+        forces: Floats | None = None,
+        matrix: MatrixCSR | None = None,
     ) -> float:
         """Return the energy in J at displacements u (k, 3) in m; add to the given
         forces in N and matrix in N/m.
@@ -80,7 +83,12 @@ class LinearElements:
         return float(self._code.assemble(count, self._bulk_to_shear, *pointers))
 
     def _pointer(
-        self, array: NDArray | None, dtype: type, size: int, *, is_written: bool = False
+        self,
+        array: NDArray | None,
+        dtype: type,
+        size: int,
+        *,
+        is_written: bool = False,
     ) -> Any:
         if array is None:
             return self._interface.NULL

@@ -103,7 +103,12 @@ class TwoLevelPreconditioner:
             self._made_at = self._tangent.elastic.assembled
             self._set_coarse_level()
 
-    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def apply(
+        self,
+        _: PETSc.PC,
+        x: PETSc.Vec,
+        y: PETSc.Vec,
+    ) -> None:
         """Set y to the preconditioned x."""
         coarse = self._domain.sum_over_ranks(
             self._motions.restrict(x.array_r, self._parts)
@@ -201,7 +206,12 @@ class LinearSolver:
         self._cg.setTolerances(atol=0.0, max_it=max_iterations)
 
     def solve(
-        self, tangent: Tangent, residual: Residual, reduction: float, *, convexify: bool
+        self,
+        tangent: Tangent,
+        residual: Residual,
+        reduction: float,
+        *,
+        convexify: bool,
     ) -> Direction:
         """Solve J d = −r for a descent direction d, with the tangent J and the residual
         r at the same displacement.

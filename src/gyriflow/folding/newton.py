@@ -88,7 +88,11 @@ def residual_floor(mesh: TetrahedralMesh, modulus_pa: float) -> float:
     return 1e-11 * modulus_pa * edge_m**2 * math.sqrt(len(mesh.vertices))
 
 
-def _forcing_term(final: float, left: float, tightest: float) -> float:
+def _forcing_term(
+    final: float,
+    left: float,
+    tightest: float,
+) -> float:
     """Return the forcing term of inexact Newton, the relative tolerance of a linear
     solve (Eisenstat and Walker 1996).
 
@@ -118,7 +122,10 @@ class NewtonSolver:
     """
 
     def __init__(
-        self, problem: NonlinearProblem, settings: NewtonSettings, residual_floor: float
+        self,
+        problem: NonlinearProblem,
+        settings: NewtonSettings,
+        residual_floor: float,
     ) -> None:
         self.problem = problem
         self.settings = settings

@@ -22,7 +22,11 @@ GROWTH_SMOOTHING_MM = 0.4
 not."""
 
 
-def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
+def print_line(
+    text: str,
+    event: str = "",
+    **facts: float | str | None,
+) -> None:
     """Print a line without buffering, so that a log is always up to date, and log its
     `event`, if any, with its facts."""
     print(text, flush=True)
@@ -91,7 +95,9 @@ def layer_fields(
 
 
 def log_growth_at_vertices(
-    positions_mm: Floats, inputs: GrowthInputs, growth: Floats
+    positions_mm: Floats,
+    inputs: GrowthInputs,
+    growth: Floats,
 ) -> Floats:
     """Return the logarithm (n, 6) of growth at (n, 3) positions, from the deformation
     (m, 3, 3) of elements by growth.

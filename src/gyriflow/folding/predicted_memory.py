@@ -11,7 +11,12 @@ GLOBAL_CONTACT = 1.15
 """Factor on the memory per element; includes growth towards shapes."""
 
 
-def predicted_memory_mib(tets: int, ranks: int, contact: str, order: int = 1) -> float:
+def predicted_memory_mib(
+    tets: int,
+    ranks: int,
+    contact: str,
+    order: int = 1,
+) -> float:
     """Return the likely peak memory in MiB of a run with elements of an order, over all
     ranks."""
     per_tet = KIB_PER_TET[order] + KIB_PER_TET_AND_RANK[order] * ranks

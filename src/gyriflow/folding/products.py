@@ -39,7 +39,10 @@ def _library() -> tuple[Any, Any]:
 
 
 def _call(
-    function: str, count: int, *arrays: tuple[NDArray, type, int], written: NDArray
+    function: str,
+    count: int,
+    *arrays: tuple[NDArray, type, int],
+    written: NDArray,
 ) -> None:
     """Call a function with arrays, the type of each and the least number of its values;
     one of them is `written`."""
@@ -62,7 +65,10 @@ class SymmetricProducts:
     """
 
     def __init__(
-        self, column_map: IndexMap, nodes: Ints, columns: NDArray[np.int32]
+        self,
+        column_map: IndexMap,
+        nodes: Ints,
+        columns: NDArray[np.int32],
     ) -> None:
         self._owned = column_map.size_local
         self._columns = columns.astype(np.int32)
@@ -148,7 +154,11 @@ class PartMotions:
         )
 
 
-def multiply_blocks(blocks: NDArray[np.float32], x: Floats, y: Floats) -> None:
+def multiply_blocks(
+    blocks: NDArray[np.float32],
+    x: Floats,
+    y: Floats,
+) -> None:
     """Set y (3 · k,) to the products of (k, 3, 3) blocks with x."""
     count = len(blocks)
     _call(

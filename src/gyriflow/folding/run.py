@@ -115,7 +115,11 @@ def run(
     print_line(f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s")
 
 
-def _low_radius_ratio(mesh: TetrahedralMesh, out: Path, week: float) -> float:
+def _low_radius_ratio(
+    mesh: TetrahedralMesh,
+    out: Path,
+    week: float,
+) -> float:
     """Return the radius ratio that 1 % of the elements are below at an output week."""
     positions = read_positions(out / FRAMES, week)
     ratios = radius_ratios(TetrahedralMesh(positions, mesh.tets))
@@ -123,7 +127,12 @@ def _low_radius_ratio(mesh: TetrahedralMesh, out: Path, week: float) -> float:
 
 
 def simulate(
-    folding: Folding, state: State, folder: Path, key: str, *, may_diverge: bool
+    folding: Folding,
+    state: State,
+    folder: Path,
+    key: str,
+    *,
+    may_diverge: bool,
 ) -> tuple[State, str | None]:
     """Run to the end and return the last state; write a frame per output week and a
     checkpoint per step into `folder`.
@@ -160,7 +169,12 @@ def simulate(
     return state, None
 
 
-def _save_frame(folding: Folding, state: State, week: float, folder: Path) -> State:
+def _save_frame(
+    folding: Folding,
+    state: State,
+    week: float,
+    folder: Path,
+) -> State:
     """Write the frame of a week and return the state to continue with; collective over
     the ranks."""
     names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
@@ -191,7 +205,11 @@ def _save_frame(folding: Folding, state: State, week: float, folder: Path) -> St
     return replace(state, growth=None, growth_s=0.0)
 
 
-def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
+def report_step(
+    state: State,
+    end_week: float,
+    seconds_per_step: float,
+) -> None:
     """Print the progress line of the last step: week, iterations, displacement,
     time."""
     row = state.rows[-1]
@@ -227,7 +245,9 @@ def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
 
 
 def quality_note(
-    mesh: TetrahedralMesh, positions: Floats, week: float
+    mesh: TetrahedralMesh,
+    positions: Floats,
+    week: float,
 ) -> tuple[str, bool]:
     """Return a note if elements are flatter than any may be at the start, else an empty
     text, and if they are many."""
@@ -247,7 +267,9 @@ def quality_note(
 
 
 def load_state(
-    folder: Path, key: str, parameters: FoldingParameters
+    folder: Path,
+    key: str,
+    parameters: FoldingParameters,
 ) -> tuple[State | None, str]:
     """Return the state to resume from, or None, and a message for the user.
 

@@ -254,7 +254,11 @@ class Folding:
         }
 
 
-def advance(folding: Folding, state: State, until_s: float) -> State:
+def advance(
+    folding: Folding,
+    state: State,
+    until_s: float,
+) -> State:
     """Return the state after one accepted step towards `until_s`; the step is halved
     while its solve fails.
 
@@ -301,7 +305,11 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
         return after
 
 
-def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
+def elements_through(
+    domain: Domain,
+    distance: Floats,
+    thickness: float,
+) -> float:
     """Return a cortical thickness over the mean edge length of the elements in the
     cortex; NaN if there are none.
 

@@ -66,7 +66,10 @@ class SteeredStep(GrowthByRates):
 
 
 def steered_growth(
-    p: FoldingParameters, inputs: GrowthInputs, at_start: Size, start: StepStart
+    p: FoldingParameters,
+    inputs: GrowthInputs,
+    at_start: Size,
+    start: StepStart,
 ) -> SteeredStep:
     """Return the growth by sizes of a step of a run with a size `at_start`."""
     week = start.week(p, 1.0)
@@ -93,7 +96,9 @@ def steered_growth(
 
 
 def steered_rates(
-    required: Floats, gain: Floats, bounds: tuple[float, float]
+    required: Floats,
+    gain: Floats,
+    bounds: tuple[float, float],
 ) -> tuple[float, float, bool]:
     """Return the rates of cortex and core, and whether bounds prevent the brain from
     following its curves.
@@ -127,7 +132,10 @@ def steered_rates(
 
 
 def free_growth(
-    p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs, week: float
+    p: FoldingParameters,
+    positions_mm: Floats,
+    inputs: GrowthInputs,
+    week: float,
 ) -> tuple[Floats, Floats]:
     """Return the rates of the logarithms of area and volume of unconstrained growth at
     (n, 3) positions.
@@ -142,7 +150,11 @@ def free_growth(
     weight = cortical_weight(distance, thickness)
     volumes = volumes_between(positions_mm, inputs.pieces)
 
-    def volume_rate(tangential: float, radial: float | Floats, core: float) -> float:
+    def volume_rate(
+        tangential: float,
+        radial: float | Floats,
+        core: float,
+    ) -> float:
         dg, dr = increments(weight, zones.growth, tangential, radial, core, 1.0)
         of_volume = 2 * dg + dr
         of_pieces = of_volume[inputs.pieces].mean(axis=1)
@@ -186,7 +198,12 @@ def missed_curves(row: dict[str, Any]) -> str:
     )
 
 
-def blended(curve: Any, at_start: float, start_week: float, week: float) -> float:
+def blended(
+    curve: Any,
+    at_start: float,
+    start_week: float,
+    week: float,
+) -> float:
     """Return the value at a week of a {week: value} curve, for a brain with another
     value at the start.
 

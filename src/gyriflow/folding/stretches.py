@@ -28,7 +28,10 @@ def unpacked(values: Floats) -> Floats:
 
 
 def deformation_gradients(
-    before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats
+    before: Floats,
+    after: Floats,
+    cells: NDArray[np.integer],
+    slopes: Floats,
 ) -> Floats:
     """Return the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of
     tetrahedra at points inside them.
@@ -49,7 +52,9 @@ def deformation_gradients(
 
 
 def inverse_stretch(
-    F: Floats, power: Floats | float = 1.0, limit: float = np.inf
+    F: Floats,
+    power: Floats | float = 1.0,
+    limit: float = np.inf,
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Return U^−power (..., 3, 3) of F = R·U, with one power for all or one for each,
     and where U is limited.
@@ -77,7 +82,12 @@ def from_principal(values: Floats, axes: Floats) -> Floats:
     return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
-def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floats:
+def log_stretch(
+    F: Floats,
+    *,
+    left: bool = False,
+    limit: float = np.inf,
+) -> Floats:
     """Return the Hencky strain (..., 3, 3): ln U of F = R·U, in axes before F, or the
     `left` ln V of F = V·R.
 
@@ -97,7 +107,11 @@ def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
     return from_principal(squares ** (power / 2), axes)
 
 
-def relaxed(V: Floats, step_gw: float, memory_gw: float) -> Floats:
+def relaxed(
+    V: Floats,
+    step_gw: float,
+    memory_gw: float,
+) -> Floats:
     """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as
     exp(−t/τ), with τ = `memory_gw`."""
     if np.isinf(memory_gw):

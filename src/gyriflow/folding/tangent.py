@@ -243,7 +243,12 @@ class Tangent:
             else None
         )
 
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def mult(
+        self,
+        _: PETSc.Mat,
+        x: PETSc.Vec,
+        y: PETSc.Vec,
+    ) -> None:
         """Set y to the product with x."""
         self.elastic.matrix.products.multiply(x.array_r, y.array_w)
         for part in self.parts:

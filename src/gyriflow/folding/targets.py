@@ -111,7 +111,9 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
 
 
 def shapes_of_run(
-    p: FoldingParameters, maps: Maps, positions_mm: Floats
+    p: FoldingParameters,
+    maps: Maps,
+    positions_mm: Floats,
 ) -> tuple[list[float], list[Floats]]:
     """Return the ascending weeks and (n, 3) shapes in mm of a run: that at its start,
     and the targets in its maps."""
@@ -124,7 +126,10 @@ def shapes_of_run(
 
 
 def growth_on_path(
-    p: FoldingParameters, inputs: GrowthInputs, path: Path, start: StepStart
+    p: FoldingParameters,
+    inputs: GrowthInputs,
+    path: Path,
+    start: StepStart,
 ) -> TargetGrowth:
     """Return the growth of a step: that of the path, and of the part of the misfit that
     feedback makes up for."""

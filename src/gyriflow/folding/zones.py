@@ -124,7 +124,9 @@ def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floa
 
 
 def _medial_wall_facets(
-    mesh: TetrahedralMesh, facets: NDArray[np.int64], side: Side
+    mesh: TetrahedralMesh,
+    facets: NDArray[np.int64],
+    side: Side,
 ) -> NDArray[np.bool_]:
     """Return the mask (f,) of the facets of a single hemisphere that face the missing
     one, near its innermost point."""
@@ -149,7 +151,11 @@ def _wall_anchors(
     return wall[[central, farthest]], fixed
 
 
-def inside_ellipsoid(vertices: NDArray, low: Floats, high: Floats) -> NDArray[np.bool_]:
+def inside_ellipsoid(
+    vertices: NDArray,
+    low: Floats,
+    high: Floats,
+) -> NDArray[np.bool_]:
     """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,)
     are the ends of the brain."""
     extent = high - low
@@ -162,7 +168,9 @@ def inside_ellipsoid(vertices: NDArray, low: Floats, high: Floats) -> NDArray[np
 
 
 def zones_of_run(
-    mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: float = GAP_MM
+    mesh: TetrahedralMesh,
+    parameters: FoldingParameters,
+    gap_mm: float = GAP_MM,
 ) -> Zones:
     """Return the zones of a brain in RAS+ mm for the parameters of a run.
 
@@ -228,7 +236,9 @@ def zones_of_run(
 
 
 def _planes_distance(
-    vertices: Floats, facets: NDArray[np.int64], fissure_x_mm: float
+    vertices: Floats,
+    facets: NDArray[np.int64],
+    fissure_x_mm: float,
 ) -> float:
     """Return the distance in mm from the middle of the fissure that has
     `MAX_BETWEEN_PLANES` of the area within."""
@@ -256,7 +266,10 @@ def _bridge_vertices(
 
 
 def _medial_vertices(
-    mesh: TetrahedralMesh, fissure_x_mm: float, left_plane: float, right_plane: float
+    mesh: TetrahedralMesh,
+    fissure_x_mm: float,
+    left_plane: float,
+    right_plane: float,
 ) -> NDArray[np.int64]:
     """Return the vertices, each once, of the elements whose most medial vertex lies
     between the planes.
@@ -272,7 +285,10 @@ def _medial_vertices(
 
 
 def model_fields(
-    zones: Zones, positions: Floats, p: FoldingParameters, week: float
+    zones: Zones,
+    positions: Floats,
+    p: FoldingParameters,
+    week: float,
 ) -> dict[str, Floats]:
     """Return the fields of a run without maps at its nodes, whose `positions` (n, 3) of
     a week are in mm.
@@ -295,7 +311,11 @@ def model_fields(
     }
 
 
-def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
+def cell_tags(
+    mesh: TetrahedralMesh,
+    zones: Zones,
+    weight: Floats,
+) -> Tags:
     """Return the (m,) tags of the elements.
 
     `hemisphere` is LEFT or RIGHT by the element's centroid, or BRIDGE between the two

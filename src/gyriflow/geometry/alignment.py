@@ -58,7 +58,11 @@ def angle_deg(rotation: Floats) -> float:
     return float(np.degrees(Rotation.from_matrix(rotation).magnitude()))
 
 
-def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
+def rigid_fit(
+    points: Floats,
+    onto: Floats,
+    weights: Floats,
+) -> Floats:
     """Return the (4, 4) least-squares motion of (n, 3) points onto others (Kabsch 1976,
     10.1107/S0567739476001873)."""
     source = np.average(points, axis=0, weights=weights)
@@ -72,7 +76,11 @@ def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
     return motion(turn.as_matrix(), shift)
 
 
-def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floats:
+def without_rigid_motion(
+    first: Floats,
+    second: Floats,
+    weights: Floats,
+) -> Floats:
     """Return the (n, 3) displacement from `first` to `second` after the latter is
     rigidly aligned to the former."""
     back = rigid_fit(second, first, weights)
@@ -80,7 +88,10 @@ def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floa
 
 
 def step_towards_planes(
-    points: Floats, normals: Floats, distances: Floats, weights: Floats | None = None
+    points: Floats,
+    normals: Floats,
+    distances: Floats,
+    weights: Floats | None = None,
 ) -> tuple[Floats, Floats]:
     """Return the rotation and shift that minimise the squared distances of (n, 3)
     points from planes.
@@ -167,7 +178,11 @@ def _fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         residuals.append(float(np.linalg.norm(distances)))
         return points, normals, distances, None
 
-    def is_converged(points: Floats, turn: Floats, move: Floats) -> bool:
+    def is_converged(
+        points: Floats,
+        turn: Floats,
+        move: Floats,
+    ) -> bool:
         before = residuals[:-STALL_ROUNDS]
         last = residuals[-STALL_ROUNDS:]
         if before and min(last) > (1 - STALL_TOL) * min(before):
@@ -213,7 +228,9 @@ def fits_from_all_sides(
 
 
 def residual_ratio(
-    fits: Iterable[RigidFit], best: RigidFit, distinct_deg: float
+    fits: Iterable[RigidFit],
+    best: RigidFit,
+    distinct_deg: float,
 ) -> float:
     """Return the least residual in another pose over that of the best fit, ∞ without;
     near 1 it is ambiguous."""

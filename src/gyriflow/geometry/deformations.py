@@ -71,7 +71,9 @@ def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
 
 
 def between_moved(
-    pair: Correspondence, first: Floats, second: Floats
+    pair: Correspondence,
+    first: Floats,
+    second: Floats,
 ) -> Correspondence:
     """Return the correspondence of two brains after (4, 4) rigid motions of the first
     and of the second."""

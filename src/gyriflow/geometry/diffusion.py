@@ -34,7 +34,11 @@ def vertex_sizes(vertices: Floats, cells: Indices) -> Floats:
     return _parts_at_vertices(sizes, cells, len(vertices))
 
 
-def _parts_at_vertices(values: Floats, cells: Indices, count: int) -> Floats:
+def _parts_at_vertices(
+    values: Floats,
+    cells: Indices,
+    count: int,
+) -> Floats:
     """Return the (n,) sums of equal parts of the (m,) values of the cells around each
     of `count` vertices."""
     corners = cells.shape[1]
@@ -67,7 +71,9 @@ def diffuse(
 
 
 def _implicit_step(
-    vertices: Floats, cells: Indices, time_mm2: float
+    vertices: Floats,
+    cells: Indices,
+    time_mm2: float,
 ) -> tuple[Floats, sparse.csr_matrix]:
     """Return the (n,) lumped masses M, and the matrix M + t K of an implicit step of
     the heat equation over the time t."""
@@ -78,7 +84,11 @@ def _implicit_step(
     return mass, sparse.csr_matrix(sparse.diags(mass) + time_mm2 * stiffness)
 
 
-def integrals_at_vertices(vertices: Floats, cells: Indices, values: Floats) -> Floats:
+def integrals_at_vertices(
+    vertices: Floats,
+    cells: Indices,
+    values: Floats,
+) -> Floats:
     """Return the (n, k) integrals around the vertices of the (m, k) values of cells:
     equal parts of the cells' own."""
     corners = cells.shape[1]
@@ -91,7 +101,10 @@ def integrals_at_vertices(vertices: Floats, cells: Indices, values: Floats) -> F
 
 
 def smooth_integrals(
-    vertices: Floats, cells: Indices, integrals: Floats, length_mm: float
+    vertices: Floats,
+    cells: Indices,
+    integrals: Floats,
+    length_mm: float,
 ) -> Floats:
     """Return (n, k) smooth values at the vertices from their integrals around them, by
     one implicit step of diffusion.
@@ -128,7 +141,10 @@ def harmonic_continuation(
 
 
 def _solve(
-    matrix: sparse.csr_matrix, right: Floats, start: Floats, tolerance: float
+    matrix: sparse.csr_matrix,
+    right: Floats,
+    start: Floats,
+    tolerance: float,
 ) -> Floats:
     """Solve for all (n, k) columns by conjugate gradients with the Jacobi
     preconditioner.

@@ -90,7 +90,11 @@ def chunks(count: int) -> Iterator[slice]:
         yield slice(first, first + CHUNK)
 
 
-def jacobians(vertices: Floats, tets: Indices, slopes: Floats) -> Floats:
+def jacobians(
+    vertices: Floats,
+    tets: Indices,
+    slopes: Floats,
+) -> Floats:
     """Return the (m, p) Jacobian determinants of (m, 10) elements, from (p, 10, 3)
     shape function gradients."""
     values = np.empty((len(tets), len(slopes)))
@@ -134,7 +138,10 @@ def _bounds(values: Floats, depth: int) -> Floats:
 
 
 def inverted_on_the_way(
-    before: Floats, after: Floats, tets: Indices, least: float = 0.0
+    before: Floats,
+    after: Floats,
+    tets: Indices,
+    least: float = 0.0,
 ) -> Mask:
     """Return whether each (m, 4) or (m, 10) element is inverted anywhere on the
     straight way of its vertices.
@@ -183,7 +190,12 @@ def _mixed_determinants(first: Floats, last: Floats) -> Floats:
     return total / 3
 
 
-def _has_root(a: float, b: float, c: float, d: float) -> bool:
+def _has_root(
+    a: float,
+    b: float,
+    c: float,
+    d: float,
+) -> bool:
     """Return whether the cubic with these Bernstein coefficients on [0, 1] is anywhere
     zero or negative there."""
     if min(a, d) <= 0:

@@ -89,7 +89,9 @@ def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
 
 
 def surface_mask(
-    mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None
+    mesh: TriangleMesh,
+    voxel_mm: float,
+    box: Floats | None = None,
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return a volume, 1 inside a closed surface, and its affine; 4 voxels around it or
     a (2, 3) `box`."""
@@ -105,7 +107,10 @@ def surface_mask(
 
 
 def layer_labels(
-    mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], affine: Floats
+    mesh: TriangleMesh,
+    thickness: Floats,
+    shape: tuple[int, ...],
+    affine: Floats,
 ) -> NDArray[np.int32]:
     """Return labels in a volume's grid, its (4, 4) affine in mm: 2 less deep than (n,)
     thickness in mm, 1 deeper."""
@@ -118,7 +123,11 @@ def layer_labels(
     return labels
 
 
-def _inside(mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats) -> Mask:
+def _inside(
+    mesh: TriangleMesh,
+    shape: tuple[int, ...],
+    affine: Floats,
+) -> Mask:
     """Return the (i, j, k) mask of the voxels whose centres lie inside a closed
     surface, by winding numbers.
 
@@ -206,7 +215,11 @@ def crossing_faces(mesh: TriangleMesh) -> int:
     return len(faces_that_cross(mesh))
 
 
-def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
+def match_points(
+    points: Floats,
+    normals: Floats,
+    mesh: TriangleMesh,
+) -> Match:
     """Match (n, 3) points with unit normals to the nearest points of a surface whose
     normals agree.
 

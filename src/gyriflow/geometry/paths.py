@@ -83,7 +83,11 @@ def path_through(
     return Path(at, BPoly(np.stack(controls, axis=1), at), inverted)
 
 
-def _straighten(control: Floats, steps: int, mesh: TetrahedralMesh) -> Ints:
+def _straighten(
+    control: Floats,
+    steps: int,
+    mesh: TetrahedralMesh,
+) -> Ints:
     """Straighten a path with (4, n, 3) control points, in place, near elements that its
     steps invert; return those that they still invert."""
     first, _, _, last = control
@@ -101,7 +105,11 @@ def _straighten(control: Floats, steps: int, mesh: TetrahedralMesh) -> Ints:
     return _inverted_by_steps(control, steps, mesh)
 
 
-def _inverted_by_steps(control: Floats, steps: int, mesh: TetrahedralMesh) -> Ints:
+def _inverted_by_steps(
+    control: Floats,
+    steps: int,
+    mesh: TetrahedralMesh,
+) -> Ints:
     curve = BPoly(control[:, None], [0.0, 1.0])
     found = np.zeros(len(mesh.tets), dtype=bool)
     before = control[0]
@@ -113,7 +121,9 @@ def _inverted_by_steps(control: Floats, steps: int, mesh: TetrahedralMesh) -> In
 
 
 def merged_shapes(
-    weeks: Floats, places: Floats, stops: Collection[float] = ()
+    weeks: Floats,
+    places: Floats,
+    stops: Collection[float] = (),
 ) -> tuple[Floats, Floats]:
     """Return weeks and (k, n, 3) places, with shapes closer than `MIN_SPACING_GW` moved
     onto one line in time.

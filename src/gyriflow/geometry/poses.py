@@ -89,7 +89,12 @@ def pose_from(plain: Mapping[str, Any]) -> Pose:
     )
 
 
-def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) -> Pose:
+def turned(
+    rotation: Floats,
+    by: str,
+    coordinates: str = "ras",
+    *warnings: str,
+) -> Pose:
     """Return the pose of a file that a (3, 3) rotation brings to RAS+; the brain's
     volumes are in RAS+ already."""
     whole = motion(rotation)

@@ -74,7 +74,9 @@ def untangle(mesh: TriangleMesh) -> tuple[TriangleMesh, int, int]:
             document.apply_selection_dilatation()
         document.compute_selection_transfer_face_to_vertex()
         document.apply_coord_laplacian_smoothing(
-            stepsmoothnum=2, cotangentweight=False, selected=True
+            stepsmoothnum=2,
+            cotangentweight=False,
+            selected=True,
         )
         mesh = from_meshlab(document)
     return mesh, counts[0], counts[-1]

@@ -19,7 +19,11 @@ Indices = NDArray[np.integer]
 COINCIDENCE_TOL = 1e-3
 
 
-def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
+def frozen(
+    values: ArrayLike,
+    dtype: type,
+    width: int,
+) -> NDArray:
     """Return a read-only (n, width) copy of `values`; ValueError for another shape."""
     array: NDArray = np.array(values, dtype=dtype, order="C")
     if array.ndim != 2 or array.shape[1] != width:
@@ -28,7 +32,11 @@ def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
     return array
 
 
-def require_indices(cells: Ints, count: int, cell: str) -> None:
+def require_indices(
+    cells: Ints,
+    count: int,
+    cell: str,
+) -> None:
     """Raise ValueError, with the name of a `cell`, if cells have a vertex outside of
     the first `count`."""
     if len(cells) and not 0 <= cells.min() <= cells.max() < count:
@@ -262,7 +270,9 @@ def _angles_around_edge(mesh: TriangleMesh, half_edges: Ints) -> Floats:
 
 
 def _cheapest_pairs(
-    costs: NDArray, backward: Ints, forward: Ints
+    costs: NDArray,
+    backward: Ints,
+    forward: Ints,
 ) -> tuple[Ints, float]:
     """Return the (k, 2) pairs of half-edges of both directions with the smallest sum of
     (b, f) costs, and that sum."""
@@ -271,7 +281,11 @@ def _cheapest_pairs(
     return pairs, float(costs[rows, columns].sum())
 
 
-def _joined_corners(pairs: Ints, start: Ints, following: Ints) -> Ints:
+def _joined_corners(
+    pairs: Ints,
+    start: Ints,
+    following: Ints,
+) -> Ints:
     """Return the (3 m,) number of the vertex at each corner of the faces, which share
     vertices only along (k, 2) paired half-edges."""
     edge, partner = pairs.T

@@ -262,7 +262,10 @@ def resample_by_size(
 
 
 def positions_at(
-    week: float, atlas: Floats, weeks: Sequence[float] | Floats, sizes: Floats
+    week: float,
+    atlas: Floats,
+    weeks: Sequence[float] | Floats,
+    sizes: Floats,
 ) -> Floats:
     """Interpolate the (k, n, 3) positions of an atlas in k weeks linearly to a week;
     return (n, 3) positions.

@@ -35,7 +35,9 @@ def number_regions(*tables: Mapping[int, str]) -> dict[str, int]:
 
 
 def renumber(
-    labels: Indices, names: Mapping[int, str], numbers: Mapping[str, int]
+    labels: Indices,
+    names: Mapping[int, str],
+    numbers: Mapping[str, int],
 ) -> Ints:
     """Convert labels to the numbers of their regions; 0 for labels without a name."""
     regions = np.full(np.shape(labels), NO_REGION, dtype=np.int64)
@@ -45,7 +47,9 @@ def renumber(
 
 
 def regions_from_volume(
-    points: Mapping[str, Floats], regions: Indices, affine: Floats
+    points: Mapping[str, Floats],
+    regions: Indices,
+    affine: Floats,
 ) -> dict[str, Ints]:
     """Return the region of the voxel nearest to each vertex; 0 if none is within 4 mm.
 
@@ -104,7 +108,9 @@ def regions_from_volume(
 
 
 def regions_from_surface(
-    target: TriangleMesh, surface: TriangleMesh, regions: Indices
+    target: TriangleMesh,
+    surface: TriangleMesh,
+    regions: Indices,
 ) -> Ints:
     """Return the regions at the vertices of `target`, from another surface of the same
     hemisphere.

@@ -225,7 +225,11 @@ def maps_on_template(
     return {**at_template, "template_distance_mm": match.distance_mm}
 
 
-def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> None:
+def _require_on_grid(
+    deformation: Deformation,
+    points: Floats,
+    what: str,
+) -> None:
     index = transform_points(points, np.linalg.inv(deformation.affine))
     last = np.array(deformation.displacement.shape[:3]) - 1
     beyond = index - np.clip(index, 0, last)

@@ -233,7 +233,11 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
 
 
 def _solve(
-    design: Floats, logs: Floats, weights: Floats, penalty: Floats, n_levels: int
+    design: Floats,
+    logs: Floats,
+    weights: Floats,
+    penalty: Floats,
+    n_levels: int,
 ) -> Floats:
     """Return the coefficients of a first value, rates that are not negative, and
     levels."""
@@ -293,7 +297,9 @@ def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def _checked(
-    weeks: Sequence[float], values: Sequence[float], name: str
+    weeks: Sequence[float],
+    values: Sequence[float],
+    name: str,
 ) -> tuple[Floats, Floats]:
     weeks_ = np.asarray(weeks, dtype=float)
     values_ = np.asarray(values, dtype=float)
@@ -437,7 +443,9 @@ def sizes_on_curves(
 
 
 def _measured_curve(
-    curves: pd.DataFrame | None, series: str | None, quantity: str
+    curves: pd.DataFrame | None,
+    series: str | None,
+    quantity: str,
 ) -> Curve:
     if curves is None:
         curves = pd.DataFrame(columns=["series", "quantity", "week", "value"])

@@ -38,7 +38,11 @@ class ObservedSurface:
     places: Floats
 
 
-def nearest_in_age(ages: pd.DataFrame, weeks: Sequence[float], week: float) -> int:
+def nearest_in_age(
+    ages: pd.DataFrame,
+    weeks: Sequence[float],
+    week: float,
+) -> int:
     """Return the number of that of an atlas' stated `weeks` whose brain has the age by
     size closest to a week.
 
@@ -51,7 +55,11 @@ def nearest_in_age(ages: pd.DataFrame, weeks: Sequence[float], week: float) -> i
     return int(nearest)
 
 
-def finer_share(kept: pd.DataFrame, start_week: float, week: float) -> float:
+def finer_share(
+    kept: pd.DataFrame,
+    start_week: float,
+    week: float,
+) -> float:
     """Return the share of the finer individual differences at a week, interpolated
     between those of `Expectation.kept`, 1 at the start."""
     weeks = [start_week, *kept["week"]]

@@ -16,7 +16,9 @@ includes the ventricles."""
 
 
 def growth_rates(
-    weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3: Sequence[float]
+    weeks: Sequence[float],
+    areas_mm2: Sequence[float],
+    volumes_mm3: Sequence[float],
 ) -> pd.DataFrame:
     """Return the growth rates between successive weeks, given sizes at two or more
     weeks in any order.

@@ -157,7 +157,11 @@ def channels(
     )
 
 
-def _mask(labels: Indices, numbers: Sequence[int], name: str) -> Mask:
+def _mask(
+    labels: Indices,
+    numbers: Sequence[int],
+    name: str,
+) -> Mask:
     """Return where labels have some numbers; InputError if nowhere."""
     mask = np.isin(labels, numbers)
     if not mask.any():
@@ -169,7 +173,11 @@ def _mask(labels: Indices, numbers: Sequence[int], name: str) -> Mask:
     return mask
 
 
-def perturb_labels(labels: Indices, seed: int, brain: str) -> Indices:
+def perturb_labels(
+    labels: Indices,
+    seed: int,
+    brain: str,
+) -> Indices:
     """Return labels (i, j, k) with their boundaries shifted by a random smooth
     displacement of half a voxel.
 
@@ -234,7 +242,10 @@ def _intensity(
 
 
 def _resample(
-    values: NDArray[np.float32], affine: Floats, grid: Floats, shape: tuple[int, ...]
+    values: NDArray[np.float32],
+    affine: Floats,
+    grid: Floats,
+    shape: tuple[int, ...],
 ) -> NDArray[np.float32]:
     index = np.linalg.inv(affine) @ grid
     resampled = affine_transform(
@@ -262,7 +273,11 @@ class Registration:
 
 
 def register(
-    earlier: Channels, later: Channels, *, smoothing: float = 1.0, threads: int = 1
+    earlier: Channels,
+    later: Channels,
+    *,
+    smoothing: float = 1.0,
+    threads: int = 1,
 ) -> Registration:
     """Register an earlier brain to a later one.
 
@@ -300,8 +315,19 @@ def register(
     greedy = Greedy3D()
     output = io.StringIO()
     try:
-        greedy.execute(affine, out=output, err=output, found=None, **images)
-        greedy.execute(deformable, out=output, err=output, warp=None)
+        greedy.execute(
+            affine,
+            out=output,
+            err=output,
+            found=None,
+            **images,
+        )
+        greedy.execute(
+            deformable,
+            out=output,
+            err=output,
+            warp=None,
+        )
     except RuntimeError as error:
         raise InputError(
             f"greedy cannot register the brains: {error}",
@@ -347,7 +373,9 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
 
 
 def _find_start(
-    earlier: Channels, later: Channels, volumes: Mapping[str, VolumePair]
+    earlier: Channels,
+    later: Channels,
+    volumes: Mapping[str, VolumePair],
 ) -> tuple[Floats, Floats]:
     """Return the (3, 3) rotation of a start, and the start as a (4, 4) affine map."""
     first, first_size = _centre_and_size(earlier)
@@ -390,7 +418,9 @@ def _centre_and_size(brain: Channels) -> tuple[Floats, float]:
 
 
 def measure_quality(
-    earlier: Channels, later: Channels, deformation: Deformation
+    earlier: Channels,
+    later: Channels,
+    deformation: Deformation,
 ) -> dict[str, float]:
     """Measure the quality of a deformation between two brains from their unsmoothed
     masks.
@@ -466,7 +496,10 @@ def register_and_measure(
 
 
 def require_good(
-    quality: Mapping[str, float], *, pair: str, only_warn: bool = False
+    quality: Mapping[str, float],
+    *,
+    pair: str,
+    only_warn: bool = False,
 ) -> None:
     """Raise InputError, with all measures, if a registration of a named `pair` of
     brains must not be used.
@@ -499,7 +532,12 @@ def require_good(
     log.warning("%s", error)
 
 
-def _dice(earlier: Channels, later: Channels, bit: int, places: Floats) -> float:
+def _dice(
+    earlier: Channels,
+    later: Channels,
+    bit: int,
+    places: Floats,
+) -> float:
     first = (earlier.tissue & bit > 0).ravel()
     mask = later.tissue & bit > 0
     carried = map_coordinates(mask.astype(np.float32), places, order=1)

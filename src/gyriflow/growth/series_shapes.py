@@ -97,7 +97,10 @@ def fit_onto_surface(
 
 
 def _pulls(
-    moved: TriangleMesh, surface: TriangleMesh, inner: Floats | None, reach_mm: float
+    moved: TriangleMesh,
+    surface: TriangleMesh,
+    inner: Floats | None,
+    reach_mm: float,
 ) -> tuple[Floats, Floats]:
     """Return the (n, 3) sums of the weighted pulls of a surface on the vertices of a
     moved one, and the (n,) sums of the weights, which are areas."""
@@ -187,7 +190,11 @@ class SeriesShapes:
         return shapes
 
 
-def with_stops(before: WeekShape, week: float, body: FittedBody) -> list[WeekShape]:
+def with_stops(
+    before: WeekShape,
+    week: float,
+    body: FittedBody,
+) -> list[WeekShape]:
     """Return the shape of a body at a week, after the stops on its way from the shape
     before."""
     stops = {}
@@ -354,7 +361,9 @@ def _carried(
 
 
 def tissue_below(
-    boundary: TriangleMesh, observed: TriangleMesh, pair: Deformation
+    boundary: TriangleMesh,
+    observed: TriangleMesh,
+    pair: Deformation,
 ) -> Floats:
     """Return the (n, 3) places, after a registration, of the tissue below the vertices
     of a boundary before it."""
@@ -372,7 +381,11 @@ def misfit_mm(boundary: TriangleMesh, surface: TriangleMesh) -> tuple[float, flo
     return surface_distance(ways)
 
 
-def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -> None:
+def warn_of_misfit(
+    boundary: TriangleMesh,
+    surface: TriangleMesh,
+    week: float,
+) -> None:
     """Log the distance of a body's boundary from the surface that it is fitted to, as a
     warning if it is large."""
     mean, far = misfit_mm(boundary, surface)

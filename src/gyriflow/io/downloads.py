@@ -59,7 +59,11 @@ def fetch(
         timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"}
     )
 
-    def download(url: str, output_file: str, caller: pooch.Pooch) -> None:
+    def download(
+        url: str,
+        output_file: str,
+        caller: pooch.Pooch,
+    ) -> None:
         by_http(url, output_file, caller)
         _check(Path(output_file), path.name, sha256)
 
@@ -84,7 +88,11 @@ def fetch(
     )
 
 
-def _check(path: Path, name: str, sha256: str | None) -> None:
+def _check(
+    path: Path,
+    name: str,
+    sha256: str | None,
+) -> None:
     content = path.read_bytes()
     start = f"it begins with {content[:40]!r}"
     if sha256 is not None:
@@ -118,18 +126,28 @@ def _refused(path: Path, url: str) -> Iterator[None]:
             f" {path.parent} by hand."
         )
         raise StorageError(
-            "cannot be fetched", path=url, found=_cause(error), remedy=remedy
+            "cannot be fetched",
+            path=url,
+            found=_cause(error),
+            remedy=remedy,
         ) from error
     except ValueError as error:
         if path.exists():
             remedy = "It was left as it is. Move it away, and the file is fetched."
             raise StorageError(
-                "is not the file of the atlas", path=path, found=error, remedy=remedy
+                "is not the file of the atlas",
+                path=path,
+                found=error,
+                remedy=remedy,
             ) from error
         remedy = "Check the address, and whether the network asks for a login."
         problem = "the server sent something else than the file"
         raise StorageError(
-            problem, path=url, found=error, expected=path.name, remedy=remedy
+            problem,
+            path=url,
+            found=error,
+            expected=path.name,
+            remedy=remedy,
         ) from error
     except OSError as error:
         raise StorageError(

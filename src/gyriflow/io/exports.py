@@ -198,7 +198,9 @@ def export_bids(
 
 
 def labels_file(
-    folder: AnyPath, brain: ExportedBrain, brains: Sequence[ExportedBrain]
+    folder: AnyPath,
+    brain: ExportedBrain,
+    brains: Sequence[ExportedBrain],
 ) -> str:
     """Return the file to which `export_bids` writes the labels of a simulated brain,
     given all brains."""
@@ -209,7 +211,9 @@ def labels_file(
 
 
 def _places(
-    folder: Path, brains: Sequence[ExportedBrain], names: BidsNames
+    folder: Path,
+    brains: Sequence[ExportedBrain],
+    names: BidsNames,
 ) -> list[Place]:
     taken: dict[tuple[str, str], ExportedBrain] = {}
     places = []
@@ -254,7 +258,9 @@ def _descriptions(
 
 
 def _write_surfaces(
-    place: Place, brain: ExportedBrain, back: Floats
+    place: Place,
+    brain: ExportedBrain,
+    back: Floats,
 ) -> dict[str, dict[str, Any]]:
     prefix, simulated = place
     kinds: dict[str, tuple[Mapping[Side, str], str, Layer]] = {
@@ -278,7 +284,10 @@ def _write_surfaces(
 
 
 def _write_maps(
-    place: Place, brain: ExportedBrain, space: str, reference: Mapping[str, Any]
+    place: Place,
+    brain: ExportedBrain,
+    space: str,
+    reference: Mapping[str, Any],
 ) -> dict[str, dict[str, Any]]:
     sidecars: dict[str, dict[str, Any]] = {}
     prefix, simulated = place
@@ -420,7 +429,9 @@ def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
 
 
 def _write_people(
-    folder: Path, brains: Sequence[ExportedBrain], names: BidsNames
+    folder: Path,
+    brains: Sequence[ExportedBrain],
+    names: BidsNames,
 ) -> None:
     # covariates that differ between a subject's brains are those of sessions
     first = list(OWN_COLUMNS)
@@ -465,7 +476,11 @@ def _bids_unit(unit: str) -> str:
 def _write_tsv(path: Path, table: pd.DataFrame) -> None:
     with atomic_write(path) as temporary:
         table.to_csv(
-            temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a"
+            temporary,
+            sep="\t",
+            index=False,
+            float_format="%.10g",
+            na_rep="n/a",
         )
 
 

@@ -28,7 +28,11 @@ TABLE_LOOK = (
 """How tables look in a page of their own."""
 
 
-def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
+def write_figure(
+    png: AnyPath,
+    pdf: AnyPath,
+    figure: Figure,
+) -> None:
     """Write a figure as pixels, `DPI` to the inch, and as vectors; pictures keep their
     pixels."""
     with atomic_write(png) as temporary:

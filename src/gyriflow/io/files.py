@@ -120,7 +120,10 @@ def require_content(path: AnyPath) -> None:
 
 @contextmanager
 def reading(
-    path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN
+    path: AnyPath,
+    kind: str,
+    expected: str | None = None,
+    remedy: str | None = AGAIN,
 ) -> Iterator[None]:
     """Turn what a reader raises into an InputError: the file cannot be read as `kind`,
     or is of another format."""
@@ -151,7 +154,12 @@ def reading(
         ) from error
 
 
-def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> None:
+def require_finite(
+    values: np.ndarray,
+    path: AnyPath,
+    what: str,
+    of: str,
+) -> None:
     """Raise InputError where some of a file's (n,) or (n, k) values, such as the
     coordinates of vertices, are none."""
     bad = int(
@@ -337,7 +345,12 @@ def read_table(path: AnyPath) -> "pd.DataFrame":
     with reading(path, "a CSV table", remedy=None):
         # "NA" and "None" are texts, too
         types = dict.fromkeys(TEXT_COLUMNS, str)
-        return pd.read_csv(path, dtype=types, keep_default_na=False, na_values=[""])
+        return pd.read_csv(
+            path,
+            dtype=types,
+            keep_default_na=False,
+            na_values=[""],
+        )
 
 
 def read_tables(paths: Iterable[AnyPath]) -> "pd.DataFrame":
@@ -365,7 +378,10 @@ def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
 
 @contextmanager
 def reading_hdf5(
-    path: AnyPath, what: str, expected: str, remedy: str | None = None
+    path: AnyPath,
+    what: str,
+    expected: str,
+    remedy: str | None = None,
 ) -> Iterator["h5py.File"]:
     """Yield an HDF5 file to be read; InputError for whatever goes wrong in the block,
     with what it should be."""
@@ -387,7 +403,12 @@ def sha256_of(path: AnyPath) -> str:
 
 
 @cache
-def _facts(path: str, size: int, written_ns: int, changed_ns: int) -> list[Any]:
+def _facts(
+    path: str,
+    size: int,
+    written_ns: int,
+    changed_ns: int,
+) -> list[Any]:
     """Return the contents of a file in one state, which is read once in a process."""
     return [sha256_of(path), size, written_ns, changed_ns, _companion_files(path)]
 

@@ -56,7 +56,11 @@ def _single(values: NDArray) -> NDArray:
     return values.astype(np.float32) if values.dtype.kind == "f" else values
 
 
-def join_frames(path: AnyPath, tets: NDArray, frames: Sequence[AnyPath]) -> None:
+def join_frames(
+    path: AnyPath,
+    tets: NDArray,
+    frames: Sequence[AnyPath],
+) -> None:
     """Join the files of single frames of (m, 4) or (m, 10) tetrahedra, by time, into
     `path` (.h5) and a .xdmf."""
     path = Path(path)
@@ -127,7 +131,11 @@ def read_tets(path: AnyPath) -> NDArray[np.int64]:
         return file["tets"][:].astype(np.int64)
 
 
-def read_field(path: AnyPath, week: float, field: str) -> NDArray:
+def read_field(
+    path: AnyPath,
+    week: float,
+    field: str,
+) -> NDArray:
     """Return a field at the vertices at a week; InputError, which names the weeks there
     are, where there is none."""
     with _reading(path) as file:

@@ -31,13 +31,21 @@ def kept_result(kind: str, key: str) -> Any:
     return None
 
 
-def keep_result(kind: str, key: str, result: Any) -> None:
+def keep_result(
+    kind: str,
+    key: str,
+    result: Any,
+) -> None:
     """Keep a plain result under a key, unless the folder cannot be written. Two
     processes may keep the same."""
     with suppress(StorageError, OSError, RuntimeError):
         path = _path(kind, key)
         # results may contain names of subjects
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.parent.mkdir(
+            mode=0o700,
+            parents=True,
+            exist_ok=True,
+        )
         write_json(path, {"result": result})
 
 

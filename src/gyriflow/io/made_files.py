@@ -10,7 +10,11 @@ from .files import AnyPath, files_below, read_json, write_json
 
 
 @contextmanager
-def making_files(folder: AnyPath, record: AnyPath, *subfolders: str) -> Iterator[None]:
+def making_files(
+    folder: AnyPath,
+    record: AnyPath,
+    *subfolders: str,
+) -> Iterator[None]:
     """Remove the files that earlier blocks made in a folder, and list those that this
     block makes in `record`.
 

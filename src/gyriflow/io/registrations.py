@@ -20,7 +20,9 @@ REGISTER_AGAIN = "Register the brains, or match their surfaces, again."
 
 
 def write_correspondence(
-    path: AnyPath, pair: Correspondence, report: Mapping[str, Any]
+    path: AnyPath,
+    pair: Correspondence,
+    report: Mapping[str, Any],
 ) -> None:
     """Write what takes one brain to another, and the `report` as JSON in an attribute.
 
@@ -41,7 +43,12 @@ def write_correspondence(
                 "faces": pair.first.faces,
             }
         for name, values in large.items():
-            file.create_dataset(name, data=values, compression="gzip", shuffle=True)
+            file.create_dataset(
+                name,
+                data=values,
+                compression="gzip",
+                shuffle=True,
+            )
         file.attrs["report"] = json.dumps(dict(report))
 
 
@@ -136,7 +143,10 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
             )
         if shapes.tets is not None:
             file.create_dataset(
-                "tets", data=shapes.tets, compression="gzip", shuffle=True
+                "tets",
+                data=shapes.tets,
+                compression="gzip",
+                shuffle=True,
             )
         for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)

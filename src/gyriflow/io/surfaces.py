@@ -81,7 +81,12 @@ def surface_space_structure(
     read = SURFACE_READERS[found.name if found else "FreeSurfer"]
     with reading(path, "a surface", SURFACE_NAMES):
         if not path.stat().st_size:
-            raise InputError("is empty", path=path, expected="a surface", remedy=AGAIN)
+            raise InputError(
+                "is empty",
+                path=path,
+                expected="a surface",
+                remedy=AGAIN,
+            )
         vertices, faces, space, structure = read(path)
     if (
         vertices.ndim != 2
@@ -128,7 +133,11 @@ def _structure_in_name(path: AnyPath) -> str | None:
     return STRUCTURES[side] if side else None
 
 
-def _require_side(path: AnyPath, structure: str | None, side: str | None) -> None:
+def _require_side(
+    path: AnyPath,
+    structure: str | None,
+    side: str | None,
+) -> None:
     """Raise InputError if a file's structure is the other hemisphere than `side`,
     "left" or "right"."""
     expected = next((name for key, name in STRUCTURES.items() if key == side), None)
@@ -236,7 +245,9 @@ def write_brain(
 
 
 def write_vertex_maps(
-    path: AnyPath, maps: dict[str, NDArray], structure: Structure | None = None
+    path: AnyPath,
+    maps: dict[str, NDArray],
+    structure: Structure | None = None,
 ) -> None:
     """Write named (n,) per-vertex values as a GIFTI shape file (.shape.gii,
     float32)."""
@@ -272,7 +283,9 @@ def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
 
 
 def read_surface_map(
-    path: AnyPath, surface_path: AnyPath, side: str | None = None
+    path: AnyPath,
+    surface_path: AnyPath,
+    side: str | None = None,
 ) -> tuple[TriangleMesh, Floats]:
     """Return a surface and the values of a GIFTI shape or func file at its vertices.
 
@@ -303,7 +316,10 @@ def read_surface_map(
         problem = "is not a map of one value per vertex"
         expected = "one array of numbers (.shape.gii, .func.gii)"
         raise InputError(
-            problem, path=path, found=", ".join(kinds) or "none", expected=expected
+            problem,
+            path=path,
+            found=", ".join(kinds) or "none",
+            expected=expected,
         )
     _require_side(surface_path, structure, side)
     _require_side(
@@ -555,7 +571,10 @@ def read_vertex_labels(
         shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
         expected = "one label for each vertex (.label.gii)"
         raise InputError(
-            "is not a label file", path=path, found=shapes, expected=expected
+            "is not a label file",
+            path=path,
+            found=shapes,
+            expected=expected,
         )
     values = np.asarray(arrays[0].data)
     require_finite(values, path, "labels", "vertices")
@@ -608,7 +627,9 @@ def write_vertex_labels(
     with atomic_write(path) as temporary:
         nib.save(
             GiftiImage(
-                darrays=[array], labeltable=table, meta=GiftiMetaData(_named(structure))
+                darrays=[array],
+                labeltable=table,
+                meta=GiftiMetaData(_named(structure)),
             ),
             temporary,
         )
@@ -690,7 +711,10 @@ def _to_scanner_space(
                 " or mirrors"
             )
             raise InputError(
-                problem, path=path, found=f"\n{matrix}\n", expected="a rigid motion"
+                problem,
+                path=path,
+                found=f"\n{matrix}\n",
+                expected="a rigid motion",
             )
         log.warning(
             "%s: the coordinate-system matrix of the file was applied, to %s", path, to

@@ -143,7 +143,10 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
             file[f"fields/{name}"] = field
 
     def part(
-        name: str, kind: str, names: Iterable[str], fields: Mapping[str, NDArray]
+        name: str,
+        kind: str,
+        names: Iterable[str],
+        fields: Mapping[str, NDArray],
     ) -> str:
         cell_data = {
             tag: (

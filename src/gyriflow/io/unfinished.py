@@ -33,7 +33,10 @@ class UnfinishedSeries:
     folder: Path
 
     def write(
-        self, weeks: Iterable[float], positions: Floats, stops: Iterable[float]
+        self,
+        weeks: Iterable[float],
+        positions: Floats,
+        stops: Iterable[float],
     ) -> None:
         """Write the (w, n, 3) positions in mm at the weeks so far; `stops` are those
         without an observed brain."""
@@ -75,7 +78,9 @@ class UnfinishedSeries:
 
 
 def unfinished_series(
-    result: AnyPath, inputs: Iterable[AnyPath], settings: Any
+    result: AnyPath,
+    inputs: Iterable[AnyPath],
+    settings: Any,
 ) -> UnfinishedSeries:
     """Return the checkpoint of the fit that makes a result; those of other inputs or
     settings are removed.

@@ -90,7 +90,10 @@ class LabelSource(NamedTuple):
 
 
 def read_label_volume(
-    path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False
+    path: AnyPath,
+    affine_from: AffineSource = "auto",
+    *,
+    cropped: bool = False,
 ) -> LabelVolume:
     """Return the label volume of a NIfTI or MGH file, in RAS+ mm, ending a voxel beyond
     its labels if `cropped`.
@@ -149,7 +152,9 @@ def read_header(path: AnyPath) -> VolumeHeader:
 
 
 def read_values(
-    path: AnyPath, affine_from: AffineSource, content: str
+    path: AnyPath,
+    affine_from: AffineSource,
+    content: str,
 ) -> tuple[NDArray[np.number], Floats]:
     """Return the (i, j, k) values of a NIfTI or MGH file, and the (4, 4) matrix to RAS+
     positions in mm.
@@ -169,7 +174,12 @@ def read_values(
         form = f"shape {values.shape}, type {values.dtype}"
         problem = f"is not a volume of {content}"
         expected = "three axes (further ones of length 1) of numbers"
-        raise InputError(problem, path=path, found=form, expected=expected)
+        raise InputError(
+            problem,
+            path=path,
+            found=form,
+            expected=expected,
+        )
     affine = np.array(_affine(image, affine_from, path), dtype=float)
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
     if (
@@ -274,7 +284,11 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
         )
         problem = "is shorter than its header specifies"
         raise InputError(
-            problem, path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN
+            problem,
+            path=data,
+            found=f"{size} bytes",
+            expected=expected,
+            remedy=AGAIN,
         )
 
 
@@ -328,7 +342,11 @@ def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
     return values
 
 
-def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Floats:
+def _affine(
+    image: SpatialImage,
+    affine_from: AffineSource,
+    path: AnyPath,
+) -> Floats:
     # a single NIfTI file is a special kind of pair to nibabel, and a pair a special
     # kind of Analyze
     if isinstance(image, nib.Nifti1Pair):
@@ -359,7 +377,13 @@ def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Fl
             "Set them as in the scan that was labelled, for example with mri_convert"
             " --in_orientation."
         )
-        raise InputError(problem, path=path, found=0, expected=1, remedy=remedy)
+        raise InputError(
+            problem,
+            path=path,
+            found=0,
+            expected=1,
+            remedy=remedy,
+        )
     return image.affine
 
 
@@ -373,7 +397,9 @@ def _has_directions(path: AnyPath) -> bool:
 
 
 def _nifti_affine(
-    image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath
+    image: nib.Nifti1Pair,
+    affine_from: AffineSource,
+    path: AnyPath,
 ) -> Floats:
     header = image.header
     needed = ("sform", "qform") if affine_from == "auto" else (affine_from,)
@@ -401,7 +427,10 @@ def _nifti_affine(
     if not present:
         problem = "neither qform nor sform is set, so left and right are unknown"
         raise InputError(
-            problem, path=path, expected="a code > 0 of one", remedy=WHICH_MATRIX
+            problem,
+            path=path,
+            expected="a code > 0 of one",
+            remedy=WHICH_MATRIX,
         )
     if len(present) == 2:
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
@@ -417,12 +446,20 @@ def _nifti_affine(
                 f"\n{name} (code {codes[name]})\n{matrices[name]}"
                 for name in ("qform", "sform")
             )
-            raise InputError(problem, path=path, found=f"{both}\n", remedy=WHICH_MATRIX)
+            raise InputError(
+                problem,
+                path=path,
+                found=f"{both}\n",
+                remedy=WHICH_MATRIX,
+            )
     return scale * matrices[present[0]]
 
 
 def _warn_of_other_sizes(
-    header: nib.Nifti1Header, sform: Floats, unit: str, path: AnyPath
+    header: nib.Nifti1Header,
+    sform: Floats,
+    unit: str,
+    path: AnyPath,
 ) -> None:
     """Warn if the sizes of voxels in the header (pixdim), which programs may show, are
     not those of the sform, which counts."""
@@ -456,7 +493,10 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
         problem = "has a unit of length that is not in NIfTI"
         expected = "2 (mm), 1 (metres), 3 (micrometres) or 0"
         raise InputError(
-            problem, path=path, found=f"xyzt_units {code}", expected=expected
+            problem,
+            path=path,
+            found=f"xyzt_units {code}",
+            expected=expected,
         )
     return unit
 
@@ -482,7 +522,12 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
                 "Resample labels with nearest neighbour. gyriflow does not segment"
                 " images."
             )
-            raise InputError(problem, path=path, found=broken_values, remedy=remedy)
+            raise InputError(
+                problem,
+                path=path,
+                found=broken_values,
+                remedy=remedy,
+            )
         if (error := errors.max(initial=0)) > 1e-3:
             log.warning(
                 "%s: labels differ by up to %.3g from whole numbers and were rounded",

@@ -29,16 +29,31 @@ class Material(ABC):
 
     @staticmethod
     @abstractmethod
-    def energy_of_invariants(I1: Expr, J: Expr, mu: Expr, K: Expr) -> Expr:
+    def energy_of_invariants(
+        I1: Expr,
+        J: Expr,
+        mu: Expr,
+        K: Expr,
+    ) -> Expr:
         """Return ψ in Pa of I₁ = tr(Feᵀ·Fe) and J = det Fe; μ and K, in Pa, are the
         moduli of small strains."""
 
     @classmethod
-    def energy_density(cls, Fe: Expr, mu: Expr, K: Expr) -> Expr:
+    def energy_density(
+        cls,
+        Fe: Expr,
+        mu: Expr,
+        K: Expr,
+    ) -> Expr:
         """Return ψ in Pa of the elastic deformation Fe."""
         return cls.energy_of_invariants(ufl.inner(Fe, Fe), ufl.det(Fe), mu, K)
 
-    def cauchy_stress(self, Fe: Expr, mu: Expr, K: Expr) -> Expr:
+    def cauchy_stress(
+        self,
+        Fe: Expr,
+        mu: Expr,
+        K: Expr,
+    ) -> Expr:
         """Return the Cauchy stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of
         the state without stress.
 
@@ -58,7 +73,12 @@ class NeoHookean(Material):
     name = "neo-hookean"
 
     @staticmethod
-    def energy_of_invariants(I1: Expr, J: Expr, mu: Expr, K: Expr) -> Expr:
+    def energy_of_invariants(
+        I1: Expr,
+        J: Expr,
+        mu: Expr,
+        K: Expr,
+    ) -> Expr:
         """Return ψ = μ/2 (I₁ J^(−2/3) − 3) + K/2 (J − 1)² in Pa."""
         return mu / 2 * (I1 * J ** (-2 / 3) - 3) + K / 2 * (J - 1) ** 2
 
@@ -73,7 +93,12 @@ class CompressibleNeoHookean(Material):
     name = "compressible-neo-hookean"
 
     @staticmethod
-    def energy_of_invariants(I1: Expr, J: Expr, mu: Expr, K: Expr) -> Expr:
+    def energy_of_invariants(
+        I1: Expr,
+        J: Expr,
+        mu: Expr,
+        K: Expr,
+    ) -> Expr:
         """Return ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 (J − 1)² in Pa, with λ = K − 2μ/3."""
         return mu / 2 * (I1 - 3 - 2 * ufl.ln(J)) + (K - 2 * mu / 3) / 2 * (J - 1) ** 2
 

@@ -63,7 +63,11 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
 
 
 def _best_move(
-    vertices: Floats, tets: Ints, element: int, vertex: int, on_surface: Floats
+    vertices: Floats,
+    tets: Ints,
+    element: int,
+    vertex: int,
+    on_surface: Floats,
 ) -> tuple[float, int, Floats] | None:
     """Return the gain of the least ratio around a vertex by its best move, the vertex
     and its place, None without."""

@@ -64,7 +64,10 @@ def vertex_map_on_mesh(
             f" {np.median(distance):.1f} mm for half of it"
         )
         raise InputError(
-            problem, path=path, found=found, expected=f"at most {FARTHEST_MM:g} mm"
+            problem,
+            path=path,
+            found=found,
+            expected=f"at most {FARTHEST_MM:g} mm",
         )
     on_pial = np.einsum(
         "ij,ij->i",
@@ -77,7 +80,10 @@ def vertex_map_on_mesh(
 
 
 def volume_map_on_mesh(
-    mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike, path: str | None = None
+    mesh_vertices_mm: Floats,
+    data: Floats,
+    affine: ArrayLike,
+    path: str | None = None,
 ) -> Floats:
     """Return a volume's (n,) values at the vertices of a mesh, linear between the
     centres of voxels.
@@ -113,12 +119,20 @@ def volume_map_on_mesh(
             " the nearest values."
         )
         raise InputError(
-            problem, path=path, found=found, expected=expected, remedy=remedy
+            problem,
+            path=path,
+            found=found,
+            expected=expected,
+            remedy=remedy,
         )
     return values
 
 
-def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:
+def require_within(
+    values: Floats,
+    bounds: Mapping[str, float],
+    path: str,
+) -> None:
     """Raise InputError where (n,) values of a map are not within the bounds (gt, ge,
     le) of its parameter."""
     holds = {"gt": np.greater, "ge": np.greater_equal, "le": np.less_equal}
@@ -144,7 +158,9 @@ def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> No
 
 
 def move_to_mesh(
-    points: Floats, surface: TriangleMesh, pose: ArrayLike
+    points: Floats,
+    surface: TriangleMesh,
+    pose: ArrayLike,
 ) -> TriangleMesh:
     """Return the surface of a map where it is nearest to (k, 3) points on the mesh on
     average.

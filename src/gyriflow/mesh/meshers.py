@@ -38,7 +38,9 @@ stay."""
 
 
 def run_mesher(
-    name: str, arrays: Mapping[str, Any], time_limit_s: float
+    name: str,
+    arrays: Mapping[str, Any],
+    time_limit_s: float,
 ) -> TetrahedralMesh:
     """Return the mesh that a mesher, "pytetwild" or "tetgen", makes in a process of its
     own; its lines are logged.
@@ -74,7 +76,10 @@ def run_mesher(
 
 
 def _run(
-    name: str, sent: bytes, folder: str, time_limit_s: float
+    name: str,
+    sent: bytes,
+    folder: str,
+    time_limit_s: float,
 ) -> tuple[int | None, bytes, list[str]]:
     words: list[str] = []
     reading, printing = os.pipe()

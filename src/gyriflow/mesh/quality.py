@@ -129,7 +129,9 @@ def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
 
 
 def _first_hits(
-    mesh: TriangleMesh, start: Floats, direction: Floats
+    mesh: TriangleMesh,
+    start: Floats,
+    direction: Floats,
 ) -> tuple[NDArray[np.int64], Floats]:
     rays = igl.embree.EmbreeIntersector()
     rays.init(
@@ -300,7 +302,10 @@ def refuse_bad_mesh(
 
 
 def _worst_element(
-    mesh: TetrahedralMesh, name: str, values: Floats, bad: NDArray[np.bool_]
+    mesh: TetrahedralMesh,
+    name: str,
+    values: Floats,
+    bad: NDArray[np.bool_],
 ) -> str:
     """Return the number of bad elements by a measure, and the value and place of the
     worst."""

@@ -65,7 +65,11 @@ def split_inner_edges(mesh: TetrahedralMesh) -> TetrahedralMesh:
     return TetrahedralMesh(vertices, new_tets)
 
 
-def _best_place(vertices: Floats, vertex: int, star: Ints) -> Floats:
+def _best_place(
+    vertices: Floats,
+    vertex: int,
+    star: Ints,
+) -> Floats:
     """Return the place of a vertex, on the way to the mean of those around, where the
     flattest of its elements (k, 4) is least flat."""
     used, local = np.unique(star, return_inverse=True)

@@ -61,7 +61,10 @@ def edge_length_at(
 
 
 def _background_mesh(
-    surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
+    surface: TriangleMesh,
+    surface_edge_mm: float,
+    core_edge_mm: float,
+    order: int = 1,
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
     """Return a regular tetrahedral grid over the inside of the surface and the edge
     lengths in mm at its vertices.

@@ -57,7 +57,9 @@ def atlas_curves(
 
 
 def atlas_differences(
-    metrics: pd.DataFrame, curves: pd.DataFrame, record: Repeatability
+    metrics: pd.DataFrame,
+    curves: pd.DataFrame,
+    record: Repeatability,
 ) -> pd.DataFrame:
     """Return the differences of brains from the curves of atlases, linear between their
     weeks. Brains outside these weeks have no rows.

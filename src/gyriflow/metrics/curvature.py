@@ -237,7 +237,9 @@ def _quadrics(
 
 
 def _balls(
-    vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix
+    vertices: Floats,
+    radii_mm: Floats,
+    links: sparse.csr_matrix,
 ) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
     for start in range(0, len(vertices), CHUNK):
         centres = np.arange(start, min(start + CHUNK, len(vertices)))

@@ -88,7 +88,9 @@ def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> f
 
 
 def lowest_modes(
-    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int
+    stiffness: sparse.csc_matrix,
+    mass: sparse.csc_matrix,
+    count: int,
 ) -> Modes:
     """Return the `count` lowest modes of K φ = λ M φ, by `modes_below` a limit that has
     at least as many below it.
@@ -210,7 +212,12 @@ def _modes_between(
             # eigenvalue
             return Modes(np.sum(functions * (stiffness @ functions), axis=0), functions)
     problem = f"not all modes with λ from {low:g} to {high:g} mm⁻² were found"
-    raise SolverError(problem, found=found, expected=count, remedy=SLIVERS)
+    raise SolverError(
+        problem,
+        found=found,
+        expected=count,
+        remedy=SLIVERS,
+    )
 
 
 def _orthonormalise(block: Floats, mass: sparse.csc_matrix) -> tuple[Floats, Floats]:
@@ -227,7 +234,9 @@ def _spacing(mass: sparse.csc_matrix) -> float:
 
 
 def _factorise(
-    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: float
+    stiffness: sparse.csc_matrix,
+    mass: sparse.csc_matrix,
+    shift: float,
 ) -> SuperLU:
     # this order of columns is not SuperLU's own: its larger panels and relaxed
     # supernodes take ten times as long
@@ -242,7 +251,9 @@ def _factorise(
 
 
 def count_below(
-    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float
+    stiffness: sparse.csc_matrix,
+    mass: sparse.csc_matrix,
+    value: float,
 ) -> int:
     """Return the number of eigenvalues below `value` (mm⁻²), from the inertia of K −
     value·M.

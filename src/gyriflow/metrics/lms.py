@@ -155,7 +155,10 @@ class WeeklyNorm:
         return z, terms.z + INTERVAL_Z * np.stack([-error, error])
 
     def _terms_at(
-        self, locations: Floats, scales: Floats, values: ArrayLike
+        self,
+        locations: Floats,
+        scales: Floats,
+        values: ArrayLike,
     ) -> "_Terms":
         return _terms(
             locations @ self.location,
@@ -239,7 +242,11 @@ def norm_from_plain(plain: Mapping[str, Any]) -> WeeklyNorm:
 
 
 def fit_norm(
-    weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: bool
+    weeks: Floats,
+    values: Floats,
+    people: ArrayLike,
+    *,
+    is_positive: bool,
 ) -> WeeklyNorm:
     """Fit a norm to values (n,) at weeks (n,) of people (n,) by penalised likelihood,
     restricted for the scale.
@@ -425,7 +432,11 @@ class _Model:
         return _usual_skewness(self.is_positive)
 
     def state(
-        self, rows: Floats, fit: Floats, values: Floats, scans: "_Scans"
+        self,
+        rows: Floats,
+        fit: Floats,
+        values: Floats,
+        scans: "_Scans",
     ) -> "_State":
         """Return slope and information of the likelihood of values (n,) at parameters
         (k,), of which the location has the basis `rows`."""
@@ -556,7 +567,11 @@ class _Expected:
     scale_skewness: Floats
 
 
-def _expected(log_scale: Floats, skewness: float, is_positive: bool) -> _Expected:
+def _expected(
+    log_scale: Floats,
+    skewness: float,
+    is_positive: bool,
+) -> _Expected:
     """Return the expected information of observations.
 
     That of positive ones is by Rigby and Stasinopoulos (2005, doi
@@ -683,7 +698,10 @@ def _terms(
 
 
 def _signed_terms(
-    location: Floats | float, log_scale: Floats, skewness: float, values: Floats
+    location: Floats | float,
+    log_scale: Floats,
+    skewness: float,
+    values: Floats,
 ) -> _Terms:
     scale = np.exp(log_scale)
     kappa = np.tanh(skewness)
@@ -717,7 +735,11 @@ def _signed_distance(z: Floats, skewness: float) -> Floats:
 
 
 def _basis(
-    weeks: Floats, first: float, last: float, size: int, is_spline: bool
+    weeks: Floats,
+    first: float,
+    last: float,
+    size: int,
+    is_spline: bool,
 ) -> Floats:
     """Return the (n, size) values of the splines, or of the powers of the week, at
     weeks (n,)."""

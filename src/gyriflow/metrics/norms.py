@@ -266,7 +266,9 @@ def cohort_norms(
 
 
 def outlying_brains(
-    metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms
+    metrics: pd.DataFrame,
+    reference: Sequence[str],
+    cohort: CohortNorms,
 ) -> dict[str, list[str]]:
     """Return the reference brains that are far from the norms that were fitted to them,
     and the hemispheres and metrics in which they are.
@@ -301,7 +303,9 @@ def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
 
 
 def measured_scores(
-    metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms
+    metrics: pd.DataFrame,
+    reference: Sequence[str],
+    cohort: CohortNorms,
 ) -> pd.DataFrame:
     """Return the scores of brains against the norms of reference brains, at each
     brain's own week.

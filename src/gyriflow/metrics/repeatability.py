@@ -17,7 +17,11 @@ from ..settings.terms import SPECTRUM_PREFIXES
 type Repeatability = Mapping[str, Any]
 
 
-def difference_noise(metric: str, value: float, record: Repeatability) -> float:
+def difference_noise(
+    metric: str,
+    value: float,
+    record: Repeatability,
+) -> float:
     """Return the standard deviation of the difference between two measurements of a
     value; NaN if it is not known.
 
@@ -47,7 +51,9 @@ def with_change_noise(change: pd.DataFrame, record: Repeatability) -> pd.DataFra
 
 
 def with_distance_noise(
-    distances: pd.DataFrame, record: Repeatability, name: str
+    distances: pd.DataFrame,
+    record: Repeatability,
+    name: str,
 ) -> pd.DataFrame:
     """Return a table of distances with the column noise: the distance of a brain from
     itself, measured again.

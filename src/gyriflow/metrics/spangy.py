@@ -134,7 +134,9 @@ class Basis:
 
 
 def spectral_basis(
-    mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "mean"
+    mesh: TriangleMesh,
+    choice: SpangyModes,
+    mass: MassMatrix = "mean",
 ) -> Basis:
     """Return the modes that a hemisphere's spectra are made of.
 
@@ -182,7 +184,12 @@ def spectral_basis(
     return Basis(modes.eigenvalues, functions, places, energy, first, reach, is_open)
 
 
-def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
+def spectrum(
+    proxy: Floats,
+    basis: Basis,
+    *,
+    radius_mm: float,
+) -> Spectrum:
     """Return the band spectrum of a folding proxy, (n,) values per vertex of the
     surface.
 
@@ -214,7 +221,11 @@ def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
     return Spectrum(basis.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
-def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.DataFrame:
+def _band_table(
+    basis: Basis,
+    coefficients: Floats,
+    radius_mm: float,
+) -> pd.DataFrame:
     limits = _band_limits(basis.first)
     powers = coefficients**2
     bands = np.arange(BANDS + 1)

@@ -218,13 +218,19 @@ def change_between_scans(
                 (observed[0] - observed[1]).reindex(keys).to_numpy()
             )
             part["difference"] = part["to_value"] - observed[0].reindex(keys).to_numpy()
-            part = part.assign(subject=subject, from_brain=first, to_brain=second)
+            part = part.assign(
+                subject=subject,
+                from_brain=first,
+                to_brain=second,
+            )
             parts.append(part.assign(from_week=from_week, to_week=to_week)[columns])
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
 def weekly_norms(
-    weeks: Sequence[float], positions: Sequence[Floats], pial: Ints
+    weeks: Sequence[float],
+    positions: Sequence[Floats],
+    pial: Ints,
 ) -> pd.DataFrame:
     """Return the largest and the mean length of the displacement between successive
     weeks, as in the paper's table.

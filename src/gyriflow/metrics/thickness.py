@@ -28,7 +28,10 @@ def depth_of_weight(weight: Floats) -> Floats:
 
 
 def simulated_thickness(
-    start: TetrahedralMesh, depth: Floats, positions: Floats, pial: TriangleMesh
+    start: TetrahedralMesh,
+    depth: Floats,
+    positions: Floats,
+    pial: TriangleMesh,
 ) -> Floats:
     """Return the (n,) cortical thickness in mm at the vertices of a simulated pial
     surface.
@@ -57,7 +60,11 @@ def simulated_thickness(
     return layer_thickness(pial, inner)
 
 
-def at_part(values: NDArray, whole: TriangleMesh, part: TriangleMesh) -> NDArray:
+def at_part(
+    values: NDArray,
+    whole: TriangleMesh,
+    part: TriangleMesh,
+) -> NDArray:
     """Return the values (n, ...) at the vertices of a surface for the vertices of a
     part of it, such as a hemisphere.
 

@@ -74,7 +74,10 @@ def growth_figure(
 
 
 def _sizes_panel(
-    axes: Axes, areas: pd.DataFrame, column: str, colours: Mapping[str, str]
+    axes: Axes,
+    areas: pd.DataFrame,
+    column: str,
+    colours: Mapping[str, str],
 ) -> None:
     """Draw areas or volumes over weeks, a colour per series."""
     for number, (name, colour) in enumerate(reversed(list(colours.items()))):
@@ -107,7 +110,9 @@ def _sizes_panel(
 
 
 def _rates_together(
-    axes: Axes, rates: pd.DataFrame, colours: Mapping[str, str]
+    axes: Axes,
+    rates: pd.DataFrame,
+    colours: Mapping[str, str],
 ) -> None:
     """Draw the growth rate of each interval of many series as a line from week to
     week."""
@@ -141,15 +146,26 @@ def _rates_panel(
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     crowded = len(rates) > 8
     texts = axes.bar_label(
-        bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5, padding=2
+        bars,
+        fmt=lambda rate: f"{rate:.2f}".replace("-", "−"),
+        fontsize=6.5,
+        padding=2,
     )
     for text in texts:
-        text.set(bbox=box, zorder=3, rotation=90 if crowded else 0)
+        text.set(
+            bbox=box,
+            zorder=3,
+            rotation=90 if crowded else 0,
+        )
     axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
         _folding_line(axes, rates, folding_rate_per_s)
         # above the axes, so that it hides no bar
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
+        axes.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.01),
+            borderaxespad=0,
+        )
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.margins(y=0.25 if crowded else 0.12)
     axes.set_xlabel("gestational interval (GW)")
@@ -160,7 +176,9 @@ def _rates_panel(
 
 
 def _folding_line(
-    axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]
+    axes: Axes,
+    rates: pd.DataFrame,
+    rate_per_s: float | Mapping[float, float],
 ) -> None:
     """Draw the simulated growth rate over bars of equal width, one per interval."""
     style: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}

@@ -118,7 +118,12 @@ def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def _value_label(key: str, value: Any, *, alone: bool) -> str:
+def _value_label(
+    key: str,
+    value: Any,
+    *,
+    alone: bool,
+) -> str:
     label = parameter_label(key)
     name, _, unit = label.removesuffix(")").partition(" (")
     words = [f"{value:g}" if isinstance(value, float) else str(value)]

@@ -291,7 +291,10 @@ def report_page(
     `content` the output of `study_page` or `brain_page`.
     """
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     # a script must not contain its own end tag
     data = Markup(json.dumps(view, separators=(",", ":")).replace("</", "<\\/"))
@@ -591,7 +594,11 @@ def _coarseness(run: Mapping[str, Any] | pd.Series, order: int) -> list[str]:
 def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
     """Return the scores as text, dashes for missing ones."""
 
-    def text(name: str, pattern: str, factor: float = 1.0) -> str:
+    def text(
+        name: str,
+        pattern: str,
+        factor: float = 1.0,
+    ) -> str:
         value = validation.get(name, np.nan)
         return (
             "–" if pd.isna(value) else format(factor * value, pattern).replace("-", "−")

@@ -174,7 +174,10 @@ def panel_grid(
         _draw_colour_bar(figure, *colour_bar)
     if legend:
         figure.legend(
-            handles=legend, ncols=legend_columns, loc="lower right", borderaxespad=0.2
+            handles=legend,
+            ncols=legend_columns,
+            loc="lower right",
+            borderaxespad=0.2,
         )
     return figure
 
@@ -197,7 +200,10 @@ class _Block:
 
 
 def _write_letters(
-    cells: Sequence[Axes], letters: Iterator[str], *, is_labelled: bool
+    cells: Sequence[Axes],
+    letters: Iterator[str],
+    *,
+    is_labelled: bool,
 ) -> None:
     """Write the next letters at the upper left of panels: next to the row's label, or
     above the letters of the ends."""
@@ -232,7 +238,11 @@ def _lay_out_columns(
     return _dots(widths_mm * inches_per_mm), blocks, inches_per_mm
 
 
-def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
+def _heights_in(
+    row: Row,
+    block: slice,
+    inches_per_mm: float,
+) -> tuple[float, float]:
     """Return the heights of a row's pictures and captions."""
     picture_mm = 0.0
     caption_lines = 0
@@ -314,14 +324,25 @@ def _draw_row(
                 (0.04, "left", panel.view.ends[0]),
                 (0.96, "right", panel.view.ends[1]),
             ):
-                _write(axes, end, (place, 1.0), ha=align, va="top", fontsize=6)
+                _write(
+                    axes,
+                    end,
+                    (place, 1.0),
+                    ha=align,
+                    va="top",
+                    fontsize=6,
+                )
         previous = panel.view
         if panel.mark is not None:
             _draw_ring(axes, panel, panel.mark)
         _write(axes, panel.caption, (0.5, -0.01), va="top", fontsize=6.5)
 
 
-def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
+def direction_lines(
+    mesh: TriangleMesh,
+    directions: Floats,
+    view: View,
+) -> Floats:
     """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of
     `LINES_MM` that faces a view.
 
@@ -341,7 +362,11 @@ def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Float
     return np.stack([at - half, at + half], axis=1)
 
 
-def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
+def _draw_ring(
+    axes: Axes,
+    panel: Panel,
+    point: Floats,
+) -> None:
     vertices = panel.mesh.vertices
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     to_right, to_top = picture_axes(panel.view)
@@ -363,7 +388,11 @@ def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
         axes.add_patch(ring)
 
 
-def _draw_colour_bar(figure: Figure, scale: ScalarMappable, label: str) -> None:
+def _draw_colour_bar(
+    figure: Figure,
+    scale: ScalarMappable,
+    label: str,
+) -> None:
     width, total = figure.get_size_inches()
     start = _SCALE_SHARE * width + 0.1
     place = start / width, 0.5 / total, (width - start - 0.3) / width, 0.08 / total
@@ -413,5 +442,10 @@ def _draw_scale_bar(
         f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends
     )
     figure.text(
-        _EDGE_IN / width, 0.02 / total, words, ha="left", va="bottom", fontsize=6
+        _EDGE_IN / width,
+        0.02 / total,
+        words,
+        ha="left",
+        va="bottom",
+        fontsize=6,
     )

@@ -155,7 +155,9 @@ def brain_grid(
 
 
 def _panel(
-    brain: GridBrain, quantity: str, scale: ScalarMappable | None
+    brain: GridBrain,
+    quantity: str,
+    scale: ScalarMappable | None,
 ) -> Panel | None:
     """Return a brain in its view and colours, None if it has no surface."""
     if not brain.halves:

@@ -122,7 +122,13 @@ def quality_page(
     ]
     words = wrap("   ".join(facts), LINE_LETTERS)
     title = f"{row['subject']}, {row['week']:g} GW"
-    figure.suptitle(title, x=0.015, ha="left", fontsize=10, fontweight="bold")
+    figure.suptitle(
+        title,
+        x=0.015,
+        ha="left",
+        fontsize=10,
+        fontweight="bold",
+    )
     box = {"boxstyle": "round,pad=0.3", "facecolor": colour, "edgecolor": "none"}
     place: dict[str, Any] = {
         "ha": "right",
@@ -207,7 +213,15 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
             f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2
         )
         names = "PA" if plane == "sagittal" else "LR"
-        _write_ends(axes, names, 0.03, 0.5, va="center", fontsize=6.5, color=colour)
+        _write_ends(
+            axes,
+            names,
+            0.03,
+            0.5,
+            va="center",
+            fontsize=6.5,
+            color=colour,
+        )
     coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
     coronal.plot([left, left + SCALE_BAR_MM], [bottom] * 2, color=colour, linewidth=1.2)
     coronal.text(left, bottom + 1, f"{SCALE_BAR_MM:g} mm", fontsize=6, color=colour)
@@ -250,7 +264,13 @@ def _draw_volumes(
         brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
         index = voxel_index(points, affine)
         grey = map_coordinates(np.nan_to_num(values), index, order=1)
-        axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **style)
+        axes.imshow(
+            grey,
+            cmap="gray",
+            vmin=0,
+            vmax=brightest,
+            **style,
+        )
     if not brain.tissues:
         return
     groups, affine = brain.tissues
@@ -258,7 +278,13 @@ def _draw_volumes(
     if not brain.image:
         tissues = map_coordinates(groups, index, order=0, mode="constant")
         colours = ListedColormap(TISSUE_COLOURS)
-        axes.imshow(tissues, cmap=colours, vmin=-0.5, vmax=4.5, **style)
+        axes.imshow(
+            tissues,
+            cmap=colours,
+            vmin=-0.5,
+            vmax=4.5,
+            **style,
+        )
     is_inside = np.isin(groups, (2, 3)).astype(np.float32)
     inside = map_coordinates(is_inside, index, order=1)
     if (groups == 1).any() and inside.min() < 0.5 < inside.max():
@@ -274,7 +300,10 @@ def _draw_volumes(
 
 
 def _draw_views(
-    figure: SubFigure, brain: QualityBrain, colours: Floats, names: Sequence[str]
+    figure: SubFigure,
+    brain: QualityBrain,
+    colours: Floats,
+    names: Sequence[str],
 ) -> list[Axes]:
     """Draw a row of views at one scale, without views of a missing hemisphere."""
     every = [
@@ -298,7 +327,11 @@ def _draw_views(
 
 
 def _write_ends(
-    axes: Axes, ends: Sequence[str], margin: float, height: float, **style: Any
+    axes: Axes,
+    ends: Sequence[str],
+    margin: float,
+    height: float,
+    **style: Any,
 ) -> None:
     """Name the left and the right end of a panel, at a fraction of its width from its
     sides and of its height."""

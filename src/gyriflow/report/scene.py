@@ -91,7 +91,10 @@ def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
 
 
 def restricted(
-    mesh: TriangleMesh, colours: Floats, hemisphere: str, fissure_x_mm: float
+    mesh: TriangleMesh,
+    colours: Floats,
+    hemisphere: str,
+    fissure_x_mm: float,
 ) -> tuple[TriangleMesh, Floats]:
     """Return the faces on one side of the fissure's plane, all for "", and their (n, 3)
     vertex or (m, 3) face colours.
@@ -114,7 +117,11 @@ def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
 
 
 def colour_scale(
-    colormap: str, low: float, high: float, *, cut: bool = False
+    colormap: str,
+    low: float,
+    high: float,
+    *,
+    cut: bool = False,
 ) -> ScalarMappable:
     """Return a colour scale; `cut` marks values above its upper end."""
     start, end = PARTS.get(colormap, (0.0, 1.0))
@@ -134,7 +141,11 @@ def paint(values: Floats, scale: ScalarMappable) -> Floats:
     return colours
 
 
-def is_visible(mesh: TriangleMesh, point: Floats, view: View) -> bool:
+def is_visible(
+    mesh: TriangleMesh,
+    point: Floats,
+    view: View,
+) -> bool:
     """Return whether a point of the surface is visible in a view."""
     far = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     body = pv.PolyData.from_regular_faces(
@@ -177,7 +188,11 @@ def render(
         surface.point_data if len(bytes_) == len(mesh.vertices) else surface.cell_data
     )
     attributes["colour"] = bytes_
-    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
+    plotter = pv.Plotter(
+        off_screen=True,
+        window_size=size,
+        lighting="none",
+    )
     try:
         plotter.set_background("white")  # type: ignore[arg-type]
         plotter.add_mesh(
@@ -191,17 +206,26 @@ def render(
         )
         # the inside of a surface that is open where the hemispheres were separated
         plotter.add_mesh(
-            surface, color=NEUTRAL_COLOUR, ambient=0.6, diffuse=0.4, culling="front"
+            surface,
+            color=NEUTRAL_COLOUR,
+            ambient=0.6,
+            diffuse=0.4,
+            culling="front",
         )
         if lines is not None:
             ends = pv.line_segments_from_points(lines.reshape(-1, 3))
             plotter.add_mesh(
-                ends, color="black", line_width=0.005 * PIXELS_PER_INCH, lighting=False
+                ends,
+                color="black",
+                line_width=0.005 * PIXELS_PER_INCH,
+                lighting=False,
             )
         for position, intensity in _LAMPS:
             plotter.add_light(
                 pv.Light(
-                    position=position, light_type="camera light", intensity=intensity
+                    position=position,
+                    light_type="camera light",
+                    intensity=intensity,
                 )
             )
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2

@@ -66,7 +66,11 @@ def validation_figure(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
 
 
 def _gain_line(
-    axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any
+    axes: Axes,
+    x: pd.Series,
+    rows: pd.DataFrame,
+    measure: str,
+    colour: Any,
 ) -> None:
     """Draw a gain with its interval; filled marks are explained weeks, open ones
     predicted."""
@@ -74,7 +78,14 @@ def _gain_line(
     below = gain - rows[f"gain_low_{measure}"]
     above = rows[f"gain_high_{measure}"] - gain
     lengths = np.stack([below, above]).clip(min=0)
-    axes.errorbar(x, gain, yerr=lengths, color=colour, linewidth=1.0, elinewidth=0.7)
+    axes.errorbar(
+        x,
+        gain,
+        yerr=lengths,
+        color=colour,
+        linewidth=1.0,
+        elinewidth=0.7,
+    )
     for kind, face in (("explained", colour), ("predicted", "white")):
         if (selected := rows["kind"] == kind).any():
             axes.plot(
@@ -136,7 +147,12 @@ def nearest_figure(
         axes.margins(y=0.25)
         # a band cut at Weyl's number is the same measure
         if (value := lines.get(measure.removesuffix("_weyl"))) is not None:
-            axes.axvline(value, color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
+            axes.axvline(
+                value,
+                color=MUTED_COLOUR,
+                linestyle="--",
+                linewidth=0.9,
+            )
         # distances of sizes are relative to the observed brain
         unit = (
             "share of the observed"
@@ -149,19 +165,38 @@ def nearest_figure(
             axes.set_ylabel("distance from the observed brain")
     handles: list[Artist] = [
         Line2D(
-            [], [], color=colour, marker=marker, markersize=4.5, label=SIDE_NAMES[side]
+            [],
+            [],
+            color=colour,
+            marker=marker,
+            markersize=4.5,
+            label=SIDE_NAMES[side],
         )
         for side, (marker, colour) in SIDE_STYLES.items()
         if side in drawn
     ]
     ring: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
     handles.append(
-        Line2D([], [], markersize=9, markerfacecolor="none", label="nearest", **ring)
+        Line2D(
+            [],
+            [],
+            markersize=9,
+            markerfacecolor="none",
+            label="nearest",
+            **ring,
+        )
     )
     if not rows["trusted"].all():
         label = "cut off, or not resolved"
         handles.append(
-            Line2D([], [], markersize=4.5, markerfacecolor="white", label=label, **ring)
+            Line2D(
+                [],
+                [],
+                markersize=4.5,
+                markerfacecolor="white",
+                label=label,
+                **ring,
+            )
         )
     if lines:
         handles.append(
@@ -198,7 +233,12 @@ def paper_nearest_figure(
     )
 
 
-def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> None:
+def _nearest_line(
+    axes: Axes,
+    rows: pd.DataFrame,
+    marker: str,
+    colour: str,
+) -> None:
     if rows.empty:
         return
     axes.plot(rows["at"], rows["distance"], color=colour, linewidth=1.0)
@@ -230,7 +270,10 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
 
 @styled
 def calibration_figure(
-    runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str]
+    runs: pd.DataFrame,
+    optimum: pd.DataFrame,
+    *,
+    score: Sequence[str],
 ) -> Figure:
     """Draw a panel for each parameter, with the scores of the runs and the optimum.
 
@@ -250,7 +293,12 @@ def calibration_figure(
     for axes, name, value in zip(
         panels, optimum["parameter"], optimum["value"], strict=True
     ):
-        axes.axvline(value, color=RUN_COLOURS[1], linestyle="--", label="optimum")
+        axes.axvline(
+            value,
+            color=RUN_COLOURS[1],
+            linestyle="--",
+            label="optimum",
+        )
         for number, shade in shades.items():
             rows = finished[finished["round"] == number]
             style: dict[str, Any] = {

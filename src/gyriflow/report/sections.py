@@ -54,13 +54,18 @@ def draw_outline(
     segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
     axes.add_collection(
         LineCollection(
-            list(segments), colors=colour, linewidths=thickness, capstyle="round"
+            list(segments),
+            colors=colour,
+            linewidths=thickness,
+            capstyle="round",
         )
     )
 
 
 def _coronal_section(
-    positions: Floats, tets: Ints, fields: Mapping[str, Floats]
+    positions: Floats,
+    tets: Ints,
+    fields: Mapping[str, Floats],
 ) -> pv.PolyData:
     """Cut linear elements at the median y of their nodes: a polygon per element, with
     fields at its points."""
@@ -135,7 +140,11 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
         left, bottom = points.min(axis=0) - ARROW_MM
         right, top = points.max(axis=0) + ARROW_MM
         for axes in row:
-            axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+            axes.set(
+                xlim=(left, right),
+                ylim=(bottom, top),
+                aspect="equal",
+            )
             axes.set_axis_off()
         row[0].text(
             -0.02,
@@ -150,7 +159,12 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
         axes.set_title(title, fontsize=8)
     for column, top in enumerate(scales.values()):
         scale = ScalarMappable(Normalize(0, top), "YlGnBu")
-        figure.colorbar(scale, ax=list(rows[:, column]), location="bottom", shrink=0.8)
+        figure.colorbar(
+            scale,
+            ax=list(rows[:, column]),
+            location="bottom",
+            shrink=0.8,
+        )
     add_letters(rows.flat)
     return figure
 
@@ -251,5 +265,9 @@ def outlines_figure(grid: Grid) -> Figure:
     handles = [
         Line2D([], [], color=colour, label=label) for label, colour in named.items()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=4,
+    )
     return figure

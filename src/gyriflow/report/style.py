@@ -170,7 +170,10 @@ def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
     axes.set_xlabel("gestational age (GW)")
     axes.xaxis.set_major_locator(
         mpl.ticker.MaxNLocator(
-            nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1
+            nbins=8,
+            integer=True,
+            steps=[1, 2, 5, 10],
+            min_n_ticks=1,
         )
     )
     # a single week is in the middle of the axis
@@ -192,7 +195,11 @@ def from_zero(axes: Axes) -> None:
     axes.set_ylim(0, 1.07 * highest if highest > 0 else 1.0)
 
 
-def star(label: str, colour: str = OBSERVED_COLOUR, **style: Any) -> Line2D:
+def star(
+    label: str,
+    colour: str = OBSERVED_COLOUR,
+    **style: Any,
+) -> Line2D:
     """Return the legend entry of observed brains."""
     usual: dict[str, Any] = {"marker": "*", "markersize": 7, "linestyle": "none"}
     return Line2D([], [], color=colour, label=label, **{**usual, **style})
@@ -217,7 +224,13 @@ def run_legend(
         (
             Patch(color=colour, label=run)
             if bars
-            else Line2D([], [], color=colour, marker="o", label=run)
+            else Line2D(
+                [],
+                [],
+                color=colour,
+                marker="o",
+                label=run,
+            )
         )
         for run, colour in colours.items()
     ]
@@ -234,4 +247,8 @@ def run_legend(
     columns = max(1, min(len(handles), int(figure.get_figwidth() / longest)))
     lines = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.15 * (lines - 1))
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=columns,
+    )

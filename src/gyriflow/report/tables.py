@@ -178,7 +178,9 @@ def centile_text(centiles: pd.DataFrame) -> list[str]:
 
 
 def brain_table(
-    metrics: pd.DataFrame, centiles: pd.DataFrame, differences: pd.DataFrame
+    metrics: pd.DataFrame,
+    centiles: pd.DataFrame,
+    differences: pd.DataFrame,
 ) -> pd.DataFrame:
     """Return the metrics of an observed brain, whole and by hemisphere; of the whole
     brain also the differences from the average brains of atlases, and the centiles.
@@ -263,7 +265,10 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
 
 
 def resolution_over_steps(
-    order: int, steps: pd.DataFrame, *, has_layers: bool
+    order: int,
+    steps: pd.DataFrame,
+    *,
+    has_layers: bool,
 ) -> dict[str, float]:
     """Return how well the steps of a run with elements of an order resolved the cortex,
     for the table of runs.
@@ -386,7 +391,11 @@ def predicted_table(
     scores = scores.assign(text=centile_text(scores)).set_index("name")
 
     def of_brain(
-        table: pd.DataFrame, column: str, brain: str, run: str, when: str
+        table: pd.DataFrame,
+        column: str,
+        brain: str,
+        run: str,
+        when: str,
     ) -> pd.Series:
         at = table["week"] == prediction[when]
         return table.loc[
@@ -567,7 +576,11 @@ def html_table(table: pd.DataFrame) -> Markup:
     return Markup(_TABLE.render(heads=list(flat), rows=rows))
 
 
-def _kind(name: object, value: object, text: str) -> str:
+def _kind(
+    name: object,
+    value: object,
+    text: str,
+) -> str:
     """Return the CSS class of a cell."""
     if (
         isinstance(value, int | float | np.number) and not isinstance(value, bool)

@@ -197,7 +197,9 @@ def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str,
 
 
 def _atlas_lines(
-    atlases: pd.DataFrame, titles: Mapping[str, str], weeks: pd.Series
+    atlases: pd.DataFrame,
+    titles: Mapping[str, str],
+    weeks: pd.Series,
 ) -> tuple[list[Layer], list[Artist]]:
     """Return the thin lines of atlases over the weeks of a chart, and their legend
     entries."""
@@ -253,7 +255,12 @@ def metrics_figure(
     colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == OBSERVED]
     markers = _subject_markers(whole, subjects)
     shades, entries = _group_shades(groups, colours)
-    marks = _observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
+    marks = _observed_marks(
+        observed,
+        subjects=subjects,
+        markers=markers,
+        shades=shades,
+    )
     lines, names = _atlas_lines(atlases, titles, whole["week"])
     layers = [*lines, *_run_lines(rows, colours), *marks]
     figure, _ = weeks_chart(titles, layers, whole["week"])
@@ -346,10 +353,18 @@ def norms_figure(
         *(Layer(norm, thin, quantile) for quantile in ("q05", "q25", "q75", "q95")),
         *_run_lines(rows, colours),
         *_observed_marks(
-            own, subjects=subjects, markers=markers, shades=shades, **small
+            own,
+            subjects=subjects,
+            markers=markers,
+            shades=shades,
+            **small,
         ),
         *_observed_marks(
-            others, RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades
+            others,
+            RUN_COLOURS[-1],
+            subjects=subjects,
+            markers=markers,
+            shades=shades,
         ),
     ]
     figure, _ = weeks_chart(titles, layers, rows["week"], panel_in=2.0, foot_in=0.6)
@@ -359,7 +374,13 @@ def norms_figure(
         extra.append(Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95"))
     elif len(curves):
         extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
-    run_legend(figure, colours, observed_name=norm_name, markers=markers, extra=extra)
+    run_legend(
+        figure,
+        colours,
+        observed_name=norm_name,
+        markers=markers,
+        extra=extra,
+    )
     return figure
 
 
@@ -421,11 +442,24 @@ def regions_chart(
             from_zero(axes)
     panels["asymmetry"].axhline(0, color=MUTED_COLOUR, linewidth=0.8)
     extra = [
-        Line2D([], [], color=c, marker="s", linestyle="none", label=name)
+        Line2D(
+            [],
+            [],
+            color=c,
+            marker="s",
+            linestyle="none",
+            label=name,
+        )
         for name, c in colours.items()
     ]
     extra += [
-        Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run)
+        Line2D(
+            [],
+            [],
+            color=MUTED_COLOUR,
+            linestyle=line,
+            label=run,
+        )
         for run, line in lines.items()
     ]
     run_legend(figure, {}, extra=[*extra, star(observed_name, MUTED_COLOUR)])
@@ -586,7 +620,11 @@ def paper_displacement_figure(
     return displacement_figure(displacement, runs=runs, published=published)
 
 
-def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
+def _band_rows(
+    spectra: pd.DataFrame,
+    bands: Sequence[int],
+    proxy: str,
+) -> pd.DataFrame:
     """Return the rows of some bands in the spectra of a proxy, with a column
     `trusted`."""
     trusted = (
@@ -597,11 +635,21 @@ def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.Da
 
 
 def _beyond_the_modes(
-    axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0
+    axes: Axes,
+    x: float,
+    transform: Transform,
+    *,
+    rotation: float = 0.0,
 ) -> None:
     words = "beyond the\nmodes computed"
     axes.text(
-        x, 0.5, words, transform=transform, ha="center", va="center", rotation=rotation
+        x,
+        0.5,
+        words,
+        transform=transform,
+        ha="center",
+        va="center",
+        rotation=rotation,
     )
 
 
@@ -621,17 +669,30 @@ def _spectra_legend(
     extra: list[Artist] = []
     if untrusted - {OBSERVED}:
         hatched = Patch(
-            facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label
+            facecolor=MUTED_COLOUR,
+            edgecolor="white",
+            hatch=_HATCH,
+            label=label,
         )
         hollow = star(
-            label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white"
+            label,
+            MUTED_COLOUR,
+            marker="o",
+            markersize=5,
+            markerfacecolor="white",
         )
         extra.append(hatched if bars else hollow)
     if OBSERVED in untrusted:
         words = "the same, observed brain" if extra else label
         extra.append(star(words, markersize=8, markerfacecolor="white"))
     name = name if (rows["run"] == OBSERVED).any() else ""
-    run_legend(figure, colours, observed_name=name, bars=bars, extra=[*groups, *extra])
+    run_legend(
+        figure,
+        colours,
+        observed_name=name,
+        bars=bars,
+        extra=[*groups, *extra],
+    )
 
 
 def _sides_in(rows: pd.DataFrame) -> list[str]:
@@ -727,7 +788,10 @@ def influence_spectra(
     rows = pd.concat(by_proxy.values())
     sides = _sides_in(rows)
     figure, panels = panel_figure(
-        len(sides) * len(PROXIES), per_row=len(sides), panel_in=2.3, sharey="row"
+        len(sides) * len(PROXIES),
+        per_row=len(sides),
+        panel_in=2.3,
+        sharey="row",
     )
     width = 0.8 / len(colours)
     for axes, (proxy, hemisphere) in zip(panels, product(PROXIES, sides), strict=True):
@@ -743,7 +807,11 @@ def influence_spectra(
             )
             for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
                 if not trusted:
-                    bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
+                    bar.set(
+                        hatch=_HATCH,
+                        edgecolor="white",
+                        linewidth=0,
+                    )
         for _, row in side[side["run"] == OBSERVED].iterrows():
             centre, power = FOLD_BANDS.index(row["band"]), row["relative_power"]
             axes.hlines(

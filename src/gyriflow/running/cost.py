@@ -130,7 +130,11 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     return Needs(rates[mesh.order] * elements * steps, memory, disk)
 
 
-def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
+def job_seconds(
+    study: Study,
+    rule: str,
+    wildcards: Mapping[str, str],
+) -> float:
     """Predict the processor time of a job, by its rule and wildcards."""
     mesh = study.config.mesh
     if rule in FOLDINGS:
@@ -160,7 +164,11 @@ def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
     return START_SECONDS + _brain_seconds(study, rule, wildcards)
 
 
-def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
+def _brain_seconds(
+    study: Study,
+    rule: str,
+    wildcards: Mapping[str, str],
+) -> float:
     """Predict the time of a stage that deals with one brain, measured or simulated, or
     registers it as the later."""
     if rule in SECONDS_PER_STAGE:
@@ -212,7 +220,11 @@ def _meshing_seconds(week: float, mesh: MeshSettings) -> float:
     return MESHING_SECONDS_PER_ELEMENT[mesh.mesher] * elements
 
 
-def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
+def _prediction_seconds(
+    study: Study,
+    brain: str,
+    origin: str,
+) -> float:
     """Predict the time for the shapes that an atlas' growth gives a start brain."""
     chain = study.chains[brain, origin]
     file = TARGETS.format(brain=brain, origin=origin)
@@ -234,7 +246,11 @@ def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
     return PREDICTION_SECONDS + following_s
 
 
-def _series_seconds(study: Study, weeks: Sequence[float], mesh: MeshSettings) -> float:
+def _series_seconds(
+    study: Study,
+    weeks: Sequence[float],
+    mesh: MeshSettings,
+) -> float:
     """Predict the time for a mesh to follow the brains of a series; with opened sulci,
     late weeks take most of it."""
     first = weeks[0]

@@ -16,7 +16,9 @@ REPORT_STEP = "html_report"
 
 
 def gather_messages(
-    folder: AnyPath, brains: Iterable[str], runs: Iterable[tuple[str, str]]
+    folder: AnyPath,
+    brains: Iterable[str],
+    runs: Iterable[tuple[str, str]],
 ) -> pd.DataFrame:
     """Return the warnings and errors of a study, of some of its brains, and of some
     (run, brain) pairs, without those of the report.

@@ -306,7 +306,9 @@ def _is_running(process: psutil.Process) -> bool:
 
 
 def finish_without(
-    refused: dict[str, str], arguments: Sequence[str], directory: Path
+    refused: dict[str, str],
+    arguments: Sequence[str],
+    directory: Path,
 ) -> int:
     """Run the same call again without the refused brains, unless it asks for their
     files.
@@ -327,7 +329,10 @@ def finish_without(
     again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
     environment = os.environ | {REFUSED_FILE_VAR: str(path)}
     process = subprocess.Popen(
-        again, env=environment, stdout=sys.stdout, stderr=sys.stderr
+        again,
+        env=environment,
+        stdout=sys.stdout,
+        stderr=sys.stderr,
     )
     try:
         process.wait()
@@ -339,7 +344,11 @@ def finish_without(
     return 0
 
 
-def exit_code(code: int, failures: Sequence[Message], directory: Path) -> int:
+def exit_code(
+    code: int,
+    failures: Sequence[Message],
+    directory: Path,
+) -> int:
     """Return the exit code of a run that failed with Snakemake's `code`: that of the
     first error of a step that has one; report a full disk."""
     code = next(filter(None, (failure.exit_code for failure in failures)), code)

@@ -188,7 +188,11 @@ def recorded_results(folder: Path) -> dict[str, Any]:
     return found
 
 
-def difference(job: Job, manifest: Mapping[str, Any], found: Contents) -> str:
+def difference(
+    job: Job,
+    manifest: Mapping[str, Any],
+    found: Contents,
+) -> str:
     """Return in words how a job differs from the manifest of its results, the first of
     several ways; empty if they match."""
     if not manifest:
@@ -204,7 +208,9 @@ def difference(job: Job, manifest: Mapping[str, Any], found: Contents) -> str:
 
 
 def _changed_inputs(
-    job: Job, recorded: Mapping[str, list[list[str]]], found: Contents
+    job: Job,
+    recorded: Mapping[str, list[list[str]]],
+    found: Contents,
 ) -> list[str]:
     """Return the names of the inputs whose content or role has changed."""
     changed = []
@@ -235,7 +241,11 @@ def _changed_settings(now: Mapping[str, str], before: Mapping[str, str]) -> str:
     return f"changed settings {', '.join(dict.fromkeys(changes))}"
 
 
-def _changed_keys(name: str, now: str | None, before: str | None) -> list[str]:
+def _changed_keys(
+    name: str,
+    now: str | None,
+    before: str | None,
+) -> list[str]:
     """Return the keys of a setting that have changed, with their values if they are
     numbers, words or switches."""
     values = []

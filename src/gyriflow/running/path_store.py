@@ -91,7 +91,11 @@ def store_folder(study: Study, path: Chain) -> Path | None:
     return study.atlases[path.brain].folder / "paths"
 
 
-def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
+def kept_path(
+    study: Study,
+    path: Chain,
+    key: str | None,
+) -> Path | None:
     """Return the file with the path that an earlier study kept; None if there is none,
     or if it is damaged."""
     folder = store_folder(study, path)

@@ -153,7 +153,9 @@ def no_plan() -> Plan:
 
 
 def made_plan(
-    events: Events, targets: Collection[str], forced: Collection[str]
+    events: Events,
+    targets: Collection[str],
+    forced: Collection[str],
 ) -> Plan:
     """Return the plan of the jobs that Snakemake has listed, for the working directory.
 
@@ -181,7 +183,11 @@ def made_plan(
     return Plan(jobs.values(), manifests, found, reasons, outdated)
 
 
-def _outdated_by_itself(job: Job, manifest: Mapping[str, Any], found: Contents) -> str:
+def _outdated_by_itself(
+    job: Job,
+    manifest: Mapping[str, Any],
+    found: Contents,
+) -> str:
     """Return why the results of a job do not match their manifest, or ''. Results that
     were removed match as well, and those that were never made."""
     if job.manifest is None:
@@ -199,7 +205,9 @@ def _producers(jobs: Mapping[str, Job]) -> dict[str, str]:
 
 
 def _required(
-    jobs: Mapping[str, Job], producers: Mapping[str, str], targets: Collection[str]
+    jobs: Mapping[str, Job],
+    producers: Mapping[str, str],
+    targets: Collection[str],
 ) -> list[str]:
     """Return the files that a call asks for.
 
@@ -218,7 +226,9 @@ def _required(
 
 
 def _spread(
-    reasons: dict[str, str], jobs: Mapping[str, Job], producers: Mapping[str, str]
+    reasons: dict[str, str],
+    jobs: Mapping[str, Job],
+    producers: Mapping[str, str],
 ) -> None:
     """Add the jobs that run because of those with `reasons`: those that read their
     results, and those that make what they miss."""
@@ -342,7 +352,11 @@ def view_of(directory: Path) -> Iterator[Path]:
         yield view
 
 
-def link_results(directory: Path, view: Path, left_out: Iterable[str]) -> None:
+def link_results(
+    directory: Path,
+    view: Path,
+    left_out: Iterable[str],
+) -> None:
     """Link the results of a working directory into a view of it, without some files.
 
     Folders are linked whole where that is possible. Files that cannot be written are
@@ -362,7 +376,12 @@ def link_results(directory: Path, view: Path, left_out: Iterable[str]) -> None:
         _link(results, links, hidden, parted)
 
 
-def _link(source: Path, link: Path, hidden: set[Path], parted: set[Path]) -> None:
+def _link(
+    source: Path,
+    link: Path,
+    hidden: set[Path],
+    parted: set[Path],
+) -> None:
     if source not in parted:
         link.symlink_to(source)
         return

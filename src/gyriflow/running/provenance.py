@@ -79,7 +79,10 @@ def recorded_version(directory: Path) -> str | None:
 
 
 def check_results_belong_to(
-    directory: Path, files: Sequence[Path], config: Config, record: bool
+    directory: Path,
+    files: Sequence[Path],
+    config: Config,
+    record: bool,
 ) -> None:
     """Raise InputError if the results in a working directory belong to another study.
 
@@ -118,7 +121,11 @@ def check_results_belong_to(
         problem = "the results here belong to another study"
         results = path.resolve().parents[1]
         raise InputError(
-            problem, path=results, found=results_of, expected=expected, remedy=remedy
+            problem,
+            path=results,
+            found=results_of,
+            expected=expected,
+            remedy=remedy,
         )
     if record and (recorded != study or not is_recorded):
         write_json(path, study)

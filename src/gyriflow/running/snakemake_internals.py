@@ -73,7 +73,9 @@ def remove_stale(rules: Collection[Any], *folders: str) -> None:
 
 
 def check_brains(
-    targets: Iterable[str], rules: Iterable[Any], brains: Collection[str]
+    targets: Iterable[str],
+    rules: Iterable[Any],
+    brains: Collection[str],
 ) -> None:
     """Raise InputError if a file that a call asks for is of none of the `brains`."""
     for target in targets:

@@ -76,7 +76,10 @@ def status(directory: Path) -> Iterator[str]:
     for rows in (brains, runs):
         if rows:
             yield "\n" + tabulate(
-                rows, headers="keys", tablefmt="plain", disable_numparse=True
+                rows,
+                headers="keys",
+                tablefmt="plain",
+                disable_numparse=True,
             )
     if (directory / REPORT).is_file():
         yield f"\nreport: {(directory / REPORT).absolute()}"

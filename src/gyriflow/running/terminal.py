@@ -80,10 +80,16 @@ class RunDisplay:
     if the stream is a terminal."""
 
     def __init__(
-        self, stream: TextIO, details: Path, clock: Callable[[], float] = time.monotonic
+        self,
+        stream: TextIO,
+        details: Path,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.console = Console(
-            file=stream, markup=False, highlight=False, soft_wrap=True
+            file=stream,
+            markup=False,
+            highlight=False,
+            soft_wrap=True,
         )
         self.live = self.console.is_terminal and not self.console.is_dumb_terminal
         percent = TextColumn("{task.percentage:3.0f} %")

@@ -139,7 +139,11 @@ class Settings(BaseModel):
         settings = handler({} if raw is None else raw)
         if problems := dict.fromkeys(settings.problems()):
             errors = [
-                InitErrorDetails(type=refused(each.text), loc=each.key, input=None)
+                InitErrorDetails(
+                    type=refused(each.text),
+                    loc=each.key,
+                    input=None,
+                )
                 for each in problems
             ]
             raise ValidationError.from_exception_data(cls.__name__, errors)
@@ -162,7 +166,11 @@ def problems_in(error: ValidationError, kind: type[BaseModel]) -> list[KeyProble
     return [_problem(details, kind) for details in error.errors()]
 
 
-def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
+def validated[Kind: BaseModel](
+    kind: type[Kind],
+    raw: Any,
+    where: str,
+) -> Kind:
     """Return settings of a kind from plain mappings; InputError naming `where` and all
     problems at once."""
     try:

@@ -147,7 +147,11 @@ VARYING = tuple(
 GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_s"))
 
 
-def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:
+def output_weeks(
+    start_week: float,
+    end_week: float,
+    every_gw: float,
+) -> list[float]:
     """Return the output weeks of a run, to two decimals: the start, then every
     `every_gw` weeks, and the end."""
     steps = int((end_week - start_week) / every_gw + 1e-9)
@@ -209,7 +213,10 @@ class FoldingParameters(FoldingSettings):
 
 
 def value_problems(
-    p: FoldingSettings, start_week: float, maps: Maps, start: str = ""
+    p: FoldingSettings,
+    start_week: float,
+    maps: Maps,
+    start: str = "",
 ) -> Problems:
     """Yield the inconsistencies between the settings of a run, over all its weeks and
     vertices.
@@ -278,7 +285,11 @@ def parameters_from(values: Any) -> FoldingParameters:
     return validated(FoldingParameters, values, "folding parameters")
 
 
-def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
+def require_maps(
+    p: FoldingParameters,
+    maps: Maps,
+    vertices: int,
+) -> None:
     """Raise InputError where a map is missing, does not fit the mesh, or holds
     impossible values."""
     for name in sorted(p.maps):

@@ -116,7 +116,11 @@ def _preset(section: dict[str, Any]) -> dict[str, Any]:
     return PRESETS.get(str(section.get("preset")), {})
 
 
-def _merged(base: Any, over: Any, key: str = "") -> Any:
+def _merged(
+    base: Any,
+    over: Any,
+    key: str = "",
+) -> Any:
     """Return a section with the keys of another on top; inner sections are merged, but
     not values that vary."""
     if key == "growth":
@@ -148,7 +152,11 @@ def members_of(name: str, run: Run) -> dict[str, Variation]:
     return members
 
 
-def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:
+def starts_of(
+    study_start: Start | None,
+    run: Run,
+    ids: Sequence[str],
+) -> list[str]:
     """Return the ids of the brains that a run folds, in the order of `ids`."""
     start = study_start if run.start is None else run.start
     if start is None:

@@ -108,7 +108,11 @@ class LabelScheme(SchemeSettings):
     """Name of the scheme."""
 
 
-FILLED = LabelScheme(name="filled", cerebrum=(1, 2), cortex=(2,))
+FILLED = LabelScheme(
+    name="filled",
+    cerebrum=(1, 2),
+    cortex=(2,),
+)
 """Scheme of volumes filled from surfaces."""
 
 

@@ -155,7 +155,9 @@ def mean_of_curve(value: float | Varying) -> float:
 
 
 def value_at(
-    value: float | Varying, week: float, maps: Maps
+    value: float | Varying,
+    week: float,
+    maps: Maps,
 ) -> float | NDArray[np.float64]:
     """Return a parameter's value at a week: a number, or (n,) values if it has a
     map."""
@@ -165,7 +167,10 @@ def value_at(
 
 
 def value_range(
-    value: float | Varying, maps: Maps, start: float, end: float
+    value: float | Varying,
+    maps: Maps,
+    start: float,
+    end: float,
 ) -> tuple[float, float]:
     """Return the smallest and the largest value of a parameter between two weeks, over
     all vertices."""

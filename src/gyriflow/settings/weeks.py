@@ -20,7 +20,9 @@ TENTHS = re.compile(r"\d{2}[.,]([0-9])")
 
 
 def read_week(
-    text: str, unit: str = "weeks", notation: WeekNotation | None = None
+    text: str,
+    unit: str = "weeks",
+    notation: WeekNotation | None = None,
 ) -> tuple[float | None, str]:
     """Return a gestational age in weeks, rounded to two decimals as in file names, and
     the problem with it, or ''.

@@ -144,7 +144,11 @@ def is_missing(text: str) -> bool:
     return text.lower() in MISSING_VALUES
 
 
-def age_column(name: str, facts: Any, sidecar_name: str) -> AgeColumn | None:
+def age_column(
+    name: str,
+    facts: Any,
+    sidecar_name: str,
+) -> AgeColumn | None:
     """Return a column of ages, or None for other columns; `facts` is its description in
     the table's JSON file."""
     key = column_key(name)
@@ -162,7 +166,11 @@ def age_column(name: str, facts: Any, sidecar_name: str) -> AgeColumn | None:
     return AgeColumn(name, "other", unit, problem)
 
 
-def _unit(key: str, facts: Any, sidecar_name: str) -> tuple[str, str]:
+def _unit(
+    key: str,
+    facts: Any,
+    sidecar_name: str,
+) -> tuple[str, str]:
     """Return the unit of a column, and the problem in its description or ""."""
     if not isinstance(facts, dict):
         facts = {"Description": facts}
@@ -205,7 +213,9 @@ def read_ages(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanAg
 
 
 def require_clear_decimals(
-    texts: Iterable[str], notation: WeekNotation | None, path: Path
+    texts: Iterable[str],
+    notation: WeekNotation | None,
+    path: Path,
 ) -> None:
     """Raise InputError if ages such as 24.3 may mean 24 weeks and 3 days.
 

@@ -17,7 +17,9 @@ from .records import Brain, measured_files
 
 
 def plan_brains(
-    config: Config, refused: Collection[str], atlases: Iterable[UsedAtlas]
+    config: Config,
+    refused: Collection[str],
+    atlases: Iterable[UsedAtlas],
 ) -> dict[str, Brain]:
     """Return the brains of a configuration that are not refused, by id."""
     atlases = list(atlases)

@@ -169,7 +169,11 @@ def _starts(config: Config) -> Problems:
         )
 
 
-def _start_problems(start: Start | None, config: Config, key: Key) -> Problems:
+def _start_problems(
+    start: Start | None,
+    config: Config,
+    key: Key,
+) -> Problems:
     if start in (None, ALL, FIRST) or not config.brains:
         return
     ids = [start] if isinstance(start, str) else list(start or ())
@@ -181,7 +185,11 @@ def _start_problems(start: Start | None, config: Config, key: Key) -> Problems:
     yield from _unknown(ids, config, key)
 
 
-def _unknown(ids: Iterable[str], config: Config, key: Key) -> Problems:
+def _unknown(
+    ids: Iterable[str],
+    config: Config,
+    key: Key,
+) -> Problems:
     brains = [brain.id for brain in config.brains]
     for name in dict.fromkeys(ids):
         if name not in brains:
@@ -214,7 +222,11 @@ def _runs(config: Config) -> Problems:
             yield problem.inside(*_section(name, str(problem.key[0]), config))
 
 
-def _section(run: str, key: str, config: Config) -> Key:
+def _section(
+    run: str,
+    key: str,
+    config: Config,
+) -> Key:
     """Return the section to change a key of a run in: `folding` if all runs have the
     same value."""
     own = getattr(config.runs[run], key)
@@ -483,7 +495,11 @@ def _calibration(config: Config) -> Problems:
                 yield KeyProblem(text, ("calibrate", "parameters", key))
 
 
-def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterator[str]:
+def _parameter_problems(
+    key: str,
+    bounds: Sequence[float],
+    base: Run,
+) -> Iterator[str]:
     is_ratio = key == STIFFNESS_RATIO
     is_amplitude = key.endswith(AMPLITUDE)
     if (is_ratio or is_amplitude) and min(bounds) <= 0:

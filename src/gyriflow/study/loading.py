@@ -21,7 +21,10 @@ from .participants import participants_brains
 
 
 def load(
-    raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool = False
+    raw: Mapping[str, Any],
+    base_dir: Path | str = ".",
+    *,
+    keep_going: bool = False,
 ) -> Config:
     """Return the validated configuration, as read from YAML, with input files as
     absolute paths.
@@ -76,7 +79,9 @@ def load(
 
 
 def _participants(
-    section: Any, folder: Path, problems: list[str]
+    section: Any,
+    folder: Path,
+    problems: list[str],
 ) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], dict[str, str]]:
     if section is None:
         return [], {}, {}
@@ -112,7 +117,11 @@ def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:
     return atlases, problems
 
 
-def _atlas(section: Any, folder: Path, place: Key) -> tuple[list[UsedAtlas], list[str]]:
+def _atlas(
+    section: Any,
+    folder: Path,
+    place: Key,
+) -> tuple[list[UsedAtlas], list[str]]:
     """Return the atlas of a section, or none and its problems."""
     try:
         settings = AtlasSettings.model_validate(section).located(folder)

@@ -149,7 +149,12 @@ def _read_table(path: Path) -> Table:
         other_values = {key: text for key, text in values.items() if key in further}
         row = TableRow(path, empty.scope, place, name, own_session, other_values, cells)
         rows.append(row)
-    return replace(empty, rows=rows, columns=columns, ages=ages)
+    return replace(
+        empty,
+        rows=rows,
+        columns=columns,
+        ages=ages,
+    )
 
 
 def _age_columns(names: Iterable[str], table: Table) -> list[AgeColumn]:

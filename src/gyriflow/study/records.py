@@ -105,7 +105,10 @@ class Brain(MeasuredBrain):
 
 
 def measured_files(
-    sides: tuple[Side, ...], surfaces: str, folder: str, regions: str | None
+    sides: tuple[Side, ...],
+    surfaces: str,
+    folder: str,
+    regions: str | None,
 ) -> dict[str, Any]:
     """Return the files of a brain that is measured: in the folder of its surfaces, that
     of its tables and maps, and that of its regions if it has any."""

@@ -130,7 +130,9 @@ def _downloads(atlases: Iterable[UsedAtlas]) -> list[Download]:
 
 
 def _left_out(
-    config: Config, refused: Mapping[str, str], unreachable: Mapping[str, InputError]
+    config: Config,
+    refused: Mapping[str, str],
+    unreachable: Mapping[str, InputError],
 ) -> list[LeftOut]:
     causes: dict[Literal["refused", "not folded"], Mapping[str, Any]] = {
         "refused": refused,
@@ -141,7 +143,12 @@ def _left_out(
         for why, of_brains in causes.items():
             if brain.id in of_brains:
                 cause = str(of_brains[brain.id])
-                row = LeftOut(brain=brain.id, why=why, week=brain.week, cause=cause)
+                row = LeftOut(
+                    brain=brain.id,
+                    why=why,
+                    week=brain.week,
+                    cause=cause,
+                )
                 rows.append(row)
     for scan, facts in config.left_out.items():
         rows.append(LeftOut(brain=scan, why="cannot be used", **facts))
@@ -152,7 +159,9 @@ def _left_out(
 
 
 def _followed_chains(
-    simulations: Iterable[Simulation], chains: Chains, series: Series
+    simulations: Iterable[Simulation],
+    chains: Chains,
+    series: Series,
 ) -> Chains:
     """Return the chains that simulations follow, and the paths of atlases in them."""
     followed = {}
@@ -268,7 +277,9 @@ def _folded(
 
 
 def _chains(
-    folded: Iterable[_Folded], series: Series, brains: Sequence[Brain]
+    folded: Iterable[_Folded],
+    series: Series,
+    brains: Sequence[Brain],
 ) -> Chains:
     starts: dict[str, Brain] = {}
     ends: dict[str, float] = {}
@@ -339,7 +350,10 @@ class _Simulations:
         return names
 
     def _add(
-        self, folded: _Folded, weeks: Sequence[float], member_of: str | None = None
+        self,
+        folded: _Folded,
+        weeks: Sequence[float],
+        member_of: str | None = None,
     ) -> None:
         """Add a simulation, unless there is one of that name, with the brains that it
         is compared with."""
@@ -409,7 +423,11 @@ class _Simulations:
         self.simulated += _simulated(self.simulations[key], start)
 
     def _growth_source(
-        self, start: Brain, origin: Origin | None, *, has_curves: bool
+        self,
+        start: Brain,
+        origin: Origin | None,
+        *,
+        has_curves: bool,
     ) -> str:
         """Describe whose measured growth a run follows, or return ""."""
         brains: Sequence[Brain] = ()
@@ -485,7 +503,9 @@ def _simulated(simulation: Simulation, start: Brain) -> list[MeasuredBrain]:
 
 
 def _shared_runs(
-    config: Config, variants: Sequence[_Variant], simulations: Iterable[Simulation]
+    config: Config,
+    variants: Sequence[_Variant],
+    simulations: Iterable[Simulation],
 ) -> tuple[dict[str, str], dict[str, set[float]]]:
     """Return the run that each run of a sweep is simulated by, and the weeks of
     comparison of these runs, by name.
@@ -521,7 +541,11 @@ def _equality_key(run: Run) -> str:
     )
 
 
-def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]:
+def _weeks(
+    settings: Run,
+    start: Brain,
+    further: Iterable[float],
+) -> list[float]:
     weeks = set(
         output_weeks(start.week, settings.end_week, settings.output_every_gw),
     )
@@ -531,7 +555,11 @@ def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]
     return sorted(weeks)
 
 
-def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
+def _up_to_last_scan(
+    run: Run,
+    start: Brain,
+    series: Series,
+) -> Run:
     """Return a run that ends with the last scan if it follows the scans of one
     subject."""
     if run.growth.shapes != "self" or start.subject is None:
@@ -544,7 +572,9 @@ def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
 
 
 def _missing_brains(
-    folded: _Folded, series: Series, chains: Chains
+    folded: _Folded,
+    series: Series,
+    chains: Chains,
 ) -> InputError | None:
     """Return the error of a run that lacks brains to grow a start brain towards, or
     None."""
@@ -595,7 +625,9 @@ def _missing_brains(
 
 
 def _compared_with(
-    settings: ComparisonSettings, start: Brain, brains: Mapping[str, Brain]
+    settings: ComparisonSettings,
+    start: Brain,
+    brains: Mapping[str, Brain],
 ) -> tuple[str, ...]:
     """Return the brains that runs from a start brain are compared with in a sweep or a
     calibration."""
@@ -644,7 +676,9 @@ def _sweeps(
 
 
 def _calibration(
-    config: Config, simulations: Iterable[Simulation], brains: Mapping[str, Brain]
+    config: Config,
+    simulations: Iterable[Simulation],
+    brains: Mapping[str, Brain],
 ) -> list[CalibrationRun]:
     """Return the runs of the calibration, by round."""
     settings = config.calibrate

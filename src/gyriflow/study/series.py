@@ -97,7 +97,10 @@ class Series:
         return any(ids <= matched for matched in self.matched.values())
 
     def link(
-        self, earlier: Brain, later: Brain, variation: tuple[float, int] = UNVARIED
+        self,
+        earlier: Brain,
+        later: Brain,
+        variation: tuple[float, int] = UNVARIED,
     ) -> str:
         """Return the file that maps two brains, by matched vertices or by registration,
         and add it to the links.
@@ -135,7 +138,9 @@ def several_subjects(brains: Iterable[Brain]) -> bool:
 
 
 def series_of(
-    config: Config, brains: Mapping[str, Brain], atlases: Iterable[UsedAtlas]
+    config: Config,
+    brains: Mapping[str, Brain],
+    atlases: Iterable[UsedAtlas],
 ) -> Series:
     """Return the growth series of a configuration, limited to the given brains.
 
@@ -220,7 +225,10 @@ def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
 
 
 def chains_of(
-    start: Brain, end: float, series: Series, brains: Sequence[Brain]
+    start: Brain,
+    end: float,
+    series: Series,
+    brains: Sequence[Brain],
 ) -> dict[tuple[str, str], Chain]:
     """Return the brains on which growth for a start brain is measured up to a week, by
     the id of the first and the name of the chain."""
@@ -302,13 +310,21 @@ def _chain(
     )
 
 
-def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
+def _covers(
+    brains: Iterable[Brain],
+    week: float,
+    end: float,
+) -> bool:
     """Return whether growth from a week to an end is known from brains of an atlas."""
     weeks = {brain.week for brain in brains}
     return len(weeks) > 1 and min(weeks) <= week + BEFORE_GW and max(weeks) >= end
 
 
-def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
+def _own_chain(
+    start: Brain,
+    end: float,
+    series: Series,
+) -> list[Brain]:
     """Return a start brain and later brains of its growth series, one a week, up to the
     first at or past an end week.
 

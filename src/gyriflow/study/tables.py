@@ -19,7 +19,11 @@ from pydantic import TypeAdapter
 from ..io.files import AnyPath, read_text, write_text
 
 
-def write_rows(path: AnyPath, kind: type, rows: Iterable[Any]) -> None:
+def write_rows(
+    path: AnyPath,
+    kind: type,
+    rows: Iterable[Any],
+) -> None:
     """Write records of one dataclass as CSV, unless the file has these rows already."""
     types = get_type_hints(kind)
     names = [column.name for column in fields(kind)]
