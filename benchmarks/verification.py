@@ -3,9 +3,8 @@ docs/verification.md.
 
     ./run python benchmarks/verification.py --figures docs/images
 
-Cases and literature: docs/verification.md. The solver runs on two MPI ranks; part
-`ranks` compares one, two and three. Each part prints its results; the last line is one
-JSON object with all of them.
+The solver runs on two MPI ranks; part `ranks` compares one, two and three. Each part
+prints its results; the last line is one JSON object with all of them.
 """
 
 import argparse

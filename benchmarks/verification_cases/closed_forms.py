@@ -1,4 +1,16 @@
-"""Closed forms that the theory in `modes` must reach in its limits."""
+"""Closed forms that the theory in `modes` must reach in its limits.
+
+Allen, H. G. (1969). Analysis and Design of Structural Sandwich Panels. Pergamon.
+
+Biot, M. A. (1961). Theory of folding of stratified viscoelastic media and its
+implications in tectonics and orogenesis. Geol. Soc. Am. Bull. 72, 1595-1620.
+
+Biot, M. A. (1963). Surface instability of rubber in compression. Appl. Sci. Res. A 12,
+168-182.
+
+Chen, X., Hutchinson, J. W. (2004). Herringbone buckling patterns of compressed thin
+films on compliant substrates. J. Appl. Mech. 71, 597-603.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,17 @@
-"""Where code is compiled, and for which processors."""
+r"""Where code is compiled, and for which processors.
+
+The tests of our C code under the address and undefined-behaviour sanitizers of gcc:
+
+    ./run env XDG_CACHE_HOME=/tmp/sanitized PYTHONMALLOC=malloc \
+        ASAN_OPTIONS=detect_leaks=0 \
+        LD_PRELOAD="$(./run gcc -print-file-name=libasan.so) \
+            $(./run gcc -print-file-name=libubsan.so)" python -c \
+    'import sys, pytest; from gyriflow.folding import compilation; (
+        compilation.COMPILER_ARGUMENTS.extend(["-g", "-fsanitize=address,undefined"]),
+        sys.exit(pytest.main(["-q", "-n", "0", "-m", "not slow", *sys.argv[1:]])),
+    )' tests/mpi/linear_elements_cases.py tests/mpi/linear_solver_cases.py \
+        tests/unit/folding/test_compilation.py
+"""
 
 from types import SimpleNamespace
 
