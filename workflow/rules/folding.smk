@@ -1,8 +1,8 @@
 # Simulations: each run from each of its start brains.
 from gyriflow.io.files import read_json
 from gyriflow.running.cost import job_limits
+from gyriflow.settings.folding import mapped_parameters, parameters
 from gyriflow.settings.varying import files_of, mean_of_curve
-from gyriflow.study.records import mapped_parameters, parameters
 
 
 def map_sources(wildcards):

@@ -117,7 +117,7 @@ rule targets:
     params:
         weeks=lambda w: chain_of(w).weeks,
         posed=lambda w: posed_links(chain_of(w)),
-        opens_sulci=CONFIG.surface.open_sulci,
+        open_sulci=CONFIG.surface.open_sulci,
         origin=None,
         store=None,
     script:
@@ -160,7 +160,7 @@ use rule targets as atlas_path with:
     params:
         weeks=lambda w: path_of(w).weeks,
         posed=lambda w: posed_links(path_of(w)),
-        opens_sulci=CONFIG.surface.open_sulci,
+        open_sulci=CONFIG.surface.open_sulci,
         origin=lambda w: PATH_ORIGINS[w.brain],
         store=lambda w: store_folder(study, path_of(w)),
 
@@ -221,7 +221,7 @@ rule predicted_targets:
         atlas_week=lambda w: atlas_of(w).week,
         further_weeks=lambda w: chain_of(w).further_weeks,
         posed=lambda w: posed_links(chain_of(w))[0],
-        opens_sulci=CONFIG.surface.open_sulci,
+        open_sulci=CONFIG.surface.open_sulci,
         variation=lambda w: chain_of(w).variation,
         left_out=populations_left_out,
     script:

@@ -3,6 +3,7 @@ atlas."""
 
 import numpy as np
 
+from gyriflow.anatomy.sulci import has_open_sulci
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.atlas_path import AtlasPath, other_volumes
@@ -33,11 +34,10 @@ with step(snakemake.log[0]):
         for report, is_posed in pair_of_poses
     ]
     pair = between_moved(read_correspondence(files.correspondence[0]), *poses)
-    # labels whose sulci stay fused have none to open; given surfaces count as open
-    opened = read_json(files.reports[1]).get("sulci", {"sheets": 1}).get("sheets")
+    atlas_report = read_json(files.reports[1])
     options = {
         "further_weeks": params.further_weeks,
-        "open_sulci": bool(params.opens_sulci and opened),
+        "open_sulci": params.open_sulci and has_open_sulci(atlas_report),
     }
     others = []
     if files.norms:

@@ -5,7 +5,7 @@ from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.anatomy.plausible import require_plausible_thickness
 from gyriflow.folding.start_regions import start_regions
 from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface
-from gyriflow.growth.curves import run_parameters
+from gyriflow.growth.curves import followed_sizes
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface, read_surface_maps
@@ -13,13 +13,19 @@ from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps, write_regio
 from gyriflow.io.volumes import read_volume_map
 from gyriflow.io.yaml_files import write_yaml
 from gyriflow.mesh import maps as on_mesh
-from gyriflow.settings.folding import FoldingSettings, parameters_from, target_maps
+from gyriflow.settings.folding import (
+    FoldingSettings,
+    parameters_from,
+    run_parameters,
+    target_maps,
+)
 from gyriflow.settings.varying import bounds_of
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
-    mesh, maps, sizes, stops = read_tetrahedral_mesh(files.mesh), {}, {}, []
+    mesh, maps, sizes = read_tetrahedral_mesh(files.mesh), {}, {}
+    target_weeks, stops = [], []
     facets, pose = boundary_faces(mesh)[0], read_pose(files.surface)
     for name, source in params.maps.items():
         path = ", ".join(source["map"])
@@ -50,18 +56,18 @@ with step(snakemake.log[0]):
             name: dict(zip(weekly, values[passed].tolist(), strict=True))
             for name, values in targets.sizes.items()
         }
-        maps |= target_maps(weekly[1:], targets.positions[passed[1:]])
+        target_weeks = weekly[1:]
+        maps |= target_maps(target_weeks, targets.positions[passed[1:]])
     curves = read_table(files.curves) if files.curves else None
-    inputs = (
-        params.settings,
-        params.weeks,
-        read_json(files.surface),
-        sizes,
-        stops,
-        curves,
-        params.series,
+    growth = {**params.settings["growth"], **sizes}
+    growth |= followed_sizes(
+        growth, curves, params.series, params.weeks, shrink=bool(sizes)
     )
-    write_yaml(output.params, parameters := run_parameters(*inputs))
+    surface = read_json(files.surface)
+    parameters = run_parameters(
+        params.settings, growth, params.weeks, surface, target_weeks, stops
+    )
+    write_yaml(output.params, parameters)
     if maps:
         write_maps(output.maps, maps)
     regions = start_regions(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gyriflow.anatomy.sulci import has_open_sulci
 from gyriflow.errors import StorageError
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
@@ -43,12 +44,8 @@ with step(snakemake.log[0]):
             files.correspondences, params.posed, poses, strict=True
         )
     ]
-    # labels whose sulci stay fused have none to open; given surfaces count as open
-    opened = [
-        read_json(path).get("sulci", {"sheets": 1}).get("sheets")
-        for path in files.reports
-    ]
-    open_sulci = params.opens_sulci and any(opened)
+    reports = [read_json(path) for path in files.reports]
+    open_sulci = params.open_sulci and any(map(has_open_sulci, reports))
     made_from = [
         files.mesh,
         files.data,

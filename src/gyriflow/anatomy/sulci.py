@@ -6,6 +6,7 @@ There the nearest white matter changes from one bank to the other (Han et al. 20
 """
 
 import heapq
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -53,6 +54,12 @@ PLACES_MM, N_DEPTHS = 5.0, 10_000
 # cortex further from white matter than this many thicknesses lacks white matter;
 # largest share of such cortex
 FAR, MAX_FAR_SHARE = 3.0, 0.05
+
+
+def has_open_sulci(report: Mapping[str, Any]) -> bool:
+    """Return whether a surface, with this report, has sulci that can be opened: labels
+    whose sulci stay fused have none; given surfaces count as open."""
+    return bool(report.get("sulci", {"sheets": 1}).get("sheets"))
 
 
 def open_fused_sulci(

@@ -50,10 +50,10 @@ from ..io.surfaces import (
 )
 from ..io.volumes import read_header, read_label_volume, read_volume_map
 from ..settings.brains import BrainConfig, GivenRegions
+from ..settings.folding import mapped_parameters
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES, AffineSource
 from ..settings.varying import files_of, mean_of_curve
-from ..study.records import mapped_parameters
 from ..study.study import Study
 from .recognition import NATIVE_SPACES, SPACE_NAME, require_fit, scheme_fits
 

@@ -18,7 +18,6 @@ from scipy.optimize import lsq_linear
 from .. import splines
 from ..errors import InputError
 from ..geometry.triangles import Floats, Mask
-from ..settings.folding import target_map
 from ..settings.growth import SIZES
 
 log = logging.getLogger(__name__)
@@ -378,41 +377,6 @@ def followed_sizes(
         by_week = zip(at.tolist(), value(curve, at).tolist(), strict=True)
         tables[quantity] = {round(week, 6): size for week, size in by_week}
     return tables
-
-
-def run_parameters(
-    settings: Mapping[str, Any],
-    weeks: Sequence[float],
-    surface: Mapping[str, Any],
-    target_sizes: Mapping[str, Mapping[float, float]],
-    stops: Sequence[float],
-    curves: pd.DataFrame | None,
-    series: str | None,
-) -> dict[str, Any]:
-    """Return the parameters of a run as its `params.yaml` has them, with measured sizes
-    as numbers by week.
-
-    `settings` are its own, `weeks` its output weeks, `surface` is the report of the
-    start brain's surface, and `target_sizes` are those of the shapes that it grows
-    towards, by week, the start first; empty where there are none. `stops` are those of
-    the weeks without an observed brain. Curves and series are as for `followed_sizes`.
-    """
-    growth = {**settings["growth"], **target_sizes}
-    sizes = followed_sizes(growth, curves, series, weeks, shrink=bool(target_sizes))
-    parameters = {
-        "start_week": weeks[0],
-        "output_weeks": list(weeks),
-        "fissure_x_mm": surface["fissure_x_mm"],
-        "side": surface.get("side"),
-        **settings,
-    }
-    if target_sizes:
-        sizes_by_week = next(iter(target_sizes.values()))
-        later = list(sizes_by_week)[1:]
-        parameters["targets"] = {week: target_map(week) for week in later}
-        parameters["stops"] = list(stops)
-    parameters["growth"] = growth | sizes
-    return parameters
 
 
 def sizes_on_curves(

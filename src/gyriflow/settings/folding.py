@@ -2,7 +2,7 @@
 parameters of a run."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -147,6 +147,34 @@ VARYING = tuple(
 GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_s"))
 
 
+def mapped_parameters(settings: FoldingSettings) -> dict[str, Varying]:
+    """Return the parameters of a run that have a map."""
+    mapped = {}
+    for name in VARYING:
+        value = getattr(settings, name)
+        if isinstance(value, Varying) and value.map is not None:
+            mapped[name] = value
+    return mapped
+
+
+def parameters(settings: FoldingSettings) -> dict[str, Any]:
+    """Return the settings of a run for its `params.yaml` (see `run_parameters`). A map
+    has the name of its parameter.
+
+    The number of ranks is left out, since results do not depend on it.
+    """
+    plain = settings.model_dump(mode="json", exclude={"ranks", "start", "ensemble"})
+    plain["growth"] = settings.growth.own_keys()
+    mapped = mapped_parameters(settings)
+    for name in VARYING:
+        value = getattr(settings, name)
+        if isinstance(value, Varying):
+            plain[name] = {"weeks": value.weeks} if value.weeks else {}
+        if name in mapped:
+            plain[name]["map"] = name
+    return plain
+
+
 def output_weeks(
     start_week: float,
     end_week: float,
@@ -259,6 +287,35 @@ def value_problems(
             " beyond 1",
             ("step_s",),
         )
+
+
+def run_parameters(
+    settings: Mapping[str, Any],
+    growth: Mapping[str, Any],
+    weeks: Sequence[float],
+    surface: Mapping[str, Any],
+    target_weeks: Sequence[float],
+    stops: Sequence[float],
+) -> dict[str, Any]:
+    """Return the content of the `params.yaml` of a run, `FoldingParameters` as plain
+    values.
+
+    `settings` are its `parameters`, `growth` is their section with sizes as numbers by
+    week, `weeks` its output weeks, `surface` is the report of the start brain's
+    surface. `target_weeks` are those of the shapes that it grows towards, `stops` the
+    ones of them without an observed brain; both are empty for other growth.
+    """
+    content = {
+        "start_week": weeks[0],
+        "output_weeks": list(weeks),
+        "fissure_x_mm": surface["fissure_x_mm"],
+        "side": surface.get("side"),
+        **settings,
+    }
+    if target_weeks:
+        content["targets"] = {week: target_map(week) for week in target_weeks}
+        content["stops"] = list(stops)
+    return content | {"growth": growth}
 
 
 def target_map(week: float) -> str:

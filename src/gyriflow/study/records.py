@@ -10,11 +10,9 @@ from typing import Any, Literal
 
 from ..settings.brains import ShapeSettings
 from ..settings.ensemble import Variation
-from ..settings.folding import VARYING
 from ..settings.growth import Origin
 from ..settings.runs import Run
 from ..settings.terms import OBSERVED_BRAIN, AffineSource, Coordinates, Side
-from ..settings.varying import Varying
 from . import paths
 
 
@@ -216,34 +214,6 @@ class Simulation:
     def has_growth_maps(self) -> bool:
         """Whether maps of the growth that it found can be written."""
         return self.shapes is not None and "growth" in self.settings.fields
-
-
-def mapped_parameters(settings: Run) -> dict[str, Varying]:
-    """Return the parameters of a run that have a map."""
-    mapped = {}
-    for name in VARYING:
-        value = getattr(settings, name)
-        if isinstance(value, Varying) and value.map is not None:
-            mapped[name] = value
-    return mapped
-
-
-def parameters(settings: Run) -> dict[str, Any]:
-    """Return the settings of a run for its `params.yaml`. A map has the name of its
-    parameter.
-
-    The number of ranks is left out, since results do not depend on it.
-    """
-    plain = settings.model_dump(mode="json", exclude={"ranks", "start", "ensemble"})
-    plain["growth"] = settings.growth.own_keys()
-    mapped = mapped_parameters(settings)
-    for name in VARYING:
-        value = getattr(settings, name)
-        if isinstance(value, Varying):
-            plain[name] = {"weeks": value.weeks} if value.weeks else {}
-        if name in mapped:
-            plain[name]["map"] = name
-    return plain
 
 
 @dataclass(frozen=True, kw_only=True)

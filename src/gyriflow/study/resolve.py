@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from ..errors import InputError
-from ..settings.folding import output_weeks
+from ..settings.folding import mapped_parameters, output_weeks
 from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
 from ..settings.runs import (
@@ -32,7 +32,6 @@ from .records import (
     MeasuredBrain,
     Simulation,
     SweepRun,
-    mapped_parameters,
     measured_files,
 )
 from .series import (

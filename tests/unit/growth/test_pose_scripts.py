@@ -319,7 +319,7 @@ def test_a_series_is_followed_through_the_poses_of_its_brains(tmp_path, monkeypa
     params = {
         "weeks": [21.0, 22.0, 23.0],
         "posed": [(False, False), (True, False)],
-        "opens_sulci": False,
+        "open_sulci": False,
     }
     params |= {"code": "", "origin": "atlas", "store": str(tmp_path)}
     brain = SimpleNamespace(brain="first")
@@ -374,7 +374,7 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
     params = {
         "posed": posed,
         "further_weeks": [],
-        "opens_sulci": False,
+        "open_sulci": False,
         "variation": None,
         "left_out": ["crl"],
     }

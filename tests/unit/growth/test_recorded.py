@@ -30,6 +30,7 @@ from gyriflow.growth import (
     registration,
     series_shapes,
 )
+from gyriflow.settings.folding import run_parameters
 
 WEEKS = np.array([21.0, 21.0, 22.5, 23.0, 25.0, 25.0, 26.5, 28.0])
 
@@ -95,14 +96,14 @@ def test_numbers_of_curves(recorded):
             "intervals": [curves.interval(curve, at) for curve in (kept.curve, plain)],
             "followed": curves.followed_sizes(growth, table, "surface", weeks, False),
             "sizes": curves.sizes_on_curves({"model": "rates"}, table, "volume", weeks),
-            "parameters": curves.run_parameters(
+            "parameters": run_parameters(
                 {"growth": {"model": "shapes"}, "thickness_mm": 2.0},
+                {"model": "shapes"}
+                | curves.followed_sizes(sizes, table, "volume", weeks, True),
                 weeks,
                 surface,
-                sizes,
+                [23.0, 24.0],
                 [23.0],
-                table,
-                "volume",
             ),
             "shrinks": answer_of(curves.tabulated, [21, 24, 30], [90.0, 80.0, 99.0]),
         }

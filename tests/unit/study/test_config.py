@@ -14,12 +14,11 @@ from facts import Facts
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings.atlas import Atlas
-from gyriflow.settings.folding import output_weeks, parameters_from
+from gyriflow.settings.folding import output_weeks, parameters, parameters_from
 from gyriflow.settings.root import Config
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
-from gyriflow.study.records import parameters
 
 
 def test_all_mistakes_are_named_at_once():

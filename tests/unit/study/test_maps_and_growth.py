@@ -4,9 +4,9 @@ import pytest
 from configurations import both_kinds, labelled, problems
 from facts import Facts
 
+from gyriflow.settings.folding import mapped_parameters, parameters
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
-from gyriflow.study.records import mapped_parameters, parameters
 
 
 def study(folding, **others):
