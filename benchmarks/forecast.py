@@ -23,8 +23,8 @@ import pandas as pd
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.messages import read_events
 from gyriflow.running.cost import job_seconds
-from gyriflow.running.jobs import usage_in
 from gyriflow.settings.base import folder_of
+from gyriflow.step import usage_in
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
 from gyriflow.study.study import Study

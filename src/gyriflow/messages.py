@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ OUT_OF_MEMORY = "it was killed, most probably because memory ran out"
 OWN_LOGGERS = ("root", "gyriflow", "__main__")
 FOLDERS = {"brains": ["brain"], "runs": ["run", "brain"]}
 """What the folders around a log name, by folder in `results`."""
+REPORT_STEP = "html_report"
 
 
 @dataclass(frozen=True)
@@ -67,15 +69,19 @@ def messages_file(log: str | Path) -> Path:
     return Path(log).with_suffix(".jsonl")
 
 
+def place_of(log: Path) -> dict[str, str]:
+    """Return the step, brain and run of a log with a path in `results`, "" if not
+    applicable."""
+    place = {"step": log.stem, "brain": "", "run": ""}
+    if log.parts[0] == "results":
+        _, kind, *names = log.parts
+        place |= zip(FOLDERS.get(kind, []), names, strict=False)
+    return place
+
+
 def write_message(log: str | Path, message: Message) -> None:
     """Add a message to those of the step that has this log, a path in `results`."""
-    path = Path(log)
-    row = asdict(message)
-    row["step"] = path.stem
-    if path.parts[0] == "results":
-        _, kind, *names = path.parts
-        keys = FOLDERS.get(kind, [])
-        row |= zip(keys, names, strict=False)
+    row = asdict(message) | place_of(Path(log))
     known = {name: value for name, value in row.items() if value}
     write_event(log, known)
 
@@ -124,6 +130,22 @@ def study_messages(directory: Path, since_s: float = 0.0) -> list[Message]:
         if time_s >= since_s:
             messages += read_messages(path)
     return messages
+
+
+def reported_messages(
+    directory: Path,
+    brains: Iterable[str],
+    runs: Iterable[Iterable[str]],
+) -> list[Message]:
+    """Return the messages of a study, of some of its brains, and of some (run, brain)
+    pairs, by run, brain and step; without those of the report, which shows them."""
+    places = {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)}
+    found = []
+    for message in study_messages(directory):
+        is_known = (message.run, message.brain) in places
+        if is_known and message.step != REPORT_STEP:
+            found.append(message)
+    return sorted(found, key=attrgetter("run", "brain", "step"))
 
 
 class MessageHandler(logging.Handler):

@@ -1,8 +1,5 @@
 # Resources and warnings of all jobs, and the report: an HTML page of the study and one of each brain, with the figures
 # and tables of `figures.smk`.
-from itertools import takewhile
-
-from gyriflow.running.snakemake_internals import message_patterns
 from gyriflow.settings.terms import run_names
 
 # the configuration; brains of atlases and of the table of participants are already among its brains
@@ -72,10 +69,8 @@ rule study_records:
             for path in paths
         ],
         folded=study.pairs,
-        # pattern of the messages of each rule, with time and memory; those of earlier configurations do not match
-        messages=lambda w: message_patterns(
-            takewhile(lambda rule: rule.name != "study_records", workflow.rules)
-        ),
+        # also those of sweeps, whose time and memory count
+        simulated=list(study.simulations),
         growth_of=[simulation.growth_of for simulation in study.run_simulations],
         # used by the methods text
         method=lambda w: {

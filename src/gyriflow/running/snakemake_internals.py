@@ -92,14 +92,3 @@ def check_brains(
 
 def _is_made(path: str, rules: Collection[Any]) -> bool:
     return any(rule.is_producer(path) for rule in rules)
-
-
-def message_patterns(rules: Iterable[Any]) -> dict[str, str]:
-    """Return the regular expression of the messages of each rule, which lie beside its
-    log, with wildcards as groups."""
-    patterns = {}
-    for rule in rules:
-        if rule.log:
-            log = rule.log[0].regex().pattern
-            patterns[rule.name] = log.replace(r"\.log", r"\.jsonl")
-    return patterns

@@ -285,9 +285,7 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
     }
     params["files"] = [(brain["id"], "labels", brain["labels"]) for brain in brains]
     params["known_brains"] = ["young", "old"]
-    params["messages"] = {
-        "simulate": r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/logs/simulate\.jsonl"
-    }
+    params["simulated"] = FOLDED
     run_script(
         "study_records.py",
         folder,

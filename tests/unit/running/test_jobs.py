@@ -7,22 +7,8 @@ import pytest
 
 from gyriflow import code_hash as sources
 from gyriflow.code_hash import code_hash, modules_behind
-from gyriflow.messages import Message, write_message
-from gyriflow.running.jobs import gather_messages, read_usage
-from gyriflow.step import Usage, record_usage
-
-PATTERNS = {
-    "pial_from_labels": (
-        r"results/brains/(?P<brain>a|b)/logs/pial_from_labels\.jsonl$"
-    ),
-    "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/logs/simulate\.jsonl$",
-    "run_tables": r"results/study/logs/run_tables\.jsonl$",
-}
-
-
-def write_lines(path, *lines):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(lines) + "\n")
+from gyriflow.messages import Message, reported_messages, write_message
+from gyriflow.step import USAGE_COLUMNS, Usage, read_usage, record_usage
 
 
 def test_messages_are_gathered_by_brain_and_run(tmp_path, monkeypatch):
@@ -43,8 +29,11 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path, monkeypatch):
         log.parent.mkdir(parents=True, exist_ok=True)
         for _ in range(2):
             write_message(log, Message("warning", f"{place}\nmore of it"))
-    table = gather_messages(tmp_path, ["a"], [("r", "a")])
-    assert table.to_numpy().tolist() == [
+    found = [
+        [message.brain, message.run, message.step, message.level, message.first_line]
+        for message in reported_messages(tmp_path, ["a"], [["r", "a"]])
+    ]
+    assert found == [
         ["", "", "poses", "warning", "study/logs/poses"],
         ["", "", "week21.nii.gz", "warning", "study/logs/atlas_file/x/week21.nii.gz"],
         ["a", "", "measure", "warning", "brains/a/metrics/logs/measure"],
@@ -52,7 +41,7 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path, monkeypatch):
         ["a", "r", "measure", "warning", "runs/r/a/metrics/week-22.00/logs/measure"],
         ["a", "r", "simulate", "warning", "runs/r/a/logs/simulate"],
     ]
-    assert gather_messages(tmp_path / "empty", ["a"], []).empty
+    assert reported_messages(tmp_path / "empty", ["a"], []) == []
 
 
 def record(folder, name, *used):
@@ -64,28 +53,29 @@ def record(folder, name, *used):
         record_usage(log, Usage(*used))
 
 
-def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
-    record(tmp_path, "brains/a/logs/pial_from_labels", 10.5, 9.75, 200.25)
-    record(tmp_path, "brains/b/logs/pial_from_labels", 11, 10, 210)
+def test_steps_that_have_ended_are_found_with_their_rules_brains_and_runs(tmp_path):
+    record(tmp_path, "brains/a/logs/pial", 10.5, 9.75, 200.25)
+    record(tmp_path, "brains/a/logs/targets.self", 11, 10, 210)
     record(tmp_path, "runs/two/a/logs/simulate", 100, 190, 1000)
-    # of an earlier configuration
-    record(tmp_path, "brains/c/logs/pial_from_labels", 1, 1, 1)
-    record(tmp_path, "runs/three/a/logs/simulate", 1, 1, 1)
+    record(tmp_path, "runs/two/a/logs/measure_simulated.week-22.00", 3, 2, 1)
+    record(tmp_path, "study/logs/atlas_file/x/week21.nii.gz", 1, 1, 1)
     # it has failed
     record(tmp_path, "study/logs/run_tables")
-    jobs = read_usage(tmp_path, PATTERNS)
-    assert jobs.fillna("").to_numpy().tolist() == [
-        ["pial_from_labels", "", "a", 10.5, 9.75, 200.25],
-        ["pial_from_labels", "", "b", 11.0, 10.0, 210.0],
+    names = ("rule", "run", "brain", *USAGE_COLUMNS)
+    assert [[job[name] for name in names] for job in read_usage(tmp_path)] == [
+        ["pial", "", "a", 10.5, 9.75, 200.25],
+        ["targets", "", "a", 11.0, 10.0, 210.0],
+        ["measure_simulated", "two", "a", 3.0, 2.0, 1.0],
         ["simulate", "two", "a", 100.0, 190.0, 1000.0],
+        ["atlas_file", "", "", 1.0, 1.0, 1.0],
     ]
 
 
 def test_half_a_line_that_a_full_disk_left_is_no_record(tmp_path):
-    record(tmp_path, "brains/a/logs/pial_from_labels", 10.5, 9.75, 200.25)
-    path = tmp_path / "results" / "brains" / "a" / "logs" / "pial_from_labels.jsonl"
+    record(tmp_path, "brains/a/logs/pial", 10.5, 9.75, 200.25)
+    path = tmp_path / "results" / "brains" / "a" / "logs" / "pial.jsonl"
     path.write_text(path.read_text()[:-5])
-    assert read_usage(tmp_path, PATTERNS).empty
+    assert read_usage(tmp_path) == []
 
 
 @pytest.fixture
