@@ -1,8 +1,6 @@
 """Score a run of the calibration against the observed brains; no score if it
 diverged."""
 
-from itertools import islice
-
 import pandas as pd
 
 from gyriflow.compare.calibration import run_score
@@ -18,43 +16,37 @@ from gyriflow.step import step
 files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
 
 
-def _surfaces_at_week(regions, frames):
-    """Return the pial surfaces of a simulation at the week of the comparison: the
-    whole, left and right."""
-    return folded_surfaces(read_regions(regions), read_positions(frames, params.week))
+def pairs_with(observed, simulated):
+    """Yield, for each simulated brain, what there is of it and of each of its observed
+    brains."""
+    for brain, count in zip(simulated, params.compared, strict=True):
+        for _ in range(count):
+            yield brain, next(observed)
 
 
 with step(snakemake.log[0]):
     values = read_table(files.design).set_index("run").loc[run].to_dict()
-    causes = [
-        summary["diverged"]
-        for summary in map(read_json, files.summaries)
-        if summary["diverged"]
-    ]
+    endings = [read_json(path)["diverged"] for path in files.summaries]
+    causes = [cause for cause in endings if cause]
     radius_mm = params.settings["curvature_radius_mm"]
+    simulated = []
     # a diverged run has not reached the week
-    simulated = (
-        [] if causes else list(map(_surfaces_at_week, files.regions, files.frames))
-    )
-
-    def pair_up(simulations, observed):
-        """Yield each simulation's surface or table with that of each of its observed
-        brains."""
-        for simulation, count in zip(simulations, params.compared, strict=True):
-            yield from ((simulation, brain) for brain in islice(observed, count))
-
+    if not causes:
+        for regions, frames in zip(files.regions, files.frames, strict=True):
+            positions = read_positions(frames, params.week)
+            simulated.append(folded_surfaces(read_regions(regions), positions))
     brains = (
         observed_brain(path, read_surface(path), radius_mm) for path in files.observed
     )
-    pairs = pair_up((whole for whole, _, _ in simulated), brains)
     simulated_spectra = (
         surface_spectra(left, right, **params.settings) for _, left, right in simulated
     )
-    spectra = pair_up(simulated_spectra, map(read_table, files.spectra))
     score = run_score(
-        pairs, params.weights, causes, radius_mm=radius_mm, spectra=spectra
+        pairs_with(brains, [whole for whole, _, _ in simulated]),
+        params.weights,
+        causes,
+        radius_mm=radius_mm,
+        spectra=pairs_with(map(read_table, files.spectra), simulated_spectra),
     )
-    write_table(
-        snakemake.output[0],
-        pd.DataFrame([{"run": run, "round": params.round, **values, **score}]),
-    )
+    row = {"run": run, "round": params.round, **values, **score}
+    write_table(snakemake.output[0], pd.DataFrame([row]))

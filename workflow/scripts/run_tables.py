@@ -28,48 +28,22 @@ BEFORE_THE_SOLVE = (
 files, output, folded = snakemake.input, snakemake.output, snakemake.params.folded
 with step(snakemake.log[0]):
     rows, runs, displacements = [], {}, []
-    files_of_runs = zip(
-        files.params,
-        files.summaries,
-        files.zones,
-        files.steps,
-        files.frames,
-        strict=True,
-    )
-    runs_and_files = zip(
-        run_names(folded),
-        folded,
-        snakemake.params.growth_of,
-        files_of_runs,
-        strict=True,
-    )
-    for (
-        name,
-        (run, brain),
-        grown,
-        (
-            params,
-            summary,
-            zones,
-            steps,
-            frames,
-        ),
-    ) in runs_and_files:
-        report = read_json(zones)
+    names = run_names(folded)
+    for number, (run, brain) in enumerate(folded):
+        report = read_json(files.zones[number])
         before = {name: report[name] for name in BEFORE_THE_SOLVE}
-        settings = read_yaml(params)
+        settings = read_yaml(files.params[number])
         has_layers = GROWTH_MODELS[settings["growth"]["model"]].has_layers
-        resolved = resolution_over_steps(
-            report["order"], read_table(steps), has_layers=has_layers
-        )
-        found = {**read_json(summary), **before, **resolved}
-        settings["growth_of"] = grown
+        steps = read_table(files.steps[number])
+        resolved = resolution_over_steps(report["order"], steps, has_layers=has_layers)
+        found = {**read_json(files.summaries[number]), **before, **resolved}
+        settings["growth_of"] = snakemake.params.growth_of[number]
         rows.append({"run": run, "subject": brain, **settings, **found})
         # targets are in files
         settings.pop("targets", None)
-        runs[name] = settings | {
-            key: value for key, value in found.items() if key in COMMON_PARAMETERS
-        }
+        common = {key: found[key] for key in found if key in COMMON_PARAMETERS}
+        runs[names[number]] = settings | common
+        frames = files.frames[number]
         weeks = read_weeks(frames)
         positions = [read_positions(frames, week) for week in weeks]
         _, pial = boundary_surface(TetrahedralMesh(positions[0], read_tets(frames)))

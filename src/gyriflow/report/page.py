@@ -359,47 +359,22 @@ def brain_rows(
     `linked` are the ids of the brains whose source is on a page of their own.
     """
     judged = quality.set_index("subject").fillna("")
-    measured, rated = (
-        table[
-            (table["run"] == OBSERVED)
-            & (table["hemisphere"] == "whole")
-            & table["value"].notna()
-        ]
-        for table in (metrics, centiles)
-    )
-    values = dict(
-        zip(
-            zip(measured["subject"], measured["metric"], strict=True),
-            measured["value"],
-            strict=True,
-        )
-    )
-    texts = dict(
-        zip(
-            zip(rated["subject"], rated["metric"], strict=True),
-            centile_text(rated),
-            strict=True,
-        )
-    )
-    shown = [
-        name
-        for name in metrics_shown(Shown.BRAINS)
-        if name in {metric for _, metric in values}
-    ]
+    measured = _by_brain(metrics)
+    values = measured["value"].to_dict()
+    names = set(measured["metric"])
+    rated = _by_brain(centiles)
+    texts = dict(zip(rated.index, centile_text(rated), strict=True))
+    shown = [name for name in metrics_shown(Shown.BRAINS) if name in names]
     rows = []
     for brain in brains:
         key = brain["id"]
-        numbers = {
-            metric_title(name): (
-                (
-                    METRICS[name].text(values[key, name]),
-                    texts.get((key, name), ""),
-                )
-                if (key, name) in values
-                else ("–", "")
-            )
-            for name in shown
-        }
+        numbers = {}
+        for name in shown:
+            number = ("–", "")
+            if (key, name) in values:
+                value = METRICS[name].text(values[key, name])
+                number = (value, texts.get((key, name), ""))
+            numbers[metric_title(name)] = number
         is_linked, is_synthetic = key in linked, brain["synthetic"]
         licence = brain["licence"] or (
             "made here" if is_synthetic else "" if is_linked else "your own data"
@@ -419,6 +394,13 @@ def brain_rows(
         }
         rows.append({**brain, "numbers": numbers, **described})
     return rows
+
+
+def _by_brain(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the values of whole observed brains, by brain and metric."""
+    is_observed = (table["run"] == OBSERVED) & (table["hemisphere"] == "whole")
+    rows = table[is_observed & table["value"].notna()]
+    return rows.set_index(["subject", "metric"], drop=False)
 
 
 def scores_table(

@@ -212,25 +212,8 @@ def nearest_figure(
     return figure
 
 
-def paper_nearest_figure(
-    comparison: pd.DataFrame,
-    published: Mapping[str, Any],
-    *,
-    varied: str,
-    subject: str,
-    observed: Sequence[str],
-    week: float,
-) -> Figure:
-    """Draw the distance of the runs of a sweep with the paper's nearest values (see
-    `nearest_figure`)."""
-    return nearest_figure(
-        comparison,
-        varied=varied,
-        subject=subject,
-        observed=observed,
-        week=week,
-        published=published,
-    )
+paper_nearest_figure = nearest_figure
+"""Of a rule with the values of the paper as `published`."""
 
 
 def _nearest_line(

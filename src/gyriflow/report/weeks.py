@@ -609,15 +609,8 @@ def displacement_figure(
     return figure
 
 
-def paper_displacement_figure(
-    displacement: pd.DataFrame,
-    published: Mapping[str, Any],
-    *,
-    runs: Sequence[str] = (),
-) -> Figure:
-    """Draw the displacement per week beside that of the paper (see
-    `displacement_figure`)."""
-    return displacement_figure(displacement, runs=runs, published=published)
+paper_displacement_figure = displacement_figure
+"""Of a rule with the values of the paper as `published`."""
 
 
 def _band_rows(

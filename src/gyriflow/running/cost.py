@@ -136,32 +136,32 @@ def job_seconds(
     wildcards: Mapping[str, str],
 ) -> float:
     """Predict the processor time of a job, by its rule and wildcards."""
-    mesh = study.config.mesh
+    return START_SECONDS + _work_seconds(study, rule, wildcards)
+
+
+def _work_seconds(
+    study: Study,
+    rule: str,
+    wildcards: Mapping[str, str],
+) -> float:
+    mesh, path_mesh = study.config.mesh, study.config.growth.path_mesh
+    brain = wildcards.get("brain", "")
     if rule in FOLDINGS:
-        return (
-            START_SECONDS
-            + simulation_needs(
-                study.simulations[wildcards["run"], wildcards["brain"]], mesh
-            ).seconds
-        )
-    if rule in ("tetrahedralise", "path_mesh"):
-        settings = study.config.growth.path_mesh if rule == "path_mesh" else mesh
-        week = study.brains[wildcards["brain"]].week
-        return START_SECONDS + _meshing_seconds(week, settings)
-    if rule == "atlas_path":
-        path = study.paths[wildcards["brain"]]
-        return START_SECONDS + _series_seconds(
-            study, path.weeks, study.config.growth.path_mesh
-        )
-    if rule == "targets":
-        return START_SECONDS + _series_seconds(
-            study, study.chains[wildcards["brain"], wildcards["origin"]].weeks, mesh
-        )
-    if rule == "predicted_targets":
-        return START_SECONDS + _prediction_seconds(
-            study, wildcards["brain"], wildcards["origin"]
-        )
-    return START_SECONDS + _brain_seconds(study, rule, wildcards)
+        simulation = study.simulations[wildcards["run"], brain]
+        return simulation_needs(simulation, mesh).seconds
+    match rule:
+        case "tetrahedralise":
+            return _meshing_seconds(study.brains[brain].week, mesh)
+        case "path_mesh":
+            return _meshing_seconds(study.brains[brain].week, path_mesh)
+        case "atlas_path":
+            return _series_seconds(study, study.paths[brain].weeks, path_mesh)
+        case "targets":
+            chain = study.chains[brain, wildcards["origin"]]
+            return _series_seconds(study, chain.weeks, mesh)
+        case "predicted_targets":
+            return _prediction_seconds(study, brain, wildcards["origin"])
+    return _brain_seconds(study, rule, wildcards)
 
 
 def _brain_seconds(

@@ -419,36 +419,17 @@ def set_user_name() -> None:
         os.environ["LOGNAME"] = f"user-{os.getuid()}"
 
 
-def is_anything(record: logging.LogRecord) -> bool:
-    """Return that a record of Snakemake's log is shown."""
-    return True
-
-
-def is_message(record: logging.LogRecord) -> bool:
-    """Return whether a record of Snakemake's log is shown: no details."""
-    return record.levelno >= logging.INFO
-
-
-def is_no_progress(record: logging.LogRecord) -> bool:
-    """Return whether a record of Snakemake's log is shown, but not its progress."""
-    is_progress = vars(record).get("event") in ("job_finished", "progress")
-    return is_message(record) and not is_progress
-
-
-def is_error(record: logging.LogRecord) -> bool:
-    """Return whether a record of Snakemake's log is an error."""
-    return record.levelno >= logging.ERROR
-
-
 def call_snakemake(
     arguments: Sequence[str],
     events: Events,
-    is_wanted: Callable[[logging.LogRecord], bool] = is_message,
+    level: int = logging.INFO,
+    unwanted: Collection[str] = (),
 ) -> int:
     """Run Snakemake in this process; return its exit code, or 128 plus the number of
     the signal that stopped it.
 
-    `events` takes what its log says, of which `is_wanted` selects what is shown.
+    `events` takes what its log says. Shown are records of at least a `level`, without
+    `unwanted` events.
     """
     from snakemake import cli
 
@@ -459,9 +440,11 @@ def call_snakemake(
             # Snakemake's own handler, set by now, waits for running jobs to end
             signal.signal(signal.SIGTERM, interrupt)
         events.take(record)
-        names = NO_RULE.findall(record.getMessage()) if is_message(record) else []
+        is_message = record.levelno >= logging.INFO
+        names = NO_RULE.findall(record.getMessage()) if is_message else []
         unknown_targets.extend(names)
-        return not names and is_wanted(record)
+        is_wanted = getattr(record, "event", None) not in unwanted
+        return record.levelno >= level and is_wanted and not names
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         received_signals.append(number)
@@ -581,7 +564,7 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
     arguments = [*BY_MANIFEST, *call.arguments, *profile, *PLANNING]
-    code = call_snakemake(arguments, events, is_error)
+    code = call_snakemake(arguments, events, logging.ERROR)
     if code:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
@@ -630,21 +613,22 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
     """Run Snakemake, whose outdated results are hidden, and write the manifest of each
     job that ends; return its exit code, and the keys of these jobs."""
     is_detailed = call.options.verbose or call.options.debug_dag
-    is_wanted = is_anything if is_detailed else is_message
+    level = logging.NOTSET if is_detailed else logging.INFO
     arguments = [*BY_MANIFEST, *call.arguments]
     if not call.runs:
-        return call_snakemake(arguments, Events(plan.reasons), is_wanted), set()
+        return call_snakemake(arguments, Events(plan.reasons), level), set()
 
     def finish(job: Job) -> None:
         # a result without a manifest is made again
         with suppress(StorageError):
             write_manifest(job, plan.found)
 
+    unwanted: Collection[str] = ()
     if "progress" in call.quiet:
         # Snakemake would not name the jobs that have finished
         others = [word for word in call.quiet if word != "progress"]
         arguments += ["--quiet", *(others or ["host"])]
-        is_wanted = is_no_progress
+        level, unwanted = logging.INFO, ("job_finished", "progress")
     output: AbstractContextManager[None] = nullcontext()
     if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
@@ -655,7 +639,7 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
     events = Events(plan.reasons, finish)
     try:
         with output:
-            code = call_snakemake(arguments, events, is_wanted)
+            code = call_snakemake(arguments, events, level, unwanted)
     finally:
         restore_results(call.directory, events.started)
     return code, events.ended
