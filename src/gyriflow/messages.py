@@ -121,14 +121,20 @@ def messages_in(rows: Iterable[Mapping[str, Any]]) -> list[Message]:
     return list(dict.fromkeys(messages))
 
 
+def messages_files(directory: Path, since_s: float = 0.0) -> list[Path]:
+    """Return the files of messages in a working directory that were written after a
+    time (s since the epoch), the first one first."""
+    paths = (directory / "results").rglob("*.jsonl")
+    by_time = sorted((path.stat().st_mtime, path) for path in paths)
+    return [path for time_s, path in by_time if time_s >= since_s]
+
+
 def study_messages(directory: Path, since_s: float = 0.0) -> list[Message]:
     """Return the messages of the steps of a working directory that wrote any after a
     time (s since the epoch), the first step first."""
-    paths = (directory / "results").rglob("*.jsonl")
     messages = []
-    for time_s, path in sorted((path.stat().st_mtime, path) for path in paths):
-        if time_s >= since_s:
-            messages += read_messages(path)
+    for path in messages_files(directory, since_s):
+        messages += read_messages(path)
     return messages
 
 

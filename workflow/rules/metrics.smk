@@ -99,7 +99,7 @@ rule white:
         columns=lambda w: BRAINS[w.brain].columns,
         labels=lambda w: label_source(CONFIG, BRAINS[w.brain]),
         white=lambda w: BRAINS[w.brain].white_files,
-        surface=lambda w: surface_settings("edge_length_mm") if BRAINS[w.brain].labels else MESH_SETTINGS,
+        surface=lambda w: EDGE_LENGTH if BRAINS[w.brain].labels else MESH_SETTINGS,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/white.py"

@@ -76,7 +76,7 @@ rule study_records:
         method=lambda w: {
             "brains": descriptions(brain for brain in CONFIG.brains if brain.id in BRAINS),
             "filled": study.filled,
-            "surface": surface_settings("edge_length_mm", "open_sulci"),
+            "surface": LABEL_SETTINGS,
             "mesh": CONFIG.mesh.model_dump(mode="json", include={"mesher", "order"}),
             "metrics": CONFIG.metrics.model_dump(mode="json", include={"curvature_radius_mm"}),
         },

@@ -13,14 +13,10 @@ def surface_memory(wildcards):
     return surface_memory_mib(brain.labels, brain.week) if brain.labels else 4000
 
 
-def surface_settings(*names):
-    """Return the surface settings for one kind of data."""
-    return CONFIG.surface.model_dump(include=set(names))
-
-
 # settings that matter for a brain, by its source
-LABEL_SETTINGS = surface_settings("edge_length_mm", "open_sulci")
-MESH_SETTINGS = surface_settings("edge_length_mm", "max_hole_mm")
+LABEL_SETTINGS = CONFIG.surface.model_dump(include={"edge_length_mm", "open_sulci"})
+MESH_SETTINGS = CONFIG.surface.model_dump(include={"edge_length_mm", "max_hole_mm"})
+EDGE_LENGTH = {"edge_length_mm": CONFIG.surface.edge_length_mm}
 
 
 def pial_settings(brain):
@@ -37,7 +33,7 @@ rule shape:
     wildcard_constraints:
         brain=brains_where(lambda brain: brain.shape),
     params:
-        shape=lambda w: BRAINS[w.brain].shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
+        shape=lambda w: BRAINS[w.brain].shape.model_dump(mode="json") | EDGE_LENGTH,
     script:
         "../scripts/shape.py"
 

@@ -3,6 +3,7 @@ results so far."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from tabulate import tabulate
 
 from ..errors import InputError, StorageError
 from ..io.files import read_json
-from ..messages import read_events
+from ..messages import INTERRUPTED, messages_files, read_events, read_messages
 from ..shipped import CONFIG
 from ..study.paths import PLAN
 from ..study.records import Simulation
@@ -55,7 +56,7 @@ def status(directory: Path) -> Iterator[str]:
             is_live = lock is None
             if lock:
                 lock.close()
-    yield from _lines(state, is_live)
+    yield from _lines(directory, state, is_live)
     brains = [
         {"brain": folder.name}
         | {
@@ -123,7 +124,11 @@ def _planned(directory: Path) -> list[tuple[str, str]]:
     return []
 
 
-def _lines(state: dict[str, Any] | None, live: bool) -> Iterator[str]:
+def _lines(
+    directory: Path,
+    state: dict[str, Any] | None,
+    live: bool,
+) -> Iterator[str]:
     if state is None:
         yield "a run is in progress" if live else "nothing is running"
         return
@@ -148,9 +153,14 @@ def _lines(state: dict[str, Any] | None, live: bool) -> Iterator[str]:
         )
     else:
         yield f"last run: {state['began']} to {state['ended']}, {steps}"
-    for failure in state["failed"]:
-        yield f"  failed: {failure['job']}: {failure['cause']}"
-        yield from (f"          log: {log}" for log in failure["logs"])
+    began_s = datetime.fromisoformat(state["began"]).timestamp()
+    for path in messages_files(directory, began_s):
+        for message in read_messages(path):
+            if message.level == "error" and message.exit_code != INTERRUPTED:
+                place = message.step, message.run, message.brain
+                job = " ".join(filter(None, place))
+                yield f"  failed: {job}: {message.text}"
+                yield f"          log: {path.with_suffix('.log').absolute()}"
     yield f"  details: {state['details']}"
 
 

@@ -113,7 +113,7 @@ class RunDisplay:
         self.running: dict[int, Job] = {}
         self.work_done = 0.0
         self.done = self.total = self.next_percent = 0
-        self.failed: list[dict[str, Any]] = []
+        self.n_failed = 0
         self.messages = Kinds()
         self.sizes: set[str] = set()
         self.failure_messages: list[str] = []
@@ -188,13 +188,7 @@ class RunDisplay:
             self._follow(job)
         reason = self._cause(event)
         name = job.name if job else event["rule_name"]
-        self.failed.append(
-            {
-                "job": name,
-                "cause": reason,
-                "logs": [str(Path(log).absolute()) for log in event["log"]],
-            }
-        )
+        self.n_failed += 1
         line = f"failed  {name}: {reason}"
         if self.messages.add(name, line):
             self.console.print(
@@ -267,7 +261,6 @@ class RunDisplay:
                 "running": running,
                 "done": self.done,
                 "total": self.total,
-                "failed": self.failed,
                 "interrupted": bool(received_signals),
                 "details": str(self.details),
             }
@@ -286,8 +279,8 @@ class RunDisplay:
         done = f"{self.done} of {self.total} steps done"
         if received_signals:
             self.console.print(f"gyriflow: interrupted after {took}, {done}")
-        elif self.failed:
-            failed = f"finished after {took} with {len(self.failed)} failed"
+        elif self.n_failed:
+            failed = f"finished after {took} with {self.n_failed} failed"
             self.console.print(
                 f"gyriflow: {failed}, {done}; run the same command again to resume"
             )

@@ -3,7 +3,9 @@ is, and whose results."""
 
 import io
 import logging
+import os
 import signal
+from pathlib import Path
 
 import pytest
 from configurations import LABELLED, touched
@@ -133,9 +135,6 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         Facts(log),
         Facts("gyriflow:", "5 s", 1, 0, 2),
     ]
-    assert run.state["failed"] == [
-        {"job": "pial_from_labels a", "cause": "a.nii: is no image", "logs": [str(log)]}
-    ]
 
 
 @pytest.mark.parametrize(
@@ -227,7 +226,7 @@ def test_a_hundred_equal_warnings_and_failures_are_three_lines_each_and_a_number
     assert sum(line.startswith("failed ") for line in run.lines) == 3
     assert Facts("97 more", "voxels of 0 mm") in run.lines
     assert Facts("47 more", "is empty") in run.lines
-    assert len(run.state["failed"]) == 50
+    assert run.display.n_failed == 50
 
 
 def test_a_run_until_a_stage_says_when_it_is_done(run):
@@ -246,7 +245,7 @@ def test_what_was_stopped_is_no_failure(run, monkeypatch):
     run.display.end()
     assert run.lines[-1] == Facts("gyriflow:", "5 s", 0, 2)
     assert run.state["interrupted"]
-    assert run.state["failed"] == []
+    assert run.display.n_failed == 0
 
 
 def test_an_error_of_no_job_is_told(run):
@@ -263,7 +262,6 @@ RUNNING = {
     "total": 12,
     "left_s": 240.0,
     "running": ["folding, run r, brain a: GW 21.50 of 23"],
-    "failed": [],
     "details": "run.log",
     "interrupted": False,
 }
@@ -304,6 +302,27 @@ def test_a_run_that_was_killed_is_called_interrupted(study):
         == Facts("2026-01-01 10:05:00", 3, 12)
         != Facts("2026-01-01 10:00:00")
     )
+
+
+def test_failed_steps_are_listed_with_their_logs_but_not_interrupted_ones(
+    study, monkeypatch
+):
+    monkeypatch.chdir(study)
+    for brain, text, code in (("a", "x: is empty", 2), ("b", "it was stopped", 130)):
+        log = Path("results", "brains", brain, "logs", "pial.log")
+        log.parent.mkdir(parents=True, exist_ok=True)
+        write_message(log, Message("warning", "thin"))
+        write_message(log, Message("error", text, exit_code=code))
+    # of an earlier run
+    old = study / "results" / "brains" / "b" / "logs" / "measure.jsonl"
+    old.write_text('{"level": "error", "text": "of old"}\n')
+    os.utime(old, (0, 0))
+    lines = [line for line in "\n".join(status(study)).splitlines() if "  " in line]
+    assert lines[:2] == [
+        Facts("failed:", "pial a", "x: is empty"),
+        Facts(study / "results" / "brains" / "a" / "logs" / "pial.log"),
+    ]
+    assert not [line for line in lines if "stopped" in line or "of old" in line]
 
 
 def test_stages_of_brains_and_runs_are_told_from_their_files(study):
