@@ -70,7 +70,7 @@ complete_rules(workflow.rules, ENVIRONMENT)
 SCRIPTS = Path(workflow.basedir, "workflow", "scripts")
 rerun_on_code_changes(workflow.rules, SCRIPTS)
 try:
-    check_brains(call_targets, workflow.rules, BRAINS)
+    check_brains(session.targets, workflow.rules, BRAINS)
 except GyriflowError as error:
     end_with(error)
 if RUNS and study.left_out:

@@ -1,7 +1,6 @@
 """The figures that the rules plan for a configuration, with their inputs and
 parameters."""
 
-import os
 from contextlib import chdir
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +21,7 @@ from snakemake.settings.types import (
 )
 from snakemake_interface_executor_plugins.settings import ExecMode
 
-from gyriflow.running.launch import DRY_RUN_VAR, LAUNCHED_VAR
+from gyriflow.running import launch
 
 SNAKEFILE = Path(__file__).parents[1] / "Snakefile"
 
@@ -51,7 +50,7 @@ def planned_figures(folder, config, ended=(), mode=ExecMode.DEFAULT):
     # planned as in a dry run, which leaves no records
     with (
         chdir(folder),
-        patch.dict(os.environ, {DRY_RUN_VAR: "1", LAUNCHED_VAR: "1"}),
+        patch.object(launch, "session", launch.Session(is_launched=True, is_dry=True)),
         SnakemakeApi(OutputSettings(quiet={Quietness.ALL})) as api,
     ):
         workflow = api.workflow(

@@ -11,17 +11,7 @@ from gyriflow.study.atlases import known_checksums
 from gyriflow.study.brains import label_source, registered_source
 from gyriflow.study.paths import *
 from gyriflow.study.study import read_plan, write_plan
-from gyriflow.running.launch import (
-    KEEP_GOING_VAR,
-    DIRECTORY_VAR,
-    DRY_RUN_VAR,
-    LAUNCHED_VAR,
-    MEASURE_ONLY_VAR,
-    PLANNED_VAR,
-    hold_lock,
-    refused_brains,
-    call_targets,
-)
+from gyriflow.running.launch import MEASURE_ONLY_VAR, hold_lock, refused_brains, session
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.running.snakemake_internals import remove_stale
 
@@ -34,9 +24,9 @@ shell.prefix(
 
 
 # whether this process runs the study; other processes run one job, or are dry runs
-RUNS = workflow.is_main_process and DRY_RUN_VAR not in os.environ
+RUNS = workflow.is_main_process and not session.is_dry
 # a call reads the rules once to plan, and again to run
-TELLS = workflow.is_main_process and PLANNED_VAR not in os.environ
+TELLS = workflow.is_main_process and not session.is_planned
 
 
 def planned_study():
@@ -47,15 +37,16 @@ def planned_study():
     from gyriflow.study.loading import load
     from gyriflow.io.yaml_files import read_keys
 
-    base = Path(os.environ.get(DIRECTORY_VAR, os.curdir)).absolute()
+    # a dry run is in a view of the working directory
+    directory = session.viewed or Path.cwd()
+    base = directory
     for path in workflow.configfiles:
         # Snakemake itself keeps the last of two equal keys
         file = Path(workflow.workdir_init, path)
         if set(read_keys(file)) & {"brains", "atlas", "participants"}:
             base = folder_of(file)
-    # a dry run is in a view of the working directory
-    with chdir(os.environ.get(DIRECTORY_VAR, os.curdir)):
-        found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
+    with chdir(directory):
+        found = load(config, base, keep_going=session.keeps_going)
         used = found.measured_only if MEASURE_ONLY_VAR in os.environ else found
         study = resolve(used, refused_brains())
         checksums = known_checksums(study.used_atlases)
@@ -72,7 +63,7 @@ def end_with(error):
     sys.exit(error.exit_code)
 
 
-if workflow.is_main_process and LAUNCHED_VAR not in os.environ:
+if workflow.is_main_process and not session.is_launched:
     problem = "Snakemake does not know what results were made from"
     remedy = "Start it by ./run snakemake or python -m gyriflow.running.launch, with the same arguments."
     end_with(InputError(problem, remedy=remedy))

@@ -116,17 +116,6 @@ Dates do not count, either, as all inputs are `ancient`."""
 PLANNING = ("-n", "--rerun-incomplete", "--quiet", "rules", "progress")
 """Options with which Snakemake only finds the jobs that it plans. With exactly these
 two words after `--quiet`, it ends before it goes through them in turn."""
-KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
-"""Environment variable: continue after a failed step, or after a row of a table that
-cannot be used."""
-DRY_RUN_VAR = "GYRIFLOW_DRY_RUN"
-"""Environment variable: run nothing."""
-LAUNCHED_VAR = "GYRIFLOW_LAUNCHED"
-"""Environment variable: Snakemake was started by this module."""
-DIRECTORY_VAR = "GYRIFLOW_DIRECTORY"
-"""Environment variable: the working directory that a dry run is a view of."""
-PLANNED_VAR = "GYRIFLOW_PLANNED"
-"""Environment variable: the study has been planned, and its messages were printed."""
 MEASURE_ONLY_VAR = "GYRIFLOW_MEASURE_ONLY"
 """Environment variable: fold nothing."""
 REFUSED_FILE_VAR = "GYRIFLOW_REFUSED_FILE"
@@ -141,10 +130,30 @@ SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefil
 """Where Snakemake finds a workflow by itself."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: list[IO[str]] = []
-call_targets: list[str] = []
-"""The rules and files that the call asks for."""
 received_signals: list[int] = []
 """Signals that have interrupted the run of this process."""
+
+
+@dataclass
+class Session:
+    """What the rules, which are read in this process, have to know of its call.
+
+    `targets` are the rules and files that it asks for. It `keeps_going` after a failed
+    step, or after a row of a table that cannot be used. If it `is_dry` it runs nothing;
+    `viewed` is the working directory that a dry run is a view of. The rules are read
+    once to plan, and again to run: then the study `is_planned`, and its messages were
+    printed.
+    """
+
+    is_launched: bool = False
+    targets: Sequence[str] = ()
+    keeps_going: bool = False
+    is_dry: bool = False
+    viewed: Path | None = None
+    is_planned: bool = False
+
+
+session = Session()
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
@@ -392,8 +401,8 @@ def set_cache(directory: Path) -> None:
         )
 
 
-def set_environment(*, keep_going: bool, dry_run: bool) -> None:
-    """Set the environment variables that the Snakefile and the steps of the workflow
+def set_environment() -> None:
+    """Set the environment variables that Snakemake and the steps of the workflow
     read."""
     os.environ |= read_keys(ENVIRONMENT)["variables"] | os.environ
     # no module in a working directory is imported in place of another one
@@ -402,11 +411,6 @@ def set_environment(*, keep_going: bool, dry_run: bool) -> None:
     os.environ["PATH"] = os.pathsep.join(
         [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
     )
-    os.environ[LAUNCHED_VAR] = "1"
-    if keep_going:
-        os.environ[KEEP_GOING_VAR] = "1"
-    if dry_run:
-        os.environ[DRY_RUN_VAR] = "1"
     set_user_name()
 
 
@@ -534,7 +538,7 @@ class Call:
         """Return the rules and files of planned jobs that run again in any case."""
         if self.options.forceall:
             return [job.rule for job in jobs]
-        wanted = call_targets if self.options.force else []
+        wanted = session.targets if self.options.force else []
         return [*(self.options.forcerun or []), *wanted]
 
     def without_force(self) -> "Call":
@@ -569,7 +573,7 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
         forced = call.forced(events.jobs.values()) if left is None else left
-        plan = made_plan(events, call_targets, forced)
+        plan = made_plan(events, session.targets, forced)
         if call.runs:
             keep_contents(plan)
     if call.take_plan:
@@ -587,7 +591,7 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         hide_results(call.directory, plan.outdated)
     else:
         link_results(call.directory, call.place, plan.outdated)
-    os.environ[PLANNED_VAR] = "1"
+    session.is_planned = True
     try:
         code, ended = run_jobs(call, plan)
         still_left = set(plan.reasons) - ended
@@ -595,7 +599,7 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
             return plan_and_run(call, left=still_left)
         return code
     finally:
-        os.environ.pop(PLANNED_VAR, None)
+        session.is_planned = False
 
 
 def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
@@ -664,7 +668,6 @@ def main(
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)
     check_options(unknown, parser.format_usage())
-    call_targets[:] = options.targets or ["all"]
     directory = options.directory or Path()
     is_second_pass = REFUSED_FILE_VAR in os.environ
     if not (options.configfile or options.snakefile or is_second_pass):
@@ -678,7 +681,12 @@ def main(
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)
-    set_environment(keep_going=options.keep_going, dry_run=dry_run)
+    set_environment()
+    session.is_launched = True
+    session.targets = options.targets or ["all"]
+    session.keeps_going = options.keep_going
+    session.is_dry = dry_run
+    session.viewed = None
     complete = (
         ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
     )
@@ -691,12 +699,11 @@ def main(
     complete += arguments
     began_s = time.time()
     with view_of(directory) if runs_nothing else nullcontext(directory) as place:
-        os.environ.pop(DIRECTORY_VAR, None)
         if runs_nothing:
             set_cache(place)
             complete += ["--directory", str(place)]
             if directory.is_dir():
-                os.environ[DIRECTORY_VAR] = str(directory.absolute())
+                session.viewed = directory.absolute()
         call = Call(complete, options, directory, place, take_plan, is_shown)
         code = plan_and_run(call)
     if code > 128:
