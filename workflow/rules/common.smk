@@ -123,18 +123,13 @@ ANY_BRAIN = "[^/]+"
 
 
 def brains_where(condition):
-    """Return a regular expression for the ids of the brains that meet a condition."""
+    """Return a regular expression for the ids of the brains that meet a condition.
+
+    All output files of a rule are made by each of its jobs, and brains of one hemisphere have fewer. So they have rules
+    of their own (`use rule … as …_left with:`).
+    """
     ids = [brain.id for brain in BRAINS.values() if condition(brain)]
     return ANY_BRAIN if len(ids) == len(BRAINS) else one_of(ids)
-
-
-def brains_with(*sides, has_thickness=None):
-    """Return a regular expression for the ids of the brains with exactly these hemispheres, with or without thickness.
-
-    Brains of one hemisphere have fewer files. They have rules of their own (`use rule … as …_left with:`), since all
-    output files of a rule are made by each of its jobs.
-    """
-    return brains_where(lambda brain: brain.sides == sides and has_thickness in (None, bool(brain.thickness)))
 
 
 wildcard_constraints:

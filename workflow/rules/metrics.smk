@@ -12,7 +12,7 @@ rule measure:
     log:
         f"{BRAIN}/logs/measure.log",
     wildcard_constraints:
-        brain=brains_with(*SIDES),
+        brain=brains_where(lambda brain: brain.sides == SIDES),
     params:
         labels=lambda w: BRAINS[w.brain].columns,
         settings=MEASURED_WITH,
@@ -71,17 +71,12 @@ rule measure_simulated:
     log:
         f"{RUN}/logs/measure_simulated.{WEEK}.log",
     wildcard_constraints:
-        brain=brains_with(*SIDES),
+        brain=brains_where(lambda brain: brain.sides == SIDES),
     params:
         labels=lambda w: SIMULATED[w.run, w.brain, float(w.week)].columns,
         settings=MEASURED_WITH,
     script:
         "../scripts/measure.py"
-
-
-def white_brains(*sides):
-    """Return a regular expression for the ids of the brains of these hemispheres that have white surfaces."""
-    return brains_where(lambda brain: brain.white and brain.sides == sides)
 
 
 rule white:
@@ -94,7 +89,7 @@ rule white:
     log:
         f"{BRAIN}/logs/white.log",
     wildcard_constraints:
-        brain=white_brains(*SIDES),
+        brain=brains_where(lambda brain: brain.sides == SIDES and brain.white),
     params:
         columns=lambda w: BRAINS[w.brain].columns,
         labels=lambda w: label_source(CONFIG, BRAINS[w.brain]),
@@ -109,7 +104,7 @@ use rule measure as measure_left with:
     output:
         **measures_in(f"{BRAIN}/metrics", "left"),
     wildcard_constraints:
-        brain=brains_with("left"),
+        brain=brains_where(lambda brain: brain.sides == ("left",)),
 
 
 use rule measure_simulated as measure_simulated_left with:
@@ -117,21 +112,21 @@ use rule measure_simulated as measure_simulated_left with:
         **folded_of("left"),
         **measures_in(f"{RUN}/metrics/{WEEK}", "left"),
     wildcard_constraints:
-        brain=brains_with("left"),
+        brain=brains_where(lambda brain: brain.sides == ("left",)),
 
 
 use rule white as white_left with:
     output:
         **white_of("left"),
     wildcard_constraints:
-        brain=white_brains("left"),
+        brain=brains_where(lambda brain: brain.sides == ("left",) and brain.white),
 
 
 use rule measure as measure_right with:
     output:
         **measures_in(f"{BRAIN}/metrics", "right"),
     wildcard_constraints:
-        brain=brains_with("right"),
+        brain=brains_where(lambda brain: brain.sides == ("right",)),
 
 
 use rule measure_simulated as measure_simulated_right with:
@@ -139,11 +134,11 @@ use rule measure_simulated as measure_simulated_right with:
         **folded_of("right"),
         **measures_in(f"{RUN}/metrics/{WEEK}", "right"),
     wildcard_constraints:
-        brain=brains_with("right"),
+        brain=brains_where(lambda brain: brain.sides == ("right",)),
 
 
 use rule white as white_right with:
     output:
         **white_of("right"),
     wildcard_constraints:
-        brain=white_brains("right"),
+        brain=brains_where(lambda brain: brain.sides == ("right",) and brain.white),

@@ -49,7 +49,7 @@ rule pial:
     log:
         f"{BRAIN}/logs/pial.log",
     wildcard_constraints:
-        brain=brains_with(*SIDES, has_thickness=False),
+        brain=brains_where(lambda brain: brain.sides == SIDES and not brain.thickness),
     # before measuring: simulations wait for surfaces, and brains that cannot be read are known early
     priority: 1
     resources:
@@ -72,14 +72,14 @@ use rule pial as pial_left with:
     output:
         **pial_of("left"),
     wildcard_constraints:
-        brain=brains_with("left", has_thickness=False),
+        brain=brains_where(lambda brain: brain.sides == ("left",) and not brain.thickness),
 
 
 use rule pial as pial_right with:
     output:
         **pial_of("right"),
     wildcard_constraints:
-        brain=brains_with("right", has_thickness=False),
+        brain=brains_where(lambda brain: brain.sides == ("right",) and not brain.thickness),
 
 
 # with the cortical thickness, if there are labels of the cortex or white surfaces
@@ -88,7 +88,7 @@ use rule pial as pial_with_thickness with:
         **pial_of(*SIDES),
         **THICKNESS,
     wildcard_constraints:
-        brain=brains_with(*SIDES, has_thickness=True),
+        brain=brains_where(lambda brain: brain.sides == SIDES and brain.thickness),
 
 
 use rule pial as pial_left_with_thickness with:
@@ -96,7 +96,7 @@ use rule pial as pial_left_with_thickness with:
         **pial_of("left"),
         **THICKNESS,
     wildcard_constraints:
-        brain=brains_with("left", has_thickness=True),
+        brain=brains_where(lambda brain: brain.sides == ("left",) and brain.thickness),
 
 
 use rule pial as pial_right_with_thickness with:
@@ -104,7 +104,7 @@ use rule pial as pial_right_with_thickness with:
         **pial_of("right"),
         **THICKNESS,
     wildcard_constraints:
-        brain=brains_with("right", has_thickness=True),
+        brain=brains_where(lambda brain: brain.sides == ("right",) and brain.thickness),
 
 
 rule surface:
