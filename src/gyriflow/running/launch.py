@@ -687,16 +687,13 @@ def main(
     session.keeps_going = options.keep_going
     session.is_dry = dry_run
     session.viewed = None
-    complete = (
-        ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
-    )
+    complete = list(arguments)
     # a folder of that name may be in the working directory
-    complete += (
-        []
-        if options.workflow_profile
-        else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
-    )
-    complete += arguments
+    if not options.workflow_profile:
+        profile = SHIPPED / "profiles" / "default"
+        complete = ["--workflow-profile", str(profile), *complete]
+    if options.snakefile is None:
+        complete = ["--snakefile", str(SHIPPED / "Snakefile"), *complete]
     began_s = time.time()
     with view_of(directory) if runs_nothing else nullcontext(directory) as place:
         if runs_nothing:

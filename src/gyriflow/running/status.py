@@ -180,17 +180,11 @@ def _simulation_progress(folder: Path) -> str:
     with suppress(InputError, KeyError, IndexError):
         summary = read_json(folder / "folding" / "summary.json")
         return f"done, GW {week_tag(summary['weeks'][-1])}"
-    steps = [
-        row
-        for row in read_events(folder / "logs" / "simulate.log")
-        if row.get("event") == "step"
-    ]
+    events = read_events(folder / "logs" / "simulate.log")
+    steps = [event for event in events if event.get("event") == "step"]
     return format_progress(steps[-1]) if steps else MISSING
 
 
 def _folders(folder: Path) -> list[Path]:
-    return (
-        sorted(path for path in folder.iterdir() if path.is_dir())
-        if folder.is_dir()
-        else []
-    )
+    paths = folder.iterdir() if folder.is_dir() else []
+    return sorted(path for path in paths if path.is_dir())

@@ -133,18 +133,11 @@ class RunDisplay:
         self.has_errors |= record.levelno >= logging.ERROR
         match event.get("event"):
             case "run_info":
-                jobs = {
-                    rule: count
-                    for rule, count in (event["stats"] or {}).items()
-                    if rule != "total"
-                }
+                jobs = dict(event["stats"] or {})
+                jobs.pop("total", None)
                 self.total = sum(jobs.values())
-                self.bar.update(
-                    self.task.id,
-                    total=sum(
-                        count * WEIGHTS.get(rule, 1) for rule, count in jobs.items()
-                    ),
-                )
+                works = [n * WEIGHTS.get(rule, 1) for rule, n in jobs.items()]
+                self.bar.update(self.task.id, total=sum(works))
                 self.console.print(
                     f"gyriflow: {self.total} steps to run; log: {self.details}"
                 )
@@ -235,11 +228,8 @@ class RunDisplay:
             )
             if job.step:
                 since = self.clock() - job.began
-                done += (
-                    WEIGHTS.get(job.rule, 1.0)
-                    * since
-                    / max(since + job.step["left_s"], 1e-9)
-                )
+                share = since / max(since + job.step["left_s"], 1e-9)
+                done += WEIGHTS.get(job.rule, 1.0) * share
         self.bar.update(
             self.task.id,
             completed=max(done, self.task.completed),
