@@ -9,10 +9,9 @@ import dolfinx
 import numpy as np
 import ufl
 from dolfinx.la import InsertMode, MatrixCSR
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Ints
 from ..mechanics.materials import Material
 from ..settings.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
@@ -175,7 +174,7 @@ class NonlinearProblem:
         mu: Floats,
         G_inverse: Floats,
         V: Floats | None = None,
-        part: NDArray[np.int64] | None = None,
+        part: Ints | None = None,
     ) -> None:
         """Set the coefficients of a step, on the mesh as it is placed now.
 

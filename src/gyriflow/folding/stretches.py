@@ -2,10 +2,9 @@
 six values."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.jacobians import chunks
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Indices, Mask
 
 MIN_SQUARED_STRETCH = 1e-6
 """Squared principal stretches below this count as this: those of flat elements."""
@@ -30,7 +29,7 @@ def unpacked(values: Floats) -> Floats:
 def deformation_gradients(
     before: Floats,
     after: Floats,
-    cells: NDArray[np.integer],
+    cells: Indices,
     slopes: Floats,
 ) -> Floats:
     """Return the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of
@@ -55,7 +54,7 @@ def inverse_stretch(
     F: Floats,
     power: Floats | float = 1.0,
     limit: float = np.inf,
-) -> tuple[Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Mask]:
     """Return U^−power (..., 3, 3) of F = R·U, with one power for all or one for each,
     and where U is limited.
 

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Ints, Mask
 from .domain import Domain
 from .products import PartMotions, SymmetricProducts
 
 
-def part_arms(positions: Floats, part: NDArray[np.int64]) -> NDArray[np.float32]:
+def part_arms(positions: Floats, part: Ints) -> NDArray[np.float32]:
     """Return (n, 3) positions relative to the centres of their parts (n,), divided by
     the largest component of all."""
     counts = np.bincount(part)
@@ -51,7 +51,7 @@ class RigidMotions:
     """Translations and rotations of parts of the mesh, where it is now; `part` (n,) is
     the part of each vertex."""
 
-    def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
+    def __init__(self, domain: Domain, part: Ints) -> None:
         vertices = domain.vertex_of_node[: domain.n_owned]
         self._domain, self._parts = domain, int(part.max()) + 1
         arms, part = part_arms(domain.positions, part)[vertices], part[vertices]
@@ -96,7 +96,7 @@ class ElasticMatrix:
         self,
         coupling: dolfinx.fem.Form,
         add: Callable[[Floats, MatrixCSR], None],
-        fixed: NDArray[np.bool_],
+        fixed: Mask,
     ) -> None:
         self._add = add
         self._blocks = dolfinx.fem.create_matrix(coupling, block_mode=BlockMode.compact)

@@ -6,7 +6,6 @@ from typing import Any
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
@@ -19,6 +18,7 @@ from ..geometry.tetrahedra import (
     signed_volumes,
 )
 from ..geometry.triangles import (
+    Floats,
     TriangleMesh,
     edges,
     euler_number,
@@ -49,11 +49,11 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 
 
 def edge_length_at(
-    depth: NDArray[np.float64],
+    depth: Floats,
     surface_edge_mm: float,
     core_edge_mm: float,
     order: int = 1,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return edge lengths in mm of elements at depths in mm; deep down, nodes of both
     orders have the same distance."""
     below = np.maximum(depth - FINE_DEPTH_EDGES / order * surface_edge_mm, 0.0)
@@ -65,7 +65,7 @@ def _background_mesh(
     surface_edge_mm: float,
     core_edge_mm: float,
     order: int = 1,
-) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
+) -> tuple[TetrahedralMesh, Floats]:
     """Return a regular tetrahedral grid over the inside of the surface and the edge
     lengths in mm at its vertices.
 
