@@ -124,10 +124,12 @@ def pointer(
 def _remove_incomplete_entries(cache: Path) -> None:
     """Remove the files of each form that has no source, no library, or no mark that
     both are complete."""
-    for name in {path.name.split(".")[0] for path in cache.glob("libffcx_*")}:
-        has_source = (cache / f"{name}.c").exists()
-        has_mark = (cache / f"{name}.c.cached").exists()
-        has_library = any(cache.glob(f"{name}.*.so"))
-        if not (has_source and has_mark and has_library):
-            for path in cache.glob(f"{name}.*"):
-                path.unlink(missing_ok=True)
+    paths = cache.glob("libffcx_*")
+    for name in {path.name.split(".")[0] for path in paths}:
+        source = cache / f"{name}.c"
+        mark = cache / f"{name}.c.cached"
+        libraries = cache.glob(f"{name}.*.so")
+        if source.exists() and mark.exists() and any(libraries):
+            continue
+        for path in cache.glob(f"{name}.*"):
+            path.unlink(missing_ok=True)

@@ -195,9 +195,10 @@ class SelfContact:
         near = self.near_pairs(no_motion)
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
         part_of_node = part[self.surface.nodes]
-        part_of_vertex = part_of_node[nearest_node][near.part.vertices]
+        part_of_vertex = part_of_node[nearest_node]
         own_links = set()
-        for vertices in near.vertices_of_pairs():
+        for corners in near.vertices_of_pairs():
+            vertices = near.part.vertices[corners]
             parts = part_of_vertex[vertices]
             own_links.add((int(parts.min()), int(parts.max())))
         all_links = set().union(*self.domain.comm.allgather(own_links))
@@ -208,8 +209,12 @@ class SelfContact:
     def energy(self, u: Floats) -> float:
         """Return the barrier's energy in J."""
         near = self.near_pairs(u)
-        local = float(self._potential(near.pairs, near.mesh, near.part_positions))
-        return self.domain.comm.allreduce(local * J_PER_PA_MM3)
+        energy = self._potential(
+            near.pairs,
+            near.mesh,
+            near.part_positions,
+        )
+        return self.domain.comm.allreduce(float(energy) * J_PER_PA_MM3)
 
     def forces(self, u: Floats) -> Floats:
         """Return the (n, 3) derivative of the energy in N at the surface's nodes."""
@@ -220,7 +225,11 @@ class SelfContact:
         """Return the (p, 3) derivative of the energy of a rank's pairs in N."""
         if not len(near.pairs):
             return np.zeros_like(near.part_positions)
-        gradient = self._potential.gradient(near.pairs, near.mesh, near.part_positions)
+        gradient = self._potential.gradient(
+            near.pairs,
+            near.mesh,
+            near.part_positions,
+        )
         return np.asarray(gradient.reshape(-1, 3) * N_PER_PA_MM2)
 
     def add_forces(self, u: Floats, out: Floats) -> None:
@@ -250,10 +259,12 @@ class SelfContact:
         """Return the largest fraction, up to 1, of a direction (k, 3) in m that can be
         added to u without collision."""
         displacement = self.surface.displacement_mm(direction)
-        longest_mm = float(np.linalg.norm(displacement, axis=1).max())
+        lengths = np.linalg.norm(displacement, axis=1)
         # the candidates near a longer displacement would fill the memory
-        part = MAX_DISPLACEMENT_MM / max(longest_mm, MAX_DISPLACEMENT_MM)
-        step = self._search.collision_free_step(self.near_pairs(u), part * displacement)
+        longest_mm = max(float(lengths.max()), MAX_DISPLACEMENT_MM)
+        part = MAX_DISPLACEMENT_MM / longest_mm
+        near = self.near_pairs(u)
+        step = self._search.collision_free_step(near, part * displacement)
         return part * self.domain.comm.allreduce(step, op=MPI.MIN)
 
     def smallest_distance_mm(self, u: Floats) -> float:
@@ -300,10 +311,12 @@ def small_gap_mm(gaps: Floats) -> float:
     It is the smallest, unless few vertices are nearer than a quarter of the gap of the
     next one: then it is that quarter. These few are pressed apart in the first step.
     """
-    few = max(FEW_VERTICES, FEW_SHARE * len(gaps))
-    few = int(min(few, MAX_FEW_SHARE * len(gaps)))
-    next_gap = float(np.partition(gaps, few)[few])
-    return max(float(gaps.min()), FEW_BELOW * next_gap)
+    count = len(gaps)
+    few = max(FEW_VERTICES, FEW_SHARE * count)
+    few = min(few, MAX_FEW_SHARE * count)
+    ascending = np.sort(gaps)
+    next_gap = float(ascending[int(few)])
+    return max(float(ascending[0]), FEW_BELOW * next_gap)
 
 
 def stiffening(gap: float) -> float:

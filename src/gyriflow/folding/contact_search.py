@@ -89,7 +89,11 @@ class NearPairs:
         """Return the distance between the two sides of pair `i`."""
         # ipctk's pairs do not keep their list alive: a pair with a name may outlive it,
         # and then reads freed memory
-        ends = self.pairs[i].dof(self.part_positions, self.mesh.edges, self.mesh.faces)
+        ends = self.pairs[i].dof(
+            self.part_positions,
+            self.mesh.edges,
+            self.mesh.faces,
+        )
         squared = self.pairs[i].compute_distance(ends)
         return float(np.sqrt(squared))
 

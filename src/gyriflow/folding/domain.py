@@ -177,9 +177,11 @@ class Domain:
         """Return the owned nodes (o,) that are among ascending vertices, and their
         places (o,) among these."""
         owned = self.vertex_of_node[: self.n_owned]
-        place = np.searchsorted(vertices, owned).clip(max=len(vertices) - 1)
-        local = np.flatnonzero(vertices[place] == owned)
-        return local, place[local]
+        place = np.searchsorted(vertices, owned)
+        place = place.clip(max=len(vertices) - 1)
+        is_among = vertices[place] == owned
+        nodes = np.flatnonzero(is_among)
+        return nodes, place[nodes]
 
     def place(self, positions: Floats) -> None:
         """Move the mesh to (n, 3) positions in m."""
@@ -273,5 +275,6 @@ class Domain:
     def _face_numbers(self, faces: Indices) -> Ints:
         """Return one number (f,) for each face, whatever the order of its vertices."""
         count = len(self.positions)
-        weights = np.array([count * count, count, 1], dtype=np.int64)
-        return np.sort(faces, axis=1) @ weights
+        low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
+        in_plane = low * count + middle
+        return in_plane * count + high

@@ -169,8 +169,9 @@ class Springs:
         self._gaps = gaps[self._rows]
 
     def energy(self, u: Floats) -> float:
-        squares = (u[self._local] + self._gaps) ** 2
-        local = 0.5 * float((self._weights * squares).sum())
+        stretched = u[self._local] + self._gaps
+        energies = self._weights * stretched**2
+        local = 0.5 * float(energies.sum())
         return self._domain.comm.allreduce(local)
 
     def add_forces(self, u: Floats, out: Floats) -> None:
@@ -310,10 +311,12 @@ class ElasticFit:
     def _step_count(self, goal: Floats) -> int:
         """Return the number of steps to a goal (n, 3), by the strain of the whole and
         of nine elements in ten."""
+        volume = signed_volume(self.boundary)
         goal_volume = signed_volume(self._boundary_at(goal))
-        ratio = goal_volume / signed_volume(self.boundary)
-        of_whole = abs(math.log(max(ratio, 1e-3)))
-        norms = np.linalg.norm(self._strain_to(goal), axis=(1, 2))
+        ratio = max(goal_volume / volume, 1e-3)
+        of_whole = abs(math.log(ratio))
+        strain = self._strain_to(goal)
+        norms = np.linalg.norm(strain, axis=(1, 2))
         of_elements = float(np.quantile(norms, 0.9))
         mean_strain = max(of_whole, of_elements) / 3
         return max(1, math.ceil(mean_strain / STRAIN_PER_STEP))
@@ -590,10 +593,12 @@ class ElasticFit:
     def _faults_at(self, places: Floats) -> Mask:
         """Return (n,) whether a vertex belongs to a curved element that may fold over
         or to a face that crosses another."""
+        folded = self._tets[may_fold_over(places, self._tets)]
+        boundary = self._boundary_at(places)
+        crossing = boundary.faces[faces_that_cross(boundary)]
         is_fault = np.zeros(len(places), dtype=bool)
-        is_fault[self._tets[may_fold_over(places, self._tets)]] = True
-        crossing = faces_that_cross(self._boundary_at(places))
-        is_fault[self._used[self._surface.faces[crossing]]] = True
+        is_fault[folded] = True
+        is_fault[self._used[crossing]] = True
         return is_fault
 
     def _reopened(self, places: Floats) -> Floats:

@@ -56,15 +56,17 @@ class PialSearch:
     vertices and its (f, 3) facets."""
 
     def __init__(self, positions: Floats, facets: Ints) -> None:
-        self.surface, self.pial = used_part(TriangleMesh(positions, facets))
+        whole = TriangleMesh(positions, facets)
+        self.surface, self.pial = used_part(whole)
         self.normals = vertex_normals(self.surface)
-        self.tree = cKDTree(self.surface.vertices)
+        vertices = self.surface.vertices
+        self.tree = cKDTree(vertices)
         # position of each vertex in the order of coordinates, to choose among equally
         # near ones
-        x, y, z = self.surface.vertices.T
+        x, y, z = vertices.T
         by_coordinates = np.lexsort((z, y, x))
-        self._order = np.empty(len(self.pial), dtype=np.int64)
-        self._order[by_coordinates] = np.arange(len(self.pial))
+        self._order = np.empty_like(by_coordinates)
+        self._order[by_coordinates] = np.arange(len(vertices))
 
     def distance(
         self,
@@ -111,9 +113,10 @@ class PialSearch:
 
     def _within(self, to_vertex: Floats, reach: float) -> Mask:
         edges = np.diff(corners(self.surface), axis=1)
-        longest = np.linalg.norm(edges, axis=2).max()
+        lengths = np.linalg.norm(edges, axis=2)
         # a point of a triangle is at most edge/√3 from its nearest vertex
-        furthest = np.hypot(reach, longest / np.sqrt(3))
+        from_vertex = lengths.max() / np.sqrt(3)
+        furthest = np.hypot(reach, from_vertex)
         return np.asarray(to_vertex <= furthest)
 
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
@@ -125,9 +128,11 @@ class PialSearch:
         opposed walls, it is the normal of the vertex with the smallest coordinates. The
         order of points and candidates does not matter.
         """
-        offsets = self.surface.vertices[candidates] - points[:, None]
+        places = self.surface.vertices[candidates]
+        offsets = places - points[:, None]
         gaps = np.linalg.norm(offsets, axis=2)
-        is_nearest = gaps <= gaps.min(axis=1, keepdims=True) * (1 + TIE_TOL)
+        least = gaps.min(axis=1, keepdims=True)
+        is_nearest = gaps <= least * (1 + TIE_TOL)
         order = np.where(is_nearest, self._order[candidates], len(self.pial))
         first = order.argmin(axis=1)[:, None]
         chosen = np.take_along_axis(candidates, first, axis=1)
@@ -135,20 +140,23 @@ class PialSearch:
         is_other = is_nearest & (candidates != chosen)
         tied = np.flatnonzero(is_other.any(axis=1))
         if len(tied):
+            # each of the nearest vertices once, although candidates may repeat
             vertices = np.where(is_nearest[tied], candidates[tied], chosen[tied])
             vertices.sort(axis=1)
             is_new = np.ones(vertices.shape, dtype=bool)
-            is_new[:, 1:] = vertices[:, 1:] != vertices[:, :-1]
-            total = self._weighted_normals(is_new, vertices)
-            mean = total / is_new.sum(axis=1, keepdims=True)
-            is_clear = np.linalg.norm(mean, axis=1) > 0.1
+            is_new[:, 1:] = np.diff(vertices, axis=1) != 0
+            counts = is_new.sum(axis=1, keepdims=True)
+            mean = self._weighted_normals(is_new, vertices) / counts
+            lengths = np.linalg.norm(mean, axis=1)
+            is_clear = lengths > 0.1
             normals[tied[is_clear]] = unit(mean[is_clear])
         return normals
 
     def nearest_normals(self, points: Floats) -> Floats:
         """Return the (k, 3) unit normals of the pial vertices nearest to (k, 3) points;
         ties as in `normals_from`."""
+        count = min(8, len(self.pial))
         # a list of ranks, so that also one neighbour is a column
-        ranks = range(1, min(8, len(self.pial)) + 1)
+        ranks = range(1, count + 1)
         _, candidates = self.tree.query(points, k=ranks)
         return self.normals_from(points, candidates)

@@ -77,13 +77,16 @@ class LinearElements:
         nodes, -1 for those that are omitted."""
         numbers = np.arange(len(matrix.indices), dtype=np.int32)
         places = sparse.csr_array((numbers, matrix.indices, matrix.indptr))
-        rows = np.repeat(self._domain.cells, 4, axis=1).ravel()
-        columns = np.tile(self._domain.cells, 4).ravel()
+        cells = self._domain.cells
+        rows = np.repeat(cells, 4, axis=1).ravel()
+        columns = np.tile(cells, 4).ravel()
         # blocks below the diagonal are needed only if one of their nodes is a ghost
         n_owned = self._domain.n_owned
-        has_ghost = (columns >= n_owned) | (rows >= n_owned)
-        is_needed = (columns >= rows) | has_ghost
-        return np.where(is_needed, places[rows, columns], -1)
+        is_below = columns < rows
+        is_owned = (columns < n_owned) & (rows < n_owned)
+        found = places[rows, columns]
+        found[is_below & is_owned] = -1
+        return found
 
     def _pointer(
         self,

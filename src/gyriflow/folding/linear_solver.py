@@ -145,9 +145,12 @@ class TwoLevelPreconditioner:
     def _in_parts(self, modes: Floats, part: Ints) -> sparse.bsr_matrix:
         """Return (k, 3, 6) blocks as a (3 k, 6 · parts) matrix, each in the columns of
         its part."""
-        ends = np.arange(len(modes) + 1)
-        shape = (3 * len(modes), 6 * self._parts)
-        return sparse.bsr_matrix((modes, part, ends), shape=shape)
+        count = len(modes)
+        ends = np.arange(count + 1)
+        return sparse.bsr_matrix(
+            (modes, part, ends),
+            shape=(3 * count, 6 * self._parts),
+        )
 
 
 def inverse_blocks(blocks: Floats) -> Floats:
@@ -181,12 +184,12 @@ def inverse_matrix(matrix: Floats) -> Floats:
 def _positive_inverses(matrices: Floats) -> Floats:
     """Return inverses of (..., k, k) symmetric matrices with the absolute values of
     their eigenvalues."""
-    values, directions = np.linalg.eigh(matrices)
+    values, axes = np.linalg.eigh(matrices)
     sizes = np.abs(values)
-    smallest = REGULARISATION * sizes.max(axis=-1, keepdims=True)
-    divisors = np.maximum(sizes, smallest)[..., None, :]
-    inverses = (directions / divisors) @ directions.swapaxes(-1, -2)
-    return np.asarray(inverses)
+    largest = sizes.max(axis=-1, keepdims=True)
+    sizes = np.maximum(sizes, REGULARISATION * largest)
+    scaled_axes = axes / sizes[..., None, :]
+    return np.asarray(scaled_axes @ axes.swapaxes(-1, -2))
 
 
 class LinearSolver:

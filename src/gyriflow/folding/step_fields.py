@@ -109,8 +109,10 @@ def von_mises(stress: Floats) -> Floats:
     """Return the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the
     stress."""
     mean = np.trace(stress, axis1=1, axis2=2) / 3
-    deviator = stress - mean[:, None, None] * np.eye(3)
-    return np.sqrt(1.5) * np.linalg.norm(deviator, axis=(1, 2))
+    isotropic = mean[:, None, None] * np.eye(3)
+    deviator = stress - isotropic
+    norm = np.linalg.norm(deviator, axis=(1, 2))
+    return np.sqrt(1.5) * norm
 
 
 def principal_stretches(F: Floats) -> Floats:
@@ -128,8 +130,10 @@ def hencky_equivalent(F: Floats) -> Floats:
     drawn out at constant volume.
     """
     h = np.log(principal_stretches(F))
-    deviator = h - h.mean(axis=1, keepdims=True)
-    return np.sqrt(2 / 3) * np.linalg.norm(deviator, axis=1)
+    mean = h.mean(axis=1, keepdims=True)
+    deviator = h - mean
+    norm = np.linalg.norm(deviator, axis=1)
+    return np.sqrt(2 / 3) * norm
 
 
 def green_lagrange_maximum(F: Floats) -> Floats:

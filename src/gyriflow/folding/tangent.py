@@ -25,11 +25,17 @@ from .products import PartMotions, SymmetricProducts
 def part_arms(positions: Floats, part: Ints) -> NDArray[np.float32]:
     """Return (n, 3) positions relative to the centres of their parts (n,), divided by
     the largest component of all."""
-    sums = np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1)
+    x, y, z = positions.T
+    sums = [
+        np.bincount(part, x),
+        np.bincount(part, y),
+        np.bincount(part, z),
+    ]
     counts = np.maximum(np.bincount(part), 1)
-    centres = sums / counts[:, None]
+    centres = np.stack(sums, axis=1) / counts[:, None]
     arms = positions - centres[part]
-    return np.asarray(arms / np.abs(arms).max(), dtype=np.float32)
+    longest = np.abs(arms).max()
+    return np.asarray(arms / longest, dtype=np.float32)
 
 
 def rigid_motions(arms: NDArray[np.float32]) -> Floats:
@@ -54,12 +60,14 @@ class RigidMotions:
         self._domain = domain
         self._parts = int(part.max()) + 1
         owned = domain.vertex_of_node[: domain.n_owned]
-        arms = part_arms(domain.positions, part)[owned]
-        part = part[owned]
-        self._motions = PartMotions(part, arms)
+        arms = part_arms(domain.positions, part)
+        own_arms = arms[owned]
+        own_part = part[owned]
+        self._motions = PartMotions(own_part, own_arms)
         # six columns for each part, zero elsewhere
-        modes = np.zeros((len(arms), 3, self._parts, 6))
-        modes[np.arange(len(part)), :, part] = rigid_motions(arms)
+        node = np.arange(len(owned))
+        modes = np.zeros((len(owned), 3, self._parts, 6))
+        modes[node, :, own_part] = rigid_motions(own_arms)
         self.modes: Floats = modes.reshape(-1, 6 * self._parts)
         gram = domain.sum_over_ranks(self.modes.T @ self.modes)
         self._inverse_gram = np.linalg.inv(gram)

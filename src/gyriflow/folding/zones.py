@@ -151,12 +151,16 @@ def _wall_anchors(vertices: Floats, wall: Ints) -> tuple[Ints, Mask]:
     the farthest from there along y."""
     yz = vertices[wall][:, 1:]
     offsets = yz - yz.mean(axis=0)
-    central = (offsets**2).sum(axis=1).argmin()
-    along_y = np.abs(yz[:, 0] - yz[central, 0])
+    squares = (offsets**2).sum(axis=1)
+    central = squares.argmin()
+    y = yz[:, 0]
+    along_y = np.abs(y - y[central])
     farthest = along_y.argmax()
     # against translations along y and z, and the rotation about x
-    fixed = np.array([[False, True, True], [False, False, True]])
-    return wall[[central, farthest]], fixed
+    fixed_at_centre = [False, True, True]
+    fixed_farthest = [False, False, True]
+    anchors = wall[[central, farthest]]
+    return anchors, np.array([fixed_at_centre, fixed_farthest])
 
 
 def inside_ellipsoid(
