@@ -14,6 +14,7 @@ from ..geometry.triangles import (
     Ints,
     Mask,
     TriangleMesh,
+    coordinate_ranks,
     corners,
     unit,
     used_part,
@@ -61,12 +62,8 @@ class PialSearch:
         self.normals = vertex_normals(self.surface)
         vertices = self.surface.vertices
         self.tree = cKDTree(vertices)
-        # position of each vertex in the order of coordinates, to choose among equally
-        # near ones
-        x, y, z = vertices.T
-        by_coordinates = np.lexsort((z, y, x))
-        self._order = np.empty_like(by_coordinates)
-        self._order[by_coordinates] = np.arange(len(vertices))
+        # to choose among equally near vertices
+        self._rank = coordinate_ranks(vertices)
 
     def distance(
         self,
@@ -133,8 +130,8 @@ class PialSearch:
         gaps = np.linalg.norm(offsets, axis=2)
         least = gaps.min(axis=1, keepdims=True)
         is_nearest = gaps <= least * (1 + TIE_TOL)
-        order = np.where(is_nearest, self._order[candidates], len(self.pial))
-        first = order.argmin(axis=1)[:, None]
+        ranks = np.where(is_nearest, self._rank[candidates], len(self.pial))
+        first = ranks.argmin(axis=1)[:, None]
         chosen = np.take_along_axis(candidates, first, axis=1)
         normals = self.normals[chosen[:, 0]]
         is_other = is_nearest & (candidates != chosen)

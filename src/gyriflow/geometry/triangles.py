@@ -98,6 +98,15 @@ def volume_ml(mesh: TriangleMesh) -> float:
     return signed_volume(mesh) * ML_PER_MM3
 
 
+def coordinate_ranks(vertices: Floats) -> Ints:
+    """Return the (n,) places of vertices in their order by x, y, z."""
+    x, y, z = vertices.T
+    order = np.lexsort((z, y, x))
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(len(vertices))
+    return ranks
+
+
 def dots(first: Floats, second: Floats) -> Floats:
     """Return the (n,) scalar products of the rows of two (n, 3) arrays."""
     return np.einsum("ij,ij->i", first, second)

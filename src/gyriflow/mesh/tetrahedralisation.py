@@ -74,24 +74,19 @@ def _background_mesh(
     """
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
-    counts = (
-        np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int)
-        + 1
-    )
-    background = grid(
-        [
-            start + spacing * np.arange(count)
-            for start, count in zip(low, counts, strict=True)
-        ]
-    )
-    depth = cKDTree(surface.vertices).query(background.vertices)[0]
-    inside = (
-        igl.fast_winding_number(surface.vertices, surface.faces, background.vertices)
-        > 0.5
-    )
-    near = background.tets[(inside | (depth < spacing))[background.tets].any(axis=1)]
+    high = surface.vertices.max(axis=0) + spacing
+    ticks = []
+    for start, end in zip(low, high, strict=True):
+        count = int(np.ceil((end - start) / spacing)) + 1
+        ticks.append(start + spacing * np.arange(count))
+    background = grid(ticks)
+    places = background.vertices
+    depth, _ = cKDTree(surface.vertices).query(places)
+    winding = igl.fast_winding_number(surface.vertices, surface.faces, places)
+    is_needed = (winding > 0.5) | (depth < spacing)
+    needed = background.tets[is_needed[background.tets].any(axis=1)]
     lengths = edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
-    return TetrahedralMesh(background.vertices, near), lengths
+    return TetrahedralMesh(places, needed), lengths
 
 
 def tetrahedralise(
