@@ -141,7 +141,7 @@ SETTINGS = NewtonSettings(
 the next step starts from it."""
 
 
-class Springs:
+class _Springs:
     """Springs from the nodes on the boundary to their goals, a contribution to the
     energy of a step.
 
@@ -236,7 +236,7 @@ class ElasticFit:
         material = MATERIALS["neo-hookean"](POISSON_RATIO)
         self._problem = NonlinearProblem(self._domain, zones, material)
         self._contact = SelfContact(self._domain, facets, BARRIER_PA)
-        self._springs = Springs(self._domain, self._used)
+        self._springs = _Springs(self._domain, self._used)
         self._problem.contributions += [self._contact, self._springs]
         floor = residual_floor(mesh, MODULUS_PA)
         self._solver = NewtonSolver(self._problem, SETTINGS, floor)

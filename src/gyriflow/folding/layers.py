@@ -109,12 +109,15 @@ class PialSearch:
         return np.einsum("kc,kci->ki", weights, self.normals[vertices])
 
     def _within(self, to_vertex: Floats, reach: float) -> Mask:
+        """Return (k,) whether a triangle may be within reach, from distances to
+        vertices."""
         edges = np.diff(corners(self.surface), axis=1)
         lengths = np.linalg.norm(edges, axis=2)
+        longest = lengths.max()
         # a point of a triangle is at most edge/√3 from its nearest vertex
-        from_vertex = lengths.max() / np.sqrt(3)
-        furthest = np.hypot(reach, from_vertex)
-        return np.asarray(to_vertex <= furthest)
+        furthest = np.hypot(reach, longest / np.sqrt(3))
+        is_within = to_vertex <= furthest
+        return np.asarray(is_within)
 
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
         """Return for (k, 3) points the unit normals of the nearest of (k, c) candidate

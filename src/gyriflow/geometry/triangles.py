@@ -154,10 +154,11 @@ def _half_edges(mesh: TriangleMesh) -> Ints:
 def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
     """Return the (e, 2) undirected edges, each once and sorted, and the (e,) number of
     faces at each."""
+    count = len(mesh.vertices)
     pairs = np.sort(_half_edges(mesh), axis=1)
     # one number per edge: much faster than comparing rows
-    count = len(mesh.vertices)
-    numbers, uses = np.unique(pairs @ [count, 1], return_counts=True)
+    numbers = pairs @ [count, 1]
+    numbers, uses = np.unique(numbers, return_counts=True)
     ends = np.divmod(numbers, count)
     return np.stack(ends, axis=1), uses
 

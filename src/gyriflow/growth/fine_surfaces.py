@@ -106,7 +106,7 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
         moved = TriangleMesh(surface + move, observed.surface.faces)
         n_crossing = crossing_faces(moved)
         if n_crossing <= n_allowed:
-            return scaled_to_volume(moved, volume)
+            return _scaled_to_volume(moved, volume)
     log.warning(
         "an observed surface that is moved to the predicted shape crosses itself in %d"
         " faces: the coarser surface of the mesh is used",
@@ -115,7 +115,7 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
     return boundary
 
 
-def scaled_to_volume(surface: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+def _scaled_to_volume(surface: TriangleMesh, volume_mm3: float) -> TriangleMesh:
     """Scale a closed surface about its centre to a volume."""
     areas = vertex_areas(surface)
     vertices = surface.vertices
