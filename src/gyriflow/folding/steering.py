@@ -91,7 +91,7 @@ def steered_growth(
         before,
         target,
         free_rates=by_unit_rates @ [cortex, core] + by_radial,
-        limited=is_limited,
+        limited=bool(is_limited),
     )
 
 
@@ -127,7 +127,7 @@ def steered_rates(
     cortex = np.clip((volume - core_volume * core) / cortex_volume, *bounds)
     mean = volume / (cortex_volume + core_volume)
     is_limited = abs(cortex - ideal) > 1e-9 * (abs(mean) + abs(ideal))
-    return float(cortex), float(core), bool(is_limited)
+    return float(cortex), float(core), is_limited
 
 
 def free_growth(
