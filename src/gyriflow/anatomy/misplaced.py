@@ -2,6 +2,7 @@
 around the ventricles; and other tissue at its surface where cortex has to be."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
@@ -37,47 +38,88 @@ def misplaced_cortex(
     `labels` (i, j, k) have a (4, 4) affine to the coordinates in mm of places in
     messages. Nothing is yielded for a volume without cortex, or with nothing else.
     """
-    cerebrum = np.isin(labels, scheme.cerebrum)
-    cortex = np.isin(labels, scheme.cortex)
-    if not cortex.any() or cortex.sum() == cerebrum.sum():
+    around = _cropped(labels, affine, scheme)
+    if around is None:
         return
-    box = ndimage.find_objects(cerebrum.astype(np.uint8))[0]
-    # with a margin: voxels at the border of the volume would have no neighbours outside
-    first = np.array([side.start - 1 for side in box])
-    cropped_labels = np.pad(labels[box], 1)
-    cerebrum = np.pad(cerebrum[box], 1)
-    cortex = np.pad(cortex[box], 1)
-    cropped_affine = shifted_affine(affine, first)
-    fluid = np.isin(cropped_labels, scheme.ventricles)
-
-    size = np.linalg.norm(affine[:3, :3], axis=0)
-    core = cerebrum & ~cortex & ~fluid
-    outside = ~ndimage.binary_fill_holes(cerebrum)
+    cortex = around.cortex
+    fluid = np.isin(around.labels, scheme.ventricles)
+    core = around.cerebrum & ~cortex & ~fluid
+    outside = ~ndimage.binary_fill_holes(around.cerebrum)
     enclosed = _cortex_not_touching(outside, cortex)
-    from_core_mm = ndimage.distance_transform_edt(~core, sampling=size)
+    from_core_mm = around.distance_mm(core)
     is_far = cortex & (from_core_mm > MAX_FROM_CORE_MM)
     detached = is_far | _cortex_not_touching(core, cortex)
-    if found := _pieces_in_words(detached & ~enclosed, cropped_affine):
+    found = _pieces_in_words(detached & ~enclosed, around.affine)
+    if found:
         limit = (
             "apart from the tissue inside the cortex, or further than"
             f" {MAX_FROM_CORE_MM:g} mm from it"
         )
         yield f"{found} of cortex lie {limit}: {_suspect(labels, scheme)}"
 
-    if found := _pieces_in_words(enclosed, cropped_affine):
+    found = _pieces_in_words(enclosed, around.affine)
+    if found:
         yield (
             f"{found} of cortex lie inside the cerebrum, apart from its surface: is"
             " other tissue labelled as cortex?"
         )
 
-    at_ventricles = ndimage.binary_dilation(fluid, INSIDE) & cerebrum & ~fluid
-    share = (at_ventricles & cortex & ~enclosed).sum() / max(at_ventricles.sum(), 1)
+    next_to_fluid = ndimage.binary_dilation(fluid, INSIDE) & ~fluid
+    at_ventricles = next_to_fluid & around.cerebrum
+    is_cortex = at_ventricles & cortex & ~enclosed
+    share = is_cortex.sum() / max(at_ventricles.sum(), 1)
     if share > MAX_AT_VENTRICLES:
         found = (
             f"cortex lies at {100 * share:.0f} % of the ventricles' surface,"
             " at most 3 % in atlases"
         )
         yield f"{found}: is tissue around or in the ventricles labelled as cortex?"
+
+
+@dataclass(frozen=True, eq=False)
+class _Cropped:
+    """A volume of labels around its cerebrum, with a margin of one voxel: voxels at the
+    border of a volume would have no neighbours outside.
+
+    `is_inner` is False in the margin and at the border of the whole volume.
+    """
+
+    labels: np.ndarray
+    affine: Floats
+    cerebrum: Mask
+    cortex: Mask
+    is_inner: Mask
+
+    def distance_mm(self, mask: Mask) -> Floats:
+        """Return the distance of each voxel from a mask."""
+        size = np.linalg.norm(self.affine[:3, :3], axis=0)
+        return ndimage.distance_transform_edt(~mask, sampling=size)
+
+
+def _cropped(
+    labels: np.ndarray,
+    affine: Floats,
+    scheme: LabelScheme,
+) -> _Cropped | None:
+    """Return the labels around the cerebrum; None without cortex, or with nothing
+    else."""
+    padded = np.pad(labels, 1)
+    cerebrum = np.isin(padded, scheme.cerebrum)
+    cortex = np.isin(padded, scheme.cortex)
+    if not cortex.any() or cortex.sum() == cerebrum.sum():
+        return None
+    (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
+    around = tuple(slice(side.start - 1, side.stop + 1) for side in box)
+    first = np.array([side.start - 1 for side in around])
+    is_inner = np.zeros(padded.shape, dtype=bool)
+    is_inner[2:-2, 2:-2, 2:-2] = True
+    return _Cropped(
+        padded[around],
+        shifted_affine(affine, first),
+        cerebrum[around],
+        cortex[around],
+        is_inner[around],
+    )
 
 
 def bare_surface(
@@ -91,31 +133,23 @@ def bare_surface(
     Ventricles that are open, and what the border of the volume cuts, do not count. The
     (4, 4) affine leads from voxels (i, j, k) to the mm of the place.
     """
-    cerebrum = np.pad(np.isin(labels, scheme.cerebrum), 1)
-    cortex = np.pad(np.isin(labels, scheme.cortex), 1)
-    if not cortex.any() or cortex.sum() == cerebrum.sum():
+    around = _cropped(labels, affine, scheme)
+    if around is None:
         return
-    box = ndimage.find_objects(cerebrum.astype(np.uint8))[0]
-    around = tuple(slice(side.start - 1, side.stop + 1) for side in box)
-    first = np.array([side.start - 1 for side in around])
-    filled = ndimage.binary_fill_holes(cerebrum[around])
+    filled = ndimage.binary_fill_holes(around.cerebrum)
     surface = filled & ~ndimage.binary_erosion(filled)
-
-    size = np.linalg.norm(affine[:3, :3], axis=0)
-    to_cortex_mm = ndimage.distance_transform_edt(~cortex[around], sampling=size)
-    is_inner = np.zeros(cortex.shape, dtype=bool)
-    is_inner[2:-2, 2:-2, 2:-2] = True
-    numbers = np.pad(labels, 1)[around]
-    is_counted = is_inner[around] & ~np.isin(numbers, scheme.ventricles)
-    is_bare = surface & is_counted & (to_cortex_mm > MAX_TO_CORTEX_MM)
+    is_fluid = np.isin(around.labels, scheme.ventricles)
+    is_far = around.distance_mm(around.cortex) > MAX_TO_CORTEX_MM
+    is_bare = surface & around.is_inner & ~is_fluid & is_far
     share = is_bare.sum() / surface.sum()
     if share > MAX_BARE_SHARE:
         piece, _ = ndimage.label(is_bare, OUTSIDE)
-        largest = np.argwhere(piece == np.bincount(piece[is_bare]).argmax())
-        place = _place_in_words(largest, shifted_affine(affine, first))
+        largest = np.bincount(piece[is_bare]).argmax()
+        place = _place_in_words(np.argwhere(piece == largest), around.affine)
         found = []
-        for number in np.unique(numbers[is_bare]):
-            found.append(f"{number} {scheme.labels.get(int(number), '')}".strip())
+        for number in np.unique(around.labels[is_bare]):
+            name = scheme.labels.get(int(number), "")
+            found.append(f"{number} {name}".strip())
         yield (
             f"{100 * share:.1f} % of the cerebrum's surface, most of it around"
             f" {place}, lie more than {MAX_TO_CORTEX_MM:g} mm from cortex, at most"
@@ -165,9 +199,10 @@ def _cortex_not_touching(tissue: Mask, cortex: Mask) -> Mask:
 def _pieces_in_words(mask: Mask, affine: Floats) -> str:
     """Return the volume of a mask's pieces of at least `MIN_PIECE_ML`, and the place of
     the largest; or ''."""
-    voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
+    voxel_mm3 = abs(np.linalg.det(affine[:3, :3]))
     number, _ = ndimage.label(mask, OUTSIDE)
-    volumes_ml = np.bincount(number.ravel()) * voxel_ml
+    counts = np.bincount(number.ravel())
+    volumes_ml = counts * (float(voxel_mm3) * ML_PER_MM3)
     volumes_ml[0] = 0.0
     pieces_ml = volumes_ml[volumes_ml >= MIN_PIECE_ML]
     if not len(pieces_ml):

@@ -182,7 +182,7 @@ def _descend(
         distances = np.einsum("ij,ij->i", target.points[nearest] - moved, plane)
         agrees = np.einsum("ij,ij->i", target_normals, facing) > 0.5
         weights = agrees / (1.0 + (distances / scale) ** 2) ** 2
-        return moved, plane, distances, weights
+        return Planes(moved, plane, distances, weights)
 
     def is_converged(
         _: Floats,

@@ -80,7 +80,11 @@ class State:
     def at_start(cls, positions: Floats, step_s: float) -> "State":
         """Return the state before the first step, free of stress."""
         return cls(
-            positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions)
+            positions,
+            time_s=0.0,
+            step_s=step_s,
+            last=np.zeros_like(positions),
+            before_last=np.zeros_like(positions),
         )
 
     def initial_guesses(self, step_s: float) -> list[Floats]:
@@ -94,10 +98,11 @@ class State:
         rate = self.last / self.last_s
         if self.before_last_s == 0:
             return [rate * step_s]
-        slope = (rate - self.before_last / self.before_last_s) / (
-            (self.last_s + self.before_last_s) / 2
-        )
-        return [(rate + slope * (self.last_s + step_s) / 2) * step_s, rate * step_s]
+        # rates are those in the middles of steps
+        rate_before = self.before_last / self.before_last_s
+        slope = (rate - rate_before) / ((self.last_s + self.before_last_s) / 2)
+        next_rate = rate + slope * (self.last_s + step_s) / 2
+        return [next_rate * step_s, rate * step_s]
 
     def after(
         self,
@@ -157,8 +162,8 @@ def run_key(
 
 def _checksum(arrays: dict[str, Floats], scalars: str) -> str:
     digest = hashlib.sha256(scalars.encode())
-    for name in sorted(arrays):
-        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    for _, array in sorted(arrays.items()):
+        digest.update(np.ascontiguousarray(array))
     return digest.hexdigest()
 
 
@@ -199,21 +204,11 @@ def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
             raise ValueError("its checksum is wrong")
         values = json.loads(scalars)
     except Exception as error:  # HDF5 may raise anything on a corrupt file
-        return (
-            None,
-            (
-                f"the checkpoint {path} is corrupt ({error}): not used, the run starts"
-                " again"
-            ),
-        )
+        problem = f"is corrupt ({error}): not used, the run starts again"
+        return None, f"the checkpoint {path} {problem}"
     if values.pop("key") != key:
-        return (
-            None,
-            (
-                f"the checkpoint {path} belongs to another mesh or other parameters:"
-                " not used"
-            ),
-        )
+        problem = "belongs to another mesh or other parameters: not used"
+        return None, f"the checkpoint {path} {problem}"
     values["rows"] = tuple(values["rows"])
     state = State(**arrays, **values)
     return state, f"resuming from the checkpoint after step {len(state.rows)}"

@@ -28,35 +28,29 @@ def zone_report(
     the order of the elements, the initial penetration of the planes in mm (0 by
     construction), and the number of elements through the cortex.
     """
-    pial = TriangleMesh(mesh.vertices, zones.facets)
-    areas = face_areas(pial)
+    areas = face_areas(TriangleMesh(mesh.vertices, zones.facets))
+    by_zone = {}
+    for number, name in enumerate(ZONE_NAMES):
+        is_in_zone = zones.facet_zone == number
+        by_zone[name] = {
+            "facets": int(is_in_zone.sum()),
+            "area_mm2": float(areas[is_in_zone].sum()),
+        }
     centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
-    clamped = np.isin(zones.facet_zone, (CLAMPED, BASE))
-    sides = {
-        "left": centroid_x < zones.fissure_x_mm,
-        "right": centroid_x >= zones.fissure_x_mm,
-    }
+    is_left = centroid_x < zones.fissure_x_mm
+    is_clamped = np.isin(zones.facet_zone, (CLAMPED, BASE))
+    clamped_share = {}
+    for side, is_on_side in {"left": is_left, "right": ~is_left}.items():
+        total = areas[is_on_side].sum()
+        clamped = areas[is_clamped & is_on_side].sum()
+        clamped_share[side] = float(clamped / total) if total else 0.0
+    edge_mm = _edge_length_within(mesh, zones, thickness_mm)
     return {
-        "zones": {
-            name: {
-                "facets": int((zones.facet_zone == i).sum()),
-                "area_mm2": float(areas[zones.facet_zone == i].sum()),
-            }
-            for i, name in enumerate(ZONE_NAMES)
-        },
-        "clamped_share": {
-            side: (
-                float(areas[clamped & mask].sum() / areas[mask].sum())
-                if mask.any()
-                else 0.0
-            )
-            for side, mask in sides.items()
-        },
+        "zones": by_zone,
+        "clamped_share": clamped_share,
         "order": mesh.order,
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
-        "elements_through_cortex": (
-            thickness_mm / _edge_length_within(mesh, zones, thickness_mm)
-        ),
+        "elements_through_cortex": thickness_mm / edge_mm,
     }
 
 
@@ -68,13 +62,13 @@ def _edge_length_within(
     """Return the mean edge length in mm of the elements whose centroid is in the
     cortex, or of all if none is."""
     centroids = sum(mesh.vertices[corners] for corners in mesh.corners.T) / 4
-    depth = cKDTree(mesh.vertices[np.unique(zones.cortex_facets)]).query(centroids)[0]
+    pial = np.unique(zones.cortex_facets)
+    depth, _ = cKDTree(mesh.vertices[pial]).query(centroids)
     cortex = mesh.corners[depth <= thickness_mm]
     if not len(cortex):
         cortex = mesh.corners
-    return float(
-        np.mean([mean_length(mesh.vertices, cortex[:, pair]) for pair in EDGES])
-    )
+    lengths = [mean_length(mesh.vertices, cortex[:, pair]) for pair in EDGES]
+    return float(np.mean(lengths))
 
 
 def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:

@@ -35,11 +35,11 @@ def processor() -> str:
     """Return a text that differs between processors for which -march=native gives
     different code."""
     cpuinfo = Path("/proc/cpuinfo")
-    lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
-    return next(
-        (line for line in lines if line.startswith(("flags", "Features"))),
-        platform.processor(),
-    )
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
+            if line.startswith(("flags", "Features")):
+                return line
+    return platform.processor()
 
 
 @contextmanager
@@ -52,24 +52,16 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     Ranks on different processors share code without `NATIVE`.
     """
     set_compiler()
-    processors = sorted(set(comm.allgather(processor())))
-    is_mixed = len(processors) > 1
-    kind = (
-        platform.machine()
-        if is_mixed
-        else hashlib.sha256(processors[0].encode()).hexdigest()[:8]
-    )
+    processors = set(comm.allgather(processor()))
+    arguments = list(COMPILER_ARGUMENTS)
+    if len(processors) == 1:
+        kind = hashlib.sha256(processors.pop().encode()).hexdigest()[:8]
+    else:
+        kind = platform.machine()
+        arguments = [argument for argument in arguments if argument != NATIVE]
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    cache = (
-        base
-        / "gyriflow"
-        / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
-    )
-    arguments = [
-        argument
-        for argument in COMPILER_ARGUMENTS
-        if not is_mixed or argument != NATIVE
-    ]
+    cache = base / "gyriflow" / f"forms-{kind}-{python}"
     options = {"cffi_extra_compile_args": arguments, "cache_dir": str(cache)}
     with ExitStack() as stack:
         if comm.rank == 0:
@@ -95,9 +87,8 @@ def compiled(
     with form_compiler(comm) as options:
         library = Path(options["cache_dir"]) / f"{name}.so"
         if comm.rank == 0 and not library.exists():
-            interface.set_source(
-                name, code, extra_compile_args=options["cffi_extra_compile_args"]
-            )
+            arguments = options["cffi_extra_compile_args"]
+            interface.set_source(name, code, extra_compile_args=arguments)
             with TemporaryDirectory(dir=library.parent) as folder:
                 Path(interface.compile(tmpdir=folder)).rename(library)
     return interface, interface.dlopen(str(library))
@@ -133,11 +124,12 @@ def pointer(
 def _remove_incomplete_entries(cache: Path) -> None:
     """Remove the files of each form that has no source, no library, or no mark that
     both are complete."""
-    names = {path.name.split(".")[0] for path in cache.glob("libffcx_*")}
-    for name in names:
-        complete = (cache / f"{name}.c").exists() and (
-            cache / f"{name}.c.cached"
-        ).exists()
-        if not (complete and any(cache.glob(f"{name}.*.so"))):
-            for path in cache.glob(f"{name}.*"):
-                path.unlink(missing_ok=True)
+    paths = cache.glob("libffcx_*")
+    for name in {path.name.split(".")[0] for path in paths}:
+        source = cache / f"{name}.c"
+        mark = cache / f"{name}.c.cached"
+        libraries = cache.glob(f"{name}.*.so")
+        if source.exists() and mark.exists() and any(libraries):
+            continue
+        for path in cache.glob(f"{name}.*"):
+            path.unlink(missing_ok=True)

@@ -16,8 +16,9 @@ def has_compiler() -> bool:
 def set_compiler() -> None:
     """Have Python's build tools use ziglang if the system has no compiler."""
     if not _has_system_compiler() and _has_ziglang():
-        os.environ["CC"] = f"{sys.executable} -m ziglang cc"
-        os.environ["LDSHARED"] = f"{os.environ['CC']} -shared"
+        command = f"{sys.executable} -m ziglang cc"
+        os.environ["CC"] = command
+        os.environ["LDSHARED"] = f"{command} -shared"
 
 
 def _has_system_compiler() -> bool:

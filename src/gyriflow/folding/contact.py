@@ -12,12 +12,18 @@ are minima over them, so that all ranks take the same decisions.
 import ipctk
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, TriangleMesh, connected, edge_lengths, edges
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    connected,
+    edge_lengths,
+    edges,
+)
 from ..units import M_PER_MM
 from .contact_search import ContactSearch, NearPairs
 from .contact_surface import ContactSurface
@@ -84,31 +90,30 @@ class SelfContact:
     def __init__(
         self,
         domain: Domain,
-        facets: NDArray[np.int64],
+        facets: Ints,
         stiffness_pa: float,
         distance_mm: float | None = None,
         *,
         stiffens: bool = False,
     ) -> None:
         ipctk.set_num_threads(1)  # more threads would compete with other ranks
-        self.domain, self.surface = domain, ContactSurface(domain, facets)
+        self.domain = domain
+        self.surface = ContactSurface(domain, facets)
         self._stiffens = stiffens
         self._initial_pa = stiffness_pa
         self._given_mm = distance_mm
         self._max_mm = np.inf
         start = self.surface.reference_mm()
-        self._edges = edges(TriangleMesh(start, self.surface.faces))[0]
+        self._edges, _ = edges(TriangleMesh(start, self.surface.faces))
         # from rank 0, since other processors may round differently
-        self._owned = (
-            domain.comm.bcast(bisect_points(start, domain.comm.size), root=0)
-            == domain.comm.rank
-        )
+        rank_of_vertex = bisect_points(start, domain.comm.size)
+        rank_of_vertex = domain.comm.bcast(rank_of_vertex, root=0)
+        self._owned = rank_of_vertex == domain.comm.rank
         self._search = ContactSearch(self.surface.faces, self._owned, start, 0.0)
         self.begin_step()
         part, mesh = self._search.part_at(start)
-        if domain.comm.allreduce(
-            ipctk.has_intersections(mesh, part.restrict(start)), op=MPI.LOR
-        ):
+        crosses = ipctk.has_intersections(mesh, part.restrict(start))
+        if domain.comm.allreduce(crosses, op=MPI.LOR):
             raise MeshError(
                 "the pial surface of the mesh crosses itself, which contact cannot"
                 " undo",
@@ -125,22 +130,25 @@ class SelfContact:
     def _lower_gaps(self, gaps: Floats, near: NearPairs) -> None:
         """Lower the gap (n,) of each vertex to the smallest of a rank's pairs with it
         that are not neighbours."""
-        corners = near.vertices_of_pairs()
-        rows = near.part.vertices[np.unique(np.concatenate([[], *corners])).astype(int)]
+        pairs = [near.part.vertices[corners] for corners in near.vertices_of_pairs()]
+        if not pairs:
+            return
+        in_pairs = np.unique(np.concatenate(pairs))
         count = len(self._rest)
-        ends = np.concatenate([self._edges, self._edges[:, ::-1]]).T
-        links = sparse.coo_array(
-            (np.ones(ends.shape[1]), ends), shape=(count, count)
-        ).tocsr() + sparse.eye_array(count)
-        around = links[rows]
+        first, second = self._edges.T
+        ones = np.ones(len(self._edges))
+        one_way = sparse.coo_array((ones, (first, second)), shape=(count, count))
+        links = (one_way + one_way.T + sparse.eye_array(count)).tocsr()
+        # nonzero where a few edges connect a vertex in pairs (row) and another one
+        connections = links[in_pairs]
         for _ in range(NEIGHBOUR_EDGES[self.domain.order] - 1):
-            around = around @ links
-        for i, vertices in enumerate(corners):
-            numbers = near.part.vertices[vertices]
-            if (
-                around[np.searchsorted(rows, numbers)][:, numbers].toarray() == 0
-            ).any():
-                gaps[numbers] = np.minimum(gaps[numbers], near.distance_mm(i))
+            connections = connections @ links
+        for number, vertices in enumerate(pairs):
+            rows = np.searchsorted(in_pairs, vertices)
+            are_neighbours = connections[rows][:, vertices].toarray() > 0
+            if not are_neighbours.all():
+                gap_mm = near.distance_mm(number)
+                gaps[vertices] = np.minimum(gaps[vertices], gap_mm)
 
     def begin_step(self) -> None:
         """Start from the current positions; set the barrier by edge lengths and the
@@ -149,21 +157,26 @@ class SelfContact:
         lengths = edge_lengths(self._rest, self._edges)
         # from rank 0, as above
         by_edges = self.domain.comm.bcast(contact_distance_mm(lengths), root=0)
-        distance_mm = self._given_mm or min(by_edges, self._max_mm)
+        self.distance_mm = self._given_mm or min(by_edges, self._max_mm)
         self._search = ContactSearch(
-            self.surface.faces, self._owned, self._rest, distance_mm, self._search
+            self.surface.faces,
+            self._owned,
+            self._rest,
+            self.distance_mm,
+            self._search,
         )
         self._near: NearPairs | None = None
-        factor = 1.0
+        self.stiffness_pa = self._initial_pa
         if self._stiffens:
             # the first residual of the step needs them again
             self._near = self._search.near(self._rest)
-            factor = stiffening(
-                self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN) / distance_mm
-            )
-        self.distance_mm, self.stiffness_pa = distance_mm, factor * self._initial_pa
+            gap_mm = self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN)
+            self.stiffness_pa *= stiffening(gap_mm / self.distance_mm)
         self._potential = ipctk.BarrierPotential(
-            BARRIER, distance_mm, self.stiffness_pa, use_physical_barrier=True
+            BARRIER,
+            self.distance_mm,
+            self.stiffness_pa,
+            use_physical_barrier=True,
         )
 
     def near_pairs(self, u: Floats) -> NearPairs:
@@ -173,7 +186,7 @@ class SelfContact:
             self._near = self._search.near(positions)
         return self._near
 
-    def join_touching(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
+    def join_touching(self, part: Ints) -> Ints:
         """Return new part numbers (n,) of the mesh's vertices: parts in contact at the
         start of the step become one."""
         if part.max() == 0:
@@ -182,9 +195,10 @@ class SelfContact:
         near = self.near_pairs(no_motion)
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
         part_of_node = part[self.surface.nodes]
-        part_of_vertex = part_of_node[nearest_node][near.part.vertices]
+        part_of_vertex = part_of_node[nearest_node]
         own_links = set()
-        for vertices in near.vertices_of_pairs():
+        for corners in near.vertices_of_pairs():
+            vertices = near.part.vertices[corners]
             parts = part_of_vertex[vertices]
             own_links.add((int(parts.min()), int(parts.max())))
         all_links = set().union(*self.domain.comm.allgather(own_links))
@@ -195,8 +209,12 @@ class SelfContact:
     def energy(self, u: Floats) -> float:
         """Return the barrier's energy in J."""
         near = self.near_pairs(u)
-        local = float(self._potential(near.pairs, near.mesh, near.part_positions))
-        return self.domain.comm.allreduce(local * J_PER_PA_MM3)
+        energy = self._potential(
+            near.pairs,
+            near.mesh,
+            near.part_positions,
+        )
+        return self.domain.comm.allreduce(float(energy) * J_PER_PA_MM3)
 
     def forces(self, u: Floats) -> Floats:
         """Return the (n, 3) derivative of the energy in N at the surface's nodes."""
@@ -207,7 +225,11 @@ class SelfContact:
         """Return the (p, 3) derivative of the energy of a rank's pairs in N."""
         if not len(near.pairs):
             return np.zeros_like(near.part_positions)
-        gradient = self._potential.gradient(near.pairs, near.mesh, near.part_positions)
+        gradient = self._potential.gradient(
+            near.pairs,
+            near.mesh,
+            near.part_positions,
+        )
         return np.asarray(gradient.reshape(-1, 3) * N_PER_PA_MM2)
 
     def add_forces(self, u: Floats, out: Floats) -> None:
@@ -222,28 +244,27 @@ class SelfContact:
             return None
         own = None
         if len(near.pairs):
-            projection = (
-                ipctk.PSDProjectionMethod.CLAMP
-                if convex
-                else ipctk.PSDProjectionMethod.NONE
+            methods = ipctk.PSDProjectionMethod
+            projection = methods.CLAMP if convex else methods.NONE
+            own = self._potential.hessian(
+                near.pairs,
+                near.mesh,
+                near.part_positions,
+                projection,
             )
-            own = (
-                self._potential.hessian(
-                    near.pairs, near.mesh, near.part_positions, projection
-                )
-                * N_PER_M_PER_PA_MM
-            )
+            own = own * N_PER_M_PER_PA_MM
         return self.surface.matrix_sum(near.part, own)
 
     def max_step(self, u: Floats, direction: Floats) -> float:
         """Return the largest fraction, up to 1, of a direction (k, 3) in m that can be
         added to u without collision."""
         displacement = self.surface.displacement_mm(direction)
+        lengths = np.linalg.norm(displacement, axis=1)
         # the candidates near a longer displacement would fill the memory
-        part = MAX_DISPLACEMENT_MM / max(
-            float(np.linalg.norm(displacement, axis=1).max()), MAX_DISPLACEMENT_MM
-        )
-        step = self._search.collision_free_step(self.near_pairs(u), part * displacement)
+        longest_mm = max(float(lengths.max()), MAX_DISPLACEMENT_MM)
+        part = MAX_DISPLACEMENT_MM / longest_mm
+        near = self.near_pairs(u)
+        step = self._search.collision_free_step(near, part * displacement)
         return part * self.domain.comm.allreduce(step, op=MPI.MIN)
 
     def smallest_distance_mm(self, u: Floats) -> float:
@@ -259,16 +280,18 @@ class SelfContact:
         """Return the (n,) contact pressure in Pa at all vertices of the mesh, force per
         area, 0 off the surface."""
         near = self.near_pairs(u)
-        forces, areas = np.zeros_like(self._rest), np.zeros(len(self._rest))
-        forces[near.part.vertices] = self._forces_of(near)
+        part = near.part
+        forces = np.zeros_like(self._rest)
+        forces[part.vertices] = self._forces_of(near)
         # only the owner of a vertex is sure to have all faces around it
-        owned = near.part.owned
-        areas[near.part.vertices[owned]] = (
-            np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2
-        )
-        norms = np.linalg.norm(self.domain.sum_over_ranks(forces), axis=1)
-        pressure = norms / self.domain.sum_over_ranks(areas)
+        areas_mm2 = np.array(near.mesh.vertex_areas)[part.owned]
+        areas = np.zeros(len(self._rest))
+        areas[part.vertices[part.owned]] = areas_mm2 * M_PER_MM**2
+        total_forces = self.domain.sum_over_ranks(forces)
+        total_areas = self.domain.sum_over_ranks(areas)
+        pressure = np.linalg.norm(total_forces, axis=1) / total_areas
         values = np.zeros(len(self.domain.positions))
+        # the first vertices of the surface are the nodes
         values[self.surface.nodes] = pressure[: len(self.surface.nodes)]
         return values
 
@@ -288,8 +311,12 @@ def small_gap_mm(gaps: Floats) -> float:
     It is the smallest, unless few vertices are nearer than a quarter of the gap of the
     next one: then it is that quarter. These few are pressed apart in the first step.
     """
-    few = int(min(max(FEW_VERTICES, FEW_SHARE * len(gaps)), MAX_FEW_SHARE * len(gaps)))
-    return max(float(gaps.min()), FEW_BELOW * float(np.partition(gaps, few)[few]))
+    count = len(gaps)
+    few = max(FEW_VERTICES, FEW_SHARE * count)
+    few = min(few, MAX_FEW_SHARE * count)
+    ascending = np.sort(gaps)
+    next_gap = float(ascending[int(few)])
+    return max(float(ascending[0]), FEW_BELOW * next_gap)
 
 
 def stiffening(gap: float) -> float:
@@ -298,8 +325,7 @@ def stiffening(gap: float) -> float:
     `gap` is the smallest gap at the step's start as a fraction of the contact distance,
     infinite where nothing is near.
     """
-    return (
-        1.0
-        if gap >= STIFFEN_BELOW
-        else min((STIFFEN_BELOW / max(gap, 1e-9)) ** 0.5, MAX_STIFFENING)
-    )
+    if gap >= STIFFEN_BELOW:
+        return 1.0
+    ratio = STIFFEN_BELOW / max(gap, 1e-9)
+    return min(ratio**0.5, MAX_STIFFENING)

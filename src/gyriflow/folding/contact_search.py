@@ -3,13 +3,13 @@ IPC Toolkit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Protocol
 
 import ipctk
 import numpy as np
-from numpy.typing import NDArray
 
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Indices, Ints, Mask
 from .contact_surface import SurfacePart, part_of_surface
 
 CANDIDATE_MARGIN_MM = 0.05
@@ -56,7 +56,10 @@ class SearchRange:
             return True
         low = np.minimum(self.first, self.last) - margin
         high = np.maximum(self.first, self.last) + margin
-        return all(bool((at >= low).all() and (at <= high).all()) for at in positions)
+        for places in positions:
+            if (places < low).any() or (places > high).any():
+                return False
+        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,27 +82,29 @@ class NearPairs:
         """The smallest distance between the pairs, infinite without any."""
         if not len(self.pairs):
             return np.inf
-        return float(
-            np.sqrt(self.pairs.compute_minimum_distance(self.mesh, self.part_positions))
-        )
+        squared = self.pairs.compute_minimum_distance(self.mesh, self.part_positions)
+        return float(np.sqrt(squared))
 
     def distance_mm(self, i: int) -> float:
         """Return the distance between the two sides of pair `i`."""
         # ipctk's pairs do not keep their list alive: a pair with a name may outlive it,
         # and then reads freed memory
-        places = self.pairs[i].dof(
-            self.part_positions, self.mesh.edges, self.mesh.faces
+        ends = self.pairs[i].dof(
+            self.part_positions,
+            self.mesh.edges,
+            self.mesh.faces,
         )
-        return float(np.sqrt(self.pairs[i].compute_distance(places)))
+        squared = self.pairs[i].compute_distance(ends)
+        return float(np.sqrt(squared))
 
     def vertices_of_pairs(self) -> list[list[int]]:
         """Return the vertices of each pair, as numbers of the part's vertices."""
-        corners = [
-            self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces)
-            for i in range(len(self.pairs))
-        ]
-        # negative numbers stand for missing vertices
-        return [[vertex for vertex in pair if vertex >= 0] for pair in corners]
+        found = []
+        for i in range(len(self.pairs)):
+            vertices = self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces)
+            # negative numbers stand for missing vertices
+            found.append([vertex for vertex in vertices if vertex >= 0])
+        return found
 
 
 class ContactSearch:
@@ -113,8 +118,8 @@ class ContactSearch:
 
     def __init__(
         self,
-        faces: NDArray[np.integer],
-        owned: NDArray[np.bool_],
+        faces: Ints,
+        owned: Mask,
         rest_mm: Floats,
         distance_mm: float,
         previous: "ContactSearch | None" = None,
@@ -139,21 +144,23 @@ class ContactSearch:
         candidates = self._candidates_at(positions)
         if candidates is None:
             part, mesh, candidates = self._search(self._rest, positions)
-        at = part.restrict(positions)
+        places = part.restrict(positions)
         pairs = ipctk.NormalCollisions()
         pairs.use_area_weighting = True
-        pairs.build(candidates, mesh, at, self._distance)
-        pairs = _drop_parallel_edges(pairs, part.edges, at)
-        return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
+        pairs.build(candidates, mesh, places, self._distance)
+        pairs = _drop_parallel_edges(pairs, part.edges, places)
+        return NearPairs(positions, part, mesh, places, part.owned_pairs(pairs))
 
     def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
         """Return the largest fraction, at most 1, of a displacement (s, 3) in mm from
         `start` without a collision."""
         # everything that is not a pair is farther away than the contact distance
         gap = min(self._distance, start.gap_mm)
-        if 2 * float(np.linalg.norm(displacement, axis=1).max()) <= MAX_CLOSING * gap:
+        longest = float(np.linalg.norm(displacement, axis=1).max())
+        if 2 * longest <= MAX_CLOSING * gap:
             return 1.0
-        first, last = start.positions, start.positions + displacement
+        first = start.positions
+        last = first + displacement
         part, mesh = self.part_at(first, last)
         candidates = self._candidates_at(first, last)
         if candidates is None and np.abs(displacement).max() <= PART_MARGIN_MM:
@@ -182,35 +189,34 @@ class ContactSearch:
         """Return a part of the surface with all pairs of the rank, at each of the given
         (s, 3) positions in mm."""
         if self._part is None or not self._part[1].covers(self._distance, *positions):
-            displacement = max(
-                float(np.abs(at - positions[0]).max()) for at in positions
-            )
-            # a single rank has the whole surface
-            margin = np.inf if self._owned.all() else max(PART_MARGIN_MM, displacement)
-            covered = SearchRange(
-                positions[0], positions[0], self._distance / 2 + margin
-            )
-            self._part = (
-                part_of_surface(
-                    positions[0], self._faces, self._owned, 2 * covered.reach
-                ),
-                covered,
-            )
+            self._part = self._new_part(*positions)
             # candidates refer to vertex numbers of the old part
-            self._mesh, self._candidates = None, None
-        part = self._part[0]
+            self._mesh = None
+            self._candidates = None
+        part, _ = self._part
         if self._mesh is None:
-            self._mesh = ipctk.CollisionMesh(
-                part.restrict(self._rest), part.edges, part.faces
-            )
+            rest = part.restrict(self._rest)
+            self._mesh = ipctk.CollisionMesh(rest, part.edges, part.faces)
         return part, self._mesh
 
+    def _new_part(
+        self, first: Floats, *others: Floats
+    ) -> tuple[SurfacePart, SearchRange]:
+        margin = PART_MARGIN_MM
+        for places in others:
+            margin = max(margin, float(np.abs(places - first).max()))
+        if self._owned.all():
+            # a single rank has the whole surface
+            margin = np.inf
+        covered = SearchRange(first, first, self._distance / 2 + margin)
+        part = part_of_surface(first, self._faces, self._owned, 2 * covered.reach)
+        return part, covered
+
     def _candidates_at(self, *positions: Floats) -> ipctk.Candidates | None:
-        if self._candidates is None or not self._candidates[1].covers(
-            self._distance, *positions
-        ):
+        if self._candidates is None:
             return None
-        return self._candidates[0]
+        candidates, covered = self._candidates
+        return candidates if covered.covers(self._distance, *positions) else None
 
     def _search(
         self, first: Floats, last: Floats
@@ -227,7 +233,7 @@ class ContactSearch:
 
 def _drop_parallel_edges(
     pairs: ipctk.NormalCollisions,
-    edges: NDArray[np.integer],
+    edges: Indices,
     positions: Floats,
 ) -> ipctk.NormalCollisions:
     """Return the pairs without those of two edges (e, 2) that are parallel, at
@@ -247,18 +253,14 @@ def _drop_parallel_edges(
     result.use_area_weighting = pairs.use_area_weighting
     result.vv_collisions = pairs.vv_collisions
     result.ev_collisions = pairs.ev_collisions
-    result.ee_collisions = [
-        pair
-        for pair, drop in zip(pairs.ee_collisions, are_parallel, strict=True)
-        if not drop
-    ]
+    result.ee_collisions = list(compress(pairs.ee_collisions, ~are_parallel))
     result.fv_collisions = pairs.fv_collisions
     return result
 
 
 def _drop_distant_parallel_edges(
     candidates: ipctk.Candidates,
-    edges: NDArray[np.integer],
+    edges: Indices,
     first: Floats,
     last: Floats,
 ) -> ipctk.Candidates:
@@ -286,17 +288,15 @@ def _drop_distant_parallel_edges(
 
 def _parallel_edges(
     pairs: Sequence[EdgePair],
-    edges: NDArray[np.integer],
+    edges: Indices,
     positions: Floats,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Return for each pair whether its two edges (e, 2) are parallel at (p, 3)
     positions of their vertices."""
-    numbers = np.array(
-        [(pair.edge0_id, pair.edge1_id) for pair in pairs], dtype=np.int64
-    ).reshape(-1, 2)
+    numbers = np.array([(pair.edge0_id, pair.edge1_id) for pair in pairs], np.int64)
     # of the edges in pairs only, which are few: this is called at each evaluation of
     # forces
-    ends = positions[edges[numbers]]
+    ends = positions[edges[numbers.reshape(-1, 2)]]
     directions = ends[:, :, 1] - ends[:, :, 0]
     first = directions[:, 0]
     second = directions[:, 1]

@@ -16,7 +16,14 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from ..geometry.tetrahedra import finer_surface
-from ..geometry.triangles import Floats, TriangleMesh, edges
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    Mask,
+    TriangleMesh,
+    edges,
+    used_part,
+)
 from ..units import MM_PER_M
 from .domain import Domain, gather
 
@@ -30,10 +37,10 @@ class SurfacePart:
     owns.
     """
 
-    vertices: NDArray[np.int64]
+    vertices: Ints
     faces: NDArray[np.int32]
     edges: NDArray[np.int32]
-    owned: NDArray[np.bool_]
+    owned: Mask
 
     def restrict(self, values: Floats) -> Floats:
         """Return the (p, 3) values at the part's vertices from those of the whole
@@ -49,6 +56,7 @@ class SurfacePart:
         """
         if self.owned.all():
             return pairs
+        # as lists, which are faster to index one by one
         owned: list[bool] = list(self.owned)
         lowest: list[int] = list(self.edges[:, 0])
         result = ipctk.NormalCollisions()
@@ -74,32 +82,30 @@ class SurfacePart:
 
 def part_of_surface(
     positions: Floats,
-    faces: NDArray[np.integer],
-    owned: NDArray[np.bool_],
+    faces: Ints,
+    owned: Mask,
     reach: float,
 ) -> SurfacePart:
     """Return the part of a surface that has all pairs of the (n,) `owned` vertices.
 
     `reach` is the largest distance, along the axes, between the two sides of a pair.
     """
-    if owned.all():
-        near = np.ones(len(faces), dtype=bool)
-    else:
-        low, high = positions[faces].min(axis=1), positions[faces].max(axis=1)
-        owned_faces = owned[faces].any(axis=1)
-        near = (low <= high[owned_faces].max(axis=0) + reach).all(axis=1) & (
-            high >= low[owned_faces].min(axis=0) - reach
-        ).all(axis=1)
+    if not owned.all():
+        low = positions[faces].min(axis=1)
+        high = positions[faces].max(axis=1)
+        is_owned = owned[faces].any(axis=1)
+        box_low = low[is_owned].min(axis=0) - reach
+        box_high = high[is_owned].max(axis=0) + reach
+        is_near = ((low <= box_high) & (high >= box_low)).all(axis=1)
         # and the faces that adjoin these, for the areas at their vertices
-        touched = np.zeros(len(positions), dtype=bool)
-        touched[faces[near]] = True
-        near = touched[faces].any(axis=1)
-    vertices, numbers = np.unique(faces[near], return_inverse=True)
-    numbers = numbers.reshape(-1, 3)
-    sides = edges(TriangleMesh(positions[vertices], numbers))[0]
+        is_touched = np.zeros(len(positions), dtype=bool)
+        is_touched[faces[is_near]] = True
+        faces = faces[is_touched[faces].any(axis=1)]
+    part, vertices = used_part(TriangleMesh(positions, faces))
+    sides, _ = edges(part)
     return SurfacePart(
         vertices,
-        np.asfortranarray(numbers, dtype=np.int32),
+        np.asfortranarray(part.faces, dtype=np.int32),
         np.asfortranarray(sides, dtype=np.int32),
         owned[vertices],
     )
@@ -119,7 +125,7 @@ class ContactSurface:
     the nodes themselves.
     """
 
-    def __init__(self, domain: Domain, facets: NDArray[np.int64]) -> None:
+    def __init__(self, domain: Domain, facets: Ints) -> None:
         self.domain = domain
         self.nodes, faces = np.unique(facets, return_inverse=True)
         faces = faces.reshape(-1, 3)
@@ -136,16 +142,14 @@ class ContactSurface:
     def reference_mm(self) -> Floats:
         """Return the (s, 3) positions in mm of the mesh before the displacement of the
         step."""
-        return np.asarray(self.weights @ self.domain.positions[self.nodes] * MM_PER_M)
+        positions = self.domain.positions[self.nodes]
+        return np.asarray(self.weights @ positions * MM_PER_M)
 
     def displacement_mm(self, u: Floats) -> Floats:
         """Return the (s, 3) displacements in mm from those of the local nodes (k, 3) in
         m."""
-        return np.asarray(
-            self.weights
-            @ gather(self.domain.comm, u[self._local], self._gathered_rows)
-            * MM_PER_M
-        )
+        nodal = gather(self.domain.comm, u[self._local], self._gathered_rows)
+        return np.asarray(self.weights @ nodal * MM_PER_M)
 
     def nodal_sum(self, part: SurfacePart, values: Floats) -> Floats:
         """Return the (n, 3) sum over all ranks of (p, 3) values on their parts, moved
@@ -163,26 +167,26 @@ class ContactSurface:
     ) -> PETSc.Mat:
         """Return the sum over ranks of their parts' symmetric (3p, 3p) matrices, as a
         matrix of all mesh nodes."""
-        comm, components = self.domain.comm, np.arange(3)
+        comm = self.domain.comm
         rows_for: list[sparse.csr_matrix | None] = [None] * comm.size
         if matrix is not None:
             self._interpolate(part)
-            nodal = sparse.csr_matrix(
-                self._part_to_nodes @ matrix @ self._nodes_to_part
-            )
-            rows_for = [
-                nodal[(3 * rows[:, None] + components).ravel()]
-                for rows in self._rows_by_rank
-            ]
+            nodal = self._part_to_nodes @ matrix @ self._nodes_to_part
+            nodal = sparse.csr_matrix(nodal)
+            for rank, nodes in enumerate(self._rows_by_rank):
+                components = 3 * nodes[:, None] + np.arange(3)
+                rows_for[rank] = nodal[components.ravel()]
         # each rank receives the rows that it owns from all others
-        own, rows_for[comm.rank] = rows_for[comm.rank], None
-        received = [own, *comm.alltoall(rows_for)]
+        own = rows_for[comm.rank]
+        rows_for[comm.rank] = None
         rows = sparse.csr_matrix((3 * len(self._rows), 3 * len(self.nodes)))
-        rows = sum((block for block in received if block is not None), rows)
+        for block in (own, *comm.alltoall(rows_for)):
+            if block is not None:
+                rows = rows + block
         counts = np.zeros((self.domain.n_owned, 3), dtype=PETSc.IntType)
         counts[self._local] = np.diff(rows.indptr).reshape(-1, 3)
         # owned rows are in the order of the nodes
-        start = np.concatenate([[0], np.cumsum(counts.ravel())]).astype(PETSc.IntType)
+        start = np.concatenate([[0], np.cumsum(counts)]).astype(PETSc.IntType)
         node, component = np.divmod(rows.indices, 3)
         columns = (3 * self._columns[node] + component).astype(PETSc.IntType)
         size = (3 * self.domain.n_owned, 3 * len(self.domain.positions))

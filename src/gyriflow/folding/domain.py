@@ -25,7 +25,7 @@ from ..geometry.tetrahedra import (
     volumes_between,
     whole_faces,
 )
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Indices, Ints
 from ..units import M_PER_MM
 
 # Scotch reads these when it first partitions a mesh; without them runs are not
@@ -46,20 +46,19 @@ GRADIENTS_AT_NODES = shape_slopes(NODE_COORDINATES)
 def gather(
     comm: MPI.Comm,
     values: Floats,
-    order: NDArray[np.int64],
+    order: Ints,
 ) -> Floats:
     """Return on every rank the (n, ...) values of all ranks; `order` (n,) has the index
     of each, rank by rank."""
-    shape = values.shape[1:]
-    received, result = np.empty((len(order), *shape)), np.empty((len(order), *shape))
-    comm.Allgatherv(
-        np.ascontiguousarray(values), (received, comm.allgather(values.size))
-    )
+    received = np.empty((len(order), *values.shape[1:]))
+    sizes = comm.allgather(values.size)
+    comm.Allgatherv(np.ascontiguousarray(values), (received, sizes))
+    result = np.empty_like(received)
     result[order] = received
     return result
 
 
-def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
+def bisect_points(positions: Floats, count: int) -> Ints:
     """Divide (n, 3) points into `count` boxes with nearly equal numbers of points;
     return the box (n,) of each point.
 
@@ -67,9 +66,8 @@ def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
     and so on (recursive coordinate bisection, Berger and Bokhari 1987).
     """
     box = np.zeros(len(positions), dtype=np.int64)
-    stack: list[tuple[NDArray[np.int64], int, int]] = [
-        (np.arange(len(positions)), 0, count)
-    ]
+    # points, the first of the boxes that they are divided into, and how many
+    stack: list[tuple[Ints, int, int]] = [(np.arange(len(positions)), 0, count)]
     while stack:
         inside, first, number = stack.pop()
         if number == 1 or not len(inside):
@@ -79,7 +77,8 @@ def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
         inside = inside[np.argsort(positions[inside, axis], kind="stable")]
         low = number // 2
         cut = len(inside) * low // number
-        stack += [(inside[:cut], first, low), (inside[cut:], first + low, number - low)]
+        stack.append((inside[:cut], first, low))
+        stack.append((inside[cut:], first + low, number - low))
     return box
 
 
@@ -103,14 +102,13 @@ class Domain:
         self.positions: Floats = np.array(mesh.vertices) * M_PER_MM
         self.order = mesh.order
         element = basix.ufl.element("Lagrange", "tetrahedron", self.order, shape=(3,))
-        tets = mesh.tets[:, TO_DOLFINX[self.order]]
-        cells = tets if comm.rank == 0 else np.empty((0, tets.shape[1]), dtype=np.int64)
-        points = self.positions if comm.rank == 0 else np.empty((0, 3))
-        # no ghost cells
+        # from rank 0, without ghost cells
+        n_read = len(mesh.tets) if comm.rank == 0 else 0
+        n_points = len(mesh.vertices) if comm.rank == 0 else 0
         self.mesh = dolfinx.mesh.create_mesh(
             comm,
-            cells=cells,
-            x=points,
+            cells=mesh.tets[:n_read, TO_DOLFINX[self.order]],
+            x=self.positions[:n_points],
             e=ufl.Mesh(element),
         )
         self.space = dolfinx.fem.functionspace(
@@ -118,25 +116,23 @@ class Domain:
         )
         nodes_of_cells = self.space.dofmap.list
         self.cells = np.ascontiguousarray(nodes_of_cells[:, FROM_DOLFINX[self.order]])
-        self.n_owned = self.space.dofmap.index_map.size_local
-        nodes = self.n_owned + self.space.dofmap.index_map.num_ghosts
-        self._geometry_node = np.empty(nodes, dtype=np.int64)
+        index_map = self.space.dofmap.index_map
+        self.n_owned = index_map.size_local
+        n_nodes = self.n_owned + index_map.num_ghosts
+        self._geometry_node = np.empty(n_nodes, dtype=np.int64)
         # one array per cell type
         (geometry_nodes,) = self.mesh.geometry.dofmaps
         self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes.ravel()
-        self.vertex_of_node = self.mesh.geometry.input_global_indices[
-            self._geometry_node
-        ]
-        self._shared = dolfinx.la.vector(self.space.dofmap.index_map, 3)
+        vertices = self.mesh.geometry.input_global_indices
+        self.vertex_of_node = vertices[self._geometry_node]
+        self._shared = dolfinx.la.vector(index_map, 3)
         self.part = connected_parts(mesh)
         self._measure(self.local(self.positions))
-        self.tet_of_cell = np.array(
-            self.mesh.topology.original_cell_index[: len(self.cells)]
-        )
+        tets = self.mesh.topology.original_cell_index[: len(self.cells)]
+        self.tet_of_cell = np.array(tets)
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
-        self._order = np.concatenate(
-            comm.allgather(self.vertex_of_node[: self.n_owned])
-        )
+        owned_vertices = self.vertex_of_node[: self.n_owned]
+        self._order = np.concatenate(comm.allgather(owned_vertices))
         self.node_of_vertex = np.empty_like(self._order)
         self.node_of_vertex[self._order] = np.arange(len(self._order))
 
@@ -177,15 +173,15 @@ class Domain:
         """Return the values of the local nodes from those of all vertices."""
         return values[self.vertex_of_node]
 
-    def owned_rows(
-        self, vertices: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def owned_rows(self, vertices: Ints) -> tuple[Ints, Ints]:
         """Return the owned nodes (o,) that are among ascending vertices, and their
         places (o,) among these."""
         owned = self.vertex_of_node[: self.n_owned]
-        place = np.searchsorted(vertices, owned).clip(max=len(vertices) - 1)
-        local = np.flatnonzero(vertices[place] == owned)
-        return local, place[local]
+        place = np.searchsorted(vertices, owned)
+        place = place.clip(max=len(vertices) - 1)
+        is_among = vertices[place] == owned
+        nodes = np.flatnonzero(is_among)
+        return nodes, place[nodes]
 
     def place(self, positions: Floats) -> None:
         """Move the mesh to (n, 3) positions in m."""
@@ -214,11 +210,10 @@ class Domain:
         quadratic one, (c, 10).
         """
         if self.order == 1:
-            return (volumes_between(node_positions, self.cells) / self.volumes)[:, None]
-        return (
-            jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
-            / self._determinants_at_nodes
-        )
+            ratios = volumes_between(node_positions, self.cells) / self.volumes
+            return ratios[:, None]
+        after = jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
+        return after / self._determinants_at_nodes
 
     def smallest_volume_ratio(self, node_positions: Floats) -> float:
         """Return a lower bound of det F after a move, over the elements of all ranks.
@@ -230,9 +225,8 @@ class Domain:
         """
         if self.order == 1:
             return self.min_over_ranks(self.volume_ratios(node_positions))
-        return self.min_over_ranks(
-            lower_bounds(node_positions, self.cells) / self._upper_bounds
-        )
+        after = lower_bounds(node_positions, self.cells)
+        return self.min_over_ranks(after / self._upper_bounds)
 
     def min_over_ranks(self, local_values: Floats) -> float:
         """Return the smallest value of all ranks."""
@@ -252,32 +246,35 @@ class Domain:
             smallest = (float(values[i]), int(indices[i]), positions[i])
         return min(self.comm.allgather(smallest), key=lambda entry: entry[:2])
 
-    def local_facets(
-        self, facets: NDArray[np.int64], tags: NDArray[np.int64]
-    ) -> dolfinx.mesh.MeshTags:
+    def local_facets(self, facets: Ints, tags: Ints) -> dolfinx.mesh.MeshTags:
         """Return the tags (f,) of boundary facets (f, 3), vertex indices of the file,
         on the local facets.
 
         The four triangles of a quadratic element's face have one tag. ValueError where
         the facets are not the boundary.
         """
-        faces = whole_faces(facets, self.order)
-        tags = tags[:: PIECES_OF_ORDER[self.order]]
         topology = self.mesh.topology
         topology.create_entities(2)
         topology.create_connectivity(2, 3)
         local = dolfinx.mesh.exterior_facet_indices(topology)
         # the corners are the first three nodes
         nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local)
-        nodes = nodes.reshape(len(local), -1)[:, :3]
-        local_faces = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
-        count = len(self.positions)
-        weights = np.array([count * count, count, 1], dtype=np.int64)
-        keys, local_keys = np.sort(faces, axis=1) @ weights, local_faces @ weights
+        corners = nodes.reshape(len(local), -1)[:, :3]
+        local_faces = self.mesh.geometry.input_global_indices[corners]
+        keys = self._face_numbers(whole_faces(facets, self.order))
+        local_keys = self._face_numbers(local_faces)
         order = np.argsort(keys)
-        index = order[
-            np.minimum(np.searchsorted(keys, local_keys, sorter=order), len(order) - 1)
-        ]
+        place = np.searchsorted(keys, local_keys, sorter=order)
+        index = order[place.clip(max=len(order) - 1)]
         if (keys[index] != local_keys).any():
             raise ValueError("the facets are not the boundary of the mesh")
-        return dolfinx.mesh.meshtags(self.mesh, 2, local, tags[index].astype(np.int32))
+        face_tags = tags[:: PIECES_OF_ORDER[self.order]]
+        local_tags = face_tags[index].astype(np.int32)
+        return dolfinx.mesh.meshtags(self.mesh, 2, local, local_tags)
+
+    def _face_numbers(self, faces: Indices) -> Ints:
+        """Return one number (f,) for each face, whatever the order of its vertices."""
+        count = len(self.positions)
+        low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
+        in_plane = low * count + middle
+        return in_plane * count + high

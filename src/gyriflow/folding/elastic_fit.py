@@ -17,7 +17,6 @@ from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 from scipy.spatial import cKDTree
@@ -61,7 +60,6 @@ from .stretches import (
     packed,
     unpacked,
 )
-from .tissue import Elements
 from .zones import Zones
 
 log = logging.getLogger(__name__)
@@ -143,7 +141,7 @@ SETTINGS = NewtonSettings(
 the next step starts from it."""
 
 
-class Springs:
+class _Springs:
     """Springs from the nodes on the boundary to their goals, a contribution to the
     energy of a step.
 
@@ -151,7 +149,8 @@ class Springs:
     """
 
     def __init__(self, domain: Domain, vertices: Ints) -> None:
-        self._domain, self._vertices = domain, vertices
+        self._domain = domain
+        self._vertices = vertices
         self._local, self._rows = domain.owned_rows(vertices)
 
     def draw_to(
@@ -170,7 +169,9 @@ class Springs:
         self._gaps = gaps[self._rows]
 
     def energy(self, u: Floats) -> float:
-        local = 0.5 * float((self._weights * (u[self._local] + self._gaps) ** 2).sum())
+        stretched = u[self._local] + self._gaps
+        energies = self._weights * stretched**2
+        local = 0.5 * float(energies.sum())
         return self._domain.comm.allreduce(local)
 
     def add_forces(self, u: Floats, out: Floats) -> None:
@@ -204,62 +205,64 @@ class ElasticFit:
     """
 
     def __init__(self, mesh: TetrahedralMesh) -> None:
-        pieces, corners, self._tets = linear_pieces(mesh), mesh.corners, mesh.tets
+        self._tets = mesh.tets
+        self._pieces = linear_pieces(mesh)
+        self._is_curved = mesh.order == 2
+        self._kept_open = self._pieces
+        if self._is_curved:
+            # straight sides need the corners of curved elements to have volume
+            self._kept_open = np.concatenate([self._pieces, mesh.corners])
+        mesh = TetrahedralMesh(mesh.vertices, self._pieces)
+        self.positions_mm: Floats = mesh.vertices
         self._passed: list[Floats] = []
         self._moved_straight = False
-        mesh = TetrahedralMesh(mesh.vertices, pieces)
-        self.positions_mm: Floats = mesh.vertices
-        self._surface, self._used = boundary_surface(mesh)
-        self._pieces = pieces
-        # with the corners of curved elements: straight sides need these to have volume
-        self._is_curved = self._tets is not pieces
-        self._kept_open = pieces
-        if self._is_curved:
-            self._kept_open = np.concatenate([pieces, corners])
         self._start_volumes = volumes_between(mesh.vertices, self._kept_open)
+        self._surface, self._used = boundary_surface(mesh)
         is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
         all_outer = self._kept_open[is_outer[self._kept_open].all(axis=1)]
         self._inner_moves_mm = np.where(is_outer, 0.0, np.inf)
         self._outer_moves_mm = np.zeros(len(mesh.vertices))
         self._outer_moves_mm[all_outer] = MAX_OUTER_MOVE_MM
         facets = self._used[self._surface.faces]
-        whole = np.ones(len(mesh.vertices))
         zones = Zones(
             facets,
-            np.full(len(facets), FREE),
-            whole,
-            0.0,
-            (-math.inf, math.inf),
+            facet_zone=np.full(len(facets), FREE),
+            growth=np.ones(len(mesh.vertices)),
+            fissure_x_mm=0.0,
+            planes_mm=(-math.inf, math.inf),
             free=True,
         )
-        domain = self._domain = Domain(MPI.COMM_SELF, mesh)
-        self._problem = NonlinearProblem(
-            domain, zones, MATERIALS["neo-hookean"](POISSON_RATIO)
-        )
-        self._contact = SelfContact(domain, facets, BARRIER_PA)
-        self._springs = Springs(domain, self._used)
+        self._domain = Domain(MPI.COMM_SELF, mesh)
+        material = MATERIALS["neo-hookean"](POISSON_RATIO)
+        self._problem = NonlinearProblem(self._domain, zones, material)
+        self._contact = SelfContact(self._domain, facets, BARRIER_PA)
+        self._springs = _Springs(self._domain, self._used)
         self._problem.contributions += [self._contact, self._springs]
-        self._solver = NewtonSolver(
-            self._problem, SETTINGS, residual_floor(mesh, MODULUS_PA)
-        )
-        self._elements = Elements(
-            domain.cells, domain.vertex_of_node, self._problem.points
-        )
-        cells = self._elements.vertices[domain.cells]
-        corners = mesh.vertices[cells]
-        self._inverse_edges = np.linalg.inv(
-            np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-        )
-        size = (len(mesh.vertices), len(cells))
-        columns = np.repeat(np.arange(len(cells)), 4)
+        floor = residual_floor(mesh, MODULUS_PA)
+        self._solver = NewtonSolver(self._problem, SETTINGS, floor)
+        # the pieces in the order of the solver
+        self._cells = self._domain.vertex_of_node[self._domain.cells]
+        self._inverse_edges = np.linalg.inv(self._edges())
+        n_cells = len(self._cells)
+        element = np.repeat(np.arange(n_cells), 4)
         self._incidence = sparse.csr_array(
-            (np.ones(4 * len(cells)), (cells.ravel(), columns)), shape=size
+            (np.ones(4 * n_cells), (self._cells.ravel(), element)),
+            shape=(len(mesh.vertices), n_cells),
         )
+
+    def _edges(self) -> Floats:
+        """Return the (c, 3, 3) edges of the solver's elements from their first corners,
+        as columns."""
+        corners = self.positions_mm[self._cells]
+        return np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
 
     @property
     def boundary(self) -> TriangleMesh:
         """The boundary of the body as it is now."""
-        return TriangleMesh(self.positions_mm[self._used], self._surface.faces)
+        return self._boundary_at(self.positions_mm)
+
+    def _boundary_at(self, places: Floats) -> TriangleMesh:
+        return TriangleMesh(places[self._used], self._surface.faces)
 
     def follow(self, shape: Floats) -> Floats:
         """Move the body to near a shape (n, 3) in mm, which may have inverted elements;
@@ -270,42 +273,28 @@ class ElasticFit:
         if its boundary is still more than `MAX_LEFT_MM` from that of the shape (root
         mean square).
         """
-        boundary, start, n_passed = self.boundary, self.positions_mm, len(self._passed)
+        start = self.positions_mm
+        boundary = self.boundary
+        n_passed = len(self._passed)
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
-        goal_surface = TriangleMesh(goal[self._used], boundary.faces)
-        ratio = signed_volume(goal_surface) / signed_volume(boundary)
-        logs = log_stretch(self._gradients(goal), limit=MAX_LOG_STRETCH)
-        # of the whole, and of nine elements in ten
-        mean_strain = (
-            max(
-                abs(math.log(max(ratio, 1e-3))),
-                float(np.quantile(np.linalg.norm(logs, axis=(1, 2)), 0.9)),
-            )
-            / 3
-        )
-        steps = max(1, math.ceil(mean_strain / STRAIN_PER_STEP))
         lengths = np.full(len(self._used), SPRING_LENGTH_MM)
-        for left in range(steps, 0, -1):
-            displacement = (goal - self.positions_mm) / left
-            logs = log_stretch(
-                self._gradients(self.positions_mm + displacement), limit=MAX_LOG_STRETCH
-            )
-            integrals = integrals_at_vertices(
-                self.positions_mm, self._pieces, packed(logs)
-            )
-            strain = smooth_integrals(
-                self.positions_mm, self._pieces, integrals, SMOOTHING_MM
-            )
-            problem = self._step(
-                (self.positions_mm + displacement)[self._used], lengths, strain
-            )
-        if not self._make_valid(start):
+        for steps_left in range(self._step_count(goal), 0, -1):
+            places = self.positions_mm
+            next_places = places + (goal - places) / steps_left
+            logs = packed(self._strain_to(next_places))
+            integrals = integrals_at_vertices(places, self._pieces, logs)
+            strain = smooth_integrals(places, self._pieces, integrals, SMOOTHING_MM)
+            problem = self._step(next_places[self._used], lengths, strain)
+        valid = self._valid(self.positions_mm, start)
+        if valid is None:
+            valid = start
             problem = FOLDS_OVER
             log.warning("the body does not follow a shape: %s", FOLDS_OVER)
             del self._passed[n_passed:]
-        misfit_mm = rms_length((goal - self.positions_mm)[self._used])
+        misfit_mm = rms_length((goal - valid)[self._used])
         if misfit_mm > MAX_LEFT_MM:
+            self.positions_mm = valid
             found = f"{misfit_mm:.1f} mm from it (root mean square)"
             raise SolverError(
                 "a shape cannot be reached without turning elements inside out or folds"
@@ -317,7 +306,20 @@ class ElasticFit:
                     " that place."
                 ),
             )
-        return self._move(np.linalg.inv(motion))
+        return self._place_back(valid, motion)
+
+    def _step_count(self, goal: Floats) -> int:
+        """Return the number of steps to a goal (n, 3), by the strain of the whole and
+        of nine elements in ten."""
+        volume = signed_volume(self.boundary)
+        goal_volume = signed_volume(self._boundary_at(goal))
+        ratio = max(goal_volume / volume, 1e-3)
+        of_whole = abs(math.log(ratio))
+        strain = self._strain_to(goal)
+        norms = np.linalg.norm(strain, axis=(1, 2))
+        of_elements = float(np.quantile(norms, 0.9))
+        mean_strain = max(of_whole, of_elements) / 3
+        return max(1, math.ceil(mean_strain / STRAIN_PER_STEP))
 
     def draw(self, goals: Floats) -> Floats:
         """Draw the boundary towards (b, 3) goals in mm close to it, without growth;
@@ -327,19 +329,22 @@ class ElasticFit:
         elements over are softened; where soft ones do, too, the body stays as it is,
         with a warning.
         """
-        boundary, start = self.boundary, self.positions_mm
+        start = self.positions_mm
+        boundary = self.boundary
+        n_passed = len(self._passed)
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
         pull = transform_points(goals, motion) - boundary.vertices
         length = np.linalg.norm(pull, axis=1, keepdims=True)
         longest_mm = max(MAX_PULL_MM, 2 * math.sqrt(np.mean(length**2)))
         pull *= np.minimum(1.0, longest_mm / np.maximum(length, 1e-9))
-        n_passed = len(self._passed)
         for length_mm in CLOSE_SPRING_LENGTHS_MM:
             lengths = np.full(len(goals), length_mm)
             lengths[self._near_flat_elements()] = FREED_SPRING_LENGTH_MM
             self._step(boundary.vertices + pull, lengths, None)
-            if self._make_valid(start):
-                return self._move(np.linalg.inv(motion))
+            valid = self._valid(self.positions_mm, start)
+            if valid is not None:
+                return self._place_back(valid, motion)
+            self.positions_mm = start
             del self._passed[n_passed:]
         log.warning("the body is not drawn to a surface: %s", FOLDS_OVER)
         return start
@@ -355,7 +360,8 @@ class ElasticFit:
         that leaves it farther from the shape, it is moved to the smoothed one after
         all.
         """
-        start, n_passed = self.positions_mm, len(self._passed)
+        start = self.positions_mm
+        n_passed = len(self._passed)
         motion = self._fit(shape, start)
         goal = transform_points(shape, motion)
         untangled, faults = self._untangled(start, goal, UNTANGLING_MM)
@@ -380,22 +386,16 @@ class ElasticFit:
                 return followed
             log.info("the body is moved to the smoothed shape, which is nearer")
             del self._passed[n_passed:]
-        self.positions_mm = smoothed
         # opened elements brought none onto the way, but straightened sides may have
-        self._moved_straight = not (
-            self._is_curved and len(self._faults_between(start, smoothed))
-        )
-        return self._move(np.linalg.inv(motion))
+        has_faults = self._is_curved and len(self._faults_between(start, smoothed)) > 0
+        self._moved_straight = not has_faults
+        return self._place_back(smoothed, motion)
 
     def _valid_near(self, places: Floats) -> Floats | None:
         """Return valid positions (n, 3) near given ones, to which the straight way has
         no more faults; None where curved elements fold over."""
-        start = self.positions_mm
-        self.positions_mm = self._opened_after(start, places)
-        is_valid = self._make_valid(start)
-        found = self.positions_mm if is_valid else None
-        self.positions_mm = start
-        return found
+        opened = self._opened_after(self.positions_mm, places)
+        return self._valid(opened, self.positions_mm)
 
     def _untangled(
         self,
@@ -414,15 +414,14 @@ class ElasticFit:
         for length in lengths_mm:
             faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
-                break
+                return before + displacement, faults
             near = nearness(before, faults, length)[:, None]
-            smooth = smooth_integrals(
-                before, self._pieces, sizes[:, None] * displacement, length
-            )
-            displacement, least = displacement + near * (smooth - displacement), 0.0
-        else:
-            faults = self._faults_between(before, before + displacement)
-        return before + displacement, faults
+            integrals = sizes[:, None] * displacement
+            smooth = smooth_integrals(before, self._pieces, integrals, length)
+            displacement = displacement + near * (smooth - displacement)
+            least = 0.0
+        places = before + displacement
+        return places, self._faults_between(before, places)
 
     def way_from(self, before: Floats) -> list[tuple[float, Floats]]:
         """Return the shapes (n, 3) to pass on the way from an earlier shape to that of
@@ -433,32 +432,30 @@ class ElasticFit:
         are states that the body has passed through since this was last called; elements
         and faces with faults between two of them that follow each other are warned of.
         """
-        passed, self._passed = self._passed, []
+        passed = self._passed
+        self._passed = []
         if self._moved_straight:
             return []
-        motion = self._fit(self.positions_mm, before)
-        places, stops = self._stops(
-            before, transform_points(self.positions_mm, motion), passed
-        )
+        start = self.positions_mm
+        places, stops = self._stops(before, self._aligned(start, before), passed)
         # changes around faults flatten elements
         last = stops[-1] if stops else before
         places = self._opened_after(last, places)
-        valid = self.positions_mm
-        self.positions_mm = transform_points(places, self._fit(places, valid))
-        self._make_valid(valid)
+        valid = self._valid(self._aligned(places, start), start)
+        if valid is not None:
+            self.positions_mm = valid
         self._warn_of_more_faults(last, places)
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
-        parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)
-        return [(float(part), shape) for part, shape in zip(parts, stops, strict=False)]
+        fractions = np.cumsum(lengths) / max(sum(lengths), 1e-12)
+        return list(zip(fractions.tolist(), stops, strict=False))
 
     def _warn_of_more_faults(self, before: Floats, places: Floats) -> None:
         """Warn if the body, whose sides were straightened at `places`, has more faults
         than these on the way from before."""
         if not self._is_curved:
             return
-        motion = self._fit(self.positions_mm, before)
-        reached = transform_points(self.positions_mm, motion)
+        reached = self._aligned(self.positions_mm, before)
         n_faults = len(self._faults_between(before, reached))
         if n_faults > len(self._faults_between(before, places)):
             text = "with straight sides %d elements or faces have faults on the way"
@@ -475,19 +472,23 @@ class ElasticFit:
         before it."""
         untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
         # a change that flattens elements is the last resort
-        n_flat = self._flat_count(after)
-        needs_stop = len(faults) > 0 or self._flat_count(untangled) > n_flat
-        i = self._halfway(before, after, passed) if needs_stop and halvings else None
-        if i is not None:
+        flattens = self._flat_count(untangled) > self._flat_count(after)
+        halfway = None
+        if halvings and (len(faults) or flattens):
+            halfway = self._halfway(before, after, passed)
+        if halfway is not None:
             # each shape is fitted to the one before, as on the path
-            middle = transform_points(passed[i], self._fit(passed[i], before))
-            stop, first = self._stops(before, middle, passed[:i], halvings - 1)
-            end = transform_points(after, self._fit(after, stop))
-            last, second = self._stops(stop, end, passed[i + 1 :], halvings - 1)
+            middle = self._aligned(passed[halfway], before)
+            earlier = passed[:halfway]
+            stop, first = self._stops(before, middle, earlier, halvings - 1)
+            end = self._aligned(after, stop)
+            later = passed[halfway + 1 :]
+            last, second = self._stops(stop, end, later, halvings - 1)
             return last, [*first, stop, *second]
         if len(faults):
             # the shape stays as it is: it is valid, and a changed one may not be
-            untangled, faults = after, self._faults_between(before, after)
+            untangled = after
+            faults = self._faults_between(before, after)
         if len(faults):
             text = "%d elements or faces are inverted or cross near %s mm on the way"
             log.warning(text, len(faults), np.round(faults[0], 1).tolist())
@@ -496,16 +497,21 @@ class ElasticFit:
     def _near_flat_elements(self) -> Mask:
         """Return (b,) whether a vertex of the boundary is a corner of a flat element or
         of one that touches it."""
-        volumes = volumes_between(self.positions_mm, self._kept_open)
-        is_flat = volumes < MIN_VOLUME_LEFT * self._start_volumes
+        is_flat = self._are_flat(self.positions_mm, MIN_VOLUME_LEFT)
         is_near = np.zeros(len(self.positions_mm), dtype=bool)
         is_near[self._kept_open[is_flat]] = True
-        is_near[self._pieces[is_near[self._pieces].any(axis=1)]] = True
+        is_touching = is_near[self._pieces].any(axis=1)
+        is_near[self._pieces[is_touching]] = True
         return is_near[self._used]
 
-    def _flat_count(self, places: Floats) -> int:
+    def _are_flat(self, places: Floats, least: float) -> Mask:
+        """Return whether each element has less than a fraction of its volume at the
+        start."""
         volumes = volumes_between(places, self._kept_open)
-        return int((volumes < MIN_VOLUME_LEFT / 2 * self._start_volumes).sum())
+        return volumes < least * self._start_volumes
+
+    def _flat_count(self, places: Floats) -> int:
+        return int(self._are_flat(places, MIN_VOLUME_LEFT / 2).sum())
 
     def _halfway(
         self,
@@ -535,60 +541,63 @@ class ElasticFit:
         cross on the straight way."""
         inverted = inverted_on_the_way(before, after, self._tets, least)
         places = [before[self._tets[inverted]].mean(axis=1)]
-        faces = self._used[self._surface.faces]
+        boundary = self._boundary_at(before)
         for part in PARTS_OF_WAY:
-            surface = TriangleMesh(
-                ((1 - part) * before + part * after)[self._used], self._surface.faces
-            )
-            places.append(before[faces[faces_that_cross(surface)]].mean(axis=1))
+            on_way = self._boundary_at((1 - part) * before + part * after)
+            crossing = boundary.faces[faces_that_cross(on_way)]
+            places.append(boundary.vertices[crossing].mean(axis=1))
         return np.concatenate(places)
 
     def _fit(self, shape: Floats, onto: Floats) -> Floats:
         # with the weights of the path (`paths.path_through`)
         return rigid_fit(shape, onto, vertex_sizes(onto, self._pieces))
 
+    def _aligned(self, shape: Floats, onto: Floats) -> Floats:
+        return transform_points(shape, self._fit(shape, onto))
+
     def _distance(self, first: Floats, second: Floats) -> float:
         """Return how far all but a hundredth of the boundary moves between two shapes,
         without rigid motion."""
-        moves = transform_points(second, self._fit(second, first)) - first
-        return float(np.quantile(np.linalg.norm(moves[self._used], axis=1), 0.99))
+        moves = (self._aligned(second, first) - first)[self._used]
+        return float(np.quantile(np.linalg.norm(moves, axis=1), 0.99))
 
-    def _gradients(self, goal: Floats) -> Floats:
+    def _strain_to(self, goal: Floats) -> Floats:
+        """Return the (m, 3, 3) Hencky strain of the pieces from now to a goal."""
         gradients = deformation_gradients(
             self.positions_mm, goal, self._pieces, SLOPES[None]
         )
-        return gradients[:, 0]
+        return log_stretch(gradients[:, 0], limit=MAX_LOG_STRETCH)
 
-    def _make_valid(self, start: Floats) -> bool:
-        """Straighten the sides of curved elements that fold over, and return the body
-        around those that still do towards a valid `start`; return whether all are valid
-        then, or else leave the body there.
+    def _valid(self, places: Floats, start: Floats) -> Floats | None:
+        """Return positions (n, 3) near `places` at which no curved element folds over;
+        None if there are none.
+
+        Their sides are straightened, and the body is returned around those that still
+        fold over towards a valid `start`.
         """
         if not self._is_curved:
-            return True
-        moved = self.positions_mm
+            return places
         held = np.empty((0, 3))
         for length_mm in (0.0, *HOLDING_MM):
-            places = moved
+            trial = places
             if len(held):
-                near = nearness(moved, held, length_mm)[:, None]
-                places = moved + near * (start - moved)
-            places = straighten_sides(places, self._tets)
-            is_fault = self._faults_at(places)
+                near = nearness(places, held, length_mm)[:, None]
+                trial = places + near * (start - places)
+            trial = straighten_sides(trial, self._tets)
+            is_fault = self._faults_at(trial)
             if not is_fault.any():
-                self.positions_mm = self._reopened(places)
-                return True
-            held = np.concatenate([held, moved[is_fault]])
-        self.positions_mm = start
-        return False
+                return self._reopened(trial)
+            held = np.concatenate([held, places[is_fault]])
+        return None
 
     def _faults_at(self, places: Floats) -> Mask:
         """Return (n,) whether a vertex belongs to a curved element that may fold over
         or to a face that crosses another."""
+        folded = self._tets[may_fold_over(places, self._tets)]
+        boundary = self._boundary_at(places)
+        crossing = boundary.faces[faces_that_cross(boundary)]
         is_fault = np.zeros(len(places), dtype=bool)
-        is_fault[self._tets[may_fold_over(places, self._tets)]] = True
-        surface = TriangleMesh(places[self._used], self._surface.faces)
-        crossing = self._surface.faces[faces_that_cross(surface)]
+        is_fault[folded] = True
         is_fault[self._used[crossing]] = True
         return is_fault
 
@@ -599,20 +608,25 @@ class ElasticFit:
         Elements that fold over when others are opened, or faces that cross, stay as
         they are in the valid `places`.
         """
+        n_flat = self._flat_count(places)
         for _ in range(REOPENING_ROUNDS):
-            n_flat = self._flat_count(places)
             if not n_flat:
                 break
             opened = straighten_sides(self._opened(places), self._tets)
-            while (is_fault := self._faults_at(opened)).any():
+            is_fault = self._faults_at(opened)
+            while is_fault.any():
                 opened[is_fault] = places[is_fault]
-            if self._flat_count(opened) >= n_flat:
+                is_fault = self._faults_at(opened)
+            n_flat_before = n_flat
+            n_flat = self._flat_count(opened)
+            if n_flat >= n_flat_before:
                 break
             places = opened
         return places
 
-    def _move(self, motion: NDArray) -> Floats:
-        self.positions_mm = transform_points(self.positions_mm, motion)
+    def _place_back(self, places: Floats, motion: Floats) -> Floats:
+        """Place the body, without the rigid motion that a shape was aligned by."""
+        self.positions_mm = transform_points(places, np.linalg.inv(motion))
         return self.positions_mm
 
     def _step(
@@ -627,35 +641,33 @@ class ElasticFit:
         The body moves as far as the iteration went: each iterate lowers the energy,
         inverts no element, and crosses no faces.
         """
-        domain, problem, self._moved_straight = self._domain, self._problem, False
-        domain.place(self.positions_mm * M_PER_MM)
+        domain = self._domain
+        problem = self._problem
+        start = self.positions_mm
+        self._moved_straight = False
+        domain.place(start * M_PER_MM)
         self._contact.begin_step()
         self._springs.draw_to(goals, vertex_areas(self.boundary), lengths)
-        shape = len(domain.cells), len(problem.points.weights)
-        inverse = np.tile(np.eye(3), (*shape, 1, 1))
+        inverse = np.tile(np.eye(3), (len(self._cells), 1, 1, 1))
         if strain is not None:
-            nodal = strain[self._elements.vertices][self._elements.cells]
-            inverse = inverse_exponential(
-                unpacked(problem.points.interpolation @ nodal)
-            )
+            logs = unpacked(problem.points.interpolation @ strain[self._cells])
+            inverse = inverse_exponential(logs)
         # as one body, also if its parts are not connected
         one_part = np.zeros_like(domain.part)
-        moduli, reason = np.full(shape, MODULUS_PA), ""
+        moduli = np.full((len(self._cells), 1), MODULUS_PA)
         # where the stress of flat elements prevents any iteration, without it
         for stretches in (self._flattening(), None):
             problem.set_step(moduli, inverse, stretches, part=one_part)
+            reason = ""
             try:
                 self._solver.solve()
-                reason = ""
             except NotConvergedError as error:
                 reason = f"{error}; {self._solver.worst_places()}"
             if not reason or self._solver.iterates:
                 break
-        start = self.positions_mm
         for displacement in self._solver.iterates:
-            self.positions_mm = (
-                start + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
-            )
+            moved = domain.gather(displacement[: domain.n_owned]) * MM_PER_M
+            self.positions_mm = start + moved
             self._passed.append(self.positions_mm)
         opened = self._opened(self.positions_mm)
         if opened is not self.positions_mm:
@@ -669,18 +681,21 @@ class ElasticFit:
 
         No state is lost, since none is in the elements.
         """
-        arguments = self._kept_open, self._start_volumes
-        opened = open_flat_elements(
-            places, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT
-        )
+        opened = self._opened_by(places, self._inner_moves_mm)
         # elements without a vertex inside need a small move of the boundary
-        moved = open_flat_elements(
-            opened, *arguments, self._outer_moves_mm, MIN_VOLUME_LEFT
+        moved = self._opened_by(opened, self._outer_moves_mm)
+        if moved is not opened and len(faces_that_cross(self._boundary_at(moved))):
+            return opened
+        return moved
+
+    def _opened_by(self, places: Floats, longest_mm: Floats) -> Floats:
+        return open_flat_elements(
+            places,
+            self._kept_open,
+            self._start_volumes,
+            longest_mm,
+            MIN_VOLUME_LEFT,
         )
-        if moved is not opened:
-            surface = TriangleMesh(moved[self._used], self._surface.faces)
-            opened = opened if len(faces_that_cross(surface)) else moved
-        return opened
 
     def _opened_after(self, before: Floats, places: Floats) -> Floats:
         """Return the positions of `_opened`, or those given where these have fewer
@@ -688,10 +703,9 @@ class ElasticFit:
         opened = self._opened(places)
         if opened is places:
             return places
-        is_worse = len(self._faults_between(before, opened)) > len(
-            self._faults_between(before, places)
-        )
-        return places if is_worse else opened
+        n_faults = len(self._faults_between(before, opened))
+        n_faults_before = len(self._faults_between(before, places))
+        return places if n_faults > n_faults_before else opened
 
     def _flattening(self) -> Floats:
         """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them,
@@ -701,31 +715,25 @@ class ElasticFit:
         element that has lost volume, and more than these, is elastic as to the
         difference, while the body is without stress otherwise.
         """
-        cells = self._elements.vertices[self._elements.cells]
-        corners = self.positions_mm[cells]
-        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        edges = self._edges()
         logs = log_stretch(edges @ self._inverse_edges, left=True)
         volumes = determinants(edges)
+        volumes_around = (self._incidence @ volumes)[:, None]
         around = packed(logs)
         for _ in range(FLATTENING_ROUNDS):
-            at_vertices = (
-                self._incidence
-                @ (volumes[:, None] * around)
-                / (self._incidence @ volumes)[:, None]
-            )
-            around = at_vertices[cells].mean(axis=1)
+            sums = self._incidence @ (volumes[:, None] * around)
+            at_vertices = sums / volumes_around
+            around = at_vertices[self._cells].mean(axis=1)
         excess = logs - unpacked(around)
-        lost = -np.maximum(
-            np.trace(logs, axis1=1, axis2=2), np.trace(excess, axis1=1, axis2=2)
-        )
+        grown = np.trace(logs, axis1=1, axis2=2)
+        grown_more = np.trace(excess, axis1=1, axis2=2)
+        lost = -np.maximum(grown, grown_more)
         flat = np.flatnonzero(lost > MIN_FLATTENING)
-        weight = np.minimum(
-            (lost[flat] - MIN_FLATTENING) / (MAX_FLATTENING - MIN_FLATTENING), 1.0
-        )
-        stretches = np.tile(np.eye(3), (len(cells), 1, 1, 1))
-        stretches[flat, 0] = exponential(
-            weight[:, None, None] * excess[flat], MAX_OPENING
-        )
+        range_of_loss = MAX_FLATTENING - MIN_FLATTENING
+        weight = np.minimum((lost[flat] - MIN_FLATTENING) / range_of_loss, 1.0)
+        taken_back = weight[:, None, None] * excess[flat]
+        stretches = np.tile(np.eye(3), (len(self._cells), 1, 1, 1))
+        stretches[flat, 0] = exponential(taken_back, MAX_OPENING)
         return stretches
 
 
@@ -737,7 +745,8 @@ def nearness(
     """Return how near (n, 3) places are to (k, 3) faults: 1 there, and falling off as a
     Gaussian with `UNTANGLING_REACH` lengths."""
     distance, _ = cKDTree(faults).query(places)
-    return np.asarray(np.exp(-((distance / (UNTANGLING_REACH * length_mm)) ** 2)))
+    reach_mm = UNTANGLING_REACH * length_mm
+    return np.asarray(np.exp(-((distance / reach_mm) ** 2)))
 
 
 def exponential(logs: Floats, limit: float) -> Floats:

@@ -1,8 +1,6 @@
 """Pial surfaces of a folded brain; imports neither MPI nor dolfinx."""
 
-import numpy as np
-
-from ..geometry.triangles import Floats, TriangleMesh, submesh
+from ..geometry.triangles import Floats, Mask, TriangleMesh, submesh, used_part
 from ..io.tetmeshes import Regions
 from ..settings.terms import LEFT
 
@@ -17,9 +15,13 @@ def folded_surfaces(
     tags of their hemisphere.
     """
     surface = TriangleMesh(positions_mm, regions.facets)
-    on_left = regions.facet_tags["hemisphere"] == LEFT
-    left, right = (
-        submesh(surface, side)[0] if side.any() else None
-        for side in (on_left, ~on_left)
-    )
-    return submesh(surface, np.ones(len(on_left), dtype=bool))[0], left, right
+    whole, _ = used_part(surface)
+    is_left = regions.facet_tags["hemisphere"] == LEFT
+    return whole, _part(surface, is_left), _part(surface, ~is_left)
+
+
+def _part(surface: TriangleMesh, faces: Mask) -> TriangleMesh | None:
+    if not faces.any():
+        return None
+    part, _ = submesh(surface, faces)
+    return part

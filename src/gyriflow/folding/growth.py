@@ -8,10 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
-from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
+from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, area, signed_volume
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
@@ -33,10 +32,9 @@ class Size:
     def rates_to(self, after: "Size", step_s: float) -> Floats:
         """Return the (2,) rates in 1/s of ln area and ln volume between the sizes
         before and after a step."""
-        return (
-            np.log([after.area_mm2 / self.area_mm2, after.volume_mm3 / self.volume_mm3])
-            / step_s
-        )
+        area_ratio = after.area_mm2 / self.area_mm2
+        volume_ratio = after.volume_mm3 / self.volume_mm3
+        return np.log([area_ratio, volume_ratio]) / step_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class GrowthInputs:
     total: Callable[[int], int] = int
 
     @cached_property
-    def pieces(self) -> NDArray[np.int64]:
+    def pieces(self) -> Ints:
         """The (p, 4) linear tetrahedra between the mesh's vertices."""
         return linear_pieces(self.mesh)
 
@@ -109,13 +107,12 @@ class StepGrowth(ABC):
         """Return the mean (c, 3, 3) of `deformation` over each element, None if growth
         is by rates."""
         deformation = self.deformation(elements)
-        return (
-            None
-            if deformation is None
-            else np.einsum("q,cqij->cij", elements.points.weights, deformation)
-        )
+        if deformation is None:
+            return None
+        # q: integration point, c: element, ij: tensor
+        return np.einsum("q,cqij->cij", elements.points.weights, deformation)
 
-    def guess(self, fixed: NDArray[np.bool_]) -> Floats | None:
+    def guess(self, fixed: Mask) -> Floats | None:
         """Return the displacement (n, 3) in m of a free body, zero where it is fixed
         (n, 3); None if unknown."""
         return None
@@ -144,19 +141,21 @@ class GrowthByRates(StepGrowth):
     step."""
 
     def inverse(self, tissue: Tissue) -> Floats:
-        p, start = self.parameters, self.start
         dg, dr = increments_at(
-            p,
+            self.parameters,
             tissue.weight,
             tissue.growing,
             tissue.maps,
-            start.week(p, 0.5),
-            start.step_s,
+            self.start.week(self.parameters, 0.5),
+            self.start.step_s,
         )
         # normals matter only where tangential and radial growth differ
         layered, normals = tissue.normals(np.abs(dg - dr) > GROWTH_TOL)
         return layered_inverse(
-            tissue.at_points(dg), tissue.at_points(dr), layered, normals
+            tissue.at_points(dg),
+            tissue.at_points(dr),
+            layered,
+            normals,
         )
 
 
@@ -192,21 +191,16 @@ def increments_at(
 ) -> tuple[Floats, Floats]:
     """Return the increments of a step by the parameters' rates at a week; `w`, `g` and
     maps are at the same points."""
-    tangential, radial, core = (
-        value_at(rate, week, maps)
-        for rate in (
-            p.growth_rate_per_s,
-            p.radial_growth_rate_per_s,
-            p.core_growth_rate_per_s,
-        )
-    )
+    tangential = value_at(p.growth_rate_per_s, week, maps)
+    radial = value_at(p.radial_growth_rate_per_s, week, maps)
+    core = value_at(p.core_growth_rate_per_s, week, maps)
     return increments(w, g, tangential, radial, core, step_s)
 
 
 def layered_inverse(
     dg: Floats,
     dr: Floats,
-    layered: NDArray[np.bool_],
+    layered: Mask,
     normals: Floats,
 ) -> Floats:
     """Return G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.

@@ -6,16 +6,18 @@ fields do not depend on the number of ranks.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.matching import barycentric, nearest_on
 from ..geometry.triangles import (
     Floats,
     Ints,
+    Mask,
     TriangleMesh,
+    coordinate_ranks,
     corners,
     unit,
+    used_part,
     vertex_normals,
 )
 from ..settings.folding import FoldingParameters
@@ -32,10 +34,9 @@ TIE_TOL = 1e-9
 def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:
     """Return w = 1/(1 + exp(10 (d/H − 1))): 1 in the cortex, 0 in the core
     (FetalFoldSim; Tallinen et al. 2016)."""
-    return 1.0 / (
-        1.0
-        + np.exp(np.minimum(CORTICAL_STEEPNESS * (distance / thickness - 1.0), 700.0))
-    )
+    exponent = CORTICAL_STEEPNESS * (distance / thickness - 1.0)
+    # beyond 709 the exponential is infinite
+    return 1.0 / (1.0 + np.exp(np.minimum(exponent, 700.0)))
 
 
 def shear_modulus(
@@ -46,10 +47,8 @@ def shear_modulus(
 ) -> Floats:
     """Return the shear modulus (k,) in Pa at points with cortical weights w (k,) and
     values (k,) of maps."""
-    core, cortex = (
-        value_at(value, week, maps)
-        for value in (p.shear_modulus_core_pa, p.shear_modulus_cortex_pa)
-    )
+    core = value_at(p.shear_modulus_core_pa, week, maps)
+    cortex = value_at(p.shear_modulus_cortex_pa, week, maps)
     return core * (1 - w) + cortex * w
 
 
@@ -58,17 +57,13 @@ class PialSearch:
     vertices and its (f, 3) facets."""
 
     def __init__(self, positions: Floats, facets: Ints) -> None:
-        self.pial = np.unique(facets)
-        local = np.searchsorted(self.pial, facets)
-        self.surface = TriangleMesh(positions[self.pial], local)
+        whole = TriangleMesh(positions, facets)
+        self.surface, self.pial = used_part(whole)
         self.normals = vertex_normals(self.surface)
-        self.tree = cKDTree(self.surface.vertices)
-        # position of each vertex in the order of coordinates, to choose among equally
-        # near ones
-        self._order = np.empty(len(self.pial), dtype=np.int64)
-        self._order[np.lexsort(self.surface.vertices.T[::-1])] = np.arange(
-            len(self.pial)
-        )
+        vertices = self.surface.vertices
+        self.tree = cKDTree(vertices)
+        # to choose among equally near vertices
+        self._rank = coordinate_ranks(vertices)
 
     def distance(
         self,
@@ -81,16 +76,16 @@ class PialSearch:
         A distance beyond `reach` may be that to the nearest vertex instead. `to_vertex`
         are the distances to the nearest vertices, if they have been computed before.
         """
-        distance = (
-            self.tree.query(points)[0] if to_vertex is None else to_vertex
-        ).copy()
+        if to_vertex is None:
+            to_vertex, _ = self.tree.query(points)
+        distance = to_vertex.copy()
         near = (distance > 0) & self._within(distance, reach)
         if near.any():
-            distance[near] = nearest_on(points[near], self.surface)[0]
+            distance[near], _, _ = nearest_on(points[near], self.surface)
         return distance
 
     def distance_and_normals(
-        self, points: Floats, reach: float = np.inf
+        self, points: Floats, reach: float
     ) -> tuple[Floats, Floats]:
         """Return the distances of (k, 3) points to the pial triangles, and the unit
         normals at the nearest points.
@@ -104,19 +99,25 @@ class PialSearch:
         if near.any():
             distance[near], face, nearest = nearest_on(points[near], self.surface)
             weights = barycentric(nearest, corners(self.surface)[face])
-            normals[near] = unit(
-                np.einsum("kc,kci->ki", weights, self.normals[self.surface.faces[face]])
-            )
+            vertices = self.surface.faces[face]
+            normals[near] = unit(self._weighted_normals(weights, vertices))
         return distance, normals
 
-    def _within(self, to_vertex: Floats, reach: float) -> NDArray[np.bool_]:
-        surface = self.surface
-        corners = surface.vertices[surface.faces]
-        edges = np.diff(corners, axis=1)
-        longest = np.linalg.norm(edges, axis=2).max()
+    def _weighted_normals(self, weights: Floats | Mask, vertices: Ints) -> Floats:
+        """Return the (k, 3) weighted sums of the normals of (k, c) vertices."""
+        # k: point, c: vertex, i: axis
+        return np.einsum("kc,kci->ki", weights, self.normals[vertices])
+
+    def _within(self, to_vertex: Floats, reach: float) -> Mask:
+        """Return (k,) whether a triangle may be within reach, from distances to
+        vertices."""
+        edges = np.diff(corners(self.surface), axis=1)
+        lengths = np.linalg.norm(edges, axis=2)
+        longest = lengths.max()
         # a point of a triangle is at most edge/√3 from its nearest vertex
         furthest = np.hypot(reach, longest / np.sqrt(3))
-        return np.asarray(to_vertex <= furthest)
+        is_within = to_vertex <= furthest
+        return np.asarray(is_within)
 
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
         """Return for (k, 3) points the unit normals of the nearest of (k, c) candidate
@@ -127,33 +128,35 @@ class PialSearch:
         opposed walls, it is the normal of the vertex with the smallest coordinates. The
         order of points and candidates does not matter.
         """
-        gaps = np.linalg.norm(
-            self.surface.vertices[candidates] - points[:, None], axis=2
-        )
-        tied = gaps <= gaps.min(axis=1, keepdims=True) * (1 + TIE_TOL)
-        first = np.where(tied, self._order[candidates], len(self.pial)).argmin(axis=1)
-        index = np.take_along_axis(candidates, first[:, None], axis=1)
-        normals = self.normals[index[:, 0]]
-        several = np.flatnonzero((tied & (candidates != index)).any(axis=1))
-        if len(several):
-            vertices = np.sort(
-                np.where(tied[several], candidates[several], index[several]), axis=1
-            )
-            unique = np.hstack(
-                [np.ones((len(vertices), 1), bool), vertices[:, 1:] != vertices[:, :-1]]
-            )
-            mean = np.einsum("kc,kci->ki", unique, self.normals[vertices]) / unique.sum(
-                axis=1, keepdims=True
-            )
-            clear = np.linalg.norm(mean, axis=1) > 0.1
-            normals[several[clear]] = unit(mean[clear])
+        places = self.surface.vertices[candidates]
+        offsets = places - points[:, None]
+        gaps = np.linalg.norm(offsets, axis=2)
+        least = gaps.min(axis=1, keepdims=True)
+        is_nearest = gaps <= least * (1 + TIE_TOL)
+        ranks = np.where(is_nearest, self._rank[candidates], len(self.pial))
+        first = ranks.argmin(axis=1)[:, None]
+        chosen = np.take_along_axis(candidates, first, axis=1)
+        normals = self.normals[chosen[:, 0]]
+        is_other = is_nearest & (candidates != chosen)
+        tied = np.flatnonzero(is_other.any(axis=1))
+        if len(tied):
+            # each of the nearest vertices once, although candidates may repeat
+            vertices = np.where(is_nearest[tied], candidates[tied], chosen[tied])
+            vertices.sort(axis=1)
+            is_new = np.ones(vertices.shape, dtype=bool)
+            is_new[:, 1:] = np.diff(vertices, axis=1) != 0
+            counts = is_new.sum(axis=1, keepdims=True)
+            mean = self._weighted_normals(is_new, vertices) / counts
+            lengths = np.linalg.norm(mean, axis=1)
+            is_clear = lengths > 0.1
+            normals[tied[is_clear]] = unit(mean[is_clear])
         return normals
 
     def nearest_normals(self, points: Floats) -> Floats:
         """Return the (k, 3) unit normals of the pial vertices nearest to (k, 3) points;
         ties as in `normals_from`."""
-        neighbours = min(8, len(self.pial))
-        index = self.tree.query(points, k=neighbours)[1].reshape(
-            len(points), neighbours
-        )
-        return self.normals_from(points, index)
+        count = min(8, len(self.pial))
+        # a list of ranks, so that also one neighbour is a column
+        ranks = range(1, count + 1)
+        _, candidates = self.tree.query(points, k=ranks)
+        return self.normals_from(points, candidates)

@@ -28,10 +28,10 @@ class LinearElements:
     """
 
     def __init__(self, domain: Domain, material: Material) -> None:
-        self._domain, self._bulk_to_shear = domain, material.bulk_to_shear_ratio
-        code = energy_code(material) + Path(__file__).with_suffix(".c").read_text(
-            encoding="utf-8"
-        )
+        self._domain = domain
+        self._bulk_to_shear = material.bulk_to_shear_ratio
+        elements = Path(__file__).with_suffix(".c").read_text(encoding="utf-8")
+        code = energy_code(material) + elements
         self._interface, self._code = compiled(domain.comm, DECLARATION, code)
         self._places: NDArray[np.int32] | None = None
         self.weight: Floats
@@ -48,39 +48,45 @@ class LinearElements:
 
         Blocks of the stiffness below the diagonal between owned nodes are omitted.
         """
-        cells, nodes = self._domain.cells, self._domain.local(self._domain.positions)
-        if matrix is not None and self._places is None:
-            places = sparse.csr_array(
-                (
-                    np.arange(len(matrix.indices), dtype=np.int32),
-                    matrix.indices,
-                    matrix.indptr,
-                )
-            )
-            rows = np.repeat(cells, 4, axis=1).ravel()
-            columns = np.tile(cells, 4).ravel()
-            # blocks below the diagonal are needed only if one of their nodes is a ghost
-            needed = (
-                (columns >= rows)
-                | (columns >= self._domain.n_owned)
-                | (rows >= self._domain.n_owned)
-            )
-            self._places = np.where(needed, places[rows, columns], -1)
-        count, numbers = len(cells), nodes.size
-        values = None if matrix is None else matrix.data
-        places = None if matrix is None else self._places
-        n_blocks = 0 if matrix is None else len(matrix.indices)
+        cells = self._domain.cells
+        nodes = self._domain.local(self._domain.positions)
+        count = len(cells)
+        values = None
+        places = None
+        n_values = 0
+        if matrix is not None:
+            if self._places is None:
+                self._places = self._places_in(matrix)
+            places = self._places
+            values = matrix.data
+            n_values = 9 * len(matrix.indices)
         pointers = [
             self._pointer(cells, np.int32, 4 * count),
-            self._pointer(nodes, np.float64, numbers),
-            self._pointer(u, np.float64, numbers),
+            self._pointer(nodes, np.float64, nodes.size),
+            self._pointer(u, np.float64, nodes.size),
             self._pointer(self.H, np.float64, 9 * count),
             self._pointer(self.weight, np.float64, count),
-            self._pointer(forces, np.float64, numbers, is_written=True),
+            self._pointer(forces, np.float64, nodes.size, is_written=True),
             self._pointer(places, np.int32, 16 * count),
-            self._pointer(values, np.float64, 9 * n_blocks, is_written=True),
+            self._pointer(values, np.float64, n_values, is_written=True),
         ]
         return float(self._code.assemble(count, self._bulk_to_shear, *pointers))
+
+    def _places_in(self, matrix: MatrixCSR) -> NDArray[np.int32]:
+        """Return the (16 c,) numbers in a matrix of the blocks of elements' pairs of
+        nodes, -1 for those that are omitted."""
+        numbers = np.arange(len(matrix.indices), dtype=np.int32)
+        places = sparse.csr_array((numbers, matrix.indices, matrix.indptr))
+        cells = self._domain.cells
+        rows = np.repeat(cells, 4, axis=1).ravel()
+        columns = np.tile(cells, 4).ravel()
+        # blocks below the diagonal are needed only if one of their nodes is a ghost
+        n_owned = self._domain.n_owned
+        is_below = columns < rows
+        is_owned = (columns < n_owned) & (rows < n_owned)
+        found = places[rows, columns]
+        found[is_below & is_owned] = -1
+        return found
 
     def _pointer(
         self,

@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from ..errors import SolverError
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Ints
 from .domain import Domain, bisect_points
 from .problem import NonlinearProblem
 from .products import PartMotions, multiply_blocks
@@ -73,34 +73,32 @@ class TwoLevelPreconditioner:
     """
 
     def __init__(self, domain: Domain, tangent: Tangent) -> None:
-        self._domain, self._tangent = domain, tangent
+        self._domain = domain
+        self._tangent = tangent
+        first, end = domain.space.dofmap.index_map.local_range
+        self._own = slice(first, end)
         count = min(MAX_PARTS, max(len(domain.positions) // 50, 1))
-        owned_vertices = domain.vertex_of_node[: domain.n_owned]
-        # by global nodes, as the columns of the matrix
-        self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
         self._part_of_vertex = bisect_points(domain.positions, count)
+        # by global nodes, as the columns of the matrix
+        owned_vertices = domain.vertex_of_node[: domain.n_owned]
+        self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
         self._part = self._part_of_vertex[self._vertex]
-        self._own = slice(
-            first := domain.space.dofmap.index_map.local_range[0],
-            first + domain.n_owned,
-        )
         self._parts = int(self._part.max()) + 1
         # the rows of the coarse inverse that this rank needs: motions of the parts that
         # contain its nodes
-        self._moved = (
-            6 * np.unique(self._part[self._own])[:, None] + np.arange(6)
-        ).ravel()
+        own_parts = np.unique(self._part[self._own])
+        self._moved = (6 * own_parts[:, None] + np.arange(6)).ravel()
         self._fixed = np.flatnonzero(tangent.elastic.matrix.fixed[self._own])
         self._made_at = -COARSE_LIFETIME
 
     def renew(self) -> None:
         """Update the diagonal to the present tangent, and the coarse level after
         `COARSE_LIFETIME` tangents."""
-        self._inverse_diagonal = inverse_blocks(self._tangent.diagonal()).astype(
-            np.float32
-        )
-        if self._tangent.elastic.assembled >= self._made_at + COARSE_LIFETIME:
-            self._made_at = self._tangent.elastic.assembled
+        inverses = inverse_blocks(self._tangent.diagonal())
+        self._inverse_diagonal = inverses.astype(np.float32)
+        n_assembled = self._tangent.elastic.assembled
+        if n_assembled >= self._made_at + COARSE_LIFETIME:
+            self._made_at = n_assembled
             self._set_coarse_level()
 
     def apply(
@@ -110,9 +108,8 @@ class TwoLevelPreconditioner:
         y: PETSc.Vec,
     ) -> None:
         """Set y to the preconditioned x."""
-        coarse = self._domain.sum_over_ranks(
-            self._motions.restrict(x.array_r, self._parts)
-        )
+        own_coarse = self._motions.restrict(x.array_r, self._parts)
+        coarse = self._domain.sum_over_ranks(own_coarse)
         coarse[self._moved] = self._inverse_coarse @ coarse.astype(np.float32)
         multiply_blocks(self._inverse_diagonal, x.array_r, y.array_w)
         self._motions.add(coarse, y.array_w)
@@ -122,31 +119,38 @@ class TwoLevelPreconditioner:
 
     def _set_coarse_level(self) -> None:
         matrix = self._tangent.elastic.matrix
+        own = self._own
         arms = part_arms(self._domain.positions, self._part_of_vertex)[self._vertex]
-        self._motions = PartMotions(self._part[self._own], arms[self._own])
+        self._motions = PartMotions(self._part[own], arms[own])
         modes = rigid_motions(arms)
         modes[matrix.fixed] = 0.0
-        size, nodes = 6 * self._parts, np.arange(len(modes) + 1)
-        prolongation = sparse.bsr_matrix(
-            (modes, self._part, nodes), shape=(3 * len(modes), size)
-        )
-        own = modes[self._own], self._part[self._own], nodes[: self._domain.n_owned + 1]
-        restriction = sparse.bsr_matrix(
-            own, shape=(3 * self._domain.n_owned, size)
-        ).T.tobsr((6, 3))
-        coarse = self._domain.sum_over_ranks(
-            (restriction @ (matrix.half() @ prolongation)).toarray()
-        )
+        # Q, with one block in each row, and the transposed rows of this rank
+        prolongation = self._in_parts(modes, self._part)
+        restriction = self._in_parts(modes[own], self._part[own]).T.tobsr((6, 3))
+        half = restriction @ (matrix.half() @ prolongation)
+        coarse = self._domain.sum_over_ranks(half.toarray())
         coarse += coarse.T
-        scale = np.trace(coarse) / size
-        coarse[np.diag_indices(size)] += REGULARISATION * scale
+        scale = np.trace(coarse) / len(coarse)
+        coarse[np.diag_indices(len(coarse))] += REGULARISATION * scale
         motions = self._tangent.motions
         if motions is not None:
             # a stiffness against the removed motions, without which it would be
             # singular
-            modes = self._domain.sum_over_ranks(restriction @ motions.modes)
-            coarse += 10 * scale / np.linalg.norm(modes, 2) ** 2 * modes @ modes.T
-        self._inverse_coarse = inverse_matrix(coarse)[self._moved].astype(np.float32)
+            removed = self._domain.sum_over_ranks(restriction @ motions.modes)
+            squared_norm = np.linalg.norm(removed, 2) ** 2
+            coarse += 10 * scale / squared_norm * removed @ removed.T
+        inverse = inverse_matrix(coarse)
+        self._inverse_coarse = inverse[self._moved].astype(np.float32)
+
+    def _in_parts(self, modes: Floats, part: Ints) -> sparse.bsr_matrix:
+        """Return (k, 3, 6) blocks as a (3 k, 6 · parts) matrix, each in the columns of
+        its part."""
+        count = len(modes)
+        ends = np.arange(count + 1)
+        return sparse.bsr_matrix(
+            (modes, part, ends),
+            shape=(3 * count, 6 * self._parts),
+        )
 
 
 def inverse_blocks(blocks: Floats) -> Floats:
@@ -180,12 +184,12 @@ def inverse_matrix(matrix: Floats) -> Floats:
 def _positive_inverses(matrices: Floats) -> Floats:
     """Return inverses of (..., k, k) symmetric matrices with the absolute values of
     their eigenvalues."""
-    values, directions = np.linalg.eigh(matrices)
+    values, axes = np.linalg.eigh(matrices)
     sizes = np.abs(values)
-    smallest = REGULARISATION * sizes.max(axis=-1, keepdims=True)
-    divisors = np.maximum(sizes, smallest)[..., None, :]
-    inverses = (directions / divisors) @ directions.swapaxes(-1, -2)
-    return np.asarray(inverses)
+    largest = sizes.max(axis=-1, keepdims=True)
+    sizes = np.maximum(sizes, REGULARISATION * largest)
+    scaled_axes = axes / sizes[..., None, :]
+    return np.asarray(scaled_axes @ axes.swapaxes(-1, -2))
 
 
 class LinearSolver:
@@ -256,8 +260,9 @@ class LinearSolver:
     def _run(self, tangent: Tangent, residual: Residual) -> tuple[int, Direction]:
         """Return PETSc's convergence reason, 0 if the direction does not descend, and
         the direction."""
+        domain = self._problem.domain
         if self._preconditioner is None:
-            self._preconditioner = TwoLevelPreconditioner(self._problem.domain, tangent)
+            self._preconditioner = TwoLevelPreconditioner(domain, tangent)
             multilevel = self._cg.getPC()
             multilevel.setType("python")
             multilevel.setPythonContext(self._preconditioner)
@@ -269,10 +274,7 @@ class LinearSolver:
         owned = -self._solution.array_r
         # fixed components are zero only to within the tolerance
         self._problem.clear_fixed(owned)
-        slope = self._problem.domain.dot(owned, residual.owned)
+        slope = domain.dot(owned, residual.owned)
         reason = self._cg.getConvergedReason() if slope < 0 else 0  # False for NaN
-        return reason, Direction(
-            self._problem.domain.with_ghosts(owned),
-            slope,
-            self._cg.getIterationNumber(),
-        )
+        iterations = self._cg.getIterationNumber()
+        return reason, Direction(domain.with_ghosts(owned), slope, iterations)

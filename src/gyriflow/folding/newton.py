@@ -131,9 +131,8 @@ class NewtonSolver:
         self.settings = settings
         self.residual_floor = residual_floor
         self.linear_solver = LinearSolver(problem, settings.max_krylov)
-        self._first_left = (
-            0.0  # fraction of the residual after the first iteration of the last step
-        )
+        # fraction of the residual after the first iteration of the last step
+        self._first_left = 0.0
         self.last: Residual | None = None
         self.inverted: Floats | None = None
         self.iterates: list[Floats] = []
@@ -144,66 +143,64 @@ class NewtonSolver:
 
         NotConvergedError if the residual does not fall below the tolerance.
         """
-        problem, settings = self.problem, self.settings
-        self.inverted, self.iterates = None, []
-        self.last = at_rest = problem.residual(problem.rest())
+        problem = self.problem
+        settings = self.settings
+        self.inverted = None
+        self.iterates = []
+        at_rest = problem.residual(problem.rest())
+        self.last = at_rest
         if not np.isfinite(at_rest.norm):
             raise NotConvergedError("the forces at zero displacement are not finite")
         tolerance = max(settings.newton_tolerance * at_rest.norm, self.residual_floor)
-        iterate = Iterate(
-            at_rest if at_rest.norm <= tolerance else self._first(guesses, at_rest)
-        )
-        solution, before, stalled = Solution(iterate.residual.displacement), np.inf, 0
-        while (norm := iterate.residual.norm) > tolerance and not iterate.exhausted:
+        is_solved = at_rest.norm <= tolerance
+        iterate = Iterate(at_rest if is_solved else self._first(guesses, at_rest))
+        norm = iterate.residual.norm
+        norm_before = np.inf
+        solution = Solution(iterate.residual.displacement)
+        # where folds snap through or slide along each other, the energy decreases long
+        # before the residual does
+        n_stalled = 0
+        max_iterations = MAX_ITERATIONS_FACTOR * settings.max_newton
+        while norm > tolerance and not iterate.exhausted:
             self.last = iterate.residual
-            # where folds snap through or slide along each other, the energy decreases
-            # long before the residual does
-            if (
-                max(stalled, solution.newton / MAX_ITERATIONS_FACTOR)
-                >= settings.max_newton
-            ):
+            if n_stalled >= settings.max_newton or solution.newton >= max_iterations:
                 raise NotConvergedError(
                     "Newton's method did not converge",
                     found=f"residual {norm:.2e} N after {solution.newton} iterations",
                     expected=f"at most {tolerance:.2e} N",
                 )
             solution.newton += 1
-            stagnates = before / 2 < norm <= STAGNATION_FACTOR * tolerance
-            left = (
-                norm / before
-                if solution.newton > 1
-                else max(norm / at_rest.norm, self._first_left)
-            )
-            forcing = _forcing_term(
-                0.4 * tolerance / norm, left, settings.krylov_tolerance
-            )
+            stagnates = norm_before / 2 < norm <= STAGNATION_FACTOR * tolerance
+            if solution.newton == 1:
+                left = max(norm / at_rest.norm, self._first_left)
+            else:
+                left = norm / norm_before
+            tightest = settings.krylov_tolerance
+            forcing = _forcing_term(0.4 * tolerance / norm, left, tightest)
             # a lagged tangent with an error below the forcing term is as good as a new
             # one
-            tangent = problem.tangent(
-                iterate.residual, within=0.0 if stagnates else forcing
-            )
+            within = 0.0 if stagnates else forcing
+            tangent = problem.tangent(iterate.residual, within=within)
             try:
                 iterate = self._iterate(
                     iterate, tangent, forcing, solution, convexify=not stagnates
                 )
             except NotConvergedError:
-                tightest = settings.krylov_tolerance
                 if not tangent.elastic.lagged and forcing <= tightest:
                     raise
                 tangent = problem.tangent(iterate.residual)
+                forcing = min(forcing, tightest)
                 iterate = self._iterate(
-                    iterate,
-                    tangent,
-                    min(forcing, tightest),
-                    solution,
-                    convexify=not stagnates,
+                    iterate, tangent, forcing, solution, convexify=not stagnates
                 )
-            stalled += iterate.progress < settings.min_progress
+            if iterate.progress < settings.min_progress:
+                n_stalled += 1
             if settings.keeps_iterates:
                 self.iterates.append(iterate.residual.displacement)
+            norm_before = norm
+            norm = iterate.residual.norm
             if solution.newton == 1:
-                self._first_left = iterate.residual.norm / norm
-            before = norm
+                self._first_left = norm / norm_before
         self.last = iterate.residual
         solution.displacement = iterate.residual.displacement
         solution.residual = norm / at_rest.norm if at_rest.norm > 0 else 0.0
@@ -243,40 +240,38 @@ class NewtonSolver:
         element; return that iterate."""
         problem = self.problem
         start = iterate.residual.displacement
-        norm = iterate.residual.norm
-        slope, convex, before = direction.slope, direction.convex, iterate.energy
-        owned = direction.values[: problem.domain.n_owned].ravel()
+        slope = direction.slope
+        before = iterate.energy
+        is_convex = direction.convex
         if not problem.convex:
             # the energy is compared wherever its change is above round-off
             before = problem.energy(start) if before is None else before
-            convex = convex and abs(slope) <= MIN_RESOLVED * abs(before)
-        length = problem.max_step(start, direction.values)
-        for _ in range(self.settings.max_backtracks):
+            is_convex = is_convex and abs(slope) <= MIN_RESOLVED * abs(before)
+        owned = direction.values[: problem.domain.n_owned].ravel()
+        longest = problem.max_step(start, direction.values)
+        for halvings in range(self.settings.max_backtracks):
+            length = longest / 2**halvings
             u = start + length * direction.values
-            if problem.smallest_volume_ratio(u) > 0:
-                trial = problem.residual(u)
-                finite = np.isfinite(trial.norm)
-                # a convex energy whose slope nearly vanishes at the trial has fallen by
-                # about half of the initial slope
-                flat = abs(problem.domain.dot(owned, trial.owned)) <= 0.1 * abs(slope)
-                if convex and finite and trial.norm < norm and flat:
-                    return Iterate(trial)
-                before = problem.energy(start) if before is None else before
-                energy = problem.energy(u)
-                lower = finite and energy <= before + ARMIJO * length * slope
-                # if the energy's change is within round-off, the residual decides
-                if lower or (
-                    trial.norm < norm
-                    and abs(energy - before) <= ENERGY_ROUND_OFF * abs(before)
-                ):
-                    return Iterate(
-                        trial,
-                        energy,
-                        (before - energy) / max(abs(before), np.finfo(float).tiny),
-                    )
-            else:
+            has_volume = problem.smallest_volume_ratio(u) > 0  # False for NaN
+            if not has_volume:
                 self.inverted = problem.volume_ratios(u)
-            length /= 2
+                continue
+            trial = problem.residual(u)
+            is_finite = np.isfinite(trial.norm)
+            is_smaller = trial.norm < iterate.residual.norm
+            # a convex energy whose slope nearly vanishes at the trial has fallen by
+            # about half of the initial slope
+            is_flat = abs(problem.domain.dot(owned, trial.owned)) <= 0.1 * abs(slope)
+            if is_convex and is_finite and is_smaller and is_flat:
+                return Iterate(trial)
+            before = problem.energy(start) if before is None else before
+            energy = problem.energy(u)
+            is_lower = is_finite and energy <= before + ARMIJO * length * slope
+            # if the energy's change is within round-off, the residual decides
+            is_same = abs(energy - before) <= ENERGY_ROUND_OFF * abs(before)
+            if is_lower or (is_smaller and is_same):
+                progress = (before - energy) / max(abs(before), np.finfo(float).tiny)
+                return Iterate(trial, energy, progress)
         if before is not None and abs(slope) <= ENERGY_ROUND_OFF * abs(before):
             return Iterate(iterate.residual, before, exhausted=True)
         raise NotConvergedError("the line search found no step that lowers the energy")
@@ -284,24 +279,23 @@ class NewtonSolver:
     def worst_places(self) -> str:
         """Return where a failed solve was worst: the most compressed element and the
         largest residual, in mm."""
-        problem, domain = self.problem, self.problem.domain
+        problem = self.problem
+        domain = problem.domain
         last = self.last or problem.residual(problem.rest())
-        before = domain.local(domain.positions)
-        ratios = (
-            problem.volume_ratios(last.displacement)
-            if self.inverted is None
-            else self.inverted
-        )
-        forces = -np.linalg.norm(last.owned.reshape(-1, 3), axis=1)
-        centres = before[domain.corners].mean(axis=1) * MM_PER_M
+        ratios = self.inverted
+        if ratios is None:
+            ratios = problem.volume_ratios(last.displacement)
+        nodes_mm = domain.local(domain.positions) * MM_PER_M
+        centres_mm = nodes_mm[domain.corners].mean(axis=1)
         ratio, tet, centre = domain.locate_minimum(
-            ratios.min(axis=1), domain.tet_of_cell, centres
+            ratios.min(axis=1), domain.tet_of_cell, centres_mm
         )
-        force, vertex, position = domain.locate_minimum(
-            forces, domain.vertex_of_node, before * MM_PER_M
+        forces = np.linalg.norm(last.owned.reshape(-1, 3), axis=1)
+        negative, vertex, position = domain.locate_minimum(
+            -forces, domain.vertex_of_node, nodes_mm
         )
         return (
             f"smallest det F {ratio:.3g} in element {tet} at"
-            f" {np.round(centre, 1).tolist()} mm, largest residual {-force:.2e} N at"
+            f" {np.round(centre, 1).tolist()} mm, largest residual {-negative:.2e} N at"
             f" vertex {vertex} at {np.round(position, 1).tolist()} mm"
         )

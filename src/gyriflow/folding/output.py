@@ -54,44 +54,36 @@ def layer_fields(
     distance = search.distance(positions_mm)
     weight = cortical_weight(distance, value_at(parameters.thickness_mm, week, maps))
     if log_growth is None:
-        increments = increments_at(
+        tangential, radial = increments_at(
             parameters, weight, zones.growth, maps, week, parameters.step_s
         )
-        growth = dict(
-            zip(
-                ("tangential_growth_per_step", "radial_growth_per_step"),
-                increments,
-                strict=True,
-            )
-        )
+        growth = {
+            "tangential_growth_per_step": tangential,
+            "radial_growth_per_step": radial,
+        }
     else:
         growth = growth_components(log_growth, search.nearest_normals(positions_mm))
     # a vertex gets the highest of its facets' zones
     zone = np.zeros(len(positions_mm), dtype=np.int32)
-    np.maximum.at(
-        zone, zones.facets.ravel(), np.repeat(zones.facet_zone, 3).astype(np.int32)
-    )
-    mu = shear_modulus(parameters, weight, maps, week)
+    zone_at_corners = np.repeat(zones.facet_zone, 3).astype(np.int32)
+    np.maximum.at(zone, zones.facets.ravel(), zone_at_corners)
+    modulus = shear_modulus(parameters, weight, maps, week)
     material = MATERIALS[parameters.material](parameters.poisson_ratio)
-    fields: dict[str, dict[str, NDArray]] = {
+    by_name: dict[str, dict[str, NDArray]] = {
         "distance": {"distance_to_pial_mm": distance},
         "cortex_weight": {"cortex_weight": weight},
         "growth": growth,
-        "shear_modulus": {"shear_modulus_pa": mu},
-        "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * mu},
-        "normal": (
-            {"pial_normal": search.nearest_normals(positions_mm)}
-            if "normal" in names
-            else {}
-        ),
+        "shear_modulus": {"shear_modulus_pa": modulus},
+        "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * modulus},
         "zones": {"zone": zone, "growing": zones.growth},
     }
-    return {
-        name: values
-        for key in names
-        if key in fields
-        for name, values in fields[key].items()
-    }
+    fields = {}
+    for name in names:
+        if name == "normal":
+            fields["pial_normal"] = search.nearest_normals(positions_mm)
+        else:
+            fields |= by_name.get(name, {})
+    return fields
 
 
 def log_growth_at_vertices(
@@ -123,11 +115,10 @@ def growth_components(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
     tangential = np.eye(3) - radial
     # the first eigenvector is the normal, with −1
     values, axes = np.linalg.eigh(tangential @ tensors @ tangential - radial)
-    least = values[:, 1]
-    largest = values[:, 2]
-    direction = axes[:, :, 2] * (largest - least)[:, None]
+    _, least, largest = values.T
+    difference = (largest - least)[:, None]
     return {
         "tangential_growth_per_step": values[:, 1:].mean(axis=1),
         "radial_growth_per_step": (tensors * radial).sum(axis=(1, 2)),
-        "growth_direction_per_step": direction,
+        "growth_direction_per_step": axes[:, :, 2] * difference,
     }

@@ -68,7 +68,14 @@ class IntegrationPoints:
             return self.barycentric
         matrix = np.zeros((len(self.barycentric), len(NODES)))
         for row, point in zip(matrix, self.barycentric, strict=True):
-            in_parts = [point @ np.linalg.inv(NODES[list(part)]) for part in PARTS]
-            part = int(np.argmax([coordinates.min() for coordinates in in_parts]))
-            row[list(PARTS[part])] = in_parts[part]
+            best = -np.inf
+            for part in PARTS:
+                nodes = list(part)
+                weights = point @ np.linalg.inv(NODES[nodes])
+                # the point is in the part in which no weight is negative
+                if weights.min() > best:
+                    best = weights.min()
+                    nodes_around = nodes
+                    weights_around = weights
+            row[nodes_around] = weights_around
         return matrix

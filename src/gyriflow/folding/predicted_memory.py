@@ -19,8 +19,7 @@ def predicted_memory_mib(
 ) -> float:
     """Return the likely peak memory in MiB of a run with elements of an order, over all
     ranks."""
-    per_tet = KIB_PER_TET[order] + KIB_PER_TET_AND_RANK[order] * ranks
-    return (
-        MIB_PER_RANK * ranks
-        + per_tet * (GLOBAL_CONTACT if contact == "global" else 1.0) * tets / 1024
-    )
+    kib_per_tet = KIB_PER_TET[order] + KIB_PER_TET_AND_RANK[order] * ranks
+    if contact == "global":
+        kib_per_tet *= GLOBAL_CONTACT
+    return MIB_PER_RANK * ranks + kib_per_tet * tets / 1024

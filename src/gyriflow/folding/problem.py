@@ -1,6 +1,7 @@
 """The discrete problem of one step: energy, residual and tangent on the updated
 reference."""
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, Protocol
 
@@ -9,10 +10,9 @@ import dolfinx
 import numpy as np
 import ufl
 from dolfinx.la import InsertMode, MatrixCSR
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Ints
 from ..mechanics.materials import Material
 from ..settings.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
@@ -44,6 +44,15 @@ class Contribution(Protocol):
     def max_step(self, u: Floats, direction: Floats) -> float: ...
 
 
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """Compiled forms of an energy and its first and second derivative."""
+
+    energy: dolfinx.fem.Form
+    residual: dolfinx.fem.Form
+    tangent: dolfinx.fem.Form
+
+
 class NonlinearProblem:
     """Energy, residual and tangent of one step, as functions of the displacement.
 
@@ -65,61 +74,61 @@ class NonlinearProblem:
         has_planes: bool = False,
     ) -> None:
         self.domain = domain
+        self.free = zones.free
         self.contributions: list[Contribution] = []
         # the coefficient of compiled forms; each evaluation sets it
         self._u = dolfinx.fem.Function(domain.space)
         self._forces = dolfinx.la.vector(domain.space.dofmap.index_map, 3)
         self.points = IntegrationPoints.for_order(domain.order)
-        # reference coordinates, and parts of the regular element's volume
-        self._rule = self.points.barycentric[:, 1:].copy(), self.points.weights / 6
-        self._weight, self._H = self._field_at_points(()), self._field_at_points((3, 3))
-        self._undeformed = np.tile(
-            np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1)
-        )
-        F = ufl.Identity(3) + ufl.grad(self._u)
-        Fe = F * self._H
+        # coordinates in the regular element, and parts of its volume
+        self._places = self.points.barycentric[:, 1:].copy()
+        self._volumes = self.points.weights / 6
+        self._weight = self._field_at_points(())
+        self._H = self._field_at_points((3, 3))
         # a constant, so that another value needs no new form
-        moduli = (
-            self._weight,
-            dolfinx.fem.Constant(domain.mesh, material.bulk_to_shear_ratio)
-            * self._weight,
-        )
+        ratio = dolfinx.fem.Constant(domain.mesh, material.bulk_to_shear_ratio)
+        moduli = self._weight, ratio * self._weight
+        deformation = ufl.Identity(3) + ufl.grad(self._u)
+        elastic = deformation * self._H
         self._tensors = {
-            "deformation": F,
-            "elastic": Fe,
-            "stress": material.cauchy_stress(Fe, *moduli),
+            "deformation": deformation,
+            "elastic": elastic,
+            "stress": material.cauchy_stress(elastic, *moduli),
         }
         self._expressions: dict[str, dolfinx.fem.Expression] = {}
+        dx = self._volume_measure()
         self._linear: LinearElements | None = None
+        self._energy: ufl.Form | int = 0
         if domain.order == 1:
             # written by hand, instead of the form compiler's code
-            self._linear, energy = LinearElements(domain, material), 0
+            self._linear = LinearElements(domain, material)
         else:
-            energy = material.energy_density(Fe, *moduli) * self._volume_measure()
-        self._energy = energy + self._plane_energy(zones) if has_planes else energy
+            self._energy = material.energy_density(elastic, *moduli) * dx
+        if has_planes:
+            self._energy = self._energy + self._plane_energy(zones)
 
-        (coupling,) = self._compiled(
-            ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space))
-            * self._volume_measure()
-        )
+        trial = ufl.TrialFunction(domain.space)
+        coupling = self._compiled(ufl.inner(trial, ufl.TestFunction(domain.space)) * dx)
         fixed = domain.local(zones.fixed)[: domain.n_owned]
         self._fixed_owned = np.flatnonzero(fixed.ravel())
-        first = 3 * domain.space.dofmap.index_map.local_range[0]
-        self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
-        self.free = zones.free
-        elastic = LaggedTangent(
-            ElasticMatrix(coupling, self._add_stiffness, fixed), domain
-        )
-        self._tangent = Tangent(elastic, domain)
-        self.set_step(np.zeros(self._undeformed.shape[:2]), self._undeformed)
+        first_node, _ = domain.space.dofmap.index_map.local_range
+        fixed_global = 3 * first_node + self._fixed_owned
+        self._fixed_global = fixed_global.astype(PETSc.IntType)
+        matrix = ElasticMatrix(coupling, self._add_stiffness, fixed)
+        self._tangent = Tangent(LaggedTangent(matrix, domain), domain)
+        n_cells = len(domain.cells)
+        n_points = len(self.points.weights)
+        no_growth = np.tile(np.eye(3), (n_cells, n_points, 1, 1))
+        self.set_step(np.zeros((n_cells, n_points)), no_growth)
 
     def _volume_measure(self) -> ufl.Measure:
-        names = "quadrature_points", "quadrature_weights"
         # as tuples, since arrays are shortened in the names of compiled forms
-        rule = [tuple(tuple(row) for row in self._rule[0]), tuple(self._rule[1])]
-        return ufl.dx(
-            metadata={"quadrature_rule": "custom"} | dict(zip(names, rule, strict=True))
-        )
+        metadata = {
+            "quadrature_rule": "custom",
+            "quadrature_points": tuple(map(tuple, self._places)),
+            "quadrature_weights": tuple(self._volumes),
+        }
+        return ufl.dx(metadata=metadata)
 
     def _plane_energy(self, zones: Zones) -> ufl.Form | int:
         """Return the form of the energy of the fissure's planes, ε/2 ⟨penetration⟩²
@@ -131,51 +140,54 @@ class NonlinearProblem:
             return 0
         mesh = self.domain.mesh
         penalty = dolfinx.fem.Constant(mesh, PLANE_PENALTY_PA_PER_M)
-        left, right = (
-            dolfinx.fem.Constant(mesh, plane * M_PER_MM) for plane in zones.planes_mm
-        )
-        tags = self.domain.local_facets(zones.facets, zones.facet_zone)
+        left_mm, right_mm = zones.planes_mm
+        left = dolfinx.fem.Constant(mesh, left_mm * M_PER_MM)
+        right = dolfinx.fem.Constant(mesh, right_mm * M_PER_MM)
         ds = ufl.ds(
             domain=mesh,
-            subdomain_data=tags,
+            subdomain_data=self.domain.local_facets(zones.facets, zones.facet_zone),
             metadata={"quadrature_degree": FACET_DEGREE[self.domain.order]},
         )
-        current_x = ufl.SpatialCoordinate(mesh)[0] + self._u[0]
-        penetrations = (
-            (current_x - left, LEFT_CONTACT),
-            (right - current_x, RIGHT_CONTACT),
-        )
-        return sum(
-            penalty / 2 * ufl.max_value(depth, 0) ** 2 * ds(tag)
-            for depth, tag in penetrations
-        )
+        x = ufl.SpatialCoordinate(mesh)[0] + self._u[0]
+        energy = 0
+        for depth, wall in ((x - left, LEFT_CONTACT), (right - x, RIGHT_CONTACT)):
+            energy += penalty / 2 * ufl.max_value(depth, 0) ** 2 * ds(wall)
+        return energy
 
-    def _compiled(self, *forms: ufl.Form) -> list[dolfinx.fem.Form]:
+    def _compiled(self, form: ufl.Form) -> dolfinx.fem.Form:
         with form_compiler(self.domain.comm) as options:
-            return [dolfinx.fem.form(form, jit_options=options) for form in forms]
+            return dolfinx.fem.form(form, jit_options=options)
 
     @cached_property
-    def _forms(self) -> list[dolfinx.fem.Form]:
-        """The form compiler's part of the energy, its residual and its tangent."""
+    def _forms(self) -> Forms | None:
+        """The form compiler's part of the energy with its derivatives, None if it has
+        none."""
         if not self._energy:
-            return []
+            return None
         residual = ufl.derivative(self._energy, self._u)
-        return self._compiled(self._energy, residual, ufl.derivative(residual, self._u))
+        tangent = ufl.derivative(residual, self._u)
+        return Forms(
+            self._compiled(self._energy),
+            self._compiled(residual),
+            self._compiled(tangent),
+        )
 
     def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
         element = basix.ufl.quadrature_element(
-            "tetrahedron", shape, points=self._rule[0], weights=self._rule[1]
+            "tetrahedron",
+            shape,
+            points=self._places,
+            weights=self._volumes,
         )
-        return dolfinx.fem.Function(
-            dolfinx.fem.functionspace(self.domain.mesh, element)
-        )
+        space = dolfinx.fem.functionspace(self.domain.mesh, element)
+        return dolfinx.fem.Function(space)
 
     def set_step(
         self,
         mu: Floats,
         G_inverse: Floats,
         V: Floats | None = None,
-        part: NDArray[np.int64] | None = None,
+        part: Ints | None = None,
     ) -> None:
         """Set the coefficients of a step, on the mesh as it is placed now.
 
@@ -190,10 +202,13 @@ class NonlinearProblem:
         updated reference, per volume of the state without stress, since ψ is
         proportional to μ.
         """
-        weight, H, self._volume = mu, G_inverse, np.ones((1, 1, 1, 1))
+        weight = mu
+        H = G_inverse
+        self._det_V = np.ones_like(mu)
         if V is not None:
-            self._volume = np.linalg.det(V)[..., None, None]
-            weight, H = mu / self._volume[..., 0, 0], V @ G_inverse
+            self._det_V = np.linalg.det(V)
+            weight = mu / self._det_V
+            H = V @ G_inverse
         _set_at_points(self._weight, weight)
         _set_at_points(self._H, H)
         if self._linear:
@@ -201,9 +216,8 @@ class NonlinearProblem:
             self._linear.H = np.ascontiguousarray(H)
         self._tangent.elastic.forget()
         if self.free:
-            self._tangent.motions = RigidMotions(
-                self.domain, self.domain.part if part is None else part
-            )
+            part = self.domain.part if part is None else part
+            self._tangent.motions = RigidMotions(self.domain, part)
 
     def rest(self) -> Floats:
         """Return a displacement of zero."""
@@ -230,17 +244,16 @@ class NonlinearProblem:
         self._load(u)
         if name not in self._expressions:
             with form_compiler(self.domain.comm) as options:
-                expression = dolfinx.fem.Expression(
-                    self._tensors[name], self._rule[0], jit_options=options
+                self._expressions[name] = dolfinx.fem.Expression(
+                    self._tensors[name], self._places, jit_options=options
                 )
-            self._expressions[name] = expression
         cells = np.arange(len(self.domain.cells), dtype=np.int32)
-        values = (
-            self._expressions[name]
-            .eval(self.domain.mesh, cells)
-            .reshape(len(cells), -1, 3, 3)
-        )
-        return values * self._volume if name == "stress" else values
+        values = self._expressions[name].eval(self.domain.mesh, cells)
+        tensors = values.reshape(len(cells), -1, 3, 3)
+        if name == "stress":
+            # that of w = μ/det V
+            tensors = tensors * self._det_V[..., None, None]
+        return tensors
 
     def _load(self, u: Floats) -> Floats:
         self._u.x.array[:] = u.ravel()
@@ -249,21 +262,23 @@ class NonlinearProblem:
     def energy(self, u: Floats) -> float:
         """Return the total energy in J, contact included."""
         u = self._load(u)
-        local = self._linear.assemble(u) if self._linear else 0.0
+        local = 0.0
+        if self._linear:
+            local += self._linear.assemble(u)
         if self._forms:
-            local += float(np.real(dolfinx.fem.assemble_scalar(self._forms[0])))
-        return self.domain.comm.allreduce(local) + sum(
-            part.energy(u) for part in self.contributions
-        )
+            local += float(np.real(dolfinx.fem.assemble_scalar(self._forms.energy)))
+        total = self.domain.comm.allreduce(local)
+        return total + sum(part.energy(u) for part in self.contributions)
 
     def residual(self, u: Floats) -> Residual:
         """Return the residual, zero where the displacement is fixed."""
-        loaded, forces = self._load(u), self._forces
+        loaded = self._load(u)
+        forces = self._forces
         forces.array[:] = 0.0
         if self._linear:
             self._linear.assemble(loaded, forces=forces.array)
         if self._forms:
-            dolfinx.fem.assemble_vector(forces.array, self._forms[1])
+            dolfinx.fem.assemble_vector(forces.array, self._forms.residual)
         forces.scatter_reverse(InsertMode.add)
         elastic = forces.array[: 3 * self.domain.n_owned].copy()
         self.clear_fixed(elastic)
@@ -284,7 +299,7 @@ class NonlinearProblem:
         if self._linear:
             self._linear.assemble(u, matrix=blocks)
         if self._forms:
-            dolfinx.fem.assemble_matrix(blocks, self._forms[2])
+            dolfinx.fem.assemble_matrix(blocks, self._forms.tangent)
 
     def tangent(self, at: Residual, *, within: float = 0.0) -> Tangent:
         """Return the tangent in N/m at a residual's displacement, with unit rows and
@@ -324,9 +339,8 @@ class NonlinearProblem:
     def max_step(self, u: Floats, direction: Floats) -> float:
         """Return the largest fraction, up to 1, of a direction (k, 3) in m that all
         contributions allow to add to u."""
-        return min(
-            (part.max_step(u, direction) for part in self.contributions), default=1.0
-        )
+        steps = [part.max_step(u, direction) for part in self.contributions]
+        return min(steps, default=1.0)
 
     def volume_ratios(self, u: Floats) -> Floats:
         """Return det F of the local elements: (c, 1), or (c, 10) at the nodes of
@@ -344,7 +358,7 @@ class NonlinearProblem:
 
 def _set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:
     """Set a field at integration points to (c, q, ...) values."""
-    places = field.function_space.dofmap.list
-    field.x.array.reshape(-1, field.function_space.dofmap.bs)[places] = values.reshape(
-        *places.shape, -1
-    )
+    dofmap = field.function_space.dofmap
+    places = dofmap.list
+    by_place = field.x.array.reshape(-1, dofmap.bs)
+    by_place[places] = values.reshape(*places.shape, -1)

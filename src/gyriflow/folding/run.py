@@ -75,7 +75,7 @@ def run(
         state = State.at_start(folding.start, parameters.step_s)
         state = _save_frame(folding, state, parameters.output_weeks[0], folder)
     resumed_after = len(state.rows)
-    state, diverged = simulate(folding, state, folder, key, may_diverge=may_diverge)
+    state, diverged = _simulate(folding, state, folder, key, may_diverge=may_diverge)
     memory = comm.reduce(_peak_memory_mib(), op=MPI.SUM, root=0)
     processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
     if comm.rank != 0:
@@ -126,7 +126,7 @@ def _low_radius_ratio(
     return float(np.quantile(ratios, 0.01))
 
 
-def simulate(
+def _simulate(
     folding: Folding,
     state: State,
     folder: Path,
@@ -139,9 +139,10 @@ def simulate(
 
     If a run that `may_diverge` diverges, return the last good state and the reason.
     """
-    p, rank = folding.parameters, folding.domain.comm.rank
-    resumed_after, resumed = len(state.rows), time.monotonic()
-    for week_before, week in pairwise(p.output_weeks):
+    p = folding.parameters
+    began = time.monotonic()
+    n_steps_before = len(state.rows)
+    for last_week, week in pairwise(p.output_weeks):
         until = _seconds_to(week, p)
         while state.time_s < until * (1 - 1e-12):
             try:
@@ -150,23 +151,27 @@ def simulate(
                 if not may_diverge:
                     raise
                 return state, str(error)
-            arrived = until - state.time_s < 1e-9 * until
-            if arrived:
+            has_arrived = until - state.time_s < 1e-9 * until
+            if has_arrived:
                 state = _save_frame(folding, state, week, folder)
-            if rank == 0:
-                if arrived:
-                    since = [row for row in state.rows if row["week"] > week_before]
-                    for warning in filter(
-                        None, (missed_curves(state.rows[-1]), *missed_targets(since))
-                    ):
-                        log.warning(warning)
+            if folding.domain.comm.rank == 0:
+                if has_arrived:
+                    _warn_of_misses(state.rows, last_week)
                 write_checkpoint(folder / "state.h5", key, state)
-                report_step(
-                    state,
-                    p.end_week,
-                    (time.monotonic() - resumed) / (len(state.rows) - resumed_after),
-                )
+                seconds = time.monotonic() - began
+                n_steps = len(state.rows) - n_steps_before
+                report_step(state, p.end_week, seconds / n_steps)
     return state, None
+
+
+def _warn_of_misses(rows: Sequence[dict], last_week: float) -> None:
+    """Warn of curves and targets that were not followed since an output week."""
+    since = [row for row in rows if row["week"] > last_week]
+    curves = missed_curves(rows[-1])
+    if curves:
+        log.warning(curves)
+    for warning in missed_targets(since):
+        log.warning(warning)
 
 
 def _save_frame(
@@ -177,30 +182,40 @@ def _save_frame(
 ) -> State:
     """Write the frame of a week and return the state to continue with; collective over
     the ranks."""
-    names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
-    pressure, elements = step_fields(folding, names)
+    p = folding.parameters
+    step_growth = folding.solved.growth
+    at_vertices, at_elements = step_fields(folding, p.fields)
     # a mean over the steps since the last frame; before the first step, the growth of
     # that step
-    growth = (
-        folding.grown(state, solved.growth) if state.growth is None else state.growth
-    )
+    growth = state.growth
+    if growth is None:
+        growth = folding.grown(state, step_growth)
     steps = state.growth_s / p.step_s or 1.0
     if folding.domain.comm.rank == 0:
-        fields = {"positions": state.positions * MM_PER_M}
-        if "displacement" in names:
+        positions = state.positions * MM_PER_M
+        fields = {"positions": positions}
+        if "displacement" in p.fields:
             fields["displacement_mm"] = (state.positions - folding.start) * MM_PER_M
-        rates, positions = solved.growth.parameters, fields["positions"]
         logs: Floats | None = None
+        smoothing = {}
         if growth is not None:
-            logs = np.asarray(
-                log_growth_at_vertices(positions, folding.inputs, growth) / steps
-            )
+            logs = log_growth_at_vertices(positions, folding.inputs, growth) / steps
+            smoothing = {"growth_smoothing_mm": GROWTH_SMOOTHING_MM}
         fields |= layer_fields(
-            positions, folding.zones, rates, folding.maps, week, names, logs
+            positions,
+            folding.zones,
+            step_growth.parameters,
+            folding.maps,
+            week,
+            p.fields,
+            logs,
         )
-        smoothing = {} if logs is None else {"growth_smoothing_mm": GROWTH_SMOOTHING_MM}
         write_frame(
-            frame_path(folder, week), week, fields | pressure, elements, smoothing
+            frame_path(folder, week),
+            week,
+            fields | at_vertices,
+            at_elements,
+            smoothing,
         )
     return replace(state, growth=None, growth_s=0.0)
 
@@ -233,13 +248,12 @@ def report_step(
 
 def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
     """Return totals over the step table."""
+    seconds = [row["seconds"] for row in rows]
     return {
         "steps": len(rows),
         "newton": sum(row["newton"] for row in rows),
         "krylov": sum(row["krylov"] for row in rows),
-        "seconds_per_step": (
-            float(np.median([row["seconds"] for row in rows])) if rows else math.nan
-        ),
+        "seconds_per_step": float(np.median(seconds)) if rows else math.nan,
         "min_J": min((row["min_J"] for row in rows), default=math.nan),
     }
 
@@ -251,19 +265,18 @@ def quality_note(
 ) -> tuple[str, bool]:
     """Return a note if elements are flatter than any may be at the start, else an empty
     text, and if they are many."""
-    before, ratios = (
-        radius_ratios(TetrahedralMesh(places, mesh.tets))
-        for places in (mesh.vertices, positions)
-    )
-    flat = int((ratios < min(MIN_RADIUS_RATIO, float(before.min()))).sum())
-    if not flat:
+    ratios_before = radius_ratios(mesh)
+    ratios = radius_ratios(TetrahedralMesh(positions, mesh.tets))
+    allowed = min(MIN_RADIUS_RATIO, float(ratios_before.min()))
+    n_flat = int((ratios < allowed).sum())
+    if not n_flat:
         return "", False
     text = (
-        f"at GW {week:g} {flat} of {len(ratios)} elements are flatter than a mesh may"
+        f"at GW {week:g} {n_flat} of {len(ratios)} elements are flatter than a mesh may"
         f" be at the start (radius ratio {ratios.min():.3f} of {MIN_RADIUS_RATIO:g}):"
         " results are less accurate there"
     )
-    return text, flat > MAX_FLAT_SHARE * len(ratios)
+    return text, n_flat > MAX_FLAT_SHARE * len(ratios)
 
 
 def load_state(
@@ -279,40 +292,31 @@ def load_state(
     """
     state, message = read_checkpoint(folder / "state.h5", key)
     if state is None:
-        return state, message
-    end_s = _seconds_to(parameters.end_week, parameters)
-    passed = [
-        week
-        for week in parameters.output_weeks
-        if _seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)
-    ]
+        return None, message
+    passed = {}
+    for week in parameters.output_weeks:
+        seconds = _seconds_to(week, parameters)
+        if seconds <= state.time_s * (1 + 1e-12):
+            passed[week] = seconds
+    problem = ""
     if not all(frame_path(folder, week).exists() for week in passed):
+        problem = "lacks frames of some output weeks"
+    elif parameters.targets:
+        since = state.time_s - state.growth_s
+        distances = [abs(seconds - since) for seconds in passed.values()]
+        if min(distances) > 1e-6 * since:
+            problem = "is of a run with other output weeks"
+    if problem:
         return (
             None,
-            (
-                f"the checkpoint {folder} lacks frames of some output weeks: not used,"
-                " the run starts again"
-            ),
+            f"the checkpoint {folder} {problem}: not used, the run starts again",
         )
-    since = state.time_s - state.growth_s
-    if (
-        parameters.targets
-        and min(abs(_seconds_to(week, parameters) - since) for week in passed)
-        > 1e-6 * since
-    ):
-        return (
-            None,
-            (
-                f"the checkpoint {folder} is of a run with other output weeks: not"
-                " used, the run starts again"
-            ),
-        )
-    within = tuple(
-        row
-        for row in state.rows
-        if _seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9)
-    )
-    return replace(state, rows=within), message
+    end_s = _seconds_to(parameters.end_week, parameters)
+    rows = []
+    for row in state.rows:
+        if _seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9):
+            rows.append(row)
+    return replace(state, rows=tuple(rows)), message
 
 
 def frame_path(folder: Path, week: float) -> Path:
@@ -342,11 +346,12 @@ def shortened_step_note(parameters: FoldingParameters) -> str:
     """Return a note if the time step does not divide the time between two outputs, else
     an empty text."""
     step = parameters.step_s
-    for a, b in pairwise(parameters.output_weeks):
-        if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:
+    for first, second in pairwise(parameters.output_weeks):
+        remainder = math.remainder((second - first) * SECONDS_PER_GW, step)
+        if abs(remainder) > 1e-6 * step:
             return (
-                f"step_s {step:g} does not divide the time from GW {a:g} to {b:g}: the"
-                " last step there is shortened"
+                f"step_s {step:g} does not divide the time from GW {first:g} to"
+                f" {second:g}: the last step there is shortened"
             )
     return ""
 

@@ -116,46 +116,43 @@ class Folding:
         NotConvergedError if the step is too large.
         """
         began = time.monotonic()
+        p = self.parameters
         tissue, growth = self.begin(state, step_s)
+        guesses = state.initial_guesses(step_s)
         free = growth.guess(self.zones.fixed)
-        guesses = (
-            state.initial_guesses(step_s)
-            if free is None
-            else [free, *state.initial_guesses(step_s)]
-        )
+        if free is not None:
+            guesses.insert(0, free)
         solution = self.solver.solve(*map(self.domain.local, guesses))
         u = solution.displacement
         displacement = self.domain.gather(u[: self.domain.n_owned])
         positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
-        thickness = value_at(
-            self.parameters.thickness_mm,
-            growth.start.week(self.parameters, 0.5),
-            self.maps,
-        )
+        thickness_mm = value_at(p.thickness_mm, growth.start.week(p, 0.5), self.maps)
+        thickness = float(np.mean(thickness_mm)) * M_PER_MM
         stretch = None
-        if self.parameters.stress_memory_gw > 0:
-            stretch = self.domain.gather_cells(
-                packed(left_stretch(self.problem.evaluate("elastic", u)))
-            )
+        if p.stress_memory_gw > 0:
+            elastic = self.problem.evaluate("elastic", u)
+            stretch = self.domain.gather_cells(packed(left_stretch(elastic)))
         row = {
             "step": len(state.rows) + 1,
-            "week": (
-                self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW
-            ),
+            "week": p.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
             "dt_s": step_s,
             **self._solution_row(solution, displacement),
             **self._contact_row(u, positions),
             **growth.row(size),
             "elements_through_cortex": elements_through(
-                self.domain, tissue.depth, float(np.mean(thickness)) * M_PER_MM
+                self.domain, tissue.depth, thickness
             ),
             "rung": RUNGS[solution.rung],
         }
         self.solved = SolvedStep(u, step_s, growth)
-        grown = self.grown(state, growth)
         after = state.after(
-            displacement, step_s, row, stretch, growth.correction(size), grown
+            displacement,
+            step_s,
+            row,
+            stretch,
+            growth.correction(size),
+            self.grown(state, growth),
         )
         if self._inner_sides is not None:
             after = replace(after, positions=self.straighten(after.positions))
@@ -178,10 +175,12 @@ class Folding:
     def begin(self, state: State, step_s: float) -> tuple[Tissue, StepGrowth]:
         """Set up the problem of a step; return its tissue, with the parameters at
         mid-step, and its growth."""
+        p = self.parameters
+        domain = self.domain
         start = StepStart(
             state.positions * MM_PER_M, state.time_s, step_s, state.correction
         )
-        p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
+        week = start.week(p, 0.5)
         if domain.positions is not state.positions:
             domain.place(state.positions)
         tissue = Tissue.of(
@@ -198,16 +197,15 @@ class Folding:
             step_gw = step_s / SECONDS_PER_GW
             stretch = relaxed(before, step_gw, p.stress_memory_gw)
         growth = self.model(start)
-        mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
+        modulus = shear_modulus(p, tissue.weight, tissue.maps, week)
         inverse = growth.inverse(tissue)
-        self.problem.set_step(mu, inverse, stretch, part)
-        ratio = (
-            1.0 if p.targets else 1.0 / domain.min_over_ranks(np.linalg.det(inverse))
-        )
-        if ratio > MAX_STEP_VOLUME_RATIO:
-            raise NotConvergedError(
-                f"tissue grows to {ratio:.1f} times its volume in one step"
-            )
+        self.problem.set_step(tissue.at_points(modulus), inverse, stretch, part)
+        if not p.targets:
+            ratio = 1.0 / domain.min_over_ranks(np.linalg.det(inverse))
+            if ratio > MAX_STEP_VOLUME_RATIO:
+                raise NotConvergedError(
+                    f"tissue grows to {ratio:.1f} times its volume in one step"
+                )
         return tissue, growth
 
     def grown(self, state: State, growth: StepGrowth) -> Floats | None:
@@ -292,13 +290,10 @@ def advance(
             state = replace(state, step_s=half, successes=0)
             continue
         if folding.domain.comm.rank == 0:
-            has_layers = p.growth.definition.has_layers
-            coarse = (
-                resolution_warning(after.rows, folding.domain.order)
-                if has_layers
-                else ""
-            )
-            for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
+            warnings = [unconverged_warning(after.rows[-1])]
+            if p.growth.definition.has_layers:
+                warnings.append(resolution_warning(after.rows, folding.domain.order))
+            for warning in filter(None, warnings):
                 log.warning(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)

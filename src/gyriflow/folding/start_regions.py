@@ -3,10 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..geometry.triangles import TriangleMesh
+from ..geometry.triangles import Mask, TriangleMesh
 from ..io.tetmeshes import Regions
 from ..settings.folding import FoldingParameters, require_maps
 from ..settings.terms import REGION_FIELDS
@@ -24,7 +23,7 @@ def start_regions(
     mesh: TetrahedralMesh,
     parameters: FoldingParameters,
     maps: Maps,
-    left_faces: Callable[[TriangleMesh], NDArray[np.bool_]],
+    left_faces: Callable[[TriangleMesh], Mask],
 ) -> Regions:
     """Return the regions of a run on its start mesh, with the fields of the first step.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import volumes_between
-from ..geometry.triangles import TriangleMesh, area_vectors
+from ..geometry.triangles import TriangleMesh, face_areas
 from ..settings.folding import FoldingParameters
 from ..settings.varying import value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3
@@ -45,22 +45,18 @@ class SteeredStep(GrowthByRates):
     limited: bool
 
     def correction(self, after: Size) -> tuple[float, ...]:
-        return tuple(
-            map(float, self.before.rates_to(after, self.start.step_s) - self.free_rates)
-        )
+        realised = self.before.rates_to(after, self.start.step_s)
+        return tuple((realised - self.free_rates).tolist())
 
     def row(self, after: Size) -> dict[str, Any]:
-        realised = self.before.rates_to(after, self.start.step_s)
+        realised_area, _ = self.before.rates_to(after, self.start.step_s)
+        free_area, _ = self.free_rates
         return super().row(after) | {
             "area_aim_cm2": self.target.area_mm2 * CM2_PER_MM2,
             "volume_aim_ml": self.target.volume_mm3 * ML_PER_MM3,
             "growth_rate_per_s": self.parameters.growth_rate_per_s,
             "core_growth_rate_per_s": self.parameters.core_growth_rate_per_s,
-            "realised_share": (
-                float(realised[0] / self.free_rates[0])
-                if self.free_rates[0]
-                else np.nan
-            ),
+            "realised_share": float(realised_area / free_area) if free_area else np.nan,
             "growth_limited": int(self.limited),
         }
 
@@ -73,31 +69,35 @@ def steered_growth(
 ) -> SteeredStep:
     """Return the growth by sizes of a step of a run with a size `at_start`."""
     week = start.week(p, 1.0)
+    area_cm2 = blended(
+        p.growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, p.start_week, week
+    )
+    volume_ml = blended(
+        p.growth.volume_ml, at_start.volume_mm3 * ML_PER_MM3, p.start_week, week
+    )
+    target = Size(area_cm2 / CM2_PER_MM2, volume_ml / ML_PER_MM3)
     before = inputs.size(start.positions_mm)
-    target = Size(
-        blended(p.growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, p.start_week, week)
-        / CM2_PER_MM2,
-        blended(
-            p.growth.volume_ml, at_start.volume_mm3 * ML_PER_MM3, p.start_week, week
-        )
-        / ML_PER_MM3,
+    by_unit_rates, by_radial = free_growth(p, start.positions_mm, inputs, week)
+    required = before.rates_to(target, start.step_s) - by_radial
+    if start.correction:
+        required -= start.correction
+    cortex, core, is_limited = steered_rates(
+        required, by_unit_rates, (0.0, MAX_RATE_PER_S)
     )
-    gain, radial = free_growth(p, start.positions_mm, inputs, week)
-    required = (
-        before.rates_to(target, start.step_s)
-        - radial
-        - (start.correction or (0.0, 0.0))
+    rates = {"growth_rate_per_s": cortex, "core_growth_rate_per_s": core}
+    return SteeredStep(
+        p.model_copy(update=rates),
+        start,
+        before,
+        target,
+        free_rates=by_unit_rates @ [cortex, core] + by_radial,
+        limited=bool(is_limited),
     )
-    *rates, limited = steered_rates(required, gain, (0.0, MAX_RATE_PER_S))
-    p = p.model_copy(
-        update={"growth_rate_per_s": rates[0], "core_growth_rate_per_s": rates[1]}
-    )
-    return SteeredStep(p, start, before, target, gain @ rates + radial, bool(limited))
 
 
 def steered_rates(
     required: Floats,
-    gain: Floats,
+    by_unit_rates: Floats,
     bounds: tuple[float, float],
 ) -> tuple[float, float, bool]:
     """Return the rates of cortex and core, and whether bounds prevent the brain from
@@ -105,30 +105,29 @@ def steered_rates(
 
     The rate of the cortex is set by the area, then that of the core by the remaining
     volume. If bounds exclude both curves, that of the volume is followed. `required`
-    are the (2,) rates of the logarithms of area and volume, `gain` (2, 2) what unit
-    rates of cortex and core add to them (`free_growth`). SolverError if cortex or core
-    adds no volume.
+    are the (2,) rates of the logarithms of area and volume, `by_unit_rates` (2, 2) what
+    unit rates of cortex and core add to them (`free_growth`). SolverError if cortex or
+    core adds no volume.
     """
-    cortex_volume, core_volume = gain[1]
+    area, volume = required
+    cortex_area = by_unit_rates[0, 0]
+    cortex_volume, core_volume = by_unit_rates[1]
     if min(cortex_volume, core_volume) <= 0:
         raise SolverError(
             "growth by sizes finds no rates",
             found="tissue that does not grow",
             expected="a growing core",
         )
-    mean = required[1] / (cortex_volume + core_volume)
-    ideal = required[0] / max(gain[0, 0], 1e-9)
+    ideal = area / max(cortex_area, 1e-9)
     # on a ball tangential growth adds no area: feedback raises it until the core no
     # longer grows
     cortex = np.clip(ideal, *bounds)
-    core = np.clip((required[1] - cortex_volume * cortex) / core_volume, *bounds)
+    core = np.clip((volume - cortex_volume * cortex) / core_volume, *bounds)
     # the cortex makes up for a core at its bound
-    cortex = np.clip((required[1] - core_volume * core) / cortex_volume, *bounds)
-    return (
-        float(cortex),
-        float(core),
-        abs(cortex - ideal) > 1e-9 * (abs(mean) + abs(ideal)),
-    )
+    cortex = np.clip((volume - core_volume * core) / cortex_volume, *bounds)
+    mean = volume / (cortex_volume + core_volume)
+    is_limited = abs(cortex - ideal) > 1e-9 * (abs(mean) + abs(ideal))
+    return float(cortex), float(core), is_limited
 
 
 def free_growth(
@@ -143,10 +142,10 @@ def free_growth(
     A (2, 2) array for unit rates of cortex and core (columns), and the (2,) rates in
     1/s of radial growth.
     """
-    zones, thickness = inputs.zones, value_at(p.thickness_mm, week, inputs.maps)
-    distance = PialSearch(positions_mm, zones.cortex_facets).distance(
-        positions_mm, WEIGHT_REACH * np.max(thickness)
-    )
+    zones = inputs.zones
+    thickness = value_at(p.thickness_mm, week, inputs.maps)
+    search = PialSearch(positions_mm, zones.cortex_facets)
+    distance = search.distance(positions_mm, WEIGHT_REACH * np.max(thickness))
     weight = cortical_weight(distance, thickness)
     volumes = volumes_between(positions_mm, inputs.pieces)
 
@@ -158,18 +157,18 @@ def free_growth(
         dg, dr = increments(weight, zones.growth, tangential, radial, core, 1.0)
         of_volume = 2 * dg + dr
         of_pieces = of_volume[inputs.pieces].mean(axis=1)
-        mean = np.average(of_pieces, weights=volumes)
-        return float(mean)
+        return float(np.average(of_pieces, weights=volumes))
 
     faces = zones.measured_facets
-    areas = np.linalg.norm(area_vectors(TriangleMesh(positions_mm, faces)), axis=1)
-    surface = 2 * float(zones.growth[faces].mean(axis=1) @ areas / areas.sum())
-    radial = volume_rate(
-        0.0, value_at(p.radial_growth_rate_per_s, week, inputs.maps), 0.0
-    )
-    return np.array(
-        [[surface, 0.0], [volume_rate(1.0, 0.0, 0.0), volume_rate(0.0, 0.0, 1.0)]]
-    ), np.array([0.0, radial])
+    areas = face_areas(TriangleMesh(positions_mm, faces))
+    growing = zones.growth[faces].mean(axis=1)
+    cortex_area = 2 * float(growing @ areas / areas.sum())
+    cortex_volume = volume_rate(1.0, 0.0, 0.0)
+    core_volume = volume_rate(0.0, 0.0, 1.0)
+    radial_rate = value_at(p.radial_growth_rate_per_s, week, inputs.maps)
+    radial_volume = volume_rate(0.0, radial_rate, 0.0)
+    by_unit_rates = np.array([[cortex_area, 0.0], [cortex_volume, core_volume]])
+    return by_unit_rates, np.array([0.0, radial_volume])
 
 
 def missed_curves(row: dict[str, Any]) -> str:
@@ -181,21 +180,16 @@ def missed_curves(row: dict[str, Any]) -> str:
         "area": row["area_cm2"] / row["area_aim_cm2"] - 1,
         "volume": row["volume_ml"] / row["volume_aim_ml"] - 1,
     }
-    parts = [
-        f"{name} {100 * error:+.1f} % off its curve"
-        for name, error in errors.items()
-        if abs(error) > CURVE_TOL
-    ]
-    reason = (
-        ": no growth rates within their bounds follow both curves"
-        if row.get("growth_limited")
-        else ""
-    )
-    return (
-        f"at GW {row['week']:g} the brain is {' and '.join(parts)}{reason}"
-        if parts
-        else ""
-    )
+    parts = []
+    for name, error in errors.items():
+        if abs(error) > CURVE_TOL:
+            parts.append(f"{name} {100 * error:+.1f} % off its curve")
+    if not parts:
+        return ""
+    text = f"at GW {row['week']:g} the brain is {' and '.join(parts)}"
+    if row.get("growth_limited"):
+        text += ": no growth rates within their bounds follow both curves"
+    return text
 
 
 def blended(

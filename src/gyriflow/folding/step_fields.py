@@ -9,7 +9,6 @@ from collections.abc import Collection
 import numpy as np
 
 from ..geometry.triangles import Floats
-from ..settings.terms import ELEMENT_FIELDS
 from ..units import SECONDS_PER_GW
 from .layers import PialSearch
 from .simulation import Folding
@@ -30,9 +29,6 @@ def step_fields(
     contact, where they depend on the mesh: there are none.
     """
     p = folding.parameters
-    problem = folding.problem
-    domain = folding.domain
-    u = folding.solved.displacement
 
     def as_rates(fields: dict[str, Floats]) -> dict[str, Floats]:
         if p.stress_memory_gw > 0:
@@ -44,47 +40,63 @@ def step_fields(
 
     at_vertices: dict[str, Floats] = {}
     if folding.contact is not None and "contact_pressure" in names:
-        at_vertices = as_rates({"contact_pressure_pa": folding.contact.pressure(u)})
+        pressure_pa = folding.contact.pressure(folding.solved.displacement)
+        at_vertices = as_rates({"contact_pressure_pa": pressure_pa})
     is_elastic = p.growth.definition.measured != "shapes"
-    element_names = {*names} & {*ELEMENT_FIELDS} - (set() if is_elastic else {"stress"})
-    if not element_names:
-        return at_vertices, {}
     fields: dict[str, Floats] = {}
-    start, slopes = domain.local(folding.start), problem.points.gradients
-    after = domain.local(domain.positions) + u
-    total = deformation_gradients(start, after, domain.cells, slopes).reshape(-1, 3, 3)
-    if "stress" in element_names:
-        stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
-        fields |= {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
-    if "strain" in element_names and is_elastic:
-        Fe = problem.evaluate("elastic", u).reshape(-1, 3, 3)
-        fields |= {
-            "elastic_strain": hencky_equivalent(Fe),
-            "elastic_volume_strain": np.log(np.linalg.det(Fe)),
-        }
-    fields = as_rates(fields)
-    if "strain" in element_names:
-        search = PialSearch(folding.start, folding.zones.cortex_facets)
-        normals = np.repeat(
-            search.nearest_normals(start[domain.corners].mean(axis=1)),
-            len(slopes),
-            axis=0,
-        )
-        fields |= {
-            "total_strain": green_lagrange_maximum(total),
-            "area_stretch": areal_stretch(total, normals),
-        }
-    if "volume_ratio" in element_names:
-        fields["volume_ratio_step"] = np.linalg.det(
-            problem.evaluate("deformation", u).reshape(-1, 3, 3)
-        )
-        fields["volume_ratio"] = np.linalg.det(total)
-    means = [
-        values.reshape(-1, len(slopes)) @ problem.points.weights
-        for values in fields.values()
-    ]
-    gathered = domain.gather_cells(np.stack(means, axis=1))
+    if is_elastic:
+        fields |= as_rates(_elastic_fields(folding, names))
+    fields |= _total_fields(folding, names)
+    if not fields:
+        return at_vertices, {}
+    points = folding.problem.points
+    means = []
+    for values in fields.values():
+        by_element = values.reshape(-1, len(points.weights))
+        means.append(by_element @ points.weights)
+    gathered = folding.domain.gather_cells(np.stack(means, axis=1))
     return at_vertices, dict(zip(fields, gathered.T, strict=True))
+
+
+def _elastic_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]:
+    """Return fields of stress and elastic strain at a rank's points."""
+    problem = folding.problem
+    u = folding.solved.displacement
+    fields: dict[str, Floats] = {}
+    if "stress" in names:
+        stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
+        fields["von_mises_pa"] = von_mises(stress)
+        fields["pressure_pa"] = pressure(stress)
+    if "strain" in names:
+        elastic = problem.evaluate("elastic", u).reshape(-1, 3, 3)
+        fields["elastic_strain"] = hencky_equivalent(elastic)
+        fields["elastic_volume_strain"] = np.log(np.linalg.det(elastic))
+    return fields
+
+
+def _total_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]:
+    """Return fields of the deformation since the start of the run, and of the step's
+    volume ratio, at a rank's points."""
+    domain = folding.domain
+    slopes = folding.problem.points.gradients
+    u = folding.solved.displacement
+    start = domain.local(folding.start)
+    after = domain.local(domain.positions) + u
+    fields: dict[str, Floats] = {}
+    if "strain" in names or "volume_ratio" in names:
+        total = deformation_gradients(start, after, domain.cells, slopes)
+        total = total.reshape(-1, 3, 3)
+    if "strain" in names:
+        search = PialSearch(folding.start, folding.zones.cortex_facets)
+        centres = start[domain.corners].mean(axis=1)
+        normals = np.repeat(search.nearest_normals(centres), len(slopes), axis=0)
+        fields["total_strain"] = green_lagrange_maximum(total)
+        fields["area_stretch"] = areal_stretch(total, normals)
+    if "volume_ratio" in names:
+        deformation = folding.problem.evaluate("deformation", u).reshape(-1, 3, 3)
+        fields["volume_ratio_step"] = np.linalg.det(deformation)
+        fields["volume_ratio"] = np.linalg.det(total)
+    return fields
 
 
 def pressure(stress: Floats) -> Floats:
@@ -96,8 +108,11 @@ def pressure(stress: Floats) -> Floats:
 def von_mises(stress: Floats) -> Floats:
     """Return the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the
     stress."""
-    mean = (np.trace(stress, axis1=1, axis2=2) / 3)[:, None, None] * np.eye(3)
-    return np.sqrt(1.5) * np.linalg.norm(stress - mean, axis=(1, 2))
+    mean = np.trace(stress, axis1=1, axis2=2) / 3
+    isotropic = mean[:, None, None] * np.eye(3)
+    deviator = stress - isotropic
+    norm = np.linalg.norm(deviator, axis=(1, 2))
+    return np.sqrt(1.5) * norm
 
 
 def principal_stretches(F: Floats) -> Floats:
@@ -115,7 +130,10 @@ def hencky_equivalent(F: Floats) -> Floats:
     drawn out at constant volume.
     """
     h = np.log(principal_stretches(F))
-    return np.sqrt(2 / 3) * np.linalg.norm(h - h.mean(axis=1, keepdims=True), axis=1)
+    mean = h.mean(axis=1, keepdims=True)
+    deviator = h - mean
+    norm = np.linalg.norm(deviator, axis=1)
+    return np.sqrt(2 / 3) * norm
 
 
 def green_lagrange_maximum(F: Floats) -> Floats:
@@ -127,5 +145,5 @@ def green_lagrange_maximum(F: Floats) -> Floats:
 def areal_stretch(F: Floats, N: Floats) -> Floats:
     """Return the (c,) ratios of areas, after to before, of planes with unit normals N
     (c, 3) before: det F·|F⁻ᵀ·N|."""
-    rows = np.linalg.solve(F.transpose(0, 2, 1), N[:, :, None])[:, :, 0]
-    return np.linalg.det(F) * np.linalg.norm(rows, axis=1)
+    turned = np.linalg.solve(F.transpose(0, 2, 1), N[..., None])
+    return np.linalg.det(F) * np.linalg.norm(turned[..., 0], axis=1)

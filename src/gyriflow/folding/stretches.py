@@ -2,35 +2,35 @@
 six values."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.jacobians import chunks
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Indices, Mask
 
 MIN_SQUARED_STRETCH = 1e-6
 """Squared principal stretches below this count as this: those of flat elements."""
-UPPER = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
+ROWS = np.array([0, 1, 2, 0, 0, 1])
+COLUMNS = np.array([0, 1, 2, 1, 2, 2])
 """Rows and columns of the six values of a symmetric tensor."""
 
 
 def packed(tensors: Floats) -> Floats:
     """Return the (..., 6) values xx, yy, zz, xy, xz, yz of (..., 3, 3) symmetric
     tensors."""
-    return tensors[..., UPPER[0], UPPER[1]]
+    return tensors[..., ROWS, COLUMNS]
 
 
 def unpacked(values: Floats) -> Floats:
     """Return the (..., 3, 3) symmetric tensors of (..., 6) values."""
     tensors = np.empty((*values.shape[:-1], 3, 3))
-    tensors[..., UPPER[0], UPPER[1]] = values
-    tensors[..., UPPER[1], UPPER[0]] = values
+    tensors[..., ROWS, COLUMNS] = values
+    tensors[..., COLUMNS, ROWS] = values
     return tensors
 
 
 def deformation_gradients(
     before: Floats,
     after: Floats,
-    cells: NDArray[np.integer],
+    cells: Indices,
     slopes: Floats,
 ) -> Floats:
     """Return the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of
@@ -43,11 +43,11 @@ def deformation_gradients(
     found = np.empty((len(cells), len(slopes), 3, 3))
     across = slopes.transpose(0, 2, 1)
     for chunk in chunks(len(cells)):
+        nodes = cells[chunk]
         # the transposed maps from the regular element: those after = those before · Fᵀ
-        first, second = (
-            np.matmul(across, x[cells[chunk]][:, None]) for x in (before, after)
-        )
-        found[chunk] = np.linalg.solve(first, second).swapaxes(-1, -2)
+        map_before = np.matmul(across, before[nodes][:, None])
+        map_after = np.matmul(across, after[nodes][:, None])
+        found[chunk] = np.linalg.solve(map_before, map_after).swapaxes(-1, -2)
     return found
 
 
@@ -55,7 +55,7 @@ def inverse_stretch(
     F: Floats,
     power: Floats | float = 1.0,
     limit: float = np.inf,
-) -> tuple[Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Mask]:
     """Return U^−power (..., 3, 3) of F = R·U, with one power for all or one for each,
     and where U is limited.
 

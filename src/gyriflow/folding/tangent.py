@@ -17,33 +17,38 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Ints, Mask
 from .domain import Domain
 from .products import PartMotions, SymmetricProducts
 
 
-def part_arms(positions: Floats, part: NDArray[np.int64]) -> NDArray[np.float32]:
+def part_arms(positions: Floats, part: Ints) -> NDArray[np.float32]:
     """Return (n, 3) positions relative to the centres of their parts (n,), divided by
     the largest component of all."""
-    counts = np.bincount(part)
-    centres = (
-        np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1)
-        / np.maximum(counts, 1)[:, None]
-    )
+    x, y, z = positions.T
+    sums = [
+        np.bincount(part, x),
+        np.bincount(part, y),
+        np.bincount(part, z),
+    ]
+    counts = np.maximum(np.bincount(part), 1)
+    centres = np.stack(sums, axis=1) / counts[:, None]
     arms = positions - centres[part]
-    return np.asarray(arms / np.abs(arms).max(), dtype=np.float32)
+    longest = np.abs(arms).max()
+    return np.asarray(arms / longest, dtype=np.float32)
 
 
 def rigid_motions(arms: NDArray[np.float32]) -> Floats:
     """Return the (n, 3, 6) translations of points and their rotations about centres,
     from (n, 3) arms."""
     motions = np.zeros((len(arms), 3, 6))
-    for i in range(3):
-        j = (i + 1) % 3
-        k = (i + 2) % 3
-        motions[:, i, i] = 1.0
-        motions[:, j, 3 + i] = -arms[:, k]
-        motions[:, k, 3 + i] = arms[:, j]
+    for axis in range(3):
+        second = (axis + 1) % 3
+        third = (axis + 2) % 3
+        rotation = 3 + axis
+        motions[:, axis, axis] = 1.0
+        motions[:, second, rotation] = -arms[:, third]
+        motions[:, third, rotation] = arms[:, second]
     return motions
 
 
@@ -51,28 +56,26 @@ class RigidMotions:
     """Translations and rotations of parts of the mesh, where it is now; `part` (n,) is
     the part of each vertex."""
 
-    def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
-        vertices = domain.vertex_of_node[: domain.n_owned]
-        self._domain, self._parts = domain, int(part.max()) + 1
-        arms, part = part_arms(domain.positions, part)[vertices], part[vertices]
-        self._motions = PartMotions(part, arms)
-        motions = rigid_motions(arms)
-        by_part = [
-            np.where((part == number)[:, None, None], motions, 0.0)
-            for number in range(self._parts)
-        ]
-        self.modes: Floats = np.concatenate(by_part, axis=2).reshape(
-            -1, 6 * self._parts
-        )
-        self._inverse_gram = np.linalg.inv(
-            domain.sum_over_ranks(self.modes.T @ self.modes)
-        )
+    def __init__(self, domain: Domain, part: Ints) -> None:
+        self._domain = domain
+        self._parts = int(part.max()) + 1
+        owned = domain.vertex_of_node[: domain.n_owned]
+        arms = part_arms(domain.positions, part)
+        own_arms = arms[owned]
+        own_part = part[owned]
+        self._motions = PartMotions(own_part, own_arms)
+        # six columns for each part, zero elsewhere
+        node = np.arange(len(owned))
+        modes = np.zeros((len(owned), 3, self._parts, 6))
+        modes[node, :, own_part] = rigid_motions(own_arms)
+        self.modes: Floats = modes.reshape(-1, 6 * self._parts)
+        gram = domain.sum_over_ranks(self.modes.T @ self.modes)
+        self._inverse_gram = np.linalg.inv(gram)
 
     def remove(self, values: Floats) -> None:
         """Remove the rigid motions from the owned components of a vector, in place."""
-        amounts = self._domain.sum_over_ranks(
-            self._motions.restrict(values, self._parts)
-        )
+        own = self._motions.restrict(values, self._parts)
+        amounts = self._domain.sum_over_ranks(own)
         self._motions.add(-self._inverse_gram @ amounts, values)
 
 
@@ -96,33 +99,37 @@ class ElasticMatrix:
         self,
         coupling: dolfinx.fem.Form,
         add: Callable[[Floats, MatrixCSR], None],
-        fixed: NDArray[np.bool_],
+        fixed: Mask,
     ) -> None:
         self._add = add
         self._blocks = dolfinx.fem.create_matrix(coupling, block_mode=BlockMode.compact)
-        row_map, column_map = self._blocks.index_map(0), self._blocks.index_map(1)
-        owned, first = row_map.size_local, row_map.local_range[0]
-        self.row_ends = self._blocks.indptr[: owned + 1]
-        self.nodes = np.repeat(np.arange(owned), np.diff(self.row_ends))
+        row_map = self._blocks.index_map(0)
+        column_map = self._blocks.index_map(1)
+        n_owned = row_map.size_local
+        first_row, _ = row_map.local_range
+        self.row_ends = self._blocks.indptr[: n_owned + 1]
+        self.nodes = np.repeat(np.arange(n_owned), np.diff(self.row_ends))
         local_columns = self._blocks.indices[: len(self.nodes)]
         self.columns = column_map.local_to_global(local_columns)
         # by global nodes, since columns include nodes of other ranks' elements
         self.fixed = np.concatenate(row_map.comm.allgather(fixed))
-        rows = first + self.nodes
-        self._diagonal = np.flatnonzero(rows == self.columns)
-        is_fixed = self.fixed[rows][:, :, None] | self.fixed[self.columns][:, None, :]
+        rows = first_row + self.nodes
+        is_diagonal = rows == self.columns
+        is_ghost = local_columns >= n_owned
+        self._diagonal = np.flatnonzero(is_diagonal)
+        has_fixed_row = self.fixed[rows][:, :, None]
+        has_fixed_column = self.fixed[self.columns][:, None, :]
+        is_fixed = has_fixed_row | has_fixed_column
         self._fixed_entries = np.flatnonzero(is_fixed)
-        self._fixed_diagonal = np.einsum("bii->bi", is_fixed)[self._diagonal]
+        self._fixed_diagonal = _diagonals(is_fixed)[self._diagonal]
         # without the mirror images of blocks within a rank
-        self._stored = np.flatnonzero(
-            (self.columns >= rows) | (local_columns >= owned)
-        ).astype(np.int32)
+        stored = np.flatnonzero((self.columns >= rows) | is_ghost)
+        self._stored = stored.astype(np.int32)
         self.products = SymmetricProducts(
-            column_map, self.nodes[self._stored], local_columns[self._stored]
+            column_map, self.nodes[stored], local_columns[stored]
         )
         # so that these blocks and their transposes add up to the matrix
-        is_half = (rows == self.columns) | (local_columns >= owned)
-        self._half_weights = np.where(is_half, 0.5, 1.0)[self._stored]
+        self._half_weights = np.where(is_diagonal | is_ghost, 0.5, 1.0)[stored]
 
     def assemble(self, u: Floats) -> None:
         """Assemble the tangent at a displacement (k, 3) of the local nodes in m."""
@@ -131,7 +138,7 @@ class ElasticMatrix:
         self._blocks.scatter_reverse()
         values = self.values
         values.reshape(-1)[self._fixed_entries] = 0.0
-        np.einsum("bii->bi", values)[self._diagonal] += self._fixed_diagonal
+        _diagonals(values)[self._diagonal] += self._fixed_diagonal
         self.products.take(values, self._stored)
 
     def half(self) -> sparse.bsr_matrix:
@@ -237,11 +244,9 @@ class Tangent:
     def shift_diagonal(self, part: float) -> None:
         """Shift the diagonal by a fraction of its absolute values in all further
         products; 0 removes the shift."""
-        self._shift = (
-            part * np.abs(np.einsum("nii->ni", self._diagonal())).ravel()
-            if part
-            else None
-        )
+        self._shift = None
+        if part:
+            self._shift = part * np.abs(_diagonals(self._diagonal())).ravel()
 
     def mult(
         self,
@@ -262,16 +267,24 @@ class Tangent:
         """Return the (n_owned, 3, 3) blocks on the diagonal, with the shift."""
         blocks = self._diagonal()
         if self._shift is not None:
-            np.einsum("nii->ni", blocks)[:] += self._shift.reshape(-1, 3)
+            _diagonals(blocks)[:] += self._shift.reshape(-1, 3)
         return blocks
 
     def _diagonal(self) -> Floats:
         blocks = self.elastic.matrix.diagonal
         for part in self.parts:
             start, columns, values = part.getValuesCSR()
-            rows = np.repeat(np.arange(len(start) - 1), np.diff(start))
-            columns = columns - part.getOwnershipRange()[0]
-            on_diagonal = rows // 3 == columns // 3
-            rows, columns = rows[on_diagonal], columns[on_diagonal]
-            np.add.at(blocks, (rows // 3, rows % 3, columns % 3), values[on_diagonal])
+            first_row, _ = part.getOwnershipRange()
+            row = np.repeat(np.arange(len(start) - 1), np.diff(start))
+            node, component = np.divmod(row, 3)
+            other_node, other_component = np.divmod(columns - first_row, 3)
+            is_diagonal = node == other_node
+            entries = node, component, other_component
+            entries = tuple(numbers[is_diagonal] for numbers in entries)
+            np.add.at(blocks, entries, values[is_diagonal])
         return blocks
+
+
+def _diagonals(blocks: NDArray) -> NDArray:
+    """Return the (n, 3) diagonals of (n, 3, 3) blocks: a view, that can be set."""
+    return np.einsum("nii->ni", blocks)

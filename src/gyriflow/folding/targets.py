@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
@@ -21,6 +20,7 @@ from ..geometry.deformations import transform_points
 from ..geometry.diffusion import smooth_integrals, vertex_sizes
 from ..geometry.paths import Path, path_through
 from ..geometry.tetrahedra import has_volume, volumes_between
+from ..geometry.triangles import Mask
 from ..settings.folding import AXES, FoldingParameters
 from ..settings.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
@@ -71,22 +71,23 @@ class TargetGrowth(StepGrowth):
     def inverse(self, tissue: Tissue) -> Floats:
         elements = tissue.elements
         is_valid = has_volume(self.goal_mm[elements.vertices], elements.cells)
-        grows = np.where(is_valid, tissue.at_points(tissue.growing).T, 0.0).T
+        growing = np.where(is_valid[:, None], tissue.at_points(tissue.growing), 0.0)
         inverse, is_limited = inverse_stretch(
-            self.deformation(elements), grows, MAX_LOG_STRETCH
+            self.deformation(elements), growing, MAX_LOG_STRETCH
         )
-        self.held.append(self.total(int((~is_valid | is_limited.any(axis=1)).sum())))
+        is_held = ~is_valid | is_limited.any(axis=1)
+        self.held.append(self.total(int(is_held.sum())))
         return inverse
 
     def deformation(self, elements: Elements) -> Floats:
-        before, after = (
-            x[elements.vertices] for x in (self.start.positions_mm, self.goal_mm)
-        )
         return deformation_gradients(
-            before, after, elements.cells, elements.points.gradients
+            self.start.positions_mm[elements.vertices],
+            self.goal_mm[elements.vertices],
+            elements.cells,
+            elements.points.gradients,
         )
 
-    def guess(self, fixed: NDArray[np.bool_]) -> Floats:
+    def guess(self, fixed: Mask) -> Floats:
         return np.where(fixed, 0.0, (self.goal_mm - self.start.positions_mm) * M_PER_MM)
 
     def row(self, after: Size) -> dict[str, Any]:
@@ -100,7 +101,8 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
 
     InputError if the targets end before the run does.
     """
-    if (last := max(p.targets)) < p.end_week - WEEK_TOL_GW:
+    last = max(p.targets)
+    if last < p.end_week - WEEK_TOL_GW:
         raise InputError(
             "the target shapes of the run end before it does",
             found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
@@ -117,12 +119,14 @@ def shapes_of_run(
 ) -> tuple[list[float], list[Floats]]:
     """Return the ascending weeks and (n, 3) shapes in mm of a run: that at its start,
     and the targets in its maps."""
-    weeks = sorted(week for week in p.targets if week > p.start_week + WEEK_TOL_GW)
-    targets = [
-        np.stack([maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1)
-        for week in weeks
-    ]
-    return [p.start_week, *weeks], [positions_mm, *targets]
+    weeks = [p.start_week]
+    shapes = [positions_mm]
+    for week, name in sorted(p.targets.items()):
+        if week > p.start_week + WEEK_TOL_GW:
+            x, y, z = (maps[f"{name}_{axis}"] for axis in AXES)
+            weeks.append(week)
+            shapes.append(np.stack([x, y, z], axis=1))
+    return weeks, shapes
 
 
 def growth_on_path(
@@ -133,24 +137,27 @@ def growth_on_path(
 ) -> TargetGrowth:
     """Return the growth of a step: that of the path, and of the part of the misfit that
     feedback makes up for."""
-    tets, positions, pieces = inputs.mesh.tets, start.positions_mm, inputs.pieces
-    week, end = (min(start.week(p, part), float(path.weeks[-1])) for part in (0.0, 1.0))
-    sizes = vertex_sizes(positions, pieces)
+    positions = start.positions_mm
+    last_week = float(path.weeks[-1])
+    week = min(start.week(p, 0.0), last_week)
+    end_week = min(start.week(p, 1.0), last_week)
+    sizes = vertex_sizes(positions, inputs.pieces)
     motion = rigid_fit(path(week), positions, sizes)
-    now, later = (transform_points(path(at), motion) for at in (week, end))
-    misfit = now - positions
-    misfit_mm = float(np.sqrt(np.average((misfit**2).sum(axis=1), weights=sizes)))
-    goal = later - misfit
+    misfit = transform_points(path(week), motion) - positions
+    squares = (misfit**2).sum(axis=1)
+    misfit_mm = float(np.sqrt(np.average(squares, weights=sizes)))
+    goal = transform_points(path(end_week), motion) - misfit
     if misfit_mm > FEEDBACK_FROM_MM:
-        back = (1 - np.exp((week - end) / FEEDBACK_GW)) * misfit
+        share = 1 - np.exp((week - end_week) / FEEDBACK_GW)
+        integrals = sizes[:, None] * (share * misfit)
         goal += smooth_integrals(
-            positions, pieces, sizes[:, None] * back, FEEDBACK_SMOOTHING_MM
+            positions, inputs.pieces, integrals, FEEDBACK_SMOOTHING_MM
         )
+    tets = inputs.mesh.tets
     ratios = volumes_between(goal, tets) / volumes_between(positions, tets)
-    shrinking = (ratios > 0) & (
-        ratios < 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S
-    )
-    return TargetGrowth(p, start, goal, misfit_mm, int(shrinking.sum()), inputs.total)
+    least_ratio = 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S
+    n_shrinking = int(((ratios > 0) & (ratios < least_ratio)).sum())
+    return TargetGrowth(p, start, goal, misfit_mm, n_shrinking, inputs.total)
 
 
 def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -158,18 +165,18 @@ def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:
     path."""
     if not rows or "to_path_mm" not in rows[-1]:
         return []
-    last, warnings = rows[-1], []
+    last = rows[-1]
+    warnings = []
     if last["to_path_mm"] > MAX_MISFIT_MM:
-        distance = (
-            f"{last['to_path_mm']:.2f} mm from its target shape (root mean square)"
-        )
+        distance = f"{last['to_path_mm']:.2f} mm from its target shape"
         warnings.append(
-            f"at GW {last['week']:g} the brain is {distance}: contact or stiffness"
-            " prevents the growth"
+            f"at GW {last['week']:g} the brain is {distance} (root mean square):"
+            " contact or stiffness prevents the growth"
         )
-    if held := max(row["held_elements"] for row in rows):
+    n_held = max(row["held_elements"] for row in rows)
+    if n_held:
         warnings.append(
-            f"up to GW {last['week']:g} at most {held} elements in a step grow less"
+            f"up to GW {last['week']:g} at most {n_held} elements in a step grow less"
             " than their path asks for, which would bend or invert them"
         )
     return warnings

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, Indices, Mask
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
 from ..units import M_PER_MM, MM_PER_M
@@ -23,8 +23,8 @@ class Elements:
     All elements have the same integration `points`.
     """
 
-    cells: NDArray[np.integer]
-    vertices: NDArray[np.integer]
+    cells: Indices
+    vertices: Indices
     points: IntegrationPoints
 
 
@@ -67,15 +67,13 @@ class Tissue:
 
         Maps are (n,) at all vertices.
         """
-        points, cells = elements.points, elements.cells
+        points = elements.points
+        cells = elements.cells
         pial = PialSearch(positions, zones.cortex_facets)
         nodes = positions[elements.vertices]
         # the maximum over the whole mesh, so that all ranks search equally far
-        reach = (
-            WEIGHT_REACH
-            * float(np.max(value_at(p.thickness_mm, week, maps)))
-            * M_PER_MM
-        )
+        thickest_mm = float(np.max(value_at(p.thickness_mm, week, maps)))
+        reach = WEIGHT_REACH * thickest_mm * M_PER_MM
         growing = zones.growth[elements.vertices]
         maps = {name: maps[name][elements.vertices] for name in p.varying_maps}
         nearest: NDArray
@@ -85,38 +83,23 @@ class Tissue:
             value_depth = depth
         else:
             depth, nearest = pial.distance_and_normals(nodes, reach)
-            growing = growing[cells] @ points.piecewise_linear.T
-            maps = {
-                name: values[cells] @ points.piecewise_linear.T
-                for name, values in maps.items()
-            }
+            linear = points.piecewise_linear.T
+            growing = growing[cells] @ linear
+            maps = {name: values[cells] @ linear for name, values in maps.items()}
             value_depth = np.maximum(depth[cells] @ points.interpolation.T, 0.0)
-        weight = cortical_weight(
-            value_depth * MM_PER_M, value_at(p.thickness_mm, week, maps)
-        )
+        thickness_mm = value_at(p.thickness_mm, week, maps)
+        weight = cortical_weight(value_depth * MM_PER_M, thickness_mm)
         return cls(elements, nodes, depth, pial, nearest, weight, growing, maps)
-
-    @property
-    def places_mm(self) -> Floats:
-        """The positions (k, 3) or (c, q, 3) in mm that `weight` and the others are
-        at."""
-        nodes_mm = self.nodes * MM_PER_M
-        if self.elements.points.order == 1:
-            return nodes_mm
-        interpolation = self.elements.points.interpolation
-        return np.asarray(interpolation @ nodes_mm[self.elements.cells])
 
     def at_points(self, values: Floats) -> Floats:
         """Return (..., c, q) values at the integration points from values like
         `weight`."""
         points = self.elements.points
-        return (
-            values[..., self.elements.cells] @ points.interpolation.T
-            if points.order == 1
-            else values
-        )
+        if points.order == 2:
+            return values
+        return values[..., self.elements.cells] @ points.interpolation.T
 
-    def normals(self, needed: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
+    def normals(self, needed: Mask) -> tuple[Mask, Floats]:
         """Return the mask (c,) of elements that need a normal at a node or point, and
         their unit normals (e, q, 3).
 
@@ -124,15 +107,15 @@ class Tissue:
         """
         cells = self.elements.cells
         points = self.elements.points
-        if points.order == 1:
-            mask = np.asarray(needed[cells].any(axis=1))
-            nodes = cells[mask]
-            centres = self.nodes[nodes].mean(axis=1)
-            normals = self.pial.normals_from(centres, self.nearest[nodes])
-            return mask, np.repeat(normals[:, None], len(points.weights), axis=1)
-        mask = np.asarray(needed.any(axis=1))
+        if points.order == 2:
+            mask = needed.any(axis=1)
+            at_nodes = self.nearest[cells[mask]]
+            return mask, interpolated_normals(at_nodes, points)
+        mask = needed[cells].any(axis=1)
         nodes = cells[mask]
-        return mask, interpolated_normals(self.nearest[nodes], points)
+        centres = self.nodes[nodes].mean(axis=1)
+        normals = self.pial.normals_from(centres, self.nearest[nodes])
+        return mask, np.repeat(normals[:, None], len(points.weights), axis=1)
 
 
 def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
@@ -143,13 +126,13 @@ def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
     ones: all are turned to the side of the first before they are interpolated. If the
     result nearly vanishes, the nearest node's normal is taken.
     """
-    cosines = np.einsum("cki,ci->ck", normals, normals[:, 0])
+    first = normals[:, 0]
+    # c: element, k: node, i: axis
+    cosines = np.einsum("cki,ci->ck", normals, first)
     signs = np.where(cosines < 0, -1.0, 1.0)
     turned = normals * signs[:, :, None]
     mean = np.matmul(points.interpolation, turned)
     length = np.linalg.norm(mean, axis=2, keepdims=True)
     nearest_node = points.piecewise_linear.argmax(axis=1)
-    nearest = turned[:, nearest_node]
-    has_length = length > 0.1
     unit_mean = mean / np.maximum(length, 0.1)
-    return np.where(has_length, unit_mean, nearest)
+    return np.where(length > 0.1, unit_mean, turned[:, nearest_node])

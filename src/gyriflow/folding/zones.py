@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
-from ..geometry.triangles import Floats, TriangleMesh, face_areas, face_normals
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    Mask,
+    TriangleMesh,
+    face_areas,
+    face_normals,
+)
 from ..settings import terms
 from ..settings.folding import FoldingParameters
 from ..settings.terms import Side
@@ -59,15 +66,15 @@ class Zones:
         there are such motions.
     """
 
-    facets: NDArray[np.int64]
-    facet_zone: NDArray[np.int64]
+    facets: Ints
+    facet_zone: Ints
     growth: Floats
     fissure_x_mm: float
     planes_mm: tuple[float, float]
     free: bool = False
-    anchors: tuple[NDArray[np.int64], NDArray[np.bool_]] | None = None
+    anchors: tuple[Ints, Mask] | None = None
 
-    def vertices_of(self, *zones: int) -> NDArray[np.int64]:
+    def vertices_of(self, *zones: int) -> Ints:
         """Return the vertices of the facets of some zones, each once."""
         return np.unique(self.facets[np.isin(self.facet_zone, zones)])
 
@@ -82,19 +89,19 @@ class Zones:
         return float(beyond.max(initial=0.0))
 
     @property
-    def cortex_facets(self) -> NDArray[np.int64]:
+    def cortex_facets(self) -> Ints:
         """The (c, 3) facets with cortex under them: all but flat cuts and the medial
         wall of a single hemisphere."""
         return self.facets[~np.isin(self.facet_zone, terms.FLAT_CUTS)]
 
     @property
-    def measured_facets(self) -> NDArray[np.int64]:
+    def measured_facets(self) -> Ints:
         """The (k, 3) facets whose area is measured: with the medial wall, without the
         cuts of synthetic shapes."""
         return self.facets[~np.isin(self.facet_zone, terms.SHAPE_CUTS)]
 
     @property
-    def fixed(self) -> NDArray[np.bool_]:
+    def fixed(self) -> Mask:
         """The mask (n, 3) of the displacement components that are fixed at zero."""
         fixed = np.zeros((len(self.growth), 3), dtype=bool)
         fixed[self.vertices_of(terms.CLAMPED, terms.BASE)] = True
@@ -114,7 +121,8 @@ def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floa
     The single hemisphere `side` is completed by its mirror image at its innermost
     point.
     """
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low = vertices.min(axis=0)
+    high = vertices.max(axis=0)
     width = high[0] - low[0]
     if side == "left":
         high[0] += width
@@ -125,37 +133,41 @@ def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floa
 
 def _medial_wall_facets(
     mesh: TetrahedralMesh,
-    facets: NDArray[np.int64],
+    facets: Ints,
     side: Side,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Return the mask (f,) of the facets of a single hemisphere that face the missing
     one, near its innermost point."""
-    x = mesh.vertices[:, 0] if side == "left" else -mesh.vertices[:, 0]
-    facing = face_normals(TriangleMesh(mesh.vertices, facets))[:, 0] * (
-        1.0 if side == "left" else -1.0
-    )
-    near = (x[facets] > x.max() - MAX_WALL_MM).all(axis=1)
-    return on_whole_faces(near & (facing > MIN_WALL_COSINE), mesh.order)
+    inwards = 1.0 if side == "left" else -1.0
+    x = inwards * mesh.vertices[:, 0]
+    normals = face_normals(TriangleMesh(mesh.vertices, facets))
+    is_facing = inwards * normals[:, 0] > MIN_WALL_COSINE
+    is_near = (x[facets] > x.max() - MAX_WALL_MM).all(axis=1)
+    return on_whole_faces(is_near & is_facing, mesh.order)
 
 
-def _wall_anchors(
-    vertices: Floats, wall: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _wall_anchors(vertices: Floats, wall: Ints) -> tuple[Ints, Mask]:
+    """Return the `anchors` of a hemisphere: the vertex in the middle of its wall and
+    the farthest from there along y."""
     yz = vertices[wall][:, 1:]
-    from_centre = yz - yz.mean(axis=0)
-    central = (from_centre**2).sum(axis=1).argmin()
-    along_y = np.abs(yz[:, 0] - yz[central, 0])
+    offsets = yz - yz.mean(axis=0)
+    squares = (offsets**2).sum(axis=1)
+    central = squares.argmin()
+    y = yz[:, 0]
+    along_y = np.abs(y - y[central])
     farthest = along_y.argmax()
     # against translations along y and z, and the rotation about x
-    fixed = np.array([[False, True, True], [False, False, True]])
-    return wall[[central, farthest]], fixed
+    fixed_at_centre = [False, True, True]
+    fixed_farthest = [False, False, True]
+    anchors = wall[[central, farthest]]
+    return anchors, np.array([fixed_at_centre, fixed_farthest])
 
 
 def inside_ellipsoid(
     vertices: NDArray,
     low: Floats,
     high: Floats,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,)
     are the ends of the brain."""
     extent = high - low
@@ -182,46 +194,47 @@ def zones_of_run(
     hemisphere has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
     p = parameters
-    fissure_x_mm, support, side = p.fissure_x_mm, p.support, p.side
+    fissure_x_mm = p.fissure_x_mm
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
-    distance = bridge = gap_mm / 4
+    bridge = gap_mm / 4
+    distance = bridge
     if p.contact == "planes":
         distance = min(distance, _planes_distance(mesh.vertices, facets, fissure_x_mm))
-    left_plane, right_plane = fissure_x_mm - distance, fissure_x_mm + distance
-    if side is not None:
-        left_plane = right_plane = float(x.max() if side == "left" else x.min())
-    low, high = brain_box(mesh.vertices, side)
+    left_plane = fissure_x_mm - distance
+    right_plane = fissure_x_mm + distance
+    if p.side is not None:
+        left_plane = right_plane = float(x.max() if p.side == "left" else x.min())
+    low, high = brain_box(mesh.vertices, p.side)
     reach = (high - low)[0] / 8
     facet_x = x[facets]
-    static = inside_ellipsoid(mesh.vertices, low, high)
-
-    def all_of_face(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the mask (f,) of facets on elements' faces with a mask that is True at
-        all vertices (f, 3)."""
-        return on_whole_faces(np.asarray(mask.all(axis=1)), mesh.order)
-
+    is_static = inside_ellipsoid(mesh.vertices, low, high)
     zone = np.full(len(facets), terms.FREE)
-    if support == "ellipsoid":
-        zone[all_of_face(static[facets])] = terms.CLAMPED
+
+    def set_zone(number: int, is_inside: Mask) -> None:
+        """Set the zone of elements' faces that are inside with all vertices (f, 3)."""
+        zone[on_whole_faces(is_inside.all(axis=1), mesh.order)] = number
+
+    if p.support == "ellipsoid":
+        set_zone(terms.CLAMPED, is_static[facets])
     if p.contact != "none":
-        between = (facet_x > left_plane) & (facet_x < right_plane)
-        left = (facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)
-        right = (facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)
-        zone[all_of_face(between)] = terms.BETWEEN_PLANES
-        zone[all_of_face(left)] = terms.LEFT_CONTACT
-        zone[all_of_face(right)] = terms.RIGHT_CONTACT
+        is_left = (facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)
+        is_right = (facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)
+        is_between = (facet_x > left_plane) & (facet_x < right_plane)
+        set_zone(terms.BETWEEN_PLANES, is_between)
+        set_zone(terms.LEFT_CONTACT, is_left)
+        set_zone(terms.RIGHT_CONTACT, is_right)
     anchors = None
-    if side is not None:
-        zone[_medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL
+    if p.side is not None:
+        zone[_medial_wall_facets(mesh, facets, p.side)] = terms.MEDIAL_WALL
         wall = np.unique(facets[zone == terms.MEDIAL_WALL])
-        if support == "free" and len(wall):
+        if p.support == "free" and len(wall):
             anchors = _wall_anchors(mesh.vertices, wall)
 
     growth = np.ones(len(mesh.vertices))
     if p.no_growth != "none":
-        growth[static] = 0.0
-        if side is None:
+        growth[is_static] = 0.0
+        if p.side is None:
             in_bridge = _bridge_vertices(
                 mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
             )
@@ -229,40 +242,48 @@ def zones_of_run(
             if p.contact == "planes":
                 medial = _medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
                 growth[medial] = 0.0
-    free = support == "free" and side is None
     return Zones(
-        facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, anchors
+        facets,
+        zone,
+        growth,
+        fissure_x_mm,
+        (left_plane, right_plane),
+        free=p.support == "free" and p.side is None,
+        anchors=anchors,
     )
 
 
 def _planes_distance(
     vertices: Floats,
-    facets: NDArray[np.int64],
+    facets: Ints,
     fissure_x_mm: float,
 ) -> float:
     """Return the distance in mm from the middle of the fissure that has
     `MAX_BETWEEN_PLANES` of the area within."""
-    farthest = np.abs(vertices[facets, 0] - fissure_x_mm).max(axis=1)
-    nearest_first = np.argsort(farthest)
-    within = np.cumsum(face_areas(TriangleMesh(vertices, facets))[nearest_first])
-    last = np.searchsorted(within, MAX_BETWEEN_PLANES * within[-1])
-    return float(farthest[nearest_first][last])
+    distances = np.abs(vertices[facets, 0] - fissure_x_mm).max(axis=1)
+    nearest_first = np.argsort(distances)
+    areas = face_areas(TriangleMesh(vertices, facets))
+    area_within = np.cumsum(areas[nearest_first])
+    last = np.searchsorted(area_within, MAX_BETWEEN_PLANES * area_within[-1])
+    return float(distances[nearest_first[last]])
 
 
 def _bridge_vertices(
     mesh: TetrahedralMesh,
-    facets: NDArray[np.int64],
+    facets: Ints,
     left_plane: float,
     right_plane: float,
-) -> NDArray[np.int64]:
+) -> Ints:
     """Return the vertices of the elements whose deepest vertex lies between the planes,
     each once."""
     x = mesh.vertices[:, 0]
-    depth = PialSearch(mesh.vertices, facets).distance(mesh.vertices)[mesh.tets]
+    is_between = (x > left_plane) & (x < right_plane)
+    depths = PialSearch(mesh.vertices, facets).distance(mesh.vertices)
+    depth = depths[mesh.tets]
     # of several equally deep vertices, all must lie between the planes
-    deepest = depth >= depth.max(axis=1, keepdims=True) - 1e-9
-    between = ((x > left_plane) & (x < right_plane))[mesh.tets]
-    return np.unique(mesh.tets[(between | ~deepest).all(axis=1)])
+    is_deepest = depth >= depth.max(axis=1, keepdims=True) - 1e-9
+    is_in_bridge = (is_between[mesh.tets] | ~is_deepest).all(axis=1)
+    return np.unique(mesh.tets[is_in_bridge])
 
 
 def _medial_vertices(
@@ -270,7 +291,7 @@ def _medial_vertices(
     fissure_x_mm: float,
     left_plane: float,
     right_plane: float,
-) -> NDArray[np.int64]:
+) -> Ints:
     """Return the vertices, each once, of the elements whose most medial vertex lies
     between the planes.
 
@@ -297,16 +318,14 @@ def model_fields(
     growth in a step) and the normals (n, 3) of the pial surface at the nearest points.
     """
     pial = PialSearch(positions, zones.cortex_facets)
-    weight = cortical_weight(
-        pial.distance(positions), value_at(p.thickness_mm, week, {})
-    )
-    increment = (
-        value_at(p.growth_rate_per_s, week, {}) * p.step_s * weight * zones.growth
-    )
-    fields = {"weight": weight, "growing": zones.growth, "increment": increment}
+    thickness = value_at(p.thickness_mm, week, {})
+    weight = cortical_weight(pial.distance(positions), thickness)
+    rate = value_at(p.growth_rate_per_s, week, {})
     return {
         "positions": positions,
-        **fields,
+        "weight": weight,
+        "growing": zones.growth,
+        "increment": rate * p.step_s * weight * zones.growth,
         "normals": pial.nearest_normals(positions),
     }
 
@@ -324,23 +343,21 @@ def cell_tags(
     CORE.
     """
     x = mesh.vertices[mesh.corners, 0].mean(axis=1)
-    left, right = zones.planes_mm
+    left_plane, right_plane = zones.planes_mm
+    hemisphere = np.full(len(x), terms.BRIDGE, dtype=np.int32)
+    hemisphere[x >= right_plane] = terms.RIGHT
+    hemisphere[x <= left_plane] = terms.LEFT
+    is_growing = zones.growth[mesh.tets].max(axis=1) > 0
+    is_cortex = weight[mesh.tets].mean(axis=1) > 0.5
+    layer = np.where(is_cortex, terms.CORTEX, terms.CORE)
     return {
-        "hemisphere": (
-            np.select(
-                [x <= left, x >= right], [terms.LEFT, terms.RIGHT], terms.BRIDGE
-            ).astype(np.int32)
-        ),
-        "growing": (zones.growth[mesh.tets].max(axis=1) > 0).astype(np.int32),
-        "layer": (
-            np.where(
-                weight[mesh.tets].mean(axis=1) > 0.5, terms.CORTEX, terms.CORE
-            ).astype(np.int32)
-        ),
+        "hemisphere": hemisphere,
+        "growing": is_growing.astype(np.int32),
+        "layer": layer.astype(np.int32),
     }
 
 
-def facet_tags(zones: Zones, on_left: NDArray[np.bool_]) -> Tags:
+def facet_tags(zones: Zones, on_left: Mask) -> Tags:
     """Return the (f,) tags of `zones.facets`: `zone`, and `hemisphere`, LEFT for the
     mask `on_left`, else RIGHT.
 

@@ -20,9 +20,16 @@ IDENTITY: Floats = np.eye(3)
 MIRROR: Floats = np.diag([-1.0, 1.0, 1.0, 1.0])
 """The (4, 4) reflection that exchanges left and right in RAS coordinates."""
 
-Planes = tuple[Floats, Floats, Floats, Floats | None]
-"""Points, unit normals of their target planes, signed distances to these along the
-normals, and weights."""
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """Points (n, 3), the unit `normals` of their target planes, the signed `distances`
+    to these along the normals, and weights."""
+
+    points: Floats
+    normals: Floats
+    distances: Floats
+    weights: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,24 +94,20 @@ def without_rigid_motion(
     return second @ back[:3, :3].T + back[:3, 3] - first
 
 
-def step_towards_planes(
-    points: Floats,
-    normals: Floats,
-    distances: Floats,
-    weights: Floats | None = None,
-) -> tuple[Floats, Floats]:
-    """Return the rotation and shift that minimise the squared distances of (n, 3)
-    points from planes.
+def step_towards_planes(planes: Planes) -> tuple[Floats, Floats]:
+    """Return the rotation and shift that minimise the squared distances of points from
+    planes.
 
-    One step of Chen and Medioni 1992. The planes have unit `normals` and lie at signed
-    `distances` (n,) along these. Undetermined directions, such as the rotations of a
-    sphere, are not changed.
+    One step of Chen and Medioni 1992. Undetermined directions, such as the rotations of
+    a sphere, are not changed.
     """
+    points = planes.points
+    distances = planes.distances
     centre = points.mean(axis=0)
-    turns = np.cross(points - centre, normals)
-    rows = np.hstack([turns, normals])
-    if weights is not None:
-        roots = np.sqrt(weights)
+    turns = np.cross(points - centre, planes.normals)
+    rows = np.hstack([turns, planes.normals])
+    if planes.weights is not None:
+        roots = np.sqrt(planes.weights)
         rows = rows * roots[:, None]
         distances = distances * roots
     solution, *_ = np.linalg.lstsq(rows, distances, rcond=1e-6)
@@ -116,24 +119,24 @@ def step_towards_planes(
 def follow_planes(
     rotation: Floats,
     shift: Floats,
-    planes: Callable[[Floats, Floats], Planes],
+    find_planes: Callable[[Floats, Floats], Planes],
     rounds: int,
     is_converged: Callable[[Floats, Floats, Floats], bool],
 ) -> tuple[Floats, Floats]:
     """Return the rotation and shift after at most `rounds` steps of iterative closest
     points.
 
-    `planes` gives the moved points and their planes; `is_converged` gets a step's
-    points, rotation and shift.
+    `find_planes` gives the planes for a rotation and shift; `is_converged` gets a
+    step's points, rotation and shift.
     """
     for _ in range(rounds):
-        points, normals, distances, weights = planes(rotation, shift)
-        turn, move = step_towards_planes(points, normals, distances, weights)
+        planes = find_planes(rotation, shift)
+        turn, move = step_towards_planes(planes)
         # as (4, 4) matrices, since round-off decides between two equally close faces
         whole = motion(turn, move) @ motion(rotation, shift)
         rotation = whole[:3, :3]
         shift = whole[:3, 3]
-        if is_converged(points, turn, move):
+        if is_converged(planes.points, turn, move):
             break
     return rotation, shift
 
@@ -142,11 +145,13 @@ def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floa
     """Return a function that finds the nearest points of a surface, and the normals
     there."""
     normals = face_normals(mesh)
+    vertices = mesh.vertices
+    faces = mesh.faces
     tree = igl.AABB()
-    tree.init(mesh.vertices, mesh.faces)
+    tree.init(vertices, faces)
 
     def nearest(points: Floats) -> tuple[Floats, Floats]:
-        _, face, places = tree.squared_distance(mesh.vertices, mesh.faces, points)
+        _, face, places = tree.squared_distance(vertices, faces, points)
         return places, normals[face]
 
     return nearest
@@ -166,17 +171,20 @@ def _fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
     points_a = _some_points(mesh)
     points_b = _some_points(onto)
 
-    def planes(rotation: Floats, shift: Floats) -> Planes:
-        moved = points_a @ rotation.T + shift
-        on_b, normals_b = nearest_of_b(moved)
+    def find_planes(rotation: Floats, shift: Floats) -> Planes:
+        moved_a = points_a @ rotation.T + shift
+        on_b, normals_b = nearest_of_b(moved_a)
         # points of b are moved back to the original place of a
-        on_a, normals_a = nearest_of_a((points_b - shift) @ rotation)
-        points = np.concatenate([moved, on_a @ rotation.T + shift])
+        back = (points_b - shift) @ rotation
+        on_a, normals_a = nearest_of_a(back)
+        moved_on_a = on_a @ rotation.T + shift
+        turned_normals = normals_a @ rotation.T
+        points = np.concatenate([moved_a, moved_on_a])
         targets = np.concatenate([on_b, points_b])
-        normals = np.concatenate([normals_b, normals_a @ rotation.T])
+        normals = np.concatenate([normals_b, turned_normals])
         distances = dots(targets - points, normals)
         residuals.append(float(np.linalg.norm(distances)))
-        return points, normals, distances, None
+        return Planes(points, normals, distances)
 
     def is_converged(
         points: Floats,
@@ -189,11 +197,17 @@ def _fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
             return True
         start = points[: len(points_a)]
         moves = start @ turn.T + move - start
-        return bool(np.linalg.norm(moves, axis=1).max() < MOVE_TOL_MM)
+        lengths = np.linalg.norm(moves, axis=1)
+        return bool(lengths.max() < MOVE_TOL_MM)
 
-    shift = points_b.mean(axis=0) - points_a.mean(axis=0)
-    found = follow_planes(np.eye(3), shift, planes, MAX_ROUNDS, is_converged)
-    return motion(*found)
+    rotation, shift = follow_planes(
+        np.eye(3),
+        points_b.mean(axis=0) - points_a.mean(axis=0),
+        find_planes,
+        MAX_ROUNDS,
+        is_converged,
+    )
+    return motion(rotation, shift)
 
 
 def align(mesh: TriangleMesh, onto: TriangleMesh) -> TriangleMesh:

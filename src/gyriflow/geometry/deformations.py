@@ -102,9 +102,9 @@ def volume_changes(deformation: Deformation) -> Floats:
     differences); ≤ 0 where it folds."""
     displacement = deformation.displacement.astype(np.float64)
     slopes = np.gradient(displacement, axis=(0, 1, 2))
-    gradient = np.stack(list(slopes), axis=-1)
+    by_index = np.stack(list(slopes), axis=-1)
     voxel = deformation.affine[:3, :3]
-    gradient = gradient @ np.linalg.inv(voxel)
-    of_displacement = np.linalg.det(np.eye(3) + gradient)
-    of_affine = np.linalg.det(deformation.matrix[:3, :3])
-    return of_displacement * of_affine
+    by_position = by_index @ np.linalg.inv(voxel)
+    of_displacement = np.linalg.det(np.eye(3) + by_position)
+    linear = deformation.matrix[:3, :3]
+    return of_displacement * np.linalg.det(linear)

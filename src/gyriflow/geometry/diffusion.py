@@ -22,29 +22,19 @@ MAX_ITERATIONS = 10_000
 def cell_sizes(vertices: Floats, cells: Indices) -> Floats:
     """Return the (m,) areas in mm² of (m, 3) triangles, or signed volumes in mm³ of (m,
     4) tetrahedra."""
-    if cells.shape[1] == 3:
-        return face_areas(TriangleMesh(vertices, cells.astype(np.int64)))
-    return volumes_between(vertices, cells)
+    if cells.shape[1] == 4:
+        return volumes_between(vertices, cells)
+    faces = cells.astype(np.int64)
+    return face_areas(TriangleMesh(vertices, faces))
 
 
 def vertex_sizes(vertices: Floats, cells: Indices) -> Floats:
     """Return the (n,) areas or volumes of the vertices: equal parts of the cells around
     them."""
-    sizes = cell_sizes(vertices, cells)
-    return _parts_at_vertices(sizes, cells, len(vertices))
-
-
-def _parts_at_vertices(
-    values: Floats,
-    cells: Indices,
-    count: int,
-) -> Floats:
-    """Return the (n,) sums of equal parts of the (m,) values of the cells around each
-    of `count` vertices."""
-    corners = cells.shape[1]
-    parts = np.repeat(values / corners, corners)
-    sums = np.bincount(cells.ravel(), parts, count)
-    return sums.astype(np.float64)
+    n_corners = cells.shape[1]
+    shares = cell_sizes(vertices, cells) / n_corners
+    parts = np.repeat(shares, n_corners)
+    return np.bincount(cells.ravel(), parts, len(vertices))
 
 
 def diffuse(

@@ -55,7 +55,8 @@ def _bernstein(places: Floats) -> Floats:
     """Return the (p, 20) Bernstein polynomials of third degree at (p, 4) barycentric
     coordinates."""
     factorials = np.array([1, 1, 2, 6])
-    factors = 6 / factorials[POWERS].prod(axis=1)
+    divisors = factorials[POWERS].prod(axis=1)
+    factors = 6 / divisors
     powers = places[:, None, :] ** POWERS
     return powers.prod(axis=2) * factors
 
@@ -128,12 +129,16 @@ def _bounds(values: Floats, depth: int) -> Floats:
     """Return the (k,) lower bounds from (k, 20) coefficients, with up to `depth`
     subdivisions."""
     bounds = values.min(axis=1)
-    least_at_corners = values[:, AT_CORNERS].min(axis=1)
-    undecided = (bounds <= 0) & (least_at_corners > 0)
+    at_corners = values[:, AT_CORNERS]
+    # a corner is a place of the element: with a value ≤ 0 there the bound is right
+    undecided = (bounds <= 0) & (at_corners.min(axis=1) > 0)
     if depth > 0 and undecided.any():
-        parts = np.einsum("sij,kj->ksi", ON_PARTS, values[undecided])
-        of_parts = _bounds(parts.reshape(-1, len(POWERS)), depth - 1)
-        bounds[undecided] = of_parts.reshape(-1, len(PARTS)).min(axis=1)
+        # s: part, i: coefficient on the part, j: on the whole element, k: element
+        on_parts = np.einsum("sij,kj->ksi", ON_PARTS, values[undecided])
+        all_parts = on_parts.reshape(-1, len(POWERS))
+        part_bounds = _bounds(all_parts, depth - 1)
+        part_bounds = part_bounds.reshape(-1, len(PARTS))
+        bounds[undecided] = part_bounds.min(axis=1)
     return bounds
 
 

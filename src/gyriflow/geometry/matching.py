@@ -187,21 +187,24 @@ def _crossings(mesh: TriangleMesh, shape: tuple[int, ...]) -> tuple[Ints, Floats
 def _lines_near_faces(corners: Floats, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
     """Return the (n, 2) lines of voxels that may cross the (m, 3, 2) corners of faces,
     and the (n,) face of each."""
-    last = np.array(shape[:2]) - 1
     low = np.ceil(corners.min(axis=1))
-    low = np.maximum(low, 0).astype(np.int64)
+    low = np.maximum(low, 0)
     high = np.floor(corners.max(axis=1))
-    high = np.minimum(high, last).astype(np.int64)
+    last = np.array(shape[:2]) - 1
+    high = np.minimum(high, last)
     sizes = np.maximum(high - low + 1, 0)
+    sizes = sizes.astype(np.int64)
     counts = sizes.prod(axis=1)
     faces = np.arange(len(corners))
     face = np.repeat(faces, counts)
-    first = np.cumsum(counts) - counts
     # the lines of a face are numbered by rows
-    number = np.arange(len(face)) - first[face]
-    widths = sizes[face, 1]
-    offset = np.stack(np.divmod(number, widths), axis=1)
-    return low[face] + offset, face
+    ends = np.cumsum(counts)
+    starts = ends - counts
+    number = np.arange(len(face)) - starts[face]
+    widths = sizes[:, 1]
+    offset = np.divmod(number, widths[face])
+    first = low.astype(np.int64)
+    return first[face] + np.stack(offset, axis=1), face
 
 
 def faces_that_cross(mesh: TriangleMesh) -> Ints:

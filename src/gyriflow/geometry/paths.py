@@ -168,11 +168,13 @@ def limited_velocities(weeks: Floats, places: Floats) -> Floats:
     ends, limited in length.
     """
     velocities = np.gradient(places, weeks, axis=0)
-    distance = np.linalg.norm(np.diff(places, axis=0), axis=2)
-    speed = distance / np.diff(weeks)[:, None]
-    limit = MAX_VELOCITY_RATIO * np.minimum(speed[:-1], speed[1:])
+    steps = np.diff(places, axis=0)
+    durations = np.diff(weeks)
+    speeds = np.linalg.norm(steps, axis=2) / durations[:, None]
+    slower = np.minimum(speeds[:-1], speeds[1:])
+    limits = MAX_VELOCITY_RATIO * slower
     inner = velocities[1:-1]
-    length = np.linalg.norm(inner, axis=2)
-    factor = np.minimum(1.0, limit / np.maximum(length, 1e-12))
-    inner *= factor[..., None]
+    lengths = np.linalg.norm(inner, axis=2)
+    factors = np.minimum(1.0, limits / np.maximum(lengths, 1e-12))
+    inner *= factors[..., None]
     return velocities

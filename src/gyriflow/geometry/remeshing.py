@@ -3,9 +3,8 @@ MeshLab's filters."""
 
 import numpy as np
 import pymeshlab
-from numpy.typing import NDArray
 
-from .triangles import TriangleMesh
+from .triangles import Mask, TriangleMesh
 
 REMESHING_ROUNDS = 5
 UNTANGLING_ROUNDS = 10
@@ -13,7 +12,7 @@ UNTANGLING_ROUNDS = 10
 SHARP_DEG = 30.0
 
 
-def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
+def self_intersecting_faces(mesh: TriangleMesh) -> Mask:
     """Return the (m,) mask of faces that cut others; unlike in `faces_that_cross`,
     contacts do not count."""
     document = in_meshlab(mesh)

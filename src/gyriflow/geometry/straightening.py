@@ -43,11 +43,11 @@ def straighten_sides(positions: Floats, tets: Indices) -> Floats:
 def may_fold_over(positions: Floats, tets: Indices) -> Mask:
     """Return (m,) whether (m, 10) elements may fold over, or a linear piece between
     their nodes is inverted."""
-    pieces = tets[:, PIECES]
-    volumes = volumes_between(positions, pieces.reshape(-1, 4))
-    volumes = volumes.reshape(len(tets), -1)
-    bounds = lower_bounds(positions, tets)
-    return (volumes.min(axis=1) <= 0) | (bounds <= 0)
+    pieces = tets[:, PIECES].reshape(-1, 4)
+    volumes = volumes_between(positions, pieces)
+    by_element = volumes.reshape(len(tets), -1)
+    has_inverted_piece = by_element.min(axis=1) <= 0
+    return has_inverted_piece | (lower_bounds(positions, tets) <= 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,16 +65,17 @@ class InnerSides:
     @classmethod
     def of(cls, mesh: TetrahedralMesh) -> "InnerSides":
         """Return the inner sides of a mesh of quadratic elements."""
+        middles = mesh.tets[:, 4:]
         ends = np.full((len(mesh.vertices), 2), -1)
-        ends[mesh.tets[:, 4:]] = mesh.tets[:, EDGES]
+        ends[middles] = mesh.tets[:, EDGES]
         on_surface, _ = boundary_faces(mesh)
         ends[on_surface] = -1
-        elements = np.repeat(np.arange(len(mesh.tets)), mesh.tets.shape[1])
-        places = mesh.tets.ravel(), elements
-        is_around = np.ones(len(elements), dtype=bool)
+        n_elements, n_nodes = mesh.tets.shape
+        element = np.repeat(np.arange(n_elements), n_nodes)
+        is_around = np.ones(len(element), dtype=bool)
         around = sparse.coo_array(
-            (is_around, places),
-            shape=(len(mesh.vertices), len(mesh.tets)),
+            (is_around, (mesh.tets.ravel(), element)),
+            shape=(len(mesh.vertices), n_elements),
         )
         return cls(mesh.tets, ends, around.tocsr())
 
@@ -120,6 +121,8 @@ def straightness(positions: Floats, tets: Indices) -> Floats:
 
     It is the lower bound of the Jacobian determinant in an element over the mean.
     """
-    means = 6 * np.abs(volumes_between(positions, tets))
+    volumes = volumes_between(positions, tets)
+    means = 6 * np.abs(volumes)
+    tiny = np.finfo(float).tiny
     bounds = lower_bounds(positions, tets)
-    return bounds / np.maximum(means, np.finfo(float).tiny)
+    return bounds / np.maximum(means, tiny)

@@ -86,13 +86,16 @@ def _lattice_triangles() -> Ints:
     """Return the (16, 3) triangles of the lattice, all with the same orientation."""
     number = {place: vertex for vertex, place in enumerate(PLACES)}
     triangles = []
-    for i, j, k in PLACES:
+    for place in PLACES:
+        i, j, k = place
         along = (i + 1, j, k - 1)
         across = (i, j + 1, k - 1)
         back = (i - 1, j + 1, k)
-        for triangle in ([(i, j, k), along, across], [(i, j, k), across, back]):
-            if number.keys() >= set(triangle):
-                triangles.append([number[place] for place in triangle])
+        for triangle in ([place, along, across], [place, across, back]):
+            vertices = [number.get(corner) for corner in triangle]
+            # not beyond the face
+            if None not in vertices:
+                triangles.append(vertices)
     return np.array(triangles)
 
 
@@ -114,8 +117,8 @@ class TetrahedralMesh:
     def __post_init__(self) -> None:
         vertices = frozen(self.vertices, np.float64, 3)
         is_quadratic = np.shape(self.tets)[1:] == (NODES_OF_ORDER[2],)
-        width = NODES_OF_ORDER[2 if is_quadratic else 1]
-        tets = frozen(self.tets, np.int64, width)
+        order = 2 if is_quadratic else 1
+        tets = frozen(self.tets, np.int64, NODES_OF_ORDER[order])
         require_indices(tets, len(vertices), "tetrahedron")
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "tets", tets)
@@ -159,6 +162,7 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
     """Return the (m,) ratios 3 × inscribed / circumscribed radius of the corners: 1
     regular, 0 flat."""
     ratios = np.empty(len(mesh.tets))
+    tiny = np.finfo(float).tiny
     for chunk in chunks(len(ratios)):
         a, b, c, d = mesh.vertices[mesh.corners[chunk].T]
         p = b - a
@@ -176,9 +180,10 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
             surface2 += np.linalg.norm(normal, axis=1)
         centre = np.zeros_like(p)
         for edge, normal in ((p, qr), (q, rp), (r, pq)):
-            centre += dots(edge, edge)[:, None] * normal
+            squared_length = dots(edge, edge)
+            centre += squared_length[:, None] * normal
         product = surface2 * np.linalg.norm(centre, axis=1)
-        ratios[chunk] = 6 * volume6**2 / np.maximum(product, np.finfo(float).tiny)
+        ratios[chunk] = 6 * volume6**2 / np.maximum(product, tiny)
     return ratios
 
 
@@ -217,14 +222,15 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
     count = len(mesh.vertices)
     pairs = np.sort(mesh.tets[:, EDGES], axis=2)
     # one number per edge: much faster than comparing rows
-    numbers = pairs @ [count, 1]
-    edges, place = np.unique(numbers, return_inverse=True)
-    ends = np.stack(np.divmod(edges, count), axis=1)
+    edges, place = np.unique(pairs @ [count, 1], return_inverse=True)
+    first, second = np.divmod(edges, count)
+    ends = np.stack([first, second], axis=1)
     middles = mesh.vertices[ends].mean(axis=1)
-    vertices = np.concatenate([mesh.vertices, middles])
     nodes = count + place.reshape(-1, len(EDGES))
-    tets = np.hstack([mesh.tets, nodes])
-    return TetrahedralMesh(vertices, tets)
+    return TetrahedralMesh(
+        np.concatenate([mesh.vertices, middles]),
+        np.hstack([mesh.tets, nodes]),
+    )
 
 
 def linear_pieces(mesh: TetrahedralMesh) -> Ints:
@@ -302,21 +308,23 @@ def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     on_lattice = on_lattice[:, [0, 1, 2, 4, 5, 6]]
     weights = np.tile(on_lattice, (len(corners), 1))
     nodes[weights == 0] = -1
-    count = int(triangles.max()) + 1
     is_new = ~(weights == 1).any(axis=1)
     new_nodes = nodes[is_new]
     new_weights = weights[is_new]
     first, place = _distinct_points(new_nodes, new_weights)
+    n_nodes = int(triangles.max()) + 1
     # at a node there is no other
     number = nodes.max(axis=1)
-    number[is_new] = count + place
+    number[is_new] = n_nodes + place
     columns = np.maximum(new_nodes[first], 0)
-    rows = np.repeat(np.arange(len(first)), columns.shape[1])
+    n_new, n_around = columns.shape
+    rows = np.repeat(np.arange(n_new), n_around)
+    values = new_weights[first].ravel()
     new = sparse.coo_array(
-        (new_weights[first].ravel(), (rows, columns.ravel())),
-        shape=(len(first), count),
+        (values, (rows, columns.ravel())),
+        shape=(n_new, n_nodes),
     )
-    matrix = sparse.vstack([sparse.eye_array(count), new])
+    matrix = sparse.vstack([sparse.eye_array(n_nodes), new])
     by_face = number.reshape(-1, len(LATTICE))
     faces = by_face[:, LATTICE_TRIANGLES].reshape(-1, 3)
     return sparse.csr_array(matrix), faces

@@ -98,6 +98,15 @@ def volume_ml(mesh: TriangleMesh) -> float:
     return signed_volume(mesh) * ML_PER_MM3
 
 
+def coordinate_ranks(vertices: Floats) -> Ints:
+    """Return the (n,) places of vertices in their order by x, y, z."""
+    x, y, z = vertices.T
+    order = np.lexsort((z, y, x))
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(len(vertices))
+    return ranks
+
+
 def dots(first: Floats, second: Floats) -> Floats:
     """Return the (n,) scalar products of the rows of two (n, 3) arrays."""
     return np.einsum("ij,ij->i", first, second)
@@ -116,12 +125,14 @@ def face_normals(mesh: TriangleMesh) -> Floats:
 
 def _sums_at_vertices(mesh: TriangleMesh, face_values: Floats) -> Floats:
     """Return per vertex the sum of (m,) or (m, k) values over its faces."""
-    number = np.repeat(np.arange(len(mesh.faces)), 3)
-    at_corners = scipy.sparse.csr_matrix(
-        (np.ones(number.size), (mesh.faces.ravel(), number)),
-        shape=(len(mesh.vertices), len(mesh.faces)),
+    n_faces = len(mesh.faces)
+    vertex = mesh.faces.ravel()
+    face = np.repeat(np.arange(n_faces), 3)
+    is_corner = scipy.sparse.csr_matrix(
+        (np.ones(3 * n_faces), (vertex, face)),
+        shape=(len(mesh.vertices), n_faces),
     )
-    return np.asarray(at_corners @ face_values)
+    return np.asarray(is_corner @ face_values)
 
 
 def vertex_normals(mesh: TriangleMesh) -> Floats:
@@ -143,14 +154,13 @@ def _half_edges(mesh: TriangleMesh) -> Ints:
 def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
     """Return the (e, 2) undirected edges, each once and sorted, and the (e,) number of
     faces at each."""
-    directed = _half_edges(mesh)
-    pairs = np.sort(directed, axis=1)
-    # one number per edge: much faster than comparing rows
     count = len(mesh.vertices)
+    pairs = np.sort(_half_edges(mesh), axis=1)
+    # one number per edge: much faster than comparing rows
     numbers = pairs @ [count, 1]
     numbers, uses = np.unique(numbers, return_counts=True)
-    low, high = np.divmod(numbers, count)
-    return np.stack([low, high], axis=1), uses
+    ends = np.divmod(numbers, count)
+    return np.stack(ends, axis=1), uses
 
 
 def mean_edge_length(mesh: TriangleMesh) -> float:
@@ -199,12 +209,14 @@ def euler_number(mesh: TriangleMesh) -> int:
 def face_components(mesh: TriangleMesh) -> Ints:
     """Return the (m,) number of the connected component of each face, the largest area
     first (0)."""
-    of_vertex = connected(_half_edges(mesh), len(mesh.vertices))
-    of_face = of_vertex[mesh.faces[:, 0]]
-    _, component = np.unique(of_face, return_inverse=True)
+    links = _half_edges(mesh)
+    of_vertex = connected(links, len(mesh.vertices))
+    first_corner = mesh.faces[:, 0]
+    _, component = np.unique(of_vertex[first_corner], return_inverse=True)
     areas = np.bincount(component, weights=face_areas(mesh))
-    order = np.argsort(-areas, kind="stable")
-    return np.argsort(order)[component]
+    largest_first = np.argsort(-areas, kind="stable")
+    rank = np.argsort(largest_first)
+    return rank[component]
 
 
 def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
@@ -219,14 +231,25 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
     # half-edge 3 f + k starts at corner k of face f
     start = faces.ravel()
     end = np.roll(faces, -1, axis=1).ravel()
-    following = np.roll(np.arange(faces.size).reshape(-1, 3), -1, axis=1).ravel()
-    is_forward = (start < end) == (signed_volume(mesh) >= 0)
-    keys = np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end)
+    numbers = np.arange(faces.size).reshape(-1, 3)
+    following = np.roll(numbers, -1, axis=1).ravel()
+    is_outward = signed_volume(mesh) >= 0
+    is_forward = (start < end) == is_outward
+    low = np.minimum(start, end)
+    high = np.maximum(start, end)
+    # one number per edge
+    keys = low * len(mesh.vertices) + high
     order = np.argsort(keys, kind="stable")
-    _, first, uses = np.unique(keys[order], return_index=True, return_counts=True)
-    pairs = [order[first[uses == 2, None] + [0, 1]]]
+    _, first, uses = np.unique(
+        keys[order],
+        return_index=True,
+        return_counts=True,
+    )
+    of_two = first[uses == 2]
+    pairs = [order[of_two[:, None] + [0, 1]]]
     overlapping = []
-    for place, number in zip(first[uses > 2], uses[uses > 2], strict=True):
+    is_crowded = uses > 2
+    for place, number in zip(first[is_crowded], uses[is_crowded], strict=True):
         around = order[place : place + number]
         angles = _angles_around_edge(mesh, around)
         forward = is_forward[around]
@@ -239,9 +262,12 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
         else:
             overlapping.append(sides)
     # where faces overlap, faces of the same sheet elsewhere are paired
-    sheet = connected(np.concatenate(pairs) // 3, len(faces))
+    joined = np.concatenate(pairs)
+    sheet = connected(joined // 3, len(faces))
     for backward, forward in overlapping:
-        differs = sheet[backward // 3][:, None] != sheet[forward // 3]
+        sheet_behind = sheet[backward // 3]
+        sheet_ahead = sheet[forward // 3]
+        differs = sheet_behind[:, None] != sheet_ahead
         paired, _ = _cheapest_pairs(differs, backward, forward)
         pairs.append(paired)
     corner = _joined_corners(np.concatenate(pairs), start, following)
@@ -353,13 +379,15 @@ def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:
 def _edges_within(mesh: TriangleMesh, loop: Ints) -> Mask:
     """Return the (n, n) mask of the pairs of places in a loop whose vertices have an
     edge, for the first before the second."""
+    count = len(loop)
     place = np.full(len(mesh.vertices), -1)
-    place[loop] = np.arange(len(loop))
+    place[loop] = np.arange(count)
     pairs, _ = edges(mesh)
-    inside = np.sort(place[pairs], axis=1)
-    inside = inside[inside[:, 0] >= 0]
-    is_edge = np.zeros((len(loop), len(loop)), dtype=bool)
-    is_edge[tuple(inside.T)] = True
+    ends = np.sort(place[pairs], axis=1)
+    first, second = ends.T
+    is_within = first >= 0
+    is_edge = np.zeros((count, count), dtype=bool)
+    is_edge[first[is_within], second[is_within]] = True
     return is_edge
 
 

@@ -204,9 +204,11 @@ def _weights_in(tetrahedra: Floats, points: Floats) -> Floats:
     """Return the (n, 4) barycentric coordinates of points in tetrahedra with (n, 4, 3)
     corners."""
     first = tetrahedra[:, :1]
-    edges = np.moveaxis(tetrahedra[:, 1:] - first, 1, 2)
+    edges = tetrahedra[:, 1:] - first
+    # point - first corner = sum of the three other weights times the edges to these
+    columns = np.moveaxis(edges, 1, 2)
     offset = points - first[:, 0]
-    solution = np.linalg.solve(edges, offset[..., None])
+    solution = np.linalg.solve(columns, offset[..., None])
     others = solution[..., 0]
     of_first = 1 - others.sum(axis=1)
     return np.column_stack([of_first, others])
@@ -220,9 +222,9 @@ def _weighted(places: Floats, weights: Floats) -> Floats:
 def _frames(surface: TriangleMesh, faces: Ints) -> Floats:
     """Return the (n, 3, 3) orthonormal axes of faces as columns: along an edge, across
     it, and the normal."""
-    at = corners(surface)[faces]
+    a, b, _ = corners(surface)[faces].transpose(1, 0, 2)
     normal = face_normals(surface)[faces]
-    along = at[:, 1] - at[:, 0]
+    along = b - a
     length = np.linalg.norm(along, axis=1, keepdims=True)
     along /= np.maximum(length, 1e-12)
     across = np.cross(normal, along)

@@ -76,27 +76,22 @@ def match_surfaces(
         )
     first = outward(first)
     weights = vertex_areas(first)
-    motion = rigid_fit(first.vertices, second.vertices, weights)
-    from_centre = _from_centre(first.vertices, weights)
-    aligned = from_centre @ motion[:3, :3].T
-    target = _from_centre(second.vertices, weights)
-    scatter = _radius(
-        aligned / _radius(aligned, weights) - target / _radius(target, weights), weights
-    )
     later_areas = vertex_areas(TriangleMesh(second.vertices, first.faces))
-    numbers = {
-        "vertices": float(len(first.vertices)),
-        "turn_deg": angle_deg(motion[:3, :3]),
-        "scatter": scatter,
-        "area_ratio": float(later_areas.sum() / weights.sum()),
-    }
-    if numbers["turn_deg"] > MAX_TURN_DEG or numbers["scatter"] > MAX_SCATTER:
+    motion = rigid_fit(first.vertices, second.vertices, weights)
+    rotation = motion[:3, :3]
+    turned = _from_centre(first.vertices, weights) @ rotation.T
+    target = _from_centre(second.vertices, weights)
+    scaled = turned / _radius(turned, weights)
+    scaled_target = target / _radius(target, weights)
+    turn_deg = angle_deg(rotation)
+    scatter = _radius(scaled - scaled_target, weights)
+    if turn_deg > MAX_TURN_DEG or scatter > MAX_SCATTER:
         raise InputError(
             "the surfaces have the same triangles, but their vertices do not"
             " correspond",
             found=(
-                f"a rotation of {numbers['turn_deg']:.0f}° between them, and a scatter"
-                f" of {numbers['scatter']:.2f}"
+                f"a rotation of {turn_deg:.0f}° between them, and a scatter of"
+                f" {scatter:.2f}"
             ),
             expected=(
                 f"at most {MAX_TURN_DEG:g}° between posed brains, and {MAX_SCATTER:g}"
@@ -107,6 +102,12 @@ def match_surfaces(
                 " are matched."
             ),
         )
+    numbers = {
+        "vertices": float(len(first.vertices)),
+        "turn_deg": turn_deg,
+        "scatter": scatter,
+        "area_ratio": float(later_areas.sum() / weights.sum()),
+    }
     return MatchedSurfaces(first, second.vertices), numbers
 
 
@@ -162,10 +163,12 @@ def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Flo
     InputError if points leave the grids of the deformations.
     """
     positions = [points]
-    for number, deformation in enumerate(deformations):
-        interval = f"interval {number + 1} of {len(deformations)}"
-        _require_on_grid(deformation, positions[-1], interval)
-        positions.append(carry(deformation, positions[-1]))
+    count = len(deformations)
+    for number, deformation in enumerate(deformations, start=1):
+        interval = f"interval {number} of {count}"
+        _require_on_grid(deformation, points, interval)
+        points = carry(deformation, points)
+        positions.append(points)
     return np.stack(positions)
 
 
@@ -230,17 +233,20 @@ def _require_on_grid(
     points: Floats,
     what: str,
 ) -> None:
+    """Raise InputError if more than a few of (n, 3) points in mm lie outside the grid;
+    `what` is said of them."""
     index = transform_points(points, np.linalg.inv(deformation.affine))
     last = np.array(deformation.displacement.shape[:3]) - 1
     beyond = index - np.clip(index, 0, last)
     is_outside = beyond.any(axis=1)
     if is_outside.mean() > MAX_OUTSIDE:
-        distance = np.linalg.norm(beyond @ deformation.affine[:3, :3].T, axis=1)
+        beyond_mm = beyond @ deformation.affine[:3, :3].T
+        distance_mm = np.linalg.norm(beyond_mm, axis=1)
         raise InputError(
             f"points lie outside the grid of the registration ({what})",
             found=(
                 f"{np.count_nonzero(is_outside)} of {len(points)} points, up to"
-                f" {distance.max():.3g} mm"
+                f" {distance_mm.max():.3g} mm"
             ),
             expected="points inside the brain that was registered",
             remedy=(

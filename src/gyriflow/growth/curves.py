@@ -81,11 +81,12 @@ def rate(curve: Curve, week: ArrayLike) -> Floats:
 def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     """Return the bounds of the 95 % interval of a curve at weeks. Its width is constant
     beyond the ends."""
-    sd = np.interp(np.asarray(week, dtype=float), curve.weeks, curve.sd)
+    at = np.asarray(week, dtype=float)
+    sd = np.interp(at, curve.weeks, curve.sd)
     middle = value(curve, week)
-    low = middle * np.exp(-Z_95 * sd)
-    high = middle * np.exp(Z_95 * sd)
-    return low, high
+    below = np.exp(-Z_95 * sd)
+    above = np.exp(Z_95 * sd)
+    return middle * below, middle * above
 
 
 def tabulated(
@@ -286,11 +287,14 @@ def _robust_weights(
 
 
 def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
+    """Return the logarithm of a curve at weeks, straight beyond the ends, and its rate
+    there."""
     at = np.asarray(week, dtype=float)
-    inside = np.clip(at, curve.weeks[0], curve.weeks[-1])
+    first = curve.weeks[0]
+    last = curve.weeks[-1]
+    inside = np.clip(at, first, last)
     log_curve = PchipInterpolator(curve.weeks, np.log(curve.values))
-    rate_curve = log_curve.derivative()
-    rates = rate_curve(inside)
+    rates = log_curve.derivative()(inside)
     logs = log_curve(inside) + rates * (at - inside)
     return logs, rates
 

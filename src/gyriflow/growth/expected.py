@@ -86,10 +86,10 @@ class Persistence:
 
         It is the best linear predictor: persistence times the reliability of the match.
         """
-        persistence = self.lasting + (1 - self.lasting) * np.exp(
-            -weeks_ahead / LASTING_GW
-        )
-        error = (1 - self.reliability) * np.exp(-weeks_ahead / MATCH_FADING_GW)
+        fading = np.exp(-weeks_ahead / LASTING_GW)
+        persistence = self.lasting + (1 - self.lasting) * fading
+        match_fading = np.exp(-weeks_ahead / MATCH_FADING_GW)
+        error = (1 - self.reliability) * match_fading
         return float(persistence * (self.reliability + error))
 
 

@@ -84,7 +84,8 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
     before = TriangleMesh(observed.places, boundary.faces)
     areas = vertex_areas(before)
     centre = np.average(before.vertices, axis=0, weights=areas)
-    scale = np.cbrt(signed_volume(boundary) / signed_volume(before))
+    volume = signed_volume(boundary)
+    scale = np.cbrt(volume / signed_volume(before))
     motion = rigid_fit(before.vertices, boundary.vertices, areas)
 
     def aligned(points: Floats) -> Floats:
@@ -93,29 +94,32 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
     places = aligned(before.vertices)
     displacements = boundary.vertices - places
     surface = aligned(observed.surface.vertices)
-    tree = cKDTree(places)
     n_neighbours = min(N_NEIGHBOURS, len(places))
-    distances, neighbours = tree.query(surface, n_neighbours)
-    allowed = crossing_faces(observed.surface)
+    distances, neighbours = cKDTree(places).query(surface, n_neighbours)
+    n_allowed = crossing_faces(observed.surface)
     for spread_mm in SPREADS_MM:
-        weights = areas[neighbours] * np.exp(-0.5 * (distances / spread_mm) ** 2)
+        nearness = np.exp(-0.5 * (distances / spread_mm) ** 2)
+        weights = areas[neighbours] * nearness
         weights /= weights.sum(axis=1, keepdims=True)
+        # n: vertex of the surface, k: neighbour of it, j: axis
         move = np.einsum("nk,nkj->nj", weights, displacements[neighbours])
         moved = TriangleMesh(surface + move, observed.surface.faces)
-        if crossing_faces(moved) <= allowed:
-            return scaled_to_volume(moved, signed_volume(boundary))
+        n_crossing = crossing_faces(moved)
+        if n_crossing <= n_allowed:
+            return _scaled_to_volume(moved, volume)
     log.warning(
         "an observed surface that is moved to the predicted shape crosses itself in %d"
         " faces: the coarser surface of the mesh is used",
-        crossing_faces(moved),
+        n_crossing,
     )
     return boundary
 
 
-def scaled_to_volume(surface: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+def _scaled_to_volume(surface: TriangleMesh, volume_mm3: float) -> TriangleMesh:
     """Scale a closed surface about its centre to a volume."""
     areas = vertex_areas(surface)
-    centre = np.average(surface.vertices, axis=0, weights=areas)
-    scale = np.cbrt(volume_mm3 / signed_volume(surface))
-    vertices = centre + scale * (surface.vertices - centre)
-    return TriangleMesh(vertices, surface.faces)
+    vertices = surface.vertices
+    centre = np.average(vertices, axis=0, weights=areas)
+    ratio = volume_mm3 / signed_volume(surface)
+    scaled = centre + np.cbrt(ratio) * (vertices - centre)
+    return TriangleMesh(scaled, surface.faces)

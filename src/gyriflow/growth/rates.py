@@ -68,7 +68,7 @@ def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
     from labels, the table has tissue_ratio, … and tissue_compound_rate_per_s, …,
     ln(V₂/V₁)/(3Δt), NaN where unknown.
     """
-    tables = [growth_rates([], [], []).assign(series=[])]
+    tables = []
     chosen = areas[areas["series"].isin(names)]
     for name, brains in chosen.groupby("series", sort=False):
         sizes = brains.filter(regex="^week$|_cm2$|_ml$").astype(float)
@@ -86,8 +86,9 @@ def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
                 rates[f"{tissue}_ratio"] = ratio
                 rates[f"{tissue}_compound_rate_per_s"] = np.log(ratio) / (3 * seconds)
         tables.append(rates)
-    if len(tables) > 1:
-        del tables[0]
+    if not tables:
+        # the columns of a table without rows
+        return growth_rates([], [], []).assign(series=[])
     return pd.concat(tables, ignore_index=True)
 
 

@@ -33,6 +33,7 @@ from ..geometry.deformations import (
     carry,
     transform_points,
     volume_changes,
+    voxel_index,
 )
 from ..geometry.poses import LPS_TO_RAS
 from ..geometry.triangles import Floats, Indices, Mask
@@ -364,11 +365,13 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
     """Return a volume as SimpleITK has it, with reversed axes."""
     reversed_values = np.ascontiguousarray(values.transpose(2, 1, 0))
     image = SimpleITK.GetImageFromArray(reversed_values)
-    spacing = np.linalg.norm(affine[:3, :3], axis=0)
-    direction = affine[:3, :3] / spacing
+    linear = affine[:3, :3]
+    spacing = np.linalg.norm(linear, axis=0)
+    direction = linear / spacing
+    origin = affine[:3, 3]
     image.SetSpacing(spacing.tolist())
     image.SetDirection(direction.ravel().tolist())
-    image.SetOrigin(affine[:3, 3].tolist())
+    image.SetOrigin(origin.tolist())
     return image
 
 
@@ -382,16 +385,16 @@ def _find_start(
     second, second_size = _centre_and_size(later)
     scale = (second_size / first_size) ** (1 / 3)
     index = np.argwhere(earlier.cerebrum > 0.01)
-    index = index[:: max(1, len(index) // N_POINTS)]
+    every = max(1, len(index) // N_POINTS)
+    index = index[::every]
     points = transform_points(index, earlier.affine)
-    to_later_index = np.linalg.inv(later.affine)
 
     def start_of(turn: Floats) -> Floats:
         return motion(scale * turn, second - scale * turn @ first)
 
     def difference(turn: Floats) -> float:
         moved = transform_points(points, start_of(turn))
-        places = transform_points(moved, to_later_index).T
+        places = voxel_index(moved, later.affine)
         means = []
         for name, (fixed, moving) in volumes.items():
             there = map_coordinates(moving, places, order=1)
@@ -411,10 +414,15 @@ def _find_start(
 
 def _centre_and_size(brain: Channels) -> tuple[Floats, float]:
     """Return the centroid (3,) in mm and the volume in mm³ of the cerebrum."""
-    index = np.argwhere(brain.tissue & CEREBRUM_BIT > 0)
-    points = transform_points(index, brain.affine)
+    points = _cerebrum_mm(brain)
     volume = len(points) * brain.voxel_mm**3
     return points.mean(axis=0), volume
+
+
+def _cerebrum_mm(brain: Channels) -> Floats:
+    """Return the (n, 3) places in mm of the voxels of the cerebrum."""
+    index = np.argwhere(brain.tissue & CEREBRUM_BIT > 0)
+    return transform_points(index, brain.affine)
 
 
 def measure_quality(
@@ -436,29 +444,29 @@ def measure_quality(
     """
     index = np.indices(earlier.tissue.shape).reshape(3, -1).T
     carried = carry(deformation, transform_points(index, earlier.affine))
-    places = transform_points(carried, np.linalg.inv(later.affine)).T
+    places = voxel_index(carried, later.affine)
     dice_cortex = float("nan")
     if earlier.cortex is not None and later.cortex is not None:
         dice_cortex = _dice(earlier, later, CORTEX_BIT, places)
-    inside = np.argwhere(earlier.tissue & CEREBRUM_BIT > 0)
-    inside_mm = transform_points(inside, earlier.affine)
-    on_grid = transform_points(inside_mm, np.linalg.inv(deformation.affine)).T
-    growth = map_coordinates(
-        volume_changes(deformation), on_grid, order=1, mode="nearest"
-    )
+    on_grid = voxel_index(_cerebrum_mm(earlier), deformation.affine)
+
+    def in_cerebrum(values: Floats) -> Floats:
+        return map_coordinates(values, on_grid, order=1, mode="nearest")
+
+    growth = in_cerebrum(volume_changes(deformation))
     lengths = np.linalg.norm(deformation.displacement, axis=-1)
-    lengths_inside = map_coordinates(lengths, on_grid, order=1, mode="nearest")
     rim = np.ones(lengths.shape, dtype=bool)
     rim[1:-1, 1:-1, 1:-1] = False
+    log_growth = np.log(growth[growth > 0])
     return {
         "dice_cerebrum": _dice(earlier, later, CEREBRUM_BIT, places),
         "dice_cortex": dice_cortex,
         "least_determinant": float(growth.min()),
         "folded_share": float((growth <= 0).mean()),
-        "log_growth_sd": float(np.log(growth[growth > 0]).std()),
+        "log_growth_sd": float(log_growth.std()),
         "volume_ratio": float(growth.mean()),
         "rim_mm": float(np.quantile(lengths[rim], 0.95)),
-        "inside_mm": float(np.quantile(lengths_inside, 0.95)),
+        "inside_mm": float(np.quantile(in_cerebrum(lengths), 0.95)),
     }
 
 

@@ -374,10 +374,12 @@ def tissue_below(
 def misfit_mm(boundary: TriangleMesh, surface: TriangleMesh) -> tuple[float, float]:
     """Return the mean distance of a boundary and a surface, and the larger quantile at
     95 % of both ways."""
-    ways = []
-    for first, second in ((boundary, surface), (surface, boundary)):
-        distance, _, _ = nearest_on(first.vertices, second)
-        ways.append((distance, vertex_areas(first)))
+    there, _, _ = nearest_on(boundary.vertices, surface)
+    back, _, _ = nearest_on(surface.vertices, boundary)
+    ways = [
+        (there, vertex_areas(boundary)),
+        (back, vertex_areas(surface)),
+    ]
     return surface_distance(ways)
 
 

@@ -1,6 +1,7 @@
 """Improve the few flat elements of a mesh by moving their vertices a little."""
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ..geometry.tetrahedra import (
     boundary_surface,
     radius_ratios,
 )
-from ..geometry.triangles import Floats, Ints
+from ..geometry.triangles import Floats, Ints, Mask
 
 log = logging.getLogger(__name__)
 
@@ -33,33 +34,43 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     that raises the least radius ratio around it; vertices of the surface move less than
     a twentieth of an edge.
     """
-    flat = np.flatnonzero(radius_ratios(mesh) < MIN_RADIUS_RATIO)
+    ratios = radius_ratios(mesh)
+    flat = np.flatnonzero(ratios < MIN_RADIUS_RATIO)
     if not 0 < len(flat) <= MAX_FLAT:
         return mesh
     vertices = mesh.vertices.copy()
+    _, outer = boundary_surface(mesh)
     on_surface = np.zeros(len(vertices), dtype=bool)
-    on_surface[boundary_surface(mesh)[1]] = True
+    on_surface[outer] = True
     for element in flat.tolist():
         for _ in range(ROUNDS):
             if signed_ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break
-            moves = [
-                _best_move(vertices, mesh.tets, element, vertex, on_surface)
-                for vertex in mesh.tets[element]
-            ]
-            if not any(moves):
+            best: Move | None = None
+            for vertex in mesh.tets[element].tolist():
+                move = _best_move(vertices, mesh.tets, element, vertex, on_surface)
+                if move and (best is None or move.gain > best.gain):
+                    best = move
+            if best is None:
                 break
-            _, vertex, place = max(filter(None, moves), key=lambda move: move[0])
-            vertices[vertex] = place
+            vertices[best.vertex] = best.place
     improved = TetrahedralMesh(vertices, mesh.tets)
-    before, after = (float(radius_ratios(m)[flat].min()) for m in (mesh, improved))
     log.info(
         "%d flat elements improved, least radius ratio from %.4f to %.4f",
         len(flat),
-        before,
-        after,
+        ratios[flat].min(),
+        radius_ratios(improved)[flat].min(),
     )
     return improved
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A move of a vertex to a place (3,), and its gain of the least ratio around."""
+
+    gain: float
+    vertex: int
+    place: Floats
 
 
 def _best_move(
@@ -67,10 +78,9 @@ def _best_move(
     tets: Ints,
     element: int,
     vertex: int,
-    on_surface: Floats,
-) -> tuple[float, int, Floats] | None:
-    """Return the gain of the least ratio around a vertex by its best move, the vertex
-    and its place, None without."""
+    on_surface: Mask,
+) -> Move | None:
+    """Return the best move of a vertex of an element; None if none gains."""
     star = tets[(tets == vertex).any(axis=1)]
     corners = tets[element]
     start = vertices[vertex]
@@ -82,7 +92,6 @@ def _best_move(
     largest_step = MAX_SURFACE_STEP if on_surface[vertex] else np.inf
     least = _signed_ratios_of(vertices[star]).min()
     best = None
-    best_gain = 0.0
     for direction in (normal, across, *edges):
         length = np.linalg.norm(direction)
         if length == 0:
@@ -94,9 +103,8 @@ def _best_move(
                 trial = vertices[star]
                 trial[star == vertex] = place
                 gain = float(_signed_ratios_of(trial).min() - least)
-                if gain > best_gain:
-                    best_gain = gain
-                    best = (gain, int(vertex), place)
+                if gain > (best.gain if best else 0.0):
+                    best = Move(gain, vertex, place)
     return best
 
 

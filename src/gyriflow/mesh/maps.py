@@ -15,7 +15,9 @@ from ..geometry.triangles import (
     Floats,
     Ints,
     TriangleMesh,
+    coordinate_ranks,
     corners,
+    dots,
     face_areas,
     transformed,
 )
@@ -69,11 +71,8 @@ def vertex_map_on_mesh(
             found=found,
             expected=f"at most {FARTHEST_MM:g} mm",
         )
-    on_pial = np.einsum(
-        "ij,ij->i",
-        barycentric(nearest, corners(surface)[faces]),
-        values[surface.faces[faces]],
-    )
+    weights = barycentric(nearest, corners(surface)[faces])
+    on_pial = dots(weights, values[surface.faces[faces]])
     mapped = on_pial[_nearest_vertices(mesh_vertices_mm, points)]
     mapped[pial] = on_pial
     return mapped
@@ -168,29 +167,30 @@ def move_to_mesh(
     Surfaces of the input are moved like the brain, by its (4, 4) pose; those that
     gyriflow made have been already.
     """
-    moved = transformed(surface, pose)
-    return min(
-        moved,
-        surface,
-        key=lambda candidate: nearest_on(points, _solid(candidate))[0].mean(),
-    )
+
+    def mean_distance(candidate: TriangleMesh) -> float:
+        distance, _, _ = nearest_on(points, _solid(candidate))
+        return float(distance.mean())
+
+    return min(transformed(surface, pose), surface, key=mean_distance)
 
 
 def _solid(surface: TriangleMesh) -> TriangleMesh:
-    return TriangleMesh(surface.vertices, surface.faces[face_areas(surface) > 0])
+    """Return a surface without the faces that have no area."""
+    has_area = face_areas(surface) > 0
+    return TriangleMesh(surface.vertices, surface.faces[has_area])
 
 
 def _nearest_vertices(points: Floats, vertices: Floats) -> Ints:
     """Return the (k,) nearest vertex of each point; of equally near ones the first by
     x, y, z."""
-    neighbours = range(1, min(NEIGHBOURS, len(vertices)) + 1)
+    count = len(vertices)
+    neighbours = range(1, min(NEIGHBOURS, count) + 1)
     gaps, candidates = cKDTree(vertices).query(points, k=neighbours)
-    x, y, z = vertices.T
-    order = np.lexsort((z, y, x))
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(vertices))
     least = gaps[:, :1]
     is_nearest = gaps <= least * (1 + TIE)
-    ranks = np.where(is_nearest, rank[candidates], len(vertices))
+    rank = coordinate_ranks(vertices)
+    ranks = np.where(is_nearest, rank[candidates], count)
     first = ranks.argmin(axis=1)
-    return candidates[np.arange(len(points)), first]
+    rows = np.arange(len(points))
+    return candidates[rows, first]

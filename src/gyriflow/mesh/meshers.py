@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from threading import Thread
 from typing import Any
 
@@ -53,17 +54,17 @@ def run_mesher(
     np.savez(sent, **arrays)
     # a mesher may leave files in its working folder
     with tempfile.TemporaryDirectory() as folder:
-        code, output, words = _run(name, sent.getvalue(), folder, time_limit_s)
-    last = "\n".join(words)[-LAST_WORDS:]
-    if code is None:
+        ended = _run(name, sent.getvalue(), folder, time_limit_s)
+    last = "\n".join(ended.lines)[-LAST_WORDS:]
+    if ended.code is None:
         raise MeshError(
             f"the mesher {name} was stopped after {time_limit_s:g} s",
             found=f"its last words: {last or 'none'}",
             remedy="Mesh with longer edges, or with another mesh.mesher.",
         )
-    if code != 0:
+    if ended.code != 0:
         raise MeshError(
-            f"the mesher {name} failed with exit code {code}",
+            f"the mesher {name} failed with exit code {ended.code}",
             found=last or "no message",
             remedy=(
                 "A negative code is a signal: -9 means that memory ran out. A module"
@@ -71,8 +72,18 @@ def run_mesher(
                 " envs/requirements.txt."
             ),
         )
-    with np.load(io.BytesIO(output)) as received:
+    with np.load(io.BytesIO(ended.output)) as received:
         return TetrahedralMesh(received["vertices"], received["tets"])
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A process that has ended: its exit code, None after the time limit, its output
+    and the lines that it printed."""
+
+    code: int | None
+    output: bytes
+    lines: list[str]
 
 
 def _run(
@@ -80,25 +91,28 @@ def _run(
     sent: bytes,
     folder: str,
     time_limit_s: float,
-) -> tuple[int | None, bytes, list[str]]:
-    words: list[str] = []
+) -> Ended:
+    lines: list[str] = []
     reading, printing = os.pipe()
 
     def listen() -> None:
         # lines go to the log as they come, so that one can see how far the mesher is
         with os.fdopen(reading, errors="replace") as stream:
-            for line in filter(str.strip, stream):
-                words.append(line.rstrip())
-                log.info("%s: %s", name, words[-1])
+            for line in stream:
+                text = line.rstrip()
+                if text:
+                    lines.append(text)
+                    log.info("%s: %s", name, text)
 
     listener = Thread(target=listen)
+    search_path = os.pathsep.join(filter(None, sys.path))
     with subprocess.Popen(
         [sys.executable, "-m", __name__, name],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=printing,
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        env=os.environ | {"PYTHONPATH": search_path},
     ) as process:
         os.close(printing)
         listener.start()
@@ -106,11 +120,12 @@ def _run(
             output, _ = process.communicate(sent, timeout=time_limit_s)
             code: int | None = process.returncode
         except subprocess.TimeoutExpired:
-            output, code = b"", None
+            output = b""
+            code = None
         finally:
             process.kill()
     listener.join()
-    return code, output, words
+    return Ended(code, output, lines)
 
 
 def _pytetwild(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -9,14 +9,13 @@ from typing import Any
 import igl
 import igl.embree
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import MeshError
 from ..geometry import tetrahedra, triangles
 from ..geometry.jacobians import lower_bounds
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance
 from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh
-from ..geometry.triangles import Floats, TriangleMesh
+from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, dots
 
 QUANTILE = 0.99
 GAP_MM = 3.0
@@ -132,7 +131,7 @@ def _first_hits(
     mesh: TriangleMesh,
     start: Floats,
     direction: Floats,
-) -> tuple[NDArray[np.int64], Floats]:
+) -> tuple[Ints, Floats]:
     rays = igl.embree.EmbreeIntersector()
     rays.init(
         np.asfortranarray(mesh.vertices, dtype=np.float32),
@@ -167,7 +166,7 @@ def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats
     return distance, areas
 
 
-def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
+def jacobian_ratios(mesh: TetrahedralMesh) -> Floats:
     """Return (m,) lower bounds of elements' determinants over the mean: 1 straight, not
     positive if folded."""
     if mesh.order == 1:
@@ -177,22 +176,22 @@ def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     )
 
 
-def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
+def dihedral_angles(mesh: TetrahedralMesh) -> Floats:
     """Return the (m, 6) angles in degrees between the faces at each edge, taken as flat
     between corners."""
     corner = mesh.vertices[mesh.corners]
-    angles = np.empty((len(mesh.tets), 6))
+    angles = []
     opposite = reversed(SIDES_OF_ELEMENT)
-    pairs = zip(SIDES_OF_ELEMENT, opposite, strict=True)
-    for i, ((a, b), (c, d)) in enumerate(pairs):
+    for (a, b), (c, d) in zip(SIDES_OF_ELEMENT, opposite, strict=True):
         start = corner[:, a]
         edge = corner[:, b] - start
         first = np.cross(edge, corner[:, c] - start)
         second = np.cross(edge, corner[:, d] - start)
-        sine = np.linalg.norm(np.cross(first, second), axis=1)
-        cosine = np.einsum("ij,ij->i", first, second)
-        angles[:, i] = np.degrees(np.arctan2(sine, cosine))
-    return angles
+        across = np.cross(first, second)
+        sine = np.linalg.norm(across, axis=1)
+        cosine = dots(first, second)
+        angles.append(np.arctan2(sine, cosine))
+    return np.degrees(np.stack(angles, axis=1))
 
 
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
@@ -305,7 +304,7 @@ def _worst_element(
     mesh: TetrahedralMesh,
     name: str,
     values: Floats,
-    bad: NDArray[np.bool_],
+    bad: Mask,
 ) -> str:
     """Return the number of bad elements by a measure, and the value and place of the
     worst."""

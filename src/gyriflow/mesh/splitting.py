@@ -90,16 +90,16 @@ def _best_place(
 def _inner_edges(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     """Return the inner edges (k, 2) between vertices of the surface, and the elements
     that have one."""
-    n_vertices = len(mesh.vertices)
+    count = len(mesh.vertices)
     faces, _ = boundary_faces(mesh)
-    is_outer = np.zeros(n_vertices, dtype=bool)
+    is_outer = np.zeros(count, dtype=bool)
     is_outer[faces] = True
     pairs = np.sort(mesh.tets[:, EDGES], axis=2)
-    numbers = pairs[..., 0] * n_vertices + pairs[..., 1]
     on_surface, _ = edges(TriangleMesh(mesh.vertices, faces))
-    outer_pairs = np.sort(on_surface, axis=1)
-    outer_numbers = outer_pairs[:, 0] * n_vertices + outer_pairs[:, 1]
-    is_along_surface = np.isin(numbers, outer_numbers)
+    # one number per edge
+    number = [count, 1]
+    is_along_surface = np.isin(pairs @ number, on_surface @ number)
     is_inner = is_outer[pairs].all(axis=2) & ~is_along_surface
     between = np.unique(pairs[is_inner], axis=0)
-    return between, np.flatnonzero(is_inner.any(axis=1))
+    elements = np.flatnonzero(is_inner.any(axis=1))
+    return between, elements

@@ -6,7 +6,6 @@ from typing import Any
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
@@ -19,6 +18,7 @@ from ..geometry.tetrahedra import (
     signed_volumes,
 )
 from ..geometry.triangles import (
+    Floats,
     TriangleMesh,
     edges,
     euler_number,
@@ -49,11 +49,11 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 
 
 def edge_length_at(
-    depth: NDArray[np.float64],
+    depth: Floats,
     surface_edge_mm: float,
     core_edge_mm: float,
     order: int = 1,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return edge lengths in mm of elements at depths in mm; deep down, nodes of both
     orders have the same distance."""
     below = np.maximum(depth - FINE_DEPTH_EDGES / order * surface_edge_mm, 0.0)
@@ -65,7 +65,7 @@ def _background_mesh(
     surface_edge_mm: float,
     core_edge_mm: float,
     order: int = 1,
-) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
+) -> tuple[TetrahedralMesh, Floats]:
     """Return a regular tetrahedral grid over the inside of the surface and the edge
     lengths in mm at its vertices.
 
@@ -74,24 +74,19 @@ def _background_mesh(
     """
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
-    counts = (
-        np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int)
-        + 1
-    )
-    background = grid(
-        [
-            start + spacing * np.arange(count)
-            for start, count in zip(low, counts, strict=True)
-        ]
-    )
-    depth = cKDTree(surface.vertices).query(background.vertices)[0]
-    inside = (
-        igl.fast_winding_number(surface.vertices, surface.faces, background.vertices)
-        > 0.5
-    )
-    near = background.tets[(inside | (depth < spacing))[background.tets].any(axis=1)]
+    high = surface.vertices.max(axis=0) + spacing
+    ticks = []
+    for start, end in zip(low, high, strict=True):
+        count = int(np.ceil((end - start) / spacing)) + 1
+        ticks.append(start + spacing * np.arange(count))
+    background = grid(ticks)
+    places = background.vertices
+    depth, _ = cKDTree(surface.vertices).query(places)
+    winding = igl.fast_winding_number(surface.vertices, surface.faces, places)
+    is_needed = (winding > 0.5) | (depth < spacing)
+    needed = background.tets[is_needed[background.tets].any(axis=1)]
     lengths = edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
-    return TetrahedralMesh(background.vertices, near), lengths
+    return TetrahedralMesh(places, needed), lengths
 
 
 def tetrahedralise(

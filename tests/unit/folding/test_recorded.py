@@ -122,7 +122,7 @@ def test_numbers_of_layers_and_zones(recorded):
     parameters = parameters_from(RUN)
     planes = parameters_from(RUN | KINDS["rates, planes, ellipsoid"])
     search = layers.PialSearch(mesh.vertices, zones_of_run(mesh, parameters).facets)
-    distance, normals = search.distance_and_normals(mesh.vertices)
+    distance, normals = search.distance_and_normals(mesh.vertices, np.inf)
     thickness = 2.0 + smooth_field(mesh.vertices)
     weight = layers.cortical_weight(distance, thickness)
     zones = zones_of_run(mesh, planes, 2.0)

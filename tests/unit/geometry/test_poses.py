@@ -9,6 +9,7 @@ from shapes import LPS, rigid
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import (
+    Planes,
     RigidFit,
     angle_deg,
     fits_from_all_sides,
@@ -65,15 +66,15 @@ def about(degrees, axis=(0.0, 0.0, 1.0)):
 def test_a_small_motion_is_taken_back_in_one_step():
     turn, move = about(0.01, (0.6, 0.0, 0.8)), np.array([0.002, -0.001, 0.003])
     targets = POINTS @ turn.T + move
-    found, shift = step_towards_planes(
-        POINTS, NORMALS, np.einsum("ij,ij->i", targets - POINTS, NORMALS)
-    )
+    distances = np.einsum("ij,ij->i", targets - POINTS, NORMALS)
+    found, shift = step_towards_planes(Planes(POINTS, NORMALS, distances))
     np.testing.assert_allclose(POINTS @ found.T + shift, targets, atol=1e-5)
 
 
 def test_a_sphere_is_not_turned():
     ball = NORMALS - NORMALS.mean(axis=0)
-    rotation, _ = step_towards_planes(ball, ball, RANDOM.normal(size=200) * 0.01)
+    distances = RANDOM.normal(size=200) * 0.01
+    rotation, _ = step_towards_planes(Planes(ball, ball, distances))
     assert angle_deg(rotation) < 1e-6
 
 
