@@ -341,11 +341,8 @@ def test_a_free_body_grows_without_drifting(mesh):
 def test_values_of_tissue_have_their_places(mesh, shares):
     folding, start = folding_of(mesh, zones_of(mesh))
     tissue, _ = folding.begin(start, 43200.0)
-    points = tissue.elements.points
+    at_points = [tissue.at_points(tissue.places_mm[..., axis]) for axis in range(3)]
+    means = np.stack(at_points, axis=-1).swapaxes(1, 2) @ tissue.elements.points.weights
     corners_mm = tissue.nodes[tissue.elements.cells] / M_PER_MM
-    places_mm = np.moveaxis(points.interpolation @ corners_mm, 2, 0)
-    if mesh.order == 1:
-        places_mm = tissue.at_points(tissue.nodes.T / M_PER_MM)
-    means = np.moveaxis(places_mm @ points.weights, 0, 1)
     centres = np.einsum("k,ckx->cx", shares, corners_mm)
     np.testing.assert_allclose(means, centres, atol=1e-12)

@@ -91,6 +91,16 @@ class Tissue:
         weight = cortical_weight(value_depth * MM_PER_M, thickness_mm)
         return cls(elements, nodes, depth, pial, nearest, weight, growing, maps)
 
+    @property
+    def places_mm(self) -> Floats:
+        """The positions (k, 3) or (c, q, 3) in mm that `weight` and the others are
+        at, for growth that depends on place (docs/tutorial-folding.md)."""
+        nodes_mm = self.nodes * MM_PER_M
+        if self.elements.points.order == 1:
+            return nodes_mm
+        interpolation = self.elements.points.interpolation
+        return np.asarray(interpolation @ nodes_mm[self.elements.cells])
+
     def at_points(self, values: Floats) -> Floats:
         """Return (..., c, q) values at the integration points from values like
         `weight`."""
