@@ -2,8 +2,10 @@
 there is, the site is whole."""
 
 import importlib.util
+import json
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -124,6 +126,42 @@ def test_the_examples_in_python_run(tmp_path, monkeypatch, capsys):
         exec(block, names)
     assert capsys.readouterr().out == Facts("mm²", "gyrification_index")
     assert (tmp_path / "depth.png").stat().st_size > 10_000
+
+
+GALLERY = CHECKOUT / "docs" / "how-to" / "bad-inputs.md"
+MAX_GALLERY_MB = 1.5
+
+
+def test_pictures_are_all_shown_and_those_of_the_gallery_small():
+    pages = [CHECKOUT / "README.md", *CHECKOUT.glob("docs/**/*.md")]
+    shown = {
+        (page.parent / link).resolve()
+        for page in pages
+        for link in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", page.read_text())
+    }
+    assert shown == set(CHECKOUT.glob("docs/images/**/*.png"))
+    pictures = list(CHECKOUT.glob("docs/images/gallery/*.png"))
+    assert len(pictures) >= 10
+    size = sum(picture.stat().st_size for picture in pictures)
+    assert size < MAX_GALLERY_MB * 1e6
+
+
+@pytest.mark.extended
+def test_the_gallery_has_the_words_of_each_case(tmp_path):
+    program = CHECKOUT / "benchmarks" / "gallery.py"
+    done = ran(sys.executable, str(program), str(tmp_path), timeout_s=3600)
+    assert done.returncode == 0, done.stderr
+    page = " ".join(GALLERY.read_text().split())
+    cases = json.loads(done.stdout.splitlines()[-1])
+    assert cases.pop("sound")["verdict"] == "fine"
+    missing = [
+        f"{name}: {text}"
+        for name, case in cases.items()
+        for text in [case["verdict"], *case["messages"]]
+        if text not in page
+    ]
+    assert missing == []
+    assert len(cases) >= 10
 
 
 @pytest.mark.slow

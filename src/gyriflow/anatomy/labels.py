@@ -134,7 +134,10 @@ def read_cerebrum(
             f"{dropped * voxel_ml:.2f} mL, {100 * dropped / main.sum():.1f} % of the"
             " brain"
         )
-        warnings.append(f"{parts} separate parts were dropped: {loss}")
+        dropped_parts = (
+            "a separate part was" if parts == 1 else f"{parts} separate parts were"
+        )
+        warnings.append(f"{dropped_parts} dropped: {loss}")
     tissue = np.where(mask & ~main, 0, labels)
     cortex = np.isin(tissue, scheme.cortex)
     holes = main & ~mask
@@ -150,8 +153,12 @@ def read_cerebrum(
     # not from the cortex
     _fill_from_nearest(tissue, holes & unlabelled, mask & main & ~cortex)
     fluid_ml = float(open_fluid.sum() * voxel_ml)
-    dropped_parts = {"parts": parts, "parts_mL": float(dropped * voxel_ml)}
-    report["outside"] = {"ventricles_mL": fluid_ml, "stalks": stalks, **dropped_parts}
+    report["outside"] = {
+        "ventricles_mL": fluid_ml,
+        "stalks": stalks,
+        "parts": parts,
+        "parts_mL": float(dropped * voxel_ml),
+    }
     lost = fluid_ml + sum(stalk["volume_mm3"] for stalk in stalks) * ML_PER_MM3
     if lost > REPORTED_LOSS * mask.sum() * voxel_ml:
         warnings.append(

@@ -214,4 +214,4 @@ def _pieces_in_words(mask: Mask, affine: Floats) -> str:
 def _place_in_words(voxels: np.ndarray, affine: Floats) -> str:
     """Return the centre in mm of (n, 3) voxels."""
     place = transform_points(voxels.mean(axis=0, keepdims=True), affine)[0]
-    return f"({', '.join(f'{x:.0f}' for x in place)}) mm"
+    return f"({', '.join(str(round(x)) for x in place)}) mm"

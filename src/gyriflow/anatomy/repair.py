@@ -104,9 +104,12 @@ def sound_pieces(
             f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?"
         )
     if dropped > REPORTED_LOSS * remaining:
+        count = repairs["pieces_dropped"]
+        pieces_words = "a piece" if count == 1 else f"{count} pieces"
         warnings.append(
-            f"{repairs['pieces_dropped']} pieces outside or inside the brain were"
-            f" dropped: {100 * dropped / (remaining + dropped):.1f} % of the area"
+            f"{pieces_words} outside or inside the brain"
+            f" {'was' if count == 1 else 'were'} dropped:"
+            f" {100 * dropped / (remaining + dropped):.1f} % of the area"
         )
     warnings += [
         f"a hemisphere is open at its medial wall, {width:.0f} mm across: it was closed"
@@ -182,9 +185,15 @@ def require_sound(mesh: TriangleMesh) -> None:
     """Raise MeshError if the surface is not made of closed spheres without
     self-intersections."""
     if problems := faults(mesh):
-        expected = "closed pieces of Euler number 2 without self-intersections"
         raise MeshError(
-            "the surface could not be repaired", found=problems, expected=expected
+            "the surface could not be repaired",
+            found=problems,
+            expected="closed pieces of Euler number 2 without self-intersections",
+            remedy=(
+                "An Euler number of 0 is a handle or a tunnel. Look where the surface"
+                " crosses itself or has vertices far off, mend its segmentation there,"
+                " and export it again."
+            ),
         )
 
 
