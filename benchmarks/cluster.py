@@ -1,25 +1,25 @@
-"""Forecast what a cohort takes on a cluster, with `gyriflow check`: scans that are
+"""Forecast what a cohort takes on a cluster, as `gyriflow check` does: scans that are
 measured only, and scans that are also folded.
 
     ./run python benchmarks/cluster.py FOLDER [--measured 100] [--folded 20]
 
 The scans of FOLDER/measured are links to the shipped label volumes, in turn, from 21 to
 34 GW; those of FOLDER/folded are of 21 to 25 GW, each folded for five weeks by the
-paper's model. Nothing is run. Below the forecasts are those of a job of each stage, for
-the youngest and the oldest scan (CPU seconds). The last line is one JSON object.
+paper's model. Nothing is run, and unlike `check` this opens no scan. Below the
+forecasts are those of a job of each stage, for the youngest and the oldest scan (CPU
+seconds). The last line is one JSON object.
 """
 
 import argparse
 import json
 import re
-import subprocess
-import sys
 from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
 from common import ROOT
 
+from gyriflow.cli.check import work_of
 from gyriflow.io.yaml_files import read_keys, write_yaml
 from gyriflow.running.cost import job_seconds, simulation_needs
 from gyriflow.settings.base import folder_of
@@ -70,21 +70,18 @@ def write_study(folder: Path, number: int, *, is_folded: bool) -> Path:
             settings["start"] = [
                 brain["id"] for brain in brains if brain["week"] == week
             ]
-        study |= {"start": "all", "runs": runs}
+        end = LAST_START_GW + FOLDED_WEEKS
+        study |= {"start": "all", "folding": {"end_week": end}, "runs": runs}
     path = folder / "study.yaml"
     write_yaml(path, study)
     return path
 
 
-def check(config: Path) -> dict[str, str]:
-    """Return the forecasts of `gyriflow check`, by the word that they begin with."""
-    command = [sys.executable, "-m", "gyriflow.cli", "check", str(config)]
-    options = ["--directory", str(config.parent), "--cores", str(CORES)]
-    done = subprocess.run(
-        [*command, *options], capture_output=True, text=True, check=True
-    )
+def forecast(config: Path, study: Study) -> dict[str, str]:
+    """Return the last lines of `gyriflow check`, by the word that they begin with."""
+    cores = ["--cores", str(CORES)]
     lines = {}
-    for line in done.stdout.splitlines():
+    for line, _ in work_of(config, config.parent, CORES, cores, study):
         word, _, rest = line.partition(" ")
         if word in ("to", "time", "work", "memory", "disk"):
             lines[word] = rest.strip()
@@ -127,7 +124,7 @@ def main() -> None:
             study = resolve(load(read_keys(path), folder_of(path)))
         rows[name] = {
             "scans": number,
-            "check": check(path),
+            "check": forecast(path, study),
             "stages": stages(study, MEASURING + (FOLDING if is_folded else ())),
         }
         if is_folded:

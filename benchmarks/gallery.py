@@ -5,7 +5,8 @@ each, and draw what is wrong.
 
 The sound brain is the shipped one of 25 GW (operated). FOLDER gets the damaged files, a
 study of them and its results up to the surface stage. Printed is what gyriflow says of
-each brain: the words in docs/how-to/bad-inputs.md. A picture has the sound brain on the
+each brain, but what it says of the sound one, too: the words in
+docs/how-to/bad-inputs.md. A picture has the sound brain on the
 left and the damaged one on the right, at one scale, with the outline of the surface if
 one was made.
 """
@@ -13,6 +14,7 @@ one was made.
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -185,7 +187,7 @@ def missing_cortex(sound: Sound) -> Damaged:
 
 
 def lost_white_matter(sound: Sound) -> Damaged:
-    """A ball of white matter has the label of the outer CSF."""
+    """White matter up to the surface has the label of the outer CSF."""
     ball = sound.within((14.0, -16.0, 4.0), LOST_MM)
     is_lost = ball & (sound.labels == WHITE)
     return of_labels(sound, np.where(is_lost, OUTER_CSF, sound.labels), at=-16.0)
@@ -342,6 +344,21 @@ def verdict(messages: list[Message]) -> str:
     if "error" in levels:
         return "refused"
     return "needs review" if levels else "fine"
+
+
+def in_folder(text: str, folder: Path) -> str:
+    """Return a message with the paths of its files in the folder of the study."""
+    return text.replace(f"{folder.resolve()}/", "")
+
+
+def without_numbers(text: str) -> str:
+    """Return a message without its numbers."""
+    return re.sub(r"[\d.]+", "", text)
+
+
+def unlike(texts: list[str], known: set[str]) -> list[str]:
+    """Return the messages that, but for their numbers, are not among the known ones."""
+    return [text for text in texts if without_numbers(text) not in known]
 
 
 @styled
@@ -511,16 +528,13 @@ def main() -> None:
     rows: dict[str, dict[str, Any]] = {}
     for name in whole:
         found = messages.get(name, [])
-        rows[name] = {
-            "verdict": verdict(found),
-            # as on a page, where the folder does not matter
-            "messages": [
-                message.text.replace(f"{arguments.folder.resolve()}/", "")
-                for message in found
-            ],
-        }
+        texts = [in_folder(message.text, arguments.folder) for message in found]
+        if name != SOUND:
+            of_sound = map(without_numbers, rows[SOUND]["messages"])
+            texts = unlike(texts, set(of_sound))
+        rows[name] = {"verdict": verdict(found), "messages": texts}
         print(f"{name}: {rows[name]['verdict']}")
-        for text in rows[name]["messages"]:
+        for text in texts:
             print(f"  {text}")
     if arguments.figures:
         arguments.figures.mkdir(parents=True, exist_ok=True)

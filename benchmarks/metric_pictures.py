@@ -8,6 +8,7 @@ the numbers that the picture shows.
 """
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,7 @@ SCHEME = SCHEMES["spina-bifida-atlas"]
 HULL_COLOUR = "#0072B2"
 COLUMNS, ROW_IN = 3, 1.75
 DOTS_PER_INCH = 120
+BANDS = (4, 5)
 # every so many vertices of the section have a line of thickness
 LINES_EVERY = 3
 SECTION_MM = 1.0
@@ -77,15 +79,22 @@ COMPARED = (
 )
 
 
-@styled
-def main() -> None:
-    """Measure the brain and draw the picture."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("picture", type=Path)
-    picture = parser.parse_args().picture
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What is drawn: the surfaces in the brain's pose, its metrics, and the parts (n,)
+    of the left hemisphere's mean curvature (1/mm) in bands."""
 
+    pial: PialSurface
+    left: TriangleMesh
+    inner: TriangleMesh
+    brain: BrainMetrics
+    hull: TriangleMesh
+    envelope: TriangleMesh
+    in_bands: dict[int, Floats]
+
+
+def measure() -> Measured:
+    """Measure the brain."""
     volume = read_sound().volume
     pial = from_labels(volume.labels, volume.affine, SCHEME, week=WEEK, open_sulci=True)
     assert pial.left is not None
@@ -95,34 +104,39 @@ def main() -> None:
     sides = {"left": pial.left, "right": pial.right}
     inner = merged(*white_from_labels(*placed, sides, pial.pose).values())
     brain = measure_brain(
-        pial.whole,
+        pial.whole, pial.left, pial.right, thickness_mm=thickness.measured_mm
+    )
+    return Measured(
+        pial,
         pial.left,
-        pial.right,
-        thickness_mm=thickness.measured_mm,
+        inner,
+        brain,
+        convex_hull(pial.left),
+        envelope(pial.left),
+        parts_in_bands(pial.left),
     )
 
+
+@styled
+def draw(measured: Measured) -> Figure:
+    """Draw the figure, a panel for each metric or map."""
     figure = Figure(figsize=(FULL_WIDTH_IN, 5 * ROW_IN), layout="constrained")
-    panels = iter(figure.subplots(5, COLUMNS).flat)
-    every = list(figure.axes)
-    left = pial.left
+    grid = list(figure.subplots(5, COLUMNS).flat)
+    panels = iter(grid)
+    left, brain = measured.left, measured.brain
+    maps = brain.maps["left"]
 
     draw_cut(next(panels), left)
-    hull, around = convex_hull(left), envelope(left)
-    draw_section(next(panels), left, hull, "gyrification_index\npial surface, hull")
-    draw_section(
-        next(panels),
-        left,
-        around,
-        "gyrification_index_envelope\npial surface, envelope",
-    )
-    maps = brain.maps["left"]
+    title = "gyrification_index\npial surface, hull"
+    draw_section(next(panels), left, measured.hull, title)
+    title = "gyrification_index_envelope\npial surface, envelope"
+    draw_section(next(panels), left, measured.envelope, title)
     for name in ("sulcal_depth_mm", "local_gyrification_index"):
         draw_map(next(panels), left, name, maps[name])
-    draw_thickness(next(panels), pial, inner)
+    draw_thickness(next(panels), measured.pial, measured.inner)
     for name in ("shape_index", "mean_curvature", "curvedness"):
         draw_map(next(panels), left, name, maps[name])
-    for band in (4, 5):
-        values = band_map(left, band)
+    for band, values in measured.in_bands.items():
         end = float(np.quantile(np.abs(values), 0.98))
         draw_map(
             next(panels),
@@ -132,23 +146,25 @@ def main() -> None:
             title=f"spangy_B{band}_power\nmean curvature (1/mm) in B{band}",
             scale=colour_scale(SIGNED_COLOURS, -end, end),
         )
-    draw_map(next(panels), left, "spangy_dominant_band", maps["spangy_dominant_band"])
-    draw_map(next(panels), left, "thickness_mm", maps["thickness_mm"])
+    for name in ("spangy_dominant_band", "thickness_mm"):
+        draw_map(next(panels), left, name, maps[name])
     draw_quantiles(next(panels), left, brain)
     draw_asymmetry(next(panels), brain)
-    add_letters(every)
-    save(figure, picture)
+    add_letters(grid)
+    return figure
 
 
-def band_map(mesh: TriangleMesh, band: int) -> Floats:
-    """Return the part of the mean curvature (1/mm) of a hemisphere in a band."""
+def parts_in_bands(mesh: TriangleMesh) -> dict[int, Floats]:
+    """Return the parts of the mean curvature (1/mm) of a hemisphere in `BANDS`."""
     bent = curvature(mesh, radius_mm=CURVATURE_RADIUS_MM)
-    basis = spectral_basis(mesh, "B5")
+    basis = spectral_basis(mesh, f"B{max(BANDS)}")
     found = spectrum(bent.mean, basis, radius_mm=CURVATURE_RADIUS_MM)
-    in_band = found.band == band
-    return np.asarray(
-        basis.places @ (basis.functions[:, in_band] @ found.coefficients[in_band])
-    )
+    parts = {}
+    for band in BANDS:
+        is_in = found.band == band
+        part = basis.functions[:, is_in] @ found.coefficients[is_in]
+        parts[band] = np.asarray(basis.places @ part)
+    return parts
 
 
 def draw_surface(
@@ -261,6 +277,16 @@ def draw_asymmetry(axes: Axes, brain: BrainMetrics) -> None:
     axes.set(xlabel="right has more ← 0 → left has more")
     axes.set_title("asymmetry index")
     print(values.to_string())
+
+
+def main() -> None:
+    """Measure the brain and draw the picture."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("picture", type=Path)
+    picture = parser.parse_args().picture
+    save(draw(measure()), picture)
 
 
 if __name__ == "__main__":

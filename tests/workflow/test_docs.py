@@ -153,7 +153,6 @@ def test_the_gallery_has_the_words_of_each_case(tmp_path):
     assert done.returncode == 0, done.stderr
     page = " ".join(GALLERY.read_text().split())
     cases = json.loads(done.stdout.splitlines()[-1])
-    assert cases.pop("sound")["verdict"] == "fine"
     missing = [
         f"{name}: {text}"
         for name, case in cases.items()

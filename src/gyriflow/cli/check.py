@@ -426,6 +426,7 @@ def _needs(
         "memory",
         memory or MIN_SURFACE_MIB / 4,
         available_memory_mib() if here else None,
+        "the foldings that run" if foldings else "each step that runs",
     )
     folder = next(
         path
@@ -469,10 +470,11 @@ def _fits(
     name: str,
     mib: float,
     there_mib: float | None,
+    users: str = "",
 ) -> Iterator[tuple[str, bool]]:
     bad = there_mib is not None and mib > there_mib
     here = (
-        ", for the foldings that run at the same time"
+        f", for {users} at the same time"
         if there_mib is None
         else f"; {_gib(there_mib)} available"
     )
