@@ -453,10 +453,11 @@ def _draw_whites(panels: np.ndarray, sound: Sound, brain: Damaged) -> None:
 def _draw_surfaces(
     panels: np.ndarray, sound: Sound, brain: Damaged, title: str
 ) -> None:
-    """Draw surfaces from one side at one scale; hemispheres in two colours where they
-    are exchanged."""
+    """Draw surfaces from one side at one scale; hemispheres in two colours if they
+    are two surfaces."""
     view = VIEWS[brain.view]
     colours = (OBSERVED_SURFACE_COLOUR, "#8FB4DC")
+    has_sides = "whole" not in brain.surfaces
     damaged = merged(*brain.surfaces.values())
     given = [(sound.sides, SOUND), (brain.surfaces, title)]
     wide, tall = np.max(
@@ -468,7 +469,7 @@ def _draw_surfaces(
         mesh = merged(*parts.values())
         painted = np.concatenate(
             [
-                uniform_colours(part, colours[side == "right"])
+                uniform_colours(part, colours[has_sides and side == "right"])
                 for side, part in parts.items()
             ]
         )

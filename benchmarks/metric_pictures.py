@@ -146,8 +146,10 @@ def draw(measured: Measured) -> Figure:
             title=f"spangy_B{band}_power\nmean curvature (1/mm) in B{band}",
             scale=colour_scale(SIGNED_COLOURS, -end, end),
         )
-    for name in ("spangy_dominant_band", "thickness_mm"):
-        draw_map(next(panels), left, name, maps[name])
+    name = "spangy_dominant_band"
+    scale = colour_scale(SIGNED_COLOURS, -max(BANDS), max(BANDS))
+    draw_map(next(panels), left, name, maps[name], scale=scale)
+    draw_map(next(panels), left, "thickness_mm", maps["thickness_mm"])
     draw_quantiles(next(panels), left, brain)
     draw_asymmetry(next(panels), brain)
     add_letters(grid)
