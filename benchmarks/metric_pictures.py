@@ -61,6 +61,7 @@ from gyriflow.report.style import (
 
 SCHEME = SCHEMES["spina-bifida-atlas"]
 HULL_COLOUR = "#0072B2"
+PLAIN_COLOURS = "YlGnBu"
 COLUMNS, ROW_IN = 3, 1.75
 DOTS_PER_INCH = 120
 BANDS = (4, 5)
@@ -191,10 +192,15 @@ def draw_map(
     scale: ScalarMappable | None = None,
 ) -> None:
     """Draw a map on the left hemisphere, from its left, with its colours."""
-    scale = scale or scale_of(name, values)
+    record = VERTEX_MAPS[name]
+    if scale is None and (record.colours or record.is_signed):
+        scale = scale_of(name, values)
+    elif scale is None:
+        # a map that pages do not show has no colours of its own
+        scale = colour_scale(PLAIN_COLOURS, 0.0, float(np.nanquantile(values, 0.98)))
     draw_surface(axes, mesh, paint(values, scale), "left", MAP)
     axes.figure.colorbar(scale, ax=axes, shrink=0.7, aspect=12, pad=0.02)
-    unit = VERTEX_MAPS[name].unit
+    unit = record.unit
     axes.set_title(title or f"{name}{'' if unit in ('1', '') else f' ({unit})'}")
 
 
