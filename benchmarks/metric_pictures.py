@@ -68,7 +68,7 @@ BANDS = (4, 5)
 # every so many vertices of the section have a line of thickness
 LINES_EVERY = 3
 SECTION_MM = 1.0
-ZOOM_MM = 16.0
+ZOOM_MM = 12.0
 QUANTILES = ("q05", "q25", "q50", "q75", "q95")
 COMPARED = (
     "volume",
@@ -128,10 +128,9 @@ def draw(measured: Measured) -> Figure:
     maps = brain.maps["left"]
 
     draw_cut(next(panels), left)
-    title = "gyrification_index\npial surface, hull"
-    draw_section(next(panels), left, measured.hull, title)
-    title = "gyrification_index_envelope\npial surface, envelope"
-    draw_section(next(panels), left, measured.envelope, title)
+    draw_section(next(panels), left, measured.hull, "gyrification_index", "hull")
+    title = "gyrification_index_envelope"
+    draw_section(next(panels), left, measured.envelope, title, "envelope")
     for name in ("sulcal_depth_mm", "local_gyrification_index"):
         draw_map(next(panels), left, name, maps[name])
     draw_thickness(next(panels), measured.pial, measured.inner)
@@ -144,7 +143,8 @@ def draw(measured: Measured) -> Figure:
             left,
             "mean_curvature",
             values,
-            title=f"spangy_B{band}_power\nmean curvature (1/mm) in B{band}",
+            title=f"spangy_B{band}_power",
+            note=f"mean curvature (1/mm) in B{band}",
             scale=colour_scale(SIGNED_COLOURS, -end, end),
         )
     name = "spangy_dominant_band"
@@ -189,6 +189,7 @@ def draw_map(
     values: Floats,
     *,
     title: str = "",
+    note: str = "",
     scale: ScalarMappable | None = None,
 ) -> None:
     """Draw a map on the left hemisphere, from its left, with its colours."""
@@ -202,6 +203,12 @@ def draw_map(
     axes.figure.colorbar(scale, ax=axes, shrink=0.7, aspect=12, pad=0.02)
     unit = record.unit
     axes.set_title(title or f"{name}{'' if unit in ('1', '') else f' ({unit})'}")
+    write_below(axes, note)
+
+
+def write_below(axes: Axes, note: str) -> None:
+    """Write what a panel shows below it."""
+    axes.text(0.5, -0.02, note, transform=axes.transAxes, ha="center", va="top")
 
 
 def draw_cut(axes: Axes, mesh: TriangleMesh) -> None:
@@ -211,11 +218,16 @@ def draw_cut(axes: Axes, mesh: TriangleMesh) -> None:
     by_face = np.repeat(colours[:1], len(closed.faces), axis=0)
     by_face[len(mesh.faces) :] = uniform_colours(closed, NEUTRAL_COLOUR)[0]
     draw_surface(axes, closed, by_face, "right", TISSUE)
-    axes.set_title("area\nmedial side; grey: the cut, left out")
+    axes.set_title("area")
+    write_below(axes, "medial side; grey: the cut, left out")
 
 
 def draw_section(
-    axes: Axes, mesh: TriangleMesh, around: TriangleMesh, title: str
+    axes: Axes,
+    mesh: TriangleMesh,
+    around: TriangleMesh,
+    title: str,
+    name: str,
 ) -> None:
     """Draw a coronal section of a hemisphere and of what is around it."""
     at = float(np.median(mesh.vertices[:, 1]))
@@ -225,6 +237,7 @@ def draw_section(
     axes.autoscale_view()
     axes.set_axis_off()
     axes.set_title(title)
+    write_below(axes, f"orange: pial surface; blue: {name}")
 
 
 def draw_thickness(axes: Axes, pial: PialSurface, inner: TriangleMesh) -> None:
@@ -243,12 +256,12 @@ def draw_thickness(axes: Axes, pial: PialSurface, inner: TriangleMesh) -> None:
     axes.add_collection(
         LineCollection(list(lines), colors=MUTED_COLOUR, linewidths=0.6)
     )
-    x = mesh.vertices[near, 0].min() + ZOOM_MM / 2
-    z = float(mesh.vertices[near[mesh.vertices[near, 0].argmin()], 2])
+    outermost = mesh.vertices[near[mesh.vertices[near, 0].argmin()]]
     half = np.array([-ZOOM_MM, ZOOM_MM]) / 2
-    axes.set(xlim=x + 1.5 * half - 1, ylim=z + half, aspect="equal")
+    axes.set(xlim=outermost[0] + half, ylim=outermost[2] + half, aspect="equal")
     axes.set_axis_off()
-    axes.set_title("mean_thickness\npial surface, inner border")
+    axes.set_title("mean_thickness")
+    write_below(axes, "orange: pial surface; green: inner border")
 
 
 def draw_quantiles(axes: Axes, mesh: TriangleMesh, brain: BrainMetrics) -> None:
@@ -258,7 +271,7 @@ def draw_quantiles(axes: Axes, mesh: TriangleMesh, brain: BrainMetrics) -> None:
     areas = vertex_areas(mesh)
     axes.hist(
         bent[is_reliable],
-        bins=np.linspace(-0.6, 0.8, 57),
+        bins=np.linspace(-0.2, 0.4, 61),
         weights=areas[is_reliable] / areas[is_reliable].sum(),
         color=OBSERVED_SURFACE_COLOUR,
     )
