@@ -18,6 +18,9 @@ from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, tran
 PAD_VOXELS = 6
 # σ of the Gaussian that smooths a mask before its isosurface is extracted
 SMOOTHING_VOXELS = 1.0
+# how often what this Gaussian has taken away is added again; more would keep more of
+# the terraces than of the folds
+N_TWICINGS = 2
 LEVEL = 0.5
 # slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
 EDGE_SLOPE = 0.4
@@ -126,6 +129,19 @@ def smooth_mask(
     """Return the mask smoothed by a Gaussian of the given σ in voxels, as a field from
     0 to 1."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
+
+
+def sharp_mask(mask: Mask) -> NDArray[np.float32]:
+    """Return the mask smoothed as by `smooth_mask`, with the height of its folds.
+
+    A Gaussian G lowers folds and moves curved walls. What it takes away, smoothed as
+    well, is added again (twicing, Tukey 1977): 1 − (1 − G)³ instead of G, whose lowest
+    term is of the sixth order in σ over the wavelength instead of the second.
+    """
+    field = smooth_mask(mask)
+    for _ in range(N_TWICINGS):
+        field += ndimage.gaussian_filter(mask - field, SMOOTHING_VOXELS)
+    return field
 
 
 def remove_bridges(
