@@ -159,8 +159,11 @@ def cortical_thickness(
 
 
 def border(mask: Mask, affine: Floats) -> TriangleMesh:
-    """Return the surface in mm around the main parts of an (i, j, k) mask, with the
-    height of its folds, moved to enclose their volume."""
+    """Return the surface in mm around the main parts of an (i, j, k) mask, moved to
+    enclose their volume.
+
+    A border whose folds are lower than those of the pial surface is too far from it.
+    """
     field = sharp_mask(mask)
     kept, _, _ = main_parts(field > LEVEL)
     field = np.where(
