@@ -20,7 +20,10 @@ predicted shape (`delivered`), which is what a study measures. The map of an ind
 depends on its kind and seed only.
 
 The last line is one JSON object: `rows` with `grown_by`, `persistence`, `individual`,
-`horizon` (GW), `model`, `distance_mm`, `r_shape_index`.
+`horizon` (GW), `model`, `distance_mm`, `r_shape_index`; of `delivered` also the
+differences of area, volume, folding (gyrification index) and mean sulcal depth, as
+fractions of the later brain's, which are the errors of its metrics. A table shows the
+largest and the root mean square of these.
 """
 
 import argparse
@@ -36,6 +39,8 @@ import pandas as pd
 from common import print_rows, r_shape_index, run_workflow
 from scipy.ndimage import map_coordinates
 
+from gyriflow.anatomy.fissure import cut_sides, nearer_left
+from gyriflow.compare.accuracy import FOLDING, QUANTITIES, log_value
 from gyriflow.compare.comparison import aligned_distances
 from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
@@ -49,6 +54,8 @@ from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_keys
+from gyriflow.metrics.measure import folding_metrics, measure_folds, size_metrics
+from gyriflow.settings.terms import CURVATURE_RADIUS_MM, SIDES
 from gyriflow.shipped import ATLASES
 from gyriflow.study.paths import MESH, PIAL, REGISTERED
 
@@ -185,11 +192,44 @@ def targets_of(
     return result
 
 
+def metrics_of(
+    whole: TriangleMesh, left: TriangleMesh, right: TriangleMesh
+) -> dict[str, float]:
+    """Return the metrics of a brain's size and folding."""
+    sides = (left, right)
+    folds = [measure_folds(side, CURVATURE_RADIUS_MM) for side in sides]
+    return size_metrics(whole, sides) | folding_metrics(folds)
+
+
+def differences(
+    found: dict[str, float], observed: dict[str, float]
+) -> dict[str, float]:
+    """Return the differences of metrics from the observed brain's, as fractions; that
+    of the gyrification index is of the folding."""
+    result = {}
+    for metric in QUANTITIES:
+        name = "folding" if metric == FOLDING else metric
+        error = log_value(metric, found[metric]) - log_value(metric, observed[metric])
+        result[f"{name}_difference"] = float(np.expm1(error))
+    return result
+
+
+def surfaces_of(
+    folder: Path, brain: str
+) -> tuple[TriangleMesh, TriangleMesh, TriangleMesh]:
+    """Return the whole surface of a brain and those of its left and right side."""
+    whole, left, right = (
+        read_surface(folder / PIAL[part].format(brain=brain))
+        for part in ("whole", *SIDES)
+    )
+    return whole, left, right
+
+
 def scores_of(
     folder: Path, name: str, atlas: str, weeks: Sequence[int]
 ) -> list[dict[str, Any]]:
     """Return the distances and correlations of all models of an individual, with both
-    persistences."""
+    persistences, and the differences of the delivered surface's metrics."""
     start, rows = weeks[0], []
     brain = f"{name}-kept-{start}"
     targets = targets_of(
@@ -197,13 +237,21 @@ def scores_of(
         brain,
         {float(week): f"{atlas}-{week}" for week in range(start, weeks[-1] + 1)},
     )
+    delivered_metrics = {}
+    for week in weeks[1:]:
+        delivered = targets[week]["delivered"]
+        whole, left, right = surfaces_of(folder, f"{atlas}-{week}")
+        if delivered is targets[week]["predicted"]:
+            # the mesh's own surface, where an observed one would cross itself
+            _, left, right = surfaces_of(folder, brain)
+            mesh = read_tetrahedral_mesh(folder / MESH["mesh"].format(brain=brain))
+            whole, _ = boundary_surface(mesh)
+        sides = cut_sides(delivered, nearer_left(whole, left, right))
+        delivered_metrics[week] = metrics_of(delivered, *sides)
     for persistence, week in product(KEPT_GW, weeks[1:]):
-        observed = read_surface(
-            folder / PIAL["whole"].format(brain=f"{name}-{persistence}-{week}")
-        )
-        atlas_brain = read_surface(
-            folder / PIAL["whole"].format(brain=f"{atlas}-{week}")
-        )
+        parts = surfaces_of(folder, f"{name}-{persistence}-{week}")
+        observed, observed_metrics = parts[0], metrics_of(*parts)
+        atlas_brain, _, _ = surfaces_of(folder, f"{atlas}-{week}")
         models = targets[week] | {
             "atlas": scale_to_volume(atlas_brain, targets[week]["predicted"])
         }
@@ -219,9 +267,10 @@ def scores_of(
                 "model": model,
                 "distance_mm": aligned_distances(surface, observed)["distance_mm"],
             }
-            rows.append(
-                row | {"r_shape_index": r_shape_index(surface, observed, folds)}
-            )
+            row["r_shape_index"] = r_shape_index(surface, observed, folds)
+            if model == "delivered":
+                row |= differences(delivered_metrics[week], observed_metrics)
+            rows.append(row)
     return rows
 
 
@@ -330,9 +379,18 @@ def main() -> None:
             rows += [
                 row for found in pool.map(score, arguments.individuals) for row in found
             ]
-    means = pd.DataFrame(rows).groupby(["persistence", "horizon", "model"])
+    table = pd.DataFrame(rows)
+    means = table.groupby(["persistence", "horizon", "model"])
     columns = ["distance_mm", "r_shape_index"]
     print(means[columns].mean().to_string(float_format="%.3f"))
+    delivered = table[table["model"] == "delivered"]
+    errors = delivered.filter(like="_difference").abs()
+    by_horizon = errors.groupby([delivered["persistence"], delivered["horizon"]])
+    squares = (errors**2).groupby([delivered["persistence"], delivered["horizon"]])
+    print("largest")
+    print(by_horizon.max().to_string(float_format="%.3f"))
+    print("root mean square")
+    print(np.sqrt(squares.mean()).to_string(float_format="%.3f"))
     print_rows(rows)
 
 

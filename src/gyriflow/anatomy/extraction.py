@@ -18,6 +18,9 @@ from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, tran
 PAD_VOXELS = 6
 # σ of the Gaussian that smooths a mask before its isosurface is extracted
 SMOOTHING_VOXELS = 1.0
+# how often what this Gaussian has taken away is added again; a third time brings back
+# more of the terraces than of the folds
+N_TWICINGS = 2
 LEVEL = 0.5
 # slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
 EDGE_SLOPE = 0.4
@@ -126,6 +129,20 @@ def smooth_mask(
     """Return the mask smoothed by a Gaussian of the given σ in voxels, as a field from
     0 to 1."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
+
+
+def sharp_mask(mask: Mask) -> NDArray[np.float32]:
+    """Return the mask smoothed as by `smooth_mask`, but with a third of its loss of
+    folds.
+
+    A Gaussian G lowers a wall's folds of wave number k by σ²k²/2 of their height. What
+    it takes away, smoothed as well, is added again (twicing, Tukey 1977): 1 − (1 − G)³
+    in place of G lowers them by a third of that, and moves flat walls as little.
+    """
+    field = smooth_mask(mask)
+    for _ in range(N_TWICINGS):
+        field += ndimage.gaussian_filter(mask - field, SMOOTHING_VOXELS)
+    return field
 
 
 def remove_bridges(

@@ -210,15 +210,19 @@ def faults(mesh: TriangleMesh) -> str:
     return ", ".join(fault for fault in problems if fault)
 
 
+def taubin_smoothed(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a surface smoothed without shrinking (Taubin 1995, λ = 0.5, μ = −0.53)."""
+    document = remeshing.in_meshlab(mesh)
+    document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
+    return remeshing.from_meshlab(document)
+
+
 def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
-    """Smooth (Taubin 1995, λ = 0.5, μ = −0.53), remesh and untangle a surface; also
-    count crossing faces before.
+    """Smooth, remesh and untangle a surface; also count crossing faces before.
 
     Walls of a narrow slit that keep crossing are not smoothed.
     """
-    document = remeshing.in_meshlab(mesh)
-    document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
-    smooth = remeshing.from_meshlab(document)
+    smooth = taubin_smoothed(mesh)
     even, crossing, remaining = remeshing.untangle(
         remeshing.remesh(smooth, edge_length_mm)
     )

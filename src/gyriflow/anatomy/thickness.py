@@ -27,10 +27,18 @@ from ..geometry.triangles import (
 )
 from ..settings.schemes import FILLED, LabelScheme
 from ..settings.terms import SIDES, Side
-from .extraction import LEVEL, Floats, Mask, isosurface, main_parts, smooth_mask
+from .extraction import (
+    LEVEL,
+    Floats,
+    Mask,
+    isosurface,
+    main_parts,
+    sharp_mask,
+    smooth_mask,
+)
 from .fissure import FISSURE_MM, cut_sides, nearer_left, sample
 from .labels import Labels, read_cerebrum
-from .repair import make_sound, sound_pieces, surface_of_mask
+from .repair import make_sound, sound_pieces, surface_of_mask, taubin_smoothed
 
 log = logging.getLogger(__name__)
 
@@ -152,13 +160,17 @@ def cortical_thickness(
 
 def border(mask: Mask, affine: Floats) -> TriangleMesh:
     """Return the surface in mm around the main parts of an (i, j, k) mask, moved to
-    enclose their volume."""
-    field = smooth_mask(mask)
+    enclose their volume.
+
+    A border whose folds are lower than those of the pial surface is too far from it.
+    """
+    field = sharp_mask(mask)
     kept, _, _ = main_parts(field > LEVEL)
     field = np.where(
         kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)
     )
-    mesh = isosurface(field.astype(np.float32), affine)
+    # terraces of voxels would be nearer than the wall they lie on
+    mesh = taubin_smoothed(isosurface(field.astype(np.float32), affine))
     mask_mm3 = main_parts(mask)[0].sum() * abs(np.linalg.det(affine[:3, :3]))
     missing_mm3 = mask_mm3 - signed_volume(mesh)
     return TriangleMesh(

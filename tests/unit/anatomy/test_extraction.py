@@ -19,6 +19,7 @@ from gyriflow.anatomy.extraction import (
     parts_in_boxes,
     refine,
     remove_bridges,
+    sharp_mask,
     smooth_mask,
     unambiguous,
     without_handles,
@@ -290,3 +291,29 @@ def test_a_bridge_is_cut_though_what_it_joins_meets_far_away_only():
         counts["bridges_cut"],
         counts["voxels_cut_from_bridges"],
     ) == (0, 1, 1)
+
+
+def height_of_waves(field, k):
+    """Return the height of waves cos(k x) of a wall z(x, y), by linear interpolation
+    along z; the ends of x and y, which the Gaussian has changed, are left out."""
+    last = (field > 0.5).sum(axis=2, keepdims=True) - 1
+    inside = np.take_along_axis(field, last, axis=2)
+    outside = np.take_along_axis(field, last + 1, axis=2)
+    wall = (last + (inside - 0.5) / (inside - outside))[8:40, 5:25, 0]
+    x = np.arange(8, 40)[:, None]
+    return 2.0 * float((wall * np.cos(k * x)).mean())
+
+
+def test_a_sharp_mask_keeps_two_thirds_more_of_waves_than_a_smooth_one():
+    """Low waves of a wall are multiplied by exp(−k²/2) by a Gaussian of one voxel, and
+    by a quotient of three such by what is added again."""
+    x, y, z = np.indices((48, 30, 44))
+    k = 2 * np.pi / 8
+    # tilted along y, so that its voxels round it up and down
+    mask = z < 22.5 + np.cos(k * x) + 0.37 * (y - 15)
+    loss = np.exp(-(k**2) / 2)
+    widths = np.array([3.0, -3.0, 1.0]) / np.sqrt([1.0, 2.0, 3.0])
+    sharp = (widths * loss ** np.array([1, 2, 3])).sum() / widths.sum()
+    assert height_of_waves(smooth_mask(mask), k) == pytest.approx(loss, abs=0.01)
+    assert height_of_waves(sharp_mask(mask), k) == pytest.approx(sharp, abs=0.01)
+    assert 1.0 - sharp < 0.45 * (1.0 - loss)
