@@ -20,7 +20,6 @@ from gyriflow.metrics.gyrification import gyrification_index, sulcal_depth
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.settings.atlas import (
     Atlas,
-    AtlasFileRecord,
     AtlasLicence,
     AtlasSeries,
     AtlasSettings,
@@ -71,7 +70,6 @@ SECTIONS = {
         "atlas: (one, or a list)": AtlasSettings,
         "The file atlas.yaml": Atlas,
         "series: by name, in atlas.yaml": AtlasSeries,
-        "A file of a week": AtlasFileRecord,
         "licence: in atlas.yaml": AtlasLicence,
     },
     "Surfaces and meshes": {"surface:": SurfaceSettings, "mesh:": MeshSettings},

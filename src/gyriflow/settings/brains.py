@@ -28,21 +28,16 @@ KEY_SOURCES: dict[str, tuple[str, ...]] = {
 MAX_AXIS_RATIO = 2.0
 """Limit of longest over shortest semi-axis; the ends of longer shapes are too sharp for
 even triangles."""
-MAX_NOISE = 0.02
-"""Largest height of the bumps relative to the shortest semi-axis."""
 Length = Annotated[float, Field(ge=5, le=150)]
 
 
 class ShapeSettings(Settings):
     """An ellipsoid in place of a brain, for teaching and verification, centred on the
-    origin; `{}` is one of 21 GW."""
+    origin; `{}` is one of 21 GW. Folding starts from smooth bumps of 0.05 mm."""
 
     semi_axes_mm: tuple[Length, Length, Length] = (21.0, 28.0, 22.0)
     """Semi-axes along X, Y, Z, all the same for a sphere; the longest is at most twice
     the shortest. [mm]"""
-    noise_mm: float = Field(0.05, ge=0, le=0.5)
-    """Root mean square height of the smooth bumps that start the folding, at most a
-    fiftieth of the shortest semi-axis. [mm]"""
 
     @property
     def kind(self) -> str:
@@ -56,13 +51,6 @@ class ShapeSettings(Settings):
                 " times the shortest"
             )
             yield KeyProblem(text, ("semi_axes_mm",))
-        # the default suits the default sizes; only a given value can be wrong
-        if self.is_set("noise_mm") and self.noise_mm > MAX_NOISE * shortest:
-            text = (
-                f"found {self.noise_mm:g}; expected at most {MAX_NOISE * shortest:g}, a"
-                " fiftieth of the shortest"
-            )
-            yield KeyProblem(f"{text} semi-axis", ("noise_mm",))
 
 
 class HemisphereFiles(Settings):

@@ -97,17 +97,13 @@ def _of_population(run: Mapping[str, Any]) -> bool:
 GROWTH_MODELS: dict[ModelName, GrowthModel] = {
     "rates": GrowthModel(
         keys=(),
-        rates=(
-            "growth_rate_per_s",
-            "radial_growth_rate_per_s",
-            "core_growth_rate_per_s",
-        ),
+        rates=("growth_rate_per_s", "core_growth_rate_per_s"),
         measured=None,
         sentence=_rates_sentence,
     ),
     "sizes": GrowthModel(
         keys=SIZES,
-        rates=("radial_growth_rate_per_s",),
+        rates=(),
         measured="sizes",
         sentence=_sizes_sentence,
     ),

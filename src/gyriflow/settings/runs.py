@@ -36,7 +36,6 @@ FREE_GROWTH: dict[str, Any] = {
     "shear_modulus_core_pa": 300.0,
     "support": "free",
     "contact": "global",
-    "no_growth": "none",
 }
 """Growth everywhere, a free body, a cortex as stiff as the core: growth makes the
 folds, not buckling."""
@@ -53,12 +52,10 @@ PRESETS: dict[str, dict[str, Any]] = {
         "material": "neo-hookean",
         "poisson_ratio": 0.45,
         "growth_rate_per_s": 2.0e-7,
-        "radial_growth_rate_per_s": 0.0,
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
         "contact": "planes",
-        "no_growth": "ellipsoid",
     },
     # growth towards the shapes that were measured on the brain's own series
     "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},

@@ -34,8 +34,6 @@ REGION_FIELDS: tuple[RegionField, ...] = get_args(RegionField)
 
 Mesher = Literal["pytetwild", "tetgen"]
 """The programs that fill a surface with tetrahedra."""
-MAX_HOLE_MM = 20.0
-"""Upper bound of the setting `max_hole_mm`."""
 Coordinates = Literal["auto", "ras", "lps"]
 """Axes of the coordinates in surface files; `auto`: determined from the shape."""
 AffineSource = Literal["auto", "sform", "qform"]

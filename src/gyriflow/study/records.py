@@ -358,5 +358,4 @@ class Download:
 
     file: str
     url: str | None
-    bytes: int | None
     sha256: str | None

@@ -121,8 +121,7 @@ def _downloads(atlases: Iterable[UsedAtlas]) -> list[Download]:
             row = Download(
                 file=str(file.path),
                 url=file.url,
-                bytes=file.record.bytes,
-                sha256=file.record.sha256,
+                sha256=file.sha256,
             )
             rows.append(row)
     return rows

@@ -118,7 +118,6 @@ REGIONS = {"a": {"labels": "a.nii.gz", "names": {1: "frontal"}}}
             [200, 150],
         ),
         ({"shape": {"semi_axes_mm": [10, 21, 12]}}, ".shape.semi_axes_mm", [21, 2]),
-        ({"shape": {"noise_mm": 0.45}}, ".shape.noise_mm", [0.45, 0.42]),
         ({"week": 50, "pial": "all.stl"}, ".week", [50, 45]),
     ],
 )
