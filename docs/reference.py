@@ -27,7 +27,6 @@ from gyriflow.settings.atlas import (
 from gyriflow.settings.brains import (
     BrainConfig,
     GivenRegions,
-    HemisphereFiles,
     ParticipantsSettings,
     ShapeSettings,
 )
@@ -61,7 +60,6 @@ TYPES = {
 SECTIONS = {
     "Brains": {
         "brains: (a list)": BrainConfig,
-        "hemispheres: of a brain": HemisphereFiles,
         "shape: of a brain": ShapeSettings,
         "participants:": ParticipantsSettings,
         "schemes: by name": SchemeSettings,

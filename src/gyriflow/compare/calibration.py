@@ -22,7 +22,6 @@ from ..settings.terms import (
     OBSERVED,
     PROXIES,
     SPECTRAL_SCORES,
-    STIFFNESS_RATIO,
     Score,
 )
 from .comparison import Group, ObservedBrain, compare
@@ -169,14 +168,11 @@ def calibrated_parameters(
     week.
 
     `base` is that of the base run, `values` the value of each parameter: a key of
-    `params.yaml` (with dots for nested keys), `stiffness_ratio`, or `KEY.amplitude`, a
-    factor on the curve KEY.
+    `params.yaml` (with dots for nested keys), or `KEY.amplitude`, a factor on the
+    curve KEY.
     """
     params = deepcopy(dict(base))
     for key, value in values.items():
-        if key == STIFFNESS_RATIO:
-            params["shear_modulus_cortex_pa"] = value * params["shear_modulus_core_pa"]
-            continue
         *outer, last = key.removesuffix(AMPLITUDE).split(".")
         section = params
         for name in outer:

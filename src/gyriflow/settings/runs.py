@@ -325,9 +325,8 @@ class CalibrationSettings(ComparisonSettings):
 
     parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
     """One to three keys of `folding` with their lowest and highest values, such as
-    `{thickness_mm: [1, 3]}`; inner keys with dots. `stiffness_ratio` is the cortex's
-    shear modulus over the core's; `KEY.amplitude` scales the base run's curve of
-    KEY."""
+    `{thickness_mm: [1, 3]}`; inner keys with dots. `KEY.amplitude` scales the base
+    run's curve of KEY."""
     score: dict[Score, Annotated[float, Field(gt=0)]]
     """What is minimised: the weights of one or more measures (docs/metrics.md)."""
     rounds: tuple[Annotated[int, Field(ge=1, le=MAX_RUNS)], ...] = (12, 4, 4, 4)

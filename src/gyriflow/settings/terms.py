@@ -176,9 +176,6 @@ SPECTRAL_SCORES: tuple[SpectralScore, ...] = get_args(SpectralScore)
 
 AMPLITUDE = ".amplitude"
 """Suffix of a parameter that scales a curve of the base run."""
-STIFFNESS_RATIO = "stiffness_ratio"
-"""The parameter that sets the shear modulus of the cortex to a multiple of that of the
-core."""
 
 
 def rounded_elements(elements: float) -> float:

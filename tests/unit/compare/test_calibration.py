@@ -216,7 +216,11 @@ def test_values_take_their_places_in_the_parameters():
         "growth": {"area_cm2": {21.0: 90.0, 25.0: 150.0}},
         "contact": {"gap_mm": 2.5},
     }
-    values = {"thickness_mm": 2.0, "stiffness_ratio": 4.0, "contact.gap_mm": 3.0}
+    values = {
+        "thickness_mm": 2.0,
+        "shear_modulus_cortex_pa": 1200.0,
+        "contact.gap_mm": 3.0,
+    }
     found = calibrated_parameters(
         base, values | {"growth_rate_per_s.amplitude": 2.0}, 25.0
     )

@@ -313,8 +313,8 @@ def test_folders_of_results_are_no_names_of_sweeps():
             [],
         ),
         (
-            {"parameters": {"stiffness_ratio": [0, 2]}},
-            "parameters.stiffness_ratio",
+            {"parameters": {"growth_rate_per_s.amplitude": [0, 2]}},
+            "parameters.growth_rate_per_s.amplitude",
             [0],
         ),
         ({"parameters": {}}, "parameters", [0, 1]),
