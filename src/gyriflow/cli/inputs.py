@@ -277,9 +277,8 @@ def _template_space(path: str) -> str:
     return space if space in TEMPLATE_SPACES else ""
 
 
-def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:
-    """Yield each problem of files of regions and maps: whose it is, the text, and
-    True."""
+def check_other_files(study: Study) -> Iterator[tuple[str, str]]:
+    """Yield each problem of files of regions and maps: whose it is, and the text."""
     seen = set()
     for owner, files, check in _other_files(study):
         # runs may share a map
@@ -288,7 +287,7 @@ def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:
             try:
                 check()
             except InputError as error:
-                yield owner, str(error), True
+                yield owner, str(error)
 
 
 def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], None]]]:

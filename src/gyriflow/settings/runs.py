@@ -387,14 +387,16 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
     return type(run).model_validate(raw)
 
 
-def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Value]]]:
+def variants(name: str, sweep: SweepSettings) -> Iterator[tuple[str, dict[str, Value]]]:
     """Yield the name and the varied values of each run of a sweep, the last key varying
     fastest."""
-    for values in product(*study.vary.values()):
-        texts = map(_short, values)
-        run = "-".join([name, *texts])
-        varied = zip(study.vary, values, strict=True)
-        yield run, dict(varied)
+    for values in product(*sweep.vary.values()):
+        run = name
+        varied = {}
+        for key, value in zip(sweep.vary, values, strict=True):
+            run += f"-{_short(value)}"
+            varied[key] = value
+        yield run, varied
 
 
 def _short(value: str | float) -> str:
