@@ -13,7 +13,7 @@ MAX_KEPT = 20_000
 """How many results are kept, the latest used."""
 
 
-def cache_folder() -> Path:
+def _cache_folder() -> Path:
     """Return the folder in which gyriflow keeps what it can make again."""
     base = os.environ.get("XDG_CACHE_HOME")
     return Path(base or Path.home() / ".cache", "gyriflow")
@@ -61,4 +61,4 @@ def remove_old_results(kind: str) -> None:
 
 
 def _path(kind: str, key: str) -> Path:
-    return cache_folder() / kind / f"{key}.json"
+    return _cache_folder() / kind / f"{key}.json"
