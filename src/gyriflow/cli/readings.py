@@ -33,7 +33,7 @@ seconds to start."""
 
 @dataclass(frozen=True)
 class Reading:
-    """What reading the files of a scan has found, until an `error` refused them;
+    """The results of reading the files of a scan, until an `error` refused them;
     `warnings` are those of the log."""
 
     values: list[Any] = field(default_factory=list)

@@ -138,7 +138,7 @@ class FoundBrain:
 
     @property
     def _is_whole_surface(self) -> bool:
-        """Whether it is one surface of both hemispheres."""
+        """True if it is one surface of both hemispheres."""
         return "pial" in self.entry and "side" not in self.entry
 
 
@@ -690,7 +690,7 @@ def _require_some_content(path: Path) -> None:
 def fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
     """Yield what `scheme_fits` returns for a label volume; nothing for a surface.
 
-    InputError if it cannot be read, or if the surface is no whole brain.
+    InputError if it cannot be read, or if the surface is not a whole brain.
     """
     (file,) = files
     if is_volume(file):

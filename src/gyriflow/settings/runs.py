@@ -400,8 +400,8 @@ def variants(name: str, sweep: SweepSettings) -> Iterator[tuple[str, dict[str, V
 
 
 def _short(value: str | float) -> str:
-    """Return a value as text: a number in six digits, or in as many as it takes to tell
-    it from all others."""
+    """Return a value as text: a number in six digits, or in as many as make it
+    unique."""
     if isinstance(value, str):
         return value
     short = f"{value:g}"
