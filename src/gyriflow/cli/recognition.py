@@ -206,27 +206,14 @@ def recognise(
     and `ses-`, files of others are not read. InputError if no scan is found, or none of
     a named participant or session.
     """
-    paths = [path.relative_to(folder) for path in files_in(folder)]
-    own = [
-        file.parent
-        for file in paths
-        if file.name == "dataset_description.json" and is_own_data_set(folder / file)
-    ]
-    own += [
-        file.parents[1] for file in paths if file.parts[-2:] == ("study", "study.json")
-    ]
-    own += [results.parent / "resources" for results in own]
-    files = [file for file in paths if not any(map(file.is_relative_to, own))]
-    tables = ScanTables(
-        [folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation
-    )
-    found: dict[str, list[FoundBrain]] = defaultdict(list)
+    files = _files_of_others(folder)
+    table_files = [folder / file for file in files if TABLE_NAME.fullmatch(file.name)]
+    tables = ScanTables(table_files, notation)
     unreadable = [file for file in files if (folder / file).is_dir()]
-    for brain in (
-        *_hemispheres(files),
-        *_whole_surfaces(files),
-        *_volumes(files, unreadable),
-    ):
+    candidates = [*_hemispheres(files), *_whole_surfaces(files)]
+    candidates += _volumes(files, unreadable)
+    found: dict[str, list[FoundBrain]] = defaultdict(list)
+    for brain in candidates:
         if fnmatch(str(brain.file), pattern):
             found[_scan_of(brain.file)].append(brain)
     # sessions without labels or surfaces count
@@ -235,37 +222,32 @@ def recognise(
         sessions_of[_label(file, "sub")] |= {_label(file, "ses")} - {None}
     if not found:
         raise _no_brain(folder, {str(file): _rejection(file) for file in files})
-    selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
-    selected["ses"] = {label.removeprefix("ses-") for label in sessions or ()}
+    selected = {
+        "sub": {label.removeprefix("sub-") for label in participants or ()},
+        "ses": {label.removeprefix("ses-") for label in sessions or ()},
+    }
     for entity, labels in selected.items():
-        existing = {
-            _label(brain.file, entity) for group in found.values() for brain in group
-        }
-        if absent := sorted(labels - existing):
-            problem = (
-                f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
-            )
-            names = (
-                ", ".join(
-                    sorted(f"{entity}-{label}" for label in existing if label)[:20]
-                )
-                or "none"
-            )
-            remedy = "Labels must be equal, with their zeros and case."
+        existing = set()
+        for group in found.values():
+            existing |= {_label(brain.file, entity) for brain in group}
+        absent = [f"{entity}-{label}" for label in sorted(labels - existing)]
+        if absent:
+            names = sorted(f"{entity}-{label}" for label in existing if label)
             raise InputError(
-                problem,
+                f"has no scan of {', '.join(absent)}",
                 path=folder,
-                found=names,
-                remedy=remedy,
+                found=", ".join(names[:20]) or "none",
+                remedy="Labels must be equal, with their zeros and case.",
             )
     unused = _in_other_formats(files)
     preferred: dict[str, list[FoundBrain]] = {}
     to_read: list[FoundBrain] = []
     for name, group in found.items():
-        if not any(
-            labels and _label(group[0].file, entity) not in labels
-            for entity, labels in selected.items()
-        ):
+        is_selected = True
+        for entity, labels in selected.items():
+            if labels and _label(group[0].file, entity) not in labels:
+                is_selected = False
+        if is_selected:
             preferred[name] = _preferred_files(group, unused)
             for brain in preferred[name]:
                 _complete(brain, folder, tables, sessions_of)
@@ -275,12 +257,10 @@ def recognise(
     for name, files_of_scan in preferred.items():
         brains += _brains_of_scan(name, found[name], files_of_scan, unused)
     # templates among subjects are not scans
-    if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (
-        0,
-        len(brains),
-    ):
-        unused |= {brain.files: brain.problem for brain in brains if brain.is_template}
-        brains = own_scans
+    templates = [brain for brain in brains if brain.is_template]
+    if len(templates) < len(brains):
+        unused |= {brain.files: brain.problem for brain in templates}
+        brains = [brain for brain in brains if not brain.is_template]
     if not brains:
         if unused:
             raise _no_brain(folder, unused)
@@ -301,20 +281,33 @@ def recognise(
     return FoundScans(brains, unused)
 
 
+def _files_of_others(folder: Path) -> list[Path]:
+    """Return the files in a folder, relative to it, without results and data sets of
+    gyriflow itself."""
+    files = [path.relative_to(folder) for path in files_in(folder)]
+    own = []
+    for file in files:
+        if file.name == "dataset_description.json" and is_own_data_set(folder / file):
+            own.append(file.parent)
+        elif file.parts[-2:] == ("study", "study.json"):
+            own.append(file.parents[1])
+    own += [results.parent / "resources" for results in own]
+    return [file for file in files if not any(map(file.is_relative_to, own))]
+
+
 def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
     expected = (
         "tissue label volumes (.nii.gz), or surfaces with left and right or pial in"
         " their names"
     )
-    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]]
+    lines = [f"{len(reasons)} files"]
+    for file, reason in list(reasons.items())[:10]:
+        lines.append(f"  {file}: {reason}")
     if len(reasons) > 10:
-        names.append("\n  …")
-    found = f"{len(reasons)} files{''.join(names)}\n"
+        lines.append("  …")
+    found = "\n".join(lines) + "\n"
     return InputError(
-        "no brain was recognised",
-        path=folder,
-        found=found,
-        expected=expected,
+        "no brain was recognised", path=folder, found=found, expected=expected
     )
 
 
@@ -407,7 +400,8 @@ def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
     folders: dict[str, set[str]] = defaultdict(set)
     for brain in group:
         above = re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix())
-        folder = data_set_of(Path(above[1] or "" if above else ""))
+        above_subject = above[1] if above else None
+        folder = data_set_of(Path(above_subject or ""))
         parts = [part for part in folder.parts if not GENERIC_FOLDER.fullmatch(part)]
         kind = "labels" if "labels" in brain.entry else "surfaces"
         folders[kind].add(str(Path(*parts)))

@@ -10,7 +10,6 @@ from .base import FirstIf, KeyProblem, Problems, Settings
 from .brains import BrainConfig
 from .ensemble import Variation, variations
 from .folding import VARYING, FoldingSettings
-from .growth import SIZES
 from .stages import MeshSettings
 from .terms import MAX_NAME_LENGTH, SCORES, Score
 from .weeks import EndWeek
@@ -270,8 +269,6 @@ NOT_VARIED = (
     "ensemble",
 )
 """Keys that do not belong to the model of a run, or that the sweep sets."""
-CURVE_KEYS = tuple(f"growth.{size}" for size in SIZES)
-"""Curves that may vary besides those of parameters."""
 MAX_PARAMETERS = 3
 MIN_FIRST_ROUND, MAX_RUNS = 3, 40
 """Limits of a calibration."""
@@ -325,8 +322,7 @@ class CalibrationSettings(ComparisonSettings):
 
     parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
     """One to three keys of `folding` with their lowest and highest values, such as
-    `{thickness_mm: [1, 3]}`; inner keys with dots. `KEY.amplitude` scales the base
-    run's curve of KEY."""
+    `{thickness_mm: [1, 3]}`; inner keys with dots."""
     score: dict[Score, Annotated[float, Field(gt=0)]]
     """What is minimised: the weights of one or more measures (docs/metrics.md)."""
     rounds: tuple[Annotated[int, Field(ge=1, le=MAX_RUNS)], ...] = (12, 4, 4, 4)

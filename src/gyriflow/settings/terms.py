@@ -174,9 +174,6 @@ week.
 SCORES: tuple[Score, ...] = get_args(Score)
 SPECTRAL_SCORES: tuple[SpectralScore, ...] = get_args(SpectralScore)
 
-AMPLITUDE = ".amplitude"
-"""Suffix of a parameter that scales a curve of the base run."""
-
 
 def rounded_elements(elements: float) -> float:
     """Return a number of elements through the cortex to two digits, as texts show it

@@ -303,19 +303,9 @@ def test_folders_of_results_are_no_names_of_sweeps():
         ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm", [0, -1]),
         ({"parameters": {"poisson": [0, 0.4]}}, "parameters.poisson", []),
         (
-            {"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}},
-            "parameters.growth_rate_per_s.amplitude",
+            {"parameters": {"growth.area_cm2": [0.5, 2]}},
+            "parameters.growth.area_cm2",
             [],
-        ),
-        (
-            {"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}},
-            "parameters.growth.area_cm2.amplitude",
-            [],
-        ),
-        (
-            {"parameters": {"growth_rate_per_s.amplitude": [0, 2]}},
-            "parameters.growth_rate_per_s.amplitude",
-            [0],
         ),
         ({"parameters": {}}, "parameters", [0, 1]),
         ({"rounds": [30, 11]}, "rounds", [[30, 11], 3, 40]),
