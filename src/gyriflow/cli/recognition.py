@@ -3,7 +3,7 @@ and sessions."""
 
 import logging
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -368,9 +368,8 @@ def _brains_of_scan(
     readable = [brain for brain in brains if not brain.is_unreadable]
     names = sorted({_scan_name(brain.file) for brain in group})
     data_sets = _data_sets(group)
-    for number, brain in enumerate(
-        [*readable, *(brain for brain in brains if brain.is_unreadable)], start=1
-    ):
+    unreadable = [brain for brain in brains if brain.is_unreadable]
+    for number, brain in enumerate([*readable, *unreadable], start=1):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
             # several files of one scan do not make a series
@@ -425,13 +424,15 @@ def _preferred_files(
     }
     preferred = [brain for brain in preferred if brain.file.parent not in volumes]
     for brain in group:
-        if brain not in preferred:
-            reason = (
-                f"in the space {brain.space}"
-                if brain.space
-                else "a volume of a subject with surfaces"
-            )
-            unused[str(brain.file)] = RESAMPLED if brain.space == RESAMPLED else reason
+        if brain in preferred:
+            continue
+        if brain.space == RESAMPLED:
+            reason = RESAMPLED
+        elif brain.space:
+            reason = f"in the space {brain.space}"
+        else:
+            reason = "a volume of a subject with surfaces"
+        unused[str(brain.file)] = reason
     return preferred
 
 
@@ -441,13 +442,13 @@ def _refuse_equal_weeks(brains: Sequence[FoundBrain]) -> None:
         if "subject" in brain.entry and brain.entry["week"] != UNSET:
             scans[brain.entry["subject"], brain.entry["week"]].append(brain)
     for (_, week), group in scans.items():
-        found = ", ".join(
-            f"{brain.entry['id']} ({brain.age_source})" for brain in group
-        )
-        for brain in group if len(group) > 1 else ():
+        if len(group) == 1:
+            continue
+        names = [f"{brain.entry['id']} ({brain.age_source})" for brain in group]
+        for brain in group:
             brain.contradiction = (
-                f"scans of one subject have the same age, {week:g}; found {found};"
-                " expected one"
+                f"scans of one subject have the same age, {week:g}; found"
+                f" {', '.join(names)}; expected one"
             )
 
 
@@ -621,20 +622,18 @@ def _complete(
         entry["subject"] = f"sub-{subject}" if subject else owners[0]
     brain.entry = entry | covariates(facts.values) | brain.entry
     brain.age_source, brain.named_age = age.source, age.named
-    labels = {entity: _labels(brain.file, entity) for entity in ("ses", "sub")}
-    if names := [
-        f"{entity}-{label}"
-        for entity in labels
-        for label in labels[entity]
-        if len(labels[entity]) > 1
-    ]:
+    all_labels = []
+    names = []
+    for entity in ("ses", "sub"):
+        labels = _labels(brain.file, entity)
+        all_labels += labels
+        if len(labels) > 1:
+            names += [f"{entity}-{label}" for label in labels]
+    if names:
         brain.problem = (
             f"its path names several scans: found {', '.join(names)}; expected one"
         )
-    elif not all(
-        re.fullmatch("[A-Za-z0-9-]+", label)
-        for label in (*labels["sub"], *labels["ses"])
-    ):
+    elif not all(re.fullmatch("[A-Za-z0-9-]+", label) for label in all_labels):
         brain.problem = (
             f"has other characters than letters and digits in {_scan_name(brain.file)}"
         )
@@ -979,13 +978,12 @@ def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> 
         elif choices:
             brain.notes.append(f"scheme: {' or '.join(choices)} both fit the labels")
         else:
-            against = [
-                f"; not {name}: {cause}" for name, cause in (brain.fits or {}).items()
-            ]
-            brain.notes.append(
-                "scheme: no shipped one"
-                f" fits{''.join(against) or ', none has all labels'}"
-            )
+            note = "scheme: no shipped one fits"
+            if not brain.fits:
+                note += ", none has all labels"
+            for name, cause in (brain.fits or {}).items():
+                note += f"; not {name}: {cause}"
+            brain.notes.append(note)
     for brain in brains:
         schemes = by_subject[brain.entry.get("subject", "")]
         if brain.entry.get("subject") and len(schemes) > 1:
@@ -999,23 +997,17 @@ def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> 
 def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
     """Yield the number of volumes of each chosen scheme, then contradictions to it and
     to the other schemes."""
-    for name, number in Counter(
-        brain.entry.get("scheme", UNSET) for brain in brains
-    ).items():
-        if name != UNSET:
-            fits = [
-                brain.fits or {}
-                for brain in brains
-                if brain.entry.get("scheme") == name
-            ]
-            causes = {
-                fitted: cause
-                for schemes in fits
-                for fitted, cause in schemes.items()
-                if cause
-            }
-            yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
-            yield from (
-                f"  {'but' if fitted == name else f'not {fitted}:'} {causes[fitted]}"
-                for fitted in causes
-            )
+    by_scheme: dict[str, list[FoundBrain]] = defaultdict(list)
+    for brain in brains:
+        by_scheme[brain.entry.get("scheme", UNSET)].append(brain)
+    by_scheme.pop(UNSET, None)
+    for name, with_scheme in by_scheme.items():
+        number = len(with_scheme)
+        yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
+        causes: dict[str, str] = {}
+        for brain in with_scheme:
+            for scheme, cause in (brain.fits or {}).items():
+                if cause:
+                    causes[scheme] = cause
+        for scheme, cause in causes.items():
+            yield f"  but {cause}" if scheme == name else f"  not {scheme}: {cause}"
