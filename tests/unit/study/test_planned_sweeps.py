@@ -302,11 +302,6 @@ def test_folders_of_results_are_no_names_of_sweeps():
         ),
         ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm", [0, -1]),
         ({"parameters": {"poisson": [0, 0.4]}}, "parameters.poisson", []),
-        (
-            {"parameters": {"growth.area_cm2": [0.5, 2]}},
-            "parameters.growth.area_cm2",
-            [],
-        ),
         ({"parameters": {}}, "parameters", [0, 1]),
         ({"rounds": [30, 11]}, "rounds", [[30, 11], 3, 40]),
         ({"score": {}}, "score", ["shape_index", "surface_distance"]),
