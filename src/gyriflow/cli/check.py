@@ -367,7 +367,7 @@ def _needs(
     cores: int,
 ) -> Iterator[tuple[str, bool]]:
     seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
-    made_by = {}
+    made_by: dict[str, int] = {}
     for number, job in enumerate(jobs):
         made_by |= dict.fromkeys(job.outputs, number)
 

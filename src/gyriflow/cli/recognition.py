@@ -227,7 +227,7 @@ def recognise(
         "ses": {label.removeprefix("ses-") for label in sessions or ()},
     }
     for entity, labels in selected.items():
-        existing = set()
+        existing: set[str | None] = set()
         for group in found.values():
             existing |= {_label(brain.file, entity) for brain in group}
         absent = [f"{entity}-{label}" for label in sorted(labels - existing)]
