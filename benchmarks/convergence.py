@@ -103,7 +103,6 @@ PARAMETERS = {
     "fissure_x_mm": 0.0,
     "growth_rate_per_s": 2.0e-7,
     "support": "free",
-    "no_growth": "none",
     "fields": ["displacement"],
 }
 COMPARED = (

@@ -127,7 +127,7 @@ def with_surfaces(
     entry = {
         "week": week,
         "population": population,
-        "hemispheres": {"left": left, "right": right},
+        "hemispheres": [left, right],
     }
     brains = [
         entry | {"id": f"{brain}-pial"},

@@ -20,7 +20,6 @@ from gyriflow.metrics.gyrification import gyrification_index, sulcal_depth
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.settings.atlas import (
     Atlas,
-    AtlasFileRecord,
     AtlasLicence,
     AtlasSeries,
     AtlasSettings,
@@ -28,7 +27,6 @@ from gyriflow.settings.atlas import (
 from gyriflow.settings.brains import (
     BrainConfig,
     GivenRegions,
-    HemisphereFiles,
     ParticipantsSettings,
     ShapeSettings,
 )
@@ -62,7 +60,6 @@ TYPES = {
 SECTIONS = {
     "Brains": {
         "brains: (a list)": BrainConfig,
-        "hemispheres: of a brain": HemisphereFiles,
         "shape: of a brain": ShapeSettings,
         "participants:": ParticipantsSettings,
         "schemes: by name": SchemeSettings,
@@ -71,7 +68,6 @@ SECTIONS = {
         "atlas: (one, or a list)": AtlasSettings,
         "The file atlas.yaml": Atlas,
         "series: by name, in atlas.yaml": AtlasSeries,
-        "A file of a week": AtlasFileRecord,
         "licence: in atlas.yaml": AtlasLicence,
     },
     "Surfaces and meshes": {"surface:": SurfaceSettings, "mesh:": MeshSettings},

@@ -33,7 +33,6 @@ def slab_parameters(contrast: float, growth: float, **more: Any) -> FoldingParam
         "growth_rate_per_s": RATE_PER_S,
         "step_s": growth / RATE_PER_S,
         "support": "free",
-        "no_growth": "none",
     }
     return parameters_from(values | more)
 

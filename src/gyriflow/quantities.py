@@ -19,8 +19,8 @@ class Registry[Record](dict[str, Record]):
 
 
 class Shown(Flag):
-    """Where a metric is shown or used, besides in the tables of the study and of the
-    brain."""
+    """The places where a metric is shown or used, besides in the tables of the study
+    and of the brain."""
 
     CHART = auto()  # chart of metrics over the weeks
     NORMS = auto()  # chart of norms

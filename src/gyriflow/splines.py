@@ -70,9 +70,9 @@ def penalty(
         distances = 0.5 * (middles[2:] - middles[:-2])
         slopes = np.diff(slopes, axis=0)
         slopes /= distances[:, None]
-    of_rate = slopes.T @ slopes
+    rate_penalty = slopes.T @ slopes
     # the value at the first week has no penalty
-    return np.pad(of_rate, ((1, 0), (1, 0)))
+    return np.pad(rate_penalty, ((1, 0), (1, 0)))
 
 
 def strength(

@@ -108,7 +108,6 @@ def closing_sulcus(kind, comm=COMM, support="box", **changes):
             "growth_rate_per_s": 1e-6,
             "support": "free",
             "contact": kind,
-            "no_growth": "none",
         }
         | changes
     )

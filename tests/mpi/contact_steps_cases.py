@@ -102,7 +102,7 @@ def free_blocks(gap, **changes):
         "output_weeks": [21.0, 30.0],
         "fissure_x_mm": 0.0,
     }
-    p = parameters_from(values | {"support": "free", "no_growth": "none"} | changes)
+    p = parameters_from(values | {"support": "free"} | changes)
     return Folding(COMM, mesh, zones, p), State.at_start(
         mesh.vertices * M_PER_MM, p.step_s
     )
@@ -169,7 +169,6 @@ def pressed(step_s, days=4, **changes):
         "fissure_x_mm": 0.0,
     }
     values |= {
-        "no_growth": "none",
         "support": "free",
         "step_s": step_s,
         "fields": ["stress", "strain"],

@@ -245,7 +245,6 @@ def test_tissue_held_at_its_sides_forgets_a_part_of_the_volume_it_grew_by(mesh):
         | {
             "contact": "none",
             "support": "free",
-            "no_growth": "none",
         }
     )
     zones = box_zones(mesh, parameters)
@@ -313,9 +312,7 @@ def test_an_elastic_state_stays_where_it_is_in_equilibrium():
 @pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=ORDERS)
 def test_a_free_body_grows_without_drifting(mesh):
     zones = replace(zones_of(mesh), free=True)
-    folding, state = folding_of(
-        mesh, zones, thickness_mm=2.0, support="free", no_growth="none"
-    )
+    folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free")
     # growth on one side only, which would turn a body that is only extrapolated
     folding.zones = replace(zones, growth=(mesh.vertices[:, 0] > 0).astype(float))
     for _ in range(4):

@@ -60,7 +60,6 @@ def towards(targets, mesh=BODY, **changes):
     }
     settings = {
         "support": "free",
-        "no_growth": "none",
         "contact": "none",
         "thickness_mm": 4.0,
     }
@@ -272,7 +271,7 @@ def test_growth_and_positions_hardly_depend_on_the_time_step():
 
 @pytest.mark.one_rank
 def test_a_body_that_is_held_misses_its_target_and_says_so():
-    clamped = {"support": "ellipsoid", "no_growth": "none"}
+    clamped = {"support": "ellipsoid"}
     folding, state = towards({23.0: BODY.vertices * 1.2}, **clamped)
     rows = after_steps(folding, state, 3).rows
     assert missed_targets(rows) == []
@@ -396,7 +395,6 @@ def following(growth):
     }
     weeks |= {
         "support": "free",
-        "no_growth": "none",
         "contact": "none",
         "thickness_mm": 4.0,
     }

@@ -29,8 +29,7 @@ def study(folder: Path, url: str) -> dict:
     """Write an atlas whose files are at a server into a folder and return a study of
     it."""
     weeks = {
-        week: {"labels": {"sha256": sha256(FILES[f"w{week}/labels.nii.gz"])}}
-        for week in WEEKS
+        week: {"labels": sha256(FILES[f"w{week}/labels.nii.gz"])} for week in WEEKS
     }
     write_atlas(
         folder,

@@ -388,7 +388,7 @@ rule growth_found_figures:
 show(rules.growth_found_figures.output, names_of(WITH_GROWTH))
 
 # the settings that determine the zones of a run; runs with equal ones share a figure
-ZONES = {"contact", "no_growth", "support"}
+ZONES = {"contact", "support"}
 BY_ZONES = {}
 for simulation in study.run_simulations:
     zones = repr(simulation.settings.model_dump(include=ZONES))

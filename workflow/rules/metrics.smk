@@ -94,7 +94,7 @@ rule white:
         columns=lambda w: BRAINS[w.brain].columns,
         labels=lambda w: label_source(CONFIG, BRAINS[w.brain]),
         white=lambda w: BRAINS[w.brain].white_files,
-        surface=lambda w: EDGE_LENGTH if BRAINS[w.brain].labels else MESH_SETTINGS,
+        surface=EDGE_LENGTH,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/white.py"

@@ -23,7 +23,6 @@ rule atlas_file:
     params:
         url=lambda w: ATLAS_FILES[w.file].url,
         sha256=lambda w: ATLAS_FILES[w.file].sha256,
-        size=lambda w: ATLAS_FILES[w.file].bytes,
     script:
         "../scripts/retrieve.py"
 

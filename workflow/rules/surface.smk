@@ -15,7 +15,6 @@ def surface_memory(wildcards):
 
 # settings that matter for a brain, by its source
 LABEL_SETTINGS = CONFIG.surface.model_dump(include={"edge_length_mm", "open_sulci"})
-MESH_SETTINGS = CONFIG.surface.model_dump(include={"edge_length_mm", "max_hole_mm"})
 EDGE_LENGTH = {"edge_length_mm": CONFIG.surface.edge_length_mm}
 
 
@@ -23,7 +22,7 @@ def pial_settings(brain):
     """Return the surface settings for the source of a brain; a shape has none."""
     if brain.shape:
         return {}
-    return LABEL_SETTINGS if brain.labels else MESH_SETTINGS
+    return LABEL_SETTINGS if brain.labels else EDGE_LENGTH
 
 
 # a simple shape instead of a brain

@@ -12,5 +12,4 @@ with step(snakemake.log[0]):
         params.url,
         logging.info,
         sha256=params.sha256,
-        size=params.size,
     )

@@ -377,13 +377,12 @@ def from_hemispheres(
     coordinates: Coordinates = "ras",
     declared: bool = False,
     edge_length_mm: float = 1.0,
-    max_hole_mm: float = 3.0,
     max_hemisphere_ratio: float = 1.15,
     max_asymmetry: float = 0.02,
 ) -> PialSurface:
     """Return the pial surface of a brain from surfaces of its hemispheres.
 
-    They are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed,
+    They are repaired (small holes, open medial walls), posed, smoothed,
     remeshed to `edge_length_mm`, rotated so that the mid-plane is x = const, and moved
     to a gap of 0.5 mm. With coordinates "auto" each may have any rigid pose; `declared`
     is whether both files name one coordinate system. Hemispheres that share the
@@ -396,7 +395,6 @@ def from_hemispheres(
             week=week,
             coordinates=coordinates,
             edge_length_mm=edge_length_mm,
-            max_hole_mm=max_hole_mm,
         )
         to_pose = connected.pose.of_file()
         plausible.require_left_and_right(
@@ -418,7 +416,6 @@ def from_hemispheres(
     parts = [
         repair.sound_pieces(
             triangles.transformed(mesh, to_ras),
-            max_hole_mm,
             single=True,
             caps_walls=True,
         )
@@ -527,7 +524,6 @@ def from_surface(
     week: float,
     coordinates: Coordinates = "ras",
     edge_length_mm: float = 1.0,
-    max_hole_mm: float = 3.0,
 ) -> PialSurface:
     """Return the pial surface of a brain, or of a single hemisphere (`side`), from one
     surface.
@@ -540,9 +536,7 @@ def from_surface(
     brain = _Brain(
         week, {"source": "hemisphere", "side": side} if side else {"source": "pial"}
     )
-    clean = repair.sound_pieces(
-        mesh, max_hole_mm, single=side is not None, caps_walls=True
-    )
+    clean = repair.sound_pieces(mesh, single=side is not None, caps_walls=True)
     brain.take(clean)
     brain.warn(
         plausible.require_plausible_size(

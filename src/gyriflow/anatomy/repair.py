@@ -16,7 +16,6 @@ from ..geometry import remeshing, triangles
 from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on, surface_mask
 from ..geometry.triangles import Ints, TriangleMesh
-from ..settings.terms import MAX_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
 from .extraction import (
@@ -47,6 +46,8 @@ MIN_LENGTH_MM, MAX_LENGTH_MM = 15.0, 300.0
 SPIKE_MM, SPIKE_FACTOR = 10.0, 10.0
 # voxel size of the search for stalks
 STALK_VOXEL_MM = 0.8
+# largest hole of a given surface that is closed, but for open medial walls
+MAX_HOLE_MM = 3.0
 # cuts follow the triangles, so they are wider than the stalks
 MAX_CUT_MM = 12.0
 # margin around a surface that is rebuilt, with that of `surface_mask`
@@ -81,7 +82,6 @@ class RepairedSurface:
 
 def sound_pieces(
     mesh: TriangleMesh,
-    max_hole_mm: float,
     *,
     single: bool = False,
     caps_walls: bool = False,
@@ -95,9 +95,7 @@ def sound_pieces(
     lengths = np.linalg.norm(
         np.diff(mesh.vertices[triangles.edges(mesh)[0]], axis=1), axis=2
     )
-    mesh, repairs, is_cap = clean(
-        mesh, max_hole_mm, single=single, caps_walls=caps_walls
-    )
+    mesh, repairs, is_cap = clean(mesh, single=single, caps_walls=caps_walls)
     warnings, dropped, remaining = [], repairs["area_dropped_mm2"], triangles.area(mesh)
     if lengths.max() > max(SPIKE_MM, SPIKE_FACTOR * np.median(lengths)):
         warnings.append(
@@ -250,7 +248,7 @@ def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh
 
 def clean(
     mesh: TriangleMesh,
-    max_hole_mm: float,
+    max_hole_mm: float = MAX_HOLE_MM,
     *,
     single: bool = False,
     caps_walls: bool = False,
@@ -431,17 +429,11 @@ def _fill_holes(
         int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop in loops[small:]
     }
     if wide and not (caps_walls and len(pieces_with_wide) == len(wide)):
-        can_cover = "or raise surface.max_hole_mm if the opening may be covered."
-        remedy = (
-            can_cover
-            if wide[-1] <= MAX_HOLE_MM
-            else "since holes of this size cannot be covered."
-        )
         raise MeshError(
             "the surface has holes that are too large to close",
             found=f"{len(wide)} of {len(loops)} holes, up to {wide[-1]:.1f} mm across",
-            expected=f"at most {max_hole_mm:g} mm (max_hole_mm)",
-            remedy=f"Give a closed surface, {remedy}",
+            expected=f"at most {max_hole_mm:g} mm",
+            remedy="Give a closed surface.",
         )
     for number, loop in enumerate(loops):
         # new faces have the edges of existing ones in the opposite direction

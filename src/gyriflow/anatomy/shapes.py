@@ -8,8 +8,9 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import Floats, TriangleMesh, convex_hull, unit
-from ..settings.brains import ShapeSettings
 
+# root mean square height of the bumps that start the folding
+NOISE_MM = 0.05
 REMESHING_ROUNDS = 10
 # the edges of a finely sampled curved face are far less sharp
 SHARP_DEG = 45.0
@@ -23,7 +24,7 @@ def shape_surface(
     semi_axes_mm: tuple[float, float, float],
     *,
     edge_length_mm: float,
-    noise_mm: float = ShapeSettings.model_fields["noise_mm"].default,
+    noise_mm: float = NOISE_MM,
 ) -> TriangleMesh:
     """Return an ellipsoid as a closed, outward surface of even triangles, with smooth
     bumps along the normal.

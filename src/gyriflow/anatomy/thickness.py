@@ -381,13 +381,12 @@ def white_from_surfaces(
     pial: Mapping[Side, TriangleMesh],
     pose: Pose,
     *,
-    max_hole_mm: float = 3.0,
     edge_length_mm: float = 1.0,
 ) -> dict[Side, TriangleMesh]:
     """Pose and remesh white surfaces of the sides or the "whole"; return them by side.
     MeshError if not sound."""
     even = {
-        name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, edge_length_mm).mesh
+        name: make_sound(sound_pieces(mesh).mesh, edge_length_mm).mesh
         for name, mesh in posed_whites(pose, whites).items()
     }
     return (

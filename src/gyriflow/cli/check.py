@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from ..grouping import grouped
-from ..io.volumes import read_header
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
 from ..running.cost import (
@@ -43,7 +42,7 @@ from ..settings.terms import (
     is_too_coarse,
 )
 from ..settings.varying import Varying, curve_at
-from ..study.atlases import atlas_by_brain, known_checksums, used_atlases
+from ..study.atlases import known_checksums, used_atlases
 from ..study.brains import label_scheme
 from ..study.loading import load
 from ..study.paths import PLAN
@@ -89,70 +88,50 @@ def check_study(
 
     `name` stands for a temporary configuration.
     """
-    with _read_study(path, directory) as study, collected_warnings() as logged:
-        config, problems = study.config, list(input_problems(study.config))
-        valid = not any(bad for *_, bad in problems)
-        volumes = [
-            volume
-            for brain in config.brains
-            if (volume := brain.labels) and Path(volume).is_file()
-        ]
-        without_unit = (
-            sum(read_header(volume).unit == "unknown" for volume in volumes)
-            if valid
-            else 0
-        )
-        from .inputs import check_other_files, input_facts
+    # takes half a second, which other commands need not wait for
+    from .inputs import check_other_files, input_facts
 
-        further, facts = list(check_other_files(study)), list(input_facts(study))
-        valid = valid and not further
-        downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
-    yield f"{name or path}: {_contents(study)}", False
-    warnings = [
-        (brain, f"  warning: brain {brain}: {text}")
-        for brain, text, bad in problems
-        if not bad
-    ]
-    told = {text for _, text, _ in problems}
-    texts = [record.getMessage() for record in logged]
-    warnings += [("", f"  warning: {text}") for text in texts if text not in told]
-    yield from ((line, False) for line, _ in grouped(warnings))
-    refusals = [
-        (brain, f"  brain {brain}: {text}") for brain, text, bad in problems if bad
-    ]
-    refusals += [(owner, f"  {owner}: {text}") for owner, text, _ in further]
+    with _read_study(path, directory) as study, collected_warnings() as logged:
+        problems = list(input_problems(study.config))
+        further = list(check_other_files(study))
+        facts = list(input_facts(study))
+        n_downloads = len(study.downloads)
+    yield f"{name or path}: {_contents(study)}", 0
+    warnings = []
+    refusals = []
+    for brain, text, is_refused in problems:
+        if is_refused:
+            refusals.append((brain, f"  brain {brain}: {text}"))
+        else:
+            warnings.append((brain, f"  warning: brain {brain}: {text}"))
+    texts = {text for _, text, _ in problems}
+    for record in logged:
+        text = record.getMessage()
+        if text not in texts:
+            warnings.append(("", f"  warning: {text}"))
+    for owner, text in further:
+        refusals.append((owner, f"  {owner}: {text}"))
+    for line, _ in grouped(warnings):
+        yield line, 0
     yield from grouped(refusals)
-    yield from ((f"  {line}", False) for line in facts)
+    for line in facts:
+        yield f"  {line}", 0
     for line in (*coarse_cortices(study), *deep_curved_folds(study)):
-        yield f"  warning: {line}", False
-    yield from (
-        (f"  warning: no export: {line}", False) for line in export_problems(study)
-    )
-    if without_unit:
-        yield (
-            (
-                f"  note: {without_unit} of {len(volumes)} label volumes give no unit"
-                " of length, taken as mm"
-            ),
-            False,
-        )
-    if downloads:
-        yield (
-            (
-                f"  {downloads} atlas file{'s are' if downloads > 1 else ' is'} missing"
-                " and will be downloaded"
-            ),
-            False,
-        )
-    if valid:
-        yield "  input files: no problem found", False
-        plan_folder = directory / PLAN
-        yield f"  plan: tables in {plan_folder}, written before the first step", False
-        yield from work_of(
-            path, directory, cores, ["--cores", str(cores), *stages], study
-        )
-    yield from ((f"not used: {line}", False) for line in commented_scans(path))
-    yield from ((line, False) for line in scan_lines(_scans(config, problems)))
+        yield f"  warning: {line}", 0
+    for line in export_problems(study):
+        yield f"  warning: no export: {line}", 0
+    if n_downloads:
+        files = "files are" if n_downloads > 1 else "file is"
+        yield f"  {n_downloads} atlas {files} missing and will be downloaded", 0
+    if not refusals:
+        yield "  input files: no problem found", 0
+        yield f"  plan: tables in {directory / PLAN}, written before the first step", 0
+        options = ["--cores", str(cores), *stages]
+        yield from work_of(path, directory, cores, options, study)
+    for line in commented_scans(path):
+        yield f"not used: {line}", 0
+    for line in scan_lines(_scans(study, problems)):
+        yield line, 0
 
 
 @contextmanager
@@ -160,8 +139,11 @@ def _read_study(path: Path, directory: Path) -> Iterator[Study]:
     """Read a study in its working directory, since paths of a configuration may be
     relative to that."""
     file = path.absolute()
-    with chdir(directory if directory.is_dir() else Path()):
-        yield resolve(load(read_keys(file), folder_of(file)))
+    folder = directory if directory.is_dir() else Path()
+    with chdir(folder):
+        keys = read_keys(file)
+        config = load(keys, folder_of(file))
+        yield resolve(config)
 
 
 def work_of(
@@ -187,20 +169,12 @@ def work_of(
     rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
     for job in jobs:
         rules_by_reason[_why(job.reason, directory)][job.rule] += 1
-    for reason, rules in rules_by_reason.items():
-        words = ", ".join(
-            rule if number == 1 else f"{rule}×{number}"
-            for rule, number in rules.items()
-        )
-        yield (
-            fill(
-                f"{reason}: {words}",
-                width=100,
-                initial_indent="  ",
-                subsequent_indent="    ",
-            ),
-            False,
-        )
+    for reason, counts in rules_by_reason.items():
+        rules = []
+        for rule, count in counts.items():
+            rules.append(rule if count == 1 else f"{rule}×{count}")
+        text = f"{reason}: {', '.join(rules)}"
+        yield fill(text, 100, initial_indent="  ", subsequent_indent="    "), False
     if study is None:
         with _read_study(path, directory) as read:
             study = read
@@ -245,16 +219,20 @@ def plan(
 
 
 def _contents(study: Study) -> str:
-    runs = list(study.config.runs)
-    names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
-    brains, folded = len(study.brains), len(study.run_simulations)
-    simulations = (
-        f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})"
-        if folded
-        else "measured only"
-    )
-    parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
-    parts += [f"{len(runs)} of sweep {name}" for name, runs in study.by_sweep.items()]
+    n_brains = len(study.brains)
+    parts = [f"{n_brains} brain{'s' if n_brains > 1 else ''}"]
+    n_simulations = len(study.run_simulations)
+    if n_simulations:
+        runs = list(study.config.runs)
+        names = runs[:NAMED_RUNS]
+        if len(runs) > NAMED_RUNS:
+            names.append("…")
+        plural = "s" if n_simulations > 1 else ""
+        parts.append(f"{n_simulations} simulation{plural} ({', '.join(names)})")
+    else:
+        parts.append("measured only")
+    for name, members in study.by_sweep.items():
+        parts.append(f"{len(members)} of sweep {name}")
     if study.calibration:
         calibrated = {run for run, _ in study.calibration}
         parts.append(f"{len(calibrated)} of the calibration")
@@ -274,22 +252,22 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         # a map's thickness is unknown before the surface is made
         if isinstance(thickness, Varying) and thickness.map:
             continue
-        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(
-            thickness, simulation.weeks[0]
-        )
+        thickness_mm = curve_at(thickness, simulation.weeks[0])
+        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * thickness_mm
         elements = through / mesh.surface_edge_mm
         error, text = element_error(mesh.order, elements)
-        few, remedy = "", "mesh.order: 2"
-        if is_coarse := is_too_coarse(mesh.order, elements):
+        is_coarse = is_too_coarse(mesh.order, elements)
+        few = ""
+        remedy = "mesh.order: 2"
+        if is_coarse:
+            edge_mm = math.floor(100 * through / needed) / 100
             few = f", fewer than the {needed:g} needed"
-            remedy = (
-                f"mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g}"
-            )
+            remedy = f"mesh.surface_edge_mm: {edge_mm:g}"
         if is_coarse or error > LARGE_ELEMENT_ERROR:
-            coarse[f"about {text}{few}; use {remedy}"].append(
-                f"run {simulation.run} from {simulation.brain}"
-            )
-    yield from (f"{', '.join(names)}: {text}" for text, names in coarse.items())
+            name = f"run {simulation.run} from {simulation.brain}"
+            coarse[f"about {text}{few}; use {remedy}"].append(name)
+    for text, names in coarse.items():
+        yield f"{', '.join(names)}: {text}"
 
 
 def deep_curved_folds(study: Study) -> Iterator[str]:
@@ -309,10 +287,9 @@ def deep_curved_folds(study: Study) -> Iterator[str]:
 def export_problems(study: Study) -> Iterator[str]:
     """Yield why a study cannot be exported under the labels that BIDS would give its
     subjects and runs."""
+    subjects = [brain.subject_name for brain in study.brains.values()]
     try:
-        require_bids_names(
-            [brain.subject_name for brain in study.brains.values()], study.config.runs
-        )
+        require_bids_names(subjects, study.config.runs)
     except InputError as error:
         yield str(error)
 
@@ -359,19 +336,27 @@ def _memory_doubts(brain: BrainConfig) -> list[str]:
 
 
 def _scans(
-    config: Config, problems: Sequence[tuple[str, str, bool]]
+    study: Study, problems: Sequence[tuple[str, str, bool]]
 ) -> Iterator[ScanRow]:
-    atlases = atlas_by_brain(used_atlases(config))
+    config = study.config
+    verdicts = {}
+    for brain_id, _, is_refused in problems:
+        if is_refused:
+            verdicts[brain_id] = "refused"
+        else:
+            verdicts.setdefault(brain_id, "warning")
     for brain in config.brains:
-        is_bad = {bad for name, _, bad in problems if name == brain.id}
-        verdict = "refused" if True in is_bad else "warning" if is_bad else "ok"
-        default = "configuration"
-        if brain.id in atlases:
-            default = atlases[brain.id].atlas.name
-        source = config.age_sources.get(brain.id) or default
-        data = ", ".join(Path(file).name for file in brain.files) or brain.source
+        source = config.age_sources.get(brain.id)
+        if not source and brain.id in study.atlases:
+            source = study.atlases[brain.id].atlas.name
+        files = [Path(file).name for file in brain.files]
         yield ScanRow(
-            brain.id, f"{brain.week:g}", source, data, brain.scheme or "–", verdict
+            scan=brain.id,
+            age=f"{brain.week:g}",
+            age_source=source or "configuration",
+            data=", ".join(files) or brain.source,
+            scheme=brain.scheme or "–",
+            verdict=verdicts.get(brain.id, "ok"),
         )
 
 
@@ -382,58 +367,52 @@ def _needs(
     cores: int,
 ) -> Iterator[tuple[str, bool]]:
     seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
-    made_by = {file: number for number, job in enumerate(jobs) for file in job.outputs}
+    made_by: dict[str, int] = {}
+    for number, job in enumerate(jobs):
+        made_by |= dict.fromkeys(job.outputs, number)
 
     @cache
     def end_s(number: int) -> float:
-        before = (
-            end_s(made_by[file]) for file in jobs[number].inputs if file in made_by
-        )
-        return max(before, default=0.0) + seconds[number] / min(
-            jobs[number].threads, cores
-        )
+        """Return when a job ends whose inputs are made as early as possible."""
+        job = jobs[number]
+        start_s = 0.0
+        for file in job.inputs:
+            if file in made_by:
+                start_s = max(start_s, end_s(made_by[file]))
+        return start_s + seconds[number] / min(job.threads, cores)
 
     foldings = [job for job in jobs if job.rule in FOLDINGS]
-    needs = [
-        simulation_needs(
-            study.simulations[job.wildcards["run"], job.wildcards["brain"]],
-            study.config.mesh,
-        )
-        for job in foldings
-    ]
-    yield from ((line, False) for line in _path_lines(jobs, seconds, study, directory))
-    hours = sum(seconds) / 3600
-    wall_s = max(sum(seconds) / cores, *map(end_s, range(len(jobs))))
+    needs = []
+    for job in foldings:
+        key = (job.wildcards["run"], job.wildcards["brain"])
+        needs.append(simulation_needs(study.simulations[key], study.config.mesh))
+    for line in _path_lines(jobs, seconds, study, directory):
+        yield line, False
+    work_s = sum(seconds)
+    longest_s = max(end_s(number) for number in range(len(jobs)))
+    duration = format_duration(max(work_s / cores, longest_s))
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
-    yield (
-        (
-            f"time    about {format_duration(wall_s)} on {on}, within a factor of"
-            f" {ERROR_FACTOR:g}"
-        ),
-        False,
-    )
+    within = f"within a factor of {ERROR_FACTOR:g}"
+    yield f"time    about {duration} on {on}, {within}", False
     share = ""
     if foldings:
-        folding_s = sum(each.seconds for each in needs)
-        share = f", {folding_s / sum(seconds):.0%} of them for folding"
-    yield f"work    about {hours:.2g} core hours{share}", False
-    at_once = max(cores // max((job.threads for job in foldings), default=1), 1)
-    memory = sum(sorted((each.memory_mib for each in needs), reverse=True)[:at_once])
-    disk = sum(each.disk_mib for each in needs) + len(jobs)
+        folding_s = sum(need.seconds for need in needs)
+        share = f", {folding_s / work_s:.0%} of them for folding"
+    yield f"work    about {work_s / 3600:.2g} core hours{share}", False
+    threads = max((job.threads for job in foldings), default=1)
+    at_once = max(cores // threads, 1)
+    largest_first = sorted((need.memory_mib for need in needs), reverse=True)
+    memory_mib = sum(largest_first[:at_once]) or MIN_SURFACE_MIB / 4
     # the memory of this machine does not limit a cluster
-    here = cores <= available_cores()
-    yield from _fits(
-        "memory",
-        memory or MIN_SURFACE_MIB / 4,
-        available_memory_mib() if here else None,
-        "the foldings that run" if foldings else "each step that runs",
-    )
-    folder = next(
-        path
-        for path in (directory.absolute(), *directory.absolute().parents)
-        if path.is_dir()
-    )
-    yield from _fits("disk", disk, shutil.disk_usage(folder).free / 2**20)
+    is_here = cores <= available_cores()
+    available_mib = available_memory_mib() if is_here else None
+    users = "the foldings that run" if foldings else "each step that runs"
+    yield _fits("memory", memory_mib, available_mib, users)
+    disk_mib = sum(need.disk_mib for need in needs) + len(jobs)
+    folder = directory.absolute()
+    while not folder.is_dir():
+        folder = folder.parent
+    yield _fits("disk", disk_mib, shutil.disk_usage(folder).free / 2**20)
 
 
 def _path_lines(
@@ -469,19 +448,18 @@ def _reuse(folder: str | None, directory: Path) -> str:
 def _fits(
     name: str,
     mib: float,
-    there_mib: float | None,
+    available_mib: float | None,
     users: str = "",
-) -> Iterator[tuple[str, bool]]:
-    bad = there_mib is not None and mib > there_mib
-    here = (
-        f", for {users} at the same time"
-        if there_mib is None
-        else f"; {_gib(there_mib)} available"
-    )
-    yield (
-        f"{name:<7} about {_gib(mib)}{here}{', which is too little' if bad else ''}",
-        bad,
-    )
+) -> tuple[str, bool]:
+    """Return a line on a need, and whether it exceeds what is available; None: that of
+    a cluster, for its `users`."""
+    line = f"{name:<7} about {_gib(mib)}"
+    if available_mib is None:
+        return f"{line}, for {users} at the same time", False
+    line += f"; {_gib(available_mib)} available"
+    if mib > available_mib:
+        return f"{line}, which is too little", True
+    return line, False
 
 
 def _gib(mib: float) -> str:

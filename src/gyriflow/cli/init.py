@@ -55,11 +55,11 @@ def write_configuration(
             remedy="Choose another file with --output, or add --force.",
         )
     inside = path.resolve().parent == folder.resolve()
-    usable = [
-        brain
-        for brain in found.brains
-        if not (brain.causes if only_measured else brain.problem)
-    ]
+    usable = []
+    for brain in found.brains:
+        is_refused = brain.causes if only_measured else brain.problem
+        if not is_refused:
+            usable.append(brain)
     if not usable:
         raise InputError(
             "no scan can be used", path=folder, found=_causes(found.brains)
@@ -74,35 +74,27 @@ def write_configuration(
             width=10_000,
             allow_unicode=True,
         ).strip()
-        notes = [" ".join(note.split()) for note in (*brain.causes, *brain.warnings)]
-        notes += [f"week: {brain.age_source}"] if brain.age_source else []
-        lines.append(
-            f"  {'-' if brain in usable else '# -'} {text}"
-            + "".join(f"  # {note}" for note in notes)
-            + "\n"
-        )
+        line = f"  {'-' if brain in usable else '# -'} {text}"
+        for note in (*brain.causes, *brain.warnings):
+            line += f"  # {' '.join(note.split())}"
+        if brain.age_source:
+            line += f"  # week: {brain.age_source}"
+        lines.append(line)
     # the start is a brain with later scans of its subject or atlas, if any
     several = _series(usable)
     series = several[0] if several else usable
     weeks = _weeks(series)
-    end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    text = _from_template(
-        "brains", config=SHIPPED / "config", brains="".join(lines).rstrip()
-    )
+    end = UNSET
+    if weeks:
+        end = f"{weeks[-1] if several else weeks[0] + 1:g}"
+    text = _from_template("brains", config=SHIPPED / "config", brains="\n".join(lines))
     if not only_measured:
         # an id may look like a number, which YAML writes in quotes
         start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
-        measured_run = (
-            "\n  measured: {preset: measured}"
-            if several and _have_shapes(series, folder)
-            else ""
-        )
-        text += _from_template(
-            "folding",
-            start=start,
-            end=end,
-            measured=measured_run,
-        )
+        measured_run = ""
+        if several and _have_shapes(series, folder):
+            measured_run = "\n  measured: {preset: measured}"
+        text += _from_template("folding", start=start, end=end, measured=measured_run)
     kept = _keep_other(path, text)
     write_text(path, text)
     return kept
@@ -127,22 +119,22 @@ def _keep_other(path: Path, text: str) -> Path | None:
 def commented_scans(path: Path) -> list[str]:
     """Return lines on the scans that are comments in a configuration as of
     `write_configuration`: id and cause."""
-    scans = re.findall(
-        r"^  # - \{id: ([^,]+),.*?\}  # (.*)$",
-        path.read_text(encoding="utf-8"),
-        re.MULTILINE,
-    )
-    return [
-        line for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans)
-    ]
+    text = path.read_text(encoding="utf-8")
+    comment = r"^  # - \{id: ([^,]+),.*?\}  # (.*)$"
+    return _grouped_causes(re.findall(comment, text, re.MULTILINE))
 
 
 def _causes(brains: Iterable[FoundBrain]) -> str:
-    scans = [(brain.entry["id"], cause) for brain in brains for cause in brain.causes]
-    return "".join(
-        f"\n  {line}"
-        for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans)
-    )
+    scans = []
+    for brain in brains:
+        scans += [(brain.entry["id"], cause) for cause in brain.causes]
+    return "".join(f"\n  {line}" for line in _grouped_causes(scans))
+
+
+def _grouped_causes(scans: Iterable[tuple[str, str]]) -> list[str]:
+    """Return lines on scans, given id and cause of each; those of one kind together."""
+    messages = [(scan, f"{scan}: {cause}") for scan, cause in scans]
+    return [line for line, _ in grouped(messages)]
 
 
 def write_prediction(
@@ -222,12 +214,8 @@ def write_prediction(
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
     given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
-    names = (
-        ", ".join(
-            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
-        )
-        or files[0]
-    )
+    pair = entry.get("hemispheres")
+    names = f"left {pair[0]}, right {pair[1]}" if pair else files[0]
     yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
 
 
@@ -270,20 +258,22 @@ def write_bids(
     the first of several scans of a subject is also folded. Scans without `sub-` in
     their path become unused. InputError if no scan can be used.
     """
+    with_subject = []
     for brain in found.brains:
-        if not brain.entry["id"].startswith("sub-"):
+        if brain.entry["id"].startswith("sub-"):
+            with_subject.append(brain)
+        else:
             found.unused[brain.files] = "no sub-… in its path"
-    found.brains = [
-        brain for brain in found.brains if brain.entry["id"].startswith("sub-")
-    ]
-    brains = [brain for brain in found.brains if not brain.causes]
+    found.brains = with_subject
+    brains = [brain for brain in with_subject if not brain.causes]
     if not brains:
-        causes = _causes(found.brains) or "no files named sub-…"
-        choice = (
-            "Choose one of several files with --files, such as"
-            " '*_desc-brain_dseg.nii.gz'."
-        )
-        remedy = choice if "keep one" in causes else None
+        causes = _causes(with_subject) or "no files named sub-…"
+        remedy = None
+        if "keep one" in causes:
+            remedy = (
+                "Choose one of several files with --files, such as"
+                " '*_desc-brain_dseg.nii.gz'."
+            )
         raise InputError(
             "no scan can be used",
             path=folder,
@@ -300,25 +290,19 @@ def write_bids(
         "brains": [_absolute(brain.entry, folder) for brain in brains]
     }
     if fold:
-        followed, weeks = _series(brains), _weeks(brains)
-        can_measure = followed and all(
-            _have_shapes(scans, folder) for scans in followed
-        )
-        runs: dict[str, Any] = {"reference": {}} | (
-            {"measured": {"preset": "measured"}} if can_measure else {}
-        )
-        text |= {
-            "start": [scans[0].entry["id"] for scans in followed] or youngest,
-            "runs": runs,
-            **further,
-        }
-        text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (
-            further.get("folding") or {}
-        )
+        series = _series(brains)
+        runs: dict[str, Any] = {"reference": {}}
+        if series and all(_have_shapes(scans, folder) for scans in series):
+            runs["measured"] = {"preset": "measured"}
+        starts = [scans[0].entry["id"] for scans in series]
+        text |= {"start": starts or youngest, "runs": runs, **further}
+        weeks = _weeks(brains)
+        end_week = max(max(weeks), min(weeks) + 1)
+        text["folding"] = {"end_week": end_week} | (further.get("folding") or {})
     else:
-        text |= {
-            key: value for key, value in further.items() if key not in FOLDING_SECTIONS
-        }
+        for key, value in further.items():
+            if key not in FOLDING_SECTIONS:
+                text[key] = value
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
     is_own = path.with_name(BIDS_OPTIONS).exists() or (
         path.exists() and read_text(path).startswith(BIDS_HEAD)
@@ -415,20 +399,13 @@ def _have_shapes(scans: Sequence[FoundBrain], folder: Path) -> bool:
     vertex-matched surfaces."""
     if all("labels" in brain.entry for brain in scans):
         return True
-    dated = [
-        brain.entry
-        for brain in scans
-        if brain.entry["week"] != UNSET and UNSET not in brain.entry.values()
-    ]
-    return (
-        unmatched_reason(
-            [
-                validated(BrainConfig, _absolute(entry, folder), entry["id"])
-                for entry in dated
-            ]
-        )
-        is None
-    )
+    brains = []
+    for scan in scans:
+        # without a week or a scheme it is no brain yet
+        if UNSET not in scan.entry.values():
+            entry = _absolute(scan.entry, folder)
+            brains.append(validated(BrainConfig, entry, scan.entry["id"]))
+    return unmatched_reason(brains) is None
 
 
 def _absolute(value: object, folder: Path) -> object:

@@ -2,7 +2,8 @@
 would refuse minutes later."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -70,32 +71,40 @@ def describe(path: str) -> str:
     InputError as its reader's."""
     if is_volume(path):
         header = read_header(path)
-        size = " x ".join(f"{size:.3g}" for size in header.voxel_mm)
-        unit = {"unknown": ", no unit given", "mm": ""}.get(
-            header.unit, f", given in {header.unit}"
-        )
-        return (
-            f"{' x '.join(map(str, header.shape))} voxels of {size} mm{unit},"
-            f" {header.space} space"
-        )
+        shape = " x ".join(map(str, header.shape))
+        text = f"{shape} voxels of {_sizes(header.voxel_mm)} mm"
+        if header.unit == "unknown":
+            text += ", no unit given"
+        elif header.unit != "mm":
+            text += f", given in {header.unit}"
+        return f"{text}, {header.space} space"
     if path.lower().endswith((".shape.gii", ".func.gii", ".label.gii")):
         image = load_gifti(path)
-        values = [np.asarray(array.data) for array in image.darrays]
-        span = ", ".join(
-            f"{part.min():.4g} to {part.max():.4g}" for part in values if part.size
-        )
-        return (
-            f"{', '.join(str(len(part)) for part in values)} values,"
-            f" {span}{_side(structure_of(image, path))}"
-        )
+        counts = []
+        spans = []
+        for array in image.darrays:
+            values = np.asarray(array.data)
+            counts.append(str(len(values)))
+            if values.size:
+                spans.append(f"{values.min():.4g} to {values.max():.4g}")
+        side = _side(structure_of(image, path))
+        return f"{', '.join(counts)} values, {', '.join(spans)}{side}"
     mesh, space, structure = surface_space_structure(path)
-    size = " x ".join(f"{extent:.3g}" for extent in np.ptp(mesh.vertices, axis=0))
-    named = f", {space.removeprefix('NIFTI_XFORM_').lower()} space" if space else ""
-    closed = "closed" if is_closed(mesh) else "open"
-    return (
-        f"{closed} surface of {len(mesh.vertices)} vertices, {size}"
-        f" mm{_side(structure)}{named}"
-    )
+    kind = "closed" if is_closed(mesh) else "open"
+    size = _sizes(np.ptp(mesh.vertices, axis=0))
+    text = f"{kind} surface of {len(mesh.vertices)} vertices, {size} mm"
+    text += _side(structure)
+    if space:
+        text += f", {_plain_space(space)} space"
+    return text
+
+
+def _sizes(sizes: Iterable[float]) -> str:
+    return " x ".join(f"{size:.3g}" for size in sizes)
+
+
+def _plain_space(space: str) -> str:
+    return space.removeprefix("NIFTI_XFORM_").lower()
 
 
 def _side(structure: str | None) -> str:
@@ -107,12 +116,9 @@ def input_facts(study: Study) -> Iterator[str]:
     order of the configuration."""
     owners: dict[str, list[str]] = {}
     for brain in study.config.brains:
-        for path in (
-            *brain.files,
-            *brain.white_files.values(),
-            *filter(None, [brain.image]),
-        ):
-            owners.setdefault(path, []).append(brain.id)
+        for path in (*brain.files, *brain.white_files.values(), brain.image):
+            if path is not None:
+                owners.setdefault(path, []).append(brain.id)
     for owner, files, _ in _other_files(study):
         for path in files:
             owners.setdefault(path, []).append(owner)
@@ -120,13 +126,9 @@ def input_facts(study: Study) -> Iterator[str]:
         # problems are those of `doubts_about_files` and `check_other_files`; files of
         # atlases may be missing yet
         if Path(path).is_file():
-            try:
-                yield (
-                    f"{', '.join(dict.fromkeys(names))}: {Path(path).name}:"
-                    f" {describe(path)}"
-                )
-            except GyriflowError:
-                continue
+            with suppress(GyriflowError):
+                named = ", ".join(dict.fromkeys(names))
+                yield f"{named}: {Path(path).name}: {describe(path)}"
 
 
 def doubts_about_files(
@@ -180,9 +182,7 @@ def _check_surfaces(brain: BrainConfig) -> Iterator[str]:
         side: read_surface(path, side) for side, path in brain.white_files.items()
     }
     if brain.hemispheres is not None:
-        left, right, declared = read_hemispheres(
-            brain.hemispheres.left, brain.hemispheres.right
-        )
+        left, right, declared = read_hemispheres(*brain.hemispheres)
         yield from _check_pair(brain, left, right, declared=declared)
         _check_whites({"left": left, "right": right}, whites)
     elif brain.files:
@@ -241,24 +241,23 @@ def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:
 
 
 def _outward(mesh: TriangleMesh) -> TriangleMesh:
-    return (
-        mesh
-        if signed_volume(mesh) >= 0
-        else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
-    )
+    if signed_volume(mesh) >= 0:
+        return mesh
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
 
 
 def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:
-    name, own = Path(path).name, {*SUBJECT_NAME.findall(f"{brain.id} {brain.subject}")}
-    if own and (found := {*SUBJECT_NAME.findall(name)} - own):
-        yield f"{path} has a name of sub-{', sub-'.join(sorted(found))}"
-    spaces = {
-        space
-        for space in SPACE_NAME.findall(name)
-        if space.lower() not in NATIVE_SPACES
-    }
-    if Path(path).is_file() and (space := _template_space(path)):
-        spaces.add(space)
+    name = Path(path).name
+    own_names = set(SUBJECT_NAME.findall(f"{brain.id} {brain.subject}"))
+    other_names = set(SUBJECT_NAME.findall(name)) - own_names
+    if own_names and other_names:
+        yield f"{path} has a name of sub-{', sub-'.join(sorted(other_names))}"
+    spaces = set()
+    for space in SPACE_NAME.findall(name):
+        if space.lower() not in NATIVE_SPACES:
+            spaces.add(space)
+    if Path(path).is_file():
+        spaces |= {_template_space(path)} - {""}
     if spaces:
         yield (
             f"{path} is in the space {', '.join(sorted(spaces))}: has the brain its own"
@@ -271,48 +270,40 @@ def _template_space(path: str) -> str:
     if is_volume(path):
         space = read_header(path).space
     else:
-        space = (
-            (surface_space_structure(path)[1] or "")
-            .removeprefix("NIFTI_XFORM_")
-            .lower()
-        )
+        _, named, _ = surface_space_structure(path)
+        space = _plain_space(named or "")
     return space if space in TEMPLATE_SPACES else ""
 
 
-def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:
-    """Yield each problem of files of regions and maps: whose it is, the text, and
-    True."""
+def check_other_files(study: Study) -> Iterator[tuple[str, str]]:
+    """Yield each problem of files of regions and maps: whose it is, and the text."""
     seen = set()
     for owner, files, check in _other_files(study):
+        what = owner.partition(" of ")[0]
         # runs may share a map
-        if (key := (owner.partition(" of ")[0], *files)) not in seen:
-            seen.add(key)
-            try:
-                check()
-            except InputError as error:
-                yield owner, str(error), True
+        key = (what, *files)
+        if key in seen:
+            continue
+        seen.add(key)
+        try:
+            check()
+        except InputError as error:
+            yield owner, str(error)
 
 
 def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], None]]]:
     """Yield whose each group of files of regions and maps is, the files, and the
     function that checks them."""
-    regions = study.config.metrics.regions
-    for name, given in ({} if isinstance(regions, str) else regions).items():
+    for name, regions in study.config.metrics.regions.items():
         brain = study.brains.get(name)
         affine_from = brain.affine_from if brain else "auto"
-        yield (
-            f"regions of {name}",
-            [*given.files.values()],
-            partial(_check_regions, given, affine_from),
-        )
+        check = partial(_check_regions, regions, affine_from)
+        yield f"regions of {name}", list(regions.files.values()), check
     for simulation in study.run_simulations:
         for name, value in mapped_parameters(simulation.settings).items():
             files = [*files_of(value.map), *files_of(value.surface)]
-            yield (
-                f"{name} of run {simulation.run}",
-                files,
-                partial(_check_map, name, value),
-            )
+            check = partial(_check_map, name, value)
+            yield f"{name} of run {simulation.run}", files, check
 
 
 def _check_regions(regions: GivenRegions, affine_from: AffineSource) -> None:
@@ -336,11 +327,12 @@ def _check_regions(regions: GivenRegions, affine_from: AffineSource) -> None:
 
 
 def _check_map(name: str, value: Any) -> None:
-    paths, surfaces = files_of(value.map), files_of(value.surface)
-    values = (
-        read_surface_maps(paths, surfaces)[1]
-        if surfaces
-        else read_volume_map(paths[0])[0].ravel()
-    )
+    paths = files_of(value.map)
+    surfaces = files_of(value.surface)
+    if surfaces:
+        _, values = read_surface_maps(paths, surfaces)
+    else:
+        volume, _ = read_volume_map(paths[0])
+        values = volume.ravel()
     if name == "thickness_mm":
         require_plausible_thickness(values, mean_of_curve(value), ", ".join(paths))

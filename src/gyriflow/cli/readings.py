@@ -24,8 +24,6 @@ from ..running.machine import available_cores
 from ..settings.schemes import SCHEME_FILES
 from ..version import version
 
-KIND = "readings"
-"""The folder in the cache folder."""
 MIN_IN_POOL = 16
 """From so many scans on they are read by several processes, each of which takes two
 seconds to start."""
@@ -33,7 +31,7 @@ seconds to start."""
 
 @dataclass(frozen=True)
 class Reading:
-    """What reading the files of a scan has found, until an `error` refused them;
+    """The results of reading the files of a scan, until an `error` refused them;
     `warnings` are those of the log."""
 
     values: list[Any] = field(default_factory=list)
@@ -67,9 +65,9 @@ def readings(
         results[number] = result
         key = keys[number]
         if key is not None:
-            keep_result(KIND, key, asdict(result))
+            keep_result(key, asdict(result))
     if missing:
-        remove_old_results(KIND)
+        remove_old_results()
     return [result for result in results if result is not None]
 
 
@@ -102,7 +100,7 @@ def _plain(value: Any) -> Any:
 
 
 def _kept(key: str | None) -> Reading | None:
-    kept = {} if key is None else kept_result(KIND, key)
+    kept = {} if key is None else kept_result(key)
     # another program may have changed the file
     with suppress(TypeError):
         return Reading(**kept) if kept else None

@@ -3,7 +3,7 @@ and sessions."""
 
 import logging
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -134,11 +134,11 @@ class FoundBrain:
     def files(self) -> str:
         """Its files, separated by commas."""
         source = self.entry.get("labels") or self.entry.get("pial")
-        return str(source or ", ".join(self.entry["hemispheres"].values()))
+        return str(source or ", ".join(self.entry["hemispheres"]))
 
     @property
-    def is_whole_surface(self) -> bool:
-        """Whether it is one surface of both hemispheres."""
+    def _is_whole_surface(self) -> bool:
+        """True if it is one surface of both hemispheres."""
         return "pial" in self.entry and "side" not in self.entry
 
 
@@ -206,27 +206,14 @@ def recognise(
     and `ses-`, files of others are not read. InputError if no scan is found, or none of
     a named participant or session.
     """
-    paths = [path.relative_to(folder) for path in files_in(folder)]
-    own = [
-        file.parent
-        for file in paths
-        if file.name == "dataset_description.json" and is_own_data_set(folder / file)
-    ]
-    own += [
-        file.parents[1] for file in paths if file.parts[-2:] == ("study", "study.json")
-    ]
-    own += [results.parent / "resources" for results in own]
-    files = [file for file in paths if not any(map(file.is_relative_to, own))]
-    tables = ScanTables(
-        [folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation
-    )
-    found: dict[str, list[FoundBrain]] = defaultdict(list)
+    files = _files_of_others(folder)
+    table_files = [folder / file for file in files if TABLE_NAME.fullmatch(file.name)]
+    tables = ScanTables(table_files, notation)
     unreadable = [file for file in files if (folder / file).is_dir()]
-    for brain in (
-        *_hemispheres(files),
-        *_whole_surfaces(files),
-        *_volumes(files, unreadable),
-    ):
+    candidates = [*_hemispheres(files), *_whole_surfaces(files)]
+    candidates += _volumes(files, unreadable)
+    found: dict[str, list[FoundBrain]] = defaultdict(list)
+    for brain in candidates:
         if fnmatch(str(brain.file), pattern):
             found[_scan_of(brain.file)].append(brain)
     # sessions without labels or surfaces count
@@ -235,37 +222,32 @@ def recognise(
         sessions_of[_label(file, "sub")] |= {_label(file, "ses")} - {None}
     if not found:
         raise _no_brain(folder, {str(file): _rejection(file) for file in files})
-    selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
-    selected["ses"] = {label.removeprefix("ses-") for label in sessions or ()}
+    selected = {
+        "sub": {label.removeprefix("sub-") for label in participants or ()},
+        "ses": {label.removeprefix("ses-") for label in sessions or ()},
+    }
     for entity, labels in selected.items():
-        existing = {
-            _label(brain.file, entity) for group in found.values() for brain in group
-        }
-        if absent := sorted(labels - existing):
-            problem = (
-                f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
-            )
-            names = (
-                ", ".join(
-                    sorted(f"{entity}-{label}" for label in existing if label)[:20]
-                )
-                or "none"
-            )
-            remedy = "Labels must be equal, with their zeros and case."
+        existing: set[str | None] = set()
+        for group in found.values():
+            existing |= {_label(brain.file, entity) for brain in group}
+        absent = [f"{entity}-{label}" for label in sorted(labels - existing)]
+        if absent:
+            names = sorted(f"{entity}-{label}" for label in existing if label)
             raise InputError(
-                problem,
+                f"has no scan of {', '.join(absent)}",
                 path=folder,
-                found=names,
-                remedy=remedy,
+                found=", ".join(names[:20]) or "none",
+                remedy="Labels must be equal, with their zeros and case.",
             )
     unused = _in_other_formats(files)
     preferred: dict[str, list[FoundBrain]] = {}
     to_read: list[FoundBrain] = []
     for name, group in found.items():
-        if not any(
-            labels and _label(group[0].file, entity) not in labels
-            for entity, labels in selected.items()
-        ):
+        is_selected = True
+        for entity, labels in selected.items():
+            if labels and _label(group[0].file, entity) not in labels:
+                is_selected = False
+        if is_selected:
             preferred[name] = _preferred_files(group, unused)
             for brain in preferred[name]:
                 _complete(brain, folder, tables, sessions_of)
@@ -275,12 +257,10 @@ def recognise(
     for name, files_of_scan in preferred.items():
         brains += _brains_of_scan(name, found[name], files_of_scan, unused)
     # templates among subjects are not scans
-    if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (
-        0,
-        len(brains),
-    ):
-        unused |= {brain.files: brain.problem for brain in brains if brain.is_template}
-        brains = own_scans
+    templates = [brain for brain in brains if brain.is_template]
+    if len(templates) < len(brains):
+        unused |= {brain.files: brain.problem for brain in templates}
+        brains = [brain for brain in brains if not brain.is_template]
     if not brains:
         if unused:
             raise _no_brain(folder, unused)
@@ -301,20 +281,33 @@ def recognise(
     return FoundScans(brains, unused)
 
 
+def _files_of_others(folder: Path) -> list[Path]:
+    """Return the files in a folder, relative to it, without results and data sets of
+    gyriflow itself."""
+    files = [path.relative_to(folder) for path in files_in(folder)]
+    own = []
+    for file in files:
+        if file.name == "dataset_description.json" and is_own_data_set(folder / file):
+            own.append(file.parent)
+        elif file.parts[-2:] == ("study", "study.json"):
+            own.append(file.parents[1])
+    own += [results.parent / "resources" for results in own]
+    return [file for file in files if not any(map(file.is_relative_to, own))]
+
+
 def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
     expected = (
         "tissue label volumes (.nii.gz), or surfaces with left and right or pial in"
         " their names"
     )
-    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]]
+    lines = [f"{len(reasons)} files"]
+    for file, reason in list(reasons.items())[:10]:
+        lines.append(f"  {file}: {reason}")
     if len(reasons) > 10:
-        names.append("\n  …")
-    found = f"{len(reasons)} files{''.join(names)}\n"
+        lines.append("  …")
+    found = "\n".join(lines) + "\n"
     return InputError(
-        "no brain was recognised",
-        path=folder,
-        found=found,
-        expected=expected,
+        "no brain was recognised", path=folder, found=found, expected=expected
     )
 
 
@@ -366,7 +359,7 @@ def _brains_of_scan(
     for brain in preferred:
         if (
             brain.is_unreadable
-            and brain.is_whole_surface
+            and brain._is_whole_surface
             and not LAYER_NAME.search(brain.file.name)
         ):
             unused[brain.files] = brain.problem
@@ -375,9 +368,8 @@ def _brains_of_scan(
     readable = [brain for brain in brains if not brain.is_unreadable]
     names = sorted({_scan_name(brain.file) for brain in group})
     data_sets = _data_sets(group)
-    for number, brain in enumerate(
-        [*readable, *(brain for brain in brains if brain.is_unreadable)], start=1
-    ):
+    unreadable = [brain for brain in brains if brain.is_unreadable]
+    for number, brain in enumerate([*readable, *unreadable], start=1):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
             # several files of one scan do not make a series
@@ -407,7 +399,8 @@ def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
     folders: dict[str, set[str]] = defaultdict(set)
     for brain in group:
         above = re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix())
-        folder = data_set_of(Path(above[1] or "" if above else ""))
+        above_subject = above[1] if above else None
+        folder = data_set_of(Path(above_subject or ""))
         parts = [part for part in folder.parts if not GENERIC_FOLDER.fullmatch(part)]
         kind = "labels" if "labels" in brain.entry else "surfaces"
         folders[kind].add(str(Path(*parts)))
@@ -431,13 +424,15 @@ def _preferred_files(
     }
     preferred = [brain for brain in preferred if brain.file.parent not in volumes]
     for brain in group:
-        if brain not in preferred:
-            reason = (
-                f"in the space {brain.space}"
-                if brain.space
-                else "a volume of a subject with surfaces"
-            )
-            unused[str(brain.file)] = RESAMPLED if brain.space == RESAMPLED else reason
+        if brain in preferred:
+            continue
+        if brain.space == RESAMPLED:
+            reason = RESAMPLED
+        elif brain.space:
+            reason = f"in the space {brain.space}"
+        else:
+            reason = "a volume of a subject with surfaces"
+        unused[str(brain.file)] = reason
     return preferred
 
 
@@ -447,13 +442,13 @@ def _refuse_equal_weeks(brains: Sequence[FoundBrain]) -> None:
         if "subject" in brain.entry and brain.entry["week"] != UNSET:
             scans[brain.entry["subject"], brain.entry["week"]].append(brain)
     for (_, week), group in scans.items():
-        found = ", ".join(
-            f"{brain.entry['id']} ({brain.age_source})" for brain in group
-        )
-        for brain in group if len(group) > 1 else ():
+        if len(group) == 1:
+            continue
+        names = [f"{brain.entry['id']} ({brain.age_source})" for brain in group]
+        for brain in group:
             brain.contradiction = (
-                f"scans of one subject have the same age, {week:g}; found {found};"
-                " expected one"
+                f"scans of one subject have the same age, {week:g}; found"
+                f" {', '.join(names)}; expected one"
             )
 
 
@@ -505,7 +500,7 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
         pair = {side: str(sides[side]) for side in SIDES if side in sides}
         first = next(iter(pair))
         file, white = sides[first], surfaces.get((rest, "white"), {})
-        source: dict[str, Any] = {"hemispheres": pair}
+        source: dict[str, Any] = {"hemispheres": list(pair.values())}
         problem = ""
         if kind == "white":
             if (rest, "pial") in surfaces:
@@ -627,20 +622,18 @@ def _complete(
         entry["subject"] = f"sub-{subject}" if subject else owners[0]
     brain.entry = entry | covariates(facts.values) | brain.entry
     brain.age_source, brain.named_age = age.source, age.named
-    labels = {entity: _labels(brain.file, entity) for entity in ("ses", "sub")}
-    if names := [
-        f"{entity}-{label}"
-        for entity in labels
-        for label in labels[entity]
-        if len(labels[entity]) > 1
-    ]:
+    all_labels = []
+    names = []
+    for entity in ("ses", "sub"):
+        labels = _labels(brain.file, entity)
+        all_labels += labels
+        if len(labels) > 1:
+            names += [f"{entity}-{label}" for label in labels]
+    if names:
         brain.problem = (
             f"its path names several scans: found {', '.join(names)}; expected one"
         )
-    elif not all(
-        re.fullmatch("[A-Za-z0-9-]+", label)
-        for label in (*labels["sub"], *labels["ses"])
-    ):
+    elif not all(re.fullmatch("[A-Za-z0-9-]+", label) for label in all_labels):
         brain.problem = (
             f"has other characters than letters and digits in {_scan_name(brain.file)}"
         )
@@ -662,7 +655,7 @@ def _read_files(brains: Sequence[FoundBrain], folder: Path) -> None:
     for brain in brains:
         if brain.problem:
             continue
-        if "labels" in brain.entry or brain.is_whole_surface:
+        if "labels" in brain.entry or brain._is_whole_surface:
             whole.append(brain)
             continue
         names = [*brain.files.split(", "), *brain.entry.get("white", ())]
@@ -690,7 +683,7 @@ def _require_some_content(path: Path) -> None:
 def fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
     """Yield what `scheme_fits` returns for a label volume; nothing for a surface.
 
-    InputError if it cannot be read, or if the surface is no whole brain.
+    InputError if it cannot be read, or if the surface is not a whole brain.
     """
     (file,) = files
     if is_volume(file):
@@ -887,7 +880,7 @@ def recognise_brain(
         _require_brain(pial[0], whole=True)
         entry["pial"] = str(pial[0])
     else:
-        entry["hemispheres"] = dict(zip(SIDES, map(str, pial), strict=True))
+        entry["hemispheres"] = [str(file) for file in pial]
     if white and len(white) != len(files):
         problem = f"--white: found {len(white)} surfaces for {len(files)} pial ones"
         raise InputError(
@@ -985,13 +978,12 @@ def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> 
         elif choices:
             brain.notes.append(f"scheme: {' or '.join(choices)} both fit the labels")
         else:
-            against = [
-                f"; not {name}: {cause}" for name, cause in (brain.fits or {}).items()
-            ]
-            brain.notes.append(
-                "scheme: no shipped one"
-                f" fits{''.join(against) or ', none has all labels'}"
-            )
+            note = "scheme: no shipped one fits"
+            if not brain.fits:
+                note += ", none has all labels"
+            for name, cause in (brain.fits or {}).items():
+                note += f"; not {name}: {cause}"
+            brain.notes.append(note)
     for brain in brains:
         schemes = by_subject[brain.entry.get("subject", "")]
         if brain.entry.get("subject") and len(schemes) > 1:
@@ -1005,23 +997,17 @@ def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> 
 def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
     """Yield the number of volumes of each chosen scheme, then contradictions to it and
     to the other schemes."""
-    for name, number in Counter(
-        brain.entry.get("scheme", UNSET) for brain in brains
-    ).items():
-        if name != UNSET:
-            fits = [
-                brain.fits or {}
-                for brain in brains
-                if brain.entry.get("scheme") == name
-            ]
-            causes = {
-                fitted: cause
-                for schemes in fits
-                for fitted, cause in schemes.items()
-                if cause
-            }
-            yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
-            yield from (
-                f"  {'but' if fitted == name else f'not {fitted}:'} {causes[fitted]}"
-                for fitted in causes
-            )
+    by_scheme: dict[str, list[FoundBrain]] = defaultdict(list)
+    for brain in brains:
+        by_scheme[brain.entry.get("scheme", UNSET)].append(brain)
+    by_scheme.pop(UNSET, None)
+    for name, with_scheme in by_scheme.items():
+        number = len(with_scheme)
+        yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
+        causes: dict[str, str] = {}
+        for brain in with_scheme:
+            for scheme, cause in (brain.fits or {}).items():
+                if cause:
+                    causes[scheme] = cause
+        for scheme, cause in causes.items():
+            yield f"  but {cause}" if scheme == name else f"  not {scheme}: {cause}"

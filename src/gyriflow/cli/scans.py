@@ -43,23 +43,27 @@ def scan_lines(scans: Iterable[ScanRow]) -> Iterator[str]:
         disable_numparse=True,
     )
     heading, *lines = table.splitlines()
-    shown = Kinds()
+    kinds = Kinds()
     yield heading
     for line, row in zip(lines, rows, strict=True):
         yield line
-        for reason in (" ".join(text.split()) for text in row.reasons):
-            if shown.add(row.scan, f"{row.scan}: {reason}"):
+        for text in row.reasons:
+            reason = " ".join(text.split())
+            if kinds.add(row.scan, f"{row.scan}: {reason}"):
                 yield f"    {reason}"
-    yield from shown.others()
+    yield from kinds.others()
     counts = Counter(row.verdict for row in rows)
-    unusable = [
-        f"{counts[verdict]} {text}"
-        for verdict, text in UNUSABLE.items()
-        if counts[verdict]
-    ]
-    usable = sum(row.verdict not in UNUSABLE for row in rows)
+    n_usable = len(rows)
+    unusable = []
+    for verdict, text in UNUSABLE.items():
+        if counts[verdict]:
+            unusable.append(f"{counts[verdict]} {text}")
+            n_usable -= counts[verdict]
     total = f"{len(rows)} scan{'s' if len(rows) != 1 else ''}"
-    yield f"{usable} of {total}; {', '.join(unusable)}" if unusable else total
+    if unusable:
+        yield f"{n_usable} of {total}; {', '.join(unusable)}"
+    else:
+        yield total
 
 
 def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
@@ -68,11 +72,11 @@ def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
     path = directory / "results" / "study" / "quality.csv"
     if not path.is_file():
         return {}
-    table = read_table(path).fillna("")
-    return {
-        str(row["subject"]): (str(row["verdict"]), str(row.get("cause", "")))
-        for _, row in table.iterrows()
-    }
+    verdicts = {}
+    for _, row in read_table(path).fillna("").iterrows():
+        cause = str(row.get("cause", ""))
+        verdicts[str(row["subject"])] = (str(row["verdict"]), cause)
+    return verdicts
 
 
 def found_rows(
@@ -81,31 +85,29 @@ def found_rows(
     """Yield the rows of recognised scans; `verdicts` has verdict and cause of those
     that were run, by id."""
     for brain in found.brains:
-        week, scheme = brain.entry["week"], brain.entry.get("scheme", UNSET)
+        scan = brain.entry["id"]
+        week = brain.entry["week"]
+        scheme = brain.entry.get("scheme", UNSET)
         reasons = [*brain.causes, *brain.warnings]
-        if brain.causes:
-            is_refused = brain.problem or brain.contradiction
-            verdict = (
-                "not read"
-                if brain.is_unreadable
-                else "refused"
-                if is_refused
-                else "fill in"
-            )
+        if brain.is_unreadable and brain.causes:
+            verdict = "not read"
+        elif brain.problem or brain.contradiction:
+            verdict = "refused"
+        elif brain.causes:
+            verdict = "fill in"
+        elif scan in verdicts:
+            verdict, cause = verdicts[scan]
+            if cause:
+                reasons.append(cause)
         else:
-            verdict, cause = verdicts.get(
-                brain.entry["id"], ("warning" if brain.warnings else "ok", "")
-            )
-            reasons += [cause] if cause else []
-        data = ", ".join(file.rpartition("/")[2] for file in brain.files.split(", "))
-        age = "–" if week == UNSET else f"{week:g}"
-        scheme = "–" if scheme == UNSET else scheme
+            verdict = "warning" if brain.warnings else "ok"
+        names = [file.rpartition("/")[2] for file in brain.files.split(", ")]
         yield ScanRow(
-            brain.entry["id"],
-            age,
-            brain.age_source or "–",
-            data,
-            scheme,
-            verdict,
-            reasons,
+            scan=scan,
+            age="–" if week == UNSET else f"{week:g}",
+            age_source=brain.age_source or "–",
+            data=", ".join(names),
+            scheme="–" if scheme == UNSET else scheme,
+            verdict=verdict,
+            reasons=reasons,
         )

@@ -17,12 +17,10 @@ from ..errors import InputError
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
 from ..settings.terms import (
-    AMPLITUDE,
     FOLD_BANDS,
     OBSERVED,
     PROXIES,
     SPECTRAL_SCORES,
-    STIFFNESS_RATIO,
     Score,
 )
 from .comparison import Group, ObservedBrain, compare
@@ -169,31 +167,16 @@ def calibrated_parameters(
     week.
 
     `base` is that of the base run, `values` the value of each parameter: a key of
-    `params.yaml` (with dots for nested keys), `stiffness_ratio`, or `KEY.amplitude`, a
-    factor on the curve KEY.
+    `params.yaml`, with dots for nested keys.
     """
     params = deepcopy(dict(base))
     for key, value in values.items():
-        if key == STIFFNESS_RATIO:
-            params["shear_modulus_cortex_pa"] = value * params["shear_modulus_core_pa"]
-            continue
-        *outer, last = key.removesuffix(AMPLITUDE).split(".")
+        *outer, last = key.split(".")
         section = params
         for name in outer:
             section = section[name]
-        section[last] = (
-            _scaled(section[last], value) if key.endswith(AMPLITUDE) else value
-        )
+        section[last] = value
     return params | {"end_week": week, "output_weeks": [params["start_week"], week]}
-
-
-def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
-    """Return a curve with all values times a factor."""
-    if "weeks" in curve:
-        scaled = dict(curve)
-        scaled["weeks"] = _scaled(curve["weeks"], factor)
-        return scaled
-    return {week: factor * value for week, value in curve.items()}
 
 
 SURFACE_SCORES: dict[Score, tuple[Group, Callable[[Mapping[str, float]], float]]] = {

@@ -48,7 +48,6 @@ PARAMETERS = (
     "shear_modulus_core_pa",
     "poisson_ratio",
     "growth_rate_per_s",
-    "radial_growth_rate_per_s",
     "step_s",
     "start_week",
     "end_week",

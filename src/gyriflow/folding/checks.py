@@ -107,7 +107,7 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     if not (zones.growth > 0).any():
         raise InputError(
             "no vertex grows",
-            remedy="Make the no-growth ellipsoid smaller (folding.no_growth).",
+            remedy="Choose another folding.support.",
         )
     if zones.free:
         return
@@ -118,10 +118,7 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     if not len(clamped):
         raise InputError(
             "no facet is clamped, so the brain would drift",
-            expected=(
-                "pial facets inside the ellipsoid without growth (folding.no_growth),"
-                " or another folding.support"
-            ),
+            expected="pial facets inside the ellipsoid, or another folding.support",
         )
     part = connected_parts(mesh)
     parts = part.max() + 1

@@ -163,21 +163,19 @@ def increments(
     w: Any,
     g: Any,
     tangential: Any,
-    radial: Any,
     core: Any,
     step_s: float,
 ) -> tuple[Any, Any]:
     """Return the tangential and radial growth increments dg and dr, as stretches minus
     1.
 
-    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt,
-    with the cortical weight w, g 1 where tissue grows and else 0, and rates in 1/s:
-    tangential of the cortex (α_TAN), radial of the core (α_RAD), and isotropic of the
-    core (α_CORE).
+    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = α_CORE (1 − w) · g · Δt, with the
+    cortical weight w, g 1 where tissue grows and else 0, and rates in 1/s: tangential
+    of the cortex (α_TAN) and isotropic of the core (α_CORE).
     """
     isotropic = core * (1 - w)
     tangential_growth = (tangential * w + isotropic) * (g * step_s)
-    radial_growth = (radial * (1 - w) + isotropic) * (g * step_s)
+    radial_growth = isotropic * (g * step_s)
     return tangential_growth, radial_growth
 
 
@@ -192,9 +190,8 @@ def increments_at(
     """Return the increments of a step by the parameters' rates at a week; `w`, `g` and
     maps are at the same points."""
     tangential = value_at(p.growth_rate_per_s, week, maps)
-    radial = value_at(p.radial_growth_rate_per_s, week, maps)
     core = value_at(p.core_growth_rate_per_s, week, maps)
-    return increments(w, g, tangential, radial, core, step_s)
+    return increments(w, g, tangential, core, step_s)
 
 
 def layered_inverse(

@@ -77,8 +77,8 @@ def steered_growth(
     )
     target = Size(area_cm2 / CM2_PER_MM2, volume_ml / ML_PER_MM3)
     before = inputs.size(start.positions_mm)
-    by_unit_rates, by_radial = free_growth(p, start.positions_mm, inputs, week)
-    required = before.rates_to(target, start.step_s) - by_radial
+    by_unit_rates = free_growth(p, start.positions_mm, inputs, week)
+    required = before.rates_to(target, start.step_s)
     if start.correction:
         required -= start.correction
     cortex, core, is_limited = steered_rates(
@@ -90,7 +90,7 @@ def steered_growth(
         start,
         before,
         target,
-        free_rates=by_unit_rates @ [cortex, core] + by_radial,
+        free_rates=by_unit_rates @ [cortex, core],
         limited=bool(is_limited),
     )
 
@@ -135,13 +135,10 @@ def free_growth(
     positions_mm: Floats,
     inputs: GrowthInputs,
     week: float,
-) -> tuple[Floats, Floats]:
-    """Return the rates of the logarithms of area and volume of unconstrained growth at
-    (n, 3) positions.
-
-    A (2, 2) array for unit rates of cortex and core (columns), and the (2,) rates in
-    1/s of radial growth.
-    """
+) -> Floats:
+    """Return the (2, 2) rates of the logarithms of area and volume (rows) of
+    unconstrained growth at (n, 3) positions, for unit rates of cortex and core
+    (columns)."""
     zones = inputs.zones
     thickness = value_at(p.thickness_mm, week, inputs.maps)
     search = PialSearch(positions_mm, zones.cortex_facets)
@@ -149,12 +146,8 @@ def free_growth(
     weight = cortical_weight(distance, thickness)
     volumes = volumes_between(positions_mm, inputs.pieces)
 
-    def volume_rate(
-        tangential: float,
-        radial: float | Floats,
-        core: float,
-    ) -> float:
-        dg, dr = increments(weight, zones.growth, tangential, radial, core, 1.0)
+    def volume_rate(tangential: float, core: float) -> float:
+        dg, dr = increments(weight, zones.growth, tangential, core, 1.0)
         of_volume = 2 * dg + dr
         of_pieces = of_volume[inputs.pieces].mean(axis=1)
         return float(np.average(of_pieces, weights=volumes))
@@ -163,12 +156,9 @@ def free_growth(
     areas = face_areas(TriangleMesh(positions_mm, faces))
     growing = zones.growth[faces].mean(axis=1)
     cortex_area = 2 * float(growing @ areas / areas.sum())
-    cortex_volume = volume_rate(1.0, 0.0, 0.0)
-    core_volume = volume_rate(0.0, 0.0, 1.0)
-    radial_rate = value_at(p.radial_growth_rate_per_s, week, inputs.maps)
-    radial_volume = volume_rate(0.0, radial_rate, 0.0)
-    by_unit_rates = np.array([[cortex_area, 0.0], [cortex_volume, core_volume]])
-    return by_unit_rates, np.array([0.0, radial_volume])
+    cortex_volume = volume_rate(1.0, 0.0)
+    core_volume = volume_rate(0.0, 1.0)
+    return np.array([[cortex_area, 0.0], [cortex_volume, core_volume]])
 
 
 def missed_curves(row: dict[str, Any]) -> str:

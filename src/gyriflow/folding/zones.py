@@ -232,7 +232,7 @@ def zones_of_run(
             anchors = _wall_anchors(mesh.vertices, wall)
 
     growth = np.ones(len(mesh.vertices))
-    if p.no_growth != "none":
+    if p.support == "ellipsoid":
         growth[is_static] = 0.0
         if p.side is None:
             in_bridge = _bridge_vertices(

@@ -2,7 +2,6 @@
 
 import gzip
 import hashlib
-import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,14 +39,12 @@ def fetch(
     report: Report,
     *,
     sha256: str | None = None,
-    size: int | None = None,
 ) -> None:
     """Fetch a file from a URL, check it and put it under `path`, or check the one
     there, which is never replaced.
 
     `report` gets a line about the file. Without a checksum, a GIFTI or NIfTI file has
-    to be readable to its end. There has to be room for the size in bytes, if known.
-    StorageError otherwise, with nothing new under `path`.
+    to be readable to its end. StorageError otherwise, with nothing new under `path`.
     """
     import pooch
 
@@ -73,11 +70,6 @@ def fetch(
             report(f"{path} already exists")
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        free = shutil.disk_usage(path.parent).free
-        if size is not None and free < size:
-            raise StorageError(
-                f"no room for {size} bytes; {free} are free", path=path.parent
-            )
         files = {"registry": {path.name: None}, "urls": {path.name: url}}
         pooch.create(path.parent, "", retry_if_failed=TRIES - 1, **files).fetch(
             path.name, downloader=download

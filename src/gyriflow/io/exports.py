@@ -2,7 +2,6 @@
 
 import re
 import shutil
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,7 +28,7 @@ from .surfaces import (
 from .volumes import LabelVolume, write_label_volume
 
 BIDS_VERSION = "1.10.0"
-OF_STUDY = ("participants", "metrics_wide", "metrics_long")
+STUDY_TABLES = ("participants", "metrics_wide", "metrics_long")
 """Tables of all subjects."""
 IGNORED = """\
 # BIDS has no names for surfaces and the maps on them yet: these are those that its
@@ -364,68 +363,61 @@ def publish_derivatives(
     """
     exported, folder, source = Path(exported), Path(folder), Path(source)
     require_own_data_set(folder)
-    files = {str(path.relative_to(exported)): path for path in files_below(exported)}
-    subjects = {name.partition("/")[0] for name in files if "/" in name}
-    study_tables = [
-        name
-        for name in files
-        if "/" not in name and Path(name).stem in OF_STUDY and not whole
-    ]
-    pages = {
-        f"{brain.split('_')[0]}/figures/{brain}_quality.png": (
-            f"brains/{brain}/figures/quality.png"
-        )
-        for brain in brains
-    }
-    # brains of an atlas have pages, too, to which the report leads
-    report = exported.parent / "report"
-    names = [
-        *(str(path.relative_to(report)) for path in report.glob("**/*.html")),
-        "methods.rst",
-    ]
-    pages |= {name: f"report/{name}" for name in names if whole}
-    files |= {
-        target: path
-        for target, page in pages.items()
-        if (path := exported.parent / page).is_file()
-    }
+    files = {}
+    subjects = set()
+    for path in files_below(exported):
+        name = str(path.relative_to(exported))
+        subject, is_of_subject, _ = name.partition("/")
+        if is_of_subject:
+            subjects.add(subject)
+        elif path.stem in STUDY_TABLES and not whole:
+            continue
+        files[name] = path
+    results = exported.parent
+    pages = {}
+    for brain in brains:
+        name = f"{brain.split('_')[0]}/figures/{brain}_quality.png"
+        pages[name] = results / "brains" / brain / "figures" / "quality.png"
+    if whole:
+        report = results / "report"
+        # brains of an atlas have pages, too, to which the report leads
+        for page in (*report.glob("**/*.html"), report / "methods.rst"):
+            pages[str(page.relative_to(report))] = page
+    for name, page in pages.items():
+        if page.is_file():
+            files[name] = page
     with making_files(folder, exported.with_name(".published-files.json"), *subjects):
-        for name in files.keys() - study_tables:
-            _copy(files[name], folder / name)
+        for name, path in files.items():
+            _copy(path, folder / name)
     description = source / "dataset_description.json"
     source_description = read_json(description) if description.is_file() else {}
     doi = str(source_description.get("DatasetDOI", ""))
-    url = (
-        doi
-        if doi.startswith(("doi:", "http"))
-        else f"doi:{doi}"
-        if doi
-        else source.resolve().as_uri()
-    )
+    if not doi:
+        url = source.resolve().as_uri()
+    elif doi.startswith(("doi:", "http")):
+        url = doi
+    else:
+        url = f"doi:{doi}"
     described = read_json(exported / "dataset_description.json")
-    write_json(
-        folder / "dataset_description.json",
-        described | {"SourceDatasets": [{"URL": url}]},
-    )
+    described["SourceDatasets"] = [{"URL": url}]
+    write_json(folder / "dataset_description.json", described)
 
 
 def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
-    subjects = {brain.brain: bids_subject(brain.subject) for brain in brains}
-    sessions = {
-        brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}"
-        for brain in brains
-    }
-    several = max(
-        Counter(brain.subject for brain in brains).values(), default=0
-    ) > 1 or any(sessions.values())
-    week = {
-        brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None
-        for brain in brains
-    }
-    return {
-        brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain])
-        for brain in brains
-    }
+    sessions = {}
+    for brain in brains:
+        named = SESSION.search(brain.brain)
+        if named:
+            sessions[brain.brain] = f"ses-{named[1]}"
+    n_subjects = len({brain.subject for brain in brains})
+    has_sessions = bool(sessions) or n_subjects < len(brains)
+    names: dict[str, tuple[str, str | None]] = {}
+    for brain in brains:
+        session = sessions.get(brain.brain)
+        if session is None and has_sessions:
+            session = f"ses-{brain.week:.2f}w".replace(".", "")
+        names[brain.brain] = (bids_subject(brain.subject), session)
+    return names
 
 
 def _write_people(
@@ -435,11 +427,14 @@ def _write_people(
 ) -> None:
     # covariates that differ between a subject's brains are those of sessions
     first = list(OWN_COLUMNS)
-    people = pd.DataFrame(
-        dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True))
-        | {_column_of_input(name): text for name, text in brain.covariates.items()}
-        for brain in brains
-    ).sort_values(first[:2])
+    rows = []
+    for brain in brains:
+        own = (*names[brain.brain], brain.week, brain.brain)
+        row: dict[str, Any] = dict(zip(first, own, strict=True))
+        for name, text in brain.covariates.items():
+            row[_column_of_input(name)] = text
+        rows.append(row)
+    people = pd.DataFrame(rows).sort_values(first[:2])
     most = people.groupby("participant_id").nunique(dropna=False).max()
     tables = {"participants": people.drop(columns="session_id")}
     if people["session_id"].notna().any():
@@ -454,11 +449,10 @@ def _write_people(
             _write_tsv(folder / str(subject) / f"{subject}_sessions.tsv", part[varying])
     _write_tsv(folder / "participants.tsv", tables["participants"])
     for name, table in tables.items():
-        columns = {
-            str(key): PEOPLE.get(str(key), OF_INPUT)
-            for key in table
-            if key not in first[:2]
-        }
+        columns = {}
+        for key in map(str, table):
+            if key not in first[:2]:
+                columns[key] = PEOPLE.get(key, OF_INPUT)
         write_json(folder / f"{name}.json", columns)
 
 

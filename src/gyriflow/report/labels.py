@@ -18,7 +18,6 @@ PARAMETER_TITLES = {
     "shear_modulus_core": "shear modulus of the core",
     "poisson_ratio": "Poisson's ratio",
     "contact": "contact",
-    "no_growth": "zone without growth",
     "step": "time step",
     "tets": "elements",
     "order": "order of the elements",

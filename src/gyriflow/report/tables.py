@@ -56,7 +56,6 @@ COMMON_PARAMETERS = (
     "stress_memory_gw",
     "support",
     "contact",
-    "no_growth",
     "step_s",
     "tets",
     "order",

@@ -85,7 +85,7 @@ class Needs(NamedTuple):
     disk_mib: float
 
 
-def surface_area_mm2(week: float) -> float:
+def _surface_area_mm2(week: float) -> float:
     """Predict the area of the pial surface of a brain of a week, with sulci as labels
     of 0.8 mm show them."""
     return 9900 * (expected_volume_ml(week) / 51) ** 0.74
@@ -97,7 +97,7 @@ def linear_elements(week: float, mesh: MeshSettings) -> float:
     volume_ml, edge = expected_volume_ml(week), mesh.surface_edge_mm
     graded = 1 / edge**2 - 1 / mesh.core_edge_mm**2
     cubes = (
-        surface_area_mm2(week) * (2.5 / edge**2 + max(graded, 0))
+        _surface_area_mm2(week) * (2.5 / edge**2 + max(graded, 0))
         + volume_ml / ML_PER_MM3 / mesh.core_edge_mm**3
     )
     return ELEMENTS_PER_CUBE[mesh.mesher] * cubes
@@ -201,7 +201,7 @@ def _brain_seconds(
             if is_simulated
             else study.config.surface.edge_length_mm
         )
-        vertices = share * surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
+        vertices = share * _surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
         has_slits = (
             brain.labels is not None
             and brain.thickness is not None

@@ -203,7 +203,7 @@ def clear_stale_lock(directory: Path) -> None:
         )
 
 
-def check_configfiles(files: Sequence[Path], directory: Path) -> None:
+def _check_configfiles(files: Sequence[Path], directory: Path) -> None:
     """Raise InputError if a file, or else the directory's config/config.yaml, is not a
     valid YAML configuration."""
     default = directory / "config" / "config.yaml"
@@ -237,7 +237,7 @@ def what_runs(directory: Path) -> str:
     return text
 
 
-def check_options(unknown: Sequence[str], usage: str) -> None:
+def _check_options(unknown: Sequence[str], usage: str) -> None:
     """Raise InputError if an `unknown` argument is an option; Snakemake's `usage` lists
     the valid ones."""
     options = ["--stage", *dict.fromkeys(re.findall(r"--[a-z][a-z-]+", usage))]
@@ -281,7 +281,7 @@ def refused_brains() -> dict[str, str]:
     return read_json(path) if path else {}
 
 
-def failed_brains(failures: Sequence[Message]) -> dict[str, str]:
+def _failed_brains(failures: Sequence[Message]) -> dict[str, str]:
     """Return the causes of the brains with a failed step, by id, from the errors of
     steps."""
     causes: dict[str, str] = {}
@@ -314,7 +314,7 @@ def _is_running(process: psutil.Process) -> bool:
     return False
 
 
-def finish_without(
+def _finish_without(
     refused: dict[str, str],
     arguments: Sequence[str],
     directory: Path,
@@ -401,7 +401,7 @@ def set_cache(directory: Path) -> None:
         )
 
 
-def set_environment() -> None:
+def _set_environment() -> None:
     """Set the environment variables that Snakemake and the steps of the workflow
     read."""
     os.environ |= read_keys(ENVIRONMENT)["variables"] | os.environ
@@ -444,8 +444,8 @@ def call_snakemake(
             # Snakemake's own handler, set by now, waits for running jobs to end
             signal.signal(signal.SIGTERM, interrupt)
         events.take(record)
-        is_message = record.levelno >= logging.INFO
-        names = NO_RULE.findall(record.getMessage()) if is_message else []
+        _is_message = record.levelno >= logging.INFO
+        names = NO_RULE.findall(record.getMessage()) if _is_message else []
         unknown_targets.extend(names)
         is_wanted = getattr(record, "event", None) not in unwanted
         return record.levelno >= level and is_wanted and not names
@@ -514,7 +514,7 @@ class Call:
     take_plan: Callable[[Plan], None] | None = None
     is_shown: bool = True
 
-    def has_any(self, names: Sequence[str]) -> bool:
+    def _has_any(self, names: Sequence[str]) -> bool:
         """Return whether any of some options is given."""
         return any(getattr(self.options, name, None) for name in names)
 
@@ -524,10 +524,10 @@ class Call:
         return self.place == self.directory
 
     @property
-    def is_planned(self) -> bool:
+    def _is_planned(self) -> bool:
         """Whether it runs jobs or shows those that would run."""
         is_plain = self.options.dryrun or self.runs
-        return is_plain and not self.has_any(MANAGING_OPTIONS)
+        return is_plain and not self._has_any(MANAGING_OPTIONS)
 
     @property
     def quiet(self) -> list[str]:
@@ -541,7 +541,7 @@ class Call:
         wanted = session.targets if self.options.force else []
         return [*(self.options.forcerun or []), *wanted]
 
-    def without_force(self) -> "Call":
+    def _without_force(self) -> "Call":
         """Return the call without arguments that force jobs to run: the plan has them,
         and Snakemake would leave out some behind a checkpoint."""
         arguments = [word for word in self.arguments if word not in FORCE_OPTIONS]
@@ -560,10 +560,10 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     if call.runs:
         # of a run that was killed
         restore_results(call.directory)
-    if not call.is_planned:
+    if not call._is_planned:
         code, _ = run_jobs(call, no_plan())
         return code
-    call = call.without_force()
+    call = call._without_force()
     events = Events()
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
@@ -582,16 +582,16 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         return 0
     if events.nothing and not plan.reasons:
         if left is None:
-            say_nothing_runs(call, events.nothing)
+            _say_nothing_runs(call, events.nothing)
         return 0
-    if not (call.runs or call.has_any(SNAKEMAKE_LISTS)):
+    if not (call.runs or call._has_any(SNAKEMAKE_LISTS)):
         print(listing(plan, call.quiet), end="")
         return 0
     if call.runs:
         hide_results(call.directory, plan.outdated)
     else:
         link_results(call.directory, call.place, plan.outdated)
-    session.is_planned = True
+    session._is_planned = True
     try:
         code, ended = run_jobs(call, plan)
         still_left = set(plan.reasons) - ended
@@ -599,15 +599,15 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
             return plan_and_run(call, left=still_left)
         return code
     finally:
-        session.is_planned = False
+        session._is_planned = False
 
 
-def say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
+def _say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
     """Print that everything is up to date, or Snakemake's `record` of it if its own
     messages are asked for."""
     if call.options.dryrun:
         print(record.getMessage())
-    elif call.has_any(VERBOSE_OPTIONS):
+    elif call._has_any(VERBOSE_OPTIONS):
         print(record.getMessage(), file=sys.stderr)
     else:
         print("gyriflow: everything is up to date", file=sys.stderr)
@@ -634,7 +634,7 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
         arguments += ["--quiet", *(others or ["host"])]
         level, unwanted = logging.INFO, ("job_finished", "progress")
     output: AbstractContextManager[None] = nullcontext()
-    if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
+    if not call._has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         details = call.directory.resolve() / ".snakemake" / "log" / name
         logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
@@ -667,12 +667,12 @@ def main(
 
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)
-    check_options(unknown, parser.format_usage())
+    _check_options(unknown, parser.format_usage())
     directory = options.directory or Path()
     is_second_pass = REFUSED_FILE_VAR in os.environ
     if not (options.configfile or options.snakefile or is_second_pass):
         print(f"gyriflow: {what_runs(directory)}", file=sys.stderr)
-    check_configfiles(options.configfile or [], directory)
+    _check_configfiles(options.configfile or [], directory)
     dry_run = any(
         getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS
     )
@@ -681,7 +681,7 @@ def main(
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)
-    set_environment()
+    _set_environment()
     session.is_launched = True
     session.targets = options.targets or ["all"]
     session.keeps_going = options.keep_going
@@ -714,8 +714,8 @@ def main(
     messages = study_messages(directory, began_s)
     failures = [message for message in messages if message.level == "error"]
     if options.keep_going and not is_second_pass:
-        brains = failed_brains(failures)
-        if brains and (interrupted := finish_without(brains, arguments, directory)):
+        brains = _failed_brains(failures)
+        if brains and (interrupted := _finish_without(brains, arguments, directory)):
             return interrupted
     return exit_code(code, failures, directory)
 

@@ -109,7 +109,7 @@ class Contents:
         return self._facts.get(path, [])
 
 
-def settings_of(job: Job, found: Contents) -> dict[str, str]:
+def _settings_of(job: Job, found: Contents) -> dict[str, str]:
     """Return the settings of a job as text, files by their content."""
     texts = {}
     for name, value in job.settings().items():
@@ -164,7 +164,7 @@ def write_manifest(job: Job, found: Contents) -> None:
     manifest = {
         "rule": job.rule,
         "inputs": inputs,
-        "settings": settings_of(job, found),
+        "settings": _settings_of(job, found),
         "results": {path: found.facts(path) for path in job.outputs},
     }
     write_json(job.manifest, manifest)
@@ -204,7 +204,7 @@ def difference(
             return f"changed result {Path(path).name}"
     if changed := _changed_inputs(job, manifest["inputs"], found):
         return f"changed input {', '.join(changed)}"
-    return _changed_settings(settings_of(job, found), manifest["settings"])
+    return _changed_settings(_settings_of(job, found), manifest["settings"])
 
 
 def _changed_inputs(

@@ -41,7 +41,7 @@ UPDATED = " (update)"
 """What Snakemake's log adds to the name of a result that a rule updates."""
 
 
-def job_from(job: Any) -> Job:
+def _job_from(job: Any) -> Job:
     """Return a job of Snakemake's own."""
     named = {}
     for name, files in job.input.items():
@@ -119,7 +119,7 @@ class Events:
         if id(selected) not in self._selected:
             self._selected[id(selected)] = selected
             # also again, once it is known what a checkpoint has made
-            job = job_from(selected)
+            job = _job_from(selected)
             self.jobs[job.key] = job
 
 

@@ -71,7 +71,7 @@ def require_for(programs: Mapping[str, Path]) -> None:
         raise InputError(
             problem, found=f"step {rule}, which imports {package}", remedy=remedy
         )
-    lacking = missing_libraries()
+    lacking = _missing_libraries()
     if lacking:
         names = ", ".join(lacking)
         raise InputError(
@@ -85,7 +85,7 @@ def require_for(programs: Mapping[str, Path]) -> None:
         raise InputError(
             "simulations need a C compiler, and there is none", remedy=remedy
         )
-    if compiles and not has_python_headers():
+    if compiles and not _has_python_headers():
         raise InputError(
             "simulations need Python.h, and there is none",
             remedy=_install([_headers_package()]),
@@ -119,7 +119,7 @@ def has_dolfinx_wheels() -> bool:
     return library == "glibc" and [int(number) for number in numbers[:2]] >= [2, 34]
 
 
-def missing_libraries() -> list[str]:
+def _missing_libraries() -> list[str]:
     """Return the `LIBRARIES` that this system lacks."""
     if sys.platform != "linux":
         return []
@@ -132,17 +132,17 @@ def missing_libraries() -> list[str]:
     return lacking
 
 
-def has_python_headers() -> bool:
+def _has_python_headers() -> bool:
     """Return whether C code can be compiled for this Python."""
     return Path(sysconfig.get_path("include"), "Python.h").is_file()
 
 
 def missing_debian_packages() -> list[str]:
     """Return the Debian packages that this system lacks."""
-    packages = [LIBRARIES[name] for name in missing_libraries()]
+    packages = [LIBRARIES[name] for name in _missing_libraries()]
     if not has_compiler():
         packages += ["gcc", "libc6-dev"]
-    if not has_python_headers():
+    if not _has_python_headers():
         packages.append(_headers_package())
     return packages
 

@@ -35,6 +35,7 @@ SOURCES_OF_SERIES: tuple[tuple[set[FileKey], set[FileKey]], ...] = (
 )
 """Sets of file keys that define a surface, each with those that may come with it. A
 series has one of them."""
+Checksum = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
 """How a week may be written in a file's name, as `05.2f`."""
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
@@ -72,15 +73,6 @@ class AtlasLicence(Settings):
     """Whether users have to accept terms that are narrow or unclear."""
 
 
-class AtlasFileRecord(Settings):
-    """Size and checksum of a file."""
-
-    bytes: int | None = Field(None, ge=1)
-    """Size of the file."""
-    sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
-    """SHA-256; `null`: unknown, the file only has to be readable."""
-
-
 class AtlasSeries(Settings):
     """One population by week."""
 
@@ -92,23 +84,24 @@ class AtlasSeries(Settings):
     """Whether surfaces of all weeks have the same vertices; believed until the files
     are there."""
     files: dict[FileKey, str]
-    """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`:
+    """Path of each file below the URL, and next to `atlas.yaml` or in the folder of a
+    study's section `atlas`, with `{week}` (`{week:05.2f}`:
     21.00) for the week: `labels` and perhaps `image` (T2-weighted), or pial surfaces
     `left` and `right` (perhaps `white_left` and `white_right`), or the whole `pial` one
     (perhaps `white`)."""
-    weeks: dict[AnyWeek, dict[FileKey, AtlasFileRecord]]
-    """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its
-    files. [GW]"""
+    weeks: dict[AnyWeek, dict[FileKey, Checksum]]
+    """The weeks, as a list, or each with the SHA-256 of its files, as `{labels: …}`; a
+    file without one only has to be readable. [GW]"""
 
     @field_validator("weeks", mode="before")
     @classmethod
-    def _weeks_without_records(cls, value: Any) -> Any:
+    def _weeks_without_checksums(cls, value: Any) -> Any:
         if isinstance(value, list | dict):
             _require_weeks_once(value)
         if isinstance(value, list):
             return {week: {} for week in value}
         if isinstance(value, dict):
-            return {week: records or {} for week, records in value.items()}
+            return {week: checksums or {} for week, checksums in value.items()}
         return value
 
     @field_validator("files")
@@ -162,8 +155,6 @@ class Atlas(Settings):
     """The reference to cite: authors, title, journal, year, and DOI or address."""
     url: str | None = Field(None, pattern="^https?://")
     """Address of the files' root; `null`: not online."""
-    folder: str | None = None
-    """Folder with local files, relative to `atlas.yaml`."""
     series: dict[Annotated[str, Field(pattern=NAME)], AtlasSeries] = Field(min_length=1)
     """Populations by name, each a series over the weeks."""
 

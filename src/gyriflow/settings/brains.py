@@ -28,21 +28,16 @@ KEY_SOURCES: dict[str, tuple[str, ...]] = {
 MAX_AXIS_RATIO = 2.0
 """Limit of longest over shortest semi-axis; the ends of longer shapes are too sharp for
 even triangles."""
-MAX_NOISE = 0.02
-"""Largest height of the bumps relative to the shortest semi-axis."""
 Length = Annotated[float, Field(ge=5, le=150)]
 
 
 class ShapeSettings(Settings):
     """An ellipsoid in place of a brain, for teaching and verification, centred on the
-    origin; `{}` is one of 21 GW."""
+    origin; `{}` is one of 21 GW. Folding starts from smooth bumps of 0.05 mm."""
 
     semi_axes_mm: tuple[Length, Length, Length] = (21.0, 28.0, 22.0)
     """Semi-axes along X, Y, Z, all the same for a sphere; the longest is at most twice
     the shortest. [mm]"""
-    noise_mm: float = Field(0.05, ge=0, le=0.5)
-    """Root mean square height of the smooth bumps that start the folding, at most a
-    fiftieth of the shortest semi-axis. [mm]"""
 
     @property
     def kind(self) -> str:
@@ -56,22 +51,6 @@ class ShapeSettings(Settings):
                 " times the shortest"
             )
             yield KeyProblem(text, ("semi_axes_mm",))
-        # the default suits the default sizes; only a given value can be wrong
-        if self.is_set("noise_mm") and self.noise_mm > MAX_NOISE * shortest:
-            text = (
-                f"found {self.noise_mm:g}; expected at most {MAX_NOISE * shortest:g}, a"
-                " fiftieth of the shortest"
-            )
-            yield KeyProblem(f"{text} semi-axis", ("noise_mm",))
-
-
-class HemisphereFiles(Settings):
-    """The pial surfaces of both hemispheres, such as GIFTI or FreeSurfer files."""
-
-    left: InputFile
-    """File of the left hemisphere."""
-    right: InputFile
-    """File of the right hemisphere."""
 
 
 class BrainConfig(Settings):
@@ -100,8 +79,9 @@ class BrainConfig(Settings):
     of an entry of the key `schemes`. Required with `labels`."""
     affine_from: AffineSource = "auto"
     """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
-    hemispheres: HemisphereFiles | None = None
-    """Surface files of both hemispheres."""
+    hemispheres: tuple[InputFile, InputFile] | None = None
+    """Pial surfaces of the left and the right hemisphere, such as GIFTI or FreeSurfer
+    files."""
     pial: InputFile | None = None
     """Closed surface of the whole brain."""
     side: Side | None = None
@@ -129,9 +109,7 @@ class BrainConfig(Settings):
 
     @property
     def files(self) -> list[str]:
-        paths = [self.labels, self.pial]
-        if self.hemispheres is not None:
-            paths += [self.hemispheres.left, self.hemispheres.right]
+        paths = [self.labels, self.pial, *(self.hemispheres or ())]
         return [path for path in paths if path is not None]
 
     @property
@@ -242,8 +220,8 @@ class ParticipantsSettings(Settings):
     Columns are `participant_id` (or `id`); `session_id` (or `session`, `visit`) where a
     subject has several scans; the age at the scan, `scan_age`, or else
     `gestational_age` or `week`, as `24.3`, `24+2` or `24w2d` (in days with
-    `scan_age_days`); and keys of brains, inner ones with a dot (`hemispheres.left`),
-    two `white` surfaces with a semicolon between. Instead of keys, `files` may name
+    `scan_age_days`); and keys of brains, with a semicolon between a left and a
+    right file. Instead of keys, `files` may name
     labels, a pial surface, or left and right surfaces with a semicolon between; with
     `side`, one of these is the only hemisphere. `n/a` is an empty value. Other columns
     are covariates. Each participant is a subject. One with a

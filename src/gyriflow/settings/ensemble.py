@@ -28,7 +28,7 @@ class Variation:
     perturbation, `registration_smoothing` a factor of the registration's smoothing.
     Predictions only: `age_shift_gw` is added to the start brain's age; for
     `difference_smoothing_mm`, `fading_gw` and `lasting` see `growth.expected`; the
-    last is from 0 to 1, since no measurement says how much lasts.
+    last is from 0 to 1, since it was never measured how much lasts.
     """
 
     number: int

@@ -88,8 +88,6 @@ class FoldingSettings(Settings):
     """Poisson's ratio ν."""
     growth_rate_per_s: VaryingNumber = varying(2.0e-7, ge=0, le=1e-5)
     """Tangential growth rate of the cortex. [1/s]"""
-    radial_growth_rate_per_s: VaryingNumber = varying(0.0, ge=0, le=1e-5)
-    """Radial growth rate of the core, along the cortical normal. [1/s]"""
     core_growth_rate_per_s: VaryingNumber = varying(0.0, ge=0, le=1e-5)
     """Isotropic growth rate of the core. [1/s]"""
     growth: Growth = Growth()
@@ -98,15 +96,14 @@ class FoldingSettings(Settings):
     """Relaxation time of elastic stress: after each step 0 forgets it (the paper),
     `infinite` keeps all of it. [GW]"""
     support: Literal["ellipsoid", "free"] = "ellipsoid"
-    """What holds the brain: `ellipsoid` clamps pial facets in the paper's ellipsoid;
-    `free` removes rigid motions only."""
+    """What holds the brain, and where it grows. `ellipsoid`: pial facets in the paper's
+    ellipsoid (docs/model.md) are clamped, and tissue in it and in the bridge between
+    hemispheres does not grow; `free`: all tissue grows, and only rigid motions are
+    removed."""
     contact: Literal["global", "planes", "none"] = "global"
     """Contact between folds, and between the two hemispheres. `global`: no part of the
     pial surface crosses another; `planes`: neither hemisphere passes the fissure's
     plane, but folds may cross each other (the paper); `none`: no contact."""
-    no_growth: Literal["ellipsoid", "none"] = "ellipsoid"
-    """Tissue that does not grow. `ellipsoid`: that in the paper's ellipsoid
-    (docs/model.md), and in the bridge between hemispheres; `none`: all tissue grows."""
     output_every_gw: float = Field(1.0, ge=0.01, le=10)
     """Interval between output weeks, besides the first and the last, and where some run
     predicts the start's growth (`growth.of: atlas`) those of the brains to compare

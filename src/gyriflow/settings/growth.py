@@ -63,7 +63,7 @@ def _rates_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str
 
 def _sizes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
     source = ""
-    if _of_population(run):
+    if _is_from_population(run):
         source = f" through brains of several subjects ({run['growth_of']}), {NOT_OWN}"
     return (
         "Growth rates of cortex and core were set in each step so that area and volume"
@@ -72,7 +72,7 @@ def _sizes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str
 
 
 def _shapes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
-    if _of_population(run):
+    if _is_from_population(run):
         target = (
             f"that given by the growth of several subjects ({run['growth_of']}),"
             f" {NOT_OWN}"
@@ -90,24 +90,20 @@ def _shapes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> st
 NOT_OWN = "a population's growth and not the subject's own"
 
 
-def _of_population(run: Mapping[str, Any]) -> bool:
+def _is_from_population(run: Mapping[str, Any]) -> bool:
     return run["growth_of"].startswith("population")
 
 
 GROWTH_MODELS: dict[ModelName, GrowthModel] = {
     "rates": GrowthModel(
         keys=(),
-        rates=(
-            "growth_rate_per_s",
-            "radial_growth_rate_per_s",
-            "core_growth_rate_per_s",
-        ),
+        rates=("growth_rate_per_s", "core_growth_rate_per_s"),
         measured=None,
         sentence=_rates_sentence,
     ),
     "sizes": GrowthModel(
         keys=SIZES,
-        rates=("radial_growth_rate_per_s",),
+        rates=(),
         measured="sizes",
         sentence=_sizes_sentence,
     ),
@@ -160,7 +156,7 @@ class Growth(Settings):
 
     @property
     def follows_sizes(self) -> bool:
-        """Whether it follows curves of measured area or volume."""
+        """True if it follows curves of measured area or volume."""
         return self.definition.measured == "sizes" and "measured" in (
             self.area_cm2,
             self.volume_ml,

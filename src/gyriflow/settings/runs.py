@@ -10,7 +10,6 @@ from .base import FirstIf, KeyProblem, Problems, Settings
 from .brains import BrainConfig
 from .ensemble import Variation, variations
 from .folding import VARYING, FoldingSettings
-from .growth import SIZES
 from .stages import MeshSettings
 from .terms import MAX_NAME_LENGTH, SCORES, Score
 from .weeks import EndWeek
@@ -36,7 +35,6 @@ FREE_GROWTH: dict[str, Any] = {
     "shear_modulus_core_pa": 300.0,
     "support": "free",
     "contact": "global",
-    "no_growth": "none",
 }
 """Growth everywhere, a free body, a cortex as stiff as the core: growth makes the
 folds, not buckling."""
@@ -53,12 +51,10 @@ PRESETS: dict[str, dict[str, Any]] = {
         "material": "neo-hookean",
         "poisson_ratio": 0.45,
         "growth_rate_per_s": 2.0e-7,
-        "radial_growth_rate_per_s": 0.0,
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
         "contact": "planes",
-        "no_growth": "ellipsoid",
     },
     # growth towards the shapes that were measured on the brain's own series
     "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},
@@ -273,8 +269,6 @@ NOT_VARIED = (
     "ensemble",
 )
 """Keys that do not belong to the model of a run, or that the sweep sets."""
-CURVE_KEYS = tuple(f"growth.{size}" for size in SIZES)
-"""Curves that may vary besides those of parameters."""
 MAX_PARAMETERS = 3
 MIN_FIRST_ROUND, MAX_RUNS = 3, 40
 """Limits of a calibration."""
@@ -328,9 +322,7 @@ class CalibrationSettings(ComparisonSettings):
 
     parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
     """One to three keys of `folding` with their lowest and highest values, such as
-    `{thickness_mm: [1, 3]}`; inner keys with dots. `stiffness_ratio` is the cortex's
-    shear modulus over the core's; `KEY.amplitude` scales the base run's curve of
-    KEY."""
+    `{thickness_mm: [1, 3]}`; inner keys with dots."""
     score: dict[Score, Annotated[float, Field(gt=0)]]
     """What is minimised: the weights of one or more measures (docs/metrics.md)."""
     rounds: tuple[Annotated[int, Field(ge=1, le=MAX_RUNS)], ...] = (12, 4, 4, 4)
@@ -391,19 +383,21 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
     return type(run).model_validate(raw)
 
 
-def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Value]]]:
+def variants(name: str, sweep: SweepSettings) -> Iterator[tuple[str, dict[str, Value]]]:
     """Yield the name and the varied values of each run of a sweep, the last key varying
     fastest."""
-    for values in product(*study.vary.values()):
-        texts = map(_short, values)
-        run = "-".join([name, *texts])
-        varied = zip(study.vary, values, strict=True)
-        yield run, dict(varied)
+    for values in product(*sweep.vary.values()):
+        run = name
+        varied = {}
+        for key, value in zip(sweep.vary, values, strict=True):
+            run += f"-{_short(value)}"
+            varied[key] = value
+        yield run, varied
 
 
 def _short(value: str | float) -> str:
-    """Return a value as text: a number in six digits, or in as many as it takes to tell
-    it from all others."""
+    """Return a value as text: a number in six digits, or in as many as make it
+    unique."""
     if isinstance(value, str):
         return value
     short = f"{value:g}"

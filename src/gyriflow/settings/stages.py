@@ -8,7 +8,6 @@ from .base import FirstIf, InputFile, Settings
 from .brains import GivenRegions
 from .terms import (
     CURVATURE_RADIUS_MM,
-    MAX_HOLE_MM,
     SPANGY_MODES,
     LastBand,
     MassMatrix,
@@ -21,10 +20,6 @@ class SurfaceSettings(Settings):
 
     edge_length_mm: float = Field(1.0, gt=0.1, le=5)
     """Edge length of the remeshed surface, on which metrics are measured. [mm]"""
-    max_hole_mm: float = Field(3.0, ge=0, le=MAX_HOLE_MM)
-    """Largest hole of given pial and white surfaces that is closed. A larger one is an
-    error, unless it is the open medial wall of a pial hemisphere, which is capped.
-    [mm]"""
     asymmetric: bool = False
     """Whether hemispheres may differ in size and shape, as with unilateral pathology.
     Otherwise such a pair is refused as belonging to two brains."""

@@ -34,8 +34,6 @@ REGION_FIELDS: tuple[RegionField, ...] = get_args(RegionField)
 
 Mesher = Literal["pytetwild", "tetgen"]
 """The programs that fill a surface with tetrahedra."""
-MAX_HOLE_MM = 20.0
-"""Upper bound of the setting `max_hole_mm`."""
 Coordinates = Literal["auto", "ras", "lps"]
 """Axes of the coordinates in surface files; `auto`: determined from the shape."""
 AffineSource = Literal["auto", "sform", "qform"]
@@ -175,12 +173,6 @@ week.
 """
 SCORES: tuple[Score, ...] = get_args(Score)
 SPECTRAL_SCORES: tuple[SpectralScore, ...] = get_args(SpectralScore)
-
-AMPLITUDE = ".amplitude"
-"""Suffix of a parameter that scales a curve of the base run."""
-STIFFNESS_RATIO = "stiffness_ratio"
-"""The parameter that sets the shear modulus of the cortex to a multiple of that of the
-core."""
 
 
 def rounded_elements(elements: float) -> float:

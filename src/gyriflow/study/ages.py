@@ -71,7 +71,7 @@ OTHER_AGE = re.compile(
     r"|deliver|mother|maternal|\b(dob|pna|pca|term|months?|years?)\b",
     re.IGNORECASE,
 )
-"""Texts that say that an age is not the gestational one at the scan."""
+"""Words for another age than the gestational one at the scan."""
 MIN_AMBIGUOUS_AGES = 3
 """Number of ages in tenths of a week with digits from 0 to 6 that is enough to suspect
 days."""

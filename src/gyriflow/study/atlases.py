@@ -11,15 +11,16 @@ from typing import Any
 
 from ..io.files import files_below
 from ..io.yaml_files import read_keys
-from ..settings.atlas import DOWNLOADS, Atlas, AtlasFileRecord, AtlasSettings, FileKey
+from ..settings.atlas import DOWNLOADS, Atlas, AtlasSettings, FileKey
 from ..settings.base import KeyProblem, Problems, own_name
 from ..settings.root import Config
+from ..settings.terms import SIDES
 
 
 @dataclass(frozen=True)
 class AtlasFile:
     """A file of an atlas: its series, week and key, the id of its brain, its path, the
-    address for its download, and its size and checksum.
+    address for its download, and its SHA-256 if known.
 
     `copies` are the files of that name in the folder: none if it is missing, several if
     it is ambiguous.
@@ -31,7 +32,7 @@ class AtlasFile:
     brain: str
     path: Path
     url: str | None
-    record: AtlasFileRecord
+    sha256: str | None
     copies: tuple[Path, ...]
 
 
@@ -74,12 +75,12 @@ class UsedAtlas:
         series = self.atlas.series[name]
         weeks = set(series.weeks)
         if self.settings.weeks is not None:
-            weeks = self.known_weeks(name).intersection(self.settings.weeks)
+            weeks = self._known_weeks(name).intersection(self.settings.weeks)
         keys = series.files if self.settings.images else series.needed
         root = (self.atlas.url or "").rstrip("/")
         for week in sorted(weeks):
             brain = self.atlas.brain_id(name, week)
-            records = series.weeks.get(week, {})
+            checksums = series.weeks.get(week, {})
             for key in keys:
                 pattern = series.files[key]
                 # `{week}` has no decimals where there are none
@@ -93,11 +94,11 @@ class UsedAtlas:
                     path=copies[0] if copies else self.folder / path,
                     # unpublished files have no address
                     url=f"{root}/{path}" if root and week in series.weeks else None,
-                    record=records.get(key, AtlasFileRecord()),
+                    sha256=checksums.get(key),
                     copies=tuple(copies),
                 )
 
-    def known_weeks(self, name: str) -> set[float]:
+    def _known_weeks(self, name: str) -> set[float]:
         """Return the weeks of a series that are published, or whose required files are
         in the folder."""
         series = self.atlas.series[name]
@@ -115,10 +116,7 @@ class UsedAtlas:
         return copies
 
     def _shipped(self, path: str) -> list[Path]:
-        if self.atlas.folder is None:
-            return []
-        folder = self.settings.description.parent / self.atlas.folder
-        place = own_name(folder / path)
+        place = own_name(self.settings.description.parent / path)
         return [place] if place.is_file() else []
 
 
@@ -147,11 +145,10 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
         series = used.atlas.series[file.series]
         new = {"id": file.brain, "week": file.week, "population": series.population}
         entry = entries.setdefault(file.brain, new)
-        if file.key in ("left", "right"):
-            entry.setdefault("hemispheres", {})[file.key] = str(file.path)
-        elif file.key in ("white_left", "white_right"):
-            sides = entry.setdefault("white", ["", ""])
-            sides[file.key == "white_right"] = str(file.path)
+        layer, _, side = file.key.rpartition("_")
+        if side in SIDES:
+            pair = entry.setdefault(layer or "hemispheres", ["", ""])
+            pair[SIDES.index(side)] = str(file.path)
         else:
             entry[file.key] = str(file.path)
         if "labels" in series.files:
@@ -181,7 +178,7 @@ def atlas_problems(used: UsedAtlas) -> Problems:
             f" {licence.terms}",
             ("accept_licence",),
         )
-    available = set.union(*map(used.known_weeks, used.series))
+    available = set.union(*map(used._known_weeks, used.series))
     unknown_weeks = set(settings.weeks or ()) - available
     if unknown_weeks:
         source = atlas.name
@@ -206,17 +203,14 @@ def atlas_problems(used: UsedAtlas) -> Problems:
 
 
 def retrieval_note(used: UsedAtlas) -> str:
-    """Return the note that is shown before missing files of an atlas are fetched: size,
-    reference and licence."""
+    """Return the note that is shown before missing files of an atlas are fetched, with
+    its reference and licence."""
     atlas = used.atlas
-    records = [file.record for file in used.missing]
-    files = "file" if len(records) == 1 else "files"
-    note = f"{atlas.name}: {len(records)} {files}"
-    if all(record.bytes for record in records):
-        size = sum(record.bytes or 0 for record in records)
-        note += f" ({size / 1e6:.1f} MB)"
+    missing = used.missing
+    files = "file" if len(missing) == 1 else "files"
+    note = f"{atlas.name}: {len(missing)} {files}"
     note += f" to fetch into {used.folder} where a stage needs them"
-    if not all(record.sha256 for record in records):
+    if not all(file.sha256 for file in missing):
         note += "; no checksums are known"
     if atlas.reference is not None:
         note += f"\n  cite: {atlas.reference}"
@@ -252,6 +246,6 @@ def known_checksums(atlases: Iterable[UsedAtlas]) -> dict[str, tuple[str, str]]:
     checksums = {}
     for used in atlases:
         for file in used.files:
-            if file.record.sha256 is not None:
-                checksums[str(file.path)] = (used.atlas.name, file.record.sha256)
+            if file.sha256 is not None:
+                checksums[str(file.path)] = (used.atlas.name, file.sha256)
     return checksums

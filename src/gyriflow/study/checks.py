@@ -18,7 +18,6 @@ from ..settings.folding import VARYING, value_problems
 from ..settings.root import Config
 from ..settings.runs import (
     ALL,
-    CURVE_KEYS,
     FIRST,
     NOT_VARIED,
     ComparisonSettings,
@@ -31,7 +30,7 @@ from ..settings.runs import (
     starts_of,
     variants,
 )
-from ..settings.terms import AMPLITUDE, OBSERVED, STIFFNESS_RATIO
+from ..settings.terms import OBSERVED
 from ..settings.varying import Varying
 from ..version import RELEASE
 from .atlases import used_atlases
@@ -500,33 +499,15 @@ def _parameter_problems(
     bounds: Sequence[float],
     base: Run,
 ) -> Iterator[str]:
-    is_ratio = key == STIFFNESS_RATIO
-    is_amplitude = key.endswith(AMPLITUDE)
-    if (is_ratio or is_amplitude) and min(bounds) <= 0:
-        yield f"found {min(bounds):g}; expected bounds above 0"
-    if is_ratio:
-        if isinstance(base.shear_modulus_core_pa, Varying):
-            yield "the core's shear modulus varies in the base run; expected a number"
-    elif is_amplitude:
-        curve = key.removesuffix(AMPLITUDE)
-        if not _is_curve(curve, base):
-            yield f"{curve} is not a curve in the base run"
-    elif key in NOT_VARIED:
+    if key in NOT_VARIED:
         yield "cannot be calibrated"
-    else:
-        for bound in bounds:
-            try:
-                changed(base, {key: bound})
-            except KeyError:
-                yield NO_FOLDING_KEY
-                return
-            except ValidationError as error:
-                problems = problems_in(error, Run)
-                yield from dict.fromkeys(problem.text for problem in problems)
-
-
-def _is_curve(key: str, base: Run) -> bool:
-    if key in CURVE_KEYS:
-        return key.removeprefix("growth.") in base.growth.definition.keys
-    value = getattr(base, key) if key in VARYING else None
-    return isinstance(value, Varying) and bool(value.weeks)
+        return
+    for bound in bounds:
+        try:
+            changed(base, {key: bound})
+        except KeyError:
+            yield NO_FOLDING_KEY
+            return
+        except ValidationError as error:
+            problems = problems_in(error, Run)
+            yield from dict.fromkeys(problem.text for problem in problems)

@@ -145,14 +145,14 @@ def _atlas(
 def _lines(problems: list[KeyProblem]) -> list[str]:
     """Return the lines of problems, each once; those of the atlas are reported
     already."""
-    of_folding = {problem for problem in problems if problem.key[0] == "folding"}
+    folding_problems = {problem for problem in problems if problem.key[0] == "folding"}
     lines = []
     for problem in dict.fromkeys(problems):
         section, *inner = problem.key
         # runs repeat the problems of folding
         is_repeated = (
             section == "runs"
-            and KeyProblem(problem.text, ("folding", *inner[1:])) in of_folding
+            and KeyProblem(problem.text, ("folding", *inner[1:])) in folding_problems
         )
         if section != "atlas" and not is_repeated:
             lines.append(str(problem))

@@ -139,8 +139,8 @@ def observed_name(brains: Iterable[Brain]) -> str:
     names = list(weeks)
     if len(names) > 1:
         names = []
-        for name, of_name in weeks.items():
-            ends = sorted({min(of_name), max(of_name)})
+        for name, own_weeks in weeks.items():
+            ends = sorted({min(own_weeks), max(own_weeks)})
             names.append(f"{name} ({'-'.join(f'{week:g}' for week in ends)} GW)")
     if len(shapes) == 1:
         names.append(shapes.pop())
@@ -207,12 +207,12 @@ class Simulation:
 
     @property
     def has_growth_rate(self) -> bool:
-        """Whether its cortex grows at a rate of the settings."""
+        """True if its cortex grows at a rate of the settings."""
         return "growth_rate_per_s" in self.settings.growth.definition.rates
 
     @property
     def has_growth_maps(self) -> bool:
-        """Whether maps of the growth that it found can be written."""
+        """True if maps of the growth that it found can be written."""
         return self.shapes is not None and "growth" in self.settings.fields
 
 
@@ -353,10 +353,9 @@ class LeftOut:
 
 @dataclass(frozen=True, kw_only=True)
 class Download:
-    """A file of an atlas that is missing, with the address, size and checksum from its
+    """A file of an atlas that is missing, with the address and checksum from its
     description: a row of `downloads.csv`."""
 
     file: str
     url: str | None
-    bytes: int | None
     sha256: str | None

@@ -59,7 +59,7 @@ class _Variant:
 
 
 @dataclass(frozen=True)
-class _Folded:
+class _Pair:
     """A run with one of its start brains."""
 
     run: str
@@ -81,19 +81,19 @@ def resolve(config: Config, refused: Mapping[str, str] | None = None) -> Study:
     brains = plan_brains(config, refused, atlases)
     series = series_of(config, brains, atlases)
     swept = _variants(config)
-    folded = list(_folded(config, brains, series, swept))
-    chains = _chains(folded, series, list(brains.values()))
+    pairs = list(_pairs(config, brains, series, swept))
+    chains = _chains(pairs, series, list(brains.values()))
     unreachable: dict[str, InputError] = {}
-    for one in folded:
-        error = _missing_brains(one, series, chains)
+    for pair in pairs:
+        error = _missing_brains(pair, series, chains)
         if error is not None:
-            unreachable.setdefault(one.start.id, error)
+            unreachable.setdefault(pair.start.id, error)
     if unreachable and not refused:
         raise next(iter(unreachable.values()))
-    folded = [one for one in folded if one.start.id not in unreachable]
+    pairs = [pair for pair in pairs if pair.start.id not in unreachable]
     planned = _Simulations(config, series, chains, brains)
-    planned.add_runs(folded)
-    names = planned.add_variants(folded, swept)
+    planned.add_runs(pairs)
+    names = planned.add_variants(pairs, swept)
     simulations = list(planned.simulations.values())
     followed = _followed_chains(simulations, chains, series)
     links = _links(config, brains, series, followed.values())
@@ -118,12 +118,7 @@ def _downloads(atlases: Iterable[UsedAtlas]) -> list[Download]:
     rows = []
     for used in atlases:
         for file in used.missing:
-            row = Download(
-                file=str(file.path),
-                url=file.url,
-                bytes=file.record.bytes,
-                sha256=file.record.sha256,
-            )
+            row = Download(file=str(file.path), url=file.url, sha256=file.sha256)
             rows.append(row)
     return rows
 
@@ -139,15 +134,10 @@ def _left_out(
     }
     rows = []
     for brain in config.brains:
-        for why, of_brains in causes.items():
-            if brain.id in of_brains:
-                cause = str(of_brains[brain.id])
-                row = LeftOut(
-                    brain=brain.id,
-                    why=why,
-                    week=brain.week,
-                    cause=cause,
-                )
+        for why, causes_by_brain in causes.items():
+            if brain.id in causes_by_brain:
+                cause = str(causes_by_brain[brain.id])
+                row = LeftOut(brain=brain.id, why=why, week=brain.week, cause=cause)
                 rows.append(row)
     for scan, facts in config.left_out.items():
         rows.append(LeftOut(brain=scan, why="cannot be used", **facts))
@@ -247,12 +237,12 @@ def _variants(config: Config) -> list[_Variant]:
     return found
 
 
-def _folded(
+def _pairs(
     config: Config,
     brains: Mapping[str, Brain],
     series: Series,
     variants: Iterable[_Variant],
-) -> Iterator[_Folded]:
+) -> Iterator[_Pair]:
     """Yield each run with each start brain that is not refused: those of `runs`, of
     sweeps and of the calibration."""
     ids = [brain.id for brain in config.brains]
@@ -262,30 +252,30 @@ def _folded(
         starts[name] = [brains[brain] for brain in names if brain in brains]
     for name, run in config.runs.items():
         for start in starts[name]:
-            yield _Folded(name, start, _up_to_last_scan(run, start, series))
+            yield _Pair(name, start, _up_to_last_scan(run, start, series))
     for variant in variants:
         for start in starts[config.sweeps[variant.sweep].base]:
-            yield _Folded(variant.run, start, variant.settings)
+            yield _Pair(variant.run, start, variant.settings)
     calibrate = config.calibrate
     if calibrate is not None:
         changes = {"end_week": calibrate.compare_week, "ensemble": None}
         settings = config.runs[calibrate.base].model_copy(update=changes)
         for name in calibrate.runs:
             for start in starts[calibrate.base]:
-                yield _Folded(name, start, settings)
+                yield _Pair(name, start, settings)
 
 
 def _chains(
-    folded: Iterable[_Folded],
+    pairs: Iterable[_Pair],
     series: Series,
     brains: Sequence[Brain],
 ) -> Chains:
     starts: dict[str, Brain] = {}
     ends: dict[str, float] = {}
-    for one in folded:
-        name = one.start.id
-        starts[name] = one.start
-        ends[name] = max(one.settings.end_week, ends.get(name, 0.0))
+    for pair in pairs:
+        name = pair.start.id
+        starts[name] = pair.start
+        ends[name] = max(pair.settings.end_week, ends.get(name, 0.0))
     chains: Chains = {}
     for name, start in starts.items():
         chains |= chains_of(start, ends[name], series, brains)
@@ -306,59 +296,59 @@ class _Simulations:
     simulated: list[MeasuredBrain] = field(default_factory=list)
     compared: list[Comparison] = field(default_factory=list)
 
-    def add_runs(self, folded: Iterable[_Folded]) -> None:
+    def add_runs(self, pairs: Iterable[_Pair]) -> None:
         """Add the simulations of `runs`, and the members of their ensembles."""
         brains = list(self.brains.values())
-        own = [one for one in folded if one.run in self.config.runs]
+        own = [pair for pair in pairs if pair.run in self.config.runs]
         predicted = set()
-        for one in own:
-            if one.settings.growth.shapes == "atlas":
-                predicted.add(one.start.id)
-        for one in own:
-            start = one.start
+        for pair in own:
+            if pair.settings.growth.shapes == "atlas":
+                predicted.add(pair.start.id)
+        for pair in own:
+            start = pair.start
             further: list[float] = []
             if start.id in predicted:
                 further = later_observed_weeks(start, brains)
-            weeks = _weeks(one.settings, start, further)
-            self._add(one, weeks)
-            alone = one.settings.model_copy(update={"ensemble": None})
-            for name, variation in members_of(one.run, one.settings).items():
-                if one.settings.growth.shapes:
+            weeks = _weeks(pair.settings, start, further)
+            self._add(pair, weeks)
+            alone = pair.settings.model_copy(update={"ensemble": None})
+            for name, variation in members_of(pair.run, pair.settings).items():
+                if pair.settings.growth.shapes:
                     chain = member_chain(
-                        one.run, start, one.settings, variation, self.series, brains
+                        pair.run, start, pair.settings, variation, self.series, brains
                     )
                     chain = replace(chain, name=f"{chain.origin}.{name}")
                     self.chains[start.id, chain.name] = chain
-                self._add(_Folded(name, start, alone), weeks, one.run)
+                self._add(_Pair(name, start, alone), weeks, pair.run)
 
     def add_variants(
-        self, folded: Iterable[_Folded], variants: Sequence[_Variant]
+        self, pairs: Iterable[_Pair], variants: Sequence[_Variant]
     ) -> dict[str, str]:
         """Add the simulations of sweeps and of the calibration; return the simulated
         run of each run of a sweep, by its name."""
         names, compared = _shared_runs(self.config, variants, self.simulations.values())
         calibrate = self.config.calibrate
-        for one in folded:
-            if one.run in compared and one.run not in self.config.runs:
-                weeks = compared[one.run]
-                settings = one.settings.model_copy(update={"end_week": max(weeks)})
-                complete = _Folded(one.run, one.start, settings)
-                self._add(complete, _weeks(settings, one.start, weeks))
-            elif calibrate is not None and one.run in calibrate.runs:
-                self._add(one, [one.start.week, one.settings.end_week])
+        for pair in pairs:
+            if pair.run in compared and pair.run not in self.config.runs:
+                weeks = compared[pair.run]
+                settings = pair.settings.model_copy(update={"end_week": max(weeks)})
+                complete = _Pair(pair.run, pair.start, settings)
+                self._add(complete, _weeks(settings, pair.start, weeks))
+            elif calibrate is not None and pair.run in calibrate.runs:
+                self._add(pair, [pair.start.week, pair.settings.end_week])
         return names
 
     def _add(
         self,
-        folded: _Folded,
+        pair: _Pair,
         weeks: Sequence[float],
         member_of: str | None = None,
     ) -> None:
         """Add a simulation, unless there is one of that name, with the brains that it
         is compared with."""
-        run = folded.run
-        start = folded.start
-        settings = folded.settings
+        run = pair.run
+        start = pair.start
+        settings = pair.settings
         key = (run, start.id)
         if key in self.simulations:
             return
@@ -571,15 +561,15 @@ def _up_to_last_scan(
 
 
 def _missing_brains(
-    folded: _Folded,
+    pair: _Pair,
     series: Series,
     chains: Chains,
 ) -> InputError | None:
     """Return the error of a run that lacks brains to grow a start brain towards, or
     None."""
-    start = folded.start
-    end = folded.settings.end_week
-    origin = folded.settings.growth.shapes
+    start = pair.start
+    end = pair.settings.end_week
+    origin = pair.settings.growth.shapes
     if origin is None:
         return None
     chain = chains[start.id, origin]
@@ -615,7 +605,7 @@ def _missing_brains(
     elif len(usable_series) > 1:
         available = f"several series: {', '.join(usable_series)}"
     return InputError(
-        f"run {folded.run} needs later brains to grow {start.id} towards, up to"
+        f"run {pair.run} needs later brains to grow {start.id} towards, up to"
         f" {end:g} GW",
         found=available,
         expected=f"brains of {expected}, from {start.week:g} to {end:g} GW",

@@ -343,7 +343,7 @@ class Study:
 
     @property
     def has_norm(self) -> bool:
-        """Whether metrics are compared with a norm: of another study, or of enough
+        """True if metrics are compared with a norm: of another study, or of enough
         subjects of this one."""
         if self.config.metrics.norms is not None:
             return True

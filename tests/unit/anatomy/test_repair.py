@@ -53,7 +53,7 @@ def test_small_hole_is_closed_and_reported():
         )
         < 1.2
     )
-    mesh, report, _ = clean(submesh(whole, ~near)[0], 3.0)
+    mesh, report, _ = clean(submesh(whole, ~near)[0])
     assert is_closed(mesh)
     assert report["holes_closed"] == 1
     assert 1.5 < report["largest_hole_mm"] < 3.0
@@ -63,24 +63,16 @@ def test_small_hole_is_closed_and_reported():
 def test_large_hole_is_refused_with_its_size():
     whole = ball()
     mesh, _ = submesh(whole, whole.vertices[whole.faces][:, :, 2].max(axis=1) < 8.0)
-    with pytest.raises(
-        MeshError, match=r"1[12]\.\d mm", check=Facts(1, "3 mm", "surface.max_hole_mm")
-    ):
-        clean(mesh, 3.0)
-    wide = TriangleMesh(3.0 * mesh.vertices, mesh.faces)
-    with pytest.raises(
-        MeshError, match=r"3\d\.\d mm", check=Facts(1, "20 mm")
-    ) as caught:
-        clean(wide, 20.0)
-    assert str(caught.value) != Facts("surface.max_hole_mm")
+    with pytest.raises(MeshError, match=r"1[12]\.\d mm", check=Facts(1, "3 mm")):
+        clean(mesh)
 
 
 def test_a_vertex_far_off_the_surface_is_told():
     whole = ball()
-    assert sound_pieces(whole, 3.0).warnings == []
+    assert sound_pieces(whole).warnings == []
     vertices = whole.vertices.copy()
     vertices[7] *= 7.0
-    assert sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings[0] == Facts(
+    assert sound_pieces(TriangleMesh(vertices, whole.faces)).warnings[0] == Facts(
         "60 mm"
     )
 
@@ -94,7 +86,7 @@ def test_an_edge_is_long_for_the_surface_and_for_a_brain(subdivisions, factor, i
     whole = sphere(RADIUS, subdivisions)
     vertices = whole.vertices.copy()
     vertices[7] *= factor
-    found = sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings
+    found = sound_pieces(TriangleMesh(vertices, whole.faces)).warnings
     assert ["edge" in text for text in found] == [True] * is_told
 
 
@@ -104,7 +96,7 @@ def test_a_part_on_a_stalk_is_told_with_its_volume_and_the_stalk_s_area():
     mask |= (np.hypot(x, y) < 1.4) & (np.abs(z + 12.0) < 12.0)
     mask |= x**2 + y**2 + (z + 24.0) ** 2 < 4.0**2
     mesh = isosurface(smooth_mask(mask, 0.7), scaling(0.8))
-    found = sound_pieces(mesh, 3.0)
+    found = sound_pieces(mesh)
     (stalk,) = found.report["stalks"]
     texts = f"{stalk['volume_mm3']:.0f} mm³", f"{stalk['stalk_mm2']:.0f} mm²"
     assert found.warnings == [Facts(*texts)]
@@ -128,13 +120,13 @@ def test_gaps_of_a_tenth_of_a_millilitre_are_told():
 def test_dropped_pieces_are_told_with_their_share_of_the_area():
     # a ninth and a 900th of the area
     far, farther = ball((0, 40, 0), RADIUS / 3), ball((0, 40, 30), RADIUS / 30)
-    found = sound_pieces(merged(far, WHOLE, farther), 3.0)
+    found = sound_pieces(merged(far, WHOLE, farther))
     dropped = area(far) + area(farther)
     share = 100 * dropped / (area(WHOLE) + dropped)
     assert found.warnings == [Facts("2 pieces", f"{share:.1f} %")]
     assert found.report["repair"]["area_dropped_mm2"] == pytest.approx(dropped)
     assert area(found.mesh) == pytest.approx(area(WHOLE))
-    assert sound_pieces(merged(farther, WHOLE), 3.0).warnings == []
+    assert sound_pieces(merged(farther, WHOLE)).warnings == []
 
 
 def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():
@@ -199,7 +191,7 @@ SOME_TURNED = np.concatenate(
     ],
 )
 def test_what_is_wrong_with_triangles_is_repaired_and_counted(vertices, faces, counts):
-    mesh, report, _ = clean(TriangleMesh(vertices, faces), 3.0)
+    mesh, report, _ = clean(TriangleMesh(vertices, faces))
     assert is_closed(mesh)
     assert signed_volume(mesh) == pytest.approx(signed_volume(WHOLE), rel=1e-6)
     assert (len(mesh.vertices), len(mesh.faces)) == (len(WHOLE.vertices), COUNT)
@@ -214,7 +206,6 @@ def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
             ball((0, 30, 0), 1.0),
             flipped(ball((-11, 0, 0), 7.0)),
         ),
-        3.0,
     )
     assert (report["pieces"], report["pieces_dropped"]) == (2, 2)
     assert signed_volume(mesh) == pytest.approx(VOLUME * (1 + 0.95**3), rel=0.01)
@@ -247,7 +238,7 @@ def test_closed_pieces_that_share_a_wall_are_separated(shared, kind):
             both.vertices.round(9), axis=0, return_inverse=True
         )
         both = TriangleMesh(vertices, places[both.faces])
-    mesh, report, _ = clean(flipped(both) if kind == "all inside out" else both, 3.0)
+    mesh, report, _ = clean(flipped(both) if kind == "all inside out" else both)
     assert is_closed(mesh)
     assert [euler_number(piece) for piece in pieces(mesh)] == [2, 2]
     assert [signed_volume(piece) for piece in pieces(mesh)] == pytest.approx(
@@ -257,7 +248,7 @@ def test_closed_pieces_that_share_a_wall_are_separated(shared, kind):
 
 
 def test_a_surface_with_every_face_in_both_directions_is_one():
-    mesh, report, _ = clean(merged(WHOLE, flipped(WHOLE)), 3.0)
+    mesh, report, _ = clean(merged(WHOLE, flipped(WHOLE)))
     assert (len(pieces(mesh)), report["double_faces_removed"]) == (1, COUNT)
     assert area(mesh) == pytest.approx(area(WHOLE))
 
@@ -279,7 +270,7 @@ def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
 def test_overlapping_balls_are_made_one_surface():
     both = merged(ball((-6, 0, 0)), ball((6, 0, 0)))
     crossing = self_intersecting_faces(both).sum()
-    assert clean(both, 3.0)[1]["faces_that_cut_others"] == crossing > 0
+    assert clean(both)[1]["faces_that_cut_others"] == crossing > 0
     one, report = rebuild(both, 0.7)
     assert is_closed(one)
     assert euler_number(one) == 2
@@ -303,7 +294,7 @@ def test_a_large_filled_gap_is_warned_of():
 
 
 def test_handle_of_a_torus_is_closed_when_remade():
-    mesh, _, _ = clean(torus(10.0, 7.5, 60, 40), 3.0)
+    mesh, _, _ = clean(torus(10.0, 7.5, 60, 40))
     assert euler_number(mesh) == 0
     simple, report = rebuild(remesh(mesh, 1.0), 0.8)
     assert euler_number(simple) == 2

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gyriflow.cli import readings as module
-from gyriflow.cli.readings import KIND, Reading, ScanFiles, readings
+from gyriflow.cli.readings import Reading, ScanFiles, readings
 from gyriflow.cli.recognition import fits_of_file
 from gyriflow.errors import InputError
 from gyriflow.io import kept_results
@@ -54,7 +54,7 @@ def test_what_was_found_is_kept_with_warnings_and_errors(scans, own_cache):
     assert readings(words_in, scans) == [first, second]
     assert len(calls) == 2
     # nobody else reads it
-    assert (own_cache / KIND).stat().st_mode & 0o077 == 0
+    assert (own_cache / "readings").stat().st_mode & 0o077 == 0
 
 
 def test_files_are_read_again_whose_content_name_or_settings_are_others(
@@ -89,7 +89,7 @@ def test_other_code_reads_again(scans, monkeypatch):
 )
 def test_a_damaged_result_is_made_again(scans, own_cache, content):
     found = readings(words_in, scans)
-    paths = sorted((own_cache / KIND).iterdir())
+    paths = sorted((own_cache / "readings").iterdir())
     for path in paths:
         path.write_text(content)
     assert readings(words_in, scans) == found
@@ -105,12 +105,12 @@ def test_nothing_is_kept_where_the_folder_cannot_be_written(scans, own_cache):
 def test_the_results_used_last_are_kept(own_cache, monkeypatch):
     monkeypatch.setattr(kept_results, "MAX_KEPT", 2)
     for number, key in enumerate("abc"):
-        keep_result(KIND, key, key)
-        path = own_cache / KIND / f"{key}.json"
+        keep_result(key, key)
+        path = own_cache / "readings" / f"{key}.json"
         os.utime(path, (1e9 + number, 1e9 + number))
-    assert kept_result(KIND, "a") == "a"
-    remove_old_results(KIND)
-    assert [kept_result(KIND, key) for key in "abc"] == ["a", None, "c"]
+    assert kept_result("a") == "a"
+    remove_old_results()
+    assert [kept_result(key) for key in "abc"] == ["a", None, "c"]
 
 
 @pytest.mark.slow

@@ -206,7 +206,7 @@ def test_numbers_of_a_calibration(recorded, observed):
             "optimum": calibration.find_optimum(runs, BOUNDS),
             "parameters": calibration.calibrated_parameters(
                 base,
-                {"thickness_mm": 1.5, "growth.area_cm2.amplitude": 1.1},
+                {"thickness_mm": 1.5, "growth.area_cm2": 1.1},
                 23.0,
             ),
             "spectra": calibration.spectral_scores(folded(1.5), folded(2.1)),

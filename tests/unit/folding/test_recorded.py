@@ -44,16 +44,13 @@ RUN = {
     "step_s": 172800.0,
     "thickness_mm": {"weeks": {21.0: 4.0, 22.0: 5.0}},
     "core_growth_rate_per_s": 5e-8,
-    "radial_growth_rate_per_s": 4e-8,
     "newton_tolerance": 1e-8,
     "support": "free",
-    "no_growth": "none",
 }
 KINDS = {
     "rates, planes, ellipsoid": {
         "contact": "planes",
         "support": "ellipsoid",
-        "no_growth": "ellipsoid",
         "stress_memory_gw": 1.5,
         "material": "compressible-neo-hookean",
     },
@@ -63,7 +60,7 @@ KINDS = {
         "growth": {
             "model": "sizes",
             "area_cm2": {21.0: 44.0, 22.0: 50.0},
-            "volume_ml": {21.0: 24.0, 22.0: 27.0},
+            "volume_ml": {21.0: 24.0, 22.0: 31.0},
         },
     },
     "shapes": {

@@ -41,7 +41,6 @@ RUN = {
     "fissure_x_mm": 0.0,
     "step_s": DAY_S,
     "support": "free",
-    "no_growth": "none",
     "contact": "none",
     "thickness_mm": 4.0,
     "growth": {

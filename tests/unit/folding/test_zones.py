@@ -157,7 +157,7 @@ def test_elements_through_the_cortex_are_counted_by_the_edges_in_it():
     depth = np.abs(box.vertices).max(axis=1)
     vertices += box.vertices * np.where(depth < 2.5, 0.3, 0.0)[:, None]
     mesh = TetrahedralMesh(vertices, box.tets)
-    zones = find_zones(mesh, contact="none", support="free", no_growth="none")
+    zones = find_zones(mesh, contact="none", support="free")
     edge = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
     found = zone_report(mesh, zones, 0.8)["elements_through_cortex"]
     assert found == pytest.approx(0.8 / edge)
@@ -175,7 +175,6 @@ def test_the_sides_of_a_box_slide_in_their_planes():
     values = {
         "contact": "none",
         "support": "free",
-        "no_growth": "none",
     }
     zones = box_zones(box, parameters_from(RUN | values))
     x, y, z = box.vertices.T
@@ -190,7 +189,7 @@ def test_the_sides_of_a_box_slide_in_their_planes():
 @pytest.mark.usefixtures("tiny_ellipsoid")
 def test_a_brain_without_clamped_facets_is_refused(brain):
     zones = find_zones(brain)
-    with pytest.raises(InputError, check=Facts("folding.no_growth", "folding.support")):
+    with pytest.raises(InputError, check=Facts("folding.support")):
         refuse_impossible(brain, zones)
 
 

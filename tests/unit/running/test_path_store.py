@@ -48,7 +48,7 @@ def paths(tmp_path):
     )
 
     def path(series=LABELS, start=None, atlas=None, **settings):
-        write_atlas(tmp_path, series, folder=".")
+        write_atlas(tmp_path, series)
         config = {
             "brains": [
                 START | {"labels": str(tmp_path / "mine.nii.gz")} | (start or {})
@@ -136,7 +136,6 @@ def test_a_path_has_another_key_where_anything_differs_that_it_is_made_from(keys
         # settings
         keys(surface={"edge_length_mm": 1.1}),
         keys(surface={"open_sulci": False}),
-        keys(surface={"max_hole_mm": 2.0}),
         keys(surface={"asymmetric": True}),
     ]
     pial_only = SURFACES | {"files": {"pial": FILES[2]}}

@@ -38,7 +38,7 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
             "weeks": {30: 0.5, 21: 1},
         },
         "shear_modulus_core_pa": {"map": "soft.nii.gz"},
-        "radial_growth_rate_per_s": {"weeks": {25: 1e-7}},
+        "core_growth_rate_per_s": {"weeks": {25: 1e-7}},
     }
     with_maps, plain = resolve(
         load(
@@ -54,7 +54,7 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
             "map": "growth_rate_per_s",
         },
         "shear_modulus_core_pa": {"map": "shear_modulus_core_pa"},
-        "radial_growth_rate_per_s": {"weeks": {25.0: 1e-7}},
+        "core_growth_rate_per_s": {"weeks": {25.0: 1e-7}},
     }
     assert list(settings["growth_rate_per_s"]["weeks"]) == [21.0, 30.0]
     assert "ranks" not in settings

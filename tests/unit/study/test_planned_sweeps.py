@@ -115,7 +115,6 @@ VALUES = {
     "material": ["neo-hookean", "compressible-neo-hookean"],
     "poisson_ratio": [0.4, 0.45],
     "growth_rate_per_s": [1e-7, 2e-7],
-    "radial_growth_rate_per_s": [0.0, 1e-8],
     "core_growth_rate_per_s": [0.0, 1e-8],
     "growth": [
         "rates",
@@ -128,7 +127,6 @@ VALUES = {
     "stress_memory_gw": [0.0, 1.0],
     "support": ["ellipsoid", "free"],
     "contact": ["planes", "none"],
-    "no_growth": ["ellipsoid", "none"],
     "output_every_gw": [0.5, 1.0],
     "newton_tolerance": [1e-4, 1e-5],
     "max_halvings": [5, 6],
@@ -304,21 +302,6 @@ def test_folders_of_results_are_no_names_of_sweeps():
         ),
         ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm", [0, -1]),
         ({"parameters": {"poisson": [0, 0.4]}}, "parameters.poisson", []),
-        (
-            {"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}},
-            "parameters.growth_rate_per_s.amplitude",
-            [],
-        ),
-        (
-            {"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}},
-            "parameters.growth.area_cm2.amplitude",
-            [],
-        ),
-        (
-            {"parameters": {"stiffness_ratio": [0, 2]}},
-            "parameters.stiffness_ratio",
-            [0],
-        ),
         ({"parameters": {}}, "parameters", [0, 1]),
         ({"rounds": [30, 11]}, "rounds", [[30, 11], 3, 40]),
         ({"score": {}}, "score", ["shape_index", "surface_distance"]),

@@ -22,7 +22,14 @@ class Row:
 ROWS = [
     Row("021", 21.0, "left", "NA", True, ("a b;c.nii", 'q"u,\n.gii'), {}, None),
     Row(
-        "1e3", 24.29, None, None, False, (), {"sex": "F"}, ShapeSettings(noise_mm=0.04)
+        "1e3",
+        24.29,
+        None,
+        None,
+        False,
+        (),
+        {"sex": "F"},
+        ShapeSettings(semi_axes_mm=(9, 8, 9)),
     ),
     Row("true", 22.0, "right", "ü", False, ("null",), {"a": "1"}, ShapeSettings()),
 ]
@@ -33,7 +40,7 @@ def test_rows_are_read_as_they_were_written_ids_as_text(tmp_path):
     write_rows(path, Row, ROWS)
     assert read_rows(path, Row) == ROWS
     # the settings that were given stay known as such
-    assert read_rows(path, Row)[1].shape.model_fields_set == {"noise_mm"}
+    assert read_rows(path, Row)[1].shape.model_fields_set == {"semi_axes_mm"}
     write_rows(path, Row, [])
     assert read_rows(path, Row) == []
 
