@@ -127,7 +127,7 @@ def with_surfaces(
     entry = {
         "week": week,
         "population": population,
-        "hemispheres": [left, right],
+        "hemispheres": {"left": left, "right": right},
     }
     brains = [
         entry | {"id": f"{brain}-pial"},

@@ -60,7 +60,7 @@ def brain_entries(data: Path, out: Path) -> dict[str, dict[str, Any]]:
 
 def surface_entry(week: int, pattern: str) -> dict[str, Any]:
     """Return the entry of a pair of hemispheres, given a pattern of their files."""
-    hemispheres = [pattern.format(side) for side in SIDES]
+    hemispheres = {side: pattern.format(side) for side in SIDES}
     return {"week": week, "hemispheres": hemispheres}
 
 
@@ -102,7 +102,7 @@ def main() -> None:
     out = arguments.out.resolve()
     brains = brain_entries(arguments.data.resolve(), out)
     names = arguments.only or list(brains)
-    extracted = Path(brains["surfaces-34"]["hemispheres"][0])
+    extracted = Path(brains["surfaces-34"]["hemispheres"]["left"])
     if "surfaces-34" in names and "labels-34" not in names and not extracted.is_file():
         parser.error("surfaces-34 needs labels-34 in the same --out: add it to --only")
     for name in names:

@@ -27,6 +27,7 @@ from gyriflow.settings.atlas import (
 from gyriflow.settings.brains import (
     BrainConfig,
     GivenRegions,
+    HemisphereFiles,
     ParticipantsSettings,
     ShapeSettings,
 )
@@ -60,6 +61,7 @@ TYPES = {
 SECTIONS = {
     "Brains": {
         "brains: (a list)": BrainConfig,
+        "hemispheres: of a brain": HemisphereFiles,
         "shape: of a brain": ShapeSettings,
         "participants:": ParticipantsSettings,
         "schemes: by name": SchemeSettings,

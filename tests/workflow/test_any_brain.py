@@ -102,16 +102,16 @@ def both_sides(left, right, *, white_mm=None, coordinates="ras"):
     """Write hemispheres as FreeSurfer does, and white surfaces inside the pial ones."""
 
     def made(folder, name):
-        pial, white = [], []
+        entry, white = {}, []
         for side, mesh in (("left", left), ("right", right)):
             write_geometry(folder / f"{name}.{side}.pial", mesh.vertices, mesh.faces)
-            pial.append(f"{name}.{side}.pial")
+            entry[side] = f"{name}.{side}.pial"
             if white_mm is not None:
                 write_surface(
                     folder / f"{name}.{side}.white.stl", inner(mesh, white_mm)
                 )
                 white.append(f"{name}.{side}.white.stl")
-        return {"hemispheres": pial, "coordinates": coordinates} | (
+        return {"hemispheres": entry, "coordinates": coordinates} | (
             {"white": white} if white else {}
         )
 

@@ -76,7 +76,7 @@ def write_study(workflow, hemispheres, kind="hemispheres") -> str:
                 workflow.directory / files[side], TriangleMesh(vertices, faces)
             )
         one = {"pial": files["left"], "side": "left"}
-        source = {"hemispheres": [*files.values()]} if kind == "hemispheres" else one
+        source = {"hemispheres": files} if kind == "hemispheres" else one
         brains.append(
             {
                 "id": f"b{week}",

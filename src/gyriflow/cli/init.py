@@ -214,8 +214,12 @@ def write_prediction(
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
     given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
-    pair = entry.get("hemispheres")
-    names = f"left {pair[0]}, right {pair[1]}" if pair else files[0]
+    names = (
+        ", ".join(
+            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
+        )
+        or files[0]
+    )
     yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
 
 

@@ -182,7 +182,9 @@ def _check_surfaces(brain: BrainConfig) -> Iterator[str]:
         side: read_surface(path, side) for side, path in brain.white_files.items()
     }
     if brain.hemispheres is not None:
-        left, right, declared = read_hemispheres(*brain.hemispheres)
+        left, right, declared = read_hemispheres(
+            brain.hemispheres.left, brain.hemispheres.right
+        )
         yield from _check_pair(brain, left, right, declared=declared)
         _check_whites({"left": left, "right": right}, whites)
     elif brain.files:

@@ -134,7 +134,7 @@ class FoundBrain:
     def files(self) -> str:
         """Its files, separated by commas."""
         source = self.entry.get("labels") or self.entry.get("pial")
-        return str(source or ", ".join(self.entry["hemispheres"]))
+        return str(source or ", ".join(self.entry["hemispheres"].values()))
 
     @property
     def _is_whole_surface(self) -> bool:
@@ -500,7 +500,7 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
         pair = {side: str(sides[side]) for side in SIDES if side in sides}
         first = next(iter(pair))
         file, white = sides[first], surfaces.get((rest, "white"), {})
-        source: dict[str, Any] = {"hemispheres": list(pair.values())}
+        source: dict[str, Any] = {"hemispheres": pair}
         problem = ""
         if kind == "white":
             if (rest, "pial") in surfaces:
@@ -880,7 +880,7 @@ def recognise_brain(
         _require_brain(pial[0], whole=True)
         entry["pial"] = str(pial[0])
     else:
-        entry["hemispheres"] = [str(file) for file in pial]
+        entry["hemispheres"] = dict(zip(SIDES, map(str, pial), strict=True))
     if white and len(white) != len(files):
         problem = f"--white: found {len(white)} surfaces for {len(files)} pial ones"
         raise InputError(

@@ -53,6 +53,15 @@ class ShapeSettings(Settings):
             yield KeyProblem(text, ("semi_axes_mm",))
 
 
+class HemisphereFiles(Settings):
+    """The pial surfaces of both hemispheres, such as GIFTI or FreeSurfer files."""
+
+    left: InputFile
+    """File of the left hemisphere."""
+    right: InputFile
+    """File of the right hemisphere."""
+
+
 class BrainConfig(Settings):
     """One brain, made from exactly one of `labels`, `hemispheres`, `pial` and
     `shape`."""
@@ -79,9 +88,8 @@ class BrainConfig(Settings):
     of an entry of the key `schemes`. Required with `labels`."""
     affine_from: AffineSource = "auto"
     """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
-    hemispheres: tuple[InputFile, InputFile] | None = None
-    """Pial surfaces of the left and the right hemisphere, such as GIFTI or FreeSurfer
-    files."""
+    hemispheres: HemisphereFiles | None = None
+    """Surface files of both hemispheres."""
     pial: InputFile | None = None
     """Closed surface of the whole brain."""
     side: Side | None = None
@@ -109,7 +117,9 @@ class BrainConfig(Settings):
 
     @property
     def files(self) -> list[str]:
-        paths = [self.labels, self.pial, *(self.hemispheres or ())]
+        paths = [self.labels, self.pial]
+        if self.hemispheres is not None:
+            paths += [self.hemispheres.left, self.hemispheres.right]
         return [path for path in paths if path is not None]
 
     @property
@@ -220,8 +230,8 @@ class ParticipantsSettings(Settings):
     Columns are `participant_id` (or `id`); `session_id` (or `session`, `visit`) where a
     subject has several scans; the age at the scan, `scan_age`, or else
     `gestational_age` or `week`, as `24.3`, `24+2` or `24w2d` (in days with
-    `scan_age_days`); and keys of brains, with a semicolon between a left and a
-    right file. Instead of keys, `files` may name
+    `scan_age_days`); and keys of brains, inner ones with a dot (`hemispheres.left`),
+    two `white` surfaces with a semicolon between. Instead of keys, `files` may name
     labels, a pial surface, or left and right surfaces with a semicolon between; with
     `side`, one of these is the only hemisphere. `n/a` is an empty value. Other columns
     are covariates. Each participant is a subject. One with a

@@ -14,7 +14,6 @@ from ..io.yaml_files import read_keys
 from ..settings.atlas import DOWNLOADS, Atlas, AtlasSettings, FileKey
 from ..settings.base import KeyProblem, Problems, own_name
 from ..settings.root import Config
-from ..settings.terms import SIDES
 
 
 @dataclass(frozen=True)
@@ -145,10 +144,11 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
         series = used.atlas.series[file.series]
         new = {"id": file.brain, "week": file.week, "population": series.population}
         entry = entries.setdefault(file.brain, new)
-        layer, _, side = file.key.rpartition("_")
-        if side in SIDES:
-            pair = entry.setdefault(layer or "hemispheres", ["", ""])
-            pair[SIDES.index(side)] = str(file.path)
+        if file.key in ("left", "right"):
+            entry.setdefault("hemispheres", {})[file.key] = str(file.path)
+        elif file.key in ("white_left", "white_right"):
+            sides = entry.setdefault("white", ["", ""])
+            sides[file.key == "white_right"] = str(file.path)
         else:
             entry[file.key] = str(file.path)
         if "labels" in series.files:

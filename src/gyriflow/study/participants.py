@@ -374,11 +374,10 @@ PATHS = (
     "image",
     "pial",
     "white",
-    "hemispheres",
+    "hemispheres.left",
+    "hemispheres.right",
 )
-"""Columns that are keys of brains with paths."""
-PAIRS = ("white", "hemispheres")
-"""Those that may have a left and a right file, with a semicolon between."""
+"""Columns that are keys of brains with paths, inner keys with dots."""
 BRAIN_KEYS = (
     *PATHS,
     "population",
@@ -561,14 +560,13 @@ def _entry(
         if len(files) > limit:
             found = f"{len(files)}, {'; '.join(files)}"
             return {}, f"files: found {found}; expected {expected}"
-        key = "labels" if is_volume(files[0]) else "pial"
-        values["hemispheres" if len(files) == 2 else key] = ";".join(files)
+        values |= _file_keys(files)
     for column, text in values.items():
         if column not in BRAIN_KEYS:
             continue
         value: str | list[str] = text
         if column in PATHS:
-            parts = text.split(";") if column in PAIRS else [text]
+            parts = text.split(";") if column == "white" else [text]
             files = []
             for part in parts:
                 place = own_name(path_in(folder, part.strip()))
@@ -578,7 +576,22 @@ def _entry(
                     return {}, f"{column}: {place}: {missing}"
                 files.append(str(place))
             value = files[0] if len(files) == 1 else files
-        entry[column] = value
+        *outer, last = column.split(".")
+        section = entry
+        for key in outer:
+            section = section.setdefault(key, {})
+        section[last] = value
     if not set(SOURCES) & set(entry):
         return entry, f"found no data; expected files, or one of {', '.join(PATHS)}"
     return entry, ""
+
+
+def _file_keys(files: list[str]) -> dict[str, str]:
+    first = files[0]
+    if len(files) == 2:
+        return {
+            "hemispheres.left": first,
+            "hemispheres.right": files[1],
+        }
+    key = "labels" if is_volume(first) else "pial"
+    return {key: first}

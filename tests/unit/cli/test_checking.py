@@ -109,7 +109,7 @@ def test_white_surfaces_outside_their_pial_ones_are_refused_before_a_run(tmp_pat
         write_surface(tmp_path / f"white{n}.surf.gii", inner(mesh, 1.5))
         write_surface(tmp_path / f"shifted{n}.surf.gii", moved(inner(mesh, 1.5), 6.0))
     brain = {
-        "hemispheres": ["pial0.surf.gii", "pial1.surf.gii"],
+        "hemispheres": {"left": "pial0.surf.gii", "right": "pial1.surf.gii"},
         "coordinates": "ras",
     }
 
@@ -135,7 +135,7 @@ def checked(folder, monkeypatch, **keys):
             write_surface(
                 folder / f"{side}.surf.gii", hemisphere(sign), f"Cortex{side.title()}"
             )
-    pair = ["left.surf.gii", "right.surf.gii"]
+    pair = {side: f"{side}.surf.gii" for side in ("left", "right")}
     brain = {
         "id": "sub-1",
         "week": 23,
@@ -309,7 +309,7 @@ def test_files_named_as_of_another_subject_or_space_are_told(tmp_path, monkeypat
     lines, bad = checked(
         tmp_path,
         monkeypatch,
-        brain={"hemispheres": [name, "right.surf.gii"]},
+        brain={"hemispheres": {"left": name, "right": "right.surf.gii"}},
     )
     assert bad == []
     doubts = [line for line in lines if "warning: brain" in line and name in line]

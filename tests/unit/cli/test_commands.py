@@ -407,7 +407,7 @@ def predicted_from(monkeypatch, predicted, surfaces):
         (["brain.stl"], {"pial": "brain.stl"}),
         (
             ["rh.pial.surf.gii", "lh.pial.surf.gii"],
-            {"hemispheres": ["lh.pial.surf.gii", "rh.pial.surf.gii"]},
+            {"hemispheres": {"left": "lh.pial.surf.gii", "right": "rh.pial.surf.gii"}},
         ),
         (
             [
@@ -419,7 +419,10 @@ def predicted_from(monkeypatch, predicted, surfaces):
                 "rh.white.surf.gii",
             ],
             {
-                "hemispheres": ["lh.pial.surf.gii", "rh.pial.surf.gii"],
+                "hemispheres": {
+                    "left": "lh.pial.surf.gii",
+                    "right": "rh.pial.surf.gii",
+                },
                 "white": ["lh.white.surf.gii", "rh.white.surf.gii"],
             },
         ),

@@ -171,10 +171,10 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     assert first == {
         "id": "fetal.week22",
         "week": 22.0,
-        "hemispheres": [
-            "fetal.week22.left.pial.surf.gii",
-            "fetal.week22.right.pial.surf.gii",
-        ],
+        "hemispheres": {
+            "left": "fetal.week22.left.pial.surf.gii",
+            "right": "fetal.week22.right.pial.surf.gii",
+        },
         "white": ["fetal.week22.left.wm.surf.gii", "fetal.week22.right.wm.surf.gii"],
     }
     assert (alone["pial"], alone["side"]) == (

@@ -135,11 +135,11 @@ def test_files_are_found_by_name_wherever_they_lie_and_others_are_put_beside(tmp
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 22]}
     config = load(study(section, "dhcp-surface-21"), tmp_path)
     assert (
-        config.brains[0].hemispheres[0]
+        config.brains[0].hemispheres.left
         == f"{tmp_path}/mine/some/where/{SURFACES.format(21, 'left')}"
     )
     assert (
-        config.brains[1].hemispheres[0]
+        config.brains[1].hemispheres.left
         == f"{tmp_path}/mine/clone/atlas/fetal.week22.left.pial.surf.gii"
     )
     (missing,) = used_atlases(config)[0].missing
@@ -156,7 +156,7 @@ def test_an_atlas_folder_and_what_is_in_it_may_be_links(tmp_path):
     (tmp_path / "mine").symlink_to(tmp_path / "store")
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 22]}
     config = load(study(section, "dhcp-surface-21"), tmp_path)
-    assert [brain.hemispheres[0] for brain in config.brains] == [
+    assert [brain.hemispheres.left for brain in config.brains] == [
         f"{tmp_path}/store/{SURFACES.format(21, 'left')}",
         f"{tmp_path}/far/{SURFACES.format(22, 'left')}",
     ]
@@ -210,7 +210,9 @@ def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
         ("dhcp-surface-21", 21),
         ("dhcp-surface-21.5", 21.5),
     ]
-    assert config.brains[1].hemispheres[0].endswith("fetal.week21.5.left.pial.surf.gii")
+    assert config.brains[1].hemispheres.left.endswith(
+        "fetal.week21.5.left.pial.surf.gii"
+    )
     later = ", ".join(map(str, range(22, 37)))
     for week in (21.004, 37):
         found = problems(study(section | {"weeks": [week]}, "a"), tmp_path)

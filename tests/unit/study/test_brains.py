@@ -32,7 +32,7 @@ def folder(tmp_path):
 
 
 def test_files_are_found_beside_the_configuration(folder):
-    pair = ["l.gii", "r.gii"]
+    pair = {"left": "l.gii", "right": "r.gii"}
     brains = [
         {
             "id": "a",
@@ -83,15 +83,15 @@ REGIONS = {"a": {"labels": "a.nii.gz", "names": {1: "frontal"}}}
         ({"labels": "a.nii.gz", "scheme": "d"}, ".scheme", ["d", "binary, crl"]),
         ({"image": "t2w.nii.gz"}, ".image", ["labels"]),
         ({"pial": "lost.stl"}, ".pial", ["lost.stl"]),
-        ({"hemispheres": ["l.gii"]}, ".hemispheres[1]", []),
+        ({"hemispheres": {"left": "l.gii"}}, ".hemispheres.right", []),
         (
-            {"hemispheres": ["l.gii", "r.gii"], "white": "white.stl"},
+            {"hemispheres": {"left": "l.gii", "right": "r.gii"}, "white": "white.stl"},
             ".white",
             [],
         ),
         (HEMISPHERE, ".scheme", []),
         (
-            {"hemispheres": ["l.gii", "r.gii"], "side": "left"},
+            {"hemispheres": {"left": "l.gii", "right": "r.gii"}, "side": "left"},
             ".side",
             ["hemispheres", "labels", "pial"],
         ),

@@ -70,7 +70,7 @@ def test_equal_triangles_in_any_order_are_matched(folder):
         ("other.gii", ["b", "a"]),
         ("torn.gii", ["torn.gii:"]),
         (
-            {"hemispheres": ["a.gii", "b.gii"]},
+            {"hemispheres": {"left": "a.gii", "right": "b.gii"}},
             ["b", "hemispheres", "a", "pial"],
         ),
     ],
@@ -82,9 +82,9 @@ def test_others_are_not_and_say_why(folder, file, facts):
 
 
 def test_hemispheres_match_side_by_side(folder):
-    pair = {"hemispheres": ["a.gii", "fine.gii"]}
+    pair = {"hemispheres": {"left": "a.gii", "right": "fine.gii"}}
     assert series(folder, pair, pair).matched == {"surface": {"a", "b"}}
-    swapped = {"hemispheres": ["fine.gii", "a.gii"]}
+    swapped = {"hemispheres": {"left": "fine.gii", "right": "a.gii"}}
     assert series(folder, pair, swapped).unmatched["surface"] == Facts("b", 642, 162)
 
 
