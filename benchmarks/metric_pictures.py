@@ -10,6 +10,7 @@ the numbers that the picture shows.
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,6 @@ from gyriflow.report.style import (
     MUTED_COLOUR,
     NEUTRAL_COLOUR,
     OBSERVED_SURFACE_COLOUR,
-    add_letters,
     styled,
 )
 
@@ -153,7 +153,8 @@ def draw(measured: Measured) -> Figure:
     draw_map(next(panels), left, "thickness_mm", maps["thickness_mm"])
     draw_quantiles(next(panels), left, brain)
     draw_asymmetry(next(panels), brain)
-    add_letters(grid)
+    for letter, axes in zip(ascii_lowercase, grid, strict=False):
+        axes.set_title(rf"$\bf{{{letter}}}$  {axes.get_title()}")
     return figure
 
 
@@ -208,7 +209,16 @@ def draw_map(
 
 def write_below(axes: Axes, note: str) -> None:
     """Write what a panel shows below it."""
-    axes.text(0.5, -0.02, note, transform=axes.transAxes, ha="center", va="top")
+    text = axes.text(
+        0.5,
+        -0.02,
+        note,
+        transform=axes.transAxes,
+        ha="center",
+        va="top",
+        fontsize=5.5,
+    )
+    text.set_in_layout(False)
 
 
 def draw_cut(axes: Axes, mesh: TriangleMesh) -> None:
@@ -261,7 +271,7 @@ def draw_thickness(axes: Axes, pial: PialSurface, inner: TriangleMesh) -> None:
     axes.set(xlim=outermost[0] + half, ylim=outermost[2] + half, aspect="equal")
     axes.set_axis_off()
     axes.set_title("mean_thickness")
-    write_below(axes, "orange: pial surface; green: inner border")
+    write_below(axes, "orange: pial surface; blue: inner border")
 
 
 def draw_quantiles(axes: Axes, mesh: TriangleMesh, brain: BrainMetrics) -> None:
