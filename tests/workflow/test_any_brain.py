@@ -264,7 +264,7 @@ def test_each_hemisphere_is_one_piece_on_its_side(study, name):
 
 
 @pytest.mark.parametrize("name", WARNINGS)
-def test_what_is_doubtful_is_told(study, name):
+def test_what_is_doubtful_is_reported(study, name):
     assert WARNED[name] in study.report(name)["warnings"]
     assert WARNED[name] in study.messages(name, "warning")
     assert WARNED[name] not in study.report("plain")["warnings"]
@@ -282,7 +282,7 @@ def test_a_brain_is_the_same_however_it_is_stored(study, name):
     assert "2 x 2 x 2" not in "\n".join(study.messages("plain", "warning"))
 
 
-def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its_week(
+def test_labels_of_a_user_s_scheme_give_a_surface_with_its_thickness_at_its_week(
     study,
 ):
     report = study.report("own_scheme")

@@ -50,7 +50,7 @@ DATA = Path(
     os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data")
 )
 ATLAS = SCHEMES["spina-bifida-atlas"]
-VOXEL_MM = 2.0
+VOXEL_MM = 1.6
 QUICK = {"edge_length_mm": 2.0}
 COARSE = {"week": 24.0, "edge_length_mm": 3.0}
 pytestmark = pytest.mark.usefixtures("few_starts", "shapes_once")
@@ -137,7 +137,7 @@ def test_the_report_describes_the_surface_of_long_voxels():
     assert pose_from(report["pose"]).plain() == phantom.pose.plain()
 
 
-def test_unequal_sides_are_told_with_their_numbers():
+def test_unequal_sides_are_reported_with_their_numbers():
     small = shapes.ellipsoid((12.0, 24.0, 17.0), 3, (88.0, -50.0, 20.0))
     large = shapes.ellipsoid((14.5, 29.0, 20.0), 3, (116.0, -50.0, 20.0))
     surface = from_surface(merged(small, large), **COARSE)
@@ -257,7 +257,7 @@ def test_two_brains_in_one_volume_or_surface_are_not_one_hemisphere(
         require_whole(twins, "surface")
 
 
-def test_a_surface_in_voxel_indices_is_told(phantom):
+def test_a_surface_in_voxel_indices_is_reported(phantom):
     assert Facts("%", 24) not in phantom.report["warnings"]
     # voxels of 0.7 mm
     indices = transformed(phantom.whole, np.diag([1 / 0.7] * 3 + [1.0]))

@@ -214,7 +214,7 @@ def test_a_mesh_that_lost_or_won_volume_is_refused_with_the_share(size, change):
     refuse_bad_mesh(box, summary, **(GATES | {"max_volume_change": 0.08}))
 
 
-def test_a_mesh_that_shuts_the_fissure_is_refused():
+def test_a_mesh_that_closes_the_fissure_is_refused():
     def halves(gap):
         parts = [box_mesh((4, 6, 6), (4.0, 6.0, 6.0)) for _ in range(2)]
         shifts = ([-2 - gap / 2, 0, 0], [2 + gap / 2, 0, 0])
