@@ -1,8 +1,12 @@
-"""What a figure shows: its words, its pictures, and where these are not empty."""
+"""What a figure shows: its words, its lines and bars, its pictures, and where these are
+not empty."""
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.text import Text
 
 
@@ -13,6 +17,47 @@ def words(figure: Figure) -> set[str]:
         for text in figure.findobj(Text)
         if text.get_visible() and text.get_text()
     }
+
+
+def contents(figure: Figure) -> dict:
+    """Return all that the panels of a chart show, and its legend, for a recorded
+    table."""
+    found = {}
+    for number, axes in enumerate(figure.axes):
+        titles = axes.get_title(), axes.get_xlabel(), axes.get_ylabel()
+        panel = {"texts": [*titles, *(text.get_text() for text in axes.texts)]}
+        for kind in ("lines", "patches"):
+            for place, item in enumerate(getattr(axes, kind)):
+                panel[f"{kind} {place}"] = {"look": look(item), "at": ends(item)}
+        for place, band in enumerate(axes.collections):
+            paths = band.get_paths()
+            panel[f"band {place}"] = [path.vertices for path in paths]
+        found[f"panel {number}"] = panel
+    for legend in figure.legends:
+        texts = [text.get_text() for text in legend.get_texts()]
+        looks = [look(handle) for handle in legend.legend_handles]
+        found["legend"] = dict(zip(texts, looks, strict=True))
+    return found
+
+
+def look(item: object) -> str:
+    """Return the marker, the line and the colours of a line, or the hatch of a bar."""
+    if isinstance(item, Line2D):
+        colours = item.get_color(), item.get_markerfacecolor()
+        drawn = item.get_marker(), item.get_linestyle(), *map(to_hex, colours)
+        return " ".join(drawn)
+    if isinstance(item, Patch):
+        return f"{to_hex(item.get_facecolor())} {item.get_hatch() or ''}"
+    return type(item).__name__
+
+
+def ends(item: object) -> np.ndarray:
+    """Return the points of a line, or the place, width and height of a bar."""
+    if isinstance(item, Line2D):
+        return np.column_stack([np.asarray(item.get_xdata(), float), item.get_ydata()])
+    if hasattr(item, "get_height"):
+        return np.array([item.get_x(), item.get_width(), item.get_height()])
+    return item.get_path().vertices
 
 
 def pictures(figure: Figure) -> list[Axes]:

@@ -2,6 +2,7 @@
 tests."""
 
 import sys
+from itertools import batched
 from pathlib import Path
 
 import pytest
@@ -18,16 +19,22 @@ OF_PARTS = [
 """Whose answers hang on how many neighbours a rank's part of the mesh has: with three
 there are two of them."""
 
-
-RUNS = [(2, case) for case in CASES]
+# a process for several, as it takes seconds to start; not for all, since MPICH has at
+# most 2048 communicators in a process, and what cases leave behind has some
+RUNS = [(2, cases) for cases in batched(CASES, 3)]
 # more ranks than this machine may have cores take long
-RUNS += [pytest.param(3, case, marks=pytest.mark.extended) for case in OF_PARTS]
+RUNS += [pytest.param(3, [case], marks=pytest.mark.extended) for case in OF_PARTS]
 
 
-# a file each, since MPICH has at most 2048 communicators in a process, and what cases
-# leave behind has some
-@pytest.mark.parametrize(("ranks", "case"), RUNS)
-def test_cases_hold_on(ranks, case):
+def names(value):
+    """Return the names of files of cases, for the id of a test."""
+    return (
+        None if isinstance(value, int) else "+".join(Path(case).stem for case in value)
+    )
+
+
+@pytest.mark.parametrize(("ranks", "cases"), RUNS, ids=names)
+def test_cases_hold_on(ranks, cases):
     program = [
         sys.executable,
         "-m",
@@ -39,9 +46,9 @@ def test_cases_hold_on(ranks, case):
         "-p",
         "no:cacheprovider",
     ]
-    command = ["mpiexec", "-n", str(ranks), *program, "-m", "not one_rank", case]
+    command = ["mpiexec", "-n", str(ranks), *program, "-m", "not one_rank", *cases]
     done = ran(*command, timeout_s=1200)
-    # 5: all cases of the file are for one rank
+    # 5: all cases are for one rank
     assert done.returncode in (0, 5), done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == (ranks if done.returncode == 0 else 0), (
         done.stdout

@@ -4,10 +4,15 @@ changes nothing."""
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import chdir, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 import yaml
@@ -20,6 +25,8 @@ from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 from gyriflow.messages import read_messages
+from gyriflow.running import launch
+from gyriflow.running.planning import Plan
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -47,6 +54,20 @@ COARSE = {
     "max_surface_distance_mm": 1.0,
 }
 """A mesh that is made in a second."""
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that the launcher handles."""
+
+
+@contextmanager
+def launching(directory: Path) -> Iterator[None]:
+    """Have this process as it was, once the launcher has run in it."""
+    handlers = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        with chdir(directory), patch.dict(os.environ):
+            yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 @dataclass(frozen=True)
@@ -114,18 +135,24 @@ class Workflow:
             env=self.environment,
         )
 
+    def plan(self, *arguments: str) -> Plan:
+        """Return what a dry run plans, in this process and by this checkout's code."""
+        plans: list[Plan] = []
+        with launching(self.directory):
+            code = launch.main(["-n", *arguments], plans.append, is_shown=False)
+        assert code == 0
+        (plan,) = plans
+        return plan
+
     def jobs(self, *arguments: str) -> dict[str, int]:
         """Return the number of jobs per rule that a dry run plans."""
-        outcome = self.run("-n", *arguments)
-        assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-        if "Nothing to be done" in outcome.stdout + outcome.stderr:
-            return {}
-        _, _, table = (outcome.stdout + outcome.stderr).partition("Job stats:")
-        table, _, _ = table.partition("\ntotal")
-        return {
-            rule: int(count)
-            for rule, count in re.findall(r"^(\w+) +(\d+)$", table, flags=re.MULTILINE)
-        }
+        plan = self.plan(*arguments)
+        return Counter(job.rule for job, _ in plan.reasoned_jobs)
+
+    def reasons(self, *arguments: str) -> dict[str, str]:
+        """Return why a dry run plans the jobs of each rule."""
+        plan = self.plan(*arguments)
+        return {job.rule: reason for job, reason in plan.reasoned_jobs}
 
     def write(self, name: str, config: dict) -> str:
         """Write a configuration, and labels that it calls `labelled`, and return its
@@ -140,8 +167,9 @@ class Workflow:
 
     def lay_out(self, *arguments: str) -> list[str]:
         """Make all files that a call would make, empty, and return their names."""
-        summary = self.run(*arguments, "--forceall", "--summary").stdout
-        files = [line.split("\t")[0] for line in summary.splitlines()[1:]]
+        files = []
+        for job in self.plan(*arguments, "--forceall").jobs:
+            files += job.outputs
         for file in files:
             path = self.directory / file
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -150,8 +178,9 @@ class Workflow:
 
     def count_as_made(self, *arguments: str) -> None:
         """Have Snakemake take the files of a call that are there for made."""
-        touched = self.run("--touch", "--cores", "1", *arguments)
-        assert touched.returncode == 0, touched.stderr
+        with launching(self.directory):
+            code = launch.main(["--touch", "--cores", "1", *arguments])
+        assert code == 0
 
     def count_ellipsoid_as_meshed(self, config: dict, cells: int) -> None:
         """Write a configuration of one brain, `a`, as study.yaml, with an ellipsoid's

@@ -24,17 +24,24 @@ from .conftest import Workflow
 pytestmark = pytest.mark.slow
 
 LABELS, AFFINE = phantom(voxel_mm=2.0)
-WHOLE = cerebrum_surface(LABELS, AFFINE)
 APART = odd_brains.apart(LABELS, AFFINE)
-LEFT, RIGHT = sorted(
-    pieces(cerebrum_surface(APART, AFFINE)),
-    key=lambda piece: piece.vertices[:, 0].mean(),
-)
 
 
-def with_polyp(mesh):
-    """Return the surface with a ball of 4 mm radius on a stalk of 1 mm radius and 8 mm
-    length below it."""
+def halves():
+    """Return the surfaces of the left and the right hemisphere."""
+    both = pieces(cerebrum_surface(APART, AFFINE))
+    return sorted(both, key=lambda piece: piece.vertices[:, 0].mean())
+
+
+def bent():
+    """Return the surface of a brain whose midline is bent."""
+    return cerebrum_surface(odd_brains.bent_midline(APART, AFFINE), AFFINE)
+
+
+def with_polyp():
+    """Return the surface of the brain with a ball of 4 mm radius on a stalk of 1 mm
+    radius and 8 mm length below it."""
+    mesh = cerebrum_surface(LABELS, AFFINE)
     grid = np.indices((40, 40, 60)).reshape(3, -1).T * 0.4 - [8.0, 8.0, 18.0]
     ball = np.linalg.norm(grid - [0, 0, -12.0], axis=1) < 4.0
     stalk = (
@@ -90,20 +97,23 @@ def in_flat_voxels(*_):
     )
 
 
-def whole(mesh, suffix="surf.gii"):
+def whole(surface, suffix="surf.gii"):
+    """Write the surface that a function returns."""
+
     def made(folder, name):
-        write_surface(folder / f"{name}.{suffix}", mesh)
+        write_surface(folder / f"{name}.{suffix}", surface())
         return {"pial": f"{name}.{suffix}"}
 
     return made
 
 
-def both_sides(left, right, *, white_mm=None, coordinates="ras"):
-    """Write hemispheres as FreeSurfer does, and white surfaces inside the pial ones."""
+def both_sides(pair, *, white_mm=None, coordinates="ras"):
+    """Write the hemispheres that a function returns as FreeSurfer does, and white
+    surfaces inside the pial ones."""
 
     def made(folder, name):
         entry, white = {}, []
-        for side, mesh in (("left", left), ("right", right)):
+        for side, mesh in zip(("left", "right"), pair(), strict=True):
             write_geometry(folder / f"{name}.{side}.pial", mesh.vertices, mesh.faces)
             entry[side] = f"{name}.{side}.pial"
             if white_mm is not None:
@@ -136,10 +146,14 @@ MOTIONS = {
     "left": rigid(100, 40, -70, shift=(30.0, 0.0, -50.0)),
     "right": rigid(-20, 130, 60, shift=(0.0, 9.0, 0.0)),
 }
-POSED = [
-    flipped(transformed(half, turn))
-    for half, turn in zip(atlas_halves(), MOTIONS.values(), strict=True)
-]
+
+
+def posed():
+    """Return the hemispheres of an atlas, inside out and each in a pose of its own."""
+    moved = zip(atlas_halves(), MOTIONS.values(), strict=True)
+    return [flipped(transformed(half, turn)) for half, turn in moved]
+
+
 GOOD = {
     "plain": labelled(),
     "polyp": labelled(odd_brains.with_fourth_ventricle),
@@ -158,10 +172,10 @@ GOOD = {
     ),
     "shifted": labelled(odd_brains.shifted_midline),
     "cropped": labelled(odd_brains.crop),
-    "pial_ply": whole(with_polyp(WHOLE), "ply"),
-    "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
-    "bent": whole(cerebrum_surface(odd_brains.bent_midline(APART, AFFINE), AFFINE)),
-    "posed": both_sides(*POSED, coordinates="auto"),
+    "pial_ply": whole(with_polyp, "ply"),
+    "freesurfer": both_sides(halves, white_mm=1.5),
+    "bent": whole(bent),
+    "posed": both_sides(posed, coordinates="auto"),
     # what else is read as it is meant, or refused: tests/unit/io/test_volumes.py
     "stored_oddly": stored_oddly,
     "flat": labelled(in_flat_voxels),
@@ -177,14 +191,14 @@ MINE = {
 BAD = {
     "small_half": (labelled(odd_brains.small_hemisphere), ["volume", 0.5]),
     "whole_as_half": (alone("right", lambda labels, affine: labels), [0.56]),
-    "pial_half": (whole(LEFT), ["surface", 0.5]),
-    "swapped": (both_sides(RIGHT, LEFT), ["left", "right", "x =", "ras"]),
+    "pial_half": (whole(lambda: halves()[0]), ["surface", 0.5]),
+    "swapped": (both_sides(lambda: halves()[::-1]), ["left", "right", "x =", "ras"]),
 }
 NAMED = ("holoprosencephaly", "wide", "hypoplasia", "hemispherectomy")
 """The pathologies that go on to metrics."""
 REFUSED = list(BAD)
 HEMISPHERECTOMY = alone("left", odd_brains.one_hemisphere)
-CROSSING = both_sides(LEFT, RIGHT, white_mm=-1.5)
+CROSSING = both_sides(halves, white_mm=-1.5)
 
 
 @pytest.fixture(scope="module")
@@ -264,7 +278,7 @@ def test_each_hemisphere_is_one_piece_on_its_side(study, name):
 
 
 @pytest.mark.parametrize("name", WARNINGS)
-def test_what_is_doubtful_is_told(study, name):
+def test_what_is_doubtful_is_reported(study, name):
     assert WARNED[name] in study.report(name)["warnings"]
     assert WARNED[name] in study.messages(name, "warning")
     assert WARNED[name] not in study.report("plain")["warnings"]
@@ -282,7 +296,7 @@ def test_a_brain_is_the_same_however_it_is_stored(study, name):
     assert "2 x 2 x 2" not in "\n".join(study.messages("plain", "warning"))
 
 
-def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its_week(
+def test_labels_of_a_user_s_scheme_give_a_surface_with_its_thickness_at_its_week(
     study,
 ):
     report = study.report("own_scheme")

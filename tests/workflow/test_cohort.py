@@ -81,7 +81,7 @@ def cohort(checkout_copy, tmp_path_factory):
     )
 
 
-def test_rows_that_cannot_be_used_are_refused_before_any_job_unless_told_to_go_on(
+def test_rows_that_cannot_be_used_are_refused_before_any_job_without_keep_going(
     cohort,
 ):
     assert cohort.refusal.returncode == 2

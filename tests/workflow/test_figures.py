@@ -210,7 +210,7 @@ def test_targets_ask_for_figures_that_there_are(figures, rules):
     assert drawn == asked_for - set(rules["SECTIONS"]) | set(sectioned(rules))
 
 
-def test_the_paper_stands_in_its_own_figures_alone(figures, rules):
+def test_the_paper_is_named_in_its_own_figures_alone(figures, rules):
     with_paper = {
         figure.name for figure in figures["shapes"] if "published" in figure.inputs
     }

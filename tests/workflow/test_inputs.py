@@ -1,8 +1,6 @@
 """Which files the rules read, as a dry run lists them, where the study decides which
 brain a file is of."""
 
-import re
-
 import pytest
 from configurations import LABELLED, labelled
 
@@ -32,18 +30,11 @@ def planned(checkout_copy, tmp_path_factory):
         folder = tmp_path_factory.mktemp("planned")
         (folder / "regions.nii.gz").touch()
         workflow = Workflow(checkout_copy, folder)
-        outcome = workflow.run(
-            "-n", *targets, "--configfile", workflow.write("study.yaml", config)
-        )
-        assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-        jobs = re.findall(
-            r"\n    input: (.*)\n    output: (.*)", outcome.stdout + outcome.stderr
-        )
-        return {
-            output: files.split(", ")
-            for files, outputs in jobs
-            for output in outputs.split(", ")
-        }
+        name = workflow.write("study.yaml", config)
+        files = {}
+        for job in workflow.plan(*targets, "--configfile", name).jobs:
+            files |= dict.fromkeys(job.outputs, job.files)
+        return files
 
     return inputs
 

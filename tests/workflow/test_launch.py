@@ -6,7 +6,6 @@ import getpass
 import os
 import pwd
 import re
-import subprocess
 import sys
 import threading
 
@@ -15,25 +14,22 @@ from facts import Facts
 from mpi4py import MPI
 from processes import ran
 
-from gyriflow.errors import InputError
+from gyriflow.errors import InputError, StorageError
 from gyriflow.folding.__main__ import locked
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
 from gyriflow.running.launch import (
     clear_stale_lock,
     end_scheduler_timers,
+    hold_lock,
+    main,
     set_user_name,
     stop_jobs,
     what_runs,
 )
 from gyriflow.shipped import SHIPPED
 
-from .conftest import SMALL_STUDY
-
-
-def message(outcome):
-    assert "Traceback" not in outcome.stderr
-    return outcome.stderr
+from .conftest import SMALL_STUDY, launching
 
 
 def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(workflow):
@@ -50,16 +46,10 @@ def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(wo
     table = {"file": "participants.tsv", "columns": {"scheme": "binary"}}
     study = {"participants": table, "start": "all", "folding": {"end_week": 26}}
     name = workflow.write("my study/study.yaml", study)
-    outcome = workflow.run(
-        "-n", "surface", "--configfile", name, "--directory", "elsewhere"
-    )
-    assert outcome.returncode == 0, outcome.stderr
-    assert (
-        str(workflow.directory / "my study" / "labels.nii.gz")
-        in outcome.stdout + outcome.stderr
-    )
-    assert "of-my-study" in outcome.stdout + outcome.stderr
-    assert "of-elsewhere" not in outcome.stdout + outcome.stderr
+    plan = workflow.plan("surface", "--configfile", name, "--directory", "elsewhere")
+    (job,) = [job for job in plan.jobs if job.rule.startswith("pial")]
+    assert job.wildcards["brain"] == "of-my-study"
+    assert str(workflow.directory / "my study" / "labels.nii.gz") in job.files
 
 
 def test_a_user_whom_the_system_does_not_know_has_a_name(monkeypatch):
@@ -108,28 +98,13 @@ def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_l
     workflow,
 ):
     lock = stale(workflow.directory)
-    holder = subprocess.Popen(
-        [
-            *workflow.command()[:1],
-            "-c",
-            "from gyriflow.running.launch import hold_lock; from pathlib import Path;"
-            "lock = hold_lock(Path('.')); print('held', flush=True); input()",
-        ],
-        cwd=workflow.directory,
-        env=workflow.environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert holder.stdout.readline() == "held\n"
-        refused = workflow.run("--cores", "1", "surface")
-        assert refused.returncode == 5
-        assert message(refused) == Facts(workflow.directory, "--directory")
+    with hold_lock(workflow.directory):
+        with pytest.raises(StorageError) as refused:
+            main(["--cores", "1", "surface", "--directory", str(workflow.directory)])
+        assert refused.value.exit_code == 5
+        assert str(refused.value) == Facts(workflow.directory, "--directory")
         assert lock.exists()
         assert workflow.jobs("surface")
-    finally:
-        holder.communicate("\n")
 
 
 def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(
@@ -154,11 +129,13 @@ def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(
     assert warned.count("\n") == 1
 
 
-def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
-    (workflow.directory / "file").touch()
-    outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")
-    assert outcome.returncode == 5
-    assert message(outcome) == Facts("file/below:", "Not a directory")
+def test_a_working_directory_that_cannot_be_written_ends_in_5(tmp_path):
+    (tmp_path / "file").touch()
+    below = str(tmp_path / "file" / "below")
+    with pytest.raises(StorageError) as refused:
+        main(["--cores", "1", "surface", "--directory", below])
+    assert refused.value.exit_code == 5
+    assert str(refused.value) == Facts(f"{below}:", "Not a directory")
 
 
 @pytest.mark.parametrize("place", ["Snakefile", "workflow/Snakefile"])
@@ -177,33 +154,24 @@ def test_the_first_line_says_what_runs_where_a_folder_has_its_own_workflow(
     assert what_runs(tmp_path) == Facts(own, tmp_path / place) != Facts("demo")
 
 
-def test_what_runs_is_said_first_without_a_configuration(workflow):
+def test_what_runs_is_said_first_without_a_configuration(workflow, capsys):
     (workflow.directory / "Snakefile").touch()
-    outcome = workflow.run("-n", "surface")
-    assert outcome.returncode == 0, outcome.stderr
-    assert outcome.stderr.splitlines()[0] == Facts(
-        "gyriflow:", "demo", workflow.directory / "Snakefile"
-    )
-    outcome = workflow.run(
-        "-n", "surface", "--configfile", workflow.write("study.yaml", SMALL_STUDY)
-    )
-    assert "demo" not in outcome.stderr
+    assert workflow.jobs("surface")
+    assert capsys.readouterr().err.splitlines()[0] == Facts("gyriflow:", "demo")
+    name = workflow.write("study.yaml", SMALL_STUDY)
+    assert workflow.jobs("surface", "--configfile", name)
+    assert "demo" not in capsys.readouterr().err
 
 
-def test_results_that_are_a_link_to_nowhere_are_named(workflow):
+def test_results_that_are_a_link_to_nowhere_are_named(workflow, capfd):
     (workflow.directory / "results").symlink_to("disk/results")
-    outcome = workflow.run(
-        "--cores",
-        "1",
-        "surface",
-        "--configfile",
-        workflow.write("study.yaml", SMALL_STUDY),
-    )
-    assert outcome.returncode == 5
-    assert message(outcome).splitlines()[-1] == Facts(
-        "results is a link to disk/results"
-    )
-    assert "disk space" not in outcome.stderr
+    name = workflow.write("study.yaml", SMALL_STUDY)
+    with launching(workflow.directory):
+        code = main(["--cores", "1", "surface", "--configfile", name])
+    message = capfd.readouterr().err
+    assert code == 5
+    assert message.splitlines()[-1] == Facts("results is a link to disk/results")
+    assert "disk space" not in message
 
 
 def gyriflow(workflow, *arguments):
@@ -212,11 +180,9 @@ def gyriflow(workflow, *arguments):
 
 
 def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
-    outcome = gyriflow(
-        workflow, "run", workflow.write("study.yaml", SMALL_STUDY), "--stage", "metrcs"
-    )
-    assert outcome.returncode == 2
-    assert message(outcome).splitlines()[-1] == Facts("gyriflow:", "metrcs", "metrics")
+    name = workflow.write("study.yaml", SMALL_STUDY)
+    with pytest.raises(InputError, check=Facts("metrcs", "metrics")):
+        workflow.plan("metrcs", "--configfile", name)
 
 
 @pytest.mark.slow
@@ -244,8 +210,7 @@ def test_a_result_of_an_unknown_brain_is_refused_with_the_name_of_a_similar_one(
 ):
     name = workflow.write("study.yaml", SMALL_STUDY)
     metrics = "results/brains/{}/metrics/metrics.csv".format
-    call = ("--configfile", name, "-n", "--quiet", "rules")
-    assert workflow.run(metrics("a"), *call).returncode == 0
-    outcome = workflow.run(metrics("aa"), *call)
+    assert workflow.jobs(metrics("a"), "--configfile", name)
+    outcome = workflow.run("-n", metrics("aa"), "--configfile", name)
     assert outcome.returncode == InputError.exit_code
     assert outcome.stderr == Facts(metrics("aa"), "no brain aa", "did you mean a?")

@@ -2,7 +2,6 @@
 Snakemake's records and dates say."""
 
 import os
-import re
 import shutil
 import sys
 
@@ -153,10 +152,7 @@ def test_the_dry_run_says_why_each_step_runs_again(made, tmp_path):
     shutil.copytree(made.directory, tmp_path / "study")
     workflow = Workflow(made.checkout, tmp_path / "study")
     change(workflow, OTHER_EDGE)
-    said = workflow.run("-n", *CONFIGURED).stdout
-    reasons = dict(
-        re.findall(r"^rule (\w+):\n(?: +.*\n)*? +reason: (.*)\n", said, re.MULTILINE)
-    )
+    reasons = workflow.reasons(*CONFIGURED)
     assert "edge_length_mm" in reasons["pial_with_thickness"]
     assert "another job" in reasons["measure"]
 

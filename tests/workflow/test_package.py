@@ -117,10 +117,14 @@ def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory)
     assert " core hours, " in dry.stdout
 
 
-def test_a_brain_is_measured_without_the_solver(wheel, tmp_path, tmp_path_factory):
-    command, environment = installed(
-        wheel, tmp_path_factory.mktemp("installed"), without=FOLD
-    )
+@pytest.fixture(scope="module")
+def without_solver(wheel, tmp_path_factory):
+    """The command and variables of an environment without the packages of `fold`."""
+    return installed(wheel, tmp_path_factory.mktemp("installed"), without=FOLD)
+
+
+def test_a_brain_is_measured_without_the_solver(without_solver, tmp_path):
+    command, environment = without_solver
     python = command.with_name("python")
     blocked = ran(python, "-c", "import mpi4py", cwd=tmp_path, env=environment)
     assert blocked.returncode == 1
@@ -136,11 +140,9 @@ def test_a_brain_is_measured_without_the_solver(wheel, tmp_path, tmp_path_factor
 
 
 def test_simulating_without_the_solver_names_the_extra_before_the_first_job(
-    wheel, tmp_path, tmp_path_factory
+    without_solver, tmp_path
 ):
-    command, environment = installed(
-        wheel, tmp_path_factory.mktemp("installed"), without=FOLD
-    )
+    command, environment = without_solver
     demo = re.search(
         r"(\S+/config\.yaml)", ran(command, "run", cwd=tmp_path, env=environment).stderr
     )[1]

@@ -1,4 +1,4 @@
-"""A brain foretold by another population's growth, with the real commands, from
+"""A brain predicted by another population's growth, with the real commands, from
 phantoms given as labels or surface."""
 
 import numpy as np
@@ -49,7 +49,7 @@ def brains_of(workflow, population, seed, *weeks):
 
 @pytest.mark.slow
 @pytest.mark.extended
-def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(workflow):
+def test_a_brain_is_predicted_and_compared_with_the_observed_ones_of_any_week(workflow):
     brains = [
         *brains_of(workflow, "a", 1, 21, 22, 23),
         *brains_of(workflow, "b", 2, 21.5, 22.6, 23),

@@ -5,6 +5,7 @@ import copy
 import os
 import re
 import shutil
+from collections import Counter
 from contextlib import contextmanager
 
 import pytest
@@ -150,7 +151,9 @@ CODE = {
 def test_a_change_of_code_runs_again_what_uses_it(finished, change):
     names, expected = CODE[change]
     with changed_files(finished.checkout, *names):
-        assert planned(finished, "--configfile", "study.yaml") == expected
+        listed = finished.run("-n", "--configfile", "study.yaml").stdout
+    rules = Counter(re.findall(r"^rule (\w+):$", listed, re.MULTILINE))
+    assert {rule: rules[rule] for rule in STAGES if rule in rules} == expected
 
 
 def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(
@@ -160,11 +163,8 @@ def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_wh
     labels = "phantom-22.nii.gz"
     with changed_files(finished.directory, labels):
         assert planned(finished, "--configfile", "study.yaml") == OF_THE_OTHER_BRAIN
-        said = finished.run("-n", "--configfile", "study.yaml").stdout
-    (reason,) = re.findall(
-        r"rule pial_with_thickness:\n(?: +.*\n)*? +reason: (.*)\n", said
-    )
-    assert reason == Facts("changed input", labels)
+        reasons = finished.reasons("--configfile", "study.yaml")
+    assert reasons["pial_with_thickness"] == Facts("changed input", labels)
 
 
 def test_inputs_are_known_by_their_content_not_their_date(workflow):
@@ -185,4 +185,4 @@ def test_inputs_are_known_by_their_content_not_their_date(workflow):
     # as `mv` and `rsync -a` do
     other.rename(labels)
     assert workflow.jobs(*arguments) == {"pial": 1}
-    assert workflow.run("-n", *arguments).stdout == Facts("changed input l.nii.gz")
+    assert workflow.reasons(*arguments)["pial"] == Facts("changed input l.nii.gz")

@@ -40,7 +40,7 @@ def study(folder: Path, url: str) -> dict:
     return {"atlas": "atlas.yaml", "start": "far-21", "folding": {"end_week": 22}}
 
 
-def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(
+def test_missing_files_are_planned_announced_and_fetched_by_what_needs_them(
     workflow, server
 ):
     name = workflow.write("study.yaml", study(workflow.directory, server.url))

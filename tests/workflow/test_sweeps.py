@@ -39,7 +39,7 @@ def ellipsoids(first_week, *semi_axes_mm):
 
 @pytest.mark.slow
 @pytest.mark.extended
-def test_a_run_that_diverges_is_reported_and_sinks_nothing(workflow):
+def test_a_run_that_diverges_is_reported_and_the_others_are_compared(workflow):
     rates = {
         "base": "reference",
         "vary": {"growth_rate_per_s": [1.0e-7, 1.0e-5]},

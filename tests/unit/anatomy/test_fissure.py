@@ -94,7 +94,7 @@ def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
         largest_pieces(mesh, {"left": left, "right": ~left}, to_file)
 
 
-def test_a_small_piece_beside_a_hemisphere_is_left_out_and_told():
+def test_a_small_piece_beside_a_hemisphere_is_left_out_and_reported():
     mesh = merged(ellipsoid((24, 33, 22)), sphere(4.0, 3, (-38.0, 0.0, 0.0)))
     left = left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
     kept, (warning,) = largest_pieces(mesh, {"left": left, "right": ~left}, np.eye(4))
@@ -479,7 +479,7 @@ def test_named_coordinates_are_kept_by_a_body_with_many_mirror_planes(centred):
 
 
 @pytest.mark.parametrize("deep", [False, True])
-def test_a_mask_whose_fissure_is_shut_is_told(deep):
+def test_a_mask_whose_fissure_is_closed_is_reported(deep):
     x, y, z = np.indices((56, 66, 56)) - np.array([28, 33, 28])[:, None, None, None]
     mask = (x / 23) ** 2 + (y / 28) ** 2 + (z / 22) ** 2 < 1
     # a gap between the hemispheres, but for what joins them

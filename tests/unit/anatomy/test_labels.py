@@ -95,7 +95,7 @@ def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():
     assert require_cortex_outside(brain, ATLAS) == 1.0
 
 
-def test_little_cortex_at_the_surface_is_told_with_its_share():
+def test_little_cortex_at_the_surface_is_reported_with_its_share():
     x, _, z = np.indices((40, 40, 40)) - 19.5
     radius = np.linalg.norm(np.indices((40, 40, 40)).T - 19.5, axis=-1).T
     for limit, is_told in ((-3.0, True), (-9.0, False)):
@@ -108,7 +108,7 @@ def test_little_cortex_at_the_surface_is_told_with_its_share():
         assert told == [Facts(f"{100 * share:.0f} %")] * is_told
 
 
-def test_what_is_left_out_or_filled_is_told_with_its_volume():
+def test_what_is_left_out_or_filled_is_reported_with_its_volume():
     voxel_ml = 0.8**3 / 1000
     radius = np.linalg.norm(np.indices((50, 50, 50)).T - 24.5, axis=-1).T
     ball = np.where(radius < 16.0, np.where(radius < 13.0, 1, 5), 0)
@@ -325,7 +325,7 @@ def test_nothing_is_filled_where_the_cerebrum_is_whole(atlas_brain, scheme):
     assert not unlabelled_ventricles(atlas_brain[0], scheme, atlas_brain[1]).any()
 
 
-def test_a_filled_ventricle_is_told_and_counts_as_ventricle_and_not_as_tissue(
+def test_a_filled_ventricle_is_reported_and_counts_as_ventricle_and_not_as_tissue(
     atlas_brain,
 ):
     labels, affine = atlas_brain
@@ -366,7 +366,7 @@ def test_stray_voxels_and_voids_change_neither_the_cerebrum_nor_its_volume(brain
 @pytest.mark.parametrize(
     ("axis", "end"), [(axis, end) for axis in range(3) for end in (0, -1)]
 )
-def test_a_brain_that_is_cut_at_any_border_of_its_volume_is_told_with_the_share(
+def test_a_brain_that_is_cut_at_any_border_of_its_volume_is_reported_with_the_share(
     axis, end
 ):
     block = np.zeros((20, 18, 16), dtype=bool)

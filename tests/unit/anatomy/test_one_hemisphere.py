@@ -85,7 +85,7 @@ def test_labels_of_one_hemisphere_are_a_brain_of_one_side_and_no_whole_one(brain
         from_labels(unsided, affine, SCHEMES["spina-bifida-atlas"], **QUICK)
 
 
-def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_told_so(brain):
+def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_reported(brain):
     labels, affine = odd_brains.add_sides(*brain), brain[1]
     left, right = DHCP.cortex
     for kept, lost, side in ((left, right, "left"), (right, left, "right")):

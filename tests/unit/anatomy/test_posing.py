@@ -317,7 +317,7 @@ def test_the_axes_of_a_file_are_named():
         ("SAR", False, ["mirrored", "SAR", "SAL", "Do not swap"]),
     ],
 )
-def test_mirrored_hemispheres_are_told_from_exchanged_ones_or_both_are_named(
+def test_mirrored_hemispheres_are_distinguished_from_exchanged_ones_or_both_are_named(
     halves, axes, is_exchanged, facts
 ):
     files = [linear(half, AXES[axes]) for half in halves]
@@ -341,7 +341,7 @@ def test_of_unusual_axes_it_is_said_that_they_may_be_mirrored(halves):
 
 
 @pytest.mark.parametrize("coordinates", ["ras", "lps"])
-def test_nobody_is_told_to_swap_sides_in_coordinates_that_do_not_fit(
+def test_no_swap_of_sides_is_advised_in_coordinates_that_do_not_fit(
     halves, coordinates
 ):
     # LPS named RAS, or the reverse
@@ -512,7 +512,7 @@ def test_small_tilts_are_the_files_own(brain, degrees):
         ((-20, 25, 30), 46),
     ],
 )
-def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
+def test_larger_tilts_are_kept_and_reported(brain, degrees, angle):
     pose = pose_when_turned(brain, degrees)
     assert np.array_equal(pose.world[:3, :3], np.eye(3))
     (warning,) = pose.warnings
@@ -561,7 +561,7 @@ def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
     )
 
 
-def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
+def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_reported():
     # neither front nor back, up nor down, and its axes are no file's
     mesh = transformed(ellipsoid((24, 33, 22)), rigid(50, 40, 30))
     with pytest.raises(InputError, check=Facts("brain", 0.13, 1.07)):
@@ -571,7 +571,7 @@ def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
     assert len(pose.warnings) == 1
 
 
-def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
+def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_warned_of(brain):
     labels, affine = brain
     scheme = SCHEMES["spina-bifida-atlas"]
     assert pose_of_labels(labels[:, ::-1], affine, scheme).warnings[0] == Facts(

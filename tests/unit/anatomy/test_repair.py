@@ -67,7 +67,7 @@ def test_large_hole_is_refused_with_its_size():
         clean(mesh)
 
 
-def test_a_vertex_far_off_the_surface_is_told():
+def test_a_vertex_far_off_the_surface_is_reported():
     whole = ball()
     assert sound_pieces(whole).warnings == []
     vertices = whole.vertices.copy()
@@ -90,7 +90,7 @@ def test_an_edge_is_long_for_the_surface_and_for_a_brain(subdivisions, factor, i
     assert ["edge" in text for text in found] == [True] * is_told
 
 
-def test_a_part_on_a_stalk_is_told_with_its_volume_and_the_stalk_s_area():
+def test_a_part_on_a_stalk_is_reported_with_its_volume_and_the_stalk_s_area():
     x, y, z = (0.8 * np.indices((50, 50, 70)).T - [20.0, 20.0, 32.0]).T
     mask = x**2 + y**2 + z**2 < 15.0**2
     mask |= (np.hypot(x, y) < 1.4) & (np.abs(z + 12.0) < 12.0)
@@ -110,14 +110,14 @@ def test_a_part_on_a_stalk_is_told_with_its_volume_and_the_stalk_s_area():
     )
 
 
-def test_gaps_of_a_tenth_of_a_millilitre_are_told():
+def test_gaps_of_a_tenth_of_a_millilitre_are_reported():
     affine = rigid(10, 20, 30) @ np.diag([*LONG_MM, 1.0])
     for voxels, told in ((285, []), (286, [Facts("100 mm³")])):
         counts = {"voxels_filled_in_tunnels": voxels}
         assert filled_warning(counts, affine) == told
 
 
-def test_dropped_pieces_are_told_with_their_share_of_the_area():
+def test_dropped_pieces_are_reported_with_their_share_of_the_area():
     # a ninth and a 900th of the area
     far, farther = ball((0, 40, 0), RADIUS / 3), ball((0, 40, 30), RADIUS / 30)
     found = sound_pieces(merged(far, WHOLE, farther))
@@ -302,7 +302,9 @@ def test_handle_of_a_torus_is_closed_when_remade():
 
 
 @pytest.mark.parametrize(("lacks", "is_warned"), [(0.03, False), (0.09, True)])
-def test_a_volume_that_smoothing_has_changed_much_is_told_in_percent(lacks, is_warned):
+def test_a_volume_that_smoothing_has_changed_much_is_reported_in_percent(
+    lacks, is_warned
+):
     # a little is restored, more than 5 % is not
     places = np.indices((30, 30, 30)).T - 14.5
     mask = np.linalg.norm(places, axis=-1) < 10.0

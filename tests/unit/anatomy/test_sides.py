@@ -76,7 +76,7 @@ def test_smoothing_keeps_volume_and_area():
     )
 
 
-def test_a_volume_that_is_far_off_is_told_and_not_hidden():
+def test_a_volume_that_is_far_off_is_reported_and_not_hidden():
     ball = sphere(20.0, 3)
     volume = signed_volume(ball)
     near, report = with_volume(ball, 1.02 * volume, area(ball))

@@ -55,7 +55,7 @@ def with_sulcus(depth_mm):
 
 
 @pytest.mark.parametrize("depth_mm", [4.0, 6.0])
-def test_a_shut_sulcus_is_opened_to_its_depth(depth_mm):
+def test_a_fused_sulcus_is_opened_to_its_depth(depth_mm):
     body, core, affine = with_sulcus(depth_mm)
     field, volume = smooth_mask(body), body.sum() * VOXEL_MM**3
     truth = 4 * np.pi * RADIUS_MM**2 + 2 * np.pi * (
@@ -182,7 +182,7 @@ def test_a_hemisphere_alone_has_its_sulcus_opened():
     )
 
 
-def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
+def test_labels_that_lack_white_matter_are_reported_and_stay_as_they_are():
     body, places, depth, affine = ball()
     core = body & (depth > THICKNESS_MM) & (places[..., 0] > 3.0)
     field = smooth_mask(body)

@@ -117,7 +117,7 @@ def test_a_turned_volume_gives_the_same(ball):
     np.testing.assert_allclose(turned.values_mm, straight.values_mm, atol=1e-4)
 
 
-def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
+def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_reported(ball):
     pial, depth, inside, affine = ball
     x = affine[0, 3] + 0.8 * np.arange(inside.shape[0])
     cortex = inside & (depth < 2.4) & (x < 10)[:, None, None]
@@ -141,7 +141,7 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
         (0.9, [Facts("cortex", "1.1 voxels")]),
     ],
 )
-def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(
+def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_reported(
     ball, caplog, thickness_mm, messages
 ):
     pial, depth, inside, affine = ball
@@ -157,7 +157,9 @@ def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(
 
 
 @pytest.mark.parametrize("hidden", [0.05, 0.1])
-def test_area_that_fused_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, hidden):
+def test_area_that_fused_sulci_hide_is_reported_by_the_cortex_volume(
+    ball, caplog, hidden
+):
     """A fused sulcus through a ball of 20 mm: two banks of 2 mm that touch, as deep as
     hides a share of the area."""
     pial, depth, inside, affine = ball

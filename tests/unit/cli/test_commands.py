@@ -75,7 +75,7 @@ def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_a_missing_configuration_is_told_in_one_line_where_it_is_named(
+def test_a_missing_configuration_is_reported_in_one_line_where_it_is_named(
     monkeypatch, tmp_path, command
 ):
     monkeypatch.chdir(tmp_path)
@@ -218,7 +218,7 @@ def test_quadratic_elements_are_warned_of_on_the_way_to_deep_folds(predicted, tm
     assert list(deep_curved_folds(resolve(load(section)))) == []
 
 
-def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(
+def test_a_quick_prediction_is_coarse_and_finds_files_from_the_working_directory(
     monkeypatch, predicted, tmp_path
 ):
     atlas = SHIPPED / "atlases" / "spina-bifida"
@@ -529,7 +529,7 @@ def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(
         ([None, 3, 2], 2**30, 3),
     ],
 )
-def test_a_full_disk_is_the_cause_where_no_step_has_told_another(
+def test_a_full_disk_is_the_cause_where_no_step_has_named_another(
     tmp_path, monkeypatch, capsys, codes, free, expected
 ):
     monkeypatch.setattr(

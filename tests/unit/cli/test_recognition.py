@@ -276,7 +276,9 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
 @pytest.mark.parametrize(
     ("finer", "runs"), [(0, ["reference", "measured"]), (1, ["reference"])]
 )
-def test_surfaces_lead_a_run_only_where_their_vertices_match(tmp_path, finer, runs):
+def test_a_run_grows_towards_surfaces_only_where_their_vertices_match(
+    tmp_path, finer, runs
+):
     for week, levels in ((21, 2), (22, 2 + finer)):
         for side, x in (("left", -12.0), ("right", 12.0)):
             write_surface(
@@ -342,7 +344,7 @@ def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
     ]
 
 
-def test_only_scans_of_one_subject_are_led_to_each_other(tmp_path):
+def test_only_scans_of_one_subject_grow_towards_each_other(tmp_path):
     bids_folder(tmp_path, second="sub-02")
     config = configured(tmp_path)
     assert [brain.subject for brain in config.brains] == ["sub-01", "sub-02"]
@@ -369,7 +371,7 @@ def app(monkeypatch, tmp_path):
     return call
 
 
-def test_a_bids_app_measures_and_folds_the_first_of_several_scans_where_told(
+def test_a_bids_app_measures_and_on_request_folds_the_first_of_several_scans(
     app, tmp_path
 ):
     arguments, written = app("participant")

@@ -46,7 +46,7 @@ def brain():
     return brain_mesh(12)
 
 
-def test_the_ellipsoid_stands_where_the_model_puts_it():
+def test_the_ellipsoid_is_where_the_model_puts_it():
     box = np.array([[-10.0, -20.0, -30.0], [10.0, 20.0, 30.0]]) + CENTRE_MM
     centre = CENTRE_MM + np.array([0.0, 0.05 * 40, -0.15 * 60])
     tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])

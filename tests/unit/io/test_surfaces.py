@@ -122,7 +122,7 @@ def test_matrix_into_scanner_space_that_is_not_rigid_is_refused(tmp_path, ball, 
         ((U, SCANNER, TURN), (5.3, -17.0, 6.0), False),
     ],
 )
-def test_coordinates_that_may_be_relative_to_freesurfers_volume_are_told(
+def test_coordinates_that_may_be_relative_to_freesurfers_volume_are_reported(
     tmp_path, ball, caplog, system, centre, said
 ):
     image = nib.load(gifti(tmp_path / "lh.pial.surf.gii", ball.vertices, ball.faces))
@@ -273,7 +273,9 @@ def test_one_surface_is_not_both_hemispheres(tmp_path, ball):
     assert read_hemispheres(left, other)[2]
 
 
-def test_hemispheres_whose_files_name_different_spaces_are_told(tmp_path, ball, caplog):
+def test_hemispheres_whose_files_name_different_spaces_are_reported(
+    tmp_path, ball, caplog
+):
     files = [
         in_spaces(tmp_path / "a.gii", ball, (U, SCANNER, TURN)),
         tmp_path / "b.ply",

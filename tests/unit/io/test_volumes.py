@@ -366,7 +366,9 @@ def test_a_freesurfer_volume_with_negative_sizes_of_voxels_is_refused(tmp_path, 
         read_label_volume(path)
 
 
-def test_sizes_of_voxels_that_disagree_in_a_header_are_told(tmp_path, labels, caplog):
+def test_sizes_of_voxels_that_disagree_in_a_header_are_reported(
+    tmp_path, labels, caplog
+):
     path = saved(tmp_path / "a.nii", labels, qform=0)
     read_label_volume(path)
     assert not caplog.records

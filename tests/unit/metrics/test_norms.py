@@ -1,7 +1,6 @@
 """Norms of brains that are drawn from known curves, and published ones; tables of a
 study, by brain, side and week."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -108,79 +107,6 @@ def growing(weeks):
     return 80 + 270 * ((weeks - 21) / 16) ** 1.3
 
 
-def centiles_benchmark():
-    """Return the module `benchmarks/centiles.py`."""
-    spec = importlib.util.spec_from_file_location(
-        "centiles", ROOT / "benchmarks" / "centiles.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-CENTILES = centiles_benchmark()
-PLACES = CENTILES.PLACES
-COHORTS, SEED = 30, 5
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("subjects", [12, 100])
-@pytest.mark.parametrize("name", sorted(CENTILES.CASES.keys() - {"5 % outliers"}))
-def test_of_new_normal_subjects_5_percent_are_below_the_5th_centile(
-    name: str, subjects: int
-) -> None:
-    case = CENTILES.CASES[name]
-    if subjects < case.min_subjects:
-        return
-    found = CENTILES.new_subjects(case, subjects, COHORTS, seed=SEED)
-    for prefix, nominal in (("", 5.0), ("skewed, ", 10.0)):
-        rows = [found[key] for place in PLACES if (key := prefix + place) in found]
-        if not rows or rows[0][-1] < COHORTS / 2:
-            continue
-        below, above, first, _ = np.transpose(rows)
-        # with the chance of so few cohorts
-        for share in (below, above):
-            assert np.abs(share - nominal).max() < 0.9 * nominal
-            assert share.mean() == pytest.approx(nominal, rel=0.45)
-        assert first.max() < 3.0
-        assert first.mean() < 2.0
-
-
-def test_half_a_week_beyond_the_norm_brains_are_expected_to_have_grown() -> None:
-    found = CENTILES.new_subjects(
-        CENTILES.CASES["constant CV"], 30, COHORTS, seed=2, beyond=0.5
-    )
-    for name in ("first", "last"):
-        below, above, first, _ = found[name]
-        assert max(below, above) < 9.5
-        assert min(below, above) > 1.0
-        assert first < 3.0
-
-
-def test_subjects_of_a_norm_are_scored_as_new_ones() -> None:
-    found = CENTILES.members(CENTILES.CASES["constant CV"], 35, 6, seed=1)
-    below, above, first = np.mean(list(found.values()), axis=0)
-    assert below == pytest.approx(5, abs=2.5)
-    assert above == pytest.approx(5, abs=2.5)
-    assert first < 2.5
-
-
-def test_a_90_percent_interval_of_z_holds() -> None:
-    random, case = np.random.default_rng(1), CENTILES.CASES["constant CV"]
-    at, true = (
-        axis.ravel()
-        for axis in np.meshgrid([22.0, 29.0, 36.0], stats.norm.ppf([0.05, 0.5, 0.95]))
-    )
-    holds = []
-    for _ in range(60):
-        weeks, values, people = CENTILES.drawn(case, 30, random)
-        low, high = fit_norm(weeks, values, people, is_positive=True).scores(
-            at, case.values(at, true)
-        )[1]
-        holds.append((low <= true) & (true <= high))
-    assert 0.83 < np.mean(holds) < 0.97
-
-
 def test_few_subjects_of_one_week_are_compared_by_students_distribution() -> None:
     values = np.array([3.0, 5.0, 4.0, 6.5, 2.5, 4.5, 5.5, 3.5, 4.0, 6.0, 3.0, 4.5])
     norm = fit_norm(np.full(12, 25.0), values, np.arange(12), is_positive=False)
@@ -205,9 +131,7 @@ def test_skewness_is_estimated_from_many_subjects() -> None:
     ):
         weeks = random.uniform(21, 37, subjects)
         z = random.standard_normal(subjects).clip(-3, 3)
-        values = CENTILES.volume(weeks) * np.where(
-            share, 1 + 0.25 * z, np.exp(0.25 * z)
-        )
+        values = growing(weeks) * np.where(share, 1 + 0.25 * z, np.exp(0.25 * z))
         norm = fit_norm(weeks, values, np.arange(subjects), is_positive=True)
         if subjects == 400:
             assert norm.skewness == pytest.approx(share, abs=0.35)
@@ -216,9 +140,9 @@ def test_skewness_is_estimated_from_many_subjects() -> None:
 
 
 def test_a_subject_is_removed_by_one_step_as_by_another_fit() -> None:
-    weeks, values, people = CENTILES.drawn(
-        CENTILES.CASES["constant CV"], 150, np.random.default_rng(5)
-    )
+    random, people = np.random.default_rng(5), np.arange(150)
+    weeks = random.uniform(21, 37, 150)
+    values = growing(weeks) * (1 + 0.1 * random.standard_normal(150))
     norm = fit_norm(weeks, values, people, is_positive=True)
     inner = np.flatnonzero(
         (np.abs(weeks - 29) < 5) & (np.abs(norm.scores(weeks, values)[0]) > 1.0)
@@ -291,22 +215,6 @@ def test_values_and_scores_are_inverse(
     assert norm.is_spline == (weeks > 7)
 
 
-def test_a_small_head_of_22_weeks_is_found() -> None:
-    random = np.random.default_rng(0)
-    weeks = random.uniform(21, 37, 100)
-    values = growing(weeks) * (1 + 0.08 * random.standard_normal(100))
-    small = growing(22.0) * (1 + 0.08 * stats.norm.ppf(0.01))
-    found = (
-        scores(*table(weeks, values, ("small", 22.0, small)))
-        .query("run == 'small'")
-        .iloc[0]
-    )
-    assert found["centile"] < 5
-    assert found["centile_low"] < 1 < found["centile_high"] < 15
-    assert 100 * stats.norm.cdf(found["z_low"]) == pytest.approx(found["centile_low"])
-    assert (found["flag"], found["brains"]) == ("ok", 100)
-
-
 def test_whole_weeks_of_many_subjects_have_their_own_scatter() -> None:
     random = np.random.default_rng(3)
     weeks = random.integers(22, 29, 500).astype(float)
@@ -317,15 +225,6 @@ def test_whole_weeks_of_many_subjects_have_their_own_scatter() -> None:
         of_week = found[found["week"] == week]
         assert of_week["sd"].mean() == pytest.approx(week - 20, rel=0.2)
         assert (of_week["centile"] < 10).mean() == pytest.approx(0.1, abs=0.08)
-
-
-def test_thirty_subjects_are_compared_alike() -> None:
-    random = np.random.default_rng(4)
-    weeks = random.uniform(21, 36, 30)
-    found = scores(
-        *table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(30)))
-    )
-    assert set(found["flag"]) == {"ok"}
 
 
 def test_values_that_a_norm_cannot_have_are_not_scored() -> None:

@@ -284,7 +284,7 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
 ACCURACY = read_yaml(SHIPPED / "norms" / "predictions.yaml")
 
 
-def foretold(weeks: float) -> dict:
+def predicted(weeks: float) -> dict:
     """Return what the report of a prediction is given, so many weeks ahead of 22 GW."""
     atlas = {
         "name": "crl",
@@ -333,14 +333,14 @@ def test_the_report_of_a_prediction_says_what_it_is_how_accurate_and_in_which_fi
     )
     text = " ".join(
         page(
-            figures, validation=None, prediction=foretold(7.5), metrics=metrics
+            figures, validation=None, prediction=predicted(7.5), metrics=metrics
         ).split()
     )
     assert elements(text, "h1") == [Facts("young", "29.5 GW", "the atlas crl")]
     assert Facts("young", "22 GW", "29.5 GW", 7.5, "An atlas") in elements(text, "p")
     parts = (
         "</h1>",
-        str(escape(accuracy_sentence(foretold(7.5)))),
+        str(escape(accuracy_sentence(predicted(7.5)))),
         "210.5",
         "largest error in 4 tests",
         "0.71 mm",
@@ -359,34 +359,34 @@ def test_the_report_of_a_prediction_says_what_it_is_how_accurate_and_in_which_fi
     # no table of dashes, and the other figure in its section
     assert "results/study/validation.csv" not in text
     assert "<h2>weekly_figure" in text
-    assert "results/study/validation.csv" in page(figures, prediction=foretold(7.5))
+    assert "results/study/validation.csv" in page(figures, prediction=predicted(7.5))
     # also beside an observed brain
-    better = foretold(7.5)
+    better = predicted(7.5)
     better["tests"] |= {"advantage": "The atlas was better."}
     assert "<strong>The atlas was better. At 23 GW" in page(figures, prediction=better)
 
 
 def test_a_prediction_beyond_those_that_were_tried_says_so():
     last = max(row["horizon"] for row in ACCURACY["rows"])
-    assert accuracy_sentence(foretold(last)).count(f"{last:g} weeks") == 1
+    assert accuracy_sentence(predicted(last)).count(f"{last:g} weeks") == 1
     rows = [
         {"horizon": 2.0, "model": name, "distance_mm": 0.5, "r_shape_index": 0.8}
         for name in ("run", "atlas", "scaled")
     ]
     worse = [rows[0] | {"r_shape_index": 0.7}, *rows[1:]]
     told = [
-        accuracy_sentence(foretold(2.0) | {"accuracy": {"rows": accuracy}})
+        accuracy_sentence(predicted(2.0) | {"accuracy": {"rows": accuracy}})
         for accuracy in (rows, worse)
     ]
     assert ["shape index; it is stored with" in sentence for sentence in told] == [
         False,
         True,
     ]
-    assert accuracy_sentence(foretold(last + 1)) == Facts(
+    assert accuracy_sentence(predicted(last + 1)) == Facts(
         f"{last:g} weeks", f"{last + 1:g} weeks"
     )
     # where the atlas' own brain was better, that comes first
-    brain = foretold(2.0)
+    brain = predicted(2.0)
     assert accuracy_sentence(brain).startswith("This is a prediction")
     brain["tests"] |= {"advantage": "The atlas was better."}
     assert accuracy_sentence(brain).startswith(
@@ -445,7 +445,7 @@ def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings()
     assert elements(rows[1], "td")[2:] == ["–", "–", "refusedcropped"]
 
 
-def test_a_page_says_what_its_centiles_are_worth():
+def test_a_page_says_how_certain_its_centiles_are():
     few = pd.concat(
         [MEASURES["centiles"], MEASURES["centiles"].assign(flag="too few brains")]
     )

@@ -411,7 +411,7 @@ def test_the_models_fields_are_drawn_in_the_elements_at_the_start_and_at_the_end
     assert len(normals.get_paths()) == len(weight.get_paths())
 
 
-def test_outlines_are_those_of_both_brains_at_one_scale_laid_onto_each_other():
+def test_outlines_are_those_of_both_brains_at_one_scale_aligned():
     bigger, moved = (
         TriangleMesh(mesh, SMOOTH.faces)
         for mesh in (1.1 * SMOOTH.vertices, SMOOTH.vertices + [5, -3, 2])

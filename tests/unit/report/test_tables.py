@@ -137,7 +137,7 @@ def test_a_predicted_brain_is_between_its_start_and_the_atlas_brain_nearest_in_w
     assert found.filter(like="interval of ensemble").tolist() == ["190 to 240"]
 
 
-def test_what_predictions_were_worth_stands_by_horizon_with_what_the_starts_span():
+def test_the_accuracy_of_predictions_is_listed_by_horizon_with_the_range_of_starts():
     names = [
         "start",
         "horizon",
@@ -222,7 +222,7 @@ def test_an_absent_parameter_equals_one_that_is_off_and_curves_have_their_ends()
     ]
 
 
-def test_the_quality_of_a_mesh_stands_beside_its_limits():
+def test_the_quality_of_a_mesh_is_listed_with_its_limits():
     quality = {
         "tets": 3072,
         "min_radius_ratio": 0.125,

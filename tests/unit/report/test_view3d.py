@@ -60,7 +60,7 @@ def test_a_run_has_one_triangulation_and_its_positions_each_week():
     assert shorts(group["faces"]).max() == len(places[0]) - 1
 
 
-def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
+def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_reported():
     values = np.linspace(0.0, 0.2, len(BALL.vertices))
     values[0] = np.nan
     data = surfaces_view({"thin": growing(values)}, [], observed_name="observed brain")

@@ -127,7 +127,7 @@ def test_changed_settings_are_named_with_their_values(job):
     assert how(replace(job, settings=lambda: elsewhere)) == ""
 
 
-def test_changed_code_is_told_only_where_nothing_else_has_changed(job):
+def test_changed_code_is_reported_only_where_nothing_else_has_changed(job):
     newer = dict(job.settings()) | {"code": "code 2"}
     assert how(replace(job, settings=lambda: newer)) == CHANGED_CODE
     coarser = newer | {"surface": {"edge_length_mm": 2.0, "open_sulci": True}}

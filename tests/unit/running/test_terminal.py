@@ -156,7 +156,7 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         ),
     ],
 )
-def test_what_has_ended_a_program_from_outside_is_told(run, message, facts, code):
+def test_what_has_ended_a_program_from_outside_is_reported(run, message, facts, code):
     log = run.begin("measure", brain="a")
     write_message(log, Message("error", "a.nii: is no image", exit_code=2))
     run.fail(
@@ -248,7 +248,7 @@ def test_what_was_stopped_is_no_failure(run, monkeypatch):
     assert run.display.n_failed == 0
 
 
-def test_an_error_of_no_job_is_told(run):
+def test_an_error_of_no_job_is_reported(run):
     run.tell("run_info", stats={"measure": 1})
     run.tell("error", text="WorkflowError: no such profile", level=logging.ERROR)
     run.display.end()
@@ -325,7 +325,7 @@ def test_failed_steps_are_listed_with_their_logs_but_not_interrupted_ones(
     assert not [line for line in lines if "stopped" in line or "of old" in line]
 
 
-def test_stages_of_brains_and_runs_are_told_from_their_files(study):
+def test_stages_of_brains_and_runs_are_known_by_their_files(study):
     assert ["b", "-", "-", "-"] in [line.split() for line in text(study).splitlines()]
     progress = study / "results/runs/r/a/logs/simulate.jsonl"
     progress.write_text(
@@ -376,7 +376,7 @@ def test_a_damaged_plan_is_left_out(tmp_path, content):
     assert text(tmp_path) == "nothing is running"
 
 
-def test_the_runs_of_the_plan_are_told_before_they_start(tmp_path):
+def test_the_runs_of_the_plan_are_reported_before_they_start(tmp_path):
     shape = {"id": "a", "week": 21, "shape": {"semi_axes_mm": [20, 20, 20]}}
     raw = {"brains": [shape], "start": "a", "folding": {"end_week": 22}}
     raw["runs"] = {"x": {}, "y": {"ranks": 1}}
@@ -456,6 +456,6 @@ def test_renamed_data_with_a_renamed_configuration_are_the_same_study(tmp_path):
         check_results_belong_to(tmp_path, [tmp_path / "new.yaml"], config, record=False)
 
 
-def test_results_that_were_deleted_are_nobodys(made):
+def test_deleted_results_belong_to_no_study(made):
     (made / "results" / "brains" / "a").rmdir()
     check_results_belong_to(made, [made / "two.yaml"], configured("c"), record=True)

@@ -224,7 +224,7 @@ def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
 # an atlas of one's own
 
 
-def test_an_atlas_of_ones_own_is_one_file(tmp_path):
+def test_a_user_s_atlas_is_one_file(tmp_path):
     touched(tmp_path / "mine", "w21.nii.gz", "w22.nii.gz")
     file = write_atlas(tmp_path / "mine")
     for given in (
@@ -303,7 +303,7 @@ def test_mistakes_in_a_description_are_named_with_its_file(
 # licences and mistakes
 
 
-def test_a_narrow_licence_has_to_be_accepted_and_is_told(tmp_path):
+def test_a_narrow_licence_has_to_be_accepted_and_is_reported(tmp_path):
     (found,) = problems(study({"name": "crl", "weeks": [21]}, "crl-21"), tmp_path)
     licence = Atlas(**read_yaml(ATLASES / "crl" / "atlas.yaml")).licence
     assert found == Facts(

@@ -200,7 +200,7 @@ def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
 # schemes
 
 
-def test_a_scheme_of_ones_own_is_used_by_its_name(folder):
+def test_a_user_s_scheme_is_used_by_its_name(folder):
     config = load(
         one(labels="a.nii.gz", scheme="mine") | {"schemes": {"mine": MINE}}, folder
     )

@@ -18,7 +18,7 @@ def study(folding, **others):
     }
 
 
-def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
+def test_a_map_has_its_parameter_s_name_and_its_files_are_listed(tmp_path):
     for name in (
         "left.gii",
         "right.gii",

@@ -299,9 +299,7 @@ def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(o
 
 
 @pytest.mark.parametrize("preset", ["measured", "expected"])
-def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(
-    of_two, preset
-):
+def test_runs_of_sweeps_and_of_the_calibration_grow_until_their_own_end(of_two, preset):
     runs, later = {"runs": {"a": {"preset": preset}}}, {"base": "a", "compare_week": 26}
     varied = {"sweeps": {"late": later | {"vary": {"thickness_mm": [1.0, 2.0]}}}}
     search = {
