@@ -321,7 +321,7 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     vertices, _, _, faces = igl.remove_duplicate_vertices(
         mesh.vertices, mesh.faces, MERGE_MM
     )
-    used = len(np.unique(mesh.faces))
+    used = triangles.n_used_vertices(mesh.faces)
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]
