@@ -28,8 +28,8 @@ from gyriflow.io.yaml_files import read_keys
 from gyriflow.messages import read_events
 from gyriflow.metrics.repeatability import difference_noise
 from gyriflow.quantities import METRICS
-from gyriflow.running.jobs import usage_in
 from gyriflow.shipped import SHIPPED
+from gyriflow.step import usage_in
 
 N_DIFFERENCES = 10
 """Metrics in the table of differences, the largest in units of the noise first."""
