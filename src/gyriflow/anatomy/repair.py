@@ -138,13 +138,13 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
     Else it is rebuilt through voxels ("remade" in the report). MeshError if
     self-intersections remain.
     """
-    smooth, cutting = make_even(mesh, edge_length_mm)
+    smooth, cutting, n_crossing = make_even(mesh, edge_length_mm)
     report: dict[str, Any] = {"self_intersections": cutting}
-    if not (remaining := faults(smooth)):
+    if not (remaining := faults(smooth, n_crossing)):
         return RepairedSurface(smooth, report, [])
     mesh, report["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
-    smooth, _ = make_even(mesh, edge_length_mm)
-    require_sound(smooth)
+    smooth, _, n_crossing = make_even(mesh, edge_length_mm)
+    require_sound(smooth, n_crossing)
     return RepairedSurface(
         smooth,
         report,
@@ -179,10 +179,10 @@ def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> Repaired
     )
 
 
-def require_sound(mesh: TriangleMesh) -> None:
+def require_sound(mesh: TriangleMesh, n_crossing: int | None = None) -> None:
     """Raise MeshError if the surface is not made of closed spheres without
-    self-intersections."""
-    if problems := faults(mesh):
+    self-intersections; their number is counted where it is not known."""
+    if problems := faults(mesh, n_crossing):
         raise MeshError(
             "the surface could not be repaired",
             found=problems,
@@ -195,11 +195,13 @@ def require_sound(mesh: TriangleMesh) -> None:
         )
 
 
-def faults(mesh: TriangleMesh) -> str:
+def faults(mesh: TriangleMesh, n_crossing: int | None = None) -> str:
     """Return the faults of a surface that should be closed spheres without
     self-intersections; empty if none."""
     euler = [triangles.euler_number(piece) for piece in pieces(mesh)]
-    crossing = int(remeshing.self_intersecting_faces(mesh).sum())
+    crossing = n_crossing
+    if crossing is None:
+        crossing = int(remeshing.self_intersecting_faces(mesh).sum())
     problems = [
         "edges without two faces" if not triangles.is_closed(mesh) else "",
         f"Euler numbers {euler}" if any(number != 2 for number in euler) else "",
@@ -215,8 +217,11 @@ def taubin_smoothed(mesh: TriangleMesh) -> TriangleMesh:
     return remeshing.from_meshlab(document)
 
 
-def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
-    """Smooth, remesh and untangle a surface; also count crossing faces before.
+def make_even(
+    mesh: TriangleMesh, edge_length_mm: float
+) -> tuple[TriangleMesh, int, int]:
+    """Smooth, remesh and untangle a surface; also count crossing faces before, and
+    those that remain.
 
     Walls of a narrow slit that keep crossing are not smoothed.
     """
@@ -225,10 +230,10 @@ def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, 
         remeshing.remesh(smooth, edge_length_mm)
     )
     if remaining:
-        even, _, _ = remeshing.untangle(
+        even, _, remaining = remeshing.untangle(
             remeshing.remesh(_without_crossings(mesh, smooth), edge_length_mm)
         )
-    return even, crossing
+    return even, crossing, remaining
 
 
 def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
@@ -321,7 +326,7 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     vertices, _, _, faces = igl.remove_duplicate_vertices(
         mesh.vertices, mesh.faces, MERGE_MM
     )
-    used = len(np.unique(mesh.faces))
+    used = triangles.n_used_vertices(mesh.faces)
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]

@@ -256,15 +256,26 @@ def _grow_slits(
         for i, j, k in product((-1, 0, 1), repeat=3)
         if (i, j, k) != (0, 0, 0)
     ]
-    faces = (1, -1, row, -row, layer, -layer)
     rows = [i * layer + j * row - 1 for i in (-1, 0, 1) for j in (-1, 0, 1)]
     # flat bytes, since reading single voxels of an array takes ten times as long
     mask, sheet_bytes = bytearray(inside.tobytes()), sheet.tobytes()
     places = np.flatnonzero(sheet | (ndimage.binary_closing(sheet, OUTSIDE) & cortex))
     waiting = {int(place): -float(distance.flat[place]) for place in places}
     queue = [(value, place) for place, value in waiting.items()]
-    queued, order = set(waiting), []
+    order = []
     heapq.heapify(queue)
+    # voxels that may be put into the queue: they wait, are inside, and are not in it
+    is_idle = bytearray(len(mask))
+
+    def is_enclosed(place: int) -> int:
+        return (
+            mask[place + 1]
+            and mask[place - 1]
+            and mask[place + row]
+            and mask[place - row]
+            and mask[place + layer]
+            and mask[place - layer]
+        )
 
     def simple(place: int) -> bool:
         return is_simple(
@@ -273,15 +284,16 @@ def _grow_slits(
 
     while queue:
         _, place = heapq.heappop(queue)
-        queued.discard(place)
-        if all(mask[place + step] for step in faces) or not simple(place):
+        if is_enclosed(place) or not simple(place):
+            is_idle[place] = 1
             continue
         mask[place] = 0
         order.append(place)
         for step in steps:
             near = place + step
-            if near in waiting and mask[near] and near not in queued:
-                queued.add(near)
+            # an enclosed voxel comes into the queue when one at its faces is taken
+            if is_idle[near] and not is_enclosed(near):
+                is_idle[near] = 0
                 heapq.heappush(queue, (waiting[near], near))
     for place in reversed(order):
         if not sheet_bytes[place] and simple(place):

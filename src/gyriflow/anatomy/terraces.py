@@ -30,7 +30,8 @@ ROUNDS = 16
 # compensation of the lost height of folds: for the Gaussian in voxels², for the rounds
 # relative to the roughness weight
 GAUSSIAN_VOXELS2, ROUGHNESS_SHARE = 0.35, 0.14
-# pivots on the diagonal keep the factors sparse: 60 times faster
+# pivots on the diagonal keep the factors sparse: 60 times faster. Larger panels and
+# relaxed supernodes, which help denser matrices, would take a third longer
 SYMMETRIC = {"SymmetricMode": True}
 # how often vertices of faces that cross others, rotate by 60° or become needles are
 # reset, with their neighbours
@@ -65,7 +66,14 @@ def without_terraces(
         sparse.csc_matrix(weighted - pole * sparse.diags(mass)) for pole in poles
     ]
     solvers = [
-        splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options=SYMMETRIC)
+        splu(
+            matrix,
+            "MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.01,
+            relax=1,
+            panel_size=1,
+            options=SYMMETRIC,
+        )
         for matrix in matrices
     ]
 

@@ -195,15 +195,21 @@ def is_closed(mesh: TriangleMesh) -> bool:
     _, uses = edges(mesh)
     directed = _half_edges(mesh)
     keys = directed @ [len(mesh.vertices), 1]
-    has_repeated = len(np.unique(keys)) < len(keys)
+    # many distinct numbers are sorted faster than np.unique finds them by their hashes
+    has_repeated = (np.diff(np.sort(keys)) == 0).any()
     return not has_repeated and bool((uses == 2).all())
+
+
+def n_used_vertices(faces: Ints) -> int:
+    """Return the number of vertices that faces have."""
+    return int(np.count_nonzero(np.bincount(faces.ravel())))
 
 
 def euler_number(mesh: TriangleMesh) -> int:
     """Return vertices − edges + faces, counting used vertices only: 2 for each closed
     surface without handles."""
     pairs, _ = edges(mesh)
-    return len(np.unique(mesh.faces)) - len(pairs) + len(mesh.faces)
+    return n_used_vertices(mesh.faces) - len(pairs) + len(mesh.faces)
 
 
 def face_components(mesh: TriangleMesh) -> Ints:
@@ -272,7 +278,7 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
         pairs.append(paired)
     corner = _joined_corners(np.concatenate(pairs), start, following)
     _, first = np.unique(corner, return_index=True)
-    if len(first) == len(np.unique(faces)):
+    if len(first) == n_used_vertices(faces):
         return mesh
     return TriangleMesh(mesh.vertices[start[first]], corner.reshape(-1, 3))
 

@@ -10,11 +10,13 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import MeshError, SolverError
 from ..geometry.diffusion import stiffness_matrix
-from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
+from ..geometry.triangles import Floats, TriangleMesh, n_used_vertices, vertex_areas
 from ..settings.terms import MassMatrix
 
-RESIDUAL_TOL = 1e-10
-"""Largest residual of a mode, relative to its eigenvalue of the inverted operator."""
+RESIDUAL_TOL = 1e-6
+"""Largest residual of a mode, relative to its eigenvalue of the inverted operator.
+Eigenvalues are exact to its square. Modes mix with their neighbours by some 1e-4, which
+changes the power of a band by less."""
 MODES_PER_SLICE = 100
 """Eigenvalues to find with each shift; from 60 to 200 it matters little."""
 BLOCK = 8
@@ -48,7 +50,7 @@ def laplacian(
     `consistent` is as in LaPy. The boundary of an open surface is free (Neumann).
     MeshError where a vertex has no face.
     """
-    unused = len(mesh.vertices) - len(np.unique(mesh.faces))
+    unused = len(mesh.vertices) - n_used_vertices(mesh.faces)
     if unused:
         raise MeshError(
             "vertices without a face have no Laplacian", found=unused, expected=0
@@ -136,28 +138,33 @@ def modes_below(
     if stiffness.shape[0] <= DENSE_VERTICES:
         return lowest_modes(stiffness, mass, count)
 
+    # one order for all factorisations
+    order = np.argsort(_factorise(stiffness, mass, -_spacing(mass)).perm_c)
+    stiffness, mass = (matrix[order][:, order] for matrix in (stiffness, mass))
+
     # the eigenvalues of a surface are evenly spaced (Weyl's law)
     n_slices = max(1, round(count / MODES_PER_SLICE))
     ends = np.linspace(-_spacing(mass), value, n_slices + 1)
     counts = [0]
     for end in ends[1:-1]:
-        counts.append(count_below(stiffness, mass, float(end)))
+        counts.append(_inertia(_factorise(stiffness, mass, float(end), "NATURAL"), end))
     counts.append(count)
 
-    slices = []
+    eigenvalues = np.empty(count)
+    functions = np.empty((len(order), count), order="F")
     for i in range(n_slices):
         low, high = ends[i], ends[i + 1]
+        part = slice(counts[i], counts[i + 1])
         try:
-            slices.append(
-                _modes_between(stiffness, mass, low, high, counts[i + 1] - counts[i])
-            )
+            modes = _modes_between(stiffness, mass, low, high, part.stop - part.start)
         except (linalg.LinAlgError, RuntimeError) as error:
             problem = (
                 f"the modes with λ from {low:g} to {high:g} mm⁻² could not be found"
             )
             raise SolverError(problem, found=str(error), remedy=SLIVERS) from error
-    eigenvalues = np.concatenate([modes.eigenvalues for modes in slices])
-    return Modes(eigenvalues, np.hstack([modes.functions for modes in slices]))
+        eigenvalues[part] = modes.eigenvalues
+        functions[order, part] = modes.functions
+    return Modes(eigenvalues, functions)
 
 
 def _modes_between(
@@ -170,31 +177,38 @@ def _modes_between(
     """Return the `count` modes with low < λ < high, by block Lanczos with (K − σM)⁻¹ M
     and σ in the middle.
 
-    SolverError where not all are found.
+    Of a matrix whose order has little fill. SolverError where not all are found.
     """
     shift = 0.5 * (low + high)
-    solve = _factorise(stiffness, mass, shift).solve
+    solve = _factorise(stiffness, mass, shift, "NATURAL").solve
     size = stiffness.shape[0]
     max_vectors = min(5 * count + 20 * BLOCK, size - size % BLOCK)
-    basis = np.empty((size, max_vectors), order="F")
+    # in single precision: vectors that are orthogonal to the root of the rounding of
+    # double precision have the same projected operator (Simon 1984, Linear Algebra
+    # Appl. 61, 101-131)
+    basis = np.empty((size, max_vectors), dtype=np.float32, order="F")
     # the operator in the basis: its upper triangle
     projected = np.zeros((max_vectors, max_vectors))
 
-    block, _ = _orthonormalise(
+    block, weighted, _ = _orthonormalise(
         np.random.default_rng(1).standard_normal((size, BLOCK)), mass
     )
-    next_check = 2 * count + 4 * BLOCK
+    recent, recent_weighted = np.empty((2, size, 0))
+    next_check = 2 * count + 8 * BLOCK
     found = 0
     for used in range(BLOCK, max_vectors + 1, BLOCK):
         last = slice(used - BLOCK, used)
         basis[:, last] = block
-        block = solve(mass @ basis[:, last])
-        recent = slice(max(used - 2 * BLOCK, 0), used)
-        projected[recent, last] = basis[:, recent].T @ (mass @ block)
-        block -= basis[:, recent] @ projected[recent, last]
+        recent = np.hstack([recent[:, -BLOCK:], block])
+        recent_weighted = np.hstack([recent_weighted[:, -BLOCK:], weighted])
+        block = solve(weighted)
+        overlap = recent_weighted.T @ block
+        projected[used - recent.shape[1] : used, last] = overlap
+        block -= recent @ overlap
         # in exact arithmetic the block is orthogonal to the earlier ones by now
-        block -= basis[:, :used] @ (basis[:, :used].T @ (mass @ block))
-        block, coupling = _orthonormalise(block, mass)
+        earlier = basis[:, :used]
+        block -= earlier @ (earlier.T @ (mass @ block).astype(np.float32))
+        block, weighted, coupling = _orthonormalise(block, mass)
         if used < next_check and used < max_vectors:
             continue
 
@@ -207,7 +221,9 @@ def _modes_between(
         found = int(np.count_nonzero(is_inside & has_converged))
         if found == count == np.count_nonzero(is_inside):
             order = np.argsort(eigenvalues[is_inside])
-            functions = basis[:, :used] @ vectors[:, is_inside][:, order]
+            combined = vectors[:, is_inside][:, order].astype(np.float32)
+            functions = (basis[:, :used] @ combined).astype(np.float64)
+            functions /= np.sqrt(np.sum(functions * (mass @ functions), axis=0))
             # Rayleigh's quotient is more exact than 1/θ where the shift is near an
             # eigenvalue
             return Modes(np.sum(functions * (stiffness @ functions), axis=0), functions)
@@ -220,13 +236,17 @@ def _modes_between(
     )
 
 
-def _orthonormalise(block: Floats, mass: sparse.csc_matrix) -> tuple[Floats, Floats]:
-    """Return M-orthonormal vectors Q (n, b) and R (b, b) with block = Q R."""
+def _orthonormalise(
+    block: Floats, mass: sparse.csc_matrix
+) -> tuple[Floats, Floats, Floats]:
+    """Return M-orthonormal vectors Q (n, b), M Q, and R (b, b) with block = Q R."""
     vectors, first = linalg.qr(block, mode="economic")
-    products = vectors.T @ (mass @ vectors)
-    second = linalg.cholesky(products)
-    transposed = linalg.solve_triangular(second, vectors.T, trans="T")
-    return transposed.T, second @ first
+    # rows of eight numbers together, as sparse products read them
+    vectors = np.ascontiguousarray(vectors)
+    weighted = mass @ vectors
+    second = linalg.cholesky(vectors.T @ weighted)
+    inverse = linalg.inv(second)
+    return vectors @ inverse, weighted @ inverse, second @ first
 
 
 def _spacing(mass: sparse.csc_matrix) -> float:
@@ -237,12 +257,13 @@ def _factorise(
     stiffness: sparse.csc_matrix,
     mass: sparse.csc_matrix,
     shift: float,
+    order: str = "MMD_AT_PLUS_A",
 ) -> SuperLU:
     # this order of columns is not SuperLU's own: its larger panels and relaxed
     # supernodes take ten times as long
     return splu(
         sparse.csc_matrix(stiffness - shift * mass),
-        permc_spec="MMD_AT_PLUS_A",
+        permc_spec=order,
         diag_pivot_thresh=0.0,
         relax=1,
         panel_size=1,
@@ -256,15 +277,19 @@ def count_below(
     value: float,
 ) -> int:
     """Return the number of eigenvalues below `value` (mm⁻²), from the inertia of K −
-    value·M.
+    value·M."""
+    return _inertia(_factorise(stiffness, mass, value), value)
 
-    With pivots on the diagonal, P(K − value·M)Pᵀ = L U with U = D Lᵀ, so D has the
-    signs of the eigenvalues.
+
+def _inertia(factors: SuperLU, shift: float) -> int:
+    """Return the number of eigenvalues below the shift of factors.
+
+    With pivots on the diagonal, P(K − σM)Pᵀ = L U with U = D Lᵀ, so D has the signs of
+    the eigenvalues.
     """
-    factors = _factorise(stiffness, mass, value)
     if not np.array_equal(factors.perm_r, factors.perm_c):
         raise SolverError(
             "no inertia: a pivot off the diagonal was taken",
-            found=f"shift {value:g} mm⁻²",
+            found=f"shift {shift:g} mm⁻²",
         )
     return int(np.count_nonzero(factors.U.diagonal() < 0))

@@ -7,12 +7,14 @@ spectrum is made of, its bands, and how far two spectra are from each other.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import linalg, sparse
+from scipy import sparse
 
+from ..errors import SolverError
 from ..geometry.matching import interpolation, match_surface
 from ..geometry.remeshing import decimate
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, vertex_areas
@@ -57,6 +59,10 @@ LONGEST_EDGE_MM = 1.8
 the waves."""
 WORTHWHILE = 0.8
 """A coarser surface is made if it has at most this share of the vertices."""
+SERIES_TOL = 1e-8
+"""Size of the last term of the series that makes modes orthonormal, relative to the
+first; about six terms."""
+MAX_TERMS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +115,10 @@ class Basis:
 
     `eigenvalues` λ (k,) are in mm⁻², `functions` (m, k) in mm⁻¹; `first` is λ1 of the
     surface, `reach` the λ below which no mode is missing. `places` (n, m) takes values
-    from the copy to the surface, where `energy` (n, n) gives ∫f² in mm², and the
-    functions are orthonormal.
+    from the copy to the surface, where `energy` (n, n) gives ∫f² in mm². There the
+    functions are almost orthonormal; spectra are of the orthonormal ones nearest to
+    them (Löwdin 1950), functions S^(-1/2) with their products S (k, k), none of which
+    is computed as a whole.
     """
 
     eigenvalues: Floats
@@ -131,6 +139,44 @@ class Basis:
         band[0] = 0
         band[self.eigenvalues >= limits[-1]] = -1
         return band
+
+    @cached_property
+    def _energy_of_places(self) -> sparse.csr_matrix:
+        return sparse.csr_matrix(self.places.T @ self.energy @ self.places)
+
+    def coefficients(self, energy: Floats) -> Floats:
+        """Return the (k,) coefficients of the fit of a map f by the orthonormal
+        functions, from its (n,) products with `energy`."""
+        products = self.functions.T @ (self.places.T @ energy)
+        return self._by_inverse_root(products[:, None])[:, 0]
+
+    def values(self, coefficients: Floats) -> Floats:
+        """Return (n, c) values on the surface of sums of the orthonormal functions,
+        from (k, c) coefficients."""
+        return self.places @ (self.functions @ self._by_inverse_root(coefficients))
+
+    def _by_inverse_root(self, vectors: Floats) -> Floats:
+        """Return S^(-1/2) V for (k, c) vectors V, by the binomial series of (1 − X) for
+        X = I − S.
+
+        It converges as the powers of X, whose norm is below 0.6: that is reached where
+        S is the lumped mass of modes that are orthonormal by the mean mass.
+        """
+        found = term = vectors
+        size = np.linalg.norm(vectors)
+        for number in range(1, MAX_TERMS + 1):
+            values = self.functions @ term
+            change = term - self.functions.T @ (self._energy_of_places @ values)
+            term = (1.0 - 0.5 / number) * change
+            found = found + term
+            if np.linalg.norm(term) <= SERIES_TOL * size:
+                return found
+        raise SolverError(
+            "the modes are not orthonormal on the surface",
+            found=f"{np.linalg.norm(term) / size:.2g} after {MAX_TERMS} terms",
+            expected=f"at most {SERIES_TOL:g}",
+            remedy="Remesh the surface.",
+        )
 
 
 def spectral_basis(
@@ -174,14 +220,10 @@ def spectral_basis(
     else:
         modes = lowest_modes(stiffness, matrix, number if by_name else int(choice))
         reach = float(modes.eigenvalues[-1])
-    # interpolated modes are not quite orthonormal on the surface: the nearest that are
-    # (Löwdin 1950)
-    values, vectors = linalg.eigh(
-        modes.functions.T @ ((places.T @ energy @ places) @ modes.functions)
-    )
-    functions = modes.functions @ ((vectors / np.sqrt(values)) @ vectors.T)
     is_open = bool((edges(mesh)[1] == 1).any())
-    return Basis(modes.eigenvalues, functions, places, energy, first, reach, is_open)
+    return Basis(
+        modes.eigenvalues, modes.functions, places, energy, first, reach, is_open
+    )
 
 
 def spectrum(
@@ -198,20 +240,16 @@ def spectrum(
     proxy is positive the band with the largest part, elsewhere the one with the
     smallest, with a minus sign.
     """
-    functions = basis.functions
     band = basis.band
     energy = basis.energy @ proxy
-    coefficients = functions.T @ (basis.places.T @ energy)
+    coefficients = basis.coefficients(energy)
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     is_whole = bands["complete"] & (bands["band"] > 0)
     whole = bands.loc[is_whole, "band"].to_numpy()
     if len(whole):
-        parts = []
-        for number in whole:
-            in_band = band == number
-            parts.append(functions[:, in_band] @ coefficients[in_band])
-        at_vertices = basis.places @ np.stack(parts, axis=1)
+        is_in_band = band[:, None] == whole
+        at_vertices = basis.values(is_in_band * coefficients[:, None])
         largest = whole[at_vertices.argmax(axis=1)]
         smallest = whole[at_vertices.argmin(axis=1)]
         dominant = np.where(proxy > 0, largest, -smallest)

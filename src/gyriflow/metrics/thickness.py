@@ -1,7 +1,6 @@
 """Cortical thickness of simulated brains, and values of a surface at its parts."""
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -44,6 +43,9 @@ def simulated_thickness(
     `positions` (m, 3) are the present ones in mm. MeshError where no point is deeper
     than the cortex.
     """
+    # takes half a second, which observed brains need not wait for
+    import pyvista as pv
+
     grid = pv.UnstructuredGrid(
         {pv.CellType.TETRA: linear_pieces(start)}, np.asarray(positions, dtype=float)
     )

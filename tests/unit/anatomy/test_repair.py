@@ -259,12 +259,12 @@ def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
     document.meshing_isotropic_explicit_remeshing(
         targetlen=pymeshlab.PureValue(2.0), selectedonly=True
     )
-    even, cutting = make_even(ball(), 1.0)
+    even, cutting, remaining = make_even(ball(), 1.0)
     assert is_closed(even)
     lengths = np.linalg.norm(np.diff(even.vertices[even.faces[:, :2]], axis=1), axis=-1)
     assert lengths.mean() == pytest.approx(1.0, rel=0.1)
     assert signed_volume(even) == pytest.approx(VOLUME, rel=0.01)
-    assert cutting == 0
+    assert cutting == remaining == 0
 
 
 def test_overlapping_balls_are_made_one_surface():

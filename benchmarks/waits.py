@@ -1,0 +1,120 @@
+"""Compare what the steps of a study take with two checkouts, and their metrics.
+
+    git worktree add ../before 45cdf8ba
+    ./run python benchmarks/waits.py CONFIG --before ../before --out FOLDER \\
+        [--command measure] [--repeats 5]
+
+CONFIG is a configuration, for example of one brain from labels. Both checkouts make its
+study in turn, each time in a new folder in FOLDER, by `./run gyriflow COMMAND CONFIG
+--cores 1`. For each kind of step: processor time as its steps have recorded it, with
+child processes (s; median, smallest and largest of the repeats), and the largest memory
+(MiB). Of the metrics of measured brains the last table has the largest differences,
+relative to the value but for metrics that may be negative, and in units of the noise:
+one standard deviation of the difference between two measurements of one brain
+(`norms/repeatability.yaml`). The last line is one JSON object.
+"""
+
+import argparse
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from common import ROOT, print_rows
+from kernels import KEYS
+
+from gyriflow.io.yaml_files import read_keys
+from gyriflow.messages import read_events
+from gyriflow.metrics.repeatability import difference_noise
+from gyriflow.quantities import METRICS
+from gyriflow.shipped import SHIPPED
+from gyriflow.step import usage_in
+
+N_DIFFERENCES = 10
+"""Metrics in the table of differences, the largest in units of the noise first."""
+
+
+def make_study(checkout: Path, command: str, config: Path, folder: Path) -> None:
+    """Make a study in a new folder; CalledProcessError if a step fails."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    program = ["./run", "gyriflow", command, str(config), "-d", str(folder)]
+    subprocess.run([*program, "--cores", "1"], cwd=checkout, check=True)
+
+
+def steps_in(folder: Path) -> pd.DataFrame:
+    """Return what the steps of a study took: a row per kind of step with cpu_s and
+    memory_MiB."""
+    rows = []
+    for path in folder.glob("results/**/logs/**/*.jsonl"):
+        used = usage_in(read_events(path))
+        if used:
+            kind = path.stem.partition(".")[0]
+            memory = used["memory_MiB"]
+            rows.append({"step": kind, "cpu_s": used["cpu_s"], "memory_MiB": memory})
+    steps = pd.DataFrame(rows).groupby("step")
+    return steps.agg({"cpu_s": "sum", "memory_MiB": "max"})
+
+
+def metrics_in(folder: Path) -> pd.Series:
+    """Return the metrics of a study by `KEYS`."""
+    table = pd.read_csv(folder / "results" / "study" / "metrics.csv")
+    return table.set_index(KEYS)["value"]
+
+
+def differences(before: pd.Series, now: pd.Series) -> list[dict[str, Any]]:
+    """Return rows of metric, largest difference and largest ratio to its noise;
+    ValueError where they are not of the same brains and metrics."""
+    is_same = before.index.equals(now.index)
+    if not is_same or not before.isna().equals(now.isna()):
+        raise ValueError("the checkouts have measured other brains or metrics")
+    noise = read_keys(SHIPPED / "norms" / "repeatability.yaml")
+    rows: dict[str, dict[str, Any]] = {}
+    for key, value in before.dropna().items():
+        metric = key[KEYS.index("metric")]
+        difference = abs(now[key] - value)
+        sd = difference_noise(metric, value, noise)
+        ratio = difference / sd if sd > 0 else 0.0
+        is_relative = value and not METRICS[metric].is_signed
+        shown = difference / abs(value) if is_relative else difference
+        row = rows.setdefault(metric, {"metric": metric, "largest": 0.0, "of_noise": 0})
+        row["largest"] = max(row["largest"], shown)
+        row["of_noise"] = max(row["of_noise"], ratio)
+    return sorted(rows.values(), key=lambda row: -row["of_noise"])[:N_DIFFERENCES]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("config", type=Path)
+    parser.add_argument("--before", type=Path, metavar="CHECKOUT", required=True)
+    parser.add_argument("--out", type=Path, metavar="FOLDER", required=True)
+    parser.add_argument("--command", default="measure", choices=["measure", "run"])
+    parser.add_argument("--repeats", type=int, default=1)
+    arguments = parser.parse_args()
+    config = arguments.config.resolve()
+    out = arguments.out.resolve()
+    checkouts = {"before": arguments.before.resolve(), "now": ROOT}
+    parts = []
+    for repeat in range(arguments.repeats):
+        for name, checkout in checkouts.items():
+            folder = out / f"{name}-{repeat}"
+            make_study(checkout, arguments.command, config, folder)
+            parts.append(steps_in(folder).assign(checkout=name))
+    rows = []
+    steps = pd.concat(parts).reset_index()
+    for (kind, name), taken in steps.groupby(["step", "checkout"], sort=False):
+        seconds = taken["cpu_s"]
+        row = {"step": kind, "checkout": name, "cpu_s": seconds.median()}
+        row |= {"smallest": seconds.min(), "largest": seconds.max()}
+        rows.append(row | {"memory_MiB": taken["memory_MiB"].max()})
+    before, now = (metrics_in(out / f"{name}-0") for name in checkouts)
+    found = differences(before, now)
+    print(pd.DataFrame(found).to_string(index=False, float_format="%.2g"))
+    print_rows(rows, differences=found)
+
+
+if __name__ == "__main__":
+    main()
