@@ -514,7 +514,7 @@ class Call:
     take_plan: Callable[[Plan], None] | None = None
     is_shown: bool = True
 
-    def _has_any(self, names: Sequence[str]) -> bool:
+    def has_any(self, names: Sequence[str]) -> bool:
         """Return whether any of some options is given."""
         return any(getattr(self.options, name, None) for name in names)
 
@@ -524,10 +524,10 @@ class Call:
         return self.place == self.directory
 
     @property
-    def _is_planned(self) -> bool:
+    def is_planned(self) -> bool:
         """Whether it runs jobs or shows those that would run."""
         is_plain = self.options.dryrun or self.runs
-        return is_plain and not self._has_any(MANAGING_OPTIONS)
+        return is_plain and not self.has_any(MANAGING_OPTIONS)
 
     @property
     def quiet(self) -> list[str]:
@@ -541,7 +541,7 @@ class Call:
         wanted = session.targets if self.options.force else []
         return [*(self.options.forcerun or []), *wanted]
 
-    def _without_force(self) -> "Call":
+    def without_force(self) -> "Call":
         """Return the call without arguments that force jobs to run: the plan has them,
         and Snakemake would leave out some behind a checkpoint."""
         arguments = [word for word in self.arguments if word not in FORCE_OPTIONS]
@@ -560,10 +560,10 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     if call.runs:
         # of a run that was killed
         restore_results(call.directory)
-    if not call._is_planned:
+    if not call.is_planned:
         code, _ = run_jobs(call, no_plan())
         return code
-    call = call._without_force()
+    call = call.without_force()
     events = Events()
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
@@ -584,14 +584,14 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         if left is None:
             _say_nothing_runs(call, events.nothing)
         return 0
-    if not (call.runs or call._has_any(SNAKEMAKE_LISTS)):
+    if not (call.runs or call.has_any(SNAKEMAKE_LISTS)):
         print(listing(plan, call.quiet), end="")
         return 0
     if call.runs:
         hide_results(call.directory, plan.outdated)
     else:
         link_results(call.directory, call.place, plan.outdated)
-    session._is_planned = True
+    session.is_planned = True
     try:
         code, ended = run_jobs(call, plan)
         still_left = set(plan.reasons) - ended
@@ -599,7 +599,7 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
             return plan_and_run(call, left=still_left)
         return code
     finally:
-        session._is_planned = False
+        session.is_planned = False
 
 
 def _say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
@@ -607,7 +607,7 @@ def _say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
     messages are asked for."""
     if call.options.dryrun:
         print(record.getMessage())
-    elif call._has_any(VERBOSE_OPTIONS):
+    elif call.has_any(VERBOSE_OPTIONS):
         print(record.getMessage(), file=sys.stderr)
     else:
         print("gyriflow: everything is up to date", file=sys.stderr)
@@ -634,7 +634,7 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
         arguments += ["--quiet", *(others or ["host"])]
         level, unwanted = logging.INFO, ("job_finished", "progress")
     output: AbstractContextManager[None] = nullcontext()
-    if not call._has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
+    if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         details = call.directory.resolve() / ".snakemake" / "log" / name
         logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
