@@ -59,10 +59,10 @@ class PointCloud:
 
     @cached_property
     def tree(self) -> cKDTree:
-        return cKDTree(self._features(self.points, self.normals))
+        return cKDTree(self.features(self.points, self.normals))
 
     @staticmethod
-    def _features(points: Floats, normals: Floats) -> Floats:
+    def features(points: Floats, normals: Floats) -> Floats:
         """Return the (n, 6) features in whose space nearest points are searched."""
         return np.hstack([points, NORMAL_WEIGHT * normals])
 
@@ -176,7 +176,7 @@ def _descend(
     def planes(rotation: Floats, shift: Floats) -> Planes:
         moved = points @ rotation.T + shift
         facing = normals @ rotation.T
-        _, nearest = target.tree.query(target._features(moved, facing))
+        _, nearest = target.tree.query(target.features(moved, facing))
         target_normals = target.normals[nearest]
         plane = unit(target_normals + facing)
         distances = np.einsum("ij,ij->i", target.points[nearest] - moved, plane)
@@ -197,11 +197,11 @@ def _descend(
         rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged
     )
     forward, _ = target.tree.query(
-        target._features(points @ rotation.T + shift, normals @ rotation.T)
+        target.features(points @ rotation.T + shift, normals @ rotation.T)
     )
     target_points, facing = target.points[::every], target.normals[::every]
     backward, _ = shape.tree.query(
-        shape._features((target_points - shift) @ rotation, facing @ rotation)
+        shape.features((target_points - shift) @ rotation, facing @ rotation)
     )
     squares = [
         np.mean(np.minimum(distance, MAX_DISTANCE) ** 2)

@@ -137,7 +137,7 @@ class FoundBrain:
         return str(source or ", ".join(self.entry["hemispheres"].values()))
 
     @property
-    def _is_whole_surface(self) -> bool:
+    def is_whole_surface(self) -> bool:
         """True if it is one surface of both hemispheres."""
         return "pial" in self.entry and "side" not in self.entry
 
@@ -359,7 +359,7 @@ def _brains_of_scan(
     for brain in preferred:
         if (
             brain.is_unreadable
-            and brain._is_whole_surface
+            and brain.is_whole_surface
             and not LAYER_NAME.search(brain.file.name)
         ):
             unused[brain.files] = brain.problem
@@ -655,7 +655,7 @@ def _read_files(brains: Sequence[FoundBrain], folder: Path) -> None:
     for brain in brains:
         if brain.problem:
             continue
-        if "labels" in brain.entry or brain._is_whole_surface:
+        if "labels" in brain.entry or brain.is_whole_surface:
             whole.append(brain)
             continue
         names = [*brain.files.split(", "), *brain.entry.get("white", ())]

@@ -101,7 +101,7 @@ class GridBrain:
     directions: Floats | None = None
 
     @property
-    def _is_mapped(self) -> bool:
+    def is_mapped(self) -> bool:
         return any(maps for _, maps in self.halves)
 
     @property
@@ -109,7 +109,7 @@ class GridBrain:
         mesh, _ = whole_maps(self.halves, [])
         return mesh
 
-    def _surface_map(self, quantity: str) -> SurfaceMap:
+    def surface_map(self, quantity: str) -> SurfaceMap:
         """Return its whole surface and a map; NaN on a hemisphere that lacks it."""
         mesh, maps = whole_maps(self.halves, [quantity])
         return mesh, maps[quantity]
@@ -133,11 +133,11 @@ def brain_grid(
     has no brain.
     """
     # each brain once, in however many views it is
-    mapped = {id(brain.halves): brain for brain in grid if brain._is_mapped}
+    mapped = {id(brain.halves): brain for brain in grid if brain.is_mapped}
     scale = None
     colour_bar = None
     if quantity and mapped:
-        values = [brain._surface_map(quantity)[1] for brain in mapped.values()]
+        values = [brain.surface_map(quantity)[1] for brain in mapped.values()]
         every = np.concatenate(values)
         scale = scale_of(quantity, every)
         colour_bar = (scale, title or map_title(quantity))
@@ -162,8 +162,8 @@ def _panel(
     """Return a brain in its view and colours, None if it has no surface."""
     if not brain.halves:
         return None
-    if scale is not None and brain._is_mapped:
-        mesh, values = brain._surface_map(quantity)
+    if scale is not None and brain.is_mapped:
+        mesh, values = brain.surface_map(quantity)
         colours = paint(values, scale)
         light: Mapping[str, Any] = MAP
     else:

@@ -74,7 +74,7 @@ class UsedAtlas:
         series = self.atlas.series[name]
         weeks = set(series.weeks)
         if self.settings.weeks is not None:
-            weeks = self._known_weeks(name).intersection(self.settings.weeks)
+            weeks = self.known_weeks(name).intersection(self.settings.weeks)
         keys = series.files if self.settings.images else series.needed
         root = (self.atlas.url or "").rstrip("/")
         for week in sorted(weeks):
@@ -97,7 +97,7 @@ class UsedAtlas:
                     copies=tuple(copies),
                 )
 
-    def _known_weeks(self, name: str) -> set[float]:
+    def known_weeks(self, name: str) -> set[float]:
         """Return the weeks of a series that are published, or whose required files are
         in the folder."""
         series = self.atlas.series[name]
@@ -178,7 +178,7 @@ def atlas_problems(used: UsedAtlas) -> Problems:
             f" {licence.terms}",
             ("accept_licence",),
         )
-    available = set.union(*map(used._known_weeks, used.series))
+    available = set.union(*map(used.known_weeks, used.series))
     unknown_weeks = set(settings.weeks or ()) - available
     if unknown_weeks:
         source = atlas.name
