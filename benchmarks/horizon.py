@@ -69,7 +69,9 @@ NOTE = (
     "Volumes of both atlases jump between 24 and 25 GW, and no smooth curve of size"
     " meets the brains around it. Rows of `xu` are a test that was fixed before this"
     " atlas was seen (Xu et al. 2022, start at 23 GW, growth of CRL at its stated"
-    " weeks, fused sulci). Only rows of the default protocol are used for intervals."
+    " weeks, fused sulci), by an earlier version, which kept all of the smooth"
+    " individual difference and measured the mesh's surface. Only rows of the default"
+    " protocol are used for intervals."
 )
 
 
