@@ -146,6 +146,7 @@ def test_pictures_are_all_shown_and_those_of_the_gallery_small():
     assert size < MAX_GALLERY_MB * 1e6
 
 
+@pytest.mark.slow
 @pytest.mark.extended
 def test_the_gallery_has_the_words_of_each_case(tmp_path):
     program = CHECKOUT / "benchmarks" / "gallery.py"

@@ -320,7 +320,7 @@ def norm_settings(config: Config) -> dict[str, Any]:
     return {
         "version": RELEASE,
         # raised with the definition of a metric or of the norms
-        "norms": 2,
+        "norms": 3,
         "open_sulci": config.surface.open_sulci,
         "edge_length_mm": config.surface.edge_length_mm,
         "curvature_radius_mm": config.metrics.curvature_radius_mm,

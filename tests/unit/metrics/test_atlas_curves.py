@@ -12,7 +12,7 @@ from gyriflow.shipped import SHIPPED
 from gyriflow.study.checks import norm_settings
 from gyriflow.study.loading import load
 
-SETTINGS = {"norms": 2, "edge_length_mm": 1.0}
+SETTINGS = {"norms": 3, "edge_length_mm": 1.0}
 WEEKS = [24.0, 25.0, 27.0]
 VALUES = {
     "whole": {"area": [100.0, 120.0, 160.0], "mean_shape_index": [0.2, 0.1, -0.1]},
