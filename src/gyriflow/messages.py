@@ -124,9 +124,12 @@ def messages_in(rows: Iterable[Mapping[str, Any]]) -> list[Message]:
 def messages_files(directory: Path, since_s: float = 0.0) -> list[Path]:
     """Return the files of messages in a working directory that were written after a
     time (s since the epoch), the first one first."""
-    paths = (directory / "results").rglob("*.jsonl")
-    by_time = sorted((path.stat().st_mtime, path) for path in paths)
-    return [path for time_s, path in by_time if time_s >= since_s]
+    written = []
+    for path in (directory / "results").rglob("*.jsonl"):
+        time_s = path.stat().st_mtime
+        if time_s >= since_s:
+            written.append((time_s, path))
+    return [path for _, path in sorted(written)]
 
 
 def study_messages(directory: Path, since_s: float = 0.0) -> list[Message]:

@@ -299,8 +299,9 @@ def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], No
     for name, regions in study.config.metrics.regions.items():
         brain = study.brains.get(name)
         affine_from = brain.affine_from if brain else "auto"
+        files = list(regions.files.values())
         check = partial(_check_regions, regions, affine_from)
-        yield f"regions of {name}", list(regions.files.values()), check
+        yield f"regions of {name}", files, check
     for simulation in study.run_simulations:
         for name, value in mapped_parameters(simulation.settings).items():
             files = [*files_of(value.map), *files_of(value.surface)]

@@ -398,9 +398,14 @@ def brain_rows(
 
 def _by_brain(table: pd.DataFrame) -> pd.DataFrame:
     """Return the values of whole observed brains, by brain and metric."""
-    is_observed = (table["run"] == OBSERVED) & (table["hemisphere"] == "whole")
-    rows = table[is_observed & table["value"].notna()]
-    return rows.set_index(["subject", "metric"], drop=False)
+    is_observed = table["run"] == OBSERVED
+    is_whole = table["hemisphere"] == "whole"
+    has_value = table["value"].notna()
+    rows = table[is_observed & is_whole & has_value]
+    return rows.set_index(
+        ["subject", "metric"],
+        drop=False,
+    )
 
 
 def scores_table(
