@@ -122,7 +122,9 @@ class Workflow:
 
     @property
     def environment(self) -> dict[str, str]:
-        return os.environ | {"PYTHONPATH": str(self.checkout / "src")}
+        # what the caller has put on the path comes after, such as another Snakemake
+        paths = [str(self.checkout / "src"), os.environ.get("PYTHONPATH", "")]
+        return os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
     def run(
         self, *arguments: str, timeout_s: float = 300
