@@ -272,7 +272,7 @@ def test_growth_and_positions_hardly_depend_on_the_time_step():
 @pytest.mark.one_rank
 def test_a_body_that_is_held_misses_its_target_and_says_so():
     clamped = {"support": "ellipsoid"}
-    folding, state = towards({23.0: BODY.vertices * 1.2}, **clamped)
+    folding, state = towards({23.0: BODY.vertices * 1.1}, **clamped)
     rows = after_steps(folding, state, 3).rows
     assert missed_targets(rows) == []
     far = [*rows, rows[-1] | {"to_path_mm": 0.31, "week": 23.0, "held_elements": 0}]

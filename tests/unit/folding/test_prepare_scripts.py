@@ -145,7 +145,7 @@ def test_a_run_of_a_round_is_the_base_run_with_the_values_of_its_row(folder):
     design = {
         "run": ["r1", "r2"],
         "thickness_mm": [1.5, 3.0],
-        "stiffness_ratio": [1, 2],
+        "shear_modulus_cortex_pa": [200.0, 400.0],
     }
     write_table(folder / "design.csv", pd.DataFrame(design))
     inputs = POSED | {"design": "design.csv", "base": "base.yaml", "maps": None}
