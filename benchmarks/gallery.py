@@ -4,11 +4,10 @@ each, and draw what is wrong.
     ./run python benchmarks/gallery.py FOLDER [--figures docs/images/gallery]
 
 The sound brain is the shipped one of 25 GW (operated). FOLDER gets the damaged files, a
-study of them and its results up to the surface stage. Printed is what gyriflow says of
-each brain, but what it says of the sound one, too: the words in
-docs/how-to/bad-inputs.md. A picture has the sound brain on the
-left and the damaged one on the right, at one scale, with the outline of the surface if
-one was made.
+study of them and its results up to the surface stage. Printed are the messages about
+each brain without those about the sound one: the words in docs/how-to/bad-inputs.md. A
+picture has the sound brain on the left and the damaged one on the right, at one scale,
+with the outline of the surface if one was made.
 """
 
 import argparse
@@ -20,6 +19,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from common import ROOT
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from PIL import Image
 from scipy.ndimage import map_coordinates
 
 from gyriflow.anatomy.pial import PialSurface, from_labels
@@ -46,10 +47,16 @@ from gyriflow.io.surfaces import read_pose, read_surface, write_surface
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.io.yaml_files import SCHEMES, write_yaml
 from gyriflow.messages import Message, study_messages
-from gyriflow.report.quality import PIAL_COLOUR, TISSUE_COLOURS, tissue_groups
+from gyriflow.report.quality import (
+    INNER_COLOUR,
+    PIAL_COLOUR,
+    TISSUE_COLOURS,
+    tissue_groups,
+)
 from gyriflow.report.scene import VIEWS, half_extents, render, uniform_colours
 from gyriflow.report.sections import PLANES, draw_outline
 from gyriflow.report.style import OBSERVED_SURFACE_COLOUR, styled
+from gyriflow.report.tables import VERDICTS
 from gyriflow.settings.terms import SIDES
 
 Labels = np.ndarray
@@ -107,29 +114,37 @@ class Sound:
         return from_labels(self.labels, self.affine, SCHEME, week=WEEK, open_sulci=True)
 
     @cached_property
+    def posed_sides(self) -> dict[str, TriangleMesh]:
+        """The hemispheres by side, in the brain's pose."""
+        assert self.pial.left is not None
+        assert self.pial.right is not None
+        return {"left": self.pial.left, "right": self.pial.right}
+
+    @cached_property
+    def posed_whites(self) -> dict[str, TriangleMesh]:
+        """The white surfaces by side, in the brain's pose."""
+        return white_from_labels(
+            self.labels, self.affine, SCHEME, self.posed_sides, self.pial.pose
+        )
+
+    def placed(self, mesh: TriangleMesh) -> TriangleMesh:
+        """Return a surface in the coordinates of the labels."""
+        return transformed(mesh, np.linalg.inv(self.pial.pose.world))
+
+    @cached_property
     def sides(self) -> dict[str, TriangleMesh]:
         """The hemispheres by side, in the coordinates of the labels."""
-        back = np.linalg.inv(self.pial.pose.world)
-        pair = (self.pial.left, self.pial.right)
-        return {
-            side: transformed(mesh, back)
-            for side, mesh in zip(SIDES, pair, strict=True)
-            if mesh is not None
-        }
+        return {side: self.placed(mesh) for side, mesh in self.posed_sides.items()}
 
     @cached_property
     def whole(self) -> TriangleMesh:
-        back = np.linalg.inv(self.pial.pose.world)
-        return transformed(self.pial.whole, back)
+        """The whole brain, in the coordinates of the labels."""
+        return self.placed(self.pial.whole)
 
     @cached_property
     def whites(self) -> dict[str, TriangleMesh]:
-        back = np.linalg.inv(self.pial.pose.world)
-        pial = {"left": self.pial.left, "right": self.pial.right}
-        whites = white_from_labels(
-            self.labels, self.affine, SCHEME, pial, self.pial.pose
-        )
-        return {side: transformed(mesh, back) for side, mesh in whites.items()}
+        """The white surfaces by side, in the coordinates of the labels."""
+        return {side: self.placed(mesh) for side, mesh in self.posed_whites.items()}
 
     def within(self, centre: tuple[float, float, float], radius_mm: float) -> Labels:
         """Return the mask of a ball, its centre in mm from the middle."""
@@ -327,10 +342,11 @@ def run(config: Path, cores: int) -> dict[str, list[Message]]:
 
 def verdict(messages: list[Message]) -> str:
     """Return the verdict on a brain, as on its page and in `quality.csv`."""
+    fine, needs_review, refused = VERDICTS
     levels = {message.level for message in messages}
     if "error" in levels:
-        return "refused"
-    return "needs review" if levels else "fine"
+        return refused
+    return needs_review if levels else fine
 
 
 def in_folder(text: str, folder: Path) -> str:
@@ -445,7 +461,7 @@ def _draw_whites(panels: np.ndarray, sound: Sound, brain: Damaged) -> None:
     ends = [(low[axis] - MARGIN_MM, high[axis] + MARGIN_MM) for axis in (right, up)]
     pairs = ((sound.whites, SOUND), (brain.whites, "shifted white"))
     for axes, (whites, title) in zip(panels, pairs, strict=True):
-        draw_outline(axes, merged(*whites.values()), brain.view, at, "#0072B2", 1.0)
+        draw_outline(axes, merged(*whites.values()), brain.view, at, INNER_COLOUR, 1.0)
         draw_outline(axes, pial, brain.view, at, PIAL_COLOUR, 1.0)
         _finish(axes, title, (*ends[0], *ends[1]))
 
@@ -487,10 +503,6 @@ def _finish(axes: Axes, title: str, extent: tuple[float, ...]) -> None:
 
 def save(figure: Figure, path: Path) -> None:
     """Write a picture as a small PNG of few colours."""
-    from io import BytesIO
-
-    from PIL import Image
-
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
     picture = Image.open(buffer).convert("RGB").quantize(COLOURS)

@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from gallery import WEEK, read_sound, save
+from gallery import SCHEME, WEEK, read_sound, save
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from gyriflow.anatomy.pial import PialSurface, from_labels
-from gyriflow.anatomy.thickness import thickness_from_labels, white_from_labels
+from gyriflow.anatomy.pial import PialSurface
+from gyriflow.anatomy.thickness import thickness_from_labels
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.triangles import (
     Floats,
@@ -31,7 +31,6 @@ from gyriflow.geometry.triangles import (
     merged,
     vertex_areas,
 )
-from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.gyrification import cap, envelope
 from gyriflow.metrics.measure import CURVATURE_RADIUS_MM, BrainMetrics, measure_brain
@@ -59,7 +58,6 @@ from gyriflow.report.style import (
     styled,
 )
 
-SCHEME = SCHEMES["spina-bifida-atlas"]
 HULL_COLOUR = "#0072B2"
 PLAIN_COLOURS = "YlGnBu"
 COLUMNS, ROW_IN = 3, 1.75
@@ -96,25 +94,27 @@ class Measured:
 
 def measure() -> Measured:
     """Measure the brain."""
-    volume = read_sound().volume
-    pial = from_labels(volume.labels, volume.affine, SCHEME, week=WEEK, open_sulci=True)
-    assert pial.left is not None
-    assert pial.right is not None
-    placed = (volume.labels, volume.affine, SCHEME)
-    thickness = thickness_from_labels(*placed, pial.whole, pial.pose, pial.fissure_x_mm)
-    sides = {"left": pial.left, "right": pial.right}
-    inner = merged(*white_from_labels(*placed, sides, pial.pose).values())
-    brain = measure_brain(
-        pial.whole, pial.left, pial.right, thickness_mm=thickness.measured_mm
+    sound = read_sound()
+    pial = sound.pial
+    left = sound.posed_sides["left"]
+    thickness = thickness_from_labels(
+        sound.labels,
+        sound.affine,
+        SCHEME,
+        pial.whole,
+        pial.pose,
+        pial.fissure_x_mm,
     )
     return Measured(
-        pial,
-        pial.left,
-        inner,
-        brain,
-        convex_hull(pial.left),
-        envelope(pial.left),
-        parts_in_bands(pial.left),
+        pial=pial,
+        left=left,
+        inner=merged(*sound.posed_whites.values()),
+        brain=measure_brain(
+            pial.whole, left, pial.right, thickness_mm=thickness.measured_mm
+        ),
+        hull=convex_hull(left),
+        envelope=envelope(left),
+        in_bands=parts_in_bands(left),
     )
 
 

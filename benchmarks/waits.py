@@ -25,11 +25,10 @@ from common import ROOT, print_rows
 from kernels import KEYS
 
 from gyriflow.io.yaml_files import read_keys
-from gyriflow.messages import read_events
 from gyriflow.metrics.repeatability import difference_noise
 from gyriflow.quantities import METRICS
 from gyriflow.shipped import SHIPPED
-from gyriflow.step import usage_in
+from gyriflow.step import read_usage
 
 N_DIFFERENCES = 10
 """Metrics in the table of differences, the largest in units of the noise first."""
@@ -46,15 +45,8 @@ def make_study(checkout: Path, command: str, config: Path, folder: Path) -> None
 def steps_in(folder: Path) -> pd.DataFrame:
     """Return what the steps of a study took: a row per kind of step with cpu_s and
     memory_MiB."""
-    rows = []
-    for path in folder.glob("results/**/logs/**/*.jsonl"):
-        used = usage_in(read_events(path))
-        if used:
-            kind = path.stem.partition(".")[0]
-            memory = used["memory_MiB"]
-            rows.append({"step": kind, "cpu_s": used["cpu_s"], "memory_MiB": memory})
-    steps = pd.DataFrame(rows).groupby("step")
-    return steps.agg({"cpu_s": "sum", "memory_MiB": "max"})
+    steps = pd.DataFrame(read_usage(folder)).groupby("rule")
+    return steps.agg({"cpu_s": "sum", "memory_MiB": "max"}).rename_axis("step")
 
 
 def metrics_in(folder: Path) -> pd.Series:

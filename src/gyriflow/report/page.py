@@ -402,10 +402,7 @@ def _by_brain(table: pd.DataFrame) -> pd.DataFrame:
     is_whole = table["hemisphere"] == "whole"
     has_value = table["value"].notna()
     rows = table[is_observed & is_whole & has_value]
-    return rows.set_index(
-        ["subject", "metric"],
-        drop=False,
-    )
+    return rows.set_index(["subject", "metric"], drop=False)
 
 
 def scores_table(

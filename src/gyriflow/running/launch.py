@@ -444,8 +444,8 @@ def call_snakemake(
             # Snakemake's own handler, set by now, waits for running jobs to end
             signal.signal(signal.SIGTERM, interrupt)
         events.take(record)
-        _is_message = record.levelno >= logging.INFO
-        names = NO_RULE.findall(record.getMessage()) if _is_message else []
+        is_message = record.levelno >= logging.INFO
+        names = NO_RULE.findall(record.getMessage()) if is_message else []
         unknown_targets.extend(names)
         is_wanted = getattr(record, "event", None) not in unwanted
         return record.levelno >= level and is_wanted and not names
