@@ -176,6 +176,12 @@ def hold_lock(directory: Path) -> IO[str] | None:
     return file
 
 
+def release_locks() -> None:
+    """Have the working directories that this process has locked free for others."""
+    while _held_locks:
+        _held_locks.pop().close()
+
+
 def clear_stale_lock(directory: Path) -> None:
     """Remove Snakemake's locks from a working directory; StorageError if it is in use
     or cannot be written."""
@@ -332,9 +338,6 @@ def _finish_without(
         return 0
     path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
     write_json(path, refused)
-    # release the locks of the Snakemake run that has just ended
-    while _held_locks:
-        _held_locks.pop().close()
     again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
     environment = os.environ | {REFUSED_FILE_VAR: str(path)}
     process = subprocess.Popen(
@@ -702,7 +705,10 @@ def main(
             if directory.is_dir():
                 session.viewed = directory.absolute()
         call = Call(complete, options, directory, place, take_plan, is_shown)
-        code = plan_and_run(call)
+        try:
+            code = plan_and_run(call)
+        finally:
+            release_locks()
     if code > 128:
         print(
             "gyriflow: interrupted; run the same command again to resume",
