@@ -28,7 +28,12 @@ class GyriflowError(Exception):
         message += f"; found {found}" if found is not None else ""
         message += f"; expected {expected}" if expected is not None else ""
         super().__init__(message + (f". {remedy}" if remedy is not None else ""))
-        facts = {"file": path, "found": found, "expected": expected, "remedy": remedy}
+        facts = {
+            "file": path,
+            "found": found,
+            "expected": expected,
+            "remedy": remedy,
+        }
         self.problem = problem
         self.facts: dict[str, Any] = {}
         for name, fact in facts.items():

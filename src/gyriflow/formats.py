@@ -41,7 +41,12 @@ FORMATS = (
     FileFormat("OFF", "surface", (".off",)),
     FileFormat("FreeSurfer", "surface", (".pial", ".white")),
     FileFormat("NIfTI", "volume", (".nii", ".nii.gz")),
-    FileFormat("NIfTI pair", "volume", (".hdr", ".hdr.gz"), (".img", ".img.gz")),
+    FileFormat(
+        "NIfTI pair",
+        "volume",
+        (".hdr", ".hdr.gz"),
+        (".img", ".img.gz"),
+    ),
     FileFormat("MGH", "volume", (".mgz", ".mgh")),
 )
 SURFACE_SUFFIXES = tuple(
@@ -182,7 +187,10 @@ def foreign_format(path: str | PathLike[str], start: bytes) -> ForeignFormat | N
     content = _uncompressed(start)
     if content.startswith(GZIP_START):
         return TWICE
-    return _shown_format(name.replace(".mgz", ".mgh").removesuffix(".gz"), content)
+    return _shown_format(
+        name.replace(".mgz", ".mgh").removesuffix(".gz"),
+        content,
+    )
 
 
 def _shown_format(name: str, start: bytes) -> ForeignFormat | None:

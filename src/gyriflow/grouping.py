@@ -55,4 +55,7 @@ def grouped(messages: Iterable[tuple[str, str]]) -> list[tuple[str, int]]:
 
 
 def _kind_of(name: str, message: str) -> str:
-    return VARYING.sub("#", message.replace(name, "#") if name else message)
+    return VARYING.sub(
+        "#",
+        message.replace(name, "#") if name else message,
+    )

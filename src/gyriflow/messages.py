@@ -54,7 +54,12 @@ def error_message(error: BaseException) -> Message:
     """Return the message of an exception that ends a step; unexpected ones have exit
     code 1."""
     if isinstance(error, GyriflowError):
-        return Message("error", str(error), exit_code=error.exit_code, **error.facts)
+        return Message(
+            "error",
+            str(error),
+            exit_code=error.exit_code,
+            **error.facts,
+        )
     if isinstance(error, KeyboardInterrupt):
         return Message("error", STOPPED, exit_code=INTERRUPTED)
     if isinstance(error, MemoryError):
@@ -75,7 +80,11 @@ def place_of(log: Path) -> dict[str, str]:
     place = {"step": log.stem, "brain": "", "run": ""}
     if log.parts[0] == "results":
         _, kind, *names = log.parts
-        place |= zip(FOLDERS.get(kind, []), names, strict=False)
+        place |= zip(
+            FOLDERS.get(kind, []),
+            names,
+            strict=False,
+        )
     return place
 
 
@@ -148,7 +157,11 @@ def reported_messages(
 ) -> list[Message]:
     """Return the messages of a study, of some of its brains, and of some (run, brain)
     pairs, by run, brain and step; without those of the report, which shows them."""
-    places = {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)}
+    places = {
+        ("", ""),
+        *(("", brain) for brain in brains),
+        *map(tuple, runs),
+    }
     found = []
     for message in study_messages(directory):
         is_known = (message.run, message.brain) in places

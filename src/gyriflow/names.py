@@ -69,7 +69,10 @@ def _require_labels(
             raise InputError(
                 f"a {kind} has no BIDS label", found=name, expected="letters or digits"
             )
-    for first, second in merged_names(names, lambda name: folder_name(label(name))):
+    for first, second in merged_names(
+        names,
+        lambda name: folder_name(label(name)),
+    ):
         raise InputError(
             f"two {kind}s have the same BIDS label, {label(first)}",
             found=f"{first} and {second}",

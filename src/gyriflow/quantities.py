@@ -327,11 +327,19 @@ _THICKNESS = (
 _SHAPE = "spangy_shape_index_"
 _SPECTRUM = (
     *(
-        Metric(f"spangy_B{band}_power", "1", f"SpAnGy B{band} power")
+        Metric(
+            f"spangy_B{band}_power",
+            "1",
+            f"SpAnGy B{band} power",
+        )
         for band in range(7)
     ),
     *(
-        Metric(f"spangy_B{band}_relative_power", "1", f"SpAnGy B{band} relative power")
+        Metric(
+            f"spangy_B{band}_relative_power",
+            "1",
+            f"SpAnGy B{band} relative power",
+        )
         for band in range(1, 7)
     ),
     Metric("spangy_captured_share", "1", "SpAnGy captured share", has_norm=False),
@@ -361,7 +369,12 @@ _SPECTRUM = (
     Metric("weyl_number", "1", "Weyl number", has_norm=False),
 )
 _DEVIATIONS = tuple(
-    Metric(m.mean_name.removeprefix("mean_"), m.unit, m.label, is_signed=True)
+    Metric(
+        m.mean_name.removeprefix("mean_"),
+        m.unit,
+        m.label,
+        is_signed=True,
+    )
     for m in _DEVIATION_MAPS
 )
 _PIAL = (*_SIZES, *_FOLDING, *_THICKNESS, *_SPECTRUM, *_DEVIATIONS)
@@ -376,7 +389,13 @@ _WHITE = tuple(
     if WHITE in m.shown
 )
 _REGION_MEANS = tuple(
-    Metric(m.mean_name, m.unit, m.label, m.mean_shown, is_signed=m.is_signed)
+    Metric(
+        m.mean_name,
+        m.unit,
+        m.label,
+        m.mean_shown,
+        is_signed=m.is_signed,
+    )
     for m in _BRAIN_MAPS
     # the mean over a region has the name and the record of that over a hemisphere
     if m.is_averaged and m.mean_name not in {metric.name for metric in _PIAL}

@@ -39,7 +39,12 @@ def design(
     """Return the matrix (n, k) that gives a curve's values at weeks (n,) from its
     coefficients."""
     knots = _knots(first, last, intervals)
-    rates = BSpline(knots, np.eye(intervals + 2), 2, extrapolate=False)
+    rates = BSpline(
+        knots,
+        np.eye(intervals + 2),
+        2,
+        extrapolate=False,
+    )
     integral = rates.antiderivative()
     inside = np.clip(weeks, first, last)
     beyond = (weeks - inside)[:, None] * rates(inside)
@@ -64,7 +69,10 @@ def penalty(
     knots = _knots(first, last, intervals)
     middles = 0.5 * (knots[1:-2] + knots[2:-1])
     distances = np.diff(middles)
-    slopes = np.diff(np.eye(len(middles)), axis=0)
+    slopes = np.diff(
+        np.eye(len(middles)),
+        axis=0,
+    )
     slopes /= distances[:, None]
     if order == 2:
         distances = 0.5 * (middles[2:] - middles[:-2])
@@ -72,7 +80,10 @@ def penalty(
         slopes /= distances[:, None]
     rate_penalty = slopes.T @ slopes
     # the value at the first week has no penalty
-    return np.pad(rate_penalty, ((1, 0), (1, 0)))
+    return np.pad(
+        rate_penalty,
+        ((1, 0), (1, 0)),
+    )
 
 
 def strength(
@@ -146,4 +157,10 @@ def _knots(
     intervals: int,
 ) -> Floats:
     inner = np.linspace(first, last, intervals + 1)
-    return np.concatenate([[first, first], inner, [last, last]])
+    return np.concatenate(
+        [
+            [first, first],
+            inner,
+            [last, last],
+        ]
+    )

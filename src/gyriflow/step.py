@@ -116,7 +116,13 @@ def read_usage(directory: Path) -> list[dict[str, Any]]:
             log = path.relative_to(directory)
             # wildcards follow the rule, after a dot
             rule = re.sub(r".*/logs/(\w+).*", r"\1", log.as_posix())
-            rows.append({**place_of(log), "rule": rule, **used})
+            rows.append(
+                {
+                    **place_of(log),
+                    "rule": rule,
+                    **used,
+                }
+            )
     return rows
 
 
@@ -148,7 +154,11 @@ def step(log: str, *inputs: str) -> Iterator[None]:
         is_of_inputs = message.exit_code not in (1, INTERRUPTED)
         if inputs and is_of_inputs and not message.file:
             file = ", ".join(inputs)
-            message = replace(message, text=f"{file}: {message.text}", file=file)
+            message = replace(
+                message,
+                text=f"{file}: {message.text}",
+                file=file,
+            )
         logging.error(
             "%s", message.text, exc_info=is_unexpected, extra={"data": message}
         )
@@ -179,4 +189,9 @@ def end_shell_step(code: int, log: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(end_shell_step(int(sys.argv[1]), sys.argv[2]))
+    sys.exit(
+        end_shell_step(
+            int(sys.argv[1]),
+            sys.argv[2],
+        )
+    )

@@ -38,7 +38,14 @@ def commit() -> str | None:
 
 def _git(*arguments: str) -> str | None:
     # a checkout may belong to another user, as in a container
-    command = ["git", "-c", "safe.directory=*", "-C", str(SHIPPED), *arguments]
+    command = [
+        "git",
+        "-c",
+        "safe.directory=*",
+        "-C",
+        str(SHIPPED),
+        *arguments,
+    ]
     try:
         done = subprocess.run(
             command,

@@ -20,7 +20,12 @@ with step(snakemake.log[0]):
     start, _ = boundary_surface(read_tetrahedral_mesh(files.mesh))
     shapes = np.stack(targets.surfaces["atlas"])
     atlas = TriangleMesh(
-        positions_at(snakemake.params.week, shapes, targets.weeks, vertex_areas(start)),
+        positions_at(
+            snakemake.params.week,
+            shapes,
+            targets.weeks,
+            vertex_areas(start),
+        ),
         start.faces,
     )
     write_surface(

@@ -57,7 +57,11 @@ with step(snakemake.log[0]):
     )
     halves = [
         (read_surface(hemisphere), read_vertex_maps(maps))
-        for hemisphere, maps in zip(files.hemispheres, files.maps, strict=True)
+        for hemisphere, maps in zip(
+            files.hemispheres,
+            files.maps,
+            strict=True,
+        )
     ]
     maps = brain_maps(halves, sides=params.sides)
     notes = [report["hindbrain"]] if "hindbrain" in report else []
@@ -65,6 +69,11 @@ with step(snakemake.log[0]):
     write_figure(output.quality, output.quality_pdf, page)
     write_figure(output.maps, output.maps_pdf, maps)
     write_figure(
-        output.small, output.small_pdf, small_pictures(halves, side=params.sides[0])
+        output.small,
+        output.small_pdf,
+        small_pictures(
+            halves,
+            side=params.sides[0],
+        ),
     )
     write_json(output.row, row)

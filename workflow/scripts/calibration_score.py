@@ -32,7 +32,11 @@ with step(snakemake.log[0]):
     simulated = []
     # a diverged run has not reached the week
     if not causes:
-        for regions, frames in zip(files.regions, files.frames, strict=True):
+        for regions, frames in zip(
+            files.regions,
+            files.frames,
+            strict=True,
+        ):
             positions = read_positions(frames, params.week)
             simulated.append(folded_surfaces(read_regions(regions), positions))
     brains = (
@@ -48,5 +52,10 @@ with step(snakemake.log[0]):
         radius_mm=radius_mm,
         spectra=pairs_with(map(read_table, files.spectra), simulated_spectra),
     )
-    row = {"run": run, "round": params.round, **values, **score}
+    row = {
+        "run": run,
+        "round": params.round,
+        **values,
+        **score,
+    }
     write_table(snakemake.output[0], pd.DataFrame([row]))

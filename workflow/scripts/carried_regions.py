@@ -20,12 +20,20 @@ with step(snakemake.log[0]):
     # correspondences are in the coordinates of the files
     back = [
         np.eye(4) if posed else read_pose(report).inverse
-        for report, posed in zip(reports, snakemake.params.posed, strict=True)
+        for report, posed in zip(
+            reports,
+            snakemake.params.posed,
+            strict=True,
+        )
     ]
     between = read_correspondence(files.correspondence)
     for side in SIDES:
         regions, names = read_vertex_labels(files[f"{side}_regions"])
-        pairs = zip((files[f"given_{side}"], files[side]), back, strict=True)
+        pairs = zip(
+            (files[f"given_{side}"], files[side]),
+            back,
+            strict=True,
+        )
         found = carry_regions(
             regions,
             *(transformed(read_surface(path), matrix) for path, matrix in pairs),

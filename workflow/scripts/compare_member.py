@@ -15,7 +15,13 @@ files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 
 def parts(paths):
     """Read the surfaces of a brain by part."""
-    return dict(zip(params.parts, map(read_surface, paths), strict=True))
+    return dict(
+        zip(
+            params.parts,
+            map(read_surface, paths),
+            strict=True,
+        )
+    )
 
 
 with step(snakemake.log[0]):
@@ -24,7 +30,10 @@ with step(snakemake.log[0]):
         metrics, spectra, coefficients = map(
             read_tables, (files.metrics, files.spectra, files.coefficients)
         )
-        observed = map(parts, batched(files.measured, len(params.parts)))
+        observed = map(
+            parts,
+            batched(files.measured, len(params.parts)),
+        )
         observed = dict(zip(params.observed, observed, strict=True))
         populations = {names.brain: params.population, **params.observed}
         simulated = parts(files.simulated)

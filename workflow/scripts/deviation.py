@@ -21,7 +21,13 @@ from gyriflow.step import step
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     start, first, surface, observed = map(
-        read_surface, (files.start, files.first, files.expected, files.observed)
+        read_surface,
+        (
+            files.start,
+            files.first,
+            files.expected,
+            files.observed,
+        ),
     )
     expected = align(surface, observed)
     fitted = TriangleMesh(fit_onto_surface(expected, observed), expected.faces)
@@ -38,9 +44,19 @@ with step(snakemake.log[0]):
             expected_mm,
         )
     write_vertex_maps(snakemake.output.maps, maps)
-    sides = dict(zip(params.sides, map(read_surface, files.sides), strict=True))
+    sides = dict(
+        zip(
+            params.sides,
+            map(read_surface, files.sides),
+            strict=True,
+        )
+    )
     regions = dict(
-        zip(params.sides, map(read_vertex_labels, files.regions), strict=False)
+        zip(
+            params.sides,
+            map(read_vertex_labels, files.regions),
+            strict=False,
+        )
     )
     write_table(
         snakemake.output.table,

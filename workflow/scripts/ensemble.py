@@ -10,4 +10,7 @@ with step(snakemake.log[0]):
     run, members = map(read_tables, (files.run, files.members))
     observed = read_tables(files.observed) if files.observed else run[:0]
     tests = read_yaml(files.accuracy)["rows"] if files.accuracy else []
-    write_table(snakemake.output[0], interval_table(run, members, observed, tests))
+    write_table(
+        snakemake.output[0],
+        interval_table(run, members, observed, tests),
+    )

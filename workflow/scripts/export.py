@@ -14,7 +14,16 @@ with step(snakemake.log[0]):
     folder = Path(snakemake.output[0]).parent
     long = read_table(files.long)
     # made anew, since covariates are texts that may look like numbers
-    wide = wide_table(long, {brain.brain: brain.covariates for brain in params.brains})
+    wide = wide_table(
+        long,
+        {brain.brain: brain.covariates for brain in params.brains},
+    )
     tables = {"metrics_long": long, "metrics_wide": wide}
     with making_files(folder, folder.with_name(".export-files.json")):
-        export_bids(folder, params.brains, tables, version(), described_columns(long))
+        export_bids(
+            folder,
+            params.brains,
+            tables,
+            version(),
+            described_columns(long),
+        )

@@ -40,7 +40,10 @@ def _read_elements(frames):
     week."""
     parameters = _read_parameters(files.parameters)
     weeks = read_weeks(frames)
-    mesh = TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames))
+    mesh = TetrahedralMesh(
+        read_positions(frames, weeks[0]),
+        read_tets(frames),
+    )
     zones = zones_of_run(mesh, parameters)
     fields = {}
     for week in (weeks[0], weeks[-1]):
@@ -85,7 +88,12 @@ def read_brain(placed):
         )
     surfaces = [read_surface(path) for path in placed["surfaces"]]
     halves = list(zip(surfaces, contents, strict=True))
-    return GridBrain(placed["row"], placed["column"], halves, placed["simulated"])
+    return GridBrain(
+        placed["row"],
+        placed["column"],
+        halves,
+        placed["simulated"],
+    )
 
 
 with step(snakemake.log[0]):

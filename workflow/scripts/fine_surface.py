@@ -24,7 +24,11 @@ with step(snakemake.log[0]):
     positions = read_positions(files.frames, params.week)
     boundary = TriangleMesh(positions[used], start.faces)
     targets = read_weekly_shapes(files.targets)
-    share = finer_share(targets.kept, float(targets.weeks[0]), params.week)
+    share = finer_share(
+        targets.kept,
+        float(targets.weeks[0]),
+        params.week,
+    )
     if share > MIN_OWN_SHARE:
         parts = files.start
         places = start.vertices

@@ -41,13 +41,21 @@ with step(snakemake.log[0], *sources):
         found = regions_from_volume(points, regions, volume.affine)
     else:
         read = {
-            side: read_vertex_labels(files[f"{side}_labels"], side) for side in SIDES
+            side: read_vertex_labels(
+                files[f"{side}_labels"],
+                side,
+            )
+            for side in SIDES
         }
         tables = {side: params.names or names for side, (_, names) in read.items()}
         numbers, found = number_regions(*tables.values()), {}
         for side, (labels, _) in read.items():
             posed = transformed(
-                read_surface(files[f"{side}_surface"], side), pose.of_file(side)
+                read_surface(
+                    files[f"{side}_surface"],
+                    side,
+                ),
+                pose.of_file(side),
             )
             found[side] = regions_from_surface(
                 meshes[side], posed, renumber(labels, tables[side], numbers)

@@ -15,7 +15,11 @@ with step(snakemake.log[0]):
             curve_table({quantity: fit.curve for quantity, fit in fits.items()}),
             errors(fits),
         )
-        for table, joined in zip(tables, (curves, misfits), strict=True):
+        for table, joined in zip(
+            tables,
+            (curves, misfits),
+            strict=True,
+        ):
             joined.append(table.assign(series=name)[["series", *table.columns]])
     write_table(output.curves, pd.concat(curves, ignore_index=True))
     write_table(output.errors, pd.concat(misfits, ignore_index=True))

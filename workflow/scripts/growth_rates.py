@@ -12,7 +12,11 @@ from gyriflow.step import step
 files, params, output = snakemake.input, snakemake.params, snakemake.output
 with step(snakemake.log[0]):
     areas = pd.DataFrame(
-        {"series": params.series, "subject": params.brains, "week": params.weeks}
+        {
+            "series": params.series,
+            "subject": params.brains,
+            "week": params.weeks,
+        }
     )
     surfaces = [read_surface(file) for file in files.whole]
     areas["area_cm2"] = list(map(area_cm2, surfaces))

@@ -80,7 +80,16 @@ with step(snakemake.log[0]):
         page = brain_page(
             brains[name], tables, _with_content(figures), norm=params.norm
         )
-        write_text(path, report_page(template, parts, {"groups": []}, **origin, **page))
+        write_text(
+            path,
+            report_page(
+                template,
+                parts,
+                {"groups": []},
+                **origin,
+                **page,
+            ),
+        )
     small = dict(
         zip(
             params.brain_figures,
@@ -97,9 +106,17 @@ with step(snakemake.log[0]):
         kept = read_weekly_shapes(files.targets).kept
         prediction = prediction | {"accuracy": accuracy, "tests": tests, "kept": kept}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
-    page = study_page(params.brains, tables, _with_content(params.figures), **about)
+    page = study_page(
+        params.brains,
+        tables,
+        _with_content(params.figures),
+        **about,
+    )
     runs, observed = params.surfaces["runs"], params.surfaces["observed"]
     runs = {run: read_weeks(weeks) for run, weeks in runs.items()}
     view = surfaces_view(runs, read_weeks(observed), observed_name=params.observed_name)
     write_json(output.view, view)
-    write_text(output.report, report_page(template, parts, view, **origin, **page))
+    write_text(
+        output.report,
+        report_page(template, parts, view, **origin, **page),
+    )

@@ -11,9 +11,17 @@ from gyriflow.step import step
 first, second = snakemake.params.files
 with step(snakemake.log[0], *first, *second):
     poses, surfaces = [read_pose(path) for path in snakemake.input.reports], []
-    for files, pose in zip((first, second), poses, strict=True):
+    for files, pose in zip(
+        (first, second),
+        poses,
+        strict=True,
+    ):
         # each hemisphere may have its own pose
-        sides = zip(files, SIDES[: len(files)], strict=True)
+        sides = zip(
+            files,
+            SIDES[: len(files)],
+            strict=True,
+        )
         surfaces.append(
             merged(
                 *(

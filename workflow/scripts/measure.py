@@ -59,4 +59,8 @@ with step(snakemake.log[0]):
             table.assign(**params.labels)[[*params.labels, *table.columns]],
         )
     for side, values in maps.items():
-        write_vertex_maps(output[f"{side}_maps"], values, STRUCTURES[side])
+        write_vertex_maps(
+            output[f"{side}_maps"],
+            values,
+            STRUCTURES[side],
+        )

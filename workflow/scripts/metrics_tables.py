@@ -85,7 +85,10 @@ with step(snakemake.log[0]):
         ]
         norms = published_norms(read_yaml(files.norms))
         tables["volumes"], tables["published_centiles"] = volume_tables(brains, norms)
-    write_json(snakemake.output.norms, {"population": population, **cohort.plain})
+    write_json(
+        snakemake.output.norms,
+        {"population": population, **cohort.plain},
+    )
     for name, path in snakemake.output.items():
         if name in tables:
             write_table(path, tables[name])

@@ -22,7 +22,11 @@ from gyriflow.step import step
 output, params = snakemake.output, snakemake.params
 files, volumes, labels = snakemake.input.given, {}, params.labels
 settings = {"week": params.week, **params.settings}
-with step(snakemake.log[0], *files, *snakemake.input.white):
+with step(
+    snakemake.log[0],
+    *files,
+    *snakemake.input.white,
+):
     require_checksums(params.checksums)
     if labels:
         volume = labels.read(cropped=True)

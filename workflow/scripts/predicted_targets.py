@@ -26,7 +26,12 @@ files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh, kept = read_tetrahedral_mesh(files.mesh), read_weekly_shapes(files.path)
     path = AtlasPath(
-        kept.tets, SeriesShapes(kept.weeks.tolist(), kept.positions, kept.stops)
+        kept.tets,
+        SeriesShapes(
+            kept.weeks.tolist(),
+            kept.positions,
+            kept.stops,
+        ),
     )
     pair_of_poses = zip(files.reports, params.posed, strict=True)
     poses = [

@@ -53,7 +53,13 @@ with step(snakemake.log[0]):
         passed, stops = targets.passed, targets.stops
         weekly = targets.weeks[passed].tolist()
         sizes = {
-            name: dict(zip(weekly, values[passed].tolist(), strict=True))
+            name: dict(
+                zip(
+                    weekly,
+                    values[passed].tolist(),
+                    strict=True,
+                )
+            )
             for name, values in targets.sizes.items()
         }
         target_weeks = weekly[1:]

@@ -36,9 +36,20 @@ with step(snakemake.log[0]):
         has_layers = GROWTH_MODELS[settings["growth"]["model"]].has_layers
         steps = read_table(files.steps[number])
         resolved = resolution_over_steps(report["order"], steps, has_layers=has_layers)
-        found = {**read_json(files.summaries[number]), **before, **resolved}
+        found = {
+            **read_json(files.summaries[number]),
+            **before,
+            **resolved,
+        }
         settings["growth_of"] = snakemake.params.growth_of[number]
-        rows.append({"run": run, "subject": brain, **settings, **found})
+        rows.append(
+            {
+                "run": run,
+                "subject": brain,
+                **settings,
+                **found,
+            }
+        )
         # targets are in files
         settings.pop("targets", None)
         common = {key: found[key] for key in found if key in COMMON_PARAMETERS}
@@ -46,7 +57,12 @@ with step(snakemake.log[0]):
         frames = files.frames[number]
         weeks = read_weeks(frames)
         positions = [read_positions(frames, week) for week in weeks]
-        _, pial = boundary_surface(TetrahedralMesh(positions[0], read_tets(frames)))
+        _, pial = boundary_surface(
+            TetrahedralMesh(
+                positions[0],
+                read_tets(frames),
+            )
+        )
         moved = weekly_norms(weeks, positions, pial)
         displacements.append(
             moved.assign(subject=brain, run=run)[["subject", "run", *moved.columns]]

@@ -5,4 +5,7 @@ from gyriflow.io.surfaces import write_surface
 from gyriflow.step import step
 
 with step(snakemake.log[0]):
-    write_surface(snakemake.output[0], shape_surface(**snakemake.params.shape))
+    write_surface(
+        snakemake.output[0],
+        shape_surface(**snakemake.params.shape),
+    )

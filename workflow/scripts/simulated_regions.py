@@ -13,7 +13,11 @@ with step(snakemake.log[0]):
     start = read_regions(files.mesh)
     surface = TriangleMesh(start.mesh.vertices, start.facets)
     on_left = start.facet_tags["hemisphere"] == LEFT
-    for side, part in zip(SIDES, (on_left, ~on_left), strict=True):
+    for side, part in zip(
+        SIDES,
+        (on_left, ~on_left),
+        strict=True,
+    ):
         labels, names = read_vertex_labels(files[f"{side}_regions"])
         found = regions_from_surface(
             submesh(surface, part)[0], read_surface(files[side]), labels

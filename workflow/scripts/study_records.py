@@ -41,7 +41,13 @@ def _write_provenance(path, configuration, inputs):
 
 
 with step(snakemake.log[0]):
-    names = dict(zip(map(tuple, params.folded), run_names(params.folded), strict=True))
+    names = dict(
+        zip(
+            map(tuple, params.folded),
+            run_names(params.folded),
+            strict=True,
+        )
+    )
     brains = {("", brain) for brain in params.known_brains}
     places = {("", ""), *brains, *params.simulated}
     jobs = []
@@ -52,11 +58,22 @@ with step(snakemake.log[0]):
             # simulations are listed one by one, other jobs by rule
             job["run"] = names.get(place, "") if job["rule"] == "simulate" else ""
             jobs.append(job)
-    table = resources(pd.DataFrame(jobs, columns=["rule", "run", *USAGE_COLUMNS]))
+    table = resources(
+        pd.DataFrame(
+            jobs,
+            columns=["rule", "run", *USAGE_COLUMNS],
+        )
+    )
     write_table(output.resources, table)
     write_html(output.resources_page, html_table(table))
     rows = [
-        (message.brain, message.run, message.step, message.level, message.first_line)
+        (
+            message.brain,
+            message.run,
+            message.step,
+            message.level,
+            message.first_line,
+        )
         for message in reported_messages(Path(), params.known_brains, params.folded)
     ]
     warnings = pd.DataFrame(rows, columns=WARNING_COLUMNS).drop_duplicates()
@@ -67,7 +84,11 @@ with step(snakemake.log[0]):
     inputs = {
         brain["id"]: fingerprints(texts_in(brain), known) for brain in params.brains
     }
-    for path, brain in zip(output.brains, params.brains, strict=True):
+    for path, brain in zip(
+        output.brains,
+        params.brains,
+        strict=True,
+    ):
         _write_provenance(path, brain, inputs[brain["id"]])
     runs = []
     for number, (run, brain) in enumerate(params.folded):
@@ -75,7 +96,10 @@ with step(snakemake.log[0]):
         parameters = read_yaml(files.run_params[number])
         settings = {"run": run, "start": brain, "parameters": parameters}
         mesh = f"results/brains/{brain}/mesh/brain.h5"
-        start = fingerprints([mesh, path.parent / "folding" / "maps.h5"], {})
+        start = fingerprints(
+            [mesh, path.parent / "folding" / "maps.h5"],
+            {},
+        )
         _write_provenance(path, settings, start | inputs[brain])
         summary = read_json(files.summaries[number])
         grown = {"growth_of": params.growth_of[number], "summary": summary}
@@ -86,7 +110,12 @@ with step(snakemake.log[0]):
     ]
     write_json(output.report, used | {"files": hashed})
     template = read_text(files.template)
-    methods = methods_text(template, runs=runs, software=used, **params.method)
+    methods = methods_text(
+        template,
+        runs=runs,
+        software=used,
+        **params.method,
+    )
     write_text(output.methods, methods)
     write_yaml(output.config, params.config)
     _write_provenance(output.study, params.config, inputs)

@@ -78,12 +78,25 @@ with step(snakemake.log[0]):
     if params.origin:
         # known now that all files of the atlas are there
         key = present_key(params.origin) or ""
-    own = {"stops": found.stops, "tets": mesh.tets, "made_from": key}
-    shapes = WeeklyShapes(np.array(found.weeks), found.positions, sizes, **own)
+    own = {
+        "stops": found.stops,
+        "tets": mesh.tets,
+        "made_from": key,
+    }
+    shapes = WeeklyShapes(
+        np.array(found.weeks),
+        found.positions,
+        sizes,
+        **own,
+    )
     write_weekly_shapes(snakemake.output[0], shapes)
     if params.store and key:
         with suppress(StorageError):
             write_weekly_shapes(
-                Path(params.store, stored_name(snakemake.wildcards.brain, key)), shapes
+                Path(
+                    params.store,
+                    stored_name(snakemake.wildcards.brain, key),
+                ),
+                shapes,
             )
     unfinished.remove()

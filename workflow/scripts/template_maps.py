@@ -32,4 +32,8 @@ with step(snakemake.log[0]):
         for path, report, posed in places
     )
     maps = maps_on_template(read_vertex_maps(files.maps), surface, template, between)
-    write_vertex_maps(snakemake.output[0], maps, STRUCTURES[snakemake.wildcards.side])
+    write_vertex_maps(
+        snakemake.output[0],
+        maps,
+        STRUCTURES[snakemake.wildcards.side],
+    )

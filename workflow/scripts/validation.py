@@ -33,7 +33,13 @@ def _simple_models():
     a start brain."""
     targets = read_weekly_shapes(files.targets)
     start, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
-    atlas = dict(zip(params.atlas_weeks, map(read_surface, files.atlas), strict=True))
+    atlas = dict(
+        zip(
+            params.atlas_weeks,
+            map(read_surface, files.atlas),
+            strict=True,
+        )
+    )
     for week in params.weeks:
         at = targets.index(week)
         target = TriangleMesh(targets.positions[at][used], start.faces)
@@ -47,7 +53,11 @@ def _simple_models():
 with step(snakemake.log[0]):
     models = {
         week: {"run": read_surface(path)}
-        for week, path in zip(params.weeks, files.simulated, strict=True)
+        for week, path in zip(
+            params.weeks,
+            files.simulated,
+            strict=True,
+        )
     }
     # these are written with the run that grows as the atlas
     if params.get("of_atlas"):

@@ -33,5 +33,14 @@ with step(snakemake.log[0], *files.given):
         table.assign(**params.columns)[[*params.columns, *table.columns]],
     )
     for side, mesh in sides.items():
-        write_surface(output[f"{side}_surface"], mesh, STRUCTURES[side], "GrayWhite")
-        write_vertex_maps(output[f"{side}_maps"], maps[side], STRUCTURES[side])
+        write_surface(
+            output[f"{side}_surface"],
+            mesh,
+            STRUCTURES[side],
+            "GrayWhite",
+        )
+        write_vertex_maps(
+            output[f"{side}_maps"],
+            maps[side],
+            STRUCTURES[side],
+        )

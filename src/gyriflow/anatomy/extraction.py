@@ -159,9 +159,13 @@ def remove_bridges(
     # the volume is padded, so its first voxel is outside
     closed = (number == number[0, 0, 0]) & (field > LEVEL)
     number, gains = _parts_with_gains(field > LEVEL, closed)
-    opened = (np.bincount(number[closed], minlength=len(gains)) >= MIN_SLIT_VOXELS) & (
-        gains == 0
-    )
+    opened = (
+        np.bincount(
+            number[closed],
+            minlength=len(gains),
+        )
+        >= MIN_SLIT_VOXELS
+    ) & (gains == 0)
     slits = closed & opened[number]
     # the wall lies half-way between a voxel of the slit and the next one, which has
     # this value at a slit 1 voxel wide
@@ -307,18 +311,33 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     mask = field > 0.5
     ambiguous = np.zeros_like(mask)
     for first, second in ((0, 1), (0, 2), (1, 2)):
-        inside = np.moveaxis(mask, (first, second), (0, 1))
-        flags = np.moveaxis(ambiguous, (first, second), (0, 1))
+        inside = np.moveaxis(
+            mask,
+            (first, second),
+            (0, 1),
+        )
+        flags = np.moveaxis(
+            ambiguous,
+            (first, second),
+            (0, 1),
+        )
         # around each square in turn
         a, b, c, d = (inside[place] for place in SQUARE)
         alternating = (a == c) & (b == d) & (a != b)
         for place in SQUARE:
             flags[place] |= alternating
     corners = list(product(ENDS, repeat=3))
-    count = np.zeros(mask[corners[0]].shape, dtype=np.int8)
+    count = np.zeros(
+        mask[corners[0]].shape,
+        dtype=np.int8,
+    )
     for corner in corners:
         count += mask[corner]
-    for corner, opposite in zip(corners[:4], reversed(corners[4:]), strict=True):
+    for corner, opposite in zip(
+        corners[:4],
+        reversed(corners[4:]),
+        strict=True,
+    ):
         one = mask[corner]
         other = mask[opposite]
         only_inside = one & other & (count == 2)
@@ -334,15 +353,27 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
 def dilated(mask: Mask, radius: float) -> Mask:
     """Dilate an (i, j, k) mask by a ball of at most 10 voxels; a distance transform
     takes ten times as long."""
-    squared = np.where(mask, 0, int(radius**2) + 1).astype(np.uint8)
+    squared = np.where(
+        mask,
+        0,
+        int(radius**2) + 1,
+    ).astype(np.uint8)
     for axis in range(3):
         nearest = squared.copy()
         new = np.moveaxis(nearest, axis, 0)
         old = np.moveaxis(squared, axis, 0)
         for step in range(1, int(radius) + 1):
             further = old + step**2
-            np.minimum(new[step:], further[:-step], out=new[step:])
-            np.minimum(new[:-step], further[step:], out=new[:-step])
+            np.minimum(
+                new[step:],
+                further[:-step],
+                out=new[step:],
+            )
+            np.minimum(
+                new[:-step],
+                further[step:],
+                out=new[:-step],
+            )
         squared = nearest
     return squared <= radius**2
 
@@ -482,9 +513,10 @@ def _minimal_change(
     mask = np.pad(after, 1)
     places = np.argwhere(before != after)
     from_level = np.abs(field[tuple(places.T)] - LEVEL).round(FIELD_DECIMALS)
-    from_middle = np.linalg.norm(places - places.mean(axis=0), axis=1).round(
-        FIELD_DECIMALS
-    )
+    from_middle = np.linalg.norm(
+        places - places.mean(axis=0),
+        axis=1,
+    ).round(FIELD_DECIMALS)
     by_priority = np.lexsort((-from_middle, -from_level))
     # in the padded mask
     places = places[by_priority] + 1
@@ -507,7 +539,10 @@ def _minimal_change(
 def is_simple(block: bytes) -> bool:
     """Return whether the middle voxel of a 3 × 3 × 3 block can be flipped without a
     change of topology."""
-    voxels = int(block[::-1].translate(DIGITS), 2)
+    voxels = int(
+        block[::-1].translate(DIGITS),
+        2,
+    )
     inside, outside = voxels & EDGE_CELLS, ~voxels & CORNER_CELLS
     touching = inside & FACE_CELLS
     if not touching or not outside:
@@ -541,7 +576,10 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     A ball of 3.2 mm diameter cannot pass through a stalk, and its cross-section is at
     most 12 mm²; a gyrus is wider.
     """
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     depth = ndimage.distance_transform_edt(mask, sampling=size)
     number, count = ndimage.label(depth > NECK_RADIUS_MM, INSIDE)
     if count < 2:
@@ -557,17 +595,32 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     for part, tight in enumerate(ndimage.find_objects(number)):
         if large[part]:
             continue
-        box = _wider(tight, int(reach / size.min()) + 2)
+        box = _wider(
+            tight,
+            int(reach / size.min()) + 2,
+        )
         ball = number[box] == part + 1
         near = ndimage.distance_transform_edt(~ball, sampling=size) <= reach
-        loose, _ = ndimage.label(mask[box] & ~solid[box] & near, INSIDE)
-        cut = np.isin(loose, np.setdiff1d(loose[ball], 0))
+        loose, _ = ndimage.label(
+            mask[box] & ~solid[box] & near,
+            INSIDE,
+        )
+        cut = np.isin(
+            loose,
+            np.setdiff1d(loose[ball], 0),
+        )
         large_enough = (
             cut.sum() * size.prod() >= MIN_HANGING_MM3 and cut.sum() < max_voxels
         )
         if (
             large_enough
-            and 0 < _contact_mm2(cut, mask[box] & ~cut, size) <= MAX_NECK_MM2
+            and 0
+            < _contact_mm2(
+                cut,
+                mask[box] & ~cut,
+                size,
+            )
+            <= MAX_NECK_MM2
         ):
             hanging[box] |= cut
     number, count = ndimage.label(hanging, INSIDE)

@@ -191,7 +191,10 @@ def _middles(
     )
     neighbours = opposite[nearest]
     gap = height[neighbours] - height[wall][:, None]
-    offset_mm = np.linalg.norm(in_plane[neighbours] - in_plane[wall][:, None], axis=-1)
+    offset_mm = np.linalg.norm(
+        in_plane[neighbours] - in_plane[wall][:, None],
+        axis=-1,
+    )
     gap = np.where(
         (gap > 0) & (gap < MAX_FISSURE_WIDTH * np.ptp(height)) & (offset_mm < 2.0),
         gap,
@@ -227,9 +230,24 @@ def _symmetry_planes(
     along = 1.0 - (1.0 - np.cos(np.radians(SEARCH_DEG))) * index / DIRECTIONS
     turn = np.pi * (1.0 + 5.0**0.5) * index
     radius = np.sqrt(1.0 - along**2)
-    directions = np.stack([along, radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+    directions = np.stack(
+        [
+            along,
+            radius * np.cos(turn),
+            radius * np.sin(turn),
+        ],
+        axis=1,
+    )
     scores = np.array(
-        [_mirror_distance(n, float(n @ centre), sample[::3], tree) for n in directions]
+        [
+            _mirror_distance(
+                n,
+                float(n @ centre),
+                sample[::3],
+                tree,
+            )
+            for n in directions
+        ]
     )
     starts: list[Floats] = []
     for direction in directions[np.argsort(scores)]:
@@ -242,7 +260,11 @@ def _symmetry_planes(
     for base in starts:
         tangents = np.linalg.svd(base[None])[2][1:]
         best = minimize(
-            lambda x, *frame: _mirror_distance(*_plane_near(x, *frame), sample, tree),
+            lambda x, *frame: _mirror_distance(
+                *_plane_near(x, *frame),
+                sample,
+                tree,
+            ),
             np.zeros(3),
             args=(base, tangents, centre),
             method="Nelder-Mead",
@@ -262,7 +284,10 @@ def _plane_near(
     tangents: Floats,
     centre: Floats,
 ) -> tuple[Floats, float]:
-    normal = np.asarray(base + x[:2] @ tangents, dtype=float)
+    normal = np.asarray(
+        base + x[:2] @ tangents,
+        dtype=float,
+    )
     normal /= np.linalg.norm(normal)
     return normal, float(normal @ centre) + 10.0 * float(x[2])
 
@@ -360,8 +385,16 @@ def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
     for _ in range(N_UPDATES):
         near = np.abs(fissure.height_above(middle)) < MAX_SHIFT_MM
         weight, total = np.zeros(shape), np.zeros(shape)
-        np.add.at(weight, tuple(cells[:, near]), 1.0)
-        np.add.at(total, tuple(cells[:, near]), height[near])
+        np.add.at(
+            weight,
+            tuple(cells[:, near]),
+            1.0,
+        )
+        np.add.at(
+            total,
+            tuple(cells[:, near]),
+            height[near],
+        )
         weight, total = (
             ndimage.gaussian_filter(values, BEND_MM / SPACING_MM)
             for values in (weight, total)
@@ -387,14 +420,21 @@ def side_distance(
     its distance from the core. It starts from the labels `left` and `right`, or in the
     core far from the mid-surface. So gyri may reach over the mid-surface.
     """
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     places = np.argwhere(core)
     height = fissure.height_above(transform_points(places, affine))
     order = ndimage.distance_transform_edt(~core, sampling=size).astype(np.float32)
     order[core] = -np.abs(height)
     seeds = np.zeros(mask.shape, dtype=np.int8)
     if left is None or right is None:
-        seeds[core] = np.where(np.abs(height) > SEED_MM, np.where(height < 0, 1, 2), 0)
+        seeds[core] = np.where(
+            np.abs(height) > SEED_MM,
+            np.where(height < 0, 1, 2),
+            0,
+        )
     else:
         seeds[left & mask], seeds[right & mask] = 1, 2
     # where both sides are about equally near, they win in turn, and the middle is
@@ -442,7 +482,10 @@ def hidden_fissure(
     hemispheres; small contacts elsewhere are errors of the labels. With `bridges`, bits
     of tissue that cross a visible fissure are included.
     """
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     # not whole voxels, which rounding would include or not
     sheet = np.abs(side_mm) < 1.25 * size.max()
     reach = max(0.5 * FISSURE_MM, 1.25 * size.min())
@@ -451,7 +494,11 @@ def hidden_fissure(
         """Return each voxel's distance in mm from the nearest of some voxels, infinite
         if there are none."""
         if not voxels.any():
-            return np.full(voxels.shape, np.inf, dtype=np.float32)
+            return np.full(
+                voxels.shape,
+                np.inf,
+                dtype=np.float32,
+            )
         distance_mm = ndimage.distance_transform_edt(~voxels, sampling=size)
         return distance_mm.astype(np.float32)
 
@@ -471,14 +518,24 @@ def hidden_fissure(
         ndimage.binary_dilation(core & part) & core & ~part
         for part in (is_right, ~is_right)
     ]
-    number, _ = ndimage.label(touching[0] | touching[1], OUTSIDE)
+    number, _ = ndimage.label(
+        touching[0] | touching[1],
+        OUTSIDE,
+    )
     sizes = np.bincount(number.ravel())
     sizes[0] = 0
     above = sheet & (
         distance((number > 0) & (sizes >= MIN_JOINT * sizes.max())[number]) > FLOOR_MM
     )
     number, _ = ndimage.label(above, OUTSIDE)
-    return above & hidden & np.isin(number, np.setdiff1d(number[~brain], 0))
+    return (
+        above
+        & hidden
+        & np.isin(
+            number,
+            np.setdiff1d(number[~brain], 0),
+        )
+    )
 
 
 def open_fissure(
@@ -522,7 +579,10 @@ def plane_between_labels(
 ) -> MidPlane:
     """Fit a plane half-way between (i, j, k) labels of unequal sides, in and around a
     brain."""
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     to_left = ndimage.distance_transform_edt(~left, sampling=size)
     to_right = ndimage.distance_transform_edt(~right, sampling=size)
     side = to_left - to_right
@@ -538,7 +598,12 @@ def plane_between_labels(
     heights = (around - centre) @ normal
     towards_right = np.corrcoef(heights, side[near])[0, 1]
     normal = normal * np.sign(towards_right)
-    return MidPlane(normal, float(normal @ centre), float("nan"), len(places))
+    return MidPlane(
+        normal,
+        float(normal @ centre),
+        float("nan"),
+        len(places),
+    )
 
 
 def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
@@ -568,7 +633,13 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
     adjacent = igl.facet_adjacency_matrix(mesh.faces)
     a, b = adjacent.nonzero()
     within = side[a] == side[b]
-    piece = triangles.connected(np.stack([a[within], b[within]], axis=1), len(side))
+    piece = triangles.connected(
+        np.stack(
+            [a[within], b[within]],
+            axis=1,
+        ),
+        len(side),
+    )
     area = np.bincount(piece, weights=areas)
     largest = [
         piece[side == part][area[piece[side == part]].argmax()]
@@ -585,7 +656,13 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
         unweighted=True,
         min_only=True,
     )
-    assigned = side[np.where(start < 0, np.arange(len(side)), start)]
+    assigned = side[
+        np.where(
+            start < 0,
+            np.arange(len(side)),
+            start,
+        )
+    ]
     share = float(areas[assigned != side].sum() / areas.sum())
     if share > MAX_BULGE_SHARE:
         found = (
@@ -611,7 +688,13 @@ def largest_pieces(
     coordinates of places in messages. InputError if more than `MAX_LEFT_OUT` of a
     hemisphere's area would be left out.
     """
-    is_kept, warnings = np.zeros(len(mesh.faces), dtype=bool), []
+    is_kept, warnings = (
+        np.zeros(
+            len(mesh.faces),
+            dtype=bool,
+        ),
+        [],
+    )
     for side, is_side in sides.items():
         part, faces = triangles.submesh(mesh, is_side)[0], np.flatnonzero(is_side)
         component, areas = triangles.face_components(part), triangles.face_areas(part)
@@ -672,7 +755,10 @@ def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, Triang
     `fissure_x_mm`, open at the cut."""
     return cut_sides(
         mesh,
-        left_faces(mesh, triangles.corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm),
+        left_faces(
+            mesh,
+            triangles.corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm,
+        ),
     )
 
 

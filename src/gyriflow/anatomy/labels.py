@@ -124,7 +124,10 @@ def read_cerebrum(
             " inside it and were filled: ventricles without a label?"
         )
     open_fluid = outside_ventricles(labels, scheme)
-    whole, stalks = extraction.without_stalks((mask & ~open_fluid) | unlabelled, affine)
+    whole, stalks = extraction.without_stalks(
+        (mask & ~open_fluid) | unlabelled,
+        affine,
+    )
     smallest = (
         MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else extraction.COMPARABLE
     )
@@ -143,7 +146,10 @@ def read_cerebrum(
     holes = main & ~mask
     other = holes & ~unlabelled
     if other.sum() > REPORTED_LOSS * main.sum():
-        numbers = _listed(map(int, np.unique(labels[other])), scheme)
+        numbers = _listed(
+            map(int, np.unique(labels[other])),
+            scheme,
+        )
         warnings.append(
             f"{other.sum() * voxel_ml:.2f} mL inside the cerebrum have labels outside"
             f" it, {numbers}, and were filled with the tissue around: is tissue of the"
@@ -267,10 +273,18 @@ def require_cortex_outside(
     """Return the share of the cerebrum's surface with cortex; InputError below
     `minimum`: another scheme."""
     cerebrum = ndimage.binary_fill_holes(
-        np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1)
+        np.pad(
+            np.isin(labels, scheme.cerebrum) | unlabelled,
+            1,
+        )
     )
     outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
-    cortex = ndimage.binary_dilation(np.pad(np.isin(labels, scheme.cortex), 1))
+    cortex = ndimage.binary_dilation(
+        np.pad(
+            np.isin(labels, scheme.cortex),
+            1,
+        )
+    )
     share = float((outside & cortex).sum() / outside.sum())
     if share < minimum:
         raise InputError(
@@ -330,7 +344,10 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     # rays also pass unlabelled voxels inside: choroid plexus, septum
     clear = fluid | (ndimage.binary_fill_holes(tissue | fluid) & ~tissue)
     out = fluid & (_ray_share(clear, tissue, RAY_SMOOTHING) <= ENCLOSED)
-    hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
+    hindbrain = np.isin(
+        labels,
+        (*scheme.cerebellum, *scheme.brainstem),
+    )
     if not hindbrain.any():
         return out
     elsewhere = ~hindbrain & ~np.isin(labels, scheme.cerebrum)
@@ -356,7 +373,10 @@ def unlabelled_ventricles(
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     margin = int(np.ceil(CLOSING_MM / size.min())) + 2
     # volumes in a far larger unit are reported elsewhere
     if np.isin(labels, scheme.ventricles).any() or 2 * margin > max(labels.shape):
@@ -372,7 +392,10 @@ def unlabelled_ventricles(
     closed = to_border > CLOSING_MM
     inside = ndimage.binary_fill_holes(closed | tissue)
 
-    hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
+    hindbrain = np.isin(
+        numbers,
+        (*scheme.cerebellum, *scheme.brainstem),
+    )
     clear = inside & ~tissue & ~hindbrain
     cortex = np.isin(numbers, scheme.cortex)
     inner_tissue = tissue & ~cortex
@@ -380,7 +403,10 @@ def unlabelled_ventricles(
     needed = ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX
     is_enclosed = clear & (hit_share > needed)
     number, _ = ndimage.label(is_enclosed, extraction.OUTSIDE)
-    sizes = np.bincount(number.ravel(), minlength=2)[1:]
+    sizes = np.bincount(
+        number.ravel(),
+        minlength=2,
+    )[1:]
     smallest = max(1, MIN_PART_SHARE * sizes.max())
     large = np.flatnonzero(sizes >= smallest) + 1
     enclosed = np.isin(number, large)
@@ -460,7 +486,11 @@ def layout_of(labels: Labels) -> Layout:
     # most of the volume is air around the head
     for box in ndimage.find_objects((labels != 0).astype(np.int8)):
         labels = np.pad(labels[box], 1)
-    labels = np.where(ndimage.binary_fill_holes(labels) & (labels == 0), HOLE, labels)
+    labels = np.where(
+        ndimage.binary_fill_holes(labels) & (labels == 0),
+        HOLE,
+        labels,
+    )
     numbers, rows = np.unique(labels, return_inverse=True)
     rows, n = rows.reshape(labels.shape), len(numbers)
     contact = np.zeros((n, n))
@@ -481,7 +511,10 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     a volume without cortex."""
     tissues = {}
     for name in ("cerebrum", "cortex", "white_matter", "ventricles", "left", "right"):
-        tissues[name] = np.isin(layout.labels, getattr(scheme, name))
+        tissues[name] = np.isin(
+            layout.labels,
+            getattr(scheme, name),
+        )
     if not tissues["cortex"].any():
         return
     yield from _wrong_shares(layout, tissues)
@@ -504,7 +537,10 @@ def _with_numbers(
 def _tissue_voxels(layout: Layout, tissues: Mapping[str, Mask]) -> int:
     """Return the number of voxels of the cerebrum without ventricles, at least 1."""
     is_tissue = tissues["cerebrum"] & ~tissues["ventricles"]
-    return max(int(layout.count[is_tissue].sum()), 1)
+    return max(
+        int(layout.count[is_tissue].sum()),
+        1,
+    )
 
 
 def _wrong_shares(layout: Layout, tissues: Mapping[str, Mask]) -> Iterator[str]:

@@ -92,7 +92,10 @@ class _Cropped:
 
     def distance_mm(self, mask: Mask) -> Floats:
         """Return the distance of each voxel from a mask."""
-        size = np.linalg.norm(self.affine[:3, :3], axis=0)
+        size = np.linalg.norm(
+            self.affine[:3, :3],
+            axis=0,
+        )
         return ndimage.distance_transform_edt(~mask, sampling=size)
 
 
@@ -109,7 +112,13 @@ def _cropped(
     if not cortex.any() or cortex.sum() == cerebrum.sum():
         return None
     (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
-    around = tuple(slice(side.start - 1, side.stop + 1) for side in box)
+    around = tuple(
+        slice(
+            side.start - 1,
+            side.stop + 1,
+        )
+        for side in box
+    )
     first = np.array([side.start - 1 for side in around])
     is_inner = np.zeros(padded.shape, dtype=bool)
     is_inner[2:-2, 2:-2, 2:-2] = True
@@ -213,5 +222,8 @@ def _pieces_in_words(mask: Mask, affine: Floats) -> str:
 
 def _place_in_words(voxels: np.ndarray, affine: Floats) -> str:
     """Return the centre in mm of (n, 3) voxels."""
-    place = transform_points(voxels.mean(axis=0, keepdims=True), affine)[0]
+    place = transform_points(
+        voxels.mean(axis=0, keepdims=True),
+        affine,
+    )[0]
     return f"({', '.join(str(round(x)) for x in place)}) mm"

@@ -153,8 +153,18 @@ def from_labels(
             posing.pose_of_hemisphere(even.mesh, side, "auto", of_volume=True),
             brain,
         )
-    heights = fissure.sample(side_mm, grid, triangles.corners(even.mesh).mean(axis=1))
-    return _two_sides(even, fissure.left_faces(even.mesh, heights), plane, pose, brain)
+    heights = fissure.sample(
+        side_mm,
+        grid,
+        triangles.corners(even.mesh).mean(axis=1),
+    )
+    return _two_sides(
+        even,
+        fissure.left_faces(even.mesh, heights),
+        plane,
+        pose,
+        brain,
+    )
 
 
 def _read_volume(
@@ -290,7 +300,10 @@ def _with_fissure(
     Where more than a thousandth of the brain is removed, voxels too coarse for its
     walls are refined first.
     """
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     # an opening of less than two voxels would be lost
     factor = int(np.ceil(1.8 * size.max() / fissure.FISSURE_MM))
     for bridges in (False, True):
@@ -430,19 +443,31 @@ def from_hemispheres(
         )
     )
     if named:
-        pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
+        pose = Pose(
+            files=dict.fromkeys((*SIDES, "whole"), to_ras),
+            by="configuration",
+        )
     else:
         pose = posing.pose_of_pair(left, right, declared=declared)
         left = triangles.transformed(left, pose.of_file("left"))
         right = triangles.transformed(right, pose.of_file("right"))
         brain.warn(pose.warnings)
-    length = float(np.ptp(triangles.merged(left, right).vertices, axis=0).max())
+    length = float(
+        np.ptp(
+            triangles.merged(left, right).vertices,
+            axis=0,
+        ).max()
+    )
     brain.warn(plausible.require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
         brain.warn(posing.require_coordinates(left, right, coordinates))
     parts = [
         repair.make_pieces_sound(replace(part, mesh=mesh), edge_length_mm)
-        for part, mesh in zip(parts, (left, right), strict=True)
+        for part, mesh in zip(
+            parts,
+            (left, right),
+            strict=True,
+        )
     ]
     for side, part in zip(SIDES, parts, strict=True):
         brain.take(part, f"_{side}")
@@ -474,8 +499,15 @@ def _joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh |
     if triangles.is_closed(left) or triangles.is_closed(right):
         return None
     both = triangles.merged(left, right)
-    vertices, index = np.unique(both.vertices, axis=0, return_inverse=True)
-    joined = TriangleMesh(vertices, index.reshape(-1)[both.faces])
+    vertices, index = np.unique(
+        both.vertices,
+        axis=0,
+        return_inverse=True,
+    )
+    joined = TriangleMesh(
+        vertices,
+        index.reshape(-1)[both.faces],
+    )
     return joined if triangles.is_closed(joined) else None
 
 
@@ -536,7 +568,11 @@ def from_surface(
     brain = _Brain(
         week, {"source": "hemisphere", "side": side} if side else {"source": "pial"}
     )
-    clean = repair.sound_pieces(mesh, single=side is not None, caps_walls=True)
+    clean = repair.sound_pieces(
+        mesh,
+        single=side is not None,
+        caps_walls=True,
+    )
     brain.take(clean)
     brain.warn(
         plausible.require_plausible_size(
@@ -559,14 +595,22 @@ def from_surface(
     if side:
         return _one_side(even, side, pose, brain)
     brain.warn(pose.warnings)
-    even = replace(even, mesh=triangles.transformed(even.mesh, pose.of_file()))
+    even = replace(
+        even,
+        mesh=triangles.transformed(even.mesh, pose.of_file()),
+    )
     named = coordinates != "auto"
     plane = fissure.mid_plane(even.mesh, named=named)
     heights = fissure.fissure_between(even.mesh, plane).height_above(
         triangles.corners(even.mesh).mean(axis=1)
     )
     is_left = fissure.left_faces(even.mesh, heights)
-    if all(map(triangles.is_closed, fissure.cut_sides(even.mesh, is_left))):
+    if all(
+        map(
+            triangles.is_closed,
+            fissure.cut_sides(even.mesh, is_left),
+        )
+    ):
         return _two_pieces(even, is_left, plane, pose, brain, named=named)
     return _two_sides(even, is_left, plane, pose, brain)
 
@@ -575,9 +619,22 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
     """Return a simple geometry, unchanged, as a brain with sides at x = 0; MeshError if
     it is not sound."""
     repair.require_sound(mesh)
-    sides = dict(zip(SIDES, fissure.split(mesh, 0.0), strict=True))
+    sides = dict(
+        zip(
+            SIDES,
+            fissure.split(mesh, 0.0),
+            strict=True,
+        )
+    )
     return _pial_surface(
-        mesh, sides, 0.0, Pose(), _Brain(week, {"source": "shape", "rotation_deg": 0.0})
+        mesh,
+        sides,
+        0.0,
+        Pose(),
+        _Brain(
+            week,
+            {"source": "shape", "rotation_deg": 0.0},
+        ),
     )
 
 
@@ -621,7 +678,10 @@ def _two_sides(
         surface, {"left": is_left, "right": ~is_left}, pose.of_file(), brain
     )
     is_left = is_left[is_kept]
-    matrix, angle = fissure.upright(plane, mesh.vertices.mean(axis=0))
+    matrix, angle = fissure.upright(
+        plane,
+        mesh.vertices.mean(axis=0),
+    )
     whole = triangles.transformed(mesh, matrix)
     for cap, sign in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
         _require_medial(triangles.submesh(whole, cap)[0], sign)
@@ -699,8 +759,16 @@ def _one_side(
     """Return the pial surface of a single hemisphere, next to the mid-sagittal
     plane."""
     brain.warn(pose.warnings)
-    every = np.ones(len(surface.mesh.faces), dtype=bool)
-    mesh, is_cap, _ = _without_islands(surface, {side: every}, np.eye(4), brain)
+    every = np.ones(
+        len(surface.mesh.faces),
+        dtype=bool,
+    )
+    mesh, is_cap, _ = _without_islands(
+        surface,
+        {side: every},
+        np.eye(4),
+        brain,
+    )
     whole = pial = triangles.transformed(mesh, pose.of_file())
     if is_cap.any():
         _require_medial(
@@ -726,7 +794,12 @@ def _without_islands(
     """Remove all but the largest piece of a side; return the surface, masks of its caps
     and of the faces kept."""
     is_kept, warnings = fissure.largest_pieces(
-        surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float)
+        surface.mesh,
+        sides,
+        np.asarray(
+            np.linalg.inv(of_file),
+            dtype=float,
+        ),
     )
     brain.warn(warnings)
     is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_kept)

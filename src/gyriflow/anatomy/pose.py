@@ -108,7 +108,10 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
     fit, confidence = template.register_from_all_sides(shape, templates)
     mirrored, _ = template.register_from_all_sides(shape.mirrored(), templates)
     normal, offset = template.medial_wall(shape, -fit.rotation[0])
-    turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
+    turn, _ = Rotation.align_vectors(
+        [[-1.0, 0.0, 0.0]],
+        [fit.rotation @ normal],
+    )
     side_ratio = mirrored.residual / fit.residual
     rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
     return PosedShape(
@@ -196,7 +199,11 @@ def pose_of_pair(
     # volumes of the brain are in RAS+
     return Pose(
         np.eye(4) if frame else whole,
-        {"left": sides[0], "right": sides[1], "whole": whole},
+        {
+            "left": sides[0],
+            "right": sides[1],
+            "whole": whole,
+        },
         "file" if frame else "shape",
         together,
         evidence,
@@ -339,7 +346,12 @@ def _motions(
     posed = []
     for side, share in ((left, 0.5), (right, -0.5)):
         target = np.array([WALL_DISTANCE_MM - side.wall_mm, *(share * offset[1:])])
-        posed.append(motion(side.rotation, target - side.rotation @ side.shape.centre))
+        posed.append(
+            motion(
+                side.rotation,
+                target - side.rotation @ side.shape.centre,
+            )
+        )
     return MIRROR @ posed[0] @ MIRROR, posed[1]
 
 
@@ -404,7 +416,12 @@ def _pitch_deg(rotation: Floats) -> float:
     rotation."""
     block = rotation[1:, 1:]
     return float(
-        np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1]))
+        np.degrees(
+            np.arctan2(
+                block[1, 0] - block[0, 1],
+                block[0, 0] + block[1, 1],
+            )
+        )
     )
 
 
@@ -441,7 +458,13 @@ def require_coordinates(
         ]
     turns = [angle_deg(shape.rotation) for shape in shapes]
     if all(shape.is_clear for shape in shapes) and min(turns) > MIN_TURN_DEG:
-        return [_contradiction(coordinates, "hemispheres are", float(np.mean(turns)))]
+        return [
+            _contradiction(
+                coordinates,
+                "hemispheres are",
+                float(np.mean(turns)),
+            )
+        ]
     return []
 
 
@@ -493,7 +516,11 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
     return (
         unchecked
         if pose.by == "default"
-        else pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
+        else pose_from_rotation(
+            pose.of_file()[:3, :3],
+            "the shape",
+            has_sides,
+        )
     )
 
 
@@ -565,7 +592,13 @@ def _choose_pose(
     if coordinates != "auto":
         is_doubtful = shape.is_clear and angles[coordinates] > MIN_TURN_DEG
         doubts = (
-            [_contradiction(coordinates, f"{shape.kind} is", angles[coordinates])]
+            [
+                _contradiction(
+                    coordinates,
+                    f"{shape.kind} is",
+                    angles[coordinates],
+                )
+            ]
             if is_doubtful
             else []
         )
@@ -580,7 +613,12 @@ def _choose_pose(
             f"the {shape.kind} was rotated by {angles['ras']:.0f}° according to its"
             " shape"
         )
-        return turned(rotation, "shape", "ras", f"{moved}; {MIRROR_WARNING}")
+        return turned(
+            rotation,
+            "shape",
+            "ras",
+            f"{moved}; {MIRROR_WARNING}",
+        )
     axes = CONVENTIONS[nearest][:3, :3]
     notes = (
         []
@@ -711,7 +749,12 @@ def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
         return None
     below = unit(found[0] + found[1])
     expected_below = unit(expected[0] + expected[1])
-    expected_right = unit(np.cross(expected[0], expected[1]))
+    expected_right = unit(
+        np.cross(
+            expected[0],
+            expected[1],
+        )
+    )
     return _rotation_onto([(unit(to_right), expected_right), (below, expected_below)])
 
 
@@ -769,5 +812,8 @@ def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
 
 def _nearest_quarters(rotation: Floats) -> Floats:
     return np.asarray(
-        min(CUBE_ROTATIONS, key=lambda turn: angle_deg(rotation @ turn.T)).round()
+        min(
+            CUBE_ROTATIONS,
+            key=lambda turn: angle_deg(rotation @ turn.T),
+        ).round()
     )

@@ -93,11 +93,18 @@ def sound_pieces(
     must face the other one.
     """
     lengths = np.linalg.norm(
-        np.diff(mesh.vertices[triangles.edges(mesh)[0]], axis=1), axis=2
+        np.diff(
+            mesh.vertices[triangles.edges(mesh)[0]],
+            axis=1,
+        ),
+        axis=2,
     )
     mesh, repairs, is_cap = clean(mesh, single=single, caps_walls=caps_walls)
     warnings, dropped, remaining = [], repairs["area_dropped_mm2"], triangles.area(mesh)
-    if lengths.max() > max(SPIKE_MM, SPIKE_FACTOR * np.median(lengths)):
+    if lengths.max() > max(
+        SPIKE_MM,
+        SPIKE_FACTOR * np.median(lengths),
+    ):
         warnings.append(
             f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?"
         )
@@ -117,7 +124,12 @@ def sound_pieces(
     whole = mesh
     mesh, stalks = surface_without_stalks(mesh)
     if stalks:
-        is_cap = is_cap[nearest_on(triangles.corners(mesh).mean(axis=1), whole)[1]]
+        is_cap = is_cap[
+            nearest_on(
+                triangles.corners(mesh).mean(axis=1),
+                whole,
+            )[1]
+        ]
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of"
         f" {stalk['stalk_mm2']:.0f} mm² was cut off"
@@ -163,7 +175,10 @@ def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> Repaired
             f"{key}_{number + 1}" if number else key: value
             for key, value in even.report.items()
         }
-        nearest = nearest_on(triangles.corners(even.mesh).mean(axis=1), piece)[1]
+        nearest = nearest_on(
+            triangles.corners(even.mesh).mean(axis=1),
+            piece,
+        )[1]
         is_cap = clean.is_cap[component == number][nearest]
         # the pial surface around a cap is in one piece
         is_cap[~is_cap] = (
@@ -309,7 +324,12 @@ def _turn_outward(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, int]:
     component = triangles.face_components(mesh)
     parts = [
         triangles.submesh(mesh, component == number)[0]
-        for number in range(min(int(component.max()) + 1, count))
+        for number in range(
+            min(
+                int(component.max()) + 1,
+                count,
+            )
+        )
     ]
     inward = [
         number
@@ -318,7 +338,12 @@ def _turn_outward(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, int]:
     ]
     is_inward = np.isin(component, inward)[:, None]
     return TriangleMesh(
-        mesh.vertices, np.where(is_inward, mesh.faces[:, ::-1], mesh.faces)
+        mesh.vertices,
+        np.where(
+            is_inward,
+            mesh.faces[:, ::-1],
+            mesh.faces,
+        ),
     ), len(inward)
 
 
@@ -363,13 +388,28 @@ def _duplicate_opposites(mesh: TriangleMesh) -> Mask:
         start, end = mesh.faces, mesh.faces[:, [1, 2, 0]]
         keys = np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end)
         _, edge = np.unique(keys.ravel(), return_inverse=True)
-        direction = np.bincount(edge, np.where(start < end, 1.0, -1.0).ravel())
+        direction = np.bincount(
+            edge,
+            np.where(start < end, 1.0, -1.0).ravel(),
+        )
         single = np.bincount(edge, np.repeat(~is_double, 3))
         edge = edge.reshape(-1, 3)[is_double]
         region = triangles.face_components(triangles.submesh(mesh, is_double)[0])
         # a surface whose faces are all double has no single ones around
-        is_wall = np.bincount(region, (single[edge] > 0).any(axis=1)) > 0
-        is_wall &= np.bincount(region, (direction[edge] != 0).any(axis=1)) == 0
+        is_wall = (
+            np.bincount(
+                region,
+                (single[edge] > 0).any(axis=1),
+            )
+            > 0
+        )
+        is_wall &= (
+            np.bincount(
+                region,
+                (direction[edge] != 0).any(axis=1),
+            )
+            == 0
+        )
         is_duplicate[is_double] = ~is_wall[region]
         is_duplicate[first] = False
     return is_duplicate
@@ -397,7 +437,11 @@ def _main_pieces(
     parts = pieces(mesh)
     areas = [triangles.area(piece) for piece in parts]
     main = [parts[0]]
-    for piece, size in zip(parts[1:], areas[1:], strict=True):
+    for piece, size in zip(
+        parts[1:],
+        areas[1:],
+        strict=True,
+    ):
         inside = (
             np.median(
                 np.abs(
@@ -448,7 +492,12 @@ def _fill_holes(
         loops[number] = loop[::-1] if is_same.any() else loop
     for loop in loops[:small]:
         fan = np.stack(
-            [loop, np.roll(loop, -1), np.full(len(loop), len(mesh.vertices))], axis=1
+            [
+                loop,
+                np.roll(loop, -1),
+                np.full(len(loop), len(mesh.vertices)),
+            ],
+            axis=1,
         )
         centre = mesh.vertices[loop].mean(axis=0, keepdims=True)
         mesh = TriangleMesh(
@@ -462,7 +511,13 @@ def _fill_holes(
     mesh, is_cap = (
         _with_caps(mesh, loops[small:])
         if wide
-        else (mesh, np.zeros(len(mesh.faces), dtype=bool))
+        else (
+            mesh,
+            np.zeros(
+                len(mesh.faces),
+                dtype=bool,
+            ),
+        )
     )
     return mesh, counts, is_cap
 
@@ -471,11 +526,20 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
     """Close loops by patches of the smallest area, and remesh these; return the surface
     and the mask of the caps."""
     rims = np.concatenate(
-        [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops]
+        [
+            np.stack(
+                [loop, np.roll(loop, -1)],
+                axis=1,
+            )
+            for loop in loops
+        ]
     )
     patches = [triangles.smallest_patch(mesh, loop) for loop in loops]
     document = remeshing.in_meshlab(
-        TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches]))
+        TriangleMesh(
+            mesh.vertices,
+            np.concatenate([mesh.faces, *patches]),
+        )
     )
     # the patches: fi is MeshLab's number of a face. Faces that replace them stay
     # selected
@@ -489,7 +553,10 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
         checksurfdist=False,
         selectedonly=True,
     )
-    is_cap = np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
+    is_cap = np.asarray(
+        document.current_mesh().face_selection_array(),
+        dtype=bool,
+    )
     return remeshing.from_meshlab(document), is_cap
 
 
@@ -540,14 +607,24 @@ def surface_of_mask(
     even = make_sound(rough, edge_length_mm)
     before, grid = original or (simple, affine)
     smooth = without_terraces(
-        even.mesh, grid, sample(before, grid, even.mesh.vertices) > INSIDE_LEVEL
+        even.mesh,
+        grid,
+        sample(
+            before,
+            grid,
+            even.mesh.vertices,
+        )
+        > INSIDE_LEVEL,
     )
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
     mesh, smoothing = with_volume(
         smooth, repaired_mm3 - taken_mm3, triangles.area(rough)
     )
-    moved = np.linalg.norm(smooth.vertices - even.mesh.vertices, axis=1)
+    moved = np.linalg.norm(
+        smooth.vertices - even.mesh.vertices,
+        axis=1,
+    )
     smoothing |= {
         "terraces_moved_mm": float(moved.mean()),
         "terraces_moved_most_mm": float(moved.max()),

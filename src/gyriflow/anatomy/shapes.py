@@ -42,7 +42,12 @@ def shape_surface(
         )
     points = size * _directions(int(np.ceil(np.pi * size.max() / edge_length_mm)))
     mesh = remesh(
-        convex_hull(TriangleMesh(points, np.empty((0, 3), dtype=np.int64))),
+        convex_hull(
+            TriangleMesh(
+                points,
+                np.empty((0, 3), dtype=np.int64),
+            )
+        ),
         edge_length_mm,
         REMESHING_ROUNDS,
         SHARP_DEG,
@@ -61,7 +66,10 @@ def _directions(count: int) -> Floats:
     intervals along each edge."""
     i, j = np.indices((count + 1, count + 1))
     on_face = i + j <= count
-    face = np.stack([i, j, count - i - j], axis=-1)[on_face]
+    face = np.stack(
+        [i, j, count - i - j],
+        axis=-1,
+    )[on_face]
     octants = []
     for signs in product((1, -1), repeat=3):
         octants.append(face * signs)

@@ -85,15 +85,26 @@ def open_fused_sulci(
         main_parts(core)[0][part].astype(np.float32), affine, every * factor
     )
     near = field[brain]
-    grid = shifted_affine(affine, np.array([side.start for side in brain]))
+    grid = shifted_affine(
+        affine,
+        np.array([side.start for side in brain]),
+    )
     whole, fine = refine(near, grid, factor)
-    size = np.linalg.norm(fine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        fine[:3, :3],
+        axis=0,
+    )
     inside, solid = whole > LEVEL, solid > LEVEL
     cortex = inside & ~solid
     is_right = (
         None
         if side_mm is None
-        else refine(side_mm[part], affine, every * factor)[0] > 0
+        else refine(
+            side_mm[part],
+            affine,
+            every * factor,
+        )[0]
+        > 0
     )
     nearest = ndimage.distance_transform_edt(
         ~solid,
@@ -102,7 +113,10 @@ def open_fused_sulci(
         return_indices=True,
     )
     places = np.argwhere(cortex).astype(np.int32)
-    depth_mm = np.linalg.norm((nearest[:, cortex].T - places) * size, axis=1)
+    depth_mm = np.linalg.norm(
+        (nearest[:, cortex].T - places) * size,
+        axis=1,
+    )
     at_surface = ndimage.binary_dilation(~inside, INSIDE)
     surface = at_surface[cortex]
     if (
@@ -126,20 +140,36 @@ def open_fused_sulci(
         )
     # the depth of a sheet is measured on coarse voxels, in an eighth of the time
     below = ndimage.distance_transform_edt(
-        near > LEVEL, sampling=np.linalg.norm(affine[:3, :3], axis=0)
+        near > LEVEL,
+        sampling=np.linalg.norm(
+            affine[:3, :3],
+            axis=0,
+        ),
     )
-    depth = sample(below, grid, transform_points(np.argwhere(distance > 0), fine))
+    depth = sample(
+        below,
+        grid,
+        transform_points(np.argwhere(distance > 0), fine),
+    )
     is_deep = depth > MIN_SHEET_DEPTH * thickness[distance > 0]
     sheets, count = _deep_sheets(distance > 0, at_surface, size, is_deep)
     if not count:
         return field, affine, {"sheets": 0, "slit_voxels": 0, "opened_mL": 0.0}
     slit = _grow_slits(inside, sheets, cortex, distance)
-    opened = np.where(slit, np.minimum(whole, np.float32(SLIT_VALUE)), whole)
+    opened = np.where(
+        slit,
+        np.minimum(whole, np.float32(SLIT_VALUE)),
+        whole,
+    )
     taken = float((whole - opened).sum(dtype=float) * size.prod() * ML_PER_MM3)
     return (
         opened,
         fine,
-        {"sheets": count, "slit_voxels": int(slit.sum()), "opened_mL": taken},
+        {
+            "sheets": count,
+            "slit_voxels": int(slit.sum()),
+            "opened_mL": taken,
+        },
     )
 
 
@@ -155,7 +185,13 @@ def _around_brain(
         )
         for side in ndimage.find_objects((field > LEVEL).astype(np.uint8))[0]
     ]
-    fine = [slice(every * side.start, every * side.stop) for side in large]
+    fine = [
+        slice(
+            every * side.start,
+            every * side.stop,
+        )
+        for side in large
+    ]
     return tuple(fine), tuple(large)
 
 
@@ -178,7 +214,15 @@ def _usual_thickness(
         PLACES_MM * np.array(list(np.ndindex(shape))), NEARBY_MM
     )
     medians = np.array(
-        [min(np.median(depth[rows]), overall) if rows else overall for rows in nearby]
+        [
+            min(
+                np.median(depth[rows]),
+                overall,
+            )
+            if rows
+            else overall
+            for rows in nearby
+        ]
     )
     return medians.reshape(shape)[tuple(cell.T)]
 
@@ -197,7 +241,14 @@ def _deep_sheets(
         np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3)
         >= MIN_SHEET_MM2
     )
-    reached = np.bincount(part, at_surface[sheet], minlength=count + 1) > 0
+    reached = (
+        np.bincount(
+            part,
+            at_surface[sheet],
+            minlength=count + 1,
+        )
+        > 0
+    )
     deep = np.bincount(part, is_deep, minlength=count + 1) > 0
     is_sheet = large & reached & deep & (parts > 0)
     return is_sheet[number], int(is_sheet.sum())
@@ -253,7 +304,10 @@ def _grow_slits(
     layer, row = inside.shape[1] * inside.shape[2], inside.shape[2]
     steps = [
         i * layer + j * row + k
-        for i, j, k in product((-1, 0, 1), repeat=3)
+        for i, j, k in product(
+            (-1, 0, 1),
+            repeat=3,
+        )
         if (i, j, k) != (0, 0, 0)
     ]
     rows = [i * layer + j * row - 1 for i in (-1, 0, 1) for j in (-1, 0, 1)]

@@ -83,14 +83,23 @@ def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
     triangles, areas = corners(mesh), face_areas(mesh)
     volumes = (
         np.einsum(
-            "ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])
+            "ij,ij->i",
+            triangles[:, 0],
+            np.cross(
+                triangles[:, 1],
+                triangles[:, 2],
+            ),
         )
         / 6.0
     )
     centre = 0.75 * volumes @ triangles.mean(axis=1) / volumes.sum()
     size = float(np.cbrt(volumes.sum()))
     random = np.random.default_rng(0)
-    faces = random.choice(len(areas), POINTS, p=areas / areas.sum())
+    faces = random.choice(
+        len(areas),
+        POINTS,
+        p=areas / areas.sum(),
+    )
     points = np.einsum(
         "nc,ncd->nd", random.dirichlet(np.ones(3), POINTS), triangles[faces]
     )
@@ -125,7 +134,18 @@ def register_shape(
     """Return the best fit of a shape to one of several targets, starting from a (3, 3)
     rotation close to it."""
     return min(
-        (_descend(shape, target, rotation, shift, FINE, 30, 3) for target in targets),
+        (
+            _descend(
+                shape,
+                target,
+                rotation,
+                shift,
+                FINE,
+                30,
+                3,
+            )
+            for target in targets
+        ),
         key=lambda fit: fit.residual,
     )
 
@@ -142,7 +162,15 @@ def register_from_all_sides(
     middle = targets[len(targets) // 2]
     fits = alignment.fits_from_all_sides(
         CUBE_ROTATIONS,
-        lambda start: _descend(shape, middle, start, None, COARSE, 12, 8),
+        lambda start: _descend(
+            shape,
+            middle,
+            start,
+            None,
+            COARSE,
+            12,
+            8,
+        ),
         lambda fit: register_shape(shape, targets, fit.rotation, fit.shift),
         N_REFINED,
         DISTINCT_DEG,
@@ -150,7 +178,15 @@ def register_from_all_sides(
     best = min(fits, key=lambda fit: fit.residual)
     confidence = alignment.residual_ratio(fits, best, DISTINCT_DEG)
     fine = [
-        _descend(shape, target, best.rotation, best.shift, FINE, 30, 1)
+        _descend(
+            shape,
+            target,
+            best.rotation,
+            best.shift,
+            FINE,
+            30,
+            1,
+        )
         for target in targets
     ]
     return min(fine, key=lambda fit: fit.residual), confidence
@@ -179,7 +215,11 @@ def _descend(
         _, nearest = target.tree.query(target.features(moved, facing))
         target_normals = target.normals[nearest]
         plane = unit(target_normals + facing)
-        distances = np.einsum("ij,ij->i", target.points[nearest] - moved, plane)
+        distances = np.einsum(
+            "ij,ij->i",
+            target.points[nearest] - moved,
+            plane,
+        )
         agrees = np.einsum("ij,ij->i", target_normals, facing) > 0.5
         weights = agrees / (1.0 + (distances / scale) ** 2) ** 2
         return Planes(moved, plane, distances, weights)
@@ -190,7 +230,11 @@ def _descend(
         move: Floats,
     ) -> bool:
         return bool(
-            np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3
+            np.hypot(
+                np.linalg.norm(turn - np.eye(3)),
+                np.linalg.norm(move),
+            )
+            < 1e-3
         )
 
     rotation, shift = alignment.follow_planes(
@@ -207,7 +251,11 @@ def _descend(
         np.mean(np.minimum(distance, MAX_DISTANCE) ** 2)
         for distance in (forward, backward)
     ]
-    return RigidFit(rotation, shift, float(np.sqrt(np.mean(squares))))
+    return RigidFit(
+        rotation,
+        shift,
+        float(np.sqrt(np.mean(squares))),
+    )
 
 
 def medial_wall(shape: PointCloud, normal: Floats) -> tuple[Floats, float]:
@@ -240,7 +288,10 @@ def _wall_plane(
             _degrees(normals @ normal) / max_deg
         )
         _, axes = np.linalg.eigh(np.cov(points.T, aweights=weights))
-        normal = np.asarray(axes[:, 0] * np.sign(axes[:, 0] @ normal), dtype=np.float64)
+        normal = np.asarray(
+            axes[:, 0] * np.sign(axes[:, 0] @ normal),
+            dtype=np.float64,
+        )
         offset = float(np.average(points, axis=0, weights=weights) @ normal)
     return normal, offset
 
@@ -252,4 +303,8 @@ def _degrees(cosine: ArrayLike) -> Floats:
 
 
 def _biweight(distance: NDArray[np.floating]) -> Floats:
-    return np.where(np.abs(distance) < 1.0, (1.0 - distance**2) ** 2, 0.0)
+    return np.where(
+        np.abs(distance) < 1.0,
+        (1.0 - distance**2) ** 2,
+        0.0,
+    )

@@ -99,9 +99,18 @@ def without_terraces(
         allowed = start + np.clip(height, lowest, highest)[:, None] * normals
         error += smooth - allowed
     sharpened = smooth + compensation * (stiffness @ smooth) / mass[:, None]
-    moves = np.where(np.reshape(fixed, (-1, 1)), 0.0, sharpened - start)
+    moves = np.where(
+        np.reshape(fixed, (-1, 1)),
+        0.0,
+        sharpened - start,
+    )
     moves *= np.minimum(
-        1.0, size / np.maximum(np.linalg.norm(moves, axis=1, keepdims=True), 1e-9)
+        1.0,
+        size
+        / np.maximum(
+            np.linalg.norm(moves, axis=1, keepdims=True),
+            1e-9,
+        ),
     )
     for _ in range(N_RESETS):
         moved = TriangleMesh(start + moves, mesh.faces)
@@ -119,9 +128,14 @@ def _degraded(before: TriangleMesh, after: TriangleMesh) -> NDArray[np.bool_]:
     )
     shapes = [
         face_areas(mesh)
-        / (np.diff(corners(mesh), axis=1, append=corners(mesh)[:, :1]) ** 2).sum(
-            axis=(1, 2)
-        )
+        / (
+            np.diff(
+                corners(mesh),
+                axis=1,
+                append=corners(mesh)[:, :1],
+            )
+            ** 2
+        ).sum(axis=(1, 2))
         for mesh in (before, after)
     ]
     return turned | (shapes[1] < MIN_SHAPE_RATIO * shapes[0])
@@ -134,9 +148,12 @@ def _room(
 ) -> tuple[Floats, Floats]:
     """Return how far vertices may move inward (n,) and outward (n,) until the surface
     meets a voxel's centre."""
-    nearest = np.rint(transform_points(mesh.vertices, np.linalg.inv(voxels))).astype(
-        np.int64
-    )
+    nearest = np.rint(
+        transform_points(
+            mesh.vertices,
+            np.linalg.inv(voxels),
+        )
+    ).astype(np.int64)
     first = nearest.min(axis=0) - 1
     shape = np.ptp(nearest, axis=0) + 3
     around = np.zeros(shape, dtype=bool)
@@ -145,12 +162,24 @@ def _room(
     centres = transform_points(np.argwhere(around) + first, voxels)
     distance, face, place = nearest_on(centres, mesh)
     near = distance < max_move_mm
-    heights = np.einsum("ij,ij->i", centres - place, face_normals(mesh)[face])
+    heights = np.einsum(
+        "ij,ij->i",
+        centres - place,
+        face_normals(mesh)[face],
+    )
     height = heights[near].repeat(3)
     vertex = mesh.faces[face[near]].ravel()
     lowest, highest = (
         np.full(len(mesh.vertices), sign * max_move_mm) for sign in (-1.0, 1.0)
     )
-    np.maximum.at(lowest, vertex[height <= 0], height[height <= 0])
-    np.minimum.at(highest, vertex[height >= 0], height[height >= 0])
+    np.maximum.at(
+        lowest,
+        vertex[height <= 0],
+        height[height <= 0],
+    )
+    np.minimum.at(
+        highest,
+        vertex[height >= 0],
+        height[height >= 0],
+    )
     return lowest, highest

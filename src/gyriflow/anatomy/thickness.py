@@ -120,7 +120,10 @@ def cortical_thickness(
     values = layer_thickness(pial, inner)
     points, size = pial.vertices, np.linalg.norm(affine[:3, :3], axis=0)
     # of long voxels, no centre may be nearer than half their diagonal
-    voxel = max(float(np.cbrt(size.prod())), 0.5 * float(np.linalg.norm(size)))
+    voxel = max(
+        float(np.cbrt(size.prod())),
+        0.5 * float(np.linalg.norm(size)),
+    )
     to_cortex, to_outside = (
         sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points)
         for mask in (~cortex, cerebrum)
@@ -153,7 +156,10 @@ def cortical_thickness(
     complete_mm2 = sheet_mm2 * (
         1.0 + mean_curvature(pial, is_measured) * report["mean_mm"]
     )
-    report |= {"area_ratio": area(pial) / complete_mm2, "voxel_mm": float(size.max())}
+    report |= {
+        "area_ratio": area(pial) / complete_mm2,
+        "voxel_mm": float(size.max()),
+    }
     report["voxels_through_cortex"] = voxels_through_cortex(cerebrum, inner, affine)
     return Thickness(filled, is_measured, report)
 
@@ -186,12 +192,20 @@ def voxels_through_cortex(
     """Return the median cortical thickness, from mask to `inner` surface, over a
     voxel's longest edge."""
     outer = border(cerebrum, affine)
-    points = outer.vertices[:: max(1, len(outer.vertices) // N_SAMPLES)]
+    points = outer.vertices[
+        :: max(
+            1,
+            len(outer.vertices) // N_SAMPLES,
+        )
+    ]
     inward, _, nearest = nearest_on(points, inner)
     values = (
         0.5
         * (inward + nearest_on(nearest, outer)[0])
-        / np.linalg.norm(affine[:3, :3], axis=0).max()
+        / np.linalg.norm(
+            affine[:3, :3],
+            axis=0,
+        ).max()
     )
     return float(np.median(values[values >= MIN_LAYER_VOXELS]))
 
@@ -288,7 +302,12 @@ def thickness_from_white(
     posed = posed_whites(pose, whites)
     for side, white in posed.items():
         areas = vertex_areas(white)
-        middle = float(np.average(white.vertices[:, 0], weights=areas))
+        middle = float(
+            np.average(
+                white.vertices[:, 0],
+                weights=areas,
+            )
+        )
         if side in SIDES and (middle < fissure_x_mm) != (side == "left"):
             raise InputError(
                 f"the white surface ({side}) lies in the other hemisphere",
@@ -323,7 +342,14 @@ def require_inside(
 ) -> None:
     """Raise InputError if a white surface crosses the closed pial surface of its side
     ("whole": of the brain)."""
-    outside = igl.fast_winding_number(pial.vertices, pial.faces, white.vertices) < 0.5
+    outside = (
+        igl.fast_winding_number(
+            pial.vertices,
+            pial.faces,
+            white.vertices,
+        )
+        < 0.5
+    )
     distance, _, _ = nearest_on(white.vertices, pial)
     crossing = outside & (distance > OUTSIDE_MM)
     areas = vertex_areas(white)
@@ -401,7 +427,10 @@ def _cut_as_pial(
 ) -> dict[Side, TriangleMesh]:
     if len(pial) == 1:
         return dict.fromkeys(pial, mesh)
-    left, right = cut_sides(mesh, nearer_left(mesh, pial["left"], pial["right"]))
+    left, right = cut_sides(
+        mesh,
+        nearer_left(mesh, pial["left"], pial["right"]),
+    )
     return {"left": left, "right": right}
 
 

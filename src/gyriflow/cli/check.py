@@ -205,7 +205,12 @@ def plan(
     plans: list[Plan] = []
     with TemporaryDirectory() as empty:
         place = directory.resolve() if directory.is_dir() else empty
-        options = ["--configfile", str(config.absolute()), "--directory", str(place)]
+        options = [
+            "--configfile",
+            str(config.absolute()),
+            "--directory",
+            str(place),
+        ]
         call = [*options, "--dry-run", *further]
         code = launch(call, plans.append, is_shown=show)
         if code:
@@ -214,7 +219,15 @@ def plan(
         for job, why in plans[0].reasoned_jobs:
             names = dict(job.wildcards)
             files = job.files, job.outputs
-            jobs.append(PlannedJob(job.rule, names, job.threads(), why, *files))
+            jobs.append(
+                PlannedJob(
+                    job.rule,
+                    names,
+                    job.threads(),
+                    why,
+                    *files,
+                )
+            )
         return jobs
 
 
@@ -315,7 +328,11 @@ def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
         scans.append(ScanFiles(files, (brain, scheme, sums)))
     found = readings(doubts_about_files, scans)
     for brain, reading in zip(config.brains, found, strict=True):
-        texts = [*reading.warnings, *_memory_doubts(brain), *reading.values]
+        texts = [
+            *reading.warnings,
+            *_memory_doubts(brain),
+            *reading.values,
+        ]
         for text in dict.fromkeys(texts):
             yield brain.id, text, False
         if reading.error:
@@ -366,7 +383,14 @@ def _needs(
     directory: Path,
     cores: int,
 ) -> Iterator[tuple[str, bool]]:
-    seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
+    seconds = [
+        job_seconds(
+            study,
+            job.rule,
+            job.wildcards,
+        )
+        for job in jobs
+    ]
     made_by: dict[str, int] = {}
     for number, job in enumerate(jobs):
         made_by |= dict.fromkeys(job.outputs, number)
@@ -385,7 +409,12 @@ def _needs(
     needs = []
     for job in foldings:
         key = (job.wildcards["run"], job.wildcards["brain"])
-        needs.append(simulation_needs(study.simulations[key], study.config.mesh))
+        needs.append(
+            simulation_needs(
+                study.simulations[key],
+                study.config.mesh,
+            )
+        )
     for line in _path_lines(jobs, seconds, study, directory):
         yield line, False
     work_s = sum(seconds)
@@ -412,7 +441,11 @@ def _needs(
     folder = directory.absolute()
     while not folder.is_dir():
         folder = folder.parent
-    yield _fits("disk", disk_mib, shutil.disk_usage(folder).free / 2**20)
+    yield _fits(
+        "disk",
+        disk_mib,
+        shutil.disk_usage(folder).free / 2**20,
+    )
 
 
 def _path_lines(

@@ -150,7 +150,10 @@ class Commands(click.Group):
         except click.UsageError as error:
             command = error.ctx.command_path if error.ctx else _command_name()
             message = " ".join(error.format_message().split())
-            click.echo(f"gyriflow: {message} See `{command} --help`.", err=True)
+            click.echo(
+                f"gyriflow: {message} See `{command} --help`.",
+                err=True,
+            )
             sys.exit(error.exit_code)
 
 
@@ -285,7 +288,11 @@ def _recognise(
 ) -> "FoundScans":
     from .recognition import recognise, scheme_reasons
 
-    notation: Any = {None: None, True: "decimal", False: "days"}[decimal_weeks]
+    notation: Any = {
+        None: None,
+        True: "decimal",
+        False: "days",
+    }[decimal_weeks]
     found = recognise(folder, files or "*", notation=notation, **selection)
     for line in scheme_reasons(found.brains):
         click.echo(line)

@@ -87,7 +87,11 @@ def write_configuration(
     end = UNSET
     if weeks:
         end = f"{weeks[-1] if several else weeks[0] + 1:g}"
-    text = _from_template("brains", config=SHIPPED / "config", brains="\n".join(lines))
+    text = _from_template(
+        "brains",
+        config=SHIPPED / "config",
+        brains="\n".join(lines),
+    )
     if not only_measured:
         # an id may look like a number, which YAML writes in quotes
         start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
@@ -173,7 +177,11 @@ def write_prediction(
             found="surfaces",
             remedy="Leave it out.",
         )
-    entry = {"id": entry["id"], "week": weeks[0], "population": entry["id"]} | entry
+    entry = {
+        "id": entry["id"],
+        "week": weeks[0],
+        "population": entry["id"],
+    } | entry
     entry |= {"image": str(own_name(image))} if image else {}
     keys = {
         "name": atlas or SHIPPED_ATLAS,
@@ -213,7 +221,10 @@ def write_prediction(
         yield f"the earlier configuration is now {kept}"
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
-    given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
+    given = entry.get(
+        "scheme",
+        f"pial{' and white' if white else ''} surfaces",
+    )
     names = (
         ", ".join(
             f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()

@@ -116,7 +116,11 @@ def input_facts(study: Study) -> Iterator[str]:
     order of the configuration."""
     owners: dict[str, list[str]] = {}
     for brain in study.config.brains:
-        for path in (*brain.files, *brain.white_files.values(), brain.image):
+        for path in (
+            *brain.files,
+            *brain.white_files.values(),
+            brain.image,
+        ):
             if path is not None:
                 owners.setdefault(path, []).append(brain.id)
     for owner, files, _ in _other_files(study):
@@ -164,7 +168,12 @@ def _check_labels(
         return
     doubts = list(scheme_contradictions(layout_of(read.labels), scheme))
     if doubts:
-        require_fit(scheme_fits(read.labels), scheme.name, volume, "; ".join(doubts))
+        require_fit(
+            scheme_fits(read.labels),
+            scheme.name,
+            volume,
+            "; ".join(doubts),
+        )
         yield from doubts
     yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
 
@@ -245,7 +254,10 @@ def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:
 def _outward(mesh: TriangleMesh) -> TriangleMesh:
     if signed_volume(mesh) >= 0:
         return mesh
-    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    return TriangleMesh(
+        mesh.vertices,
+        mesh.faces[:, ::-1],
+    )
 
 
 def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:

@@ -82,7 +82,12 @@ def _keys(
         files |= dict.fromkeys(scan.files)
     found = joined_contents(contents(files, {}))
     module = Path(sys.modules[read.__module__].__file__ or "")
-    code = [read.__module__, read.__name__, version(), code_hash(module, module)]
+    code = [
+        read.__module__,
+        read.__name__,
+        version(),
+        code_hash(module, module),
+    ]
     keys = []
     for scan in scans:
         origin = {
@@ -128,7 +133,11 @@ def _reading(read: Callable[..., Iterable[Any]], scan: ScanFiles) -> Reading:
                 values.append(value)
         except GyriflowError as problem:
             error = str(problem)
-    return Reading(values, [record.getMessage() for record in logged], error)
+    return Reading(
+        values,
+        [record.getMessage() for record in logged],
+        error,
+    )
 
 
 @contextmanager

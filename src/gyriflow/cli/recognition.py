@@ -127,7 +127,13 @@ class FoundBrain:
     def causes(self) -> list[str]:
         """Reasons why the scan cannot be used as it is."""
         return [
-            cause for cause in (self.problem, self.contradiction, *self.notes) if cause
+            cause
+            for cause in (
+                self.problem,
+                self.contradiction,
+                *self.notes,
+            )
+            if cause
         ]
 
     @property
@@ -221,7 +227,10 @@ def recognise(
     for file in files:
         sessions_of[_label(file, "sub")] |= {_label(file, "ses")} - {None}
     if not found:
-        raise _no_brain(folder, {str(file): _rejection(file) for file in files})
+        raise _no_brain(
+            folder,
+            {str(file): _rejection(file) for file in files},
+        )
     selected = {
         "sub": {label.removeprefix("sub-") for label in participants or ()},
         "ses": {label.removeprefix("ses-") for label in sessions or ()},
@@ -270,7 +279,10 @@ def recognise(
     tables.require_clear_decimals(folder)
     require_clear_decimals([brain.named_age for brain in brains], notation, folder)
     _refuse_equal_weeks(brains)
-    _choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
+    _choose_schemes(
+        [brain for brain in brains if brain.fits is not None],
+        scheme,
+    )
     brains.sort(
         key=lambda brain: (
             brain.entry["week"] == UNSET,
@@ -369,7 +381,10 @@ def _brains_of_scan(
     names = sorted({_scan_name(brain.file) for brain in group})
     data_sets = _data_sets(group)
     unreadable = [brain for brain in brains if brain.is_unreadable]
-    for number, brain in enumerate([*readable, *unreadable], start=1):
+    for number, brain in enumerate(
+        [*readable, *unreadable],
+        start=1,
+    ):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
             # several files of one scan do not make a series
@@ -491,7 +506,10 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
                 part for part in file.parts[:-1] if not SIDE_FOLDER.fullmatch(part)
             ]
             parts = sorted(
-                re.split(r"[._]+", LAYER_NAME.sub("", SIDE_NAME.sub("", name)))
+                re.split(
+                    r"[._]+",
+                    LAYER_NAME.sub("", SIDE_NAME.sub("", name)),
+                )
             )
             key = "/".join([*folders, *parts]), "pial" if is_pial else "white"
             if surfaces.setdefault(key, {}).setdefault(side, file) != file:
@@ -609,8 +627,14 @@ def _complete(
     subject = _label(brain.file, "sub")
     owners = _owners(brain.file, tables) if subject is None else [subject]
     facts = _facts(brain.file, owners, folder, tables, sessions_of)
-    age = _age(facts, week_in_name(brain.file.parts, tables.notation))
-    entry: dict[str, Any] = {"id": _scan_of(brain.file), "week": UNSET}
+    age = _age(
+        facts,
+        week_in_name(brain.file.parts, tables.notation),
+    )
+    entry: dict[str, Any] = {
+        "id": _scan_of(brain.file),
+        "week": UNSET,
+    }
     if age.week is not None:
         entry["week"] = age.week
     elif age.cause:
@@ -665,7 +689,11 @@ def _read_files(brains: Sequence[FoundBrain], folder: Path) -> None:
         except InputError as error:
             brain.problem, brain.is_unreadable = str(error), True
     scans = [ScanFiles([str((folder / brain.file).absolute())]) for brain in whole]
-    for brain, found in zip(whole, readings(fits_of_file, scans), strict=True):
+    for brain, found in zip(
+        whole,
+        readings(fits_of_file, scans),
+        strict=True,
+    ):
         for text in found.warnings:
             log.warning("%s", text)
         if found.error:
@@ -746,7 +774,12 @@ def _facts(
         return ScanAge(None, cause=_similar_ids(_scan_of(file), tables))
     is_only_scan = subject is None or len(sessions_of[subject]) < 2
     session = _label(file, "ses")
-    facts = tables.facts(owners[0], session, is_only_scan, folder / file)
+    facts = tables.facts(
+        owners[0],
+        session,
+        is_only_scan,
+        folder / file,
+    )
     if facts is None and subject is not None:
         return ScanAge(None, cause=_similar_ids(subject, tables, or_first=True))
     return facts or ScanAge(None)
@@ -880,7 +913,13 @@ def recognise_brain(
         _require_brain(pial[0], whole=True)
         entry["pial"] = str(pial[0])
     else:
-        entry["hemispheres"] = dict(zip(SIDES, map(str, pial), strict=True))
+        entry["hemispheres"] = dict(
+            zip(
+                SIDES,
+                map(str, pial),
+                strict=True,
+            )
+        )
     if white and len(white) != len(files):
         problem = f"--white: found {len(white)} surfaces for {len(files)} pial ones"
         raise InputError(
@@ -940,7 +979,11 @@ def _recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
         raise InputError(
             f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}"
         )
-    entry = {"id": _scan_of(file), "labels": str(file), "scheme": UNSET}
+    entry = {
+        "id": _scan_of(file),
+        "labels": str(file),
+        "scheme": UNSET,
+    }
     fits = scheme_fits(read_label_volume(file, cropped=True).labels)
     if scheme:
         require_fit(fits, scheme, file, fits.get(scheme) or "labels that are not in it")

@@ -49,7 +49,10 @@ def scan_lines(scans: Iterable[ScanRow]) -> Iterator[str]:
         yield line
         for text in row.reasons:
             reason = " ".join(text.split())
-            if kinds.add(row.scan, f"{row.scan}: {reason}"):
+            if kinds.add(
+                row.scan,
+                f"{row.scan}: {reason}",
+            ):
                 yield f"    {reason}"
     yield from kinds.others()
     counts = Counter(row.verdict for row in rows)

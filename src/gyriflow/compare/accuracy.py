@@ -107,8 +107,18 @@ def error_in_tests(
         return None
     weeks = np.unique(errors["week"])
     horizons = np.unique(errors["horizon"])
-    last_week = weeks[np.searchsorted(weeks[:-1], week - 1e-6)]
-    longest = horizons[np.searchsorted(horizons[:-1], horizon - 1e-6)]
+    last_week = weeks[
+        np.searchsorted(
+            weeks[:-1],
+            week - 1e-6,
+        )
+    ]
+    longest = horizons[
+        np.searchsorted(
+            horizons[:-1],
+            horizon - 1e-6,
+        )
+    ]
     shortest_of_week = errors.groupby("week")["horizon"].transform("min")
     is_earlier = errors["week"] <= last_week
     is_shorter = errors["horizon"] <= np.maximum(longest, shortest_of_week)

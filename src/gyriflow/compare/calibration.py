@@ -74,7 +74,10 @@ def next_round(
     _require_finished(runs)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     # another seed each round, or the same places would be drawn again
-    sampler = optuna.samplers.TPESampler(seed=seed + len(runs), n_startup_trials=1)
+    sampler = optuna.samplers.TPESampler(
+        seed=seed + len(runs),
+        n_startup_trials=1,
+    )
     search = optuna.create_study(sampler=sampler)
     distributions: dict[str, BaseDistribution] = {}
     for name, (low, high) in bounds.items():
@@ -84,7 +87,10 @@ def next_round(
     proposed = []
     for _ in range(count):
         proposed.append(search.ask(distributions).params)
-    return _rounded(pd.DataFrame(proposed, columns=list(bounds)), bounds)
+    return _rounded(
+        pd.DataFrame(proposed, columns=list(bounds)),
+        bounds,
+    )
 
 
 def _trial(
@@ -154,7 +160,13 @@ def find_optimum(runs: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
             "highest": high,
             "at_bound": is_at_bound,
         }
-        rows.append(row | {"run": best["run"], "score": best["score"]})
+        rows.append(
+            row
+            | {
+                "run": best["run"],
+                "score": best["score"],
+            }
+        )
     return pd.DataFrame(rows)
 
 
@@ -176,7 +188,10 @@ def calibrated_parameters(
         for name in outer:
             section = section[name]
         section[last] = value
-    return params | {"end_week": week, "output_weeks": [params["start_week"], week]}
+    return params | {
+        "end_week": week,
+        "output_weeks": [params["start_week"], week],
+    }
 
 
 SURFACE_SCORES: dict[Score, tuple[Group, Callable[[Mapping[str, float]], float]]] = {

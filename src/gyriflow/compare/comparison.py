@@ -196,7 +196,11 @@ def fold_columns(
         )
         for name in COMPARED_MAPS:
             truth = getattr(observed.prepared, name)
-            row[f"r_{name}"] = correlation(truth, values[name], observed.prepared.areas)
+            row[f"r_{name}"] = correlation(
+                truth,
+                values[name],
+                observed.prepared.areas,
+            )
     if "intervals" in groups:
         sampling, known = observed.resampling, observed.baseline_correlations
         row |= {
@@ -264,7 +268,14 @@ def surface_distances(pair: list[VertexDistances]) -> dict[str, float]:
     by_side = []
     for on_side in (np.less, np.greater_equal):
         parts = [
-            (distances, vertex_areas(mesh) * on_side(mesh.vertices[:, 0], 0))
+            (
+                distances,
+                vertex_areas(mesh)
+                * on_side(
+                    mesh.vertices[:, 0],
+                    0,
+                ),
+            )
             for mesh, distances in pair
         ]
         has_both = all(areas.any() for _, areas in parts)
@@ -378,7 +389,13 @@ def comparison_table(
             "horizon": round(week - labels["start_week"], 6),
         }
         rows += [
-            {**labels, **place, "model": model, **row, **scores[model]}
+            {
+                **labels,
+                **place,
+                "model": model,
+                **row,
+                **scores[model],
+            }
             for model, (row, _) in found.items()
         ]
     table = pd.DataFrame(rows)
@@ -405,14 +422,22 @@ def model_columns(
     for model, drawn in samples.items():
         # no skill is known against a baseline that is the observed brain itself
         ratio = np.full(len(best), np.nan)
-        np.divide(drawn["distance_mm"], best, out=ratio, where=best > 0)
+        np.divide(
+            drawn["distance_mm"],
+            best,
+            out=ratio,
+            where=best > 0,
+        )
         columns[model] = with_interval("skill", 1 - ratio)
         if atlas := samples.get("atlas"):
             for name, key in (
                 ("r_less_atlas", "r_shape_index"),
                 ("distance_less_atlas_mm", "distance_mm"),
             ):
-                columns[model] |= with_interval(name, drawn[key] - atlas[key])
+                columns[model] |= with_interval(
+                    name,
+                    drawn[key] - atlas[key],
+                )
     return columns
 
 

@@ -102,17 +102,28 @@ def deviation_table(
         for part, mesh in parts.items()
     }
     everywhere = {
-        part: np.ones(len(mesh.vertices), dtype=np.int64)
+        part: np.ones(
+            len(mesh.vertices),
+            dtype=np.int64,
+        )
         for part, mesh in parts.items()
     }
     tables = [region_metrics(parts, part_maps, everywhere, {1: ""})]
     tables += [
-        region_metrics({side: sides[side]}, part_maps, {side: vertex_labels}, names)
+        region_metrics(
+            {side: sides[side]},
+            part_maps,
+            {side: vertex_labels},
+            names,
+        )
         for side, (vertex_labels, names) in regions.items()
     ]
     table = pd.concat(tables, ignore_index=True)
     means = table[table["metric"].str.startswith("mean_")]
-    table = means.assign(metric=means["metric"].str.removeprefix("mean_"), **labels)
+    table = means.assign(
+        metric=means["metric"].str.removeprefix("mean_"),
+        **labels,
+    )
     return table[[*labels, "hemisphere", "region", "metric", "value", "unit"]]
 
 

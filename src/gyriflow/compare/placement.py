@@ -134,10 +134,16 @@ class Resampling:
         drawn = xy / np.sqrt(xx * yy)
         power = sums[0]
         shares = power / power.sum()
-        freedom = max(1 / (shares**2).sum() - 2, 1.0)
+        freedom = max(
+            1 / (shares**2).sum() - 2,
+            1.0,
+        )
         spread = t.ppf(INTERVAL[1], freedom) / norm.ppf(INTERVAL[1])
         # about r, since the sides of a symmetric brain are not exactly equal
-        return np.append(r, r + spread * (drawn[1:] - drawn[0]))
+        return np.append(
+            r,
+            r + spread * (drawn[1:] - drawn[0]),
+        )
 
 
 def make_resampling(surface: PreparedSurface) -> Resampling:
@@ -148,7 +154,10 @@ def make_resampling(surface: PreparedSurface) -> Resampling:
     sides = []
     if asymmetry_mm < SYMMETRY_TOL_MM:
         left = mesh.vertices[:, 0] < image.vertices[:, 0]
-        mesh, used = submesh(surface.mesh, left[mesh.faces].sum(axis=1) >= 2)
+        mesh, used = submesh(
+            surface.mesh,
+            left[mesh.faces].sum(axis=1) >= 2,
+        )
         sides = [
             match_points(
                 image.vertices[used], vertex_normals(image)[used], surface.mesh
@@ -168,7 +177,11 @@ def make_resampling(surface: PreparedSurface) -> Resampling:
     places = interpolation(match_surface(mesh, coarse), len(coarse.vertices))
     # orthonormal on the finer surface, in the same order
     products = modes.T @ (places.T @ places.multiply(areas[:, None]).tocsr() @ modes)
-    modes = solve_triangular(cholesky(products, lower=True), modes.T, lower=True).T
+    modes = solve_triangular(
+        cholesky(products, lower=True),
+        modes.T,
+        lower=True,
+    ).T
     patch = number_patches(mesh.vertices, areas, SHORTEST_MODE_MM)
     return Resampling(
         surface.areas, tuple(sides), areas, (places, modes), patch, asymmetry_mm
@@ -186,7 +199,11 @@ def correlation(
     squares = (np.average(values * values, weights=weights) for values in (x, y))
     if any(
         spread <= 1e-12 * square
-        for spread, square in zip((xx, yy), squares, strict=True)
+        for spread, square in zip(
+            (xx, yy),
+            squares,
+            strict=True,
+        )
     ):
         return float("nan")
     return float(xy / np.sqrt(xx * yy))
@@ -207,7 +224,12 @@ def interpolate_measures(
         measure: values_at(match, getattr(surface, measure))
         for measure in COMPARED_MAPS
     }
-    return values, float(np.average(match.agrees, weights=observed.areas))
+    return values, float(
+        np.average(
+            match.agrees,
+            weights=observed.areas,
+        )
+    )
 
 
 def gain_columns(
@@ -221,7 +243,10 @@ def gain_columns(
     Columns r, r_start and r_adjacent; gain = r − r_start. r and gain have 95 %
     intervals …_low, …_high.
     """
-    row = {"r_start": float(r_start[0]), "r_adjacent": float(r_adjacent[0])}
+    row = {
+        "r_start": float(r_start[0]),
+        "r_adjacent": float(r_adjacent[0]),
+    }
     return row | with_interval("r", r) | with_interval("gain", r - r_start)
 
 
@@ -248,7 +273,10 @@ def mirror_image(surface: PreparedSurface) -> tuple[TriangleMesh, float]:
     """
     aligned = align(transformed(surface.mesh, MIRROR), surface.mesh)
     return aligned, float(
-        np.average(nearest_on(aligned.vertices, surface.mesh)[0], weights=surface.areas)
+        np.average(
+            nearest_on(aligned.vertices, surface.mesh)[0],
+            weights=surface.areas,
+        )
     )
 
 
@@ -263,13 +291,22 @@ def number_patches(
     Patches are the Voronoi cells of seeds chosen by farthest-point sampling, which is
     deterministic.
     """
-    count = max(2, round(float(areas.sum()) / edge_mm**2))
+    count = max(
+        2,
+        round(float(areas.sum()) / edge_mm**2),
+    )
     seeds = [0]
-    distances = np.linalg.norm(points - points[0], axis=1)
+    distances = np.linalg.norm(
+        points - points[0],
+        axis=1,
+    )
     for _ in range(count - 1):
         farthest = int(distances.argmax())
         seeds.append(farthest)
-        to_seed = np.linalg.norm(points - points[farthest], axis=1)
+        to_seed = np.linalg.norm(
+            points - points[farthest],
+            axis=1,
+        )
         distances = np.minimum(distances, to_seed)
     _, patches = cKDTree(points[seeds]).query(points)
     return np.asarray(patches, dtype=np.int64)
@@ -284,7 +321,11 @@ def draw_units(groups: Sequence[int]) -> Floats:
     """
     generator = np.random.default_rng(0)
     drawn = [
-        generator.multinomial(max(size - 1, 1), np.full(size, 1 / size), size=N_DRAWS)
+        generator.multinomial(
+            max(size - 1, 1),
+            np.full(size, 1 / size),
+            size=N_DRAWS,
+        )
         for size in groups
     ]
     return np.concatenate([np.ones((1, sum(groups))), np.concatenate(drawn, axis=1)])

@@ -94,7 +94,10 @@ def prepare_for_comparison(
 def scale_to_volume(mesh: TriangleMesh, other: TriangleMesh) -> TriangleMesh:
     """Scale a closed surface uniformly to the volume of another one."""
     factor = (signed_volume(other) / signed_volume(mesh)) ** (1 / 3)
-    return transformed(mesh, np.diag([factor] * 3 + [1.0]))
+    return transformed(
+        mesh,
+        np.diag([factor] * 3 + [1.0]),
+    )
 
 
 def curvature_differences(

@@ -104,7 +104,10 @@ def member_comparison(
         for name in ("relative_power", "relative_power_observed")
     )
     bands = _with_distance(
-        bands.assign(**dict(zip(_VALUES, values, strict=True)), measure=measure),
+        bands.assign(
+            **dict(zip(_VALUES, values, strict=True)),
+            measure=measure,
+        ),
         resolved,
     )
 
@@ -321,7 +324,11 @@ def nearest_runs(
         row = {name: best[name] for name in (*keys, *varied, "run", "distance")}
         if further:
             row |= {f"next_{name}": further[0][name] for name in (*varied, "distance")}
-        flags = _flags(best, members[members["subject"] == best["subject"]], varied)
+        flags = _flags(
+            best,
+            members[members["subject"] == best["subject"]],
+            varied,
+        )
         if further and further[0]["distance"] - best["distance"] < best.get(
             "noise", 0.0
         ):

@@ -186,7 +186,10 @@ def write_checkpoint(
         for name, array in arrays.items():
             file[name] = array
         # a data set, since the table of steps outgrows HDF5's limit for attributes
-        file["scalars"] = np.frombuffer(scalars.encode(), dtype=np.uint8)
+        file["scalars"] = np.frombuffer(
+            scalars.encode(),
+            dtype=np.uint8,
+        )
         file.attrs["checksum"] = _checksum(arrays, scalars)
 
 

@@ -67,7 +67,13 @@ def _edge_length_within(
     cortex = mesh.corners[depth <= thickness_mm]
     if not len(cortex):
         cortex = mesh.corners
-    lengths = [mean_length(mesh.vertices, cortex[:, pair]) for pair in EDGES]
+    lengths = [
+        mean_length(
+            mesh.vertices,
+            cortex[:, pair],
+        )
+        for pair in EDGES
+    ]
     return float(np.mean(lengths))
 
 

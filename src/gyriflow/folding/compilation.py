@@ -66,7 +66,10 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     with ExitStack() as stack:
         if comm.rank == 0:
             cache.mkdir(parents=True, exist_ok=True)
-            lock_file(stack.enter_context((cache / "lock").open("w")), wait=True)
+            lock_file(
+                stack.enter_context((cache / "lock").open("w")),
+                wait=True,
+            )
             _remove_incomplete_entries(cache)
         comm.barrier()
         yield options

@@ -109,7 +109,12 @@ class SelfContact:
         rank_of_vertex = bisect_points(start, domain.comm.size)
         rank_of_vertex = domain.comm.bcast(rank_of_vertex, root=0)
         self._owned = rank_of_vertex == domain.comm.rank
-        self._search = ContactSearch(self.surface.faces, self._owned, start, 0.0)
+        self._search = ContactSearch(
+            self.surface.faces,
+            self._owned,
+            start,
+            0.0,
+        )
         self.begin_step()
         part, mesh = self._search.part_at(start)
         crosses = ipctk.has_intersections(mesh, part.restrict(start))
@@ -122,7 +127,10 @@ class SelfContact:
         if distance_mm is None:
             gaps = np.full(len(start), np.inf)
             self._lower_gaps(gaps, self._search.near(start))
-            gaps = np.min(domain.comm.allgather(gaps), axis=0)
+            gaps = np.min(
+                domain.comm.allgather(gaps),
+                axis=0,
+            )
             # round-off must not make a pair of surface elements exactly at the limit
             self._max_mm = MAX_GAP_FRACTION * small_gap_mm(gaps)
             self.begin_step()
@@ -137,7 +145,10 @@ class SelfContact:
         count = len(self._rest)
         first, second = self._edges.T
         ones = np.ones(len(self._edges))
-        one_way = sparse.coo_array((ones, (first, second)), shape=(count, count))
+        one_way = sparse.coo_array(
+            (ones, (first, second)),
+            shape=(count, count),
+        )
         links = (one_way + one_way.T + sparse.eye_array(count)).tocsr()
         # nonzero where a few edges connect a vertex in pairs (row) and another one
         connections = links[in_pairs]
@@ -170,7 +181,10 @@ class SelfContact:
         if self._stiffens:
             # the first residual of the step needs them again
             self._near = self._search.near(self._rest)
-            gap_mm = self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN)
+            gap_mm = self.domain.comm.allreduce(
+                self._near.gap_mm,
+                op=MPI.MIN,
+            )
             self.stiffness_pa *= stiffening(gap_mm / self.distance_mm)
         self._potential = ipctk.BarrierPotential(
             BARRIER,
@@ -270,7 +284,10 @@ class SelfContact:
     def smallest_distance_mm(self, u: Floats) -> float:
         """Return the smallest distance between the two sides of a pair, infinite
         without pairs."""
-        return self.domain.comm.allreduce(self.near_pairs(u).gap_mm, op=MPI.MIN)
+        return self.domain.comm.allreduce(
+            self.near_pairs(u).gap_mm,
+            op=MPI.MIN,
+        )
 
     def pair_count(self, u: Floats) -> int:
         """Return the number of pairs within the contact distance."""

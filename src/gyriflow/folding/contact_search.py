@@ -101,7 +101,10 @@ class NearPairs:
         """Return the vertices of each pair, as numbers of the part's vertices."""
         found = []
         for i in range(len(self.pairs)):
-            vertices = self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces)
+            vertices = self.pairs[i].vertex_ids(
+                self.mesh.edges,
+                self.mesh.faces,
+            )
             # negative numbers stand for missing vertices
             found.append([vertex for vertex in vertices if vertex >= 0])
         return found
@@ -204,12 +207,20 @@ class ContactSearch:
     ) -> tuple[SurfacePart, SearchRange]:
         margin = PART_MARGIN_MM
         for places in others:
-            margin = max(margin, float(np.abs(places - first).max()))
+            margin = max(
+                margin,
+                float(np.abs(places - first).max()),
+            )
         if self._owned.all():
             # a single rank has the whole surface
             margin = np.inf
         covered = SearchRange(first, first, self._distance / 2 + margin)
-        part = part_of_surface(first, self._faces, self._owned, 2 * covered.reach)
+        part = part_of_surface(
+            first,
+            self._faces,
+            self._owned,
+            2 * covered.reach,
+        )
         return part, covered
 
     def _candidates_at(self, *positions: Floats) -> ipctk.Candidates | None:
@@ -293,14 +304,20 @@ def _parallel_edges(
 ) -> Mask:
     """Return for each pair whether its two edges (e, 2) are parallel at (p, 3)
     positions of their vertices."""
-    numbers = np.array([(pair.edge0_id, pair.edge1_id) for pair in pairs], np.int64)
+    numbers = np.array(
+        [(pair.edge0_id, pair.edge1_id) for pair in pairs],
+        np.int64,
+    )
     # of the edges in pairs only, which are few: this is called at each evaluation of
     # forces
     ends = positions[edges[numbers.reshape(-1, 2)]]
     directions = ends[:, :, 1] - ends[:, :, 0]
     first = directions[:, 0]
     second = directions[:, 1]
-    crosses = np.linalg.norm(np.cross(first, second), axis=1)
+    crosses = np.linalg.norm(
+        np.cross(first, second),
+        axis=1,
+    )
     lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
     return np.asarray(crosses < PARALLEL_TOL * lengths)
 

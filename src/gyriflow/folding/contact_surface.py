@@ -72,7 +72,12 @@ class SurfacePart:
         result.ee_collisions = [
             pair
             for pair in pairs.ee_collisions
-            if owned[min(lowest[pair.edge0_id], lowest[pair.edge1_id])]
+            if owned[
+                min(
+                    lowest[pair.edge0_id],
+                    lowest[pair.edge1_id],
+                )
+            ]
         ]
         result.fv_collisions = [
             pair for pair in pairs.fv_collisions if owned[pair.vertex_id]
@@ -148,7 +153,11 @@ class ContactSurface:
     def displacement_mm(self, u: Floats) -> Floats:
         """Return the (s, 3) displacements in mm from those of the local nodes (k, 3) in
         m."""
-        nodal = gather(self.domain.comm, u[self._local], self._gathered_rows)
+        nodal = gather(
+            self.domain.comm,
+            u[self._local],
+            self._gathered_rows,
+        )
         return np.asarray(self.weights @ nodal * MM_PER_M)
 
     def nodal_sum(self, part: SurfacePart, values: Floats) -> Floats:
@@ -183,7 +192,10 @@ class ContactSurface:
         for block in (own, *comm.alltoall(rows_for)):
             if block is not None:
                 rows = rows + block
-        counts = np.zeros((self.domain.n_owned, 3), dtype=PETSc.IntType)
+        counts = np.zeros(
+            (self.domain.n_owned, 3),
+            dtype=PETSc.IntType,
+        )
         counts[self._local] = np.diff(rows.indptr).reshape(-1, 3)
         # owned rows are in the order of the nodes
         start = np.concatenate([[0], np.cumsum(counts)]).astype(PETSc.IntType)
@@ -206,7 +218,11 @@ class ContactSurface:
             return
         self._part = part
         self._part_weights = self.weights[part.vertices]
-        components = sparse.kron(self._part_weights, np.eye(3), format="csr")
+        components = sparse.kron(
+            self._part_weights,
+            np.eye(3),
+            format="csr",
+        )
         # stored by columns like the stiffness, so that products need no conversion
         self._nodes_to_part = components.tocsc()
         self._part_to_nodes = components.T

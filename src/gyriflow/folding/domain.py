@@ -38,7 +38,10 @@ for name in (
     os.environ.setdefault(name, "1")
 
 # dolfinx numbers the nodes on edges from the last edge to the first
-TO_DOLFINX = {1: [0, 1, 2, 3], 2: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4]}
+TO_DOLFINX = {
+    1: [0, 1, 2, 3],
+    2: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4],
+}
 FROM_DOLFINX = {order: np.argsort(nodes) for order, nodes in TO_DOLFINX.items()}
 GRADIENTS_AT_NODES = shape_slopes(NODE_COORDINATES)
 
@@ -74,11 +77,22 @@ def bisect_points(positions: Floats, count: int) -> Ints:
             box[inside] = first
             continue
         axis = np.ptp(positions[inside], axis=0).argmax()
-        inside = inside[np.argsort(positions[inside, axis], kind="stable")]
+        inside = inside[
+            np.argsort(
+                positions[inside, axis],
+                kind="stable",
+            )
+        ]
         low = number // 2
         cut = len(inside) * low // number
         stack.append((inside[:cut], first, low))
-        stack.append((inside[cut:], first + low, number - low))
+        stack.append(
+            (
+                inside[cut:],
+                first + low,
+                number - low,
+            )
+        )
     return box
 
 
@@ -101,7 +115,12 @@ class Domain:
         self.comm = comm
         self.positions: Floats = np.array(mesh.vertices) * M_PER_MM
         self.order = mesh.order
-        element = basix.ufl.element("Lagrange", "tetrahedron", self.order, shape=(3,))
+        element = basix.ufl.element(
+            "Lagrange",
+            "tetrahedron",
+            self.order,
+            shape=(3,),
+        )
         # from rank 0, without ghost cells
         n_read = len(mesh.tets) if comm.rank == 0 else 0
         n_points = len(mesh.vertices) if comm.rank == 0 else 0
@@ -230,7 +249,10 @@ class Domain:
 
     def min_over_ranks(self, local_values: Floats) -> float:
         """Return the smallest value of all ranks."""
-        return self.comm.allreduce(float(local_values.min(initial=np.inf)), op=MPI.MIN)
+        return self.comm.allreduce(
+            float(local_values.min(initial=np.inf)),
+            op=MPI.MIN,
+        )
 
     def locate_minimum(
         self,
@@ -240,11 +262,22 @@ class Domain:
     ) -> tuple[float, int, Floats]:
         """Return the smallest of the local values over all ranks, with its index in the
         file and its position."""
-        smallest = (np.inf, -1, np.full(3, np.nan))
+        smallest = (
+            np.inf,
+            -1,
+            np.full(3, np.nan),
+        )
         if len(values):
             i = int(values.argmin())
-            smallest = (float(values[i]), int(indices[i]), positions[i])
-        return min(self.comm.allgather(smallest), key=lambda entry: entry[:2])
+            smallest = (
+                float(values[i]),
+                int(indices[i]),
+                positions[i],
+            )
+        return min(
+            self.comm.allgather(smallest),
+            key=lambda entry: entry[:2],
+        )
 
     def local_facets(self, facets: Ints, tags: Ints) -> dolfinx.mesh.MeshTags:
         """Return the tags (f,) of boundary facets (f, 3), vertex indices of the file,

@@ -218,7 +218,10 @@ class ElasticFit:
         self._moved_straight = False
         self._start_volumes = volumes_between(mesh.vertices, self._kept_open)
         self._surface, self._used = boundary_surface(mesh)
-        is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
+        is_outer = np.isin(
+            np.arange(len(mesh.vertices)),
+            self._used,
+        )
         all_outer = self._kept_open[is_outer[self._kept_open].all(axis=1)]
         self._inner_moves_mm = np.where(is_outer, 0.0, np.inf)
         self._outer_moves_mm = np.zeros(len(mesh.vertices))
@@ -254,7 +257,11 @@ class ElasticFit:
         """Return the (c, 3, 3) edges of the solver's elements from their first corners,
         as columns."""
         corners = self.positions_mm[self._cells]
-        return np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        return np.swapaxes(
+            corners[:, 1:] - corners[:, :1],
+            1,
+            2,
+        )
 
     @property
     def boundary(self) -> TriangleMesh:
@@ -276,7 +283,11 @@ class ElasticFit:
         start = self.positions_mm
         boundary = self.boundary
         n_passed = len(self._passed)
-        motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
+        motion = rigid_fit(
+            shape[self._used],
+            boundary.vertices,
+            vertex_areas(boundary),
+        )
         goal = transform_points(shape, motion)
         lengths = np.full(len(self._used), SPRING_LENGTH_MM)
         for steps_left in range(self._step_count(goal), 0, -1):
@@ -335,8 +346,14 @@ class ElasticFit:
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
         pull = transform_points(goals, motion) - boundary.vertices
         length = np.linalg.norm(pull, axis=1, keepdims=True)
-        longest_mm = max(MAX_PULL_MM, 2 * math.sqrt(np.mean(length**2)))
-        pull *= np.minimum(1.0, longest_mm / np.maximum(length, 1e-9))
+        longest_mm = max(
+            MAX_PULL_MM,
+            2 * math.sqrt(np.mean(length**2)),
+        )
+        pull *= np.minimum(
+            1.0,
+            longest_mm / np.maximum(length, 1e-9),
+        )
         for length_mm in CLOSE_SPRING_LENGTHS_MM:
             lengths = np.full(len(goals), length_mm)
             lengths[self._near_flat_elements()] = FREED_SPRING_LENGTH_MM
@@ -437,7 +454,11 @@ class ElasticFit:
         if self._moved_straight:
             return []
         start = self.positions_mm
-        places, stops = self._stops(before, self._aligned(start, before), passed)
+        places, stops = self._stops(
+            before,
+            self._aligned(start, before),
+            passed,
+        )
         # changes around faults flatten elements
         last = stops[-1] if stops else before
         places = self._opened_after(last, places)
@@ -491,7 +512,11 @@ class ElasticFit:
             faults = self._faults_between(before, after)
         if len(faults):
             text = "%d elements or faces are inverted or cross near %s mm on the way"
-            log.warning(text, len(faults), np.round(faults[0], 1).tolist())
+            log.warning(
+                text,
+                len(faults),
+                np.round(faults[0], 1).tolist(),
+            )
         return untangled, []
 
     def _near_flat_elements(self) -> Mask:
@@ -559,7 +584,12 @@ class ElasticFit:
         """Return how far all but a hundredth of the boundary moves between two shapes,
         without rigid motion."""
         moves = (self._aligned(second, first) - first)[self._used]
-        return float(np.quantile(np.linalg.norm(moves, axis=1), 0.99))
+        return float(
+            np.quantile(
+                np.linalg.norm(moves, axis=1),
+                0.99,
+            )
+        )
 
     def _strain_to(self, goal: Floats) -> Floats:
         """Return the (m, 3, 3) Hencky strain of the pieces from now to a goal."""
@@ -648,13 +678,19 @@ class ElasticFit:
         domain.place(start * M_PER_MM)
         self._contact.begin_step()
         self._springs.draw_to(goals, vertex_areas(self.boundary), lengths)
-        inverse = np.tile(np.eye(3), (len(self._cells), 1, 1, 1))
+        inverse = np.tile(
+            np.eye(3),
+            (len(self._cells), 1, 1, 1),
+        )
         if strain is not None:
             logs = unpacked(problem.points.interpolation @ strain[self._cells])
             inverse = inverse_exponential(logs)
         # as one body, also if its parts are not connected
         one_part = np.zeros_like(domain.part)
-        moduli = np.full((len(self._cells), 1), MODULUS_PA)
+        moduli = np.full(
+            (len(self._cells), 1),
+            MODULUS_PA,
+        )
         # where the stress of flat elements prevents any iteration, without it
         for stretches in (self._flattening(), None):
             problem.set_step(moduli, inverse, stretches, part=one_part)
@@ -730,9 +766,15 @@ class ElasticFit:
         lost = -np.maximum(grown, grown_more)
         flat = np.flatnonzero(lost > MIN_FLATTENING)
         range_of_loss = MAX_FLATTENING - MIN_FLATTENING
-        weight = np.minimum((lost[flat] - MIN_FLATTENING) / range_of_loss, 1.0)
+        weight = np.minimum(
+            (lost[flat] - MIN_FLATTENING) / range_of_loss,
+            1.0,
+        )
         taken_back = weight[:, None, None] * excess[flat]
-        stretches = np.tile(np.eye(3), (len(self._cells), 1, 1, 1))
+        stretches = np.tile(
+            np.eye(3),
+            (len(self._cells), 1, 1, 1),
+        )
         stretches[flat, 0] = exponential(taken_back, MAX_OPENING)
         return stretches
 
@@ -753,7 +795,10 @@ def exponential(logs: Floats, limit: float) -> Floats:
     """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the
     limit count as this."""
     values, axes = np.linalg.eigh(logs)
-    return from_principal(np.exp(np.clip(values, -limit, limit)), axes)
+    return from_principal(
+        np.exp(np.clip(values, -limit, limit)),
+        axes,
+    )
 
 
 def inverse_exponential(logs: Floats) -> Floats:

@@ -133,7 +133,11 @@ class PialSearch:
         gaps = np.linalg.norm(offsets, axis=2)
         least = gaps.min(axis=1, keepdims=True)
         is_nearest = gaps <= least * (1 + TIE_TOL)
-        ranks = np.where(is_nearest, self._rank[candidates], len(self.pial))
+        ranks = np.where(
+            is_nearest,
+            self._rank[candidates],
+            len(self.pial),
+        )
         first = ranks.argmin(axis=1)[:, None]
         chosen = np.take_along_axis(candidates, first, axis=1)
         normals = self.normals[chosen[:, 0]]
@@ -141,7 +145,11 @@ class PialSearch:
         tied = np.flatnonzero(is_other.any(axis=1))
         if len(tied):
             # each of the nearest vertices once, although candidates may repeat
-            vertices = np.where(is_nearest[tied], candidates[tied], chosen[tied])
+            vertices = np.where(
+                is_nearest[tied],
+                candidates[tied],
+                chosen[tied],
+            )
             vertices.sort(axis=1)
             is_new = np.ones(vertices.shape, dtype=bool)
             is_new[:, 1:] = np.diff(vertices, axis=1) != 0

@@ -66,7 +66,12 @@ class LinearElements:
             self._pointer(u, np.float64, nodes.size),
             self._pointer(self.H, np.float64, 9 * count),
             self._pointer(self.weight, np.float64, count),
-            self._pointer(forces, np.float64, nodes.size, is_written=True),
+            self._pointer(
+                forces,
+                np.float64,
+                nodes.size,
+                is_written=True,
+            ),
             self._pointer(places, np.int32, 16 * count),
             self._pointer(values, np.float64, n_values, is_written=True),
         ]
@@ -75,7 +80,10 @@ class LinearElements:
     def _places_in(self, matrix: MatrixCSR) -> NDArray[np.int32]:
         """Return the (16 c,) numbers in a matrix of the blocks of elements' pairs of
         nodes, -1 for those that are omitted."""
-        numbers = np.arange(len(matrix.indices), dtype=np.int32)
+        numbers = np.arange(
+            len(matrix.indices),
+            dtype=np.int32,
+        )
         places = sparse.csr_array((numbers, matrix.indices, matrix.indptr))
         cells = self._domain.cells
         rows = np.repeat(cells, 4, axis=1).ravel()

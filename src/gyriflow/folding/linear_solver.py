@@ -77,7 +77,10 @@ class TwoLevelPreconditioner:
         self._tangent = tangent
         first, end = domain.space.dofmap.index_map.local_range
         self._own = slice(first, end)
-        count = min(MAX_PARTS, max(len(domain.positions) // 50, 1))
+        count = min(
+            MAX_PARTS,
+            max(len(domain.positions) // 50, 1),
+        )
         self._part_of_vertex = bisect_points(domain.positions, count)
         # by global nodes, as the columns of the matrix
         owned_vertices = domain.vertex_of_node[: domain.n_owned]
@@ -120,7 +123,10 @@ class TwoLevelPreconditioner:
     def _set_coarse_level(self) -> None:
         matrix = self._tangent.elastic.matrix
         own = self._own
-        arms = part_arms(self._domain.positions, self._part_of_vertex)[self._vertex]
+        arms = part_arms(
+            self._domain.positions,
+            self._part_of_vertex,
+        )[self._vertex]
         self._motions = PartMotions(self._part[own], arms[own])
         modes = rigid_motions(arms)
         modes[matrix.fixed] = 0.0
@@ -163,7 +169,11 @@ def inverse_blocks(blocks: Floats) -> Floats:
     cofactors = np.stack([of_a, of_b, of_c], axis=1)
     determinants = np.einsum("ni,ni->n", a, of_a)
     # Sylvester's criterion
-    leading_minors = [a[:, 0], of_c[:, 2], determinants]
+    leading_minors = [
+        a[:, 0],
+        of_c[:, 2],
+        determinants,
+    ]
     definite = np.min(leading_minors, axis=0) > 0
     divisors = np.where(definite, determinants, 1.0)
     inverses = cofactors / divisors[:, None, None]

@@ -270,7 +270,10 @@ class NewtonSolver:
             # if the energy's change is within round-off, the residual decides
             is_same = abs(energy - before) <= ENERGY_ROUND_OFF * abs(before)
             if is_lower or (is_smaller and is_same):
-                progress = (before - energy) / max(abs(before), np.finfo(float).tiny)
+                progress = (before - energy) / max(
+                    abs(before),
+                    np.finfo(float).tiny,
+                )
                 return Iterate(trial, energy, progress)
         if before is not None and abs(slope) <= ENERGY_ROUND_OFF * abs(before):
             return Iterate(iterate.residual, before, exhausted=True)
@@ -290,7 +293,10 @@ class NewtonSolver:
         ratio, tet, centre = domain.locate_minimum(
             ratios.min(axis=1), domain.tet_of_cell, centres_mm
         )
-        forces = np.linalg.norm(last.owned.reshape(-1, 3), axis=1)
+        forces = np.linalg.norm(
+            last.owned.reshape(-1, 3),
+            axis=1,
+        )
         negative, vertex, position = domain.locate_minimum(
             -forces, domain.vertex_of_node, nodes_mm
         )

@@ -98,7 +98,11 @@ def log_growth_at_vertices(
     it is now.
     """
     logs = packed(log_stretch(growth, left=True))
-    logs = np.repeat(logs, len(inputs.pieces) // len(logs), axis=0)
+    logs = np.repeat(
+        logs,
+        len(inputs.pieces) // len(logs),
+        axis=0,
+    )
     integrals = integrals_at_vertices(positions_mm, inputs.pieces, logs)
     return smooth_integrals(positions_mm, inputs.pieces, integrals, GROWTH_SMOOTHING_MM)
 

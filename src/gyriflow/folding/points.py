@@ -40,7 +40,11 @@ class IntegrationPoints:
         for a, weight in CUBIC:
             points.append(a + (1 - 4 * a) * np.eye(4))
             weights.append(np.full(4, weight))
-        return cls(order, np.concatenate(points), np.concatenate(weights))
+        return cls(
+            order,
+            np.concatenate(points),
+            np.concatenate(weights),
+        )
 
     @property
     def interpolation(self) -> Floats:
@@ -53,7 +57,10 @@ class IntegrationPoints:
         """The (q, 4, 3) or (q, 10, 3) gradients of the shape functions in the reference
         element, at the points."""
         if self.order == 1:
-            return np.broadcast_to(SLOPES, (len(self.barycentric), *SLOPES.shape))
+            return np.broadcast_to(
+                SLOPES,
+                (len(self.barycentric), *SLOPES.shape),
+            )
         return shape_slopes(self.barycentric)
 
     @property

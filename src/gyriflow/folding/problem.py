@@ -78,7 +78,10 @@ class NonlinearProblem:
         self.contributions: list[Contribution] = []
         # the coefficient of compiled forms; each evaluation sets it
         self._u = dolfinx.fem.Function(domain.space)
-        self._forces = dolfinx.la.vector(domain.space.dofmap.index_map, 3)
+        self._forces = dolfinx.la.vector(
+            domain.space.dofmap.index_map,
+            3,
+        )
         self.points = IntegrationPoints.for_order(domain.order)
         # coordinates in the regular element, and parts of its volume
         self._places = self.points.barycentric[:, 1:].copy()
@@ -118,7 +121,10 @@ class NonlinearProblem:
         self._tangent = Tangent(LaggedTangent(matrix, domain), domain)
         n_cells = len(domain.cells)
         n_points = len(self.points.weights)
-        no_growth = np.tile(np.eye(3), (n_cells, n_points, 1, 1))
+        no_growth = np.tile(
+            np.eye(3),
+            (n_cells, n_points, 1, 1),
+        )
         self.set_step(np.zeros((n_cells, n_points)), no_growth)
 
     def _volume_measure(self) -> ufl.Measure:
@@ -247,7 +253,10 @@ class NonlinearProblem:
                 self._expressions[name] = dolfinx.fem.Expression(
                     self._tensors[name], self._places, jit_options=options
                 )
-        cells = np.arange(len(self.domain.cells), dtype=np.int32)
+        cells = np.arange(
+            len(self.domain.cells),
+            dtype=np.int32,
+        )
         values = self._expressions[name].eval(self.domain.mesh, cells)
         tensors = values.reshape(len(cells), -1, 3, 3)
         if name == "stress":

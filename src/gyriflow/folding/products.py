@@ -72,13 +72,26 @@ class SymmetricProducts:
     ) -> None:
         self._owned = column_map.size_local
         self._columns = columns.astype(np.int32)
-        ends = np.searchsorted(nodes, np.arange(self._owned + 1))
+        ends = np.searchsorted(
+            nodes,
+            np.arange(self._owned + 1),
+        )
         self._ends = ends.astype(np.int32)
         # the C code reads vectors of four numbers, also at the last row of the last
         # block
-        self._blocks = np.zeros(9 * len(nodes) + 1, dtype=np.float32)
-        self._x = dolfinx.la.vector(column_map, 4, dtype=np.float32)
-        self._sums = np.zeros((self._owned, 4), dtype=np.float32)
+        self._blocks = np.zeros(
+            9 * len(nodes) + 1,
+            dtype=np.float32,
+        )
+        self._x = dolfinx.la.vector(
+            column_map,
+            4,
+            dtype=np.float32,
+        )
+        self._sums = np.zeros(
+            (self._owned, 4),
+            dtype=np.float32,
+        )
 
     def take(self, values: Floats, entries: NDArray[np.int32]) -> None:
         """Set the blocks to the given (b,) entries of (·, 3, 3) values."""
@@ -108,7 +121,11 @@ class SymmetricProducts:
             owned,
             (self._ends, np.int32, owned + 1),
             (self._columns, np.int32, 0),
-            (self._blocks, np.float32, 9 * len(self._columns) + 1),
+            (
+                self._blocks,
+                np.float32,
+                9 * len(self._columns) + 1,
+            ),
             (ghosted, np.float32, 4 * owned),
             (self._sums, np.float32, 4 * owned),
             (y, np.float64, 3 * owned),

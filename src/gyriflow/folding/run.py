@@ -76,13 +76,25 @@ def run(
         state = _save_frame(folding, state, parameters.output_weeks[0], folder)
     resumed_after = len(state.rows)
     state, diverged = _simulate(folding, state, folder, key, may_diverge=may_diverge)
-    memory = comm.reduce(_peak_memory_mib(), op=MPI.SUM, root=0)
-    processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
+    memory = comm.reduce(
+        _peak_memory_mib(),
+        op=MPI.SUM,
+        root=0,
+    )
+    processor = comm.reduce(
+        time.process_time(),
+        op=MPI.SUM,
+        root=0,
+    )
     if comm.rank != 0:
         return
     reached = parameters.start_week + state.time_s / SECONDS_PER_GW
     weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
-    join_frames(out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks])
+    join_frames(
+        out / FRAMES,
+        mesh.tets,
+        [frame_path(folder, week) for week in weeks],
+    )
     seconds = time.monotonic() - began
     summary = {
         "tets": len(mesh.tets),
@@ -333,7 +345,10 @@ def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
     """Delete all but the newest two checkpoints of other meshes or parameters, and
     return messages about these two."""
     folders = [path for path in out.glob("checkpoint-*") if path != own]
-    folders.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    folders.sort(
+        key=lambda path: path.stat().st_mtime,
+        reverse=True,
+    )
     for folder in folders[2:]:
         shutil.rmtree(folder, ignore_errors=True)
     return [

@@ -92,7 +92,11 @@ class Folding:
             )
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.newton_tolerance)
-        self.solver = NewtonSolver(self.problem, newton, residual_floor(mesh, stiffest))
+        self.solver = NewtonSolver(
+            self.problem,
+            newton,
+            residual_floor(mesh, stiffest),
+        )
         self.inputs = GrowthInputs(mesh, zones, self.maps, comm.allreduce)
         self.model = growth_model(p, self.inputs)
         self.solved = SolvedStep(
@@ -127,7 +131,11 @@ class Folding:
         displacement = self.domain.gather(u[: self.domain.n_owned])
         positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
-        thickness_mm = value_at(p.thickness_mm, growth.start.week(p, 0.5), self.maps)
+        thickness_mm = value_at(
+            p.thickness_mm,
+            growth.start.week(p, 0.5),
+            self.maps,
+        )
         thickness = float(np.mean(thickness_mm)) * M_PER_MM
         stretch = None
         if p.stress_memory_gw > 0:
@@ -199,7 +207,12 @@ class Folding:
         growth = self.model(start)
         modulus = shear_modulus(p, tissue.weight, tissue.maps, week)
         inverse = growth.inverse(tissue)
-        self.problem.set_step(tissue.at_points(modulus), inverse, stretch, part)
+        self.problem.set_step(
+            tissue.at_points(modulus),
+            inverse,
+            stretch,
+            part,
+        )
         if not p.targets:
             ratio = 1.0 / domain.min_over_ranks(np.linalg.det(inverse))
             if ratio > MAX_STEP_VOLUME_RATIO:
@@ -296,7 +309,11 @@ def advance(
             for warning in filter(None, warnings):
                 log.warning(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
-            after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
+            after = replace(
+                after,
+                step_s=min(2 * after.step_s, p.step_s),
+                successes=0,
+            )
         return after
 
 

@@ -39,7 +39,11 @@ def start_regions(
     )
     points = IntegrationPoints.for_order(mesh.order)
     grown = growth.mean_deformation(
-        Elements(mesh.tets, np.arange(len(mesh.vertices)), points)
+        Elements(
+            mesh.tets,
+            np.arange(len(mesh.vertices)),
+            points,
+        )
     )
     logs = (
         None if grown is None else log_growth_at_vertices(mesh.vertices, inputs, grown)
@@ -56,6 +60,9 @@ def start_regions(
     if parameters.side is None:
         on_left = left_faces(TriangleMesh(mesh.vertices, zones.facets))
     else:
-        on_left = np.full(len(zones.facets), parameters.side == "left")
+        on_left = np.full(
+            len(zones.facets),
+            parameters.side == "left",
+        )
     tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
     return Regions(mesh, zones.facets, fields, *tags)

@@ -122,9 +122,15 @@ def steered_rates(
     # on a ball tangential growth adds no area: feedback raises it until the core no
     # longer grows
     cortex = np.clip(ideal, *bounds)
-    core = np.clip((volume - cortex_volume * cortex) / core_volume, *bounds)
+    core = np.clip(
+        (volume - cortex_volume * cortex) / core_volume,
+        *bounds,
+    )
     # the cortex makes up for a core at its bound
-    cortex = np.clip((volume - core_volume * core) / cortex_volume, *bounds)
+    cortex = np.clip(
+        (volume - core_volume * core) / cortex_volume,
+        *bounds,
+    )
     mean = volume / (cortex_volume + core_volume)
     is_limited = abs(cortex - ideal) > 1e-9 * (abs(mean) + abs(ideal))
     return float(cortex), float(core), is_limited

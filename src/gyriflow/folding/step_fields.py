@@ -89,7 +89,11 @@ def _total_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]
     if "strain" in names:
         search = PialSearch(folding.start, folding.zones.cortex_facets)
         centres = start[domain.corners].mean(axis=1)
-        normals = np.repeat(search.nearest_normals(centres), len(slopes), axis=0)
+        normals = np.repeat(
+            search.nearest_normals(centres),
+            len(slopes),
+            axis=0,
+        )
         fields["total_strain"] = green_lagrange_maximum(total)
         fields["area_stretch"] = areal_stretch(total, normals)
     if "volume_ratio" in names:
@@ -145,5 +149,8 @@ def green_lagrange_maximum(F: Floats) -> Floats:
 def areal_stretch(F: Floats, N: Floats) -> Floats:
     """Return the (c,) ratios of areas, after to before, of planes with unit normals N
     (c, 3) before: det F·|F⁻ᵀ·N|."""
-    turned = np.linalg.solve(F.transpose(0, 2, 1), N[..., None])
+    turned = np.linalg.solve(
+        F.transpose(0, 2, 1),
+        N[..., None],
+    )
     return np.linalg.det(F) * np.linalg.norm(turned[..., 0], axis=1)

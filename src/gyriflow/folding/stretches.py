@@ -21,7 +21,13 @@ def packed(tensors: Floats) -> Floats:
 
 def unpacked(values: Floats) -> Floats:
     """Return the (..., 3, 3) symmetric tensors of (..., 6) values."""
-    tensors = np.empty((*values.shape[:-1], 3, 3))
+    tensors = np.empty(
+        (
+            *values.shape[:-1],
+            3,
+            3,
+        )
+    )
     tensors[..., ROWS, COLUMNS] = values
     tensors[..., COLUMNS, ROWS] = values
     return tensors
@@ -40,7 +46,14 @@ def deformation_gradients(
     elements have a volume before. `slopes` (q, n, 3) are the gradients of the nodes'
     shape functions in the regular element, at the points.
     """
-    found = np.empty((len(cells), len(slopes), 3, 3))
+    found = np.empty(
+        (
+            len(cells),
+            len(slopes),
+            3,
+            3,
+        )
+    )
     across = slopes.transpose(0, 2, 1)
     for chunk in chunks(len(cells)):
         nodes = cells[chunk]

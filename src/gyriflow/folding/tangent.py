@@ -66,7 +66,14 @@ class RigidMotions:
         self._motions = PartMotions(own_part, own_arms)
         # six columns for each part, zero elsewhere
         node = np.arange(len(owned))
-        modes = np.zeros((len(owned), 3, self._parts, 6))
+        modes = np.zeros(
+            (
+                len(owned),
+                3,
+                self._parts,
+                6,
+            )
+        )
         modes[node, :, own_part] = rigid_motions(own_arms)
         self.modes: Floats = modes.reshape(-1, 6 * self._parts)
         gram = domain.sum_over_ranks(self.modes.T @ self.modes)
@@ -108,7 +115,10 @@ class ElasticMatrix:
         n_owned = row_map.size_local
         first_row, _ = row_map.local_range
         self.row_ends = self._blocks.indptr[: n_owned + 1]
-        self.nodes = np.repeat(np.arange(n_owned), np.diff(self.row_ends))
+        self.nodes = np.repeat(
+            np.arange(n_owned),
+            np.diff(self.row_ends),
+        )
         local_columns = self._blocks.indices[: len(self.nodes)]
         self.columns = column_map.local_to_global(local_columns)
         # by global nodes, since columns include nodes of other ranks' elements
@@ -275,7 +285,10 @@ class Tangent:
         for part in self.parts:
             start, columns, values = part.getValuesCSR()
             first_row, _ = part.getOwnershipRange()
-            row = np.repeat(np.arange(len(start) - 1), np.diff(start))
+            row = np.repeat(
+                np.arange(len(start) - 1),
+                np.diff(start),
+            )
             node, component = np.divmod(row, 3)
             other_node, other_component = np.divmod(columns - first_row, 3)
             is_diagonal = node == other_node

@@ -71,7 +71,11 @@ class TargetGrowth(StepGrowth):
     def inverse(self, tissue: Tissue) -> Floats:
         elements = tissue.elements
         is_valid = has_volume(self.goal_mm[elements.vertices], elements.cells)
-        growing = np.where(is_valid[:, None], tissue.at_points(tissue.growing), 0.0)
+        growing = np.where(
+            is_valid[:, None],
+            tissue.at_points(tissue.growing),
+            0.0,
+        )
         inverse, is_limited = inverse_stretch(
             self.deformation(elements), growing, MAX_LOG_STRETCH
         )
@@ -88,10 +92,17 @@ class TargetGrowth(StepGrowth):
         )
 
     def guess(self, fixed: Mask) -> Floats:
-        return np.where(fixed, 0.0, (self.goal_mm - self.start.positions_mm) * M_PER_MM)
+        return np.where(
+            fixed,
+            0.0,
+            (self.goal_mm - self.start.positions_mm) * M_PER_MM,
+        )
 
     def row(self, after: Size) -> dict[str, Any]:
-        counts = {"held_elements": self.held[-1], "shrinking_elements": self.shrinking}
+        counts = {
+            "held_elements": self.held[-1],
+            "shrinking_elements": self.shrinking,
+        }
         return super().row(after) | {"to_path_mm": self.misfit_mm} | counts
 
 
@@ -109,7 +120,13 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
             remedy="End the run earlier, or add brains of later weeks.",
         )
     weeks, shapes = shapes_of_run(p, inputs.maps, inputs.mesh.vertices)
-    return path_through(weeks, shapes, inputs.mesh, p.step_s / SECONDS_PER_GW, p.stops)
+    return path_through(
+        weeks,
+        shapes,
+        inputs.mesh,
+        p.step_s / SECONDS_PER_GW,
+        p.stops,
+    )
 
 
 def shapes_of_run(
@@ -125,7 +142,12 @@ def shapes_of_run(
         if week > p.start_week + WEEK_TOL_GW:
             x, y, z = (maps[f"{name}_{axis}"] for axis in AXES)
             weeks.append(week)
-            shapes.append(np.stack([x, y, z], axis=1))
+            shapes.append(
+                np.stack(
+                    [x, y, z],
+                    axis=1,
+                )
+            )
     return weeks, shapes
 
 

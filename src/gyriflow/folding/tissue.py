@@ -86,10 +86,22 @@ class Tissue:
             linear = points.piecewise_linear.T
             growing = growing[cells] @ linear
             maps = {name: values[cells] @ linear for name, values in maps.items()}
-            value_depth = np.maximum(depth[cells] @ points.interpolation.T, 0.0)
+            value_depth = np.maximum(
+                depth[cells] @ points.interpolation.T,
+                0.0,
+            )
         thickness_mm = value_at(p.thickness_mm, week, maps)
         weight = cortical_weight(value_depth * MM_PER_M, thickness_mm)
-        return cls(elements, nodes, depth, pial, nearest, weight, growing, maps)
+        return cls(
+            elements,
+            nodes,
+            depth,
+            pial,
+            nearest,
+            weight,
+            growing,
+            maps,
+        )
 
     @property
     def places_mm(self) -> Floats:
@@ -125,7 +137,11 @@ class Tissue:
         nodes = cells[mask]
         centres = self.nodes[nodes].mean(axis=1)
         normals = self.pial.normals_from(centres, self.nearest[nodes])
-        return mask, np.repeat(normals[:, None], len(points.weights), axis=1)
+        return mask, np.repeat(
+            normals[:, None],
+            len(points.weights),
+            axis=1,
+        )
 
 
 def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:

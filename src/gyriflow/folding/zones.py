@@ -103,7 +103,10 @@ class Zones:
     @property
     def fixed(self) -> Mask:
         """The mask (n, 3) of the displacement components that are fixed at zero."""
-        fixed = np.zeros((len(self.growth), 3), dtype=bool)
+        fixed = np.zeros(
+            (len(self.growth), 3),
+            dtype=bool,
+        )
         fixed[self.vertices_of(terms.CLAMPED, terms.BASE)] = True
         fixed[self.vertices_of(terms.SIDE_X), 0] = True
         fixed[self.vertices_of(terms.SIDE_Y), 1] = True
@@ -213,7 +216,12 @@ def zones_of_run(
 
     def set_zone(number: int, is_inside: Mask) -> None:
         """Set the zone of elements' faces that are inside with all vertices (f, 3)."""
-        zone[on_whole_faces(is_inside.all(axis=1), mesh.order)] = number
+        zone[
+            on_whole_faces(
+                is_inside.all(axis=1),
+                mesh.order,
+            )
+        ] = number
 
     if p.support == "ellipsoid":
         set_zone(terms.CLAMPED, is_static[facets])
@@ -300,7 +308,11 @@ def _medial_vertices(
     """
     x = mesh.vertices[mesh.tets, 0]
     is_right = x.mean(axis=1) > fissure_x_mm
-    medial = np.where(is_right, x.min(axis=1), x.max(axis=1))
+    medial = np.where(
+        is_right,
+        x.min(axis=1),
+        x.max(axis=1),
+    )
     is_between = (medial > left_plane) & (medial < right_plane)
     return np.unique(mesh.tets[is_between])
 
@@ -344,7 +356,11 @@ def cell_tags(
     """
     x = mesh.vertices[mesh.corners, 0].mean(axis=1)
     left_plane, right_plane = zones.planes_mm
-    hemisphere = np.full(len(x), terms.BRIDGE, dtype=np.int32)
+    hemisphere = np.full(
+        len(x),
+        terms.BRIDGE,
+        dtype=np.int32,
+    )
     hemisphere[x >= right_plane] = terms.RIGHT
     hemisphere[x <= left_plane] = terms.LEFT
     is_growing = zones.growth[mesh.tets].max(axis=1) > 0

@@ -12,7 +12,13 @@ from scipy.spatial.transform import Rotation
 from .triangles import Floats, TriangleMesh, dots, face_normals, transformed
 
 _TURNS = Rotation.create_group("O").as_matrix()
-CUBE_ROTATIONS: Floats = np.array(sorted(_TURNS, key=np.trace, reverse=True))
+CUBE_ROTATIONS: Floats = np.array(
+    sorted(
+        _TURNS,
+        key=np.trace,
+        reverse=True,
+    )
+)
 """The 24 rotations of a cube, the identity first. Every rotation is within 63 degrees
 of one of them."""
 
@@ -234,7 +240,13 @@ def fits_from_all_sides(
     residuals = [fit.residual for fit in coarse]
     distinct: list[int] = []
     for number in np.argsort(residuals, kind="stable").tolist():
-        turns = [_turn_deg(coarse[number], coarse[other]) for other in distinct]
+        turns = [
+            _turn_deg(
+                coarse[number],
+                coarse[other],
+            )
+            for other in distinct
+        ]
         if min(turns, default=np.inf) > distinct_deg:
             distinct.append(number)
     refined = dict.fromkeys([0, *distinct[:candidates]])

@@ -24,8 +24,16 @@ class Deformation:
     affine: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix", frozen(self.matrix, np.float64, 4))
-        object.__setattr__(self, "affine", frozen(self.affine, np.float64, 4))
+        object.__setattr__(
+            self,
+            "matrix",
+            frozen(self.matrix, np.float64, 4),
+        )
+        object.__setattr__(
+            self,
+            "affine",
+            frozen(self.affine, np.float64, 4),
+        )
         if self.displacement.ndim != 4 or self.displacement.shape[3] != 3:
             raise ValueError(
                 "expected an (i, j, k, 3) displacement, found shape"
@@ -42,7 +50,11 @@ class MatchedSurfaces:
     second: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "second", frozen(self.second, np.float64, 3))
+        object.__setattr__(
+            self,
+            "second",
+            frozen(self.second, np.float64, 3),
+        )
         if self.second.shape != self.first.vertices.shape:
             raise ValueError(
                 f"expected {len(self.first.vertices)} matched vertices, found"
@@ -60,7 +72,10 @@ def transform_points(
     """Apply a (4, 4) affine map to (n, 3) points."""
     linear = matrix[:3, :3]
     shift = matrix[:3, 3]
-    return np.asarray(points @ linear.T + shift, dtype=np.float64)
+    return np.asarray(
+        points @ linear.T + shift,
+        dtype=np.float64,
+    )
 
 
 def voxel_index(points: Floats, affine: ArrayLike) -> Floats:

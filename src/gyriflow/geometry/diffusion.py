@@ -56,7 +56,12 @@ def diffuse(
     mass, matrix = _implicit_step(vertices, cells, sigma_mm**2 / 2 / STEPS)
     smooth: Floats = values.reshape(len(values), -1).astype(float)
     for _ in range(STEPS):
-        smooth = _solve(matrix, mass[:, None] * smooth, smooth, tolerance)
+        smooth = _solve(
+            matrix,
+            mass[:, None] * smooth,
+            smooth,
+            tolerance,
+        )
     return smooth.reshape(values.shape)
 
 
@@ -86,7 +91,13 @@ def integrals_at_vertices(
     integrals = []
     for column in values.T:
         parts = np.repeat(column * shares, corners)
-        integrals.append(np.bincount(cells.ravel(), parts, len(vertices)))
+        integrals.append(
+            np.bincount(
+                cells.ravel(),
+                parts,
+                len(vertices),
+            )
+        )
     return np.stack(integrals, axis=1)
 
 
@@ -124,7 +135,12 @@ def harmonic_continuation(
         right = -(to_fixed @ values)
         everywhere = np.zeros((len(vertices), values.shape[1]))
         everywhere[fixed] = values
-        everywhere[free] = _solve(matrix, right, np.zeros_like(right), tolerance)
+        everywhere[free] = _solve(
+            matrix,
+            right,
+            np.zeros_like(right),
+            tolerance,
+        )
         return everywhere
 
     return extend
@@ -148,7 +164,11 @@ def _solve(
         "M": sparse.diags(1.0 / matrix.diagonal()),
     }
     solutions = []
-    for column, guess in zip(right.T, start.T, strict=True):
+    for column, guess in zip(
+        right.T,
+        start.T,
+        strict=True,
+    ):
         solution, failure = cg(matrix, column, guess, **options)
         if failure:
             raise ValueError(

@@ -77,16 +77,32 @@ def _best_move(
     opens the flattest of them."""
     volumes = volumes_between(places, around)
     corner = (around == vertex).argmax(axis=1)
-    opposite = np.take_along_axis(around, np.array(FACES)[corner], axis=1)
+    opposite = np.take_along_axis(
+        around,
+        np.array(FACES)[corner],
+        axis=1,
+    )
     a, b, c = places[opposite.T]
     gradients = -np.cross(b - a, c - a) / 6
     # unknowns: displacement along x, y, z, the smallest ratio, and the largest
     # component of the displacement
     count = len(around)
-    stay_open = np.column_stack([-gradients, start_volumes, np.zeros(count)])
+    stay_open = np.column_stack(
+        [
+            -gradients,
+            start_volumes,
+            np.zeros(count),
+        ]
+    )
     stay_open /= start_volumes[:, None]
     sides = np.vstack([np.eye(3), -np.eye(3)])
-    bound_move = np.column_stack([sides, np.zeros(6), -np.ones(6)])
+    bound_move = np.column_stack(
+        [
+            sides,
+            np.zeros(6),
+            -np.ones(6),
+        ]
+    )
     ratios = volumes / start_volumes
     rows = [stay_open, bound_move]
     limits = [ratios, np.zeros(6)]
@@ -101,7 +117,13 @@ def _best_move(
         [0.0, 0.0, 0.0, -1.0, COST_PER_MM],
         A_ub=np.vstack(rows),
         b_ub=np.concatenate(limits),
-        bounds=[unbounded, unbounded, unbounded, (None, least), (0.0, longest_mm)],
+        bounds=[
+            unbounded,
+            unbounded,
+            unbounded,
+            (None, least),
+            (0.0, longest_mm),
+        ],
     )
     # without a solution, by round-off, the vertex stays
     has_solution = found.status == 0

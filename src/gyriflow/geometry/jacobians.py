@@ -17,7 +17,13 @@ EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 # the eight parts of an element between its nodes: one at each corner, four around the
 # axis from node 4 to node 9
 CORNER_PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
-PARTS = (*CORNER_PARTS, (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
+PARTS = (
+    *CORNER_PARTS,
+    (4, 6, 7, 9),
+    (4, 7, 8, 9),
+    (4, 8, 5, 9),
+    (4, 5, 6, 9),
+)
 FIRST, SECOND = np.transpose(EDGES)
 NODES = np.vstack([np.eye(4), (np.eye(4)[FIRST] + np.eye(4)[SECOND]) / 2])
 """Barycentric coordinates (10, 4) of the nodes."""
@@ -75,7 +81,11 @@ AT_CORNERS = np.flatnonzero(POWERS.max(axis=1) == 3)
 def determinants(matrices: Floats) -> Floats:
     """Return the determinants of (..., 3, 3) matrices, written out: many times faster
     than factorisations."""
-    rows = np.moveaxis(matrices, (-2, -1), (0, 1))
+    rows = np.moveaxis(
+        matrices,
+        (-2, -1),
+        (0, 1),
+    )
     a, b, c = rows[0]
     d, e, f = rows[1]
     g, h, i = rows[2]

@@ -139,9 +139,16 @@ def inside_mask(
     first = np.clip(np.ceil(heights), 0, layers)
     first = first.astype(np.int64)
     # crossings above the volume count in a layer of their own
-    changes = np.zeros((columns, rows, layers + 1), dtype=np.int64)
+    changes = np.zeros(
+        (columns, rows, layers + 1),
+        dtype=np.int64,
+    )
     change = np.where(is_upwards, -1, 1)
-    np.add.at(changes, (*lines.T, first), change)
+    np.add.at(
+        changes,
+        (*lines.T, first),
+        change,
+    )
     winding = changes.cumsum(axis=2)
     is_inside = winding > 0
     return is_inside[..., :layers]
@@ -274,7 +281,10 @@ def match_layers(
     match = match_points(points, normals, mesh)
     misfit = values_at(match, mesh.vertices) - points
     inner_misfit = values_at(match, inner_of_mesh) - inner
-    distance = np.linalg.norm(np.hstack([misfit, inner_misfit]), axis=1)
+    distance = np.linalg.norm(
+        np.hstack([misfit, inner_misfit]),
+        axis=1,
+    )
     # a vertex is an edge with equal ends
     vertices = np.arange(len(mesh.vertices))
     pairs, _ = edges(mesh)
@@ -287,7 +297,10 @@ def match_layers(
     nearest = nearest[rows]
     match.corners[rows] = ends[nearest][:, [0, 1, 1]]
     match.weights[rows] = [0.5, 0.5, 0.0]
-    match.distance_mm[rows] = np.linalg.norm(places[nearest] - points[rows], axis=1)
+    match.distance_mm[rows] = np.linalg.norm(
+        places[nearest] - points[rows],
+        axis=1,
+    )
     match.agrees[:] = True
     return match
 
@@ -346,6 +359,9 @@ def barycentric(points: Floats, triangles: Floats) -> Floats:
     third = (uu * wv - uv * wu) / size
     second[flat] = 0.0
     third[flat] = 0.0
-    weights = np.stack([1.0 - second - third, second, third], axis=1)
+    weights = np.stack(
+        [1.0 - second - third, second, third],
+        axis=1,
+    )
     weights = np.clip(weights, 0.0, 1.0)
     return weights / weights.sum(axis=1, keepdims=True)

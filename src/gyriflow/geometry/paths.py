@@ -64,7 +64,11 @@ def path_through(
     for shape in shapes[1:]:
         motion = rigid_fit(shape, aligned[-1], sizes)
         aligned.append(transform_points(shape, motion))
-    at, places = merged_shapes(np.asarray(weeks, dtype=float), np.stack(aligned), stops)
+    at, places = merged_shapes(
+        np.asarray(weeks, dtype=float),
+        np.stack(aligned),
+        stops,
+    )
     velocities = limited_velocities(at, places)
     # by interval, since velocities may differ on the two sides of a week: control
     # points of Bernstein's polynomials
@@ -77,10 +81,17 @@ def path_through(
         after_first = first + velocities[i] * length / 3
         before_last = last - velocities[i + 1] * length / 3
         control = np.stack([first, after_first, before_last, last])
-        steps = max(1, int(np.ceil(length / step_gw - 1e-6)))
+        steps = max(
+            1,
+            int(np.ceil(length / step_gw - 1e-6)),
+        )
         inverted.append(_straighten(control, steps, mesh))
         controls.append(control)
-    return Path(at, BPoly(np.stack(controls, axis=1), at), inverted)
+    return Path(
+        at,
+        BPoly(np.stack(controls, axis=1), at),
+        inverted,
+    )
 
 
 def _straighten(
@@ -143,7 +154,11 @@ def merged_shapes(
     mean_places[0] = places[0]
     merged = places.copy()
     keep = np.ones(len(weeks), dtype=bool)
-    is_stop = np.isin(np.arange(len(weeks)), observed, invert=True)
+    is_stop = np.isin(
+        np.arange(len(weeks)),
+        observed,
+        invert=True,
+    )
     for number, group in enumerate(groups):
         if len(group) == 1:
             continue
@@ -171,10 +186,16 @@ def limited_velocities(weeks: Floats, places: Floats) -> Floats:
     steps = np.diff(places, axis=0)
     durations = np.diff(weeks)
     speeds = np.linalg.norm(steps, axis=2) / durations[:, None]
-    slower = np.minimum(speeds[:-1], speeds[1:])
+    slower = np.minimum(
+        speeds[:-1],
+        speeds[1:],
+    )
     limits = MAX_VELOCITY_RATIO * slower
     inner = velocities[1:-1]
     lengths = np.linalg.norm(inner, axis=2)
-    factors = np.minimum(1.0, limits / np.maximum(lengths, 1e-12))
+    factors = np.minimum(
+        1.0,
+        limits / np.maximum(lengths, 1e-12),
+    )
     inner *= factors[..., None]
     return velocities

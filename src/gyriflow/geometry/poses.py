@@ -13,7 +13,10 @@ from .triangles import Floats
 
 LPS_TO_RAS: Floats = np.diag([-1.0, -1.0, 1.0, 1.0])
 """Also the motion from RAS to LPS: it is its own inverse."""
-CONVENTIONS: dict[str, Floats] = {"ras": np.eye(4), "lps": LPS_TO_RAS}
+CONVENTIONS: dict[str, Floats] = {
+    "ras": np.eye(4),
+    "lps": LPS_TO_RAS,
+}
 """Axes of files, as motions (4, 4) to RAS+."""
 
 
@@ -44,7 +47,10 @@ class Pose:
     def of_file(self, side: str = "whole") -> Floats:
         """Return the (4, 4) motion from the coordinates of a surface file to the
         surface."""
-        return self.files.get(side, self.files.get("whole", self.world))
+        return self.files.get(
+            side,
+            self.files.get("whole", self.world),
+        )
 
     def of_volume(self, path: str) -> Floats:
         """Return the (4, 4) motion from the brain's volumes to its surface; InputError

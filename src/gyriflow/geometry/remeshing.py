@@ -17,7 +17,10 @@ def self_intersecting_faces(mesh: TriangleMesh) -> Mask:
     contacts do not count."""
     document = in_meshlab(mesh)
     document.compute_selection_by_self_intersections_per_face()
-    return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
+    return np.asarray(
+        document.current_mesh().face_selection_array(),
+        dtype=bool,
+    )
 
 
 def remesh(

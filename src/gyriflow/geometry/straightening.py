@@ -66,7 +66,10 @@ class InnerSides:
     def of(cls, mesh: TetrahedralMesh) -> "InnerSides":
         """Return the inner sides of a mesh of quadratic elements."""
         middles = mesh.tets[:, 4:]
-        ends = np.full((len(mesh.vertices), 2), -1)
+        ends = np.full(
+            (len(mesh.vertices), 2),
+            -1,
+        )
         ends[middles] = mesh.tets[:, EDGES]
         on_surface, _ = boundary_faces(mesh)
         ends[on_surface] = -1

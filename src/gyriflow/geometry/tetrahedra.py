@@ -68,7 +68,13 @@ TRIANGLES_OF_ORDER = {
 """Corners (4, 1, 3) or nodes (4, 4, 3) of the triangles of the faces."""
 # the linear elements between the nodes of a quadratic one: at its corners, and around
 # the diagonal from node 6 to 8
-PIECES = (*CORNER_PARTS, (6, 8, 4, 5), (6, 8, 5, 9), (6, 8, 9, 7), (6, 8, 7, 4))
+PIECES = (
+    *CORNER_PARTS,
+    (6, 8, 4, 5),
+    (6, 8, 5, 9),
+    (6, 8, 9, 7),
+    (6, 8, 7, 4),
+)
 PIECES_OF_ORDER = {1: 1, 2: 4}
 """Number of triangles of a face; with nodes on its edges, one at each corner and one in
 the middle."""
@@ -179,7 +185,11 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
         for normal in (pq, qr, rp, opposite):
             surface2 += np.linalg.norm(normal, axis=1)
         centre = np.zeros_like(p)
-        for edge, normal in ((p, qr), (q, rp), (r, pq)):
+        for edge, normal in (
+            (p, qr),
+            (q, rp),
+            (r, pq),
+        ):
             squared_length = dots(edge, edge)
             centre += squared_length[:, None] * normal
         product = surface2 * np.linalg.norm(centre, axis=1)
@@ -220,9 +230,15 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
     """Add nodes at the midpoints of a linear mesh's edges; corners keep their
     numbers."""
     count = len(mesh.vertices)
-    pairs = np.sort(mesh.tets[:, EDGES], axis=2)
+    pairs = np.sort(
+        mesh.tets[:, EDGES],
+        axis=2,
+    )
     # one number per edge: much faster than comparing rows
-    edges, place = np.unique(pairs @ [count, 1], return_inverse=True)
+    edges, place = np.unique(
+        pairs @ [count, 1],
+        return_inverse=True,
+    )
     first, second = np.divmod(edges, count)
     ends = np.stack([first, second], axis=1)
     middles = mesh.vertices[ends].mean(axis=1)
@@ -281,7 +297,10 @@ def on_whole_faces(selected: Mask, order: int) -> Mask:
     """Return the (f,) mask of the triangles of `boundary_faces` whose whole face is
     selected."""
     pieces = PIECES_OF_ORDER[order]
-    return np.repeat(selected.reshape(-1, pieces).all(axis=1), pieces)
+    return np.repeat(
+        selected.reshape(-1, pieces).all(axis=1),
+        pieces,
+    )
 
 
 def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
@@ -303,7 +322,10 @@ def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     nodes = np.hstack([corners, triangles[3::4]])
     nodes = np.repeat(nodes, len(LATTICE), axis=0)
     # shape functions on a tetrahedron's face with the nodes 0, 1, 2 and 4, 5, 6
-    places = np.pad(LATTICE / FINER, ((0, 0), (0, 1)))
+    places = np.pad(
+        LATTICE / FINER,
+        ((0, 0), (0, 1)),
+    )
     on_lattice = shape_values(places)
     on_lattice = on_lattice[:, [0, 1, 2, 4, 5, 6]]
     weights = np.tile(on_lattice, (len(corners), 1))

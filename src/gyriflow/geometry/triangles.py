@@ -84,7 +84,14 @@ def signed_volume(mesh: TriangleMesh) -> float:
     """Return the enclosed volume in mm³, negative if the faces are oriented inward
     (divergence theorem)."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+    return float(
+        np.einsum(
+            "ij,ij->",
+            a,
+            np.cross(b, c),
+        )
+        / 6.0
+    )
 
 
 def area_cm2(mesh: TriangleMesh) -> float:
@@ -114,7 +121,11 @@ def dots(first: Floats, second: Floats) -> Floats:
 
 def unit(vectors: Floats) -> Floats:
     """Return (n, 3) vectors scaled to length one; zero vectors stay zero."""
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    lengths = np.linalg.norm(
+        vectors,
+        axis=-1,
+        keepdims=True,
+    )
     return vectors / np.where(lengths > 0, lengths, 1.0)
 
 
@@ -173,7 +184,10 @@ def edge_lengths(vertices: Floats, pairs: Indices) -> Floats:
     """Return the (e,) lengths of edges given as (e, 2) vertex indices, in the vertices'
     unit."""
     first, second = pairs.T
-    return np.linalg.norm(vertices[second] - vertices[first], axis=1)
+    return np.linalg.norm(
+        vertices[second] - vertices[first],
+        axis=1,
+    )
 
 
 def rms_length(vectors: Floats) -> float:
@@ -255,7 +269,11 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
     pairs = [order[of_two[:, None] + [0, 1]]]
     overlapping = []
     is_crowded = uses > 2
-    for place, number in zip(first[is_crowded], uses[is_crowded], strict=True):
+    for place, number in zip(
+        first[is_crowded],
+        uses[is_crowded],
+        strict=True,
+    ):
         around = order[place : place + number]
         angles = _angles_around_edge(mesh, around)
         forward = is_forward[around]
@@ -280,7 +298,10 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
     _, first = np.unique(corner, return_index=True)
     if len(first) == n_used_vertices(faces):
         return mesh
-    return TriangleMesh(mesh.vertices[start[first]], corner.reshape(-1, 3))
+    return TriangleMesh(
+        mesh.vertices[start[first]],
+        corner.reshape(-1, 3),
+    )
 
 
 def _angles_around_edge(mesh: TriangleMesh, half_edges: Ints) -> Floats:
@@ -290,8 +311,18 @@ def _angles_around_edge(mesh: TriangleMesh, half_edges: Ints) -> Floats:
     start = mesh.faces[face, corner]
     end = mesh.faces[face, (corner + 1) % 3]
     apex = mesh.faces[face, (corner + 2) % 3]
-    low = mesh.vertices[min(start[0], end[0])]
-    high = mesh.vertices[max(start[0], end[0])]
+    low = mesh.vertices[
+        min(
+            start[0],
+            end[0],
+        )
+    ]
+    high = mesh.vertices[
+        max(
+            start[0],
+            end[0],
+        )
+    ]
     axis = high - low
     axis /= np.linalg.norm(axis)
     arms = mesh.vertices[apex] - low
@@ -334,7 +365,10 @@ def connected(pairs: Indices, count: int) -> Ints:
     """Return the (count,) number of the connected component of each of `count` nodes,
     from (k, 2) links."""
     ones = np.ones(len(pairs))
-    graph = scipy.sparse.coo_matrix((ones, pairs.T), shape=(count, count))
+    graph = scipy.sparse.coo_matrix(
+        (ones, pairs.T),
+        shape=(count, count),
+    )
     components = scipy.sparse.csgraph.connected_components
     _, component = components(graph, directed=False)
     return component
@@ -361,7 +395,10 @@ def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:
         a = points[start][:, None]
         b = points[middle]
         c = points[end][:, None]
-        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+        areas = 0.5 * np.linalg.norm(
+            np.cross(b - a, c - a),
+            axis=-1,
+        )
         before = cost[start[:, None], middle]
         after = cost[middle, end[:, None]]
         totals = before + after + areas
@@ -418,7 +455,10 @@ def used_part(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
     """Return the surface without vertices that have no face, and the indices of the
     others in `mesh`."""
     used, faces = np.unique(mesh.faces, return_inverse=True)
-    return TriangleMesh(mesh.vertices[used], faces.reshape(-1, 3)), used
+    return TriangleMesh(
+        mesh.vertices[used],
+        faces.reshape(-1, 3),
+    ), used
 
 
 def submesh(mesh: TriangleMesh, keep: Mask) -> tuple[TriangleMesh, Ints]:
@@ -441,7 +481,10 @@ def merged(*meshes: TriangleMesh) -> TriangleMesh:
 
 def flipped(mesh: TriangleMesh) -> TriangleMesh:
     """Return the surface with every face flipped."""
-    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    return TriangleMesh(
+        mesh.vertices,
+        mesh.faces[:, ::-1],
+    )
 
 
 def transformed(mesh: TriangleMesh, matrix: ArrayLike) -> TriangleMesh:

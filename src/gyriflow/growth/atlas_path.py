@@ -98,7 +98,11 @@ def ages_by_size(
     sizes = np.log(volumes)
     # the curve is flat where brains do not grow; beyond its ends ages follow its rate
     # there, or its mean rate if higher
-    ages = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)
+    ages = np.interp(
+        sizes,
+        logs + 1e-9 * np.arange(len(logs)),
+        curve.weeks,
+    )
     mean_rate = (logs[-1] - logs[0]) / (curve.weeks[-1] - curve.weeks[0])
     for end, is_beyond in ((0, sizes < logs[0]), (-1, sizes > logs[-1])):
         week = curve.weeks[end]
@@ -149,7 +153,12 @@ class AtlasPath:
     @property
     def observed(self) -> Ints:
         """The numbers of the weeks with a brain of the atlas."""
-        return np.flatnonzero(~np.isin(self.shapes.weeks, self.shapes.stops))
+        return np.flatnonzero(
+            ~np.isin(
+                self.shapes.weeks,
+                self.shapes.stops,
+            )
+        )
 
     def ages(self, others: Sequence[Mapping[float, float]] = ()) -> AtlasAges:
         """Return the ages by size of the atlas' brains in all its weeks; `others` as
@@ -165,7 +174,11 @@ class AtlasPath:
     def knots(self, ages: AtlasAges) -> Floats:
         """Return the age by size of each shape, stops between those of their
         neighbours."""
-        return np.interp(self.shapes.weeks, ages.weeks, ages.ages)
+        return np.interp(
+            self.shapes.weeks,
+            ages.weeks,
+            ages.ages,
+        )
 
     def carry(self, points: Floats, week: float) -> Floats:
         """Return the (k, n, 3) places in all weeks of (n, 3) points inside the brain of
@@ -191,7 +204,11 @@ class AtlasPath:
         frames = _frames(boundary, face)
         offset = np.einsum("nij,ni->nj", frames, others - nearest)
         carried = np.empty((len(self.shapes.weeks), *points.shape))
-        for places, shape in zip(carried, self.shapes.positions, strict=True):
+        for places, shape in zip(
+            carried,
+            self.shapes.positions,
+            strict=True,
+        ):
             surface = TriangleMesh(shape[used], boundary.faces)
             places[is_inside] = _weighted(shape[corner_nodes], weights)
             nearest = _weighted(corners(surface)[face], on_face)
@@ -254,7 +271,11 @@ def resample_by_size(
     ratio = np.exp(np.mean(np.log(own_volumes / atlas_volumes)))
     resampled = []
     for week in weeks:
-        inside = np.clip(week, knots[0], knots[-1])
+        inside = np.clip(
+            week,
+            knots[0],
+            knots[-1],
+        )
         shape = positions_at(inside, atlas, knots, sizes)
         volume = sizes_of(mesh, [shape])["volume_ml"][0]
         scale = (ratio * ages.volume(week) / volume) ** (1 / 3)
@@ -275,9 +296,19 @@ def positions_at(
     The later week is first aligned rigidly to the earlier one, with points weighted by
     their (n,) sizes.
     """
-    later = np.searchsorted(np.asarray(weeks), week, side="right")
+    later = np.searchsorted(
+        np.asarray(weeks),
+        week,
+        side="right",
+    )
     # beyond the ends along the line of the first or last two weeks
-    second = int(np.clip(later, 1, len(weeks) - 1))
+    second = int(
+        np.clip(
+            later,
+            1,
+            len(weeks) - 1,
+        )
+    )
     first = second - 1
     part = (week - weeks[first]) / (weeks[second] - weeks[first])
     motion = rigid_fit(atlas[second], atlas[first], sizes)

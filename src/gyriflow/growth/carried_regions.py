@@ -40,7 +40,11 @@ def renumber(
     numbers: Mapping[str, int],
 ) -> Ints:
     """Convert labels to the numbers of their regions; 0 for labels without a name."""
-    regions = np.full(np.shape(labels), NO_REGION, dtype=np.int64)
+    regions = np.full(
+        np.shape(labels),
+        NO_REGION,
+        dtype=np.int64,
+    )
     for label, name in names.items():
         regions[labels == label] = numbers[name]
     return regions
@@ -77,7 +81,11 @@ def regions_from_volume(
             )
         reached.append(near)
         voxels = inside[nearest[near]]
-        by_side[side] = np.full(len(vertices), NO_REGION, dtype=np.int64)
+        by_side[side] = np.full(
+            len(vertices),
+            NO_REGION,
+            dtype=np.int64,
+        )
         by_side[side][near] = regions[tuple(voxels.T)]
     share = float(np.concatenate(reached).mean())
     if share < USUAL_NEAR:
@@ -85,7 +93,10 @@ def regions_from_volume(
         # the surface
         tree = cKDTree(np.concatenate(list(points.values())))
         distance, _ = tree.query(centres, distance_upper_bound=REACH_MM)
-        share = max(share, float(np.isfinite(distance).mean()))
+        share = max(
+            share,
+            float(np.isfinite(distance).mean()),
+        )
     if share < MIN_NEAR:
         raise InputError(
             "the regions do not lie along the pial surface",

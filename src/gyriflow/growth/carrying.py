@@ -61,7 +61,10 @@ def match_surfaces(
     different places: equal triangles alone do not imply correspondence.
     """
     has_same_number = len(first.vertices) == len(second.vertices)
-    if not has_same_number or not np.array_equal(_triangles(first), _triangles(second)):
+    if not has_same_number or not np.array_equal(
+        _triangles(first),
+        _triangles(second),
+    ):
         raise InputError(
             "the surfaces have different vertices or triangles",
             found=f"{len(second.vertices)} vertices and {len(second.faces)} triangles",
@@ -113,7 +116,10 @@ def match_surfaces(
 
 def _triangles(mesh: TriangleMesh) -> Ints:
     """Return the triangles in one order, whatever their orientation."""
-    return np.unique(np.sort(mesh.faces, axis=1), axis=0)
+    return np.unique(
+        np.sort(mesh.faces, axis=1),
+        axis=0,
+    )
 
 
 def _from_centre(points: Floats, weights: Floats) -> Floats:

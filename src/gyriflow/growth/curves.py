@@ -139,7 +139,10 @@ def fitted(
     a week. InputError for other values, and if the sizes decrease.
     """
     weeks_, values_ = _checked(weeks, values, name)
-    order = np.argsort(np.asarray(weeks, dtype=float), kind="stable")
+    order = np.argsort(
+        np.asarray(weeks, dtype=float),
+        kind="stable",
+    )
     source = (
         np.zeros(len(weeks_), int) if sources is None else np.asarray(sources)[order]
     )
@@ -149,7 +152,11 @@ def fitted(
     ends = weeks_[0], weeks_[-1]
     logs = np.log(values_)
     design = splines.design(weeks_, *ends, KNOT_INTERVALS)
-    penalty = splines.penalty(*ends, KNOT_INTERVALS, order=2 if degrees >= 3 else 1)
+    penalty = splines.penalty(
+        *ends,
+        KNOT_INTERVALS,
+        order=2 if degrees >= 3 else 1,
+    )
     strength = splines.strength(design.T @ design, penalty, degrees, name)
     # columns of the levels of the other sources, which are not penalised
     levels = source[:, None] == np.arange(1, n_levels + 1)
@@ -171,7 +178,10 @@ def fitted(
     count = round((weeks_[-1] - weeks_[0]) / SPACING_WEEKS) + 1
     at = np.linspace(*ends, max(2, count))
     rows = splines.design(at, *ends, KNOT_INTERVALS)
-    rows = np.pad(rows, ((0, 0), (0, n_levels)))
+    rows = np.pad(
+        rows,
+        ((0, 0), (0, n_levels)),
+    )
     # rates at their bound of 0 are not free
     free = np.ones(len(coefficients), dtype=bool)
     free[rates] = coefficients[rates] > 1e-8
@@ -253,7 +263,12 @@ def _solve(
     lowest = np.zeros(design.shape[1])
     lowest[0] = -np.inf
     lowest[len(lowest) - n_levels :] = -np.inf
-    found = lsq_linear(rows, right, bounds=(lowest, np.inf), method="bvls")
+    found = lsq_linear(
+        rows,
+        right,
+        bounds=(lowest, np.inf),
+        method="bvls",
+    )
     return np.asarray(found.x)
 
 
@@ -280,7 +295,14 @@ def _robust_weights(
         scatter = 1.4826 * float(np.median(np.abs(residuals[is_first])))
         scatter *= np.sqrt(count / (count - degrees))
         scale = TUKEY * max(scatter, MIN_SCATTER)
-        weights = np.clip(1 - (residuals / scale) ** 2, 0, None) ** 2
+        weights = (
+            np.clip(
+                1 - (residuals / scale) ** 2,
+                0,
+                None,
+            )
+            ** 2
+        )
         coefficients = _solve(design, logs, weights, strength * penalty, n_levels)
         residuals = logs - design @ coefficients
     return weights
@@ -363,7 +385,11 @@ def followed_sizes(
     columns series, quantity, week and value, are needed for `measured`; InputError if
     the start brain's `series` is not in them. `weeks` are the output weeks of the run.
     """
-    at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
+    at = np.arange(
+        weeks[0],
+        weeks[-1] + 1e-9 + SPACING_GW,
+        SPACING_GW,
+    )
     tables = {}
     for quantity in SIZES:
         source = growth.get(quantity)
@@ -378,7 +404,11 @@ def followed_sizes(
                 name=quantity,
                 may_shrink=shrink,
             )
-        by_week = zip(at.tolist(), value(curve, at).tolist(), strict=True)
+        by_week = zip(
+            at.tolist(),
+            value(curve, at).tolist(),
+            strict=True,
+        )
         tables[quantity] = {round(week, 6): size for week, size in by_week}
     return tables
 
@@ -400,7 +430,11 @@ def sizes_on_curves(
     for name in SIZES:
         if SIZES[0] in growth:
             sizes = growth[name]
-            found[name] = tabulated(list(sizes), list(sizes.values()), may_shrink=True)
+            found[name] = tabulated(
+                list(sizes),
+                list(sizes.values()),
+                may_shrink=True,
+            )
         elif curves is not None:
             found[name] = _measured_curve(curves, series, name)
     by_week = {}

@@ -202,7 +202,10 @@ def expected_positions(
     def aligned(places: Floats, onto: Floats) -> Floats:
         return transform_points(places, rigid_fit(places, onto, sizes))
 
-    start = aligned(positions_at(start_week, atlas, atlas_weeks, sizes), mesh.vertices)
+    start = aligned(
+        positions_at(start_week, atlas, atlas_weeks, sizes),
+        mesh.vertices,
+    )
     difference = mesh.vertices - start
     smooth = diffuse(mesh.vertices, pieces, difference, smoothing_mm)
     size = cell_sizes(start, pieces).sum()
@@ -221,7 +224,10 @@ def expected_positions(
         positions.append(aligned(places, start) + scale * remaining)
         kept.append((week, smooth_share, finer_share, difference_mm))
     columns = ["week", "smooth_share", "finer_share", "difference_mm"]
-    return Expectation(np.stack(positions), pd.DataFrame(kept, columns=columns))
+    return Expectation(
+        np.stack(positions),
+        pd.DataFrame(kept, columns=columns),
+    )
 
 
 def predict_shapes(
@@ -258,7 +264,13 @@ def predict_shapes(
     inside = place_in_atlas(mesh, pair, atlas_brain, make_body, open_sulci=open_sulci)
     carried = path.carry(inside, pair_week)
     ages = path.ages(others)
-    grown = resample_by_size(mesh, carried, ages.weeks, ages, path.knots(ages))
+    grown = resample_by_size(
+        mesh,
+        carried,
+        ages.weeks,
+        ages,
+        path.knots(ages),
+    )
     atlas_weeks = ages.weeks - age_shift_gw
     is_later = atlas_weeks > start_week + MIN_AGE_SPACING_GW
     later = [round(week, 2) for week in atlas_weeks[is_later].tolist()]
@@ -278,7 +290,11 @@ def predict_shapes(
     shapes = [WeekShape(start_week, mesh.vertices)]
     _, used = boundary_surface(mesh)
     misfits_mm = {}
-    for week, shape in zip(later, expected.positions[1:], strict=True):
+    for week, shape in zip(
+        later,
+        expected.positions[1:],
+        strict=True,
+    ):
         body.move_to(shape)
         shapes += with_stops(shapes[-1], week, body)
         reached = shapes[-1].positions[used]
@@ -290,9 +306,20 @@ def predict_shapes(
         worst = max(misfits_mm, key=misfits_mm.__getitem__)
         warn_of_distance(f"at most, at GW {worst:g}, the brain", misfits_mm[worst])
     found = SeriesShapes.of(shapes)
-    way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
+    way = path_through(
+        found.weeks,
+        found.positions,
+        mesh,
+        stops=found.stops,
+    )
     between = sorted({*further_weeks} - {*found.weeks})
-    by_week = dict(zip(found.weeks, found.positions, strict=True))
+    by_week = dict(
+        zip(
+            found.weeks,
+            found.positions,
+            strict=True,
+        )
+    )
     for week in between:
         by_week[week] = way(week)
     weeks = sorted(by_week)
@@ -305,7 +332,15 @@ def predict_shapes(
         smoothing_mm=0,
         keep_all=True,
     ).positions
-    atlas = [positions_at(week, carried, path.shapes.weeks, sizes) for week in weeks]
+    atlas = [
+        positions_at(
+            week,
+            carried,
+            path.shapes.weeks,
+            sizes,
+        )
+        for week in weeks
+    ]
     baselines = {
         "atlas": [places[used] for places in atlas],
         "atlas_deformed": [places[used] for places in deformed],

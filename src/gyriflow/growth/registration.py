@@ -62,7 +62,13 @@ MAX_ROTATED_SHARE = 0.7
 rotation."""
 N_POINTS = 3000
 """Number of points of the cerebrum at which starts are compared."""
-_ANGLES = list(product(range(0, 360, 45), range(-90, 91, 45), range(0, 360, 45)))
+_ANGLES = list(
+    product(
+        range(0, 360, 45),
+        range(-90, 91, 45),
+        range(0, 360, 45),
+    )
+)
 _TURNS = Rotation.from_euler("xyz", _ANGLES, degrees=True).as_matrix()
 START_ROTATIONS = sorted(_TURNS, key=np.trace, reverse=True)
 """Rotations of the start, the identity first. Every rotation is within about 35 degrees
@@ -127,13 +133,21 @@ def channels(
     _require_whole(masks[CEREBRUM_BIT])
     if cortex:
         masks[CORTEX_BIT] = _mask(labels, cortex, "cortex")
-    sizes = np.linalg.norm(affine[:3, :3], axis=0)
+    sizes = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
     centres = transform_points(np.argwhere(masks[CEREBRUM_BIT]), affine)
     low = centres.min(axis=0) - MARGIN_MM
     high = centres.max(axis=0) + MARGIN_MM
     # start at a voxel's centre, so that a suitable grid is not resampled
-    index = np.rint(transform_points(low, np.linalg.inv(affine)))
+    index = np.rint(
+        transform_points(
+            low,
+            np.linalg.inv(affine),
+        )
+    )
     low = transform_points(index, affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
@@ -222,7 +236,11 @@ def _intensity(
 ) -> NDArray[np.float32]:
     values, affine = image
     values = np.asarray(values, dtype=np.float32)
-    finite = np.where(np.isfinite(values), values, np.float32(0))
+    finite = np.where(
+        np.isfinite(values),
+        values,
+        np.float32(0),
+    )
     intensity = _resample(finite, affine, grid, shape)
     bright = float(np.quantile(intensity[inside], BRIGHT))
     covered = float((intensity[inside] != 0).mean())
@@ -303,7 +321,10 @@ def register(
     near_cerebrum = binary_dilation(
         earlier.tissue & CEREBRUM_BIT > 0, iterations=rounds
     )
-    images["where"] = _image(near_cerebrum.astype(np.float32), earlier.affine)
+    images["where"] = _image(
+        near_cerebrum.astype(np.float32),
+        earlier.affine,
+    )
     pairs = " ".join(
         f"-w {WEIGHTS[name]:g} -i fixed_{name} moving_{name}" for name in names
     )
@@ -404,7 +425,12 @@ def _find_start(
 
     turn = min(START_ROTATIONS, key=difference)
     for step in REFINED_DEG:
-        angles = list(product((0, -step, step), repeat=3))
+        angles = list(
+            product(
+                (0, -step, step),
+                repeat=3,
+            )
+        )
         nearby = Rotation.from_euler("xyz", angles, degrees=True)
         turn = min(nearby.as_matrix() @ turn, key=difference)
     if difference(turn) >= MAX_ROTATED_SHARE * difference(np.eye(3)):
@@ -548,7 +574,11 @@ def _dice(
 ) -> float:
     first = (earlier.tissue & bit > 0).ravel()
     mask = later.tissue & bit > 0
-    carried = map_coordinates(mask.astype(np.float32), places, order=1)
+    carried = map_coordinates(
+        mask.astype(np.float32),
+        places,
+        order=1,
+    )
     second = carried > 0.5
     both = first & second
     total = first.sum() + second.sum()

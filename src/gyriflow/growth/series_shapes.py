@@ -91,7 +91,10 @@ def fit_onto_surface(
         # a mean of pulls is at most as long as these; near obtuse faces smoothed
         # weights may be zero or negative
         length = np.linalg.norm(move, axis=1, keepdims=True)
-        factor = np.minimum(1.0, reach_mm / np.maximum(length, 1e-9))
+        factor = np.minimum(
+            1.0,
+            reach_mm / np.maximum(length, 1e-9),
+        )
         vertices = vertices + move * factor
     return vertices
 
@@ -122,7 +125,11 @@ def _pulls(
     areas = vertex_areas(surface) * _is_near(backward, reach_mm)
     shares = backward.weights * areas[:, None]
     np.add.at(weight, backward.corners, shares)
-    np.add.at(pull, backward.corners, shares[..., None] * misfit[:, None])
+    np.add.at(
+        pull,
+        backward.corners,
+        shares[..., None] * misfit[:, None],
+    )
     return pull, weight
 
 
@@ -184,7 +191,11 @@ class SeriesShapes:
     def by_week(self) -> list[WeekShape]:
         """Return the shape of each week."""
         shapes = []
-        for week, positions in zip(self.weeks, self.positions, strict=True):
+        for week, positions in zip(
+            self.weeks,
+            self.positions,
+            strict=True,
+        ):
             is_stop = week in self.stops
             shapes.append(WeekShape(week, positions, is_stop))
         return shapes
@@ -419,4 +430,7 @@ def sizes_of(
         surface = TriangleMesh(places[used], boundary.faces)
         areas.append(area_cm2(surface))
         volumes.append(volume_ml(surface))
-    return {"area_cm2": np.array(areas), "volume_ml": np.array(volumes)}
+    return {
+        "area_cm2": np.array(areas),
+        "volume_ml": np.array(volumes),
+    }

@@ -70,10 +70,16 @@ def fetch(
             report(f"{path} already exists")
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        files = {"registry": {path.name: None}, "urls": {path.name: url}}
-        pooch.create(path.parent, "", retry_if_failed=TRIES - 1, **files).fetch(
-            path.name, downloader=download
-        )
+        files = {
+            "registry": {path.name: None},
+            "urls": {path.name: url},
+        }
+        pooch.create(
+            path.parent,
+            "",
+            retry_if_failed=TRIES - 1,
+            **files,
+        ).fetch(path.name, downloader=download)
     report(
         f"{path}: SHA-256 {sha256_of(path)}"
         + ("" if sha256 else " as downloaded; no checksum is known")

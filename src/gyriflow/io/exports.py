@@ -147,7 +147,10 @@ def export_bids(
         )
         sidecars |= _write_maps(place, brain, space, reference)
         if brain.volume and pose.together:
-            write_label_volume(LABELS_FILE.format(*place), _labels(brain, pose.inverse))
+            write_label_volume(
+                LABELS_FILE.format(*place),
+                _labels(brain, pose.inverse),
+            )
             _write_tsv(
                 folder / "dseg.tsv",
                 pd.DataFrame(EXPORTED_TISSUES, columns=["index", "name"]),
@@ -160,7 +163,10 @@ def export_bids(
     if descriptions := _descriptions(brains, places):
         _write_tsv(
             folder / "descriptions.tsv",
-            pd.DataFrame(descriptions.items(), columns=["desc_id", "description"]),
+            pd.DataFrame(
+                descriptions.items(),
+                columns=["desc_id", "description"],
+            ),
         )
     _write_people(folder, observed, names)
     for name, table in tables.items():
@@ -277,7 +283,10 @@ def _write_surfaces(
         named = f"{prefix}_hemi-{side[0].upper()}{desc}_dseg.label.gii"
         _copy(path, named)
     return {
-        kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"}
+        kind: {
+            "Description": f"{kind.capitalize()} surface, RAS+ mm",
+            "Units": "mm",
+        }
         for kind in kinds
     }
 
@@ -330,7 +339,12 @@ def _template(
     if template is None:
         return "", {}
     stem = "_".join(filter(None, names[template.brain]))
-    place = "/".join(filter(None, (*names[template.brain], "anat", stem)))
+    place = "/".join(
+        filter(
+            None,
+            (*names[template.brain], "anat", stem),
+        )
+    )
     surfaces = {
         side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii"
         for side in template.surfaces
@@ -343,7 +357,13 @@ def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
     mesh = transformed(read_surface(brain.volume["surface"]), back)
     (thickness,) = read_vertex_maps(brain.volume["thickness"]).values()
     return LabelVolume(
-        layer_labels(mesh, thickness, start.labels.shape, start.affine), start.affine
+        layer_labels(
+            mesh,
+            thickness,
+            start.labels.shape,
+            start.affine,
+        ),
+        start.affine,
     )
 
 
@@ -429,7 +449,11 @@ def _write_people(
     first = list(OWN_COLUMNS)
     rows = []
     for brain in brains:
-        own = (*names[brain.brain], brain.week, brain.brain)
+        own = (
+            *names[brain.brain],
+            brain.week,
+            brain.brain,
+        )
         row: dict[str, Any] = dict(zip(first, own, strict=True))
         for name, text in brain.covariates.items():
             row[_column_of_input(name)] = text
@@ -446,7 +470,10 @@ def _write_people(
             "sessions": people[varying],
         }
         for subject, part in people.groupby("participant_id"):
-            _write_tsv(folder / str(subject) / f"{subject}_sessions.tsv", part[varying])
+            _write_tsv(
+                folder / str(subject) / f"{subject}_sessions.tsv",
+                part[varying],
+            )
     _write_tsv(folder / "participants.tsv", tables["participants"])
     for name, table in tables.items():
         columns = {}

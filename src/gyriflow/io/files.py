@@ -228,7 +228,15 @@ def _plain(value: Any) -> Any:
 
 def write_json(path: AnyPath, content: Any) -> None:
     """Write plain Python and numpy values as JSON; NaN and infinity become null."""
-    write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + "\n")
+    write_text(
+        path,
+        json.dumps(
+            _plain(content),
+            indent=2,
+            ensure_ascii=False,
+        )
+        + "\n",
+    )
 
 
 def read_json(path: AnyPath) -> Any:
@@ -308,7 +316,11 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
         row: dict[str, str] = {}
         # columns whose names differ only in case are one
         names: dict[str, str] = {}
-        for name, value in zip(head, [*cells, *[""] * len(head)], strict=False):
+        for name, value in zip(
+            head,
+            [*cells, *[""] * len(head)],
+            strict=False,
+        ):
             if not value.isprintable():
                 problem = (
                     "has a line break or another character that is not printed in row"
@@ -357,7 +369,10 @@ def read_tables(paths: Iterable[AnyPath]) -> "pd.DataFrame":
     """Return CSV tables below each other; InputError where one is missing or torn."""
     import pandas as pd
 
-    return pd.concat([read_table(path) for path in paths], ignore_index=True)
+    return pd.concat(
+        [read_table(path) for path in paths],
+        ignore_index=True,
+    )
 
 
 @contextmanager
@@ -369,7 +384,12 @@ def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
     with atomic_write(path) as temporary:
         # in memory first: HDF5 crashes later on where a write of its own has failed, as
         # on a full disk
-        with h5py.File(temporary.name, "w", driver="core", backing_store=False) as file:
+        with h5py.File(
+            temporary.name,
+            "w",
+            driver="core",
+            backing_store=False,
+        ) as file:
             yield file
             file.flush()
             image = file.id.get_file_image()
@@ -481,7 +501,10 @@ def files_below(folder: AnyPath) -> list[Path]:
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
         folders[:] = (
-            sorted(folders, key=lambda name: (here / name).is_symlink())
+            sorted(
+                folders,
+                key=lambda name: (here / name).is_symlink(),
+            )
             if real not in entered
             else []
         )

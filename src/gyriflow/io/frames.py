@@ -168,7 +168,13 @@ def read_pial_frames(
                     TetrahedralMesh(values[POSITIONS], tets)
                 )
             fields = {name: field[pial] for name, field in values.items()}
-            frames[week] = TriangleMesh(fields.pop(POSITIONS), surface.faces), fields
+            frames[week] = (
+                TriangleMesh(
+                    fields.pop(POSITIONS),
+                    surface.faces,
+                ),
+                fields,
+            )
     return frames
 
 

@@ -26,7 +26,10 @@ def lock_file(file: IO, *, wait: bool = False) -> bool:
                 f"this file system has no locks ({error.strerror}): start one run in a"
                 " folder at a time"
             )
-            print(f"gyriflow: warning: {file.name}: {problem}", file=sys.stderr)
+            print(
+                f"gyriflow: warning: {file.name}: {problem}",
+                file=sys.stderr,
+            )
         UNLOCKABLE.add(file.name)
     return True
 
@@ -48,4 +51,7 @@ if sys.platform == "win32":
 else:
 
     def _lock(file: IO, wait: bool) -> None:
-        fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        fcntl.flock(
+            file,
+            fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB),
+        )

@@ -28,7 +28,10 @@ def origin_key(origin: Any, contents_by_path: Mapping[str, str]) -> str | None:
 def present_key(origin: Any) -> str | None:
     """Return the key of an origin with the contents that its files have now; None if
     one cannot be read."""
-    return origin_key(origin, joined_contents(contents(_paths_in(origin), {})))
+    return origin_key(
+        origin,
+        joined_contents(contents(_paths_in(origin), {})),
+    )
 
 
 def joined_contents(found: Mapping[str, Any]) -> dict[str, str]:

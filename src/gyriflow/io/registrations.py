@@ -63,7 +63,11 @@ def read_correspondence(path: AnyPath) -> Correspondence:
     ) as file:
         if "faces" in file:
             return MatchedSurfaces(
-                TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:]
+                TriangleMesh(
+                    file["first"][:],
+                    file["faces"][:],
+                ),
+                file["second"][:],
             )
         return Deformation(
             file["matrix"][:], file["displacement"][:], file["affine"][:]
@@ -150,7 +154,10 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
             )
         for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
-        for group, table in {"ages": shapes.ages, "kept": shapes.kept}.items():
+        for group, table in {
+            "ages": shapes.ages,
+            "kept": shapes.kept,
+        }.items():
             if table is not None:
                 for column in table:
                     file[f"{group}/{column}"] = table[column].to_numpy(dtype=np.float64)

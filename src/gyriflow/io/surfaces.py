@@ -120,7 +120,10 @@ def surface_space_structure(
             expected=expected,
         )
     return (
-        TriangleMesh(vertices, np.rint(faces).astype(np.int64)),
+        TriangleMesh(
+            vertices,
+            np.rint(faces).astype(np.int64),
+        ),
         space,
         structure or _structure_in_name(path),
     )
@@ -140,7 +143,10 @@ def _require_side(
 ) -> None:
     """Raise InputError if a file's structure is the other hemisphere than `side`,
     "left" or "right"."""
-    expected = next((name for key, name in STRUCTURES.items() if key == side), None)
+    expected = next(
+        (name for key, name in STRUCTURES.items() if key == side),
+        None,
+    )
     if expected and structure in STRUCTURES.values() and structure != expected:
         other = next(key for key, name in STRUCTURES.items() if name == structure)
         remedy = (
@@ -176,7 +182,11 @@ def read_hemispheres(
     if spaces[0] != spaces[1]:
         words = " and ".join(
             f"{path} {space or 'no space'}"
-            for path, space in zip((left, right), spaces, strict=True)
+            for path, space in zip(
+                (left, right),
+                spaces,
+                strict=True,
+            )
         )
         log.warning(
             "the files of the hemispheres name different spaces: %s; are they in the"
@@ -237,7 +247,11 @@ def write_brain(
     """Write a brain's surface and its hemispheres to `files`: `whole`, `left` and
     `right` if present, `stl`."""
     write_surface(files.whole, whole)
-    for side, mesh in zip(SIDES, (left, right), strict=True):
+    for side, mesh in zip(
+        SIDES,
+        (left, right),
+        strict=True,
+    ):
         if mesh is not None:
             write_surface(files[side], mesh, STRUCTURES[side], "Pial")
     if stl := files.get("stl"):
@@ -325,7 +339,10 @@ def read_surface_map(
     _require_side(
         path, structure_of(image, path), side or SIDES_BY_STRUCTURE.get(structure or "")
     )
-    values = np.asarray(arrays[0].data, dtype=float).ravel()
+    values = np.asarray(
+        arrays[0].data,
+        dtype=float,
+    ).ravel()
     if len(values) != len(surface.vertices):
         expected = f"{len(surface.vertices)}, the number of vertices of {surface_path}"
         raise InputError(
@@ -507,20 +524,32 @@ def _read_mni_obj(path: Path) -> RawSurface:
     """
     words = path.read_text(encoding="ascii").split()
     n_points = int(words[6])
-    points = np.array(words[7 : 7 + 3 * n_points], dtype=float).reshape(n_points, 3)
+    points = np.array(
+        words[7 : 7 + 3 * n_points],
+        dtype=float,
+    ).reshape(n_points, 3)
     place = 7 + 6 * n_points
     n_faces, coloured_by = int(words[place]), words[place + 1]
     n_colours = {"0": 1, "1": n_faces, "2": n_points}[coloured_by]
     place += 2 + 4 * n_colours
-    ends = np.array(words[place : place + n_faces], dtype=np.int64)
-    if not np.array_equal(ends, 3 * np.arange(1, n_faces + 1)):
+    ends = np.array(
+        words[place : place + n_faces],
+        dtype=np.int64,
+    )
+    if not np.array_equal(
+        ends,
+        3 * np.arange(1, n_faces + 1),
+    ):
         raise InputError(
             "has faces that are no triangles",
             path=path,
             expected="three corners of each face",
         )
     place += n_faces
-    corners = np.array(words[place : place + 3 * n_faces], dtype=np.int64)
+    corners = np.array(
+        words[place : place + 3 * n_faces],
+        dtype=np.int64,
+    )
     return points, corners.reshape(n_faces, 3), None, None
 
 
@@ -687,9 +716,18 @@ def _to_scanner_space(
     sizes.
     """
     moving = [
-        system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)
+        system
+        for system in systems
+        if not np.allclose(
+            system[2],
+            np.eye(4),
+            atol=1e-6,
+        )
     ]
-    space = next((data for data, _, _ in systems if data in SUBJECT_SPACES), None)
+    space = next(
+        (data for data, _, _ in systems if data in SUBJECT_SPACES),
+        None,
+    )
     if space is not None:
         for _, to, _ in moving:
             log.warning(
@@ -704,7 +742,11 @@ def _to_scanner_space(
     for data, to, matrix in sorted(
         into_subject, key=lambda system: SUBJECT_SPACES.index(system[1])
     ):
-        rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)
+        rigid = np.allclose(
+            matrix[:3, :3] @ matrix[:3, :3].T,
+            np.eye(3),
+            atol=RIGID,
+        )
         if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
             problem = (
                 f"has a coordinate-system matrix from {data} to {to} that changes sizes"
@@ -729,7 +771,10 @@ def _to_scanner_space(
         log.warning(text, path, to, size)
     if moving:
         return np.eye(4), None
-    named = next((to for data, to, _ in systems if UNKNOWN not in (data, to)), None)
+    named = next(
+        (to for data, to, _ in systems if UNKNOWN not in (data, to)),
+        None,
+    )
     return np.eye(4), named or next(
         (to for _, to, _ in systems if to in SUBJECT_SPACES), None
     )
@@ -784,12 +829,21 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
             path,
         )
         return np.asarray(vertices, dtype=float), faces, None, None
-    axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
+    axes = np.column_stack(
+        [
+            info["xras"],
+            info["yras"],
+            info["zras"],
+        ]
+    ).astype(float)
     # tkr RAS has the axes of a coronal volume, with columns to the left, rows down,
     # slices forward
     rotation = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     return (
-        np.asarray(vertices @ rotation.T + info["cras"], dtype=float),
+        np.asarray(
+            vertices @ rotation.T + info["cras"],
+            dtype=float,
+        ),
         faces,
         SCANNER,
         None,

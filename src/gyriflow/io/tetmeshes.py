@@ -89,7 +89,10 @@ def write_tetrahedral_mesh(
             file[f"Cell/{name}"] = values
     cells = (mesh.tets, f"{data.name}:/tets")
     points = (mesh.vertices, f"{data.name}:/vertices")
-    write_text(path, document(xdmf_grid("mesh", cells, points, {}, fields)))
+    write_text(
+        path,
+        document(xdmf_grid("mesh", cells, points, {}, fields)),
+    )
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
@@ -97,7 +100,10 @@ def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
     inverted elements."""
     data = Path(path).with_suffix(".h5")
     with reading_hdf5(data, "a tetrahedral mesh", "XDMF with its .h5 file") as file:
-        mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
+        mesh = TetrahedralMesh(
+            file["vertices"][:],
+            file["tets"][:],
+        )
     require_finite(mesh.vertices, data, "coordinates", "points")
     if wrong := int((signed_volumes(mesh) <= 0).sum()):
         raise InputError(
@@ -164,12 +170,20 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
             name, (cells[kind], f"{data.name}:/{kind}"), points, vertex_data, cell_data
         )
 
-    blocks = part("mesh", "tets", tags["tets"], regions.fields) + part(
-        "facets", "facets", tags["facets"], {}
-    )
+    blocks = part(
+        "mesh",
+        "tets",
+        tags["tets"],
+        regions.fields,
+    ) + part("facets", "facets", tags["facets"], {})
     single = [part(name, "tets", [name], {}) for name in tags["tets"]]
     single += [
-        part(f"facet_{name}" if name in tags["tets"] else name, "facets", [name], {})
+        part(
+            f"facet_{name}" if name in tags["tets"] else name,
+            "facets",
+            [name],
+            {},
+        )
         for name in tags["facets"]
     ]
     write_text(path, document(blocks, "".join(single)))
@@ -180,7 +194,10 @@ def read_regions(path: AnyPath) -> Regions:
     missing or invalid."""
     data = Path(path).with_suffix(".h5")
     with reading_hdf5(data, "regions", "regions.h5 of a run") as file:
-        mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
+        mesh = TetrahedralMesh(
+            file["vertices"][:],
+            file["tets"][:],
+        )
         kinds = ("fields", "tets_tags", "facets_tags")
         groups = [
             {name: values[:] for name, values in file[kind].items()} for kind in kinds

@@ -42,7 +42,10 @@ class UnfinishedSeries:
         without an observed brain."""
         with new_hdf5(self.folder / FILE) as file:
             file["weeks"] = np.array(list(weeks))
-            file["stops"] = np.array(list(stops), dtype=np.float64)
+            file["stops"] = np.array(
+                list(stops),
+                dtype=np.float64,
+            )
             # in full precision: folds may lie closer to each other than that of a
             # result
             file["positions"] = positions

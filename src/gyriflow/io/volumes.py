@@ -28,7 +28,12 @@ from .files import AGAIN, AnyPath, atomic_write, reading, require_finite
 
 log = logging.getLogger(__name__)
 
-MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
+MM_PER_NIFTI_UNIT = {
+    "mm": 1.0,
+    "meter": 1e3,
+    "micron": 1e-3,
+    "unknown": 1.0,
+}
 # two header matrices agree if they place every corner within this share of a voxel
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
@@ -180,8 +185,14 @@ def read_values(
             found=form,
             expected=expected,
         )
-    affine = np.array(_affine(image, affine_from, path), dtype=float)
-    sizes = np.linalg.norm(affine[:3, :3], axis=0)
+    affine = np.array(
+        _affine(image, affine_from, path),
+        dtype=float,
+    )
+    sizes = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     if (
         not np.isfinite(affine).all()
         or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod()
@@ -264,7 +275,11 @@ def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
     image.set_sform(volume.affine, code="scanner")
     # a quaternion cannot express shear: if it cannot match the sform, it stays unset
     image.set_qform(volume.affine, code="scanner")
-    if not np.allclose(image.get_qform(), volume.affine, atol=1e-3):
+    if not np.allclose(
+        image.get_qform(),
+        volume.affine,
+        atol=1e-3,
+    ):
         image.set_qform(None, code="unknown")
         image.set_sform(volume.affine, code="scanner")
     with atomic_write(path) as temporary:
@@ -413,7 +428,10 @@ def _nifti_affine(
         raise InputError(
             f"has a broken qform: {error}", path=path, remedy=remedy
         ) from error
-    codes = {"sform": int(header["sform_code"]), "qform": int(header["qform_code"])}
+    codes = {
+        "sform": int(header["sform_code"]),
+        "qform": int(header["qform_code"]),
+    }
     unit = _length_unit(header, path)
     if unit == "unknown":
         log.info("%s: no unit of length in the header, mm taken", path)
@@ -433,12 +451,18 @@ def _nifti_affine(
             remedy=WHICH_MATRIX,
         )
     if len(present) == 2:
-        voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
+        voxel = np.linalg.norm(
+            matrices["sform"][:3, :3],
+            axis=0,
+        ).min()
         difference = matrices["sform"] - matrices["qform"]
         ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]]))
         ends = ends.reshape(3, -1)
         distance = float(
-            np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max()
+            np.linalg.norm(
+                difference[:3, :3] @ ends + difference[:3, 3:],
+                axis=0,
+            ).max()
         )
         if not distance <= AGREEMENT_VOXELS * voxel:
             problem = f"qform and sform disagree by up to {distance:.3g} {unit}"
@@ -464,7 +488,10 @@ def _warn_of_other_sizes(
     """Warn if the sizes of voxels in the header (pixdim), which programs may show, are
     not those of the sform, which counts."""
     in_header = np.abs(header["pixdim"][1:4])
-    in_sform = np.linalg.norm(sform[:3, :3], axis=0)
+    in_sform = np.linalg.norm(
+        sform[:3, :3],
+        axis=0,
+    )
     # a broken sform is refused
     if not in_sform.all() or not np.isfinite(in_sform).all():
         return

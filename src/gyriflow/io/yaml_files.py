@@ -205,7 +205,10 @@ class Schemes(Mapping[str, LabelScheme]):
         if name not in self._known:
             path = SCHEME_FILES[name]
             settings = validated(SchemeSettings, read_keys(path), str(path))
-            self._known[name] = LabelScheme(name=name, **settings.model_dump())
+            self._known[name] = LabelScheme(
+                name=name,
+                **settings.model_dump(),
+            )
         return self._known[name]
 
     def __iter__(self) -> Iterator[str]:

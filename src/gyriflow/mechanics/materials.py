@@ -46,7 +46,12 @@ class Material(ABC):
         K: Expr,
     ) -> Expr:
         """Return ψ in Pa of the elastic deformation Fe."""
-        return cls.energy_of_invariants(ufl.inner(Fe, Fe), ufl.det(Fe), mu, K)
+        return cls.energy_of_invariants(
+            ufl.inner(Fe, Fe),
+            ufl.det(Fe),
+            mu,
+            K,
+        )
 
     def cauchy_stress(
         self,
@@ -120,7 +125,13 @@ def energy_code(material: Material) -> str:
     I1, J = variables["I1"], variables["J"]
     psi = material.energy_of_invariants(**variables)
     slopes = ufl.diff(psi, I1), ufl.diff(psi, J)
-    functions = dict(zip(("psi", "psi_I", "psi_J"), (psi, *slopes), strict=True))
+    functions = dict(
+        zip(
+            ("psi", "psi_I", "psi_J"),
+            (psi, *slopes),
+            strict=True,
+        )
+    )
     functions |= {
         "psi_II": ufl.diff(slopes[0], I1),
         "psi_IJ": ufl.diff(slopes[0], J),

@@ -44,7 +44,13 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     on_surface[outer] = True
     for element in flat.tolist():
         for _ in range(ROUNDS):
-            if signed_ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
+            if (
+                signed_ratios(
+                    vertices,
+                    mesh.tets[[element]],
+                )[0]
+                >= WANTED_RATIO
+            ):
                 break
             best: Move | None = None
             for vertex in mesh.tets[element].tolist():
@@ -87,7 +93,10 @@ def _best_move(
     others = vertices[corners[corners != vertex]]
     edges = start - others
     longest = float(np.linalg.norm(edges, axis=1).max())
-    normal = np.cross(others[1] - others[0], others[2] - others[0])
+    normal = np.cross(
+        others[1] - others[0],
+        others[2] - others[0],
+    )
     across = start - others.mean(axis=0)
     largest_step = MAX_SURFACE_STEP if on_surface[vertex] else np.inf
     least = _signed_ratios_of(vertices[star]).min()

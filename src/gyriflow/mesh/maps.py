@@ -92,10 +92,20 @@ def volume_map_on_mesh(
     infinite values.
     """
     matrix = np.asarray(affine, dtype=float)
-    index = np.linalg.solve(matrix[:3, :3], (mesh_vertices_mm - matrix[:3, 3]).T).T
+    index = np.linalg.solve(
+        matrix[:3, :3],
+        (mesh_vertices_mm - matrix[:3, 3]).T,
+    ).T
     # rounding must not push a vertex on the rim outside
-    covered = np.clip(index, -0.5 - 1e-6, np.array(data.shape) - 0.5 + 1e-6)
-    outside = np.linalg.norm((index - covered) @ matrix[:3, :3].T, axis=1)
+    covered = np.clip(
+        index,
+        -0.5 - 1e-6,
+        np.array(data.shape) - 0.5 + 1e-6,
+    )
+    outside = np.linalg.norm(
+        (index - covered) @ matrix[:3, :3].T,
+        axis=1,
+    )
     expected = f"values at all {len(index)} vertices of the start brain's mesh"
     if (outside > 0).any():
         found = (
@@ -134,7 +144,11 @@ def require_within(
 ) -> None:
     """Raise InputError where (n,) values of a map are not within the bounds (gt, ge,
     le) of its parameter."""
-    holds = {"gt": np.greater, "ge": np.greater_equal, "le": np.less_equal}
+    holds = {
+        "gt": np.greater,
+        "ge": np.greater_equal,
+        "le": np.less_equal,
+    }
     signs = {"gt": ">", "ge": "≥", "le": "≤"}
     outside = ~np.logical_and.reduce(
         [holds[name](values, bound) for name, bound in bounds.items()]

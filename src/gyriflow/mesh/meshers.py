@@ -169,7 +169,11 @@ def _mesh_from_standard_input(name: str) -> None:
         vertices, tets = MESHERS[name](arrays)
     used, local = np.unique(tets, return_inverse=True)
     sent = io.BytesIO()
-    np.savez(sent, vertices=vertices[used], tets=local.reshape(-1, 4))
+    np.savez(
+        sent,
+        vertices=vertices[used],
+        tets=local.reshape(-1, 4),
+    )
     with os.fdopen(output, "wb") as stream:
         stream.write(sent.getvalue())
 

@@ -52,7 +52,13 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
             | (tetrahedra.radius_ratios(placed) < WORSE * before)
         )
 
-    straight = tetrahedra.quadratic(_move(mesh, *_project(mesh, surface), spoilt)[0])
+    straight = tetrahedra.quadratic(
+        _move(
+            mesh,
+            *_project(mesh, surface),
+            spoilt,
+        )[0]
+    )
     target, way = _project(straight, surface)
     middles = way & (np.arange(len(way)) >= len(mesh.vertices))
 
@@ -83,7 +89,11 @@ def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask
     ends, _ = edges(boundary)
     lengths = edge_lengths(boundary.vertices, ends)
     shortest = np.full(len(outer), np.inf)
-    np.minimum.at(shortest, ends.ravel(), np.repeat(lengths, 2))
+    np.minimum.at(
+        shortest,
+        ends.ravel(),
+        np.repeat(lengths, 2),
+    )
     # the wall of a sulcus may be nearer to a node than the place it comes from
     normals = vertex_normals(boundary)
     normals_there = face_normals(surface)[face]

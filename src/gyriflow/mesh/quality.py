@@ -73,7 +73,12 @@ def gap_walls(mesh: TriangleMesh) -> GapWalls:
     face, distance = _first_hits(mesh, start, normals)
     facing = face >= 0
     facing[facing] = (
-        np.einsum("ij,ij->i", normals[facing], normals[face[facing]]) < PARALLEL
+        np.einsum(
+            "ij,ij->i",
+            normals[facing],
+            normals[face[facing]],
+        )
+        < PARALLEL
     )
     half = 0.5 * distance[facing, None] * normals[facing]
     return GapWalls(
@@ -144,8 +149,12 @@ def _first_hits(
             start.astype(np.float32), direction.astype(np.float32), strict=True
         )
     ]
-    return np.array([hit[0] for hit in hits], dtype=np.int64), np.array(
-        [hit[1] for hit in hits], dtype=np.float64
+    return np.array(
+        [hit[0] for hit in hits],
+        dtype=np.int64,
+    ), np.array(
+        [hit[1] for hit in hits],
+        dtype=np.float64,
     )
 
 

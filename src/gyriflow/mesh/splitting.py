@@ -94,7 +94,10 @@ def _inner_edges(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     faces, _ = boundary_faces(mesh)
     is_outer = np.zeros(count, dtype=bool)
     is_outer[faces] = True
-    pairs = np.sort(mesh.tets[:, EDGES], axis=2)
+    pairs = np.sort(
+        mesh.tets[:, EDGES],
+        axis=2,
+    )
     on_surface, _ = edges(TriangleMesh(mesh.vertices, faces))
     # one number per edge
     number = [count, 1]

@@ -51,7 +51,11 @@ def atlas_curves(
     for atlas, facts in content["atlases"].items():
         for hemisphere, metrics in facts["values"].items():
             for metric, values in metrics.items():
-                for week, value in zip(facts["weeks"], values, strict=True):
+                for week, value in zip(
+                    facts["weeks"],
+                    values,
+                    strict=True,
+                ):
                     rows.append((atlas, hemisphere, metric, week, value))
     return pd.DataFrame(rows, columns=CURVES)
 
@@ -85,7 +89,11 @@ def atlas_differences(
         )
         is_between = comparable["week"].between(*curve["week"].agg(["min", "max"]))
         rows = comparable[is_of_curve & is_between & comparable["value"].notna()]
-        expected = np.interp(rows["week"], curve["week"], curve["value"])
+        expected = np.interp(
+            rows["week"],
+            curve["week"],
+            curve["value"],
+        )
         difference = rows["value"] - expected
         relative = np.nan if METRICS[metric].is_signed else difference / expected
         noise = np.array(

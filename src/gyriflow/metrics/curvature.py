@@ -86,7 +86,10 @@ class Curvature(NamedTuple):
         return (
             2.0
             / np.pi
-            * np.arctan2(self.maximum + self.minimum, self.maximum - self.minimum)
+            * np.arctan2(
+                self.maximum + self.minimum,
+                self.maximum - self.minimum,
+            )
         )
 
     @property
@@ -149,7 +152,10 @@ def kept_curvature(wavelength_mm: Floats, radius_mm: float) -> Floats:
     mesh, with two edges to a radius. Folds whose depth is a quarter of their length
     keep more.
     """
-    k = np.maximum(2.0 * np.pi * radius_mm / np.asarray(wavelength_mm), 0.01)
+    k = np.maximum(
+        2.0 * np.pi * radius_mm / np.asarray(wavelength_mm),
+        0.01,
+    )
     return np.asarray(384.0 * jv(4, k) / k**4)
 
 
@@ -163,7 +169,10 @@ def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]
     gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1 for a sphere
     (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
     """
-    smaller, larger = np.sort(np.abs([curvature.maximum, curvature.minimum]), axis=0)
+    smaller, larger = np.sort(
+        np.abs([curvature.maximum, curvature.minimum]),
+        axis=0,
+    )
     integrals = {
         "intrinsic_curvature_index": np.maximum(curvature.gaussian, 0.0) @ areas,
         "folding_index": (larger * (larger - smaller)) @ areas,
@@ -182,7 +191,13 @@ def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, f
         curvature.mean, QUANTILES, weights=areas, method="inverted_cdf"
     )
     names = (f"mean_curvature_q{round(100 * share):02d}" for share in QUANTILES)
-    return dict(zip(names, map(float, values), strict=True))
+    return dict(
+        zip(
+            names,
+            map(float, values),
+            strict=True,
+        )
+    )
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
@@ -216,12 +231,19 @@ def _quadrics(
     """
     (pairs, uses), size = edges(mesh), len(mesh.vertices)
     both = np.concatenate(
-        [pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)]
+        [
+            pairs,
+            pairs[:, ::-1],
+            np.arange(size)[:, None].repeat(2, axis=1),
+        ]
     )
     links = sparse.csr_matrix(
         (np.ones(len(both), dtype=bool), both.T), shape=(size, size)
     )
-    boundary = np.isin(np.arange(size), pairs[uses == 1])
+    boundary = np.isin(
+        np.arange(size),
+        pairs[uses == 1],
+    )
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)
     fits = [
         (
@@ -242,12 +264,27 @@ def _balls(
     links: sparse.csr_matrix,
 ) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
     for start in range(0, len(vertices), CHUNK):
-        centres = np.arange(start, min(start + CHUNK, len(vertices)))
-        reached = np.zeros((len(centres), len(vertices)), dtype=bool)
+        centres = np.arange(
+            start,
+            min(start + CHUNK, len(vertices)),
+        )
+        reached = np.zeros(
+            (len(centres), len(vertices)),
+            dtype=bool,
+        )
         found = []
-        ring = sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr")
+        ring = sparse.eye(
+            len(centres),
+            len(vertices),
+            start,
+            dtype=bool,
+            format="csr",
+        )
         while ring.nnz:
-            row = np.repeat(np.arange(len(centres)), np.diff(ring.indptr))
+            row = np.repeat(
+                np.arange(len(centres)),
+                np.diff(ring.indptr),
+            )
             column = ring.indices
             offset = vertices[column] - vertices[centres[row]]
             is_new = ~reached[row, column] & (
@@ -291,20 +328,35 @@ def _fit(
         repeated = np.repeat(upright, counts, axis=0)
         cosines = np.einsum("ij,ij->i", facing, repeated)
         weights = share * np.maximum(cosines, 0.0)
-        upright = unit(np.add.reduceat(weights[:, None] * facing, starts))
+        upright = unit(
+            np.add.reduceat(
+                weights[:, None] * facing,
+                starts,
+            )
+        )
     least_upright = np.eye(3)[np.abs(upright).argmin(axis=1)]
     tangent = unit(np.cross(upright, least_upright))
-    frames = np.stack([tangent, np.cross(upright, tangent), upright], axis=1)
+    frames = np.stack(
+        [tangent, np.cross(upright, tangent), upright],
+        axis=1,
+    )
     repeated_frames = np.repeat(frames, counts, axis=0)
     x, y, z = np.einsum("ijk,ik->ji", repeated_frames, offset)
 
-    powers = {(0, 0): weights, (1, 0): weights * x, (0, 1): weights * y}
+    powers = {
+        (0, 0): weights,
+        (1, 0): weights * x,
+        (0, 1): weights * y,
+    }
     for a, b in _MONOMIALS:
         if (a, b) not in powers:
             powers[a, b] = powers[a - 1, b] * x if a else powers[a, b - 1] * y
     columns = [powers[key] for key in _MONOMIALS]
     columns += [powers[key] * z for key in _POWERS]
-    sums = np.stack([np.add.reduceat(column, starts) for column in columns], axis=1)
+    sums = np.stack(
+        [np.add.reduceat(column, starts) for column in columns],
+        axis=1,
+    )
     total_weight = sums[:, [_MONOMIALS.index((0, 0))]]
     sums /= np.maximum(total_weight, np.finfo(float).tiny)
 
@@ -313,7 +365,10 @@ def _fit(
     values = np.linalg.eigvalsh(matrices)
     fitted = values[:, 0] > 1e-9 * np.abs(values[:, -1])
     coefficients = np.zeros((len(centres), 6))
-    solved = np.linalg.solve(matrices[fitted], right[fitted, :, None])
+    solved = np.linalg.solve(
+        matrices[fitted],
+        right[fitted, :, None],
+    )
     coefficients[fitted] = solved[..., 0]
     # back from units of the radius
     coefficients *= radii_mm[centres, None] ** np.array([-1, -1, -1, 0, 0, 1])

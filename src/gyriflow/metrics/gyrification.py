@@ -51,7 +51,10 @@ def cap(mesh: TriangleMesh) -> TriangleMesh:
     # twenty times as fast as np.isin, which finds distinct numbers by their hashes
     backward = np.sort(end * size + start)
     forward = start * size + end
-    place = np.minimum(np.searchsorted(backward, forward), len(backward) - 1)
+    place = np.minimum(
+        np.searchsorted(backward, forward),
+        len(backward) - 1,
+    )
     has_other_face = backward[place] == forward
     rim = directed[~has_other_face]
     if not len(rim):
@@ -141,7 +144,11 @@ def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     inwards = -face_normals(small)
     tree, shape = igl.AABB(), (closed.vertices, closed.faces)
     tree.init(*shape)
-    face, *_ = tree.intersect_ray_first(*shape, centres - ABOVE_MM * inwards, inwards)
+    face, *_ = tree.intersect_ray_first(
+        *shape,
+        centres - ABOVE_MM * inwards,
+        inwards,
+    )
     # a line may miss a surface at its rim
     is_missed = face < 0
     if is_missed.any():
@@ -171,7 +178,11 @@ def local_gyrification_index(mesh: TriangleMesh, around: Pieces) -> Floats:
     """
     tree = cKDTree(around.centres)
     _, home = tree.query(corners(mesh).mean(axis=1))
-    pial = np.bincount(home, face_areas(mesh), len(around.centres))
+    pial = np.bincount(
+        home,
+        face_areas(mesh),
+        len(around.centres),
+    )
     _, nearest = tree.query(mesh.vertices)
     used, back = np.unique(nearest, return_inverse=True)
     patches = cKDTree(around.centres[used])
@@ -179,6 +190,10 @@ def local_gyrification_index(mesh: TriangleMesh, around: Pieces) -> Floats:
     piece = near["i"]
     patch = near["j"]
     pial_areas = np.bincount(patch, pial[piece], len(used))
-    patch_areas = np.bincount(patch, around.areas[piece], len(used))
+    patch_areas = np.bincount(
+        patch,
+        around.areas[piece],
+        len(used),
+    )
     ratio = pial_areas / patch_areas
     return ratio[back]

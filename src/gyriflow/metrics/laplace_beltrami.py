@@ -117,7 +117,10 @@ def lowest_modes(
     while (n_below := count_below(stiffness, mass, top)) < count:
         top *= 1.01 * needed / max(n_below, needed // 4)
     modes = modes_below(stiffness, mass, top, n_below)
-    return Modes(modes.eigenvalues[:count], modes.functions[:, :count])
+    return Modes(
+        modes.eigenvalues[:count],
+        modes.functions[:, :count],
+    )
 
 
 def modes_below(
@@ -147,16 +150,30 @@ def modes_below(
     ends = np.linspace(-_spacing(mass), value, n_slices + 1)
     counts = [0]
     for end in ends[1:-1]:
-        counts.append(_inertia(_factorise(stiffness, mass, float(end), "NATURAL"), end))
+        counts.append(
+            _inertia(
+                _factorise(stiffness, mass, float(end), "NATURAL"),
+                end,
+            )
+        )
     counts.append(count)
 
     eigenvalues = np.empty(count)
-    functions = np.empty((len(order), count), order="F")
+    functions = np.empty(
+        (len(order), count),
+        order="F",
+    )
     for i in range(n_slices):
         low, high = ends[i], ends[i + 1]
         part = slice(counts[i], counts[i + 1])
         try:
-            modes = _modes_between(stiffness, mass, low, high, part.stop - part.start)
+            modes = _modes_between(
+                stiffness,
+                mass,
+                low,
+                high,
+                part.stop - part.start,
+            )
         except (linalg.LinAlgError, RuntimeError) as error:
             problem = (
                 f"the modes with λ from {low:g} to {high:g} mm⁻² could not be found"
@@ -186,7 +203,11 @@ def _modes_between(
     # in single precision: vectors that are orthogonal to the root of the rounding of
     # double precision have the same projected operator (Simon 1984, Linear Algebra
     # Appl. 61, 101-131)
-    basis = np.empty((size, max_vectors), dtype=np.float32, order="F")
+    basis = np.empty(
+        (size, max_vectors),
+        dtype=np.float32,
+        order="F",
+    )
     # the operator in the basis: its upper triangle
     projected = np.zeros((max_vectors, max_vectors))
 
@@ -213,20 +234,34 @@ def _modes_between(
             continue
 
         next_check = used + 2 * BLOCK
-        inverse, vectors = linalg.eigh(projected[:used, :used], lower=False)
+        inverse, vectors = linalg.eigh(
+            projected[:used, :used],
+            lower=False,
+        )
         eigenvalues = shift + 1.0 / inverse
         is_inside = (low < eigenvalues) & (eigenvalues < high)
-        residuals = np.linalg.norm(coupling @ vectors[-BLOCK:], axis=0)
+        residuals = np.linalg.norm(
+            coupling @ vectors[-BLOCK:],
+            axis=0,
+        )
         has_converged = residuals <= RESIDUAL_TOL * np.abs(inverse)
         found = int(np.count_nonzero(is_inside & has_converged))
         if found == count == np.count_nonzero(is_inside):
             order = np.argsort(eigenvalues[is_inside])
             combined = vectors[:, is_inside][:, order].astype(np.float32)
             functions = (basis[:, :used] @ combined).astype(np.float64)
-            functions /= np.sqrt(np.sum(functions * (mass @ functions), axis=0))
+            functions /= np.sqrt(
+                np.sum(
+                    functions * (mass @ functions),
+                    axis=0,
+                )
+            )
             # Rayleigh's quotient is more exact than 1/θ where the shift is near an
             # eigenvalue
-            return Modes(np.sum(functions * (stiffness @ functions), axis=0), functions)
+            return Modes(
+                np.sum(functions * (stiffness @ functions), axis=0),
+                functions,
+            )
     problem = f"not all modes with λ from {low:g} to {high:g} mm⁻² were found"
     raise SolverError(
         problem,

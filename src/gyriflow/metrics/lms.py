@@ -104,7 +104,14 @@ class WeeklyNorm:
         at = np.atleast_1d(np.asarray(weeks, dtype=float))
         sizes = (len(self.location), len(self.scale))
         location, scale = (
-            _basis(at, self.first, self.last, size, self.is_spline) for size in sizes
+            _basis(
+                at,
+                self.first,
+                self.last,
+                size,
+                self.is_spline,
+            )
+            for size in sizes
         )
         return location, scale
 
@@ -146,11 +153,19 @@ class WeeklyNorm:
         )
         if len(self.covariance) > slopes.shape[1]:
             slopes = np.hstack([slopes, terms.by_skewness[:, None]])
-        error = np.sqrt(np.maximum(_squares(slopes, self.covariance), 0.0))
+        error = np.sqrt(
+            np.maximum(
+                _squares(slopes, self.covariance),
+                0.0,
+            )
+        )
         freedom, spread = self._student(locations, scales)
         # the smaller tail does not round to 1
         z = -np.sign(terms.z) * stats.norm.ppf(
-            stats.t.cdf(-np.abs(terms.z) / spread, freedom)
+            stats.t.cdf(
+                -np.abs(terms.z) / spread,
+                freedom,
+            )
         )
         return z, terms.z + INTERVAL_Z * np.stack([-error, error])
 
@@ -184,7 +199,10 @@ class WeeklyNorm:
         """Return the values with a z at weeks (n,): the inverse of `scores`."""
         locations, scales = self._bases(weeks)
         freedom, spread = self._student(locations, scales)
-        new_z = spread * stats.t.ppf(stats.norm.cdf(z), freedom)
+        new_z = spread * stats.t.ppf(
+            stats.norm.cdf(z),
+            freedom,
+        )
         scale = np.exp(scales @ self.scale)
         if not self.is_positive:
             return locations @ self.location + scale * _signed_distance(
@@ -213,7 +231,13 @@ class WeeklyNorm:
         terms = self._terms_at(locations, scales, value)
         leverage, _ = self._errors(locations, scales)
         remaining = 1 - np.minimum(leverage, MAX_LEVERAGE)
-        slope = _slope(terms, locations, scales, np.ones(1), remaining)
+        slope = _slope(
+            terms,
+            locations,
+            scales,
+            np.ones(1),
+            remaining,
+        )
         step, size = self.covariance @ slope[: len(self.covariance)], len(self.location)
         location = self.location - step[:size]
         scale = self.scale - step[size : size + len(self.scale)]
@@ -260,7 +284,14 @@ def fit_norm(
     subjects = int(scans.person.max()) + 1
     has_skewness = subjects >= MIN_SUBJECTS_FOR_SKEWNESS
     start = np.log(values) if is_positive else values
-    model = _Model.of(weeks, start, scans.weights, subjects, is_positive, has_skewness)
+    model = _Model.of(
+        weeks,
+        start,
+        scans.weights,
+        subjects,
+        is_positive,
+        has_skewness,
+    )
     size = model.rows.shape[1]
     unit = model.scatter
     has_scatter = unit > MIN_SCATTER
@@ -284,7 +315,10 @@ def fit_norm(
             break
         factor = min(1.0, MAX_STEP / shift)
         if has_skewness:
-            factor = min(factor, MAX_SKEWNESS_STEP / max(abs(step[-1]), MIN_SCATTER))
+            factor = min(
+                factor,
+                MAX_SKEWNESS_STEP / max(abs(step[-1]), MIN_SCATTER),
+            )
         if number >= ROUNDS_UNTIL_DAMPED:
             factor *= DAMPED_STEP
         fit += factor * step
@@ -293,7 +327,10 @@ def fit_norm(
     covariance = model.covariance(rows, state) * np.outer(units, units)
     fit *= units
     scale = fit[size : size + model.scale_rows.shape[1]]
-    shared = scans.spread(np.ones((len(values), 1)), 2).sum()
+    shared = scans.spread(
+        np.ones((len(values), 1)),
+        2,
+    ).sum()
     is_wide = is_positive and np.exp(model.scale_rows @ scale).max() > SKEWED_SCALE
     is_few = not has_skewness
     return WeeklyNorm(
@@ -368,7 +405,13 @@ class _Model:
         scale_rows = _basis(weeks, first, last, scale_size, is_spline)
         freedom = float(size)
         location_penalty: Floats = np.zeros((size, size))
-        ends = _basis(np.array([first, last]), first, last, scale_size, is_spline)
+        ends = _basis(
+            np.array([first, last]),
+            first,
+            last,
+            scale_size,
+            is_spline,
+        )
         half_change = 0.5 * np.diff(ends, axis=0) / HALF_CHANGE_SD
         scale_penalty = half_change.T @ half_change
         normal = (rows.T * weights) @ rows
@@ -443,14 +486,26 @@ class _Model:
         size = rows.shape[1]
         log_scale = self.scale_rows @ fit[size : size + self.scale_rows.shape[1]]
         skewness = self.skewness(fit)
-        terms = _terms(rows @ fit[:size], log_scale, skewness, values, self.is_positive)
+        terms = _terms(
+            rows @ fit[:size],
+            log_scale,
+            skewness,
+            values,
+            self.is_positive,
+        )
         scans = scans.correlated(terms.z)
         expected = _expected(log_scale, skewness, self.is_positive)
         information, remaining = _information(
             rows, self.scale_rows, expected, scans, self.penalty
         )
         count = len(fit)
-        slope = _slope(terms, rows, self.scale_rows, scans.weights, remaining)[:count]
+        slope = _slope(
+            terms,
+            rows,
+            self.scale_rows,
+            scans.weights,
+            remaining,
+        )[:count]
         return _State(
             terms,
             log_scale,
@@ -521,7 +576,11 @@ class _Scans:
         _, person, counts = np.unique(
             np.asarray(people), return_inverse=True, return_counts=True
         )
-        return cls(person, 1.0 / counts[person], 1.0 if counts.max() > 1 else None)
+        return cls(
+            person,
+            1.0 / counts[person],
+            1.0 if counts.max() > 1 else None,
+        )
 
     def correlated(self, z: Floats) -> "_Scans":
         """Return them with the correlation that z (n,) have."""
@@ -536,7 +595,11 @@ class _Scans:
         return replace(
             self,
             correlation=float(
-                np.clip(mean / (self.weights @ z**2) * len(counts), 0.0, 1.0)
+                np.clip(
+                    mean / (self.weights @ z**2) * len(counts),
+                    0.0,
+                    1.0,
+                )
             ),
         )
 
@@ -591,7 +654,12 @@ def _expected(
         )
     z, weights = np.polynomial.hermite_e.hermegauss(QUADRATURE_POINTS)
     distance = _signed_distance(z, skewness)
-    terms = _signed_terms(0.0, np.zeros(len(z)), skewness, distance)
+    terms = _signed_terms(
+        0.0,
+        np.zeros(len(z)),
+        skewness,
+        distance,
+    )
     slopes = np.stack(
         [terms.slope_location, terms.slope_scale - 1, terms.slope_skewness]
     )
@@ -648,7 +716,13 @@ def _slope(
     skewness."""
     location = (weights * terms.slope_location) @ rows
     scale = (weights * (terms.slope_scale - remaining)) @ scale_rows
-    return np.concatenate([location, scale, [weights @ terms.slope_skewness]])
+    return np.concatenate(
+        [
+            location,
+            scale,
+            [weights @ terms.slope_skewness],
+        ]
+    )
 
 
 def _squares(rows: Floats, covariance: Floats) -> Floats:

@@ -197,7 +197,10 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     meshes = [side.mesh for side in sides]
     areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
     curvature_maps = Curvature(
-        *map(np.concatenate, zip(*(side.curvature_maps for side in sides), strict=True))
+        *map(
+            np.concatenate,
+            zip(*(side.curvature_maps for side in sides), strict=True),
+        )
     )
     weights = areas * curvature_maps.reliable
     if not weights.any():
@@ -247,7 +250,12 @@ def thickness_metrics(values: Floats, areas: Floats) -> Metrics:
     return {
         "mean_thickness": mean,
         "thickness_sd": float(
-            np.sqrt(np.average((selected - mean) ** 2, weights=weights))
+            np.sqrt(
+                np.average(
+                    (selected - mean) ** 2,
+                    weights=weights,
+                )
+            )
         ),
         "thickness_q05": float(low),
         "thickness_q95": float(high),
@@ -310,7 +318,10 @@ def _table(parts: Mapping[str, Metrics]) -> pd.DataFrame:
         for hemisphere, metrics in parts.items()
         for name, value in metrics.items()
     ]
-    return pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"])
+    return pd.DataFrame(
+        rows,
+        columns=["hemisphere", "metric", "value", "unit"],
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -408,11 +419,17 @@ def measure_brain(
         f"volume_{name}": volumes[name] for name in LABEL_VOLUMES if name in volumes
     }
     bent = [
-        np.average(part.curvature_maps.mean, weights=vertex_areas(part.mesh))
+        np.average(
+            part.curvature_maps.mean,
+            weights=vertex_areas(part.mesh),
+        )
         for part in folds.values()
     ]
     mean_curvature = float(
-        np.average(bent, weights=[area_cm2(mesh) for mesh in meshes.values()])
+        np.average(
+            bent,
+            weights=[area_cm2(mesh) for mesh in meshes.values()],
+        )
     )
     metrics = {"whole": whole_metrics | area_ratio(whole_metrics, mean_curvature)}
     maps = {}

@@ -17,7 +17,13 @@ from ..settings.terms import OBSERVED, SIDES, SPREAD_UNKNOWN, Side, min_norm_sub
 from .lms import WeeklyNorm, fit_norm, norm_from_plain
 from .tables import BRAIN
 
-QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
+QUANTILES = {
+    "q05": 0.05,
+    "q25": 0.25,
+    "q50": 0.5,
+    "q75": 0.75,
+    "q95": 0.95,
+}
 """The quantiles that norms give, by the names of their columns."""
 WINDOW_GW = 0.5
 """Brains are scored up to this long before the norm's first week and after its last."""
@@ -118,7 +124,15 @@ def published_scores(
     rows = []
     for name, norm in norms.items():
         is_same = norm.scheme == brain.scheme.name
-        labels = norm.labels if is_same else getattr(brain.scheme, norm.tissue, ())
+        labels = (
+            norm.labels
+            if is_same
+            else getattr(
+                brain.scheme,
+                norm.tissue,
+                (),
+            )
+        )
         value = sum(brain.volumes.get(label, 0.0) for label in labels)
         if value <= 0:
             continue
@@ -185,7 +199,10 @@ def volume_tables(
     scores = pd.concat(
         [published_scores(brain, norms) for brain in brains], ignore_index=True
     )
-    return pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"]), scores
+    return pd.DataFrame(
+        rows,
+        columns=[*BRAIN, "label", "tissue", "volume_mL"],
+    ), scores
 
 
 @dataclass(frozen=True)
@@ -211,14 +228,27 @@ class CohortNorms:
         is_known = (norm.first <= wanted) & (wanted <= norm.last)
         known = wanted[is_known]
         medians = norm.values(known, 0.0)
-        return dict(zip(known.tolist(), medians.tolist(), strict=True))
+        return dict(
+            zip(
+                known.tolist(),
+                medians.tolist(),
+                strict=True,
+            )
+        )
 
     @property
     def plain(self) -> dict[str, Any]:
         """The norms as plain values for JSON."""
         keys = ("hemisphere", "metric", "unit")
         rows = [
-            dict(zip(keys, (*name, unit), strict=True)) | norm.plain
+            dict(
+                zip(
+                    keys,
+                    (*name, unit),
+                    strict=True,
+                )
+            )
+            | norm.plain
             for name, (unit, norm) in self.norms.items()
         ]
         subjects = max((norm.subjects for _, norm in self.norms.values()), default=0)
@@ -416,8 +446,16 @@ def _score(
     if not norm.has_converged:
         flag = "not converged"
     ends = np.array(centiles) / 100
-    scores = np.clip(np.append(z, interval), *stats.norm.ppf(ends))
-    numbers = (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores))
+    scores = np.clip(
+        np.append(z, interval),
+        *stats.norm.ppf(ends),
+    )
+    numbers = (
+        expected,
+        0.5 * (high - low),
+        *scores,
+        *100 * stats.norm.cdf(scores),
+    )
     score |= dict(zip(SCORES, numbers, strict=False))
     if score["sd"] <= MIN_SPREAD * abs(score["expected"]):
         return {"brains": norm.subjects, "flag": "no spread"}
@@ -478,7 +516,10 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
         first, last = norm.median_interval(weeks)
         band |= {"expected": expected, "expected_low": first, "expected_high": last}
         spread = {
-            name: norm.values(weeks, float(stats.norm.ppf(q)))
+            name: norm.values(
+                weeks,
+                float(stats.norm.ppf(q)),
+            )
             for name, q in QUANTILES.items()
         }
         spread |= {"sd": 0.5 * (high - low)}

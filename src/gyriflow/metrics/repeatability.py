@@ -42,7 +42,12 @@ def with_change_noise(change: pd.DataFrame, record: Repeatability) -> pd.DataFra
 
     It is NaN for regions, which are noisier than what they are parts of.
     """
-    rows = zip(change["metric"], change["from_value"], change["region"], strict=True)
+    rows = zip(
+        change["metric"],
+        change["from_value"],
+        change["region"],
+        strict=True,
+    )
     noise = [
         np.nan if region else difference_noise(metric, value, record)
         for metric, value, region in rows

@@ -105,7 +105,10 @@ def weyl_number(area_mm2: float, first: float) -> int:
 def _band_limits(first: float) -> Floats:
     """Return the (7,) limits of the bands B1 to B6 in mm⁻²: Bk holds λ1·4^(k−1) ≤ λ <
     λ1·4^k."""
-    return first * 4.0 ** np.arange(BANDS + 1, dtype=np.float64)
+    return first * 4.0 ** np.arange(
+        BANDS + 1,
+        dtype=np.float64,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +211,10 @@ def spectral_basis(
         if by_name
         else 4.0 * np.pi * int(choice) / area(mesh)
     )
-    edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
+    edge_mm = min(
+        2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH,
+        LONGEST_EDGE_MM,
+    )
     needed = math.ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
         copy = decimate(mesh, needed)
@@ -244,7 +250,10 @@ def spectrum(
     energy = basis.energy @ proxy
     coefficients = basis.coefficients(energy)
     bands = _band_table(basis, coefficients, radius_mm)
-    dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
+    dominant: Ints = np.zeros(
+        len(proxy),
+        dtype=np.int64,
+    )
     is_whole = bands["complete"] & (bands["band"] > 0)
     whole = bands.loc[is_whole, "band"].to_numpy()
     if len(whole):
@@ -277,10 +286,16 @@ def _band_table(
     total = np.nansum(power[1:])
     relative_power = power / total if total > 0 else 0.0 * power
     relative_power[is_mean] = np.nan
-    wavelengths = np.append(np.inf, 2.0 * np.pi / np.sqrt(limits))
+    wavelengths = np.append(
+        np.inf,
+        2.0 * np.pi / np.sqrt(limits),
+    )
     longest = wavelengths[:-1]
     shortest = wavelengths[1:]
-    complete = np.append(True, limits[1:] <= basis.reach * (1.0 + ROUNDING))
+    complete = np.append(
+        True,
+        limits[1:] <= basis.reach * (1.0 + ROUNDING),
+    )
     kept = kept_curvature(np.sqrt(shortest * longest), radius_mm)
     table = pd.DataFrame(
         {
@@ -302,7 +317,13 @@ def _band_table(
     part = (PARTS * np.maximum(octaves, 0.0)).astype(int)
     parts = np.bincount(part, powers[inside], PARTS * BANDS)
     of_bands = parts.reshape(BANDS, PARTS)
-    return table.join(pd.DataFrame(of_bands, bands[1:], PART_POWERS))
+    return table.join(
+        pd.DataFrame(
+            of_bands,
+            bands[1:],
+            PART_POWERS,
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,7 +384,13 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
         for key, bands in rows.groupby(HEMISPHERE)
     }
     found = [
-        (*key, other[0], other[2], PROXIES[0], *row)
+        (
+            *key,
+            other[0],
+            other[2],
+            PROXIES[0],
+            *row,
+        )
         for key, profile in profiles.items()
         for other, observed in profiles.items()
         if other[1] == OBSERVED and other[3] == key[3] and key != other

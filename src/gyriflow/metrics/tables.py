@@ -49,7 +49,12 @@ def _wide_names(table: pd.DataFrame) -> list[str]:
         .replace({"1": "", "nan": ""})
         .str.replace("/", "_per_")
     )
-    parts = [table["hemisphere"], table["region"].fillna(""), table["metric"], unit]
+    parts = [
+        table["hemisphere"],
+        table["region"].fillna(""),
+        table["metric"],
+        unit,
+    ]
     columns = []
     meanings: dict[str, tuple[str, ...]] = {}
     for row in zip(*parts, strict=True):
@@ -106,7 +111,10 @@ def wide_table(
     )
     brains = pd.MultiIndex.from_frame(table[BRAIN].drop_duplicates())
     wide = (
-        wide.reindex(index=brains, columns=list(dict.fromkeys(names)))
+        wide.reindex(
+            index=brains,
+            columns=list(dict.fromkeys(names)),
+        )
         .reset_index()
         .rename_axis(columns=None)
     )
@@ -201,9 +209,10 @@ def change_between_scans(
                     ("from_value", starts),
                 )
             )
-            part = part.merge(start, on=["run", *what]).dropna(
-                subset=["from_value", "to_value"]
-            )
+            part = part.merge(
+                start,
+                on=["run", *what],
+            ).dropna(subset=["from_value", "to_value"])
             keys = pd.MultiIndex.from_frame(part[what])
             observed = [
                 rows.set_index(what)["value"]
@@ -245,7 +254,15 @@ def weekly_norms(
         displacement = np.asarray(after) - np.asarray(before)
         lengths = np.linalg.norm(displacement, axis=1)
         for nodes, of in (("all", lengths), ("pial", lengths[pial])):
-            rows.append((week, next_week, nodes, of.max(), of.mean()))
+            rows.append(
+                (
+                    week,
+                    next_week,
+                    nodes,
+                    of.max(),
+                    of.mean(),
+                )
+            )
     columns = ["from_week", "to_week", "nodes", "max_mm", "mean_mm"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -287,7 +304,11 @@ def region_metrics(
             )
         areas, total = vertex_areas(mesh), area(mesh)
         reliable = np.asarray(
-            maps[side].get("reliable", np.ones(len(label))), dtype=bool
+            maps[side].get(
+                "reliable",
+                np.ones(len(label)),
+            ),
+            dtype=bool,
         )
         for number, name in names.items():
             inside = label == number
@@ -299,7 +320,12 @@ def region_metrics(
                     values = np.asarray(vertex_values, dtype=float)
                     used = inside & np.isfinite(values) & reliable
                     mean = (
-                        float(np.average(values[used], weights=areas[used]))
+                        float(
+                            np.average(
+                                values[used],
+                                weights=areas[used],
+                            )
+                        )
                         if areas[used].any()
                         else np.nan
                     )

@@ -69,7 +69,10 @@ def growth_figure(
         axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
     limits = [axes.get_ylim() for axes in rate_axes]
     for axes in rate_axes:
-        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+        axes.set_ylim(
+            min(low for low, _ in limits),
+            max(high for _, high in limits),
+        )
     return figure
 
 
@@ -139,9 +142,18 @@ def _rates_panel(
     rate as a line."""
     labels = [
         f"{first:g}–{last:g}"
-        for first, last in zip(rates["from_week"], rates["to_week"], strict=True)
+        for first, last in zip(
+            rates["from_week"],
+            rates["to_week"],
+            strict=True,
+        )
     ]
-    bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
+    bars = axes.bar(
+        labels,
+        rates["rate_per_s"] * 1e7,
+        width=0.7,
+        color=colour,
+    )
     # in front of the line of the simulated rate
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     crowded = len(rates) > 8
@@ -169,7 +181,10 @@ def _rates_panel(
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.margins(y=0.25 if crowded else 0.12)
     axes.set_xlabel("gestational interval (GW)")
-    axes.tick_params(axis="x", rotation=45 if len(labels) > 6 else 0)
+    axes.tick_params(
+        axis="x",
+        rotation=45 if len(labels) > 6 else 0,
+    )
     # room for at least three bars, so that a single one does not fill the panel
     spare = max(0.0, 3 - len(labels)) / 2
     axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
@@ -181,10 +196,17 @@ def _folding_line(
     rate_per_s: float | Mapping[float, float],
 ) -> None:
     """Draw the simulated growth rate over bars of equal width, one per interval."""
-    style: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
+    style: dict[str, Any] = {
+        "color": RUN_COLOURS[1],
+        "linestyle": "--",
+    }
     if not isinstance(rate_per_s, Mapping):
         rate = rate_per_s * 1e7
-        axes.axhline(rate, label=f"folding: {rate:.3g}·10⁻⁷ s⁻¹", **style)
+        axes.axhline(
+            rate,
+            label=f"folding: {rate:.3g}·10⁻⁷ s⁻¹",
+            **style,
+        )
         return
     weeks = np.array(sorted(rate_per_s))
     values = 1e7 * np.array([rate_per_s[week] for week in weeks])
@@ -193,4 +215,9 @@ def _folding_line(
     drawn = np.union1d(ends, weeks[is_inside])
     bar_edges = np.arange(len(ends)) - 0.5
     places = np.interp(drawn, ends, bar_edges)
-    axes.plot(places, np.interp(drawn, weeks, values), label="folding", **style)
+    axes.plot(
+        places,
+        np.interp(drawn, weeks, values),
+        label="folding",
+        **style,
+    )

@@ -44,7 +44,13 @@ _ENDINGS = {
     "_gw": "GW",
     "_s": "s",
 }
-_UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": ""}
+_UNITS = {
+    "cm2": "cm²",
+    "mm2": "mm²",
+    "mm3": "mm³",
+    "1/mm": "mm⁻¹",
+    "1": "",
+}
 
 
 def with_unit(name: str, unit: object) -> str:
@@ -111,7 +117,11 @@ def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
     """
     return [
         "\n".join(
-            _value_label(*item, alone=len(member) == 1) for item in member.items()
+            _value_label(
+                *item,
+                alone=len(member) == 1,
+            )
+            for item in member.items()
         )
         for member in values
     ]

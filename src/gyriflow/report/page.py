@@ -73,7 +73,10 @@ def page_figures(
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
         brains.setdefault(figure["name"], set()).add(figure["names"].get("brain"))
-    first = next((figure["path"] for figure in figures if figure["first"]), None)
+    first = next(
+        (figure["path"] for figure in figures if figure["first"]),
+        None,
+    )
     entries = []
     for figure in figures:
         names, content = figure["names"], contents[figure["path"]]
@@ -107,7 +110,13 @@ def sections(
 ) -> list[tuple[str, list[dict[str, Any]]]]:
     """Return the sections, each with its figures and tables, numbered consecutively,
     technical ones last."""
-    ordered, numbers = sorted(figures, key=lambda item: item["technical"]), count(1)
+    ordered, numbers = (
+        sorted(
+            figures,
+            key=lambda item: item["technical"],
+        ),
+        count(1),
+    )
     return [
         (
             name,
@@ -235,7 +244,10 @@ def study_page(
             if tables.warnings.empty
             else html_table(_group_warnings(tables.warnings))
         ),
-        "weeks": next((item for item in figures if item["first"]), None),
+        "weeks": next(
+            (item for item in figures if item["first"]),
+            None,
+        ),
         "sections": sections([item for item in figures if not item["first"]]),
     }
 
@@ -363,7 +375,13 @@ def brain_rows(
     values = measured["value"].to_dict()
     names = set(measured["metric"])
     rated = _by_brain(centiles)
-    texts = dict(zip(rated.index, centile_text(rated), strict=True))
+    texts = dict(
+        zip(
+            rated.index,
+            centile_text(rated),
+            strict=True,
+        )
+    )
     shown = [name for name in metrics_shown(Shown.BRAINS) if name in names]
     rows = []
     for brain in brains:
@@ -415,15 +433,31 @@ def scores_table(
     min_J, elements_through_cortex, order, least_elements_through_cortex,
     unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
     """
-    names = run_names(zip(runs["run"], runs["subject"], strict=True))
+    names = run_names(
+        zip(
+            runs["run"],
+            runs["subject"],
+            strict=True,
+        )
+    )
     rows = []
-    for name, (_, run) in zip(names, runs.iterrows(), strict=True):
+    for name, (_, run) in zip(
+        names,
+        runs.iterrows(),
+        strict=True,
+    ):
         scores: Mapping[Any, Any] = {}
         if validation is not None:
             is_own_run = validation["run"] == run["run"]
             own = validation[is_own_run & (validation["start"] == run["subject"])]
             scores = own.sort_values("week").iloc[-1] if len(own) else {}
-        rows.append({"run": name, "verdict": run_verdict(run), **_scores(scores)})
+        rows.append(
+            {
+                "run": name,
+                "verdict": run_verdict(run),
+                **_scores(scores),
+            }
+        )
     return pd.DataFrame(rows)
 
 
@@ -590,7 +624,11 @@ def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
 
     def spread(name: str, pattern: str) -> str:
         ends = " to ".join(
-            text(f"{name}_{end}_shape_index", pattern) for end in ("low", "high")
+            text(
+                f"{name}_{end}_shape_index",
+                pattern,
+            )
+            for end in ("low", "high")
         )
         return (
             f"{text(f'{name}_shape_index', pattern)} ({ends})"
@@ -628,7 +666,10 @@ def _group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
     def joined(names: pd.Series) -> str:
         return "; ".join(filter(None, names.unique()))
 
-    groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
+    groups = rows.groupby(
+        ["step", "message"],
+        sort=False,
+    )["brain, run"]
     return groups.agg(joined).reset_index()
 
 

@@ -49,7 +49,12 @@ _LETTER_IN = 0.055
 _LABEL_LETTERS = 26
 # maximum share of the width for the scale bar; the colour bar is right of it
 _SCALE_SHARE = 0.36
-_END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
+_END_NAMES = {
+    "A": "anterior",
+    "P": "posterior",
+    "L": "left",
+    "R": "right",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +114,13 @@ def panel_grid(
     the panels of a single row, have the letters a, b, c … for the caption. `colour_bar`
     is a colour scale and its label, `legend` the entries of a legend.
     """
-    rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
+    rows = [
+        replace(
+            row,
+            label=wrap(row.label, _LABEL_LETTERS),
+        )
+        for row in rows
+    ]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
     widths_in, blocks, inches_per_mm = _lay_out_columns(rows, FULL_WIDTH_IN - label_in)
@@ -165,10 +176,24 @@ def panel_grid(
             height_mm = float(block.heights_in[line] / inches_per_mm)
             panels = row.panels[block.columns]
             _draw_row(cells, row, panels, widths_mm, height_mm, inches_per_mm)
-            _write_letters(cells[:per_row], letters, is_labelled=bool(row.label))
+            _write_letters(
+                cells[:per_row],
+                letters,
+                is_labelled=bool(row.label),
+            )
             if number == 0:
-                for axes, head in zip(cells, heads[block.columns], strict=True):
-                    _write(axes, head, (0.5, 1.0), (0, 36 * head_in), va="center")
+                for axes, head in zip(
+                    cells,
+                    heads[block.columns],
+                    strict=True,
+                ):
+                    _write(
+                        axes,
+                        head,
+                        (0.5, 1.0),
+                        (0, 36 * head_in),
+                        va="center",
+                    )
     _draw_scale_bar(figure, rows, foot_in, widths_in.max(), inches_per_mm)
     if colour_bar:
         _draw_colour_bar(figure, *colour_bar)
@@ -212,7 +237,14 @@ def _write_letters(
         if is_labelled and axes is cells[0]:
             align = {"ha": "right", "va": "top"}
         bold = {"fontsize": 9, "fontweight": "bold"}
-        _write(axes, letter, (0.0, 1.0), (-2, 2), **bold, **align)
+        _write(
+            axes,
+            letter,
+            (0.0, 1.0),
+            (-2, 2),
+            **bold,
+            **align,
+        )
 
 
 def _lay_out_columns(
@@ -221,7 +253,10 @@ def _lay_out_columns(
     """Return the widths of all columns in inches, the columns of each block (at most
     `MAX_COLUMNS` side by side), and the scale in inches per mm."""
     half_widths = []
-    for column in zip(*(row.panels for row in rows), strict=True):
+    for column in zip(
+        *(row.panels for row in rows),
+        strict=True,
+    ):
         panels = [half_extents(panel.mesh, panel.view)[0] for panel in column if panel]
         half_widths.append(max(panels, default=0.0))
     half_widths_mm = np.array(half_widths)
@@ -294,7 +329,14 @@ def _draw_row(
     """Draw the pictures of a row in its cells, whose sizes are given, with the row's
     label on the left."""
     previous = None
-    _write(cells[0], row.label, (0.0, 0.5), (-4.3, 0), rotation=90, ha="right")
+    _write(
+        cells[0],
+        row.label,
+        (0.0, 0.5),
+        (-4.3, 0),
+        rotation=90,
+        ha="right",
+    )
     for index, (axes, panel, width_mm) in enumerate(
         zip(cells, panels, widths_mm, strict=True)
     ):
@@ -318,7 +360,16 @@ def _draw_row(
             light=panel.light,
             lines=lines,
         )
-        axes.imshow(image, extent=(-half[0], half[0], -half[1], half[1]), aspect="auto")
+        axes.imshow(
+            image,
+            extent=(
+                -half[0],
+                half[0],
+                -half[1],
+                half[1],
+            ),
+            aspect="auto",
+        )
         if panel.view != previous:
             for place, align, end in (
                 (0.04, "left", panel.view.ends[0]),
@@ -335,7 +386,13 @@ def _draw_row(
         previous = panel.view
         if panel.mark is not None:
             _draw_ring(axes, panel, panel.mark)
-        _write(axes, panel.caption, (0.5, -0.01), va="top", fontsize=6.5)
+        _write(
+            axes,
+            panel.caption,
+            (0.5, -0.01),
+            va="top",
+            fontsize=6.5,
+        )
 
 
 def direction_lines(
@@ -355,11 +412,18 @@ def direction_lines(
     half = (
         directions[vertices]
         * (LINES_MM / 2)
-        / np.linalg.norm(directions[vertices], axis=1, keepdims=True).clip(1)
+        / np.linalg.norm(
+            directions[vertices],
+            axis=1,
+            keepdims=True,
+        ).clip(1)
     )
     # slightly above the surface, which would otherwise hide parts of them
     at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
-    return np.stack([at - half, at + half], axis=1)
+    return np.stack(
+        [at - half, at + half],
+        axis=1,
+    )
 
 
 def _draw_ring(
@@ -396,7 +460,11 @@ def _draw_colour_bar(
     width, total = figure.get_size_inches()
     start = _SCALE_SHARE * width + 0.1
     place = start / width, 0.5 / total, (width - start - 0.3) / width, 0.08 / total
-    bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation="horizontal")
+    bar = figure.colorbar(
+        scale,
+        cax=figure.add_axes(place),
+        orientation="horizontal",
+    )
     bar.set_label(label, labelpad=1)
     bar.ax.tick_params(pad=1, length=2)
     bar.outline.set_linewidth(0.5)

@@ -150,7 +150,13 @@ def brain_grid(
         for brain in grid:
             if brain.row == label:
                 panels[brain.column] = _panel(brain, quantity, scale)
-        rows.append(Row(label, [panels.get(column) for column in columns], absent))
+        rows.append(
+            Row(
+                label,
+                [panels.get(column) for column in columns],
+                absent,
+            )
+        )
     return panel_grid(columns, rows, colour_bar=colour_bar, legend=legend)
 
 
@@ -196,7 +202,10 @@ def in_views(grid: Grid, views: Sequence[str] = SIDE_VIEWS) -> list[GridBrain]:
     for name in views:
         for row in dict.fromkeys(brain.row for brain in grid):
             for column in columns:
-                brain = places.get((row, column), GridBrain(row, column))
+                brain = places.get(
+                    (row, column),
+                    GridBrain(row, column),
+                )
                 heading = column_label(column)
                 if is_wide:
                     row_label = f"{row}\n{name} view".strip()
@@ -325,7 +334,10 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
     values = {
         name: np.concatenate(
             [
-                maps.get(name, np.full(len(mesh.vertices), np.nan))
+                maps.get(
+                    name,
+                    np.full(len(mesh.vertices), np.nan),
+                )
                 for mesh, maps in halves
             ]
         )
@@ -386,7 +398,13 @@ def influence_figure(grid: Grid, *, values: Mapping[str, Mapping[str, Any]]) -> 
     The columns are runs, in the order of the sweep, and the observed brain of the week,
     last. `values` are by run the varied parameters with their values, for the headings.
     """
-    headings = dict(zip(values, value_labels(list(values.values())), strict=True))
+    headings = dict(
+        zip(
+            values,
+            value_labels(list(values.values())),
+            strict=True,
+        )
+    )
     placed = []
     for label in ("", "shape index\n"):
         for view in SIDE_VIEWS:
@@ -455,9 +473,15 @@ def growth_grid(
             name_in_interval(f"growth_direction_{axis}", *interval) for axis in AXES
         ]
         if names[0] in growth:
-            directions[interval] = np.stack([growth[name] for name in names], axis=1)
+            directions[interval] = np.stack(
+                [growth[name] for name in names],
+                axis=1,
+            )
     if directions:
-        lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
+        lengths = np.linalg.norm(
+            np.concatenate(list(directions.values())),
+            axis=1,
+        )
         longest = np.quantile(lengths, DIRECTION_QUANTILE)
         directions = {key: lines / longest for key, lines in directions.items()}
     grid = []
@@ -523,7 +547,13 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
         for tint in TINTS
         for part in map(to_rgb, RUN_COLOURS)
     ]
-    return dict(zip(dict.fromkeys(names), cycle(shades), strict=False))
+    return dict(
+        zip(
+            dict.fromkeys(names),
+            cycle(shades),
+            strict=False,
+        )
+    )
 
 
 @styled
@@ -597,9 +627,18 @@ def zones_figure(
     mesh, tags = boundary
     zones = tags["zone"]
     colours = to_rgba_array([ZONE_COLOURS[name] for name in ZONE_NAMES])[:, :3]
-    areas_mm2 = np.bincount(zones, face_areas(mesh), minlength=len(colours))
+    areas_mm2 = np.bincount(
+        zones,
+        face_areas(mesh),
+        minlength=len(colours),
+    )
     legend = []
-    for name, colour, area_mm2 in zip(ZONE_NAMES, colours, areas_mm2, strict=True):
+    for name, colour, area_mm2 in zip(
+        ZONE_NAMES,
+        colours,
+        areas_mm2,
+        strict=True,
+    ):
         if area_mm2:
             label = f"{name} {CM2_PER_MM2 * area_mm2:.1f} cm²"
             legend.append(Patch(color=colour, label=label))

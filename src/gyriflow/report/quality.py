@@ -114,7 +114,11 @@ def quality_page(
     height_in = HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines)
     figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     heading, colour = VERDICT_HEADINGS[row["verdict"]]
-    left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
+    left: dict[str, Any] = {
+        "x": 0.015,
+        "ha": "left",
+        "fontsize": 6.5,
+    }
     # lines break between facts only
     facts = [
         f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}")
@@ -136,8 +140,18 @@ def quality_page(
         "fontsize": 10,
         "fontweight": "bold",
     }
-    figure.text(0.985, 0.985, row["verdict"].upper(), color="white", bbox=box, **place)
-    figure.supxlabel("\n".join([heading, *lines]), **left)
+    figure.text(
+        0.985,
+        0.985,
+        row["verdict"].upper(),
+        color="white",
+        bbox=box,
+        **place,
+    )
+    figure.supxlabel(
+        "\n".join([heading, *lines]),
+        **left,
+    )
     rows: Any = figure.subfigures(3, 1, height_ratios=ROWS_IN)
     planes, views, thickness = rows
     planes.suptitle(words, **left)
@@ -177,10 +191,20 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
     hemisphere."""
     low, high = brain.pial.vertices.min(axis=0), brain.pial.vertices.max(axis=0)
     middle = (low + high) / 2
-    fissure = float(np.clip(brain.fissure_x_mm, low[0], high[0]))
+    fissure = float(
+        np.clip(
+            brain.fissure_x_mm,
+            low[0],
+            high[0],
+        )
+    )
     # the larger hemisphere, of equal ones the right one
     outer = high[0] if high[0] - fissure > 0.8 * (fissure - low[0]) else low[0]
-    at = {"coronal": middle[1], "axial": middle[2], "sagittal": (fissure + outer) / 2}
+    at = {
+        "coronal": middle[1],
+        "axial": middle[2],
+        "sagittal": (fissure + outer) / 2,
+    }
     # pixel coordinates by axis, and the edges of the pictures
     dots = [
         np.arange(begin - MARGIN_MM, end + MARGIN_MM, PIXEL_MM)
@@ -193,7 +217,13 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         1, 3, width_ratios=[np.ptp(ends[right]) for _, right, _ in PLANES.values()]
     )
     for axes, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
-        points = np.empty((len(dots[up]), len(dots[right]), 3))
+        points = np.empty(
+            (
+                len(dots[up]),
+                len(dots[right]),
+                3,
+            )
+        )
         points[..., normal] = at[plane]
         points[..., right] = dots[right]
         points[..., up] = dots[up][:, None]
@@ -223,8 +253,19 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
             color=colour,
         )
     coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
-    coronal.plot([left, left + SCALE_BAR_MM], [bottom] * 2, color=colour, linewidth=1.2)
-    coronal.text(left, bottom + 1, f"{SCALE_BAR_MM:g} mm", fontsize=6, color=colour)
+    coronal.plot(
+        [left, left + SCALE_BAR_MM],
+        [bottom] * 2,
+        color=colour,
+        linewidth=1.2,
+    )
+    coronal.text(
+        left,
+        bottom + 1,
+        f"{SCALE_BAR_MM:g} mm",
+        fontsize=6,
+        color=colour,
+    )
     keys = [Patch(color=PIAL_COLOUR, label="pial surface")]
     if brain.white is not None or brain.tissues:
         keys.append(Patch(color=INNER_COLOUR, label="inner border of the cortex"))
@@ -312,14 +353,26 @@ def _draw_views(
     wide, tall = 1.04 * np.max(every, axis=0)
     panels = list(figure.subplots(1, len(names)))
     pixels_per_mm = PIXELS_PER_INCH * (FULL_WIDTH_IN - 0.7) / len(names) / (2 * wide)
-    for axes, view in zip(panels, [VIEWS[name] for name in names], strict=True):
+    for axes, view in zip(
+        panels,
+        [VIEWS[name] for name in names],
+        strict=True,
+    ):
         axes.set_axis_off()
         mesh, painted = restricted(
             brain.pial, colours, view.hemisphere, brain.fissure_x_mm
         )
         if not len(mesh.faces):
             continue
-        axes.imshow(render(mesh, painted, view, (wide, tall), pixels_per_mm))
+        axes.imshow(
+            render(
+                mesh,
+                painted,
+                view,
+                (wide, tall),
+                pixels_per_mm,
+            )
+        )
         axes.set_title(view.name, fontsize=6.5, pad=1)
         style = {"va": "top", "fontsize": 6, "color": MUTED_COLOUR}
         _write_ends(axes, view.ends, 0.05, 0.97, **style)
@@ -429,7 +482,14 @@ def quality_table(
     """
     every = [
         *rows,
-        *({**row, "verdict": "refused", "warning_count": 0} for row in refused),
+        *(
+            {
+                **row,
+                "verdict": "refused",
+                "warning_count": 0,
+            }
+            for row in refused
+        ),
     ]
     table = pd.DataFrame(every).set_index("subject", drop=False)
     ids = [name for name in order if name in table.index]

@@ -42,14 +42,56 @@ class View:
 VIEWS = {
     view.name: view
     for view in (
-        View("left", (-1, 0, 0), (0, 0, 1), ("A", "P")),
-        View("right", (1, 0, 0), (0, 0, 1), ("P", "A")),
-        View("top", (0, 0, 1), (0, 1, 0), ("L", "R")),
-        View("bottom", (0, 0, -1), (0, 1, 0), ("R", "L")),
-        View("front", (0, 1, 0), (0, 0, 1), ("R", "L")),
-        View("back", (0, -1, 0), (0, 0, 1), ("L", "R")),
-        View("left medial", (1, 0, 0), (0, 0, 1), ("P", "A"), "left"),
-        View("right medial", (-1, 0, 0), (0, 0, 1), ("A", "P"), "right"),
+        View(
+            "left",
+            (-1, 0, 0),
+            (0, 0, 1),
+            ("A", "P"),
+        ),
+        View(
+            "right",
+            (1, 0, 0),
+            (0, 0, 1),
+            ("P", "A"),
+        ),
+        View(
+            "top",
+            (0, 0, 1),
+            (0, 1, 0),
+            ("L", "R"),
+        ),
+        View(
+            "bottom",
+            (0, 0, -1),
+            (0, 1, 0),
+            ("R", "L"),
+        ),
+        View(
+            "front",
+            (0, 1, 0),
+            (0, 0, 1),
+            ("R", "L"),
+        ),
+        View(
+            "back",
+            (0, -1, 0),
+            (0, 0, 1),
+            ("L", "R"),
+        ),
+        View(
+            "left medial",
+            (1, 0, 0),
+            (0, 0, 1),
+            ("P", "A"),
+            "left",
+        ),
+        View(
+            "right medial",
+            (-1, 0, 0),
+            (0, 0, 1),
+            ("A", "P"),
+            "right",
+        ),
     )
 }
 """The views by name. In the top view the brain's left is on the picture's left."""
@@ -58,7 +100,11 @@ PIXELS_PER_INCH = 600
 """Resolution of pictures of surfaces: as in PDF files, three times that of PNG
 files."""
 
-PARTS = {"YlGnBu": (0.0, 0.85), "YlOrRd": (0.08, 0.85), "RdBu_r": (0.06, 0.94)}
+PARTS = {
+    "YlGnBu": (0.0, 0.85),
+    "YlOrRd": (0.08, 0.85),
+    "RdBu_r": (0.06, 0.94),
+}
 """Used parts of colour maps: their darkest ends could be mistaken for shade."""
 UNKNOWN_COLOUR = "#B8B8B8"
 SAME_PLACE_MM = 0.5
@@ -81,7 +127,10 @@ _LAMPS = (
 def picture_axes(view: View) -> tuple[Floats, Floats]:
     """Return the unit vectors that point right and up in the picture."""
     up = np.array(view.up, dtype=float)
-    return np.cross(up, np.array(view.towards, dtype=float)), up
+    return np.cross(
+        up,
+        np.array(view.towards, dtype=float),
+    ), up
 
 
 def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
@@ -113,7 +162,10 @@ def restricted(
 
 def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
     """Return one colour for every vertex, (n, 3) in 0 to 1."""
-    return np.tile(np.array(to_rgb(colour)), (len(mesh.vertices), 1))
+    return np.tile(
+        np.array(to_rgb(colour)),
+        (len(mesh.vertices), 1),
+    )
 
 
 def colour_scale(
@@ -130,7 +182,10 @@ def colour_scale(
         colormap, [tuple(shade) for shade in shades]
     )
     colours.colorbar_extend = "max" if cut else "neither"  # type: ignore[assignment]
-    return ScalarMappable(Normalize(low, high if high > low else low + 1.0), colours)
+    return ScalarMappable(
+        Normalize(low, high if high > low else low + 1.0),
+        colours,
+    )
 
 
 def paint(values: Floats, scale: ScalarMappable) -> Floats:
@@ -178,12 +233,22 @@ def render(
     `half_extents_mm` half the width and half the height of the picture; `lines` (k, 2,
     3) ends of lines, drawn unless the surface hides them.
     """
-    size = [max(2, round(2 * half * pixels_per_mm)) for half in half_extents_mm]
+    size = [
+        max(
+            2,
+            round(2 * half * pixels_per_mm),
+        )
+        for half in half_extents_mm
+    ]
     surface = pv.PolyData.from_regular_faces(
         np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
     )
     surface.point_data.active_normals = vertex_normals(mesh)
-    bytes_ = np.clip(np.round(255 * np.asarray(colours)), 0, 255).astype(np.uint8)
+    bytes_ = np.clip(
+        np.round(255 * np.asarray(colours)),
+        0,
+        255,
+    ).astype(np.uint8)
     attributes = (
         surface.point_data if len(bytes_) == len(mesh.vertices) else surface.cell_data
     )

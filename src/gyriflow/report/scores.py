@@ -50,13 +50,23 @@ def validation_figure(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
     """
     colours = run_colours(validation["run"], runs)
     simulations = validation.groupby(["run", "start"], sort=False)
-    figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
+    figure, panels = panel_figure(
+        len(COMPARED_MAPS),
+        per_row=2,
+        panel_in=2.5,
+    )
     for axes, measure in zip(panels, COMPARED_MAPS, strict=True):
         for number, ((run, _), rows) in enumerate(simulations):
             rows = rows.sort_values("week")
             # side by side, so that their bars do not hide each other
             shift_gw = 0.03 * (number - (simulations.ngroups - 1) / 2)
-            _gain_line(axes, rows["week"] + shift_gw, rows, measure, colours[str(run)])
+            _gain_line(
+                axes,
+                rows["week"] + shift_gw,
+                rows,
+                measure,
+                colours[str(run)],
+            )
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
         axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])
@@ -159,7 +169,10 @@ def nearest_figure(
             if measure in metrics_shown(Shown.SIZE)
             else here["unit"].iloc[0]
         )
-        axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
+        axes.set_title(
+            wrap(with_unit(plain(measure), unit), 30),
+            fontsize=7.5,
+        )
         axes.set_xlabel(parameter_label(varied))
         if number % 3 == 0:
             axes.set_ylabel("distance from the observed brain")
@@ -175,7 +188,11 @@ def nearest_figure(
         for side, (marker, colour) in SIDE_STYLES.items()
         if side in drawn
     ]
-    ring: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
+    ring: dict[str, Any] = {
+        "color": MUTED_COLOUR,
+        "linestyle": "none",
+        "marker": "o",
+    }
     handles.append(
         Line2D(
             [],
@@ -224,13 +241,24 @@ def _nearest_line(
 ) -> None:
     if rows.empty:
         return
-    axes.plot(rows["at"], rows["distance"], color=colour, linewidth=1.0)
+    axes.plot(
+        rows["at"],
+        rows["distance"],
+        color=colour,
+        linewidth=1.0,
+    )
     for trusted, part in rows.groupby("trusted"):
         style: dict[str, Any] = {
             "markerfacecolor": colour if trusted else "white",
             "markersize": 4.5,
         }
-        axes.plot(part["at"], part["distance"], marker, color=colour, **style)
+        axes.plot(
+            part["at"],
+            part["distance"],
+            marker,
+            color=colour,
+            **style,
+        )
     sound = rows[rows["trusted"]]
     best = (sound if len(sound) else rows).sort_values("distance").iloc[0]
     place = best["at"], best["distance"]
@@ -248,7 +276,13 @@ def _nearest_line(
         "ha": "center",
         "va": "top",
     }
-    axes.annotate(f"{best['at']:g}", place, fontsize=7, color=colour, **below)
+    axes.annotate(
+        f"{best['at']:g}",
+        place,
+        fontsize=7,
+        color=colour,
+        **below,
+    )
 
 
 @styled
@@ -263,7 +297,11 @@ def calibration_figure(
     `runs` has the columns of the parameters, round, score (NaN: diverged); `optimum`
     parameter, value. `score` are the terms of the score.
     """
-    figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
+    figure, panels = panel_figure(
+        len(optimum),
+        per_row=len(optimum),
+        panel_in=2.0,
+    )
     finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]
     # later rounds are darker
     shades = dict(
@@ -289,10 +327,25 @@ def calibration_figure(
                 "markeredgecolor": "black",
                 "markeredgewidth": 0.4,
             }
-            axes.plot(rows[name], rows["score"], "o", label=f"round {number}", **style)
+            axes.plot(
+                rows[name],
+                rows["score"],
+                "o",
+                label=f"round {number}",
+                **style,
+            )
         if len(diverged):
-            top = np.full(len(diverged), float(finished["score"].max()))
-            axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
+            top = np.full(
+                len(diverged),
+                float(finished["score"].max()),
+            )
+            axes.plot(
+                diverged[name],
+                top,
+                "x",
+                color=MUTED_COLOUR,
+                label="diverged",
+            )
         axes.set_xlabel(parameter_label(name))
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
     figure.legend(

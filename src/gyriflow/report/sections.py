@@ -27,7 +27,11 @@ from .style import (
     styled,
 )
 
-PLANES = {"coronal": (1, 0, 2), "axial": (2, 0, 1), "sagittal": (0, 1, 2)}
+PLANES = {
+    "coronal": (1, 0, 2),
+    "axial": (2, 0, 1),
+    "sagittal": (0, 1, 2),
+}
 """The axis normal to each plane, and those to the right and up in its picture."""
 MAX_WEEKS = 5
 SCALE_BAR_MM = 20.0
@@ -50,7 +54,10 @@ def draw_outline(
     body = pv.PolyData.from_regular_faces(
         np.array(surface.vertices), np.array(surface.faces, dtype=int)
     )
-    cut = body.slice(normal=np.eye(3)[normal], origin=np.eye(3)[normal] * at)
+    cut = body.slice(
+        normal=np.eye(3)[normal],
+        origin=np.eye(3)[normal] * at,
+    )
     segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
     axes.add_collection(
         LineCollection(
@@ -69,7 +76,12 @@ def _coronal_section(
 ) -> pv.PolyData:
     """Cut linear elements at the median y of their nodes: a polygon per element, with
     fields at its points."""
-    cells = np.insert(np.asarray(tets), 0, 4, axis=1)
+    cells = np.insert(
+        np.asarray(tets),
+        0,
+        4,
+        axis=1,
+    )
     body = pv.UnstructuredGrid(
         cells.ravel(), np.full(len(tets), pv.CellType.TETRA), np.asarray(positions)
     )
@@ -78,7 +90,11 @@ def _coronal_section(
     # one polygon per element, not triangles
     return body.slice(
         normal="y",
-        origin=(0.0, float(np.median(positions[:, 1])), 0.0),
+        origin=(
+            0.0,
+            float(np.median(positions[:, 1])),
+            0.0,
+        ),
         generate_triangles=False,
     )
 
@@ -103,13 +119,25 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
         "tangential growth\nin a step",
         "normals",
     )
-    for row, week in zip(rows, (min(weeks), max(weeks)), strict=True):
+    for row, week in zip(
+        rows,
+        (min(weeks), max(weeks)),
+        strict=True,
+    ):
         fields = dict(weeks[week])
-        section = _coronal_section(fields.pop("positions"), tets[:, :4], fields)
+        section = _coronal_section(
+            fields.pop("positions"),
+            tets[:, :4],
+            fields,
+        )
         points, values = np.asarray(section.points)[:, [0, 2]], section.point_data
         polygons = [points[face] for face in section.irregular_faces]
         style: dict[str, Any] = {"linewidths": 0.05}
-        for axes, (name, top) in zip(row, scales.items(), strict=False):
+        for axes, (name, top) in zip(
+            row,
+            scales.items(),
+            strict=False,
+        ):
             means = np.array(
                 [values[name][face].mean() for face in section.irregular_faces]
             )
@@ -126,7 +154,11 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
             )
         )
         # arrows at one point of the cortex in each square
-        _, first = np.unique(np.floor(points / ARROW_MM), axis=0, return_index=True)
+        _, first = np.unique(
+            np.floor(points / ARROW_MM),
+            axis=0,
+            return_index=True,
+        )
         arrows = first[values["weight"][first] > 0.5]
         normals = values["normals"][arrows][:, [0, 2]] * ARROW_MM
         row[3].quiver(
@@ -155,7 +187,11 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
             ha="right",
             va="center",
         )
-    for axes, title in zip(rows[0], titles, strict=True):
+    for axes, title in zip(
+        rows[0],
+        titles,
+        strict=True,
+    ):
         axes.set_title(title, fontsize=8)
     for column, top in enumerate(scales.values()):
         scale = ScalarMappable(Normalize(0, top), "YlGnBu")
@@ -186,7 +222,10 @@ def _aligned(
         if brain.is_simulated:
             aligned = runs.setdefault(brain.row, {})
             if brain.column in last:
-                aligned[brain.column] = align(brain.surface, last[brain.column])
+                aligned[brain.column] = align(
+                    brain.surface,
+                    last[brain.column],
+                )
     return last, name, runs
 
 
@@ -207,8 +246,20 @@ def outlines_figure(grid: Grid) -> Figure:
     drawn = [*observed.values()]
     for brains in runs.values():
         drawn += brains.values()
-    low = np.min([mesh.vertices.min(axis=0) for mesh in drawn], axis=0) - 1
-    high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1
+    low = (
+        np.min(
+            [mesh.vertices.min(axis=0) for mesh in drawn],
+            axis=0,
+        )
+        - 1
+    )
+    high = (
+        np.max(
+            [mesh.vertices.max(axis=0) for mesh in drawn],
+            axis=0,
+        )
+        + 1
+    )
     wide = max((high - low)[right] for _, right, _ in PLANES.values())
     tall = [(high - low)[up] for *_, up in PLANES.values()]
     inches_per_mm = min(
@@ -232,7 +283,13 @@ def outlines_figure(grid: Grid) -> Figure:
             draw_outline(axes, observed[week], plane, at, OBSERVED_COLOUR, 1.7)
             for run in runs:
                 if week in runs[run]:
-                    draw_outline(axes, runs[run][week], plane, at, colours[run])
+                    draw_outline(
+                        axes,
+                        runs[run][week],
+                        plane,
+                        at,
+                        colours[run],
+                    )
             axes.set(
                 xlim=(centre - wide / 2, centre + wide / 2),
                 ylim=(low[up], high[up]),
@@ -248,7 +305,11 @@ def outlines_figure(grid: Grid) -> Figure:
             ha="right",
             va="center",
         )
-    for axes, week in zip(panels[0], weeks, strict=True):
+    for axes, week in zip(
+        panels[0],
+        weeks,
+        strict=True,
+    ):
         axes.set_title(week_label(week), fontsize=8)
     foot = panels[-1, 0]
     start, bottom = foot.get_xlim()[0] + 2, low[PLANES["sagittal"][2]]
@@ -259,11 +320,23 @@ def outlines_figure(grid: Grid) -> Figure:
         linewidth=2,
         clip_on=False,
     )
-    foot.text(start, bottom - 1, f"{SCALE_BAR_MM:g} mm", va="top", fontsize=7)
+    foot.text(
+        start,
+        bottom - 1,
+        f"{SCALE_BAR_MM:g} mm",
+        va="top",
+        fontsize=7,
+    )
     add_letters(panels[:, 0])
     named = {**colours, observed_name: OBSERVED_COLOUR}
     handles = [
-        Line2D([], [], color=colour, label=label) for label, colour in named.items()
+        Line2D(
+            [],
+            [],
+            color=colour,
+            label=label,
+        )
+        for label, colour in named.items()
     ]
     figure.legend(
         handles=handles,

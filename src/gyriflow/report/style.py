@@ -88,7 +88,14 @@ def panel_figure(
     figure = Figure(
         figsize=(width_in, foot_in + panel_in * lines), layout="constrained"
     )
-    panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
+    panels = list(
+        figure.subplots(
+            lines,
+            columns,
+            squeeze=False,
+            **grid,
+        ).flat
+    )
     for spare in panels[count:]:
         spare.remove()
     add_letters(panels[:count])
@@ -129,7 +136,13 @@ def wrap(text: str, letters: int) -> str:
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with columns run and subject, with simulations named by
     `run_names`."""
-    pairs = list(zip(table["run"], table["subject"], strict=True))
+    pairs = list(
+        zip(
+            table["run"],
+            table["subject"],
+            strict=True,
+        )
+    )
     simulated = []
     for run, subject in dict.fromkeys(pairs):
         if run != OBSERVED:
@@ -201,8 +214,18 @@ def star(
     **style: Any,
 ) -> Line2D:
     """Return the legend entry of observed brains."""
-    usual: dict[str, Any] = {"marker": "*", "markersize": 7, "linestyle": "none"}
-    return Line2D([], [], color=colour, label=label, **{**usual, **style})
+    usual: dict[str, Any] = {
+        "marker": "*",
+        "markersize": 7,
+        "linestyle": "none",
+    }
+    return Line2D(
+        [],
+        [],
+        color=colour,
+        label=label,
+        **{**usual, **style},
+    )
 
 
 def run_legend(
@@ -244,7 +267,13 @@ def run_legend(
     # a letter of the legend is about 0.065 in wide, the line before it and the gap
     # behind 0.5 in
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)
-    columns = max(1, min(len(handles), int(figure.get_figwidth() / longest)))
+    columns = max(
+        1,
+        min(
+            len(handles),
+            int(figure.get_figwidth() / longest),
+        ),
+    )
     lines = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.15 * (lines - 1))
     figure.legend(

@@ -126,9 +126,12 @@ def metrics_table(
         or set(rows["week"])
     )
     rows = rows[rows["week"] == week].assign(name=_named)
-    wide = rows.pivot_table("value", "name", "run", aggfunc="mean").reindex(
-        dict.fromkeys(rows["name"])
-    )
+    wide = rows.pivot_table(
+        "value",
+        "name",
+        "run",
+        aggfunc="mean",
+    ).reindex(dict.fromkeys(rows["name"]))
     # of what may be zero, a difference in per cent is meaningless
     is_signed = wide.index.isin(rows.loc[_signed_metrics(rows), "name"])
     observed_values = (
@@ -189,9 +192,12 @@ def brain_table(
     centile, flag; `differences` are those of `metrics.atlas_curves`, of the study.
     """
     rows = _reported(metrics).assign(name=_named)
-    wide = rows.pivot_table("value", "name", "hemisphere", aggfunc="first").reindex(
-        rows["name"].unique()
-    )
+    wide = rows.pivot_table(
+        "value",
+        "name",
+        "hemisphere",
+        aggfunc="first",
+    ).reindex(rows["name"].unique())
     table = wide[[part for part in ("whole", *SIDES) if part in wide]]
     brain = metrics["subject"].iloc[0]
     from_atlases = _of_whole(differences, brain)
@@ -283,7 +289,10 @@ def resolution_over_steps(
     through = steps["elements_through_cortex"].fillna(0.0)
     error, first_week = math.nan, math.nan
     if has_layers:
-        error = round(element_error(order, through.iloc[0])[0], 1)
+        error = round(
+            element_error(order, through.iloc[0])[0],
+            1,
+        )
         too_coarse = [is_too_coarse(order, elements) for elements in through]
         first_week = float(steps.loc[too_coarse, "week"].min())
     return {
@@ -312,12 +321,29 @@ def resources(jobs: pd.DataFrame) -> pd.DataFrame:
         run=jobs["run"].fillna(""),
         jobs=1,
     )
-    totals = {"jobs": "sum", "hours": "sum", "core_hours": "sum", "memory_MiB": "max"}
-    stages = each.groupby(["rule", "run"], sort=False, as_index=False).agg(totals)
+    totals = {
+        "jobs": "sum",
+        "hours": "sum",
+        "core_hours": "sum",
+        "memory_MiB": "max",
+    }
+    stages = each.groupby(
+        ["rule", "run"],
+        sort=False,
+        as_index=False,
+    ).agg(totals)
     stages = stages.rename(columns={"rule": "stage"}).sort_values(
         "core_hours", ascending=False, kind="stable"
     )
-    whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(totals)}])
+    whole = pd.DataFrame(
+        [
+            {
+                "stage": "all",
+                "run": "",
+                **stages.agg(totals),
+            }
+        ]
+    )
     return pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
 
 
@@ -497,7 +523,10 @@ def accuracy_table(accuracy: Mapping[str, Any]) -> pd.DataFrame:
         distance, r = range_text(rows["distance_mm"]), range_text(rows["r_shape_index"])
         if model == "run":
             errors = {
-                f"{size} (%)": range_text(100 * rows[f"{size}_difference"], "+.1f")
+                f"{size} (%)": range_text(
+                    100 * rows[f"{size}_difference"],
+                    "+.1f",
+                )
                 for size in ("area", "volume")
             }
             table[horizon] = (
@@ -548,7 +577,13 @@ def mesh_quality(
         .rename(index=MESH_MEASURES)
     )
     table["limit"] = [
-        gates.get(name, gates.get(f"max_{name}", gates.get(f"min_{name}")))
+        gates.get(
+            name,
+            gates.get(
+                f"max_{name}",
+                gates.get(f"min_{name}"),
+            ),
+        )
         for name in MESH_MEASURES
     ]
     return table.rename_axis("measure")
@@ -566,13 +601,23 @@ def html_table(table: pd.DataFrame) -> Markup:
     rows = [
         [
             (_kind(name, value, text), text)
-            for name, value, text in zip(flat, row, words, strict=True)
+            for name, value, text in zip(
+                flat,
+                row,
+                words,
+                strict=True,
+            )
         ]
         for row, words in zip(
             flat.to_numpy(dtype=object), texts.to_numpy(), strict=True
         )
     ]
-    return Markup(_TABLE.render(heads=list(flat), rows=rows))
+    return Markup(
+        _TABLE.render(
+            heads=list(flat),
+            rows=rows,
+        )
+    )
 
 
 def _kind(
@@ -582,7 +627,11 @@ def _kind(
 ) -> str:
     """Return the CSS class of a cell."""
     if (
-        isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        isinstance(
+            value,
+            int | float | np.number,
+        )
+        and not isinstance(value, bool)
     ) or NUMBER.fullmatch(text):
         return "number"
     if isinstance(text, Markup):
@@ -606,7 +655,12 @@ def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object
                 f"{_text(at, 4)} at {week} GW" for week, at in (ends[0], ends[-1])
             )
         elif isinstance(value, Mapping):
-            flat.update(_flatten(value, f"{prefix}{name}."))
+            flat.update(
+                _flatten(
+                    value,
+                    f"{prefix}{name}.",
+                )
+            )
         else:
             flat[f"{prefix}{name}"] = value
     return flat

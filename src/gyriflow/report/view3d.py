@@ -72,15 +72,24 @@ def surfaces_view(
             MAX_VERTICES,
         )
     )
-    low = np.min([mesh.vertices.min(axis=0) for _, mesh, _ in everything], axis=0)
-    high = np.max([mesh.vertices.max(axis=0) for _, mesh, _ in everything], axis=0)
+    low = np.min(
+        [mesh.vertices.min(axis=0) for _, mesh, _ in everything],
+        axis=0,
+    )
+    high = np.max(
+        [mesh.vertices.max(axis=0) for _, mesh, _ in everything],
+        axis=0,
+    )
     box = low, float((high - low).max())
     scales = {}
     for name in _DRAWN:
         values = [maps[name] for _, _, maps in everything if name in maps]
         if values:
             every = np.concatenate(values)
-            scales[name] = scale_of(name, every[np.isfinite(every)])
+            scales[name] = scale_of(
+                name,
+                every[np.isfinite(every)],
+            )
     groups: list[dict[str, Any]] = []
     for run, frames in simulated.items():
         vertices_kept, faces = thin_out(frames[-1][1], vertices)
@@ -106,7 +115,12 @@ def surfaces_view(
         }
         groups.append(group)
     maps = [_drawn_map(name, scale) for name, scale in scales.items()]
-    return {"low": low.tolist(), "size": box[1], "groups": groups, "maps": maps}
+    return {
+        "low": low.tolist(),
+        "size": box[1],
+        "groups": groups,
+        "maps": maps,
+    }
 
 
 def _drawn_map(name: str, scale: ScalarMappable) -> dict[str, Any]:
@@ -182,10 +196,21 @@ def _frame(
         shares = (np.asarray(vertex_values, dtype=float)[vertices_kept] - bottom) / (
             top - bottom
         )
-        levels = np.clip(np.round(shares * _VALUE_LEVELS), 0, _VALUE_LEVELS)
-        values[name] = _text(np.where(np.isfinite(shares), levels, _UNKNOWN), "u1")
+        levels = np.clip(
+            np.round(shares * _VALUE_LEVELS),
+            0,
+            _VALUE_LEVELS,
+        )
+        values[name] = _text(
+            np.where(np.isfinite(shares), levels, _UNKNOWN),
+            "u1",
+        )
     places = np.round((mesh.vertices[vertices_kept] - low) / size * _POSITION_LEVELS)
-    return {"week": week, "positions": _text(places, "<u2"), "values": values}
+    return {
+        "week": week,
+        "positions": _text(places, "<u2"),
+        "values": values,
+    }
 
 
 def _text(values: NDArray, kind: str) -> str:

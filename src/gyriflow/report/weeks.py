@@ -47,7 +47,11 @@ own."""
 PUBLISHED_MARKERS = ("s", "^", "D", "v")
 NO_SUBJECTS: Mapping[str, str] = {}
 LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
-JOINED: Mapping[str, Any] = {"color": MUTED_COLOUR, "linewidth": 0.8, "zorder": 2.5}
+JOINED: Mapping[str, Any] = {
+    "color": MUTED_COLOUR,
+    "linewidth": 0.8,
+    "zorder": 2.5,
+}
 """Line through the scans of a subject."""
 NEAR_GW = 2.0
 """The lines of atlases go on so far beyond the brains of a chart."""
@@ -81,7 +85,11 @@ def weeks_chart(
     """Draw layers over the weeks, the first at the back, in a panel for each title;
     `layout` of `panel_figure`."""
     figure, panels = panel_figure(len(titles), **layout)
-    for axes, (panel, title) in zip(panels, titles.items(), strict=True):
+    for axes, (panel, title) in zip(
+        panels,
+        titles.items(),
+        strict=True,
+    ):
         for layer in layers:
             rows = layer.rows[layer.rows["panel"] == panel].sort_values("week")
             if isinstance(layer.value, tuple):
@@ -89,9 +97,19 @@ def weeks_chart(
                 weeks_at, low, high = (
                     rows[column].astype(float) for column in ("week", *layer.value)
                 )
-                axes.fill_between(weeks_at, low, high, linewidth=0, **layer.style)
+                axes.fill_between(
+                    weeks_at,
+                    low,
+                    high,
+                    linewidth=0,
+                    **layer.style,
+                )
             elif len(rows):
-                axes.plot(rows["week"], rows[layer.value], **layer.style)
+                axes.plot(
+                    rows["week"],
+                    rows[layer.value],
+                    **layer.style,
+                )
             if "trusted" in rows and not rows["trusted"].all():
                 doubtful = rows[~rows["trusted"]]
                 style = {**layer.style, "markerfacecolor": "white", "linestyle": ""}
@@ -105,7 +123,10 @@ def _run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
     """Return the line of each run."""
     style = {"marker": "o", "markersize": 2.5}
     return [
-        Layer(rows[rows["run"] == run], {"color": colour, **style})
+        Layer(
+            rows[rows["run"] == run],
+            {"color": colour, **style},
+        )
         for run, colour in colours.items()
     ]
 
@@ -162,7 +183,13 @@ def _group_shades(
     """Return the colour of each brain in a group, not used by any run, and the legend
     entries."""
     free = [colour for colour in RUN_COLOURS if colour not in colours.values()]
-    group_colours = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
+    group_colours = dict(
+        zip(
+            dict.fromkeys(groups.values()),
+            free,
+            strict=False,
+        )
+    )
     entries: list[Artist] = [
         star(name, colour, marker="o", markersize=5)
         for name, colour in group_colours.items()
@@ -206,7 +233,10 @@ def _atlas_lines(
     is_drawn = (
         (atlases["hemisphere"] == "whole")
         & atlases["metric"].isin(titles)
-        & atlases["week"].between(weeks.min() - NEAR_GW, weeks.max() + NEAR_GW)
+        & atlases["week"].between(
+            weeks.min() - NEAR_GW,
+            weeks.max() + NEAR_GW,
+        )
     )
     rows = atlases[is_drawn]
     rows = rows.assign(panel=rows["metric"])
@@ -214,16 +244,30 @@ def _atlas_lines(
     entries: list[Artist] = []
     # an atlas may have no brain of these weeks
     names = list(dict.fromkeys(rows["atlas"]))
-    for name, line in zip(names, cycle(LINES[1:]), strict=False):
+    for name, line in zip(
+        names,
+        cycle(LINES[1:]),
+        strict=False,
+    ):
         style: dict[str, Any] = {
             "color": MUTED_COLOUR,
             "linewidth": 0.8,
             "linestyle": line,
             "zorder": 1.5,
         }
-        layers.append(Layer(rows[rows["atlas"] == name], style))
+        layers.append(
+            Layer(
+                rows[rows["atlas"] == name],
+                style,
+            )
+        )
         entries.append(
-            Line2D([], [], label=f"{name}: average of many fetuses", **style)
+            Line2D(
+                [],
+                [],
+                label=f"{name}: average of many fetuses",
+                **style,
+            )
         )
     return layers, entries
 
@@ -286,14 +330,23 @@ def intervals_figure(ensemble: pd.DataFrame) -> Figure:
     rows, titles = _shown(ensemble, Shown.INTERVALS)
     layers = [
         Layer(rows, {"color": NEUTRAL_COLOUR}, ("low", "high")),
-        Layer(rows, {"color": RUN_COLOURS[0], "marker": "o", "markersize": 2.5}, "run"),
+        Layer(
+            rows,
+            {"color": RUN_COLOURS[0], "marker": "o", "markersize": 2.5},
+            "run",
+        ),
         Layer(
             rows,
             {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""},
             "observed_value",
         ),
     ]
-    figure, _ = weeks_chart(titles, layers, rows["week"], per_row=2)
+    figure, _ = weeks_chart(
+        titles,
+        layers,
+        rows["week"],
+        per_row=2,
+    )
     extra: list[Artist] = [Patch(color=NEUTRAL_COLOUR, label="interval")]
     if ensemble["observed_value"].notna().any():
         extra.append(star(OBSERVED_BRAIN))
@@ -344,10 +397,19 @@ def norms_figure(
         {"markersize": 3.0} if own["subject"].nunique() > MANY_BRAINS else {}
     )
     line, thin = (
-        {"color": MUTED_COLOUR, "linewidth": width, "zorder": 4} for width in (1.3, 0.6)
+        {
+            "color": MUTED_COLOUR,
+            "linewidth": width,
+            "zorder": 4,
+        }
+        for width in (1.3, 0.6)
     )
     layers = [
-        Layer(norm, {"color": NEUTRAL_COLOUR, "alpha": 0.6}, ("q05", "q95")),
+        Layer(
+            norm,
+            {"color": NEUTRAL_COLOUR, "alpha": 0.6},
+            ("q05", "q95"),
+        ),
         Layer(norm, {"color": NEUTRAL_COLOUR}, ("q25", "q75")),
         Layer(norm, line, "expected"),
         *(Layer(norm, thin, quantile) for quantile in ("q05", "q25", "q75", "q95")),
@@ -367,13 +429,26 @@ def norms_figure(
             shades=shades,
         ),
     ]
-    figure, _ = weeks_chart(titles, layers, rows["week"], panel_in=2.0, foot_in=0.6)
+    figure, _ = weeks_chart(
+        titles,
+        layers,
+        rows["week"],
+        panel_in=2.0,
+        foot_in=0.6,
+    )
     if not others["subject"].isin(shades).all():
         extra.append(star("other observed brains", RUN_COLOURS[-1]))
     if curves["q05"].notna().any():
         extra.append(Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95"))
     elif len(curves):
-        extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
+        extra.append(
+            Line2D(
+                [],
+                [],
+                color=MUTED_COLOUR,
+                label="norm, spread unknown",
+            )
+        )
     run_legend(
         figure,
         colours,
@@ -401,18 +476,33 @@ def regions_chart(
     """
     rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
     colours = region_colours(rows["region"])
-    lines = dict(zip(run_colours(rows["run"]), LINES, strict=False))
+    lines = dict(
+        zip(
+            run_colours(rows["run"]),
+            LINES,
+            strict=False,
+        )
+    )
     # both sides together
     keys = ["panel", "subject", "run", "week", "region"]
     rows = rows.groupby(keys, sort=False)["value"].agg(["sum", "mean"])
     rows = rows.reset_index().assign(
-        value=lambda both: both["sum"].where(both["panel"] == "area", both["mean"])
+        value=lambda both: both["sum"].where(
+            both["panel"] == "area",
+            both["mean"],
+        )
     )
     of_areas = runs_by_name(
         asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)]
     )
     rows = pd.concat(
-        [rows, of_areas.assign(panel="asymmetry", value=of_areas["asymmetry_index"])]
+        [
+            rows,
+            of_areas.assign(
+                panel="asymmetry",
+                value=of_areas["asymmetry_index"],
+            ),
+        ]
     )
     titles |= {"area": f"{titles['area']}, both sides"} if "area" in titles else {}
     titles["asymmetry"] = "asymmetry of area, 2 (L − R)/(L + R)"
@@ -431,7 +521,12 @@ def regions_chart(
                     },
                 )
             )
-    figure, panels = weeks_chart(titles, layers, rows["week"], foot_in=0.75)
+    figure, panels = weeks_chart(
+        titles,
+        layers,
+        rows["week"],
+        foot_in=0.75,
+    )
     for name, axes in panels.items():
         # signed numbers and ratios are not compared with 0
         if (
@@ -462,7 +557,11 @@ def regions_chart(
         )
         for run, line in lines.items()
     ]
-    run_legend(figure, {}, extra=[*extra, star(observed_name, MUTED_COLOUR)])
+    run_legend(
+        figure,
+        {},
+        extra=[*extra, star(observed_name, MUTED_COLOUR)],
+    )
     return figure
 
 
@@ -482,7 +581,10 @@ def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
     colours = run_colours(prediction["run"], runs)
     # simpler predictions are the same for all runs
     rows = prediction.assign(
-        line=prediction["run"].where(prediction["model"] == "run", prediction["model"])
+        line=prediction["run"].where(
+            prediction["model"] == "run",
+            prediction["model"],
+        )
     )
     rows = rows.drop_duplicates(["start", "line", "horizon"]).assign(
         week=lambda rows: rows["horizon"]
@@ -508,12 +610,19 @@ def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
         for title in columns.values()
     ]
     parts = [
-        rows.assign(panel=rows["start"] + f": {title}", value=rows[name])
+        rows.assign(
+            panel=rows["start"] + f": {title}",
+            value=rows[name],
+        )
         for name, title in columns.items()
     ]
     rows = pd.concat(parts)
     layers = [
-        Layer(rows[rows["line"] == name], style) for name, style in styles.items()
+        Layer(
+            rows[rows["line"] == name],
+            style,
+        )
+        for name, style in styles.items()
     ]
     layout: dict[str, Any] = {
         "per_row": 2,
@@ -557,7 +666,14 @@ def displacement_figure(
     of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
     named = runs_by_name(displacement)
-    moved = published["displacement"] if published else {"from_weeks": [], "rows": []}
+    moved = (
+        published["displacement"]
+        if published
+        else {
+            "from_weeks": [],
+            "rows": [],
+        }
+    )
     colours = run_colours(named["run"], runs)
     weeks = np.array(moved["from_weeks"], dtype=float)
     markers = dict(
@@ -569,7 +685,12 @@ def displacement_figure(
     )
     tables = [
         pd.DataFrame(
-            {**row, "run": row["source"], "from_week": weeks, "to_week": weeks + 1}
+            {
+                **row,
+                "run": row["source"],
+                "from_week": weeks,
+                "to_week": weeks + 1,
+            }
         )
         for row in moved["rows"]
     ]
@@ -581,7 +702,11 @@ def displacement_figure(
         "mean_mm": "mean displacement, all nodes",
     }
     rows = pd.concat(
-        rows.assign(panel=column, value=rows[column] / duration) for column in titles
+        rows.assign(
+            panel=column,
+            value=rows[column] / duration,
+        )
+        for column in titles
     )
     styles = {
         run: {"color": MUTED_COLOUR, "marker": marker, "linestyle": "--"}
@@ -589,7 +714,10 @@ def displacement_figure(
     }
     styles |= {run: {"color": colour, "marker": "o"} for run, colour in colours.items()}
     layers = [
-        Layer(rows[rows["run"] == run], {"label": run, **style})
+        Layer(
+            rows[rows["run"] == run],
+            {"label": run, **style},
+        )
         for run, style in styles.items()
     ]
     figure, panels = weeks_chart(
@@ -604,7 +732,15 @@ def displacement_figure(
     run_legend(
         figure,
         colours,
-        extra=[Line2D([], [], label=run, **styles[run]) for run in markers],
+        extra=[
+            Line2D(
+                [],
+                [],
+                label=run,
+                **styles[run],
+            )
+            for run in markers
+        ],
     )
     return figure
 
@@ -769,10 +905,28 @@ def influence_spectra(
     `observed` those of observed brains, whose run is so named. `values` are by run the
     varied parameters with their values, in the order of the sweep.
     """
-    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
+    labels = dict(
+        zip(
+            values,
+            value_labels(list(values.values())),
+            strict=True,
+        )
+    )
     simulated = [table.assign(run=table["run"].map(labels)) for table in members]
-    shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
-    colours = dict(zip(labels.values(), shades, strict=False))
+    shades = mpl.colormaps["YlGnBu"](
+        np.linspace(
+            0.3,
+            0.95,
+            max(len(labels), 2),
+        )
+    )
+    colours = dict(
+        zip(
+            labels.values(),
+            shades,
+            strict=False,
+        )
+    )
     spectra = pd.concat([*simulated, *observed])
     by_proxy = {
         proxy: _band_rows(spectra[spectra["week"] == week], FOLD_BANDS, proxy)
@@ -787,7 +941,11 @@ def influence_spectra(
         sharey="row",
     )
     width = 0.8 / len(colours)
-    for axes, (proxy, hemisphere) in zip(panels, product(PROXIES, sides), strict=True):
+    for axes, (proxy, hemisphere) in zip(
+        panels,
+        product(PROXIES, sides),
+        strict=True,
+    ):
         side = by_proxy[proxy][by_proxy[proxy]["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
             run_rows = side[side["run"] == run]
@@ -798,7 +956,11 @@ def influence_spectra(
             bars = axes.bar(
                 position, run_rows["relative_power"], width=0.92 * width, color=colour
             )
-            for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
+            for bar, trusted in zip(
+                bars,
+                run_rows["trusted"],
+                strict=True,
+            ):
                 if not trusted:
                     bar.set(
                         hatch=_HATCH,

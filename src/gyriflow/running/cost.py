@@ -107,7 +107,10 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     """Predict the cost of a simulation."""
     run, week = simulation.settings, simulation.weeks[0]
     elements = linear_elements(week, mesh)
-    steps = max((run.end_week - week) * SECONDS_PER_GW / run.step_s, 1.0)
+    steps = max(
+        (run.end_week - week) * SECONDS_PER_GW / run.step_s,
+        1.0,
+    )
     memory = predicted_memory_mib(
         round(elements / (8 if mesh.order == 2 else 1)),
         run.ranks,
@@ -238,7 +241,13 @@ def _prediction_seconds(
     if chain.path is not None:
         later = [week for week in study.paths[chain.path].weeks if week > start]
     # it ends two weeks of the atlas after the end
-    weeks = max(later[: bisect_left(later, end) + 2], default=start) - start
+    weeks = (
+        max(
+            later[: bisect_left(later, end) + 2],
+            default=start,
+        )
+        - start
+    )
     elements = linear_elements(start, study.config.mesh)
     following_s = PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
     if not study.config.surface.open_sulci:
@@ -296,4 +305,7 @@ def surface_memory_mib(labels: str, week: float) -> int:
         return MIN_SURFACE_MIB
     voxels, voxel_mm3 = prod(header.shape), prod(header.voxel_mm)
     inside = min(voxels, expected_volume_ml(week) / (voxel_mm3 * ML_PER_MM3))
-    return max(MIN_SURFACE_MIB, ceil((16 * voxels + 800 * inside) / 2**20))
+    return max(
+        MIN_SURFACE_MIB,
+        ceil((16 * voxels + 800 * inside) / 2**20),
+    )

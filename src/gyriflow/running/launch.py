@@ -259,14 +259,23 @@ def output_to(log: Path) -> Iterator[None]:
     streams stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
     # readable by its owner only, since it may contain names of subjects
-    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+    file = os.open(
+        log,
+        os.O_WRONLY | os.O_APPEND | os.O_CREAT,
+        0o600,
+    )
     streams = {}
     terminals = {}
     for number, name in ((1, "stdout"), (2, "stderr")):
         streams[name] = getattr(sys, name)
         streams[name].flush()
         terminals[number] = os.dup(number)
-        stream = os.fdopen(os.dup(number), "w", buffering=1, errors="replace")
+        stream = os.fdopen(
+            os.dup(number),
+            "w",
+            buffering=1,
+            errors="replace",
+        )
         setattr(sys, name, stream)
         os.dup2(file, number)
     os.close(file)
@@ -363,7 +372,10 @@ def exit_code(
 ) -> int:
     """Return the exit code of a run that failed with Snakemake's `code`: that of the
     first error of a step that has one; report a full disk."""
-    code = next(filter(None, (failure.exit_code for failure in failures)), code)
+    code = next(
+        filter(None, (failure.exit_code for failure in failures)),
+        code,
+    )
     if code == 1 and (full := full_disk(directory)):
         print(
             f"gyriflow: {directory.resolve()}: {full}, then run the same command again",
@@ -487,7 +499,11 @@ def call_snakemake(
             path.read_text(encoding="utf-8")
             for path in (SHIPPED / "workflow" / "rules").glob("*.smk")
         ]
-        stages = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
+        stages = re.findall(
+            r"^rule (\w+):",
+            "".join(rules),
+            re.MULTILINE,
+        )
         raise InputError(
             f"no stage or result is named {name}; {did_you_mean(name, stages)}"
         )

@@ -16,7 +16,12 @@ def available_cores() -> int:
     from joblib import cpu_count  # takes a third of a second
 
     per_task = _slurm("CPUS_PER_TASK") * (_slurm("NTASKS") or 1)
-    return min(filter(None, (cpu_count(), _slurm("CPUS_ON_NODE"), per_task)))
+    return min(
+        filter(
+            None,
+            (cpu_count(), _slurm("CPUS_ON_NODE"), per_task),
+        )
+    )
 
 
 def available_memory_mib(

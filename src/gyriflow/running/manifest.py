@@ -69,7 +69,10 @@ def manifest_of(log: str) -> Path | None:
     """Return the path of the manifest of a job with a log; None if its log lies beside
     no results."""
     path = Path(log)
-    folder = next((folder for folder in path.parents if folder.name == "logs"), None)
+    folder = next(
+        (folder for folder in path.parents if folder.name == "logs"),
+        None,
+    )
     if folder is None:
         return None
     name = path.relative_to(folder).with_suffix(".json")
@@ -237,7 +240,11 @@ def _changed_settings(now: Mapping[str, str], before: Mapping[str, str]) -> str:
         return CHANGED_CODE
     changes = []
     for name in others:
-        changes += _changed_keys(name, now.get(name), before.get(name))
+        changes += _changed_keys(
+            name,
+            now.get(name),
+            before.get(name),
+        )
     return f"changed settings {', '.join(dict.fromkeys(changes))}"
 
 

@@ -46,7 +46,11 @@ def _thickness_sources(study: Study, path: Chain) -> list[Brain]:
     sources: dict[str, Brain] = {}
     for file in path.links:
         link = study.links[file]
-        for name, is_filled in zip((link.earlier, link.later), link.posed, strict=True):
+        for name, is_filled in zip(
+            (link.earlier, link.later),
+            link.posed,
+            strict=True,
+        ):
             source = study.brains[name].thickness_of
             if is_filled and source is not None:
                 sources[source] = study.brains[source]

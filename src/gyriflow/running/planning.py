@@ -149,7 +149,13 @@ class Plan:
 
 def no_plan() -> Plan:
     """Return the plan of a call that does not plan."""
-    return Plan([], {}, Contents({}, {}), {}, [])
+    return Plan(
+        [],
+        {},
+        Contents({}, {}),
+        {},
+        [],
+    )
 
 
 def made_plan(
@@ -173,7 +179,10 @@ def made_plan(
     producers = _producers(jobs)
     for file in _required(jobs, producers, targets):
         if file in producers and not Path(file).exists():
-            reasons.setdefault(producers[file], f"{MISSING}: {file}")
+            reasons.setdefault(
+                producers[file],
+                f"{MISSING}: {file}",
+            )
     _spread(reasons, jobs, producers)
     # targets make nothing, so they never end
     reasons = {key: why for key, why in reasons.items() if jobs[key].outputs}

@@ -93,7 +93,12 @@ def check_results_belong_to(
     """
     path = directory / STUDY_RECORD
     brains: list[list[Any]] = [
-        [brain.id, brain.week, brain.source, *(Path(file).name for file in brain.files)]
+        [
+            brain.id,
+            brain.week,
+            brain.source,
+            *(Path(file).name for file in brain.files),
+        ]
         for brain in config.brains
     ]
     study: dict[str, Any] = {

@@ -50,7 +50,12 @@ def complete_rules(rules: Iterable[Any], environment: str) -> None:
         runs = rule.output and (rule.script or rule.shellcmd)
         if runs and not rule.log:
             rule.log_modifier = rule.output_modifier
-            rule.set_log(log_of(rule.name, strip_wildcard_constraints(rule.output[0])))
+            rule.set_log(
+                log_of(
+                    rule.name,
+                    strip_wildcard_constraints(rule.output[0]),
+                )
+            )
         if runs and not rule.conda_env:
             rule.conda_env = environment
 

@@ -137,7 +137,10 @@ class RunDisplay:
                 jobs.pop("total", None)
                 self.total = sum(jobs.values())
                 works = [n * WEIGHTS.get(rule, 1) for rule, n in jobs.items()]
-                self.bar.update(self.task.id, total=sum(works))
+                self.bar.update(
+                    self.task.id,
+                    total=sum(works),
+                )
                 self.console.print(
                     f"gyriflow: {self.total} steps to run; log: {self.details}"
                 )

@@ -6,4 +6,10 @@ import json
 from .root import Config
 
 if __name__ == "__main__":
-    print(json.dumps(Config.model_json_schema(), indent=1, ensure_ascii=False))
+    print(
+        json.dumps(
+            Config.model_json_schema(),
+            indent=1,
+            ensure_ascii=False,
+        )
+    )

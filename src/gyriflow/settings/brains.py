@@ -16,7 +16,10 @@ SOURCES = ("labels", "hemispheres", "pial", "shape")
 """A brain has exactly one of these keys."""
 SURFACE_SOURCES = ("hemispheres", "pial")
 KEY_SOURCES: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("scheme", "image", "affine_from"), ("labels",)),
+    **dict.fromkeys(
+        ("scheme", "image", "affine_from"),
+        ("labels",),
+    ),
     "coordinates": SURFACE_SOURCES,
     "white": SURFACE_SOURCES,
     "side": ("labels", "pial"),
@@ -125,7 +128,13 @@ class BrainConfig(Settings):
     @property
     def white_files(self) -> dict[str, str]:
         files = files_of(self.white)
-        return dict(zip(SIDES if len(files) == 2 else ("whole",), files, strict=False))
+        return dict(
+            zip(
+                SIDES if len(files) == 2 else ("whole",),
+                files,
+                strict=False,
+            )
+        )
 
     def problems(self) -> Problems:
         sources = [key for key in SOURCES if self.is_set(key)]

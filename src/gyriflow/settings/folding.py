@@ -133,7 +133,10 @@ class FoldingSettings(Settings):
     @field_validator("*")
     @classmethod
     def _hold_bounds(cls, value: Any, info: ValidationInfo) -> Any:
-        require_bounds(value, bounds_of(cls.model_fields[str(info.field_name)]))
+        require_bounds(
+            value,
+            bounds_of(cls.model_fields[str(info.field_name)]),
+        )
         return value
 
 
@@ -160,7 +163,10 @@ def parameters(settings: FoldingSettings) -> dict[str, Any]:
 
     The number of ranks is left out, since results do not depend on it.
     """
-    plain = settings.model_dump(mode="json", exclude={"ranks", "start", "ensemble"})
+    plain = settings.model_dump(
+        mode="json",
+        exclude={"ranks", "start", "ensemble"},
+    )
     plain["growth"] = settings.growth.own_keys()
     mapped = mapped_parameters(settings)
     for name in VARYING:
@@ -252,7 +258,10 @@ def value_problems(
     end = p.end_week
     if end <= start_week:
         called = f"{start_week:g}, {start}" if start else f"start_week, {start_week:g}"
-        yield KeyProblem(f"found {end:g}; it should be above {called}", ("end_week",))
+        yield KeyProblem(
+            f"found {end:g}; it should be above {called}",
+            ("end_week",),
+        )
     ranges = {}
     for key in VARYING:
         value = getattr(p, key)

@@ -166,7 +166,11 @@ class Growth(Settings):
         """Return the model and the keys that it uses, in the form of a file."""
         return self.model_dump(
             mode="json",
-            include={"model", *self.definition.keys, *self.definition.resolved},
+            include={
+                "model",
+                *self.definition.keys,
+                *self.definition.resolved,
+            },
         )
 
     def unused_keys(self, used: Collection[str]) -> Problems:

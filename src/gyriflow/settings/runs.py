@@ -59,7 +59,10 @@ PRESETS: dict[str, dict[str, Any]] = {
     # growth towards the shapes that were measured on the brain's own series
     "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},
     # a prediction: growth towards the shapes that an atlas' growth gives the brain
-    "expected": {**FREE_GROWTH, "growth": {"model": "shapes", "of": "atlas"}},
+    "expected": {
+        **FREE_GROWTH,
+        "growth": {"model": "shapes", "of": "atlas"},
+    },
 }
 """Sets of parameters by name. Keys of the configuration override them."""
 
@@ -306,8 +309,16 @@ class SweepSettings(ComparisonSettings):
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return all keys by which the run with these varied values differs from the
         base."""
-        at_first = next((self.fixed_at.get(first, {}) for first in values.values()), {})
-        return {**self.fixed, **at_first, **values, "end_week": self.compare_week}
+        at_first = next(
+            (self.fixed_at.get(first, {}) for first in values.values()),
+            {},
+        )
+        return {
+            **self.fixed,
+            **at_first,
+            **values,
+            "end_week": self.compare_week,
+        }
 
 
 class CalibrationSettings(ComparisonSettings):
@@ -343,7 +354,10 @@ class CalibrationSettings(ComparisonSettings):
                 f"found {list(self.rounds)}; expected at least {MIN_FIRST_ROUND} runs"
                 " in the first round"
             )
-            yield KeyProblem(f"{text} and at most {MAX_RUNS} in all", ("rounds",))
+            yield KeyProblem(
+                f"{text} and at most {MAX_RUNS} in all",
+                ("rounds",),
+            )
         for key, bounds in self.parameters.items():
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 yield KeyProblem(

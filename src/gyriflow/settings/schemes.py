@@ -15,7 +15,13 @@ SCHEME_FILES = {
     path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))
 }
 """Files of the shipped schemes, by name."""
-Label = Annotated[int, Field(ge=1, le=2**31 - 1)]
+Label = Annotated[
+    int,
+    Field(
+        ge=1,
+        le=2**31 - 1,
+    ),
+]
 
 
 class SchemeSettings(Settings):
@@ -56,7 +62,10 @@ class SchemeSettings(Settings):
             "cerebellum",
             "brainstem",
         ):
-            named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
+            named |= dict.fromkeys(
+                getattr(self, tissue),
+                tissue.replace("_", " "),
+            )
         return dict(sorted((named | self.known).items()))
 
     def problems(self) -> Problems:
@@ -76,7 +85,10 @@ class SchemeSettings(Settings):
             twice = sorted({label for label in labels if labels.count(label) > 1})
             outside = sorted(set(labels) - set(self.cerebrum))
             if twice:
-                yield KeyProblem(f"found {_as_text(twice)} more than once", (key,))
+                yield KeyProblem(
+                    f"found {_as_text(twice)} more than once",
+                    (key,),
+                )
             if outside:
                 yield KeyProblem(
                     f"found {_as_text(outside)}; it should have labels of the cerebrum"

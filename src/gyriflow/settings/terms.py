@@ -84,7 +84,10 @@ distances through the thickness at the surface are enough, and that mesh has a c
 0.81 at its start. The count falls as the brain grows (0.49 at 28 GW), so warnings about
 later weeks are cautious. Runs whose growth has no layers (`GrowthModel.has_layers`)
 need none."""
-ELEMENT_ERRORS = {1: {2.0: 32.2, 4.0: 13.3, 8.0: 4.5}, 2: {1.0: 4.3, 2.0: 0.9}}
+ELEMENT_ERRORS = {
+    1: {2.0: 32.2, 4.0: 13.3, 8.0: 4.5},
+    2: {1.0: 4.3, 2.0: 0.9},
+}
 """How much too slowly the fastest wave grows (%), by element order and cells per
 thickness of a uniform slab (docs/verification.md, Elements). The slab's mean edge is
 1.26 cells, so for as many elements these are upper bounds."""
@@ -192,7 +195,15 @@ def element_error(order: int, elements: float) -> tuple[float, str]:
     cortex, and text with both."""
     counts = np.log(list(ELEMENT_ERRORS[order]))
     errors = np.log(list(ELEMENT_ERRORS[order].values()))
-    error = float(np.exp(np.interp(np.log(max(0.1, elements)), counts, errors)))
+    error = float(
+        np.exp(
+            np.interp(
+                np.log(max(0.1, elements)),
+                counts,
+                errors,
+            )
+        )
+    )
     bound = "more than" if is_too_coarse(order, elements) else "up to"
     kind = "linear" if order == 1 else "quadratic"
     text = (

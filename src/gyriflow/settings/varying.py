@@ -142,7 +142,13 @@ def curve_at(value: float | Varying, week: float) -> float:
     curve = _weeks_of(value)
     if not curve:
         return 1.0
-    return float(np.interp(week, list(curve), list(curve.values())))
+    return float(
+        np.interp(
+            week,
+            list(curve),
+            list(curve.values()),
+        )
+    )
 
 
 def mean_of_curve(value: float | Varying) -> float:

@@ -67,8 +67,20 @@ def week_of(value: Any) -> Any:
 
 
 _two_decimals = AfterValidator(lambda week: round(week, 2))
-_InRange = Annotated[float, Field(ge=WEEK_RANGE[0], le=WEEK_RANGE[1])]
-_LaterInRange = Annotated[float, Field(gt=WEEK_RANGE[0], le=WEEK_RANGE[1])]
+_InRange = Annotated[
+    float,
+    Field(
+        ge=WEEK_RANGE[0],
+        le=WEEK_RANGE[1],
+    ),
+]
+_LaterInRange = Annotated[
+    float,
+    Field(
+        gt=WEEK_RANGE[0],
+        le=WEEK_RANGE[1],
+    ),
+]
 AnyWeek = Annotated[
     _InRange, BeforeValidator(week_of, json_schema_input_type=_InRange | str)
 ]

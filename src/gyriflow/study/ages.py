@@ -200,7 +200,10 @@ def read_ages(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanAg
         week, problem = read_week(age.text, age.column.unit, notation)
         problem = age.column.problem or problem
         if week is None or problem:
-            return ScanAge(None, cause=f"{age.column.name}: {problem} ({age.place})")
+            return ScanAge(
+                None,
+                cause=f"{age.column.name}: {problem} ({age.place})",
+            )
         weeks.append(week)
     if max(weeks) - min(weeks) > MAX_DIFFERENCE_WEEKS:
         found = " and ".join(map(str, ages))
@@ -209,7 +212,10 @@ def read_ages(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanAg
             " as scan_age if the other is at birth"
         )
         return ScanAge(None, cause=cause)
-    return ScanAge(weeks[0], f"{ages[0].place}, {ages[0].column.name}")
+    return ScanAge(
+        weeks[0],
+        f"{ages[0].place}, {ages[0].column.name}",
+    )
 
 
 def require_clear_decimals(
@@ -266,5 +272,10 @@ def week_in_name(parts: Sequence[str], notation: WeekNotation | None = None) -> 
         return ScanAge(None, cause=cause)
     for text, (week, problem) in found.items():
         cause = f"the name: {problem}" if problem else ""
-        return ScanAge(week, f"name ({text})", cause, named=text)
+        return ScanAge(
+            week,
+            f"name ({text})",
+            cause,
+            named=text,
+        )
     return ScanAge(None)

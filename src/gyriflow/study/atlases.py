@@ -122,7 +122,14 @@ class UsedAtlas:
 def _copies(pattern: str, files: Iterable[Path]) -> dict[float, list[Path]]:
     """Return files by week: those whose path ends as a pattern does, from the last part
     with the week on."""
-    start = pattern.rfind("/", 0, pattern.rindex("{week")) + 1
+    start = (
+        pattern.rfind(
+            "/",
+            0,
+            pattern.rindex("{week"),
+        )
+        + 1
+    )
     name = ""
     for text, field, *_ in Formatter().parse(pattern[start:]):
         name += re.escape(text)
@@ -130,9 +137,15 @@ def _copies(pattern: str, files: Iterable[Path]) -> dict[float, list[Path]]:
             name += r"(\d+(?:\.\d+)?)"
     copies: dict[float, list[Path]] = {}
     for path in files:
-        match = re.fullmatch(f"(?:.*/)?{name}", path.as_posix())
+        match = re.fullmatch(
+            f"(?:.*/)?{name}",
+            path.as_posix(),
+        )
         if match:
-            copies.setdefault(float(match[1]), []).append(path)
+            copies.setdefault(
+                float(match[1]),
+                [],
+            ).append(path)
     return copies
 
 
@@ -142,7 +155,11 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
     entries: dict[str, dict[str, Any]] = {}
     for file in used.files:
         series = used.atlas.series[file.series]
-        new = {"id": file.brain, "week": file.week, "population": series.population}
+        new = {
+            "id": file.brain,
+            "week": file.week,
+            "population": series.population,
+        }
         entry = entries.setdefault(file.brain, new)
         if file.key in ("left", "right"):
             entry.setdefault("hemispheres", {})[file.key] = str(file.path)

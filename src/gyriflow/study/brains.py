@@ -30,7 +30,10 @@ def plan_brains(
         if settings.id not in refused:
             brain = _brain(config, settings, checksums)
             if brain.id in atlas_of:
-                brain = replace(brain, atlas=atlas_of[brain.id].atlas.name)
+                brain = replace(
+                    brain,
+                    atlas=atlas_of[brain.id].atlas.name,
+                )
             brains[brain.id] = brain
     groups = _groups(brains.values())
     for name, brain in brains.items():
@@ -133,7 +136,11 @@ def _add_regions(config: Config, brains: dict[str, Brain]) -> None:
         else:
             continue
         regions = paths.region_files(brain.folder).values()
-        brains[name] = replace(brain, regions_of=source.id, regions=tuple(regions))
+        brains[name] = replace(
+            brain,
+            regions_of=source.id,
+            regions=tuple(regions),
+        )
 
 
 def _add_thickness_sources(brains: dict[str, Brain]) -> None:
@@ -157,7 +164,10 @@ def _add_thickness_sources(brains: dict[str, Brain]) -> None:
 
 def closest(brains: Iterable[Brain], week: float) -> Brain:
     """Return the first of the brains that are closest to a week."""
-    return min(brains, key=lambda brain: abs(brain.week - week))
+    return min(
+        brains,
+        key=lambda brain: abs(brain.week - week),
+    )
 
 
 def comparable(brain: Brain, brains: Iterable[Brain]) -> list[Brain]:

@@ -218,7 +218,13 @@ def _runs(config: Config) -> Problems:
                 )
                 problems.append(KeyProblem(text, (key,)))
         for problem in problems:
-            yield problem.inside(*_section(name, str(problem.key[0]), config))
+            yield problem.inside(
+                *_section(
+                    name,
+                    str(problem.key[0]),
+                    config,
+                )
+            )
 
 
 def _section(
@@ -451,7 +457,10 @@ def _member_problems(sweep: SweepSettings, base: Run) -> Problems:
         except ValidationError as error:
             for problem in problems_in(error, Run):
                 name = ".".join(map(str, problem.key))
-                yield KeyProblem(problem.text, (sections.get(name, "fixed"), name))
+                yield KeyProblem(
+                    problem.text,
+                    (sections.get(name, "fixed"), name),
+                )
         else:
             for problem in value_problems(run, run.end_week - 1e-9, {}):
                 yield problem.inside("vary")
@@ -490,7 +499,11 @@ def _calibration(config: Config) -> Problems:
         yield problem.inside("calibrate")
     if calibrate.base in config.runs:
         for key, bounds in calibrate.parameters.items():
-            for text in _parameter_problems(key, bounds, config.runs[calibrate.base]):
+            for text in _parameter_problems(
+                key,
+                bounds,
+                config.runs[calibrate.base],
+            ):
                 yield KeyProblem(text, ("calibrate", "parameters", key))
 
 

@@ -131,7 +131,14 @@ def _atlas(
     try:
         atlas = Atlas.model_validate(read_keys(settings.description))
     except InputError as error:
-        return [], [str(KeyProblem(str(error), (*place, "name")))]
+        return [], [
+            str(
+                KeyProblem(
+                    str(error),
+                    (*place, "name"),
+                )
+            )
+        ]
     except ValidationError as error:
         problems = problems_in(error, Atlas)
         return [], [f"{settings.description}: {problem}" for problem in problems]
@@ -152,7 +159,11 @@ def _lines(problems: list[KeyProblem]) -> list[str]:
         # runs repeat the problems of folding
         is_repeated = (
             section == "runs"
-            and KeyProblem(problem.text, ("folding", *inner[1:])) in folding_problems
+            and KeyProblem(
+                problem.text,
+                ("folding", *inner[1:]),
+            )
+            in folding_problems
         )
         if section != "atlas" and not is_repeated:
             lines.append(str(problem))

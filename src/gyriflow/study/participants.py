@@ -116,7 +116,10 @@ def _read_table(path: Path) -> Table:
                 expected="one",
             )
     names = {column_key(name): name for name in columns}
-    ids = next((names[key] for key in IDS if key in names), None)
+    ids = next(
+        (names[key] for key in IDS if key in names),
+        None,
+    )
     if ids is None and empty.subject is None:
         raise InputError(
             "has no column of ids",
@@ -124,7 +127,10 @@ def _read_table(path: Path) -> Table:
             found=", ".join(columns),
             expected=" or ".join(IDS),
         )
-    session = next((names[key] for key in SESSIONS if key in names), None)
+    session = next(
+        (names[key] for key in SESSIONS if key in names),
+        None,
+    )
     ages = _age_columns(columns, empty)
     name_parts = TABLE_NAME.fullmatch(path.name)
     session_of_file = name_parts[2] if name_parts else None
@@ -145,9 +151,24 @@ def _read_table(path: Path) -> Table:
         label = values[session] if session is not None else session_of_file or ""
         own_session = None if is_missing(label) else label.removeprefix("ses-")
         place = f"{path.name} row {number}"
-        cells = [TableAge(place, column, values[column.name]) for column in ages]
+        cells = [
+            TableAge(
+                place,
+                column,
+                values[column.name],
+            )
+            for column in ages
+        ]
         other_values = {key: text for key, text in values.items() if key in further}
-        row = TableRow(path, empty.scope, place, name, own_session, other_values, cells)
+        row = TableRow(
+            path,
+            empty.scope,
+            place,
+            name,
+            own_session,
+            other_values,
+            cells,
+        )
         rows.append(row)
     return replace(
         empty,
@@ -166,7 +187,11 @@ def _age_columns(names: Iterable[str], table: Table) -> list[AgeColumn]:
     columns = []
     for name in names:
         described = facts.get(column_key(name), {})
-        column = age_column(name, described, f"{table.path.stem}.json")
+        column = age_column(
+            name,
+            described,
+            f"{table.path.stem}.json",
+        )
         if column is not None:
             columns.append(column)
     return columns
@@ -228,7 +253,12 @@ class ScanTables:
             try:
                 self.tables.append(_read_table(path))
             except InputError as error:
-                self.tables.append(replace(_empty_table(path), problem=str(error)))
+                self.tables.append(
+                    replace(
+                        _empty_table(path),
+                        problem=str(error),
+                    )
+                )
         self.rows: dict[str, list[TableRow]] = {}
         self.cells: list[TableAge] = []
         for table in self.tables:
@@ -342,7 +372,12 @@ class ScanTables:
         elif present and not others:
             doubtful = self._other_ages[:1]
         if doubtful:
-            found = " and ".join(map(str, (*present, *doubtful)))
+            found = " and ".join(
+                map(
+                    str,
+                    (*present, *doubtful),
+                )
+            )
             cause = (
                 f"found {found}: which is the gestational age at the scan is unclear;"
                 " expected it in a column named scan_age"
@@ -350,11 +385,17 @@ class ScanTables:
             return ScanAge(None, cause=cause)
         if not ages:
             return None
-        age_of_scan = read_ages(present or used[:1] or ages[:1], self.notation)
+        age_of_scan = read_ages(
+            present or used[:1] or ages[:1],
+            self.notation,
+        )
         if age_of_scan.week is None or not others:
             return age_of_scan
         ignored = ", ".join(f"{age.column.name} {age.text}" for age in others)
-        return replace(age_of_scan, source=f"{age_of_scan.source} (not {ignored})")
+        return replace(
+            age_of_scan,
+            source=f"{age_of_scan.source} (not {ignored})",
+        )
 
     @cached_property
     def _other_ages(self) -> list[TableAge]:
@@ -450,7 +491,10 @@ def participants_brains(
                 f"{path}: {entry['id']}: {found} have the same files; expected files of"
                 " each session"
             )
-            left_out[entry["id"]] = {"week": entry["week"], "cause": cause}
+            left_out[entry["id"]] = {
+                "week": entry["week"],
+                "cause": cause,
+            }
     entries = [entry for entry in entries if entry["id"] not in left_out]
     return entries, left_out, sources
 
@@ -476,7 +520,10 @@ def _require_valid(table: Table, tables: ScanTables) -> None:
         raise InputError(tables.age_problem)
     tables.require_clear_decimals(table.path)
     names = [row.name for row in table.rows]
-    for first, second in merged_names(names, lambda name: name.removeprefix("sub-")):
+    for first, second in merged_names(
+        names,
+        lambda name: name.removeprefix("sub-"),
+    ):
         raise InputError(
             "has two names of one participant",
             path=table.path,

@@ -57,7 +57,10 @@ def folded_of(*sides: Side) -> dict[str, str]:
     """Return the surfaces of a simulated brain at a week with some hemispheres, and its
     thickness."""
     folder = f"{RUN}/surfaces/{WEEK}"
-    return {**surfaces_in(folder, sides), "thickness": f"{folder}/thickness.shape.gii"}
+    return {
+        **surfaces_in(folder, sides),
+        "thickness": f"{folder}/thickness.shape.gii",
+    }
 
 
 def fine_of(*sides: Side) -> dict[str, str]:
@@ -133,7 +136,10 @@ CURVES = {
 PARAMETERS = f"{RUN}/params.yaml"
 MAPS = f"{RUN}/folding/maps.h5"
 GROWTH_MAPS = f"{RUN}/surfaces/growth.shape.gii"
-REGIONS = {"mesh": f"{RUN}/folding/regions.xdmf", "data": f"{RUN}/folding/regions.h5"}
+REGIONS = {
+    "mesh": f"{RUN}/folding/regions.xdmf",
+    "data": f"{RUN}/folding/regions.h5",
+}
 FOLDING = {
     "steps": f"{RUN}/folding/steps.csv",
     "frames": f"{RUN}/folding/frames.h5",

@@ -40,7 +40,11 @@ class MeasuredBrain:
     @property
     def columns(self) -> dict[str, Any]:
         """The first columns of its tables, with values."""
-        return {"subject": self.id, "run": self.run, "week": self.week}
+        return {
+            "subject": self.id,
+            "run": self.run,
+            "week": self.week,
+        }
 
     @property
     def parts(self) -> dict[str, str]:

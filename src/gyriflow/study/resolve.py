@@ -118,7 +118,11 @@ def _downloads(atlases: Iterable[UsedAtlas]) -> list[Download]:
     rows = []
     for used in atlases:
         for file in used.missing:
-            row = Download(file=str(file.path), url=file.url, sha256=file.sha256)
+            row = Download(
+                file=str(file.path),
+                url=file.url,
+                sha256=file.sha256,
+            )
             rows.append(row)
     return rows
 
@@ -137,7 +141,12 @@ def _left_out(
         for why, causes_by_brain in causes.items():
             if brain.id in causes_by_brain:
                 cause = str(causes_by_brain[brain.id])
-                row = LeftOut(brain=brain.id, why=why, week=brain.week, cause=cause)
+                row = LeftOut(
+                    brain=brain.id,
+                    why=why,
+                    week=brain.week,
+                    cause=cause,
+                )
                 rows.append(row)
     for scan, facts in config.left_out.items():
         rows.append(LeftOut(brain=scan, why="cannot be used", **facts))
@@ -178,7 +187,12 @@ def _links(
     template = brains.get(config.metrics.template or "")
     for brain in brains.values():
         if brain.regions_of not in (None, brain.id):
-            files.append(series.link(brains[str(brain.regions_of)], brain))
+            files.append(
+                series.link(
+                    brains[str(brain.regions_of)],
+                    brain,
+                )
+            )
         if template is not None and template is not brain:
             files.append(series.link(template, brain))
     return [series.links[file] for file in files]
@@ -233,7 +247,14 @@ def _variants(config: Config) -> list[_Variant]:
         base = config.runs[sweep.base]
         for run, values in variants(name, sweep):
             changes = {**sweep.changes(values), "ensemble": None}
-            found.append(_Variant(name, run, values, changed(base, changes)))
+            found.append(
+                _Variant(
+                    name,
+                    run,
+                    values,
+                    changed(base, changes),
+                )
+            )
     return found
 
 
@@ -275,7 +296,10 @@ def _chains(
     for pair in pairs:
         name = pair.start.id
         starts[name] = pair.start
-        ends[name] = max(pair.settings.end_week, ends.get(name, 0.0))
+        ends[name] = max(
+            pair.settings.end_week,
+            ends.get(name, 0.0),
+        )
     chains: Chains = {}
     for name, start in starts.items():
         chains |= chains_of(start, ends[name], series, brains)
@@ -317,16 +341,27 @@ class _Simulations:
                     chain = member_chain(
                         pair.run, start, pair.settings, variation, self.series, brains
                     )
-                    chain = replace(chain, name=f"{chain.origin}.{name}")
+                    chain = replace(
+                        chain,
+                        name=f"{chain.origin}.{name}",
+                    )
                     self.chains[start.id, chain.name] = chain
-                self._add(_Pair(name, start, alone), weeks, pair.run)
+                self._add(
+                    _Pair(name, start, alone),
+                    weeks,
+                    pair.run,
+                )
 
     def add_variants(
         self, pairs: Iterable[_Pair], variants: Sequence[_Variant]
     ) -> dict[str, str]:
         """Add the simulations of sweeps and of the calibration; return the simulated
         run of each run of a sweep, by its name."""
-        names, compared = _shared_runs(self.config, variants, self.simulations.values())
+        names, compared = _shared_runs(
+            self.config,
+            variants,
+            self.simulations.values(),
+        )
         calibrate = self.config.calibrate
         for pair in pairs:
             if pair.run in compared and pair.run not in self.config.runs:
@@ -335,7 +370,10 @@ class _Simulations:
                 complete = _Pair(pair.run, pair.start, settings)
                 self._add(complete, _weeks(settings, pair.start, weeks))
             elif calibrate is not None and pair.run in calibrate.runs:
-                self._add(pair, [pair.start.week, pair.settings.end_week])
+                self._add(
+                    pair,
+                    [pair.start.week, pair.settings.end_week],
+                )
         return names
 
     def _add(
@@ -456,7 +494,11 @@ def _compared(
         shown = [brain.id for brain in candidates if brain.week == week]
         observed = [brain.id for brain in observed_brains if brain.week == week]
         earlier = [brain for brain in adjacent_brains if brain.week < week]
-        adjacent = max(earlier, key=lambda brain: brain.week, default=None)
+        adjacent = max(
+            earlier,
+            key=lambda brain: brain.week,
+            default=None,
+        )
         if shown:
             row = Comparison(
                 run=run,

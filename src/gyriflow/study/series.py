@@ -46,7 +46,11 @@ class Series:
         """Return the series that contains a brain (the preferred one of several), or
         ""."""
         names = self._names_with(brain)
-        return min(names, key=lambda name: name != self.preferred, default="")
+        return min(
+            names,
+            key=lambda name: name != self.preferred,
+            default="",
+        )
 
     def _names_with(self, brain: Brain) -> list[str]:
         return [name for name, brains in self.brains.items() if brain in brains]
@@ -197,7 +201,11 @@ def unmatched_reason(
         return str(error)
     for brain in read:
         first = read[0]
-        for expected, found in zip(sides[first.id], sides[brain.id], strict=True):
+        for expected, found in zip(
+            sides[first.id],
+            sides[brain.id],
+            strict=True,
+        ):
             if expected[:2] != found[:2]:
                 text = f"{brain.id} has {found[0]} vertices and {found[1]} triangles"
                 return f"{text}, but {first.id} has {expected[0]} and {expected[1]}"
@@ -235,7 +243,13 @@ def chains_of(
     own = _chain("self", _own_chain(start, end, series), series)
     atlases = series.from_other_populations(start)
     if len(atlases) == 1:
-        atlas = _along_path(start, start.week, end, atlases[0], series)
+        atlas = _along_path(
+            start,
+            start.week,
+            end,
+            atlases[0],
+            series,
+        )
     else:
         atlas = _chain("atlas", [start], series)
     further = []
@@ -273,7 +287,15 @@ def member_chain(
         # ages of one series have the same error
         return replace(chain, variation=replace(variation, age_shift_gw=0.0))
     atlases = series.from_other_populations(start, all_atlases=True)
-    names = [name for name in atlases if _covers(series.brains[name], start.week, end)]
+    names = [
+        name
+        for name in atlases
+        if _covers(
+            series.brains[name],
+            start.week,
+            end,
+        )
+    ]
     if not names:
         # the run itself is refused
         return _chain("atlas", [start], series)
@@ -282,11 +304,21 @@ def member_chain(
     # the age of the whole run is shifted, as far as the atlas goes, or a little further
     low = min(atlas_weeks) - BEFORE_GW - start.week
     high = max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
-    shift = round(min(max(variation.age_shift_gw, low), high), 2)
+    shift = round(
+        min(max(variation.age_shift_gw, low), high),
+        2,
+    )
     observed = later_observed_weeks(start, brains)
     further = {end, *(week for week in observed if week <= end)}
     return replace(
-        _along_path(start, start.week + shift, end + shift, name, series, varied),
+        _along_path(
+            start,
+            start.week + shift,
+            end + shift,
+            name,
+            series,
+            varied,
+        ),
         further_weeks=tuple(sorted(further)),
         variation=replace(variation, age_shift_gw=shift),
     )
@@ -368,9 +400,18 @@ def _along_path(
     ends = [known for known in weeks if known >= end and known > first]
     last = min(ends, default=end)
     used = [by_week[known] for known in weeks if first <= known <= last]
-    path = _chain("self", [by_week[known] for known in weeks], series)
+    path = _chain(
+        "self",
+        [by_week[known] for known in weeks],
+        series,
+    )
     series.paths[path.brain] = replace(path, name=PATH)
-    to_atlas = _chain("atlas", [start, *used[:1]], series, variation)
+    to_atlas = _chain(
+        "atlas",
+        [start, *used[:1]],
+        series,
+        variation,
+    )
     return replace(
         to_atlas,
         brains=(start.id, *(brain.id for brain in used)),

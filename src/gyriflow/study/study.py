@@ -260,7 +260,10 @@ class Study:
         """Return the brain of a prediction's atlas that is closest in week to its
         end."""
         chain = self.chains[simulation.brain, "atlas"]
-        return closest(self.brains_of(chain)[1:], simulation.weeks[-1])
+        return closest(
+            self.brains_of(chain)[1:],
+            simulation.weeks[-1],
+        )
 
     @cached_property
     def predictions(self) -> list[Simulation]:
@@ -438,8 +441,20 @@ class Study:
             run=row.run,
             week=row.week,
             subject=brain.subject_name,
-            surfaces=dict(zip(row.sides, row.hemispheres, strict=True)),
-            maps=dict(zip(row.sides, row.maps, strict=True)),
+            surfaces=dict(
+                zip(
+                    row.sides,
+                    row.hemispheres,
+                    strict=True,
+                )
+            ),
+            maps=dict(
+                zip(
+                    row.sides,
+                    row.maps,
+                    strict=True,
+                )
+            ),
             regions=dict(zip(SIDES, row.regions, strict=False)),
             report=brain.report,
             covariates=brain.covariates,
@@ -486,7 +501,10 @@ class Study:
     def atlas_surface(prediction: Simulation) -> str:
         """Return the file with the atlas' own brain in the last week of a
         prediction."""
-        return prediction.file(paths.ATLAS_BRAIN, week=prediction.weeks[-1])
+        return prediction.file(
+            paths.ATLAS_BRAIN,
+            week=prediction.weeks[-1],
+        )
 
 
 # the tables on disk
@@ -538,11 +556,18 @@ def read_plan(folder: Path) -> Study:
     """Return the study whose plan is in a folder; InputError if there is none."""
     rows: dict[str, list[Any]] = {}
     for name, table in TABLES.items():
-        rows[name] = read_rows(folder / f"{name}.csv", table.kind)
+        rows[name] = read_rows(
+            folder / f"{name}.csv",
+            table.kind,
+        )
     # a file of an atlas may be missing
     awaited: list[str | None] = []
     for brain in rows["brains"]:
-        awaited += [*brain.files, *brain.white_files.values(), brain.image]
+        awaited += [
+            *brain.files,
+            *brain.white_files.values(),
+            brain.image,
+        ]
     context = {"folder": str(folder), "awaited": awaited}
     plain = read_keys(folder / "config.yaml")
     return study_of(Config.model_validate(plain, context=context), rows)

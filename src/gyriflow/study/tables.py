@@ -57,7 +57,11 @@ def _cell(value: Any, kind: Any) -> str:
         return ""
     if _is_text(kind):
         return str(value)
-    plain = _adapter(kind).dump_python(value, mode="json", exclude_unset=True)
+    plain = _adapter(kind).dump_python(
+        value,
+        mode="json",
+        exclude_unset=True,
+    )
     return json.dumps(plain, ensure_ascii=False)
 
 
