@@ -5,7 +5,8 @@ each, and draw what is wrong.
 
 The sound brain is the shipped one of 25 GW (operated). FOLDER gets the damaged files, a
 study of them and its results up to the surface stage. Printed are the messages about
-each brain without those about the sound one: the words in docs/how-to/bad-inputs.md. A
+each brain without those about the sound one, and the verdict that follows from them:
+the words in docs/how-to/bad-inputs.md. A
 picture has the sound brain on the left and the damaged one on the right, at one scale,
 with the outline of the surface if one was made.
 """
@@ -29,7 +30,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from PIL import Image
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import binary_closing, distance_transform_edt, map_coordinates
 
 from gyriflow.anatomy.pial import PialSurface, from_labels
 from gyriflow.anatomy.thickness import white_from_labels
@@ -73,13 +74,17 @@ SOUND = "sound"
 CROPPED_SHARE = 0.25
 PATCH_MM = 12.0
 LOST_MM = 7.0
+FISSURE_MM, FISSURE_VOXELS = 4.0, 8
+SLICE_VOXELS = 6
+SWOLLEN_MM = 2.5
+SHIFT_VOXELS = 3
 HOLE_MM = 8.0
 WHITE_SHIFT_MM = 4.0
 SPIKE_MM, SPIKE_WIDTH_MM = 60.0, 4.0
 METRES_PER_MM = 1e-3
 
 MARGIN_MM, PIXEL_MM = 4.0, 0.2
-PANEL_IN, DOTS_PER_INCH, COLOURS = 2.6, 120, 48
+PANEL_IN, DOTS_PER_INCH, COLOURS = 2.6, 120, 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,6 +208,47 @@ def lost_white_matter(sound: Sound) -> Damaged:
     return of_labels(sound, np.where(is_lost, OUTER_CSF, sound.labels), at=-16.0)
 
 
+def fused(sound: Sound) -> Damaged:
+    """What lies between the hemispheres has the label of the cortex."""
+    x, _, _ = sound.places_mm
+    filled = binary_closing(sound.cerebrum, iterations=FISSURE_VOXELS)
+    fissure = filled & ~sound.cerebrum & (np.abs(x) < FISSURE_MM)
+    return of_labels(sound, np.where(fissure, CORTEX, sound.labels))
+
+
+def one_hemisphere(sound: Sound) -> Damaged:
+    """The right half was not segmented."""
+    x, _, _ = sound.places_mm
+    return of_labels(sound, np.where(x > 0, 0, sound.labels))
+
+
+def swollen_cortex(sound: Sound) -> Damaged:
+    """Fluid within 2.5 mm of the cortex has its label, also in sulci."""
+    reached = distance_transform_edt(
+        sound.labels != CORTEX, sampling=np.abs(np.diag(sound.affine)[:3])
+    )
+    is_swallowed = (sound.labels == OUTER_CSF) & (reached < SWOLLEN_MM)
+    return of_labels(sound, np.where(is_swallowed, CORTEX, sound.labels))
+
+
+def ragged(sound: Sound) -> Damaged:
+    """Slices are shifted against each other, as by motion between them."""
+    random = np.random.default_rng(1)
+    slices = [
+        np.roll(plane, random.integers(-SHIFT_VOXELS, SHIFT_VOXELS + 1, 2), (0, 1))
+        for plane in np.moveaxis(sound.labels, 2, 0)
+    ]
+    return of_labels(sound, np.stack(slices, axis=2))
+
+
+def thick_slices(sound: Sound) -> Damaged:
+    """Only every sixth axial slice was segmented."""
+    affine = sound.affine.copy()
+    affine[:, 2] *= SLICE_VOXELS
+    labels = sound.labels[:, :, ::SLICE_VOXELS]
+    return Damaged(LabelVolume(labels.astype(np.int32), affine))
+
+
 def wrong_scheme(sound: Sound) -> Damaged:
     """The labels are read by the scheme of FeTA."""
     return of_labels(sound, sound.labels, keys={"scheme": "feta-7"})
@@ -275,6 +321,11 @@ CASES: dict[str, Callable[[Sound], Damaged]] = {
         cerebellum,
         missing_cortex,
         lost_white_matter,
+        fused,
+        one_hemisphere,
+        swollen_cortex,
+        ragged,
+        thick_slices,
         wrong_scheme,
         wrong_week,
         voxel_indices,
@@ -341,7 +392,7 @@ def run(config: Path, cores: int) -> dict[str, list[Message]]:
 
 
 def verdict(messages: list[Message]) -> str:
-    """Return the verdict on a brain, as on its page and in `quality.csv`."""
+    """Return the verdict on a brain that follows from messages, as on its page."""
     fine, needs_review, refused = VERDICTS
     levels = {message.level for message in messages}
     if "error" in levels:
@@ -359,9 +410,12 @@ def without_numbers(text: str) -> str:
     return re.sub(r"[\d.]+", "", text)
 
 
-def unlike(texts: list[str], known: set[str]) -> list[str]:
+def unlike(messages: list[Message], known: list[Message]) -> list[Message]:
     """Return the messages that, but for their numbers, are not among the known ones."""
-    return [text for text in texts if without_numbers(text) not in known]
+    texts = {without_numbers(message.text) for message in known}
+    return [
+        message for message in messages if without_numbers(message.text) not in texts
+    ]
 
 
 @styled
@@ -469,8 +523,8 @@ def _draw_whites(panels: np.ndarray, sound: Sound, brain: Damaged) -> None:
 def _draw_surfaces(
     panels: np.ndarray, sound: Sound, brain: Damaged, title: str
 ) -> None:
-    """Draw surfaces from one side at one scale; hemispheres in two colours if they
-    are two surfaces."""
+    """Draw surfaces from one side at one scale; hemispheres in two colours if the
+    damaged brain's are two surfaces."""
     view = VIEWS[brain.view]
     colours = (OBSERVED_SURFACE_COLOUR, "#8FB4DC")
     has_sides = "whole" not in brain.surfaces
@@ -528,10 +582,9 @@ def main() -> None:
     rows: dict[str, dict[str, Any]] = {}
     for name in whole:
         found = messages.get(name, [])
-        texts = [in_folder(message.text, arguments.folder) for message in found]
         if name != SOUND:
-            of_sound = map(without_numbers, rows[SOUND]["messages"])
-            texts = unlike(texts, set(of_sound))
+            found = unlike(found, messages.get(SOUND, []))
+        texts = [in_folder(message.text, arguments.folder) for message in found]
         rows[name] = {"verdict": verdict(found), "messages": texts}
         print(f"{name}: {rows[name]['verdict']}")
         for text in texts:

@@ -254,6 +254,10 @@ def require_whole(
             " hemisphere only",
             found=f"a shortest extent of {shape:.2f} of the longest",
             expected=f"{MIN_NARROWNESS} or more, as in whole cerebra",
+            remedy=(
+                "If there is one hemisphere, give its side, as `side: left`. If there"
+                " are both, check the labels and the size of the voxels."
+            ),
         )
     narrow = (
         f"the cerebrum is narrow ({shape:.2f} of its length): are both hemispheres"
