@@ -180,13 +180,14 @@ def _one_by_one(args: Sequence[str]) -> list[str]:
 
 
 def _command_name() -> str:
-    """Return what a user types to get this command: in a checkout that is not
-    installed, `./run gyriflow`."""
-    return (
-        "gyriflow"
-        if shutil.which("gyriflow") or not (SHIPPED / "run").is_file()
-        else "./run gyriflow"
-    )
+    """Return what a user types here to get this command: in a checkout that is not
+    installed, its `run` and the name."""
+    run = SHIPPED / "run"
+    if shutil.which("gyriflow") or not run.is_file():
+        return "gyriflow"
+    if run.parent == Path.cwd():
+        return "./run gyriflow"
+    return f"{os.path.relpath(run)} gyriflow"
 
 
 def version(

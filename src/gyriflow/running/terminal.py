@@ -271,7 +271,8 @@ class RunDisplay:
         took = format_duration((self.ended - self.began).total_seconds())
         done = f"{self.done} of {self.total} steps done"
         if received_signals:
-            self.console.print(f"gyriflow: interrupted after {took}, {done}")
+            # the launcher says that it was interrupted
+            self.console.print(f"gyriflow: {done} after {took}")
         elif self.n_failed:
             failed = f"finished after {took} with {self.n_failed} failed"
             self.console.print(
