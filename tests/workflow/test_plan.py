@@ -26,3 +26,19 @@ def test_a_job_without_a_plan_ends_with_the_name_of_the_file(tmp_path, capsys):
     with pytest.raises(SystemExit):
         planned_figures(tmp_path, {"brains": []}, mode=ExecMode.SUBPROCESS)
     assert "results/plan" in capsys.readouterr().err
+
+
+def test_the_wide_table_says_who_was_scanned_beside_the_covariates(workflow):
+    brains = [
+        {**SHAPES[0], "subject": "x", "covariates": {"sex": "F"}},
+        {**SHAPES[1], "subject": "x", "covariates": {"sex": "F"}},
+        {"id": "single", "week": 22, "shape": {}},
+    ]
+    workflow.write("study.yaml", {"brains": brains})
+    plan = workflow.plan("metrics_tables", "--configfile", "study.yaml")
+    (job,) = [job for job in plan.jobs if job.rule == "metrics_tables"]
+    assert job.settings()["covariates"] == {
+        "b21": {"person": "x", "sex": "F"},
+        "b22": {"person": "x", "sex": "F"},
+        "single": {"person": "single"},
+    }
