@@ -2,10 +2,12 @@
 
 import logging
 import os
+import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
-from recording import DIGITS, contents, numbers_in, table_of
+from recording import DIGITS, contents, numbers_in, renewed, table_of
 from scripts import OUTPUTS
 from xdist.scheduler import LoadScopeScheduling
 
@@ -36,11 +38,12 @@ def default_logging_level():
 
 
 @pytest.fixture
-def recorded(dataframe_regression, caplog, monkeypatch):
+def recorded(dataframe_regression, original_datadir, caplog, monkeypatch, request):
     """A function that compares results by their names with the table beside the test,
     and the numbers of all warnings with them.
 
-    `rtol` is the relative tolerance of all numbers, `--force-regen` renews the table.
+    `rtol` is the relative tolerance of all numbers. `--force-regen` renews the rows
+    that differ by more.
     """
 
     monkeypatch.setattr(type(dataframe_regression), "DISPLAY_PRECISION", DIGITS)
@@ -52,6 +55,11 @@ def recorded(dataframe_regression, caplog, monkeypatch):
             if record.name.startswith("gyriflow") and record.levelname == "WARNING"
         ]
         table = table_of({**results, "warnings": warnings})
+        if request.config.getoption("force_regen"):
+            name = re.sub(r"\W", "_", request.node.name)
+            file = original_datadir / f"{name}.csv"
+            if file.exists():
+                table = renewed(pd.read_csv(file, index_col=0), table, rtol, atol)
         dataframe_regression.check(
             table, default_tolerance={"rtol": rtol, "atol": atol}
         )

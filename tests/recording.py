@@ -55,6 +55,25 @@ def table_of(results: Mapping[str, object]) -> pd.DataFrame:
     return pd.DataFrame(map(dataclasses.asdict, rows)).set_index("quantity")
 
 
+def renewed(
+    old: pd.DataFrame, new: pd.DataFrame, rtol: float, atol: float
+) -> pd.DataFrame:
+    """Return a new table with the old numbers where they agree."""
+    table = new.copy()
+    numbers = new.columns.drop("text")
+    for name in new.index.intersection(old.index):
+        before, now = old.loc[name, numbers], new.loc[name, numbers]
+        if np.allclose(
+            now.astype(float),
+            before.astype(float),
+            rtol,
+            atol,
+            equal_nan=True,
+        ):
+            table.loc[name, numbers] = before
+    return table
+
+
 def numbers_in(message: str) -> str:
     """Return the numbers of a message, whose words may change."""
     return " ".join(re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?", message))

@@ -130,6 +130,8 @@ def test_the_examples_in_python_run(tmp_path, monkeypatch, capsys):
 
 GALLERY = CHECKOUT / "docs" / "how-to" / "bad-inputs.md"
 MAX_GALLERY_MB = 1.5
+MOST_WORDS = 30_000
+"""In docs/, without the pages that are made from the code."""
 
 
 def test_pictures_are_all_shown_and_those_of_the_gallery_small():
@@ -144,6 +146,13 @@ def test_pictures_are_all_shown_and_those_of_the_gallery_small():
     assert len(pictures) >= 10
     size = sum(picture.stat().st_size for picture in pictures)
     assert size < MAX_GALLERY_MB * 1e6
+
+
+def test_the_pages_have_no_more_words_than_somebody_reads():
+    made = ("keys.md", "api.md")
+    pages = [page for page in CHECKOUT.glob("docs/**/*.md") if page.name not in made]
+    words = [word for page in pages for word in page.read_text().split()]
+    assert sum(bool(re.search(r"\w", word)) for word in words) <= MOST_WORDS
 
 
 @pytest.mark.slow

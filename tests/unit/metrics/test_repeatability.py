@@ -11,7 +11,7 @@ from gyriflow.metrics.repeatability import (
     with_change_noise,
     with_distance_noise,
 )
-from gyriflow.quantities import METRICS
+from gyriflow.quantities import METRICS, Shown
 from gyriflow.shipped import SHIPPED
 
 RECORD = {
@@ -70,6 +70,15 @@ def test_noise_of_a_score_is_the_weighted_sum_of_its_parts() -> None:
         0.023
     )
     assert np.isnan(score_noise({"size": 3.0, "surface_distance": 0.5}, record))
+
+
+def test_noise_and_curves_of_atlases_have_all_metrics_of_charts() -> None:
+    charted = {name for name, metric in METRICS.items() if metric.shown & Shown.CHART}
+    noise = read_yaml(SHIPPED / "norms" / "repeatability.yaml")["metrics"]
+    atlases = read_yaml(SHIPPED / "norms" / "atlases.yaml")["atlases"]
+    assert charted <= set(noise)
+    for atlas in atlases.values():
+        assert charted <= set(atlas["values"]["left"]) | set(atlas["values"]["whole"])
 
 
 def test_the_shipped_record_has_the_metrics_of_brains() -> None:
