@@ -194,7 +194,7 @@ def companion_rows(
             body.positions_mm, pieces, start.used, CONTINUATION_TOL
         )
         places = body.positions_mm + extend(shape.vertices - body.boundary.vertices)
-        fit_body(body, places, None, start.used, open_sulci=False)
+        fit_body(body, places, None, start.used)
         row: dict[str, Any] = {"week": week}
         for name, heights in {"removed": removed, "added": folds}.items():
             row[f"{name}_mm"], row[f"{name}_wavelength_mm"] = size_and_wavelength(

@@ -152,7 +152,7 @@ def place_in_atlas(
     extend = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)
     shape = places + extend(goals - places[used])
     body = make_body(mesh)
-    fit_body(body, shape, (surface, inner), used, open_sulci=open_sulci)
+    fit_body(body, shape, (surface, inner), used)
     return body.positions_mm
 
 

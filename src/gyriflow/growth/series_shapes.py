@@ -223,14 +223,12 @@ def fit_body(
     shape: Floats,
     target: Target | None,
     used: Ints,
-    *,
-    open_sulci: bool,
 ) -> None:
     """Let a body follow a shape, and fit its boundary to a target; `used` are the
     vertices of the boundary.
 
-    With `open_sulci` it is drawn several times, until it is close or hardly comes
-    closer.
+    A target with the tissue below has a surface with slits: to this the boundary is
+    drawn several times, until it is close or hardly comes closer.
     """
     body.follow(shape)
     if target is None:
@@ -240,7 +238,7 @@ def fit_body(
         return
     surface, inner = target
     gap_mm = np.inf
-    for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
+    for _ in range(0 if inner is None else MAX_OPENING_DRAWS):
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
         last_mm = gap_mm
         gap_mm = rms_length(goals - body.boundary.vertices)
@@ -326,8 +324,7 @@ def follow_series(
                 before.positions, pieces, used, CONTINUATION_TOL
             )
             shape = places + extend(goals - places[used])
-            is_open = open_sulci and target is not None
-            fit_body(body, shape, target, used, open_sulci=is_open)
+            fit_body(body, shape, target, used)
             if target is not None:
                 warn_of_misfit(body.boundary, target[0], week)
             shapes += with_stops(before, week, body)
