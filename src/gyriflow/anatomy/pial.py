@@ -114,7 +114,13 @@ def from_labels(
     brain = _Brain(
         week, {"source": "hemisphere", "side": side} if side else {"source": "labels"}
     )
-    cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
+    # the medial wall of a single hemisphere may have no cortex
+    cerebrum = read_cerebrum(
+        labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE
+    )
+    brain.report |= {"scheme": scheme.name, **cerebrum.report}
+    brain.warn(cerebrum.warnings)
+    pose = _checked_pose(cerebrum, labels, affine, scheme, side, brain)
     smooth, affine = extraction.smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
     grid, removed_ml = affine, 0.0
     side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
@@ -167,21 +173,16 @@ def from_labels(
     )
 
 
-def _read_volume(
+def _checked_pose(
+    cerebrum: Cerebrum,
     labels: Labels,
     affine: Floats,
     scheme: LabelScheme,
     side: Side | None,
     brain: _Brain,
-) -> tuple[Cerebrum, Pose]:
-    """Return the checked cerebrum of a label volume and its pose; that of a hemisphere
-    is found from its surface."""
-    # the medial wall of a single hemisphere may have no cortex
-    cerebrum = read_cerebrum(
-        labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE
-    )
-    brain.report |= {"scheme": scheme.name, **cerebrum.report}
-    brain.warn(cerebrum.warnings)
+) -> Pose:
+    """Check the size, sides and shape of a cerebrum and return its pose; that of a
+    hemisphere is found from its surface later."""
     pose = None if side else posing.pose_of_labels(labels, affine, scheme)
     labelled = np.intersect1d(cerebrum.tissue, scheme.cortex or scheme.cerebrum)
     sides = [
@@ -240,7 +241,7 @@ def _read_volume(
                 rough, has_sides=bool(scheme.left and scheme.right)
             )
         brain.warn(pose.warnings)
-    return cerebrum, pose or Pose()
+    return pose or Pose()
 
 
 def _fissure_of_labels(
