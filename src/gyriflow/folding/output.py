@@ -55,7 +55,7 @@ def layer_fields(
     weight = cortical_weight(distance, value_at(parameters.thickness_mm, week, maps))
     if log_growth is None:
         tangential, radial = increments(
-            parameters, weight, zones.growth, maps, week, parameters.step_s
+            parameters, weight, zones.growing, maps, week, parameters.step_s
         )
         growth = {
             "tangential_growth_per_step": tangential,
@@ -75,7 +75,7 @@ def layer_fields(
         "growth": growth,
         "shear_modulus": {"shear_modulus_pa": modulus},
         "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * modulus},
-        "zones": {"zone": zone, "growing": zones.growth},
+        "zones": {"zone": zone, "growing": zones.growing},
     }
     fields = {}
     for name in names:
