@@ -79,9 +79,8 @@ BRAINS = study.brains
 SIMULATED = study.simulated
 # the runs of each sweep
 SWEEPS = study.by_sweep
-# brains refused in an earlier pass of this call, with the cause; the study is finished without them
-REFUSED = {row.brain: row.cause for row in study.left_out.values() if row.why == "refused"}
-UNUSED_ROWS = [row for row in study.left_out.values() if row.why == "cannot be used"]
+# brains refused in an earlier pass of this call; the study is finished without them
+REFUSED = [row.brain for row in study.left_out.values() if row.why == "refused"]
 if REFUSED and TELLS:
     # the causes have been printed
     rest = "finishing the study without" if BRAINS else "no brain is left"
@@ -90,11 +89,12 @@ if REFUSED and not BRAINS:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
 if TELLS:
-    messages = [
-        (row.brain, f"not folded: {row.cause}") for row in study.left_out.values() if row.why == "not folded"
-    ]
-    if not REFUSED:
-        messages += [(row.brain, f"left out: {row.cause}") for row in UNUSED_ROWS]
+    messages = []
+    for row in study.left_out.values():
+        if row.why == "not folded":
+            messages.append((row.brain, f"not folded: {row.cause}"))
+        elif row.why == "cannot be used" and not REFUSED:
+            messages.append((row.brain, f"left out: {row.cause}"))
     for line, _ in grouped(messages):
         print(f"gyriflow: {line}", file=sys.stderr)
 
