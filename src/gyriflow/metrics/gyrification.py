@@ -1,4 +1,4 @@
-"""Hull and envelope of pial surfaces, sulcal depth below the envelope, and gyrification
+"""Hull and envelope of pial surfaces, sulcal depth below the hull, and gyrification
 indices."""
 
 from dataclasses import dataclass
