@@ -109,7 +109,7 @@ ENVIRONMENT = f"{workflow.basedir}/envs/gyriflow.yaml"
 
 # input files that several rules read together
 START_MESH = {name: MESH[name] for name in ("mesh", "data")}
-START_REGIONS = {"regions": REGIONS["mesh"], "data": REGIONS["data"]}
+START_REGIONS = {"regions": MESH_REGIONS["mesh"], "data": MESH_REGIONS["data"]}
 POSED_SIDES = {**{side: PIAL[side] for side in SIDES}, "report": PIAL["report"]}
 
 

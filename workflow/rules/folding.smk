@@ -69,7 +69,7 @@ SOLVED_FROM = {
     "params": PARAMETERS,
     "maps": lambda w: simulation_of(w).maps or [],
     # made before the ranks start, so that impossible zones are refused early
-    "regions": REGIONS["mesh"],
+    "regions": MESH_REGIONS["mesh"],
 }
 SOLVE = (
     # one BLAS thread per rank; Snakemake would give each rank all threads of the rule

@@ -50,7 +50,7 @@ rule carried_regions:
 rule simulated_regions:
     input:
         **region_files(f"{BRAIN}/metrics"),
-        **REGIONS,
+        **MESH_REGIONS,
         left=PIAL["left"],
         right=PIAL["right"],
     output:
