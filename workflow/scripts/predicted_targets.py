@@ -3,7 +3,7 @@ atlas."""
 
 import numpy as np
 
-from gyriflow.anatomy.sulci import has_open_sulci
+from gyriflow.anatomy.sulci import may_have_slits
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.atlas_path import AtlasPath, other_volumes
@@ -45,7 +45,7 @@ with step(snakemake.log[0]):
         pair,
         path.mesh(params.atlas_week),
         ElasticFit,
-        open_sulci=params.open_sulci and has_open_sulci(atlas_report),
+        has_slits=params.open_sulci and may_have_slits(atlas_report),
     )
     options = {"further_weeks": params.further_weeks}
     others = []

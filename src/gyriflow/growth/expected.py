@@ -135,7 +135,7 @@ def place_in_atlas(
     atlas: TetrahedralMesh,
     make_body: Callable[[TetrahedralMesh], FittedBody],
     *,
-    open_sulci: bool = False,
+    has_slits: bool = False,
 ) -> Floats:
     """Return the (n, 3) places of a mesh's vertices inside the atlas' brain, with its
     boundary fitted to the atlas'.
@@ -145,7 +145,7 @@ def place_in_atlas(
     """
     boundary, used = boundary_surface(mesh)
     surface, _ = boundary_surface(atlas)
-    inner = tissue_below(boundary, boundary, pair) if open_sulci else None
+    inner = tissue_below(boundary, boundary, pair) if has_slits else None
     places = carry(pair, mesh.vertices)
     carried = TriangleMesh(places[used], boundary.faces)
     goals = fit_onto_surface(carried, surface, inner=inner)
