@@ -124,7 +124,7 @@ class Pieces:
     areas: Floats
 
 
-def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
+def pieces_without_cuts(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     """Return a surface around `mesh` in pieces of 2 mm, without what lies over the cuts
     that `mesh` is open at.
 
