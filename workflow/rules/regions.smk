@@ -77,7 +77,7 @@ rule region_metrics:
     wildcard_constraints:
         where=one_of(place for place, row in ALL_MEASURED.items() if row.regions),
     params:
-        labels=lambda w: ALL_MEASURED[w.where].columns,
+        columns=lambda w: ALL_MEASURED[w.where].columns,
     script:
         "../scripts/region_metrics.py"
 
