@@ -15,7 +15,7 @@ from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
 from ..geometry.triangles import TriangleMesh
 from ..settings.schemes import LabelScheme
-from ..settings.terms import SIDES, Coordinates, Side
+from ..settings.terms import FUSED_AFTER_GW, SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from . import extraction, fissure, plausible, repair
 from . import pose as posing
@@ -42,9 +42,6 @@ MIN_AXIS_COSINE = 0.7
 MAX_USUAL_ASYMMETRY = 0.03
 # largest ratio of the hemispheres' areas; with 4 % of the volume it is about 10
 MAX_AREA_RATIO = 15.0
-# up to this week labels of 0.8 mm close no sulci: CRL has the same area with fused and
-# opened ones
-FUSED_AFTER_GW = 26.0
 # voxels of this size are fine enough to determine the pose by shape
 POSE_VOXEL_MM = 1.5
 # smallest gap between hemispheres from surfaces
