@@ -25,8 +25,8 @@ shell.prefix(
 
 # whether this process runs the study; other processes run one job, or are dry runs
 RUNS = workflow.is_main_process and not session.is_dry
-# a call reads the rules once to plan, and again to run
-TELLS = workflow.is_main_process and not session.is_planned
+# whether the rules print messages: a call reads them once to plan, and again to run
+PRINTS = workflow.is_main_process and not session.is_planned
 
 
 def planned_study():
@@ -81,14 +81,14 @@ SIMULATED = study.simulated
 SWEEPS = study.by_sweep
 # brains refused in an earlier pass of this call; the study is finished without them
 REFUSED = [row.brain for row in study.left_out.values() if row.why == "refused"]
-if REFUSED and TELLS:
+if REFUSED and PRINTS:
     # the causes have been printed
     rest = "finishing the study without" if BRAINS else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
 if REFUSED and not BRAINS:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
-if TELLS:
+if PRINTS:
     messages = []
     for row in study.left_out.values():
         if row.why == "not folded":
