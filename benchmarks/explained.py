@@ -71,7 +71,7 @@ from gyriflow.io.frames import read_positions, read_weeks
 from gyriflow.io.registrations import read_correspondence, read_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.metrics.gyrification import gyrification_index, pieces_over
+from gyriflow.metrics.gyrification import gyrification_index, pieces_without_cuts
 from gyriflow.settings.terms import SIDES
 from gyriflow.study.paths import FOLDING, MESH, PIAL, REGISTERED, TARGETS
 
@@ -151,7 +151,7 @@ def explained_rows(
         observed, _ = sides["observed"]
         folds = prepare_for_comparison(observed, observed)
         for name, (surface, halves) in sides.items():
-            hulls = [pieces_over(convex_hull(half), half) for half in halves]
+            hulls = [pieces_without_cuts(convex_hull(half), half) for half in halves]
             row = {"week": week, "shape": name, "area_cm2": area_cm2(surface)}
             row |= {"gyrification_index": gyrification_index(halves, hulls)}
             row |= {"distance_mm": distance_mm(surface, observed), "r_shape_index": 1.0}
@@ -194,7 +194,7 @@ def companion_rows(
             body.positions_mm, pieces, start.used, CONTINUATION_TOL
         )
         places = body.positions_mm + extend(shape.vertices - body.boundary.vertices)
-        fit_body(body, places, None, start.used, open_sulci=False)
+        fit_body(body, places, None, start.used)
         row: dict[str, Any] = {"week": week}
         for name, heights in {"removed": removed, "added": folds}.items():
             row[f"{name}_mm"], row[f"{name}_wavelength_mm"] = size_and_wavelength(

@@ -172,7 +172,7 @@ def targets_of(
     ]
     weeks, start = sorted(atlas), min(atlas)
     carried = follow_series(
-        mesh, [start, *weeks], pairs, surfaces, open_sulci=True
+        mesh, [start, *weeks], pairs, surfaces, has_slits=True
     ).positions[1:]
     options: dict[str, dict[str, Any]] = {
         "predicted": {},

@@ -167,7 +167,7 @@ def read_start(row: pd.Series) -> Start:
     if isinstance(pair, MatchedSurfaces):
         raise InputError("the start is matched, not registered", path=link)
     week = float(row["near"].rsplit("-", 1)[1])
-    inside = place_in_atlas(mesh, pair, path.mesh(week), ElasticFit, open_sulci=True)
+    inside = place_in_atlas(mesh, pair, path.mesh(week), ElasticFit, has_slits=True)
     return Start(
         study=study,
         name=row["start"],

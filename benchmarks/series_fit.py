@@ -147,7 +147,7 @@ def main() -> None:
     later = dict(zip(arguments.weeks[1:], surfaces, strict=True))
     measured = Measurement(mesh, later, arguments.states)
     options: dict[str, Any] = {
-        "open_sulci": True,
+        "has_slits": True,
         "earlier": earlier,
         "after_week": measured.end_week,
     }

@@ -20,16 +20,16 @@ class Registry[Record](dict[str, Record]):
 
 class Shown(Flag):
     """The places where a metric is shown or used, besides in the tables of the study
-    and of the brain."""
+    and of the brain, with the function that looks it up."""
 
-    CHART = auto()  # chart of metrics over the weeks
-    NORMS = auto()  # chart of norms
-    REGIONS = auto()  # chart of regions
-    BRAINS = auto()  # the report's table of brains
-    PREDICTION = auto()  # the report's table of a predicted brain
-    INTERVALS = auto()  # intervals of ensembles
-    SIZE = auto()  # relative difference of runs of a sweep from the observed brain
-    WHITE = auto()  # also of white surfaces, with `white_` before its name
+    CHART = auto()  # chart of metrics over the weeks (metrics_figure)
+    NORMS = auto()  # chart of norms (norms_figure)
+    REGIONS = auto()  # chart of regions (regions_chart)
+    BRAINS = auto()  # the report's table of brains (brain_rows)
+    PREDICTION = auto()  # the report's table of a predicted brain (predicted_table)
+    INTERVALS = auto()  # intervals of ensembles (interval_table, intervals_figure)
+    SIZE = auto()  # relative difference of a sweep's runs (member_comparison)
+    WHITE = auto()  # also of white surfaces, as `white_…` (measure_white)
 
 
 CHART, NORMS, REGIONS, BRAINS, PREDICTION, INTERVALS, SIZE, WHITE = Shown

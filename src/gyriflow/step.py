@@ -159,6 +159,7 @@ def step(log: str, *inputs: str) -> Iterator[None]:
                 text=f"{file}: {message.text}",
                 file=file,
             )
+        # `MessageHandler` writes `data` to the messages
         logging.error(
             "%s", message.text, exc_info=is_unexpected, extra={"data": message}
         )

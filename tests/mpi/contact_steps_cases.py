@@ -129,7 +129,7 @@ def test_parts_that_touch_move_as_one():
     )
     domain = folding.domain
     low = domain.part == domain.part[np.argmin(state.positions[:, 2])]
-    folding.zones = replace(folding.zones, growth=low.astype(float))
+    folding.zones = replace(folding.zones, growing=low.astype(float))
     # in the first step they come to touch
     after = after_steps(folding, state, 2)
     u = after.last

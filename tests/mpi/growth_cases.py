@@ -314,7 +314,7 @@ def test_a_free_body_grows_without_drifting(mesh):
     zones = replace(zones_of(mesh), free=True)
     folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free")
     # growth on one side only, which would turn a body that is only extrapolated
-    folding.zones = replace(zones, growth=(mesh.vertices[:, 0] > 0).astype(float))
+    folding.zones = replace(zones, growing=(mesh.vertices[:, 0] > 0).astype(float))
     for _ in range(4):
         before, state = state.positions, folding.step(state, 43200.0)
         u, x = state.last, before - before.mean(axis=0)

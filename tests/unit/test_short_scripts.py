@@ -138,8 +138,8 @@ def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
         write_vertex_labels(tmp_path / f"{side}.label.gii", labels, names)
         inputs |= {side: f"{side}.gii", f"{side}_maps": f"{side}.shape.gii"}
         inputs[f"{side}_regions"] = f"{side}.label.gii"
-    labels = {"labels": {"subject": "a", "run": "observed", "week": 22.5}}
-    run_script("region_metrics.py", tmp_path, inputs, {0: "regions.csv"}, labels)
+    params = {"columns": {"subject": "a", "run": "observed", "week": 22.5}}
+    run_script("region_metrics.py", tmp_path, inputs, {0: "regions.csv"}, params)
     table = read_table(tmp_path / "regions.csv")
     table = table.dropna(subset=["value"]).set_index(["hemisphere", "region", "metric"])
     half_sphere_cm2 = 2 * np.pi

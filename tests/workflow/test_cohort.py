@@ -96,6 +96,11 @@ def test_a_failed_subject_holds_up_no_other_and_the_call_ends_in_its_code(cohort
     assert [call.returncode for call in cohort.later] == [0, 2]
     metrics = pd.read_csv(cohort.results / "study" / "metrics.csv")
     assert set(metrics["subject"]) == {"sub-01", "sub-02"}
+    quality = pd.read_csv(cohort.results / "study" / "quality.csv")
+    refused = quality[quality["verdict"] == "refused"]
+    # a row of the table that cannot be used comes last
+    assert refused["subject"].tolist() == ["sub-03", "sub-05", "sub-04"]
+    assert refused["cause"].tolist()[-1] == Facts("n/a")
 
 
 @pytest.mark.parametrize("brain", ["sub-01", "sub-02"])

@@ -63,8 +63,8 @@ def from_bases(pattern):
 rule calibration_score:
     input:
         frames=from_bases(FOLDING["frames"]),
-        regions=from_bases(REGIONS["mesh"]),
-        data=from_bases(REGIONS["data"]),
+        regions=from_bases(MESH_REGIONS["mesh"]),
+        data=from_bases(MESH_REGIONS["data"]),
         summaries=from_bases(FOLDING["summary"]),
         observed=lambda w: [BRAINS[brain].pial for start in STARTS for brain in start.observed],
         spectra=OBSERVED_SPECTRA,

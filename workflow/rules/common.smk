@@ -25,8 +25,8 @@ shell.prefix(
 
 # whether this process runs the study; other processes run one job, or are dry runs
 RUNS = workflow.is_main_process and not session.is_dry
-# a call reads the rules once to plan, and again to run
-TELLS = workflow.is_main_process and not session.is_planned
+# whether the rules print messages: a call reads them once to plan, and again to run
+PRINTS = workflow.is_main_process and not session.is_planned
 
 
 def planned_study():
@@ -79,22 +79,22 @@ BRAINS = study.brains
 SIMULATED = study.simulated
 # the runs of each sweep
 SWEEPS = study.by_sweep
-# brains refused in an earlier pass of this call, with the cause; the study is finished without them
-REFUSED = {row.brain: row.cause for row in study.left_out.values() if row.why == "refused"}
-UNUSED_ROWS = [row for row in study.left_out.values() if row.why == "cannot be used"]
-if REFUSED and TELLS:
+# brains refused in an earlier pass of this call; the study is finished without them
+REFUSED = [row.brain for row in study.left_out.values() if row.why == "refused"]
+if REFUSED and PRINTS:
     # the causes have been printed
     rest = "finishing the study without" if BRAINS else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
 if REFUSED and not BRAINS:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
-if TELLS:
-    messages = [
-        (row.brain, f"not folded: {row.cause}") for row in study.left_out.values() if row.why == "not folded"
-    ]
-    if not REFUSED:
-        messages += [(row.brain, f"left out: {row.cause}") for row in UNUSED_ROWS]
+if PRINTS:
+    messages = []
+    for row in study.left_out.values():
+        if row.why == "not folded":
+            messages.append((row.brain, f"not folded: {row.cause}"))
+        elif row.why == "cannot be used" and not REFUSED:
+            messages.append((row.brain, f"left out: {row.cause}"))
     for line, _ in grouped(messages):
         print(f"gyriflow: {line}", file=sys.stderr)
 
@@ -109,7 +109,7 @@ ENVIRONMENT = f"{workflow.basedir}/envs/gyriflow.yaml"
 
 # input files that several rules read together
 START_MESH = {name: MESH[name] for name in ("mesh", "data")}
-START_REGIONS = {"regions": REGIONS["mesh"], "data": REGIONS["data"]}
+START_REGIONS = {"regions": MESH_REGIONS["mesh"], "data": MESH_REGIONS["data"]}
 POSED_SIDES = {**{side: PIAL[side] for side in SIDES}, "report": PIAL["report"]}
 
 

@@ -398,7 +398,7 @@ ZONED = list(BY_ZONES.values())
 
 rule zones_figure:
     input:
-        boundary=REGIONS["data"],
+        boundary=MESH_REGIONS["data"],
         parameters=PARAMETERS,
     output:
         zones_figure=multiext(f"{RUN}/figures/zones", ".png", ".pdf"),

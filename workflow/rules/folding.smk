@@ -1,7 +1,7 @@
 # Simulations: each run from each of its start brains.
 from gyriflow.io.files import read_json
 from gyriflow.running.cost import job_limits
-from gyriflow.settings.folding import mapped_parameters, parameters
+from gyriflow.settings.folding import mapped_parameters, plain_settings
 from gyriflow.settings.varying import files_of, mean_of_curve
 
 
@@ -44,7 +44,7 @@ rule prepare:
     wildcard_constraints:
         run=prepared_runs(with_maps=False),
     params:
-        settings=lambda w: parameters(simulation_of(w).settings),
+        settings=lambda w: plain_settings(simulation_of(w).settings),
         weeks=lambda w: simulation_of(w).weeks,
         series=lambda w: simulation_of(w).series if simulation_of(w).curves else None,
         # volumes of maps are read like label volumes
@@ -69,7 +69,7 @@ SOLVED_FROM = {
     "params": PARAMETERS,
     "maps": lambda w: simulation_of(w).maps or [],
     # made before the ranks start, so that impossible zones are refused early
-    "regions": REGIONS["mesh"],
+    "regions": MESH_REGIONS["mesh"],
 }
 SOLVE = (
     # one BLAS thread per rank; Snakemake would give each rank all threads of the rule

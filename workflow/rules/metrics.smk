@@ -14,7 +14,7 @@ rule measure:
     wildcard_constraints:
         brain=brains_where(lambda brain: brain.sides == SIDES),
     params:
-        labels=lambda w: BRAINS[w.brain].columns,
+        columns=lambda w: BRAINS[w.brain].columns,
         settings=MEASURED_WITH,
     script:
         "../scripts/measure.py"
@@ -73,7 +73,7 @@ rule measure_simulated:
     wildcard_constraints:
         brain=brains_where(lambda brain: brain.sides == SIDES),
     params:
-        labels=lambda w: SIMULATED[w.run, w.brain, float(w.week)].columns,
+        columns=lambda w: SIMULATED[w.run, w.brain, float(w.week)].columns,
         settings=MEASURED_WITH,
     script:
         "../scripts/measure.py"

@@ -36,17 +36,26 @@ rule brain_figures:
         "../scripts/brain_figures.py"
 
 
+# refused brains, and rows of a table that cannot be used
+WITHOUT_SURFACE = [row for row in study.left_out.values() if row.why != "not folded"]
+
+
+def left_out_row(row):
+    """Return the row of the quality table of a brain that was left out, with the cause."""
+    if row.why == "cannot be used":
+        return {"subject": row.brain, "week": row.week, "cause": row.cause}
+    return quality_columns(row.brain) | {"cause": row.cause, "page": None}
+
+
 rule quality_table:
     input:
         expand(rules.brain_figures.output.row, brain=BRAINS),
     output:
         f"{STUDY}/quality.csv",
     params:
-        refused=[
-            *(quality_columns(name) | {"cause": cause, "page": None} for name, cause in REFUSED.items()),
-            *({"subject": row.brain, "week": row.week, "cause": row.cause} for row in UNUSED_ROWS),
-        ],
-        order=[*(brain.id for brain in CONFIG.brains), *(row.brain for row in UNUSED_ROWS)],
+        refused=list(map(left_out_row, WITHOUT_SURFACE)),
+        # rows of a table that cannot be used come last
+        order=[brain.id for brain in CONFIG.brains],
     script:
         "../scripts/quality_table.py"
 

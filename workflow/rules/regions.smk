@@ -50,7 +50,7 @@ rule carried_regions:
 rule simulated_regions:
     input:
         **region_files(f"{BRAIN}/metrics"),
-        **REGIONS,
+        **MESH_REGIONS,
         left=PIAL["left"],
         right=PIAL["right"],
     output:
@@ -77,7 +77,7 @@ rule region_metrics:
     wildcard_constraints:
         where=one_of(place for place, row in ALL_MEASURED.items() if row.regions),
     params:
-        labels=lambda w: ALL_MEASURED[w.where].columns,
+        columns=lambda w: ALL_MEASURED[w.where].columns,
     script:
         "../scripts/region_metrics.py"
 

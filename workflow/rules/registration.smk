@@ -3,7 +3,7 @@ from gyriflow.running.cost import targets_memory_mib
 from gyriflow.io.origins import origin_key
 from gyriflow.running.path_store import has_path, kept_path, path_origin, store_folder
 
-if TELLS:
+if PRINTS:
     for series in study.series.values():
         if series.unmatched and any(start.id in series.brains for start in study.starts):
             print(

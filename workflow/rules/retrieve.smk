@@ -4,7 +4,7 @@ from gyriflow.study.atlases import retrieval_note
 
 ATLAS_FILES = {row.file.removeprefix("/"): row for row in study.downloads.values()}
 
-if TELLS:
+if PRINTS:
     for atlas in study.used_atlases:
         if atlas.missing:
             print(f"gyriflow: {retrieval_note(atlas)}", file=sys.stderr)

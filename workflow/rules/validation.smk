@@ -101,7 +101,7 @@ def deviating(wildcards):
     }
 
 
-def deviation_labels(wildcards):
+def deviation_columns(wildcards):
     """Return the first columns of the deviation table."""
     week = float(wildcards.week)
     observed = observed_of(wildcards)[week]
@@ -124,7 +124,7 @@ rule deviation:
         **DEVIATION,
     params:
         sides=lambda w: BRAINS[w.brain].sides,
-        labels=deviation_labels,
+        columns=deviation_columns,
     script:
         "../scripts/deviation.py"
 

@@ -60,5 +60,5 @@ with step(snakemake.log[0]):
     )
     write_table(
         snakemake.output.table,
-        deviation_table(params.labels, surface, maps, sides, regions),
+        deviation_table(params.columns, surface, maps, sides, regions),
     )

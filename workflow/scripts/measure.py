@@ -24,7 +24,7 @@ with step(snakemake.log[0]):
     brain = files
     if files.get("frames"):
         regions, brain = read_regions(files.regions), output
-        positions = read_positions(files.frames, params.labels["week"])
+        positions = read_positions(files.frames, params.columns["week"])
         whole, left, right = folded_surfaces(regions, positions)
         write_brain(output, whole, left, right)
         depth = depth_of_weight(regions.fields["cortex_weight"])
@@ -56,7 +56,7 @@ with step(snakemake.log[0]):
     ):
         write_table(
             output[name],
-            table.assign(**params.labels)[[*params.labels, *table.columns]],
+            table.assign(**params.columns)[[*params.columns, *table.columns]],
         )
     for side, values in maps.items():
         write_vertex_maps(

@@ -3,11 +3,11 @@ atlas."""
 
 import numpy as np
 
-from gyriflow.anatomy.sulci import has_open_sulci
+from gyriflow.anatomy.sulci import may_have_slits
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.atlas_path import AtlasPath, other_volumes
-from gyriflow.growth.expected import predict_shapes
+from gyriflow.growth.expected import place_in_atlas, predict_shapes
 from gyriflow.growth.series_shapes import SeriesShapes, sizes_of
 from gyriflow.io.files import read_json
 from gyriflow.io.registrations import (
@@ -40,10 +40,14 @@ with step(snakemake.log[0]):
     ]
     pair = between_moved(read_correspondence(files.correspondence[0]), *poses)
     atlas_report = read_json(files.reports[1])
-    options = {
-        "further_weeks": params.further_weeks,
-        "open_sulci": params.open_sulci and has_open_sulci(atlas_report),
-    }
+    inside = place_in_atlas(
+        mesh,
+        pair,
+        path.mesh(params.atlas_week),
+        ElasticFit,
+        has_slits=params.open_sulci and may_have_slits(atlas_report),
+    )
+    options = {"further_weeks": params.further_weeks}
     others = []
     if files.norms:
         norms = cohort_from_plain(read_json(files.norms))
@@ -56,7 +60,7 @@ with step(snakemake.log[0]):
         options |= {"age_shift_gw": varied.age_shift_gw, "fading_gw": varied.fading_gw}
         options["smoothing_mm"] = varied.difference_smoothing_mm
         options["lasting"] = varied.lasting
-    growth = params.start_week, params.end_week, path, pair, params.atlas_week
+    growth = params.start_week, params.end_week, path, inside, params.atlas_week
     found = predict_shapes(mesh, *growth, ElasticFit, **options)
     sizes, ages = sizes_of(mesh, found.positions), found.ages.table()
     shapes = WeeklyShapes(

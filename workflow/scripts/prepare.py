@@ -16,7 +16,7 @@ from gyriflow.mesh import maps as on_mesh
 from gyriflow.settings.folding import (
     FoldingSettings,
     parameters_from,
-    run_parameters,
+    params_content,
     target_maps,
 )
 from gyriflow.settings.varying import bounds_of
@@ -70,15 +70,15 @@ with step(snakemake.log[0]):
         growth, curves, params.series, params.weeks, shrink=bool(sizes)
     )
     surface = read_json(files.surface)
-    parameters = run_parameters(
+    content = params_content(
         params.settings, growth, params.weeks, surface, target_weeks, stops
     )
-    write_yaml(output.params, parameters)
+    write_yaml(output.params, content)
     if maps:
         write_maps(output.maps, maps)
     regions = start_regions(
         mesh,
-        parameters_from(parameters),
+        parameters_from(content),
         maps,
         lambda mesh: nearer_left(mesh, *map(read_surface, files.sides)),
     )

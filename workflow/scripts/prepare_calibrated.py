@@ -15,15 +15,15 @@ files, output = snakemake.input, snakemake.output
 with step(snakemake.log[0]):
     design = read_table(files.design).set_index("run")
     values = design.loc[snakemake.wildcards.run].astype(float).to_dict()
-    parameters = calibrated_parameters(
+    content = calibrated_parameters(
         read_yaml(files.base), values, snakemake.params.week
     )
-    write_yaml(output.params, parameters)
+    write_yaml(output.params, content)
     mesh = read_tetrahedral_mesh(files.mesh)
     maps = read_maps(files.maps) if files.maps else {}
     regions = start_regions(
         mesh,
-        parameters_from(parameters),
+        parameters_from(content),
         maps,
         lambda mesh: nearer_left(mesh, *map(read_surface, files.sides)),
     )

@@ -6,7 +6,7 @@ from gyriflow.metrics.tables import region_metrics
 from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
-files, columns = snakemake.input, snakemake.params.labels
+files, columns = snakemake.input, snakemake.params.columns
 with step(snakemake.log[0]):
     regions = {side: read_vertex_labels(files[f"{side}_regions"]) for side in SIDES}
     table = region_metrics(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gyriflow.anatomy.sulci import has_open_sulci
+from gyriflow.anatomy.sulci import may_have_slits
 from gyriflow.errors import StorageError
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
@@ -45,7 +45,7 @@ with step(snakemake.log[0]):
         )
     ]
     reports = [read_json(path) for path in files.reports]
-    open_sulci = params.open_sulci and any(map(has_open_sulci, reports))
+    has_slits = params.open_sulci and any(map(may_have_slits, reports))
     made_from = [
         files.mesh,
         files.data,
@@ -54,7 +54,7 @@ with step(snakemake.log[0]):
         *files.surfaces,
         *files.reports,
     ]
-    settings = [params.weeks, params.posed, open_sulci, params.code]
+    settings = [params.weeks, params.posed, has_slits, params.code]
     unfinished = unfinished_series(snakemake.output[0], made_from, settings)
     state = unfinished.read()
 
@@ -69,7 +69,7 @@ with step(snakemake.log[0]):
         pairs,
         surfaces,
         ElasticFit(mesh),
-        open_sulci=open_sulci,
+        has_slits=has_slits,
         earlier=SeriesShapes(*state) if state else None,
         after_week=keep,
     )

@@ -103,7 +103,8 @@ def read_cerebrum(
     the labels do not fit the scheme, or if cortex covers less than `min_cortex` of the
     cerebrum's surface.
     """
-    mask = cerebrum_mask(labels, scheme)
+    require_labels(labels, scheme)
+    mask = np.isin(labels, scheme.cerebrum)
     report = _missing_labels(labels, scheme)
     warnings = list(misplaced_cortex(labels, affine, scheme))
     # the wall of a hemisphere that is alone may have no cortex
@@ -227,9 +228,9 @@ def _fill_from_nearest(
         labels[empty] = labels[tuple(nearest[:, empty])]
 
 
-def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
-    """Return the (i, j, k) mask of the cerebrum; InputError for labels not in the
-    scheme, or missing tissues of it."""
+def require_labels(labels: Labels, scheme: LabelScheme) -> None:
+    """Raise InputError for labels that are not in the scheme, or if the cerebrum or a
+    tissue of it is missing."""
     present = set(map(int, np.unique(labels))) - {0}
     unknown = sorted(present - set(scheme.labels))
     if unknown:
@@ -261,7 +262,6 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
                 found=f"labels {_listed(sorted(present))}",
                 expected="voxels of " + _listed(numbers, scheme),
             )
-    return np.isin(labels, scheme.cerebrum)
 
 
 def require_cortex_outside(

@@ -15,7 +15,7 @@ from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
 from ..geometry.triangles import TriangleMesh
 from ..settings.schemes import LabelScheme
-from ..settings.terms import SIDES, Coordinates, Side
+from ..settings.terms import FUSED_AFTER_GW, SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from . import extraction, fissure, plausible, repair
 from . import pose as posing
@@ -42,9 +42,6 @@ MIN_AXIS_COSINE = 0.7
 MAX_USUAL_ASYMMETRY = 0.03
 # largest ratio of the hemispheres' areas; with 4 % of the volume it is about 10
 MAX_AREA_RATIO = 15.0
-# up to this week labels of 0.8 mm close no sulci: CRL has the same area with fused and
-# opened ones
-FUSED_AFTER_GW = 26.0
 # voxels of this size are fine enough to determine the pose by shape
 POSE_VOXEL_MM = 1.5
 # smallest gap between hemispheres from surfaces
@@ -114,7 +111,13 @@ def from_labels(
     brain = _Brain(
         week, {"source": "hemisphere", "side": side} if side else {"source": "labels"}
     )
-    cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
+    # the medial wall of a single hemisphere may have no cortex
+    cerebrum = read_cerebrum(
+        labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE
+    )
+    brain.report |= {"scheme": scheme.name, **cerebrum.report}
+    brain.warn(cerebrum.warnings)
+    pose = _checked_pose(cerebrum, labels, affine, scheme, side, brain)
     smooth, affine = extraction.smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
     grid, removed_ml = affine, 0.0
     side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
@@ -167,21 +170,16 @@ def from_labels(
     )
 
 
-def _read_volume(
+def _checked_pose(
+    cerebrum: Cerebrum,
     labels: Labels,
     affine: Floats,
     scheme: LabelScheme,
     side: Side | None,
     brain: _Brain,
-) -> tuple[Cerebrum, Pose]:
-    """Return the checked cerebrum of a label volume and its pose; that of a hemisphere
-    is found from its surface."""
-    # the medial wall of a single hemisphere may have no cortex
-    cerebrum = read_cerebrum(
-        labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE
-    )
-    brain.report |= {"scheme": scheme.name, **cerebrum.report}
-    brain.warn(cerebrum.warnings)
+) -> Pose:
+    """Check the size, sides and shape of a cerebrum and return its pose; that of a
+    hemisphere is found from its surface later."""
     pose = None if side else posing.pose_of_labels(labels, affine, scheme)
     labelled = np.intersect1d(cerebrum.tissue, scheme.cortex or scheme.cerebrum)
     sides = [
@@ -240,7 +238,7 @@ def _read_volume(
                 rough, has_sides=bool(scheme.left and scheme.right)
             )
         brain.warn(pose.warnings)
-    return cerebrum, pose or Pose()
+    return pose or Pose()
 
 
 def _fissure_of_labels(

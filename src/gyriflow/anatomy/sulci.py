@@ -56,9 +56,9 @@ PLACES_MM, N_DEPTHS = 5.0, 10_000
 FAR, MAX_FAR_SHARE = 3.0, 0.05
 
 
-def has_open_sulci(report: Mapping[str, Any]) -> bool:
-    """Return whether a surface, with this report, has sulci that can be opened: labels
-    whose sulci stay fused have none; given surfaces count as open."""
+def may_have_slits(report: Mapping[str, Any]) -> bool:
+    """Return whether a surface with this report may have slits: from labels if fused
+    sulci were opened, and if it was given as a surface."""
     return bool(report.get("sulci", {"sheets": 1}).get("sheets"))
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..anatomy.labels import cerebrum_mask, layout_of, scheme_contradictions
+from ..anatomy.labels import layout_of, require_labels, scheme_contradictions
 from ..errors import InputError
 from ..formats import (
     CIFTI_NAME,
@@ -850,7 +850,7 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
     for name, scheme in SCHEMES.items():
         if numbers and numbers <= set(scheme.labels):
             try:
-                cerebrum_mask(labels, scheme)
+                require_labels(labels, scheme)
                 causes[name] = next(scheme_contradictions(layout, scheme), "")
             except InputError as error:
                 causes[name] = error.problem

@@ -81,7 +81,7 @@ def thickness_difference(
 
 
 def deviation_table(
-    labels: Mapping[str, Any],
+    columns: Mapping[str, Any],
     surface: TriangleMesh,
     maps: Mapping[str, Floats],
     sides: Mapping[str, TriangleMesh],
@@ -93,8 +93,8 @@ def deviation_table(
     `sides` are among them. `regions` are by side the labels of the hemisphere's
     vertices and the names of the labels, empty without regions.
 
-    Columns are the given `labels`, hemisphere, region ("" for all of it), metric (the
-    map, without its unit), value, unit.
+    The table has the given `columns`, hemisphere, region ("" for all of it), metric
+    (the map, without its unit), value, unit.
     """
     parts = {"whole": surface, **sides}
     part_maps = {
@@ -122,9 +122,9 @@ def deviation_table(
     means = table[table["metric"].str.startswith("mean_")]
     table = means.assign(
         metric=means["metric"].str.removeprefix("mean_"),
-        **labels,
+        **columns,
     )
-    return table[[*labels, "hemisphere", "region", "metric", "value", "unit"]]
+    return table[[*columns, "hemisphere", "region", "metric", "value", "unit"]]
 
 
 def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataFrame:

@@ -110,7 +110,7 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
         raise InputError(
             "no facet has cortex under it", remedy="Choose another folding.support."
         )
-    if not (zones.growth > 0).any():
+    if not (zones.growing > 0).any():
         raise InputError(
             "no vertex grows",
             remedy="Choose another folding.support.",

@@ -230,7 +230,7 @@ class ElasticFit:
         zones = Zones(
             facets,
             facet_zone=np.full(len(facets), FREE),
-            growth=np.ones(len(mesh.vertices)),
+            growing=np.ones(len(mesh.vertices)),
             fissure_x_mm=0.0,
             planes_mm=(-math.inf, math.inf),
             free=True,

@@ -141,7 +141,7 @@ class GrowthByRates(StepGrowth):
     step."""
 
     def inverse(self, tissue: Tissue) -> Floats:
-        dg, dr = increments_at(
+        dg, dr = increments(
             self.parameters,
             tissue.weight,
             tissue.growing,
@@ -160,38 +160,27 @@ class GrowthByRates(StepGrowth):
 
 
 def increments(
-    w: Any,
-    g: Any,
-    tangential: Any,
-    core: Any,
-    step_s: float,
-) -> tuple[Any, Any]:
-    """Return the tangential and radial growth increments dg and dr, as stretches minus
-    1.
-
-    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = α_CORE (1 − w) · g · Δt, with the
-    cortical weight w, g 1 where tissue grows and else 0, and rates in 1/s: tangential
-    of the cortex (α_TAN) and isotropic of the core (α_CORE).
-    """
-    isotropic = core * (1 - w)
-    tangential_growth = (tangential * w + isotropic) * (g * step_s)
-    radial_growth = isotropic * (g * step_s)
-    return tangential_growth, radial_growth
-
-
-def increments_at(
     p: FoldingParameters,
-    w: Floats,
-    g: Floats,
+    weight: Floats,
+    growing: Floats,
     maps: Maps,
     week: float,
     step_s: float,
 ) -> tuple[Floats, Floats]:
-    """Return the increments of a step by the parameters' rates at a week; `w`, `g` and
-    maps are at the same points."""
+    """Return the tangential and radial growth increments dg and dr of a step, as
+    stretches minus 1, by the parameters' rates at a week.
+
+    dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = α_CORE (1 − w) · g · Δt, with the
+    cortical weight w, g 1 where tissue is `growing` and else 0, and rates in 1/s:
+    tangential of the cortex (α_TAN) and isotropic of the core (α_CORE). Weight,
+    `growing` and maps are at the same points.
+    """
     tangential = value_at(p.growth_rate_per_s, week, maps)
     core = value_at(p.core_growth_rate_per_s, week, maps)
-    return increments(w, g, tangential, core, step_s)
+    isotropic = core * (1 - weight)
+    tangential_growth = (tangential * weight + isotropic) * (growing * step_s)
+    radial_growth = isotropic * (growing * step_s)
+    return tangential_growth, radial_growth
 
 
 def layered_inverse(

@@ -11,7 +11,7 @@ from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
-from .growth import GrowthInputs, increments_at
+from .growth import GrowthInputs, increments
 from .layers import PialSearch, cortical_weight, shear_modulus
 from .stretches import log_stretch, packed, unpacked
 from .zones import Zones
@@ -54,8 +54,8 @@ def layer_fields(
     distance = search.distance(positions_mm)
     weight = cortical_weight(distance, value_at(parameters.thickness_mm, week, maps))
     if log_growth is None:
-        tangential, radial = increments_at(
-            parameters, weight, zones.growth, maps, week, parameters.step_s
+        tangential, radial = increments(
+            parameters, weight, zones.growing, maps, week, parameters.step_s
         )
         growth = {
             "tangential_growth_per_step": tangential,
@@ -75,7 +75,7 @@ def layer_fields(
         "growth": growth,
         "shear_modulus": {"shear_modulus_pa": modulus},
         "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * modulus},
-        "zones": {"zone": zone, "growing": zones.growth},
+        "zones": {"zone": zone, "growing": zones.growing},
     }
     fields = {}
     for name in names:

@@ -153,14 +153,16 @@ def free_growth(
     volumes = volumes_between(positions_mm, inputs.pieces)
 
     def volume_rate(tangential: float, core: float) -> float:
-        dg, dr = increments(weight, zones.growth, tangential, core, 1.0)
+        rates = {"growth_rate_per_s": tangential, "core_growth_rate_per_s": core}
+        by_rates = p.model_copy(update=rates)
+        dg, dr = increments(by_rates, weight, zones.growing, {}, week, 1.0)
         of_volume = 2 * dg + dr
         of_pieces = of_volume[inputs.pieces].mean(axis=1)
         return float(np.average(of_pieces, weights=volumes))
 
     faces = zones.measured_facets
     areas = face_areas(TriangleMesh(positions_mm, faces))
-    growing = zones.growth[faces].mean(axis=1)
+    growing = zones.growing[faces].mean(axis=1)
     cortex_area = 2 * float(growing @ areas / areas.sum())
     cortex_volume = volume_rate(1.0, 0.0)
     core_volume = volume_rate(0.0, 1.0)

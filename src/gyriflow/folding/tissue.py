@@ -74,7 +74,7 @@ class Tissue:
         # the maximum over the whole mesh, so that all ranks search equally far
         thickest_mm = float(np.max(value_at(p.thickness_mm, week, maps)))
         reach = WEIGHT_REACH * thickest_mm * M_PER_MM
-        growing = zones.growth[elements.vertices]
+        growing = zones.growing[elements.vertices]
         maps = {name: maps[name][elements.vertices] for name in p.varying_maps}
         nearest: NDArray
         if points.order == 1:

@@ -52,7 +52,7 @@ class Zones:
         FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES (f,); BASE, SIDE_X
         or SIDE_Y on flat cuts, which have no cortex; MEDIAL_WALL on the wall of a
         single hemisphere towards the missing one.
-    growth
+    growing
         1 at vertices (n,) that grow, else 0.
     fissure_x_mm, planes_mm
         Position of the fissure, and of the planes that the left and the right
@@ -68,7 +68,7 @@ class Zones:
 
     facets: Ints
     facet_zone: Ints
-    growth: Floats
+    growing: Floats
     fissure_x_mm: float
     planes_mm: tuple[float, float]
     free: bool = False
@@ -104,7 +104,7 @@ class Zones:
     def fixed(self) -> Mask:
         """The mask (n, 3) of the displacement components that are fixed at zero."""
         fixed = np.zeros(
-            (len(self.growth), 3),
+            (len(self.growing), 3),
             dtype=bool,
         )
         fixed[self.vertices_of(terms.CLAMPED, terms.BASE)] = True
@@ -239,21 +239,21 @@ def zones_of_run(
         if p.support == "free" and len(wall):
             anchors = _wall_anchors(mesh.vertices, wall)
 
-    growth = np.ones(len(mesh.vertices))
+    growing = np.ones(len(mesh.vertices))
     if p.support == "ellipsoid":
-        growth[is_static] = 0.0
+        growing[is_static] = 0.0
         if p.side is None:
             in_bridge = _bridge_vertices(
                 mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge
             )
-            growth[in_bridge] = 0.0
+            growing[in_bridge] = 0.0
             if p.contact == "planes":
                 medial = _medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)
-                growth[medial] = 0.0
+                growing[medial] = 0.0
     return Zones(
         facets,
         zone,
-        growth,
+        growing,
         fissure_x_mm,
         (left_plane, right_plane),
         free=p.support == "free" and p.side is None,
@@ -336,8 +336,8 @@ def model_fields(
     return {
         "positions": positions,
         "weight": weight,
-        "growing": zones.growth,
-        "increment": rate * p.step_s * weight * zones.growth,
+        "growing": zones.growing,
+        "increment": rate * p.step_s * weight * zones.growing,
         "normals": pial.nearest_normals(positions),
     }
 
@@ -363,7 +363,7 @@ def cell_tags(
     )
     hemisphere[x >= right_plane] = terms.RIGHT
     hemisphere[x <= left_plane] = terms.LEFT
-    is_growing = zones.growth[mesh.tets].max(axis=1) > 0
+    is_growing = zones.growing[mesh.tets].max(axis=1) > 0
     is_cortex = weight[mesh.tets].mean(axis=1) > 0.5
     layer = np.where(is_cortex, terms.CORTEX, terms.CORE)
     return {

@@ -135,7 +135,7 @@ def place_in_atlas(
     atlas: TetrahedralMesh,
     make_body: Callable[[TetrahedralMesh], FittedBody],
     *,
-    open_sulci: bool = False,
+    has_slits: bool = False,
 ) -> Floats:
     """Return the (n, 3) places of a mesh's vertices inside the atlas' brain, with its
     boundary fitted to the atlas'.
@@ -145,14 +145,14 @@ def place_in_atlas(
     """
     boundary, used = boundary_surface(mesh)
     surface, _ = boundary_surface(atlas)
-    inner = tissue_below(boundary, boundary, pair) if open_sulci else None
+    inner = tissue_below(boundary, boundary, pair) if has_slits else None
     places = carry(pair, mesh.vertices)
     carried = TriangleMesh(places[used], boundary.faces)
     goals = fit_onto_surface(carried, surface, inner=inner)
     extend = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)
     shape = places + extend(goals - places[used])
     body = make_body(mesh)
-    fit_body(body, shape, (surface, inner), used, open_sulci=open_sulci)
+    fit_body(body, shape, (surface, inner), used)
     return body.positions_mm
 
 
@@ -235,8 +235,8 @@ def predict_shapes(
     start_week: float,
     end_week: float,
     path: AtlasPath,
-    pair: Deformation,
-    pair_week: float,
+    inside: Floats,
+    atlas_week: float,
     make_body: Callable[[TetrahedralMesh], FittedBody],
     *,
     further_weeks: Sequence[float] = (),
@@ -245,24 +245,21 @@ def predict_shapes(
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
     fading_gw: float = FADING_GW,
     lasting: float = LASTING,
-    open_sulci: bool = False,
 ) -> Prediction:
     """Predict the shapes of a mesh from its week to that of the atlas after the end
     week, and at further weeks.
 
-    The mesh is carried into the brain of `pair_week` of the atlas and along the atlas'
-    path, whose brains count at their age by size (`resample_by_size`). One body follows
-    the prediction from week to week of the atlas, so that no element is inverted and no
-    faces cross. Curve, ages and the weeks that the body passes are those of the atlas,
-    and the path ends two weeks of the atlas after the end: so a shape does not depend
-    on what else is predicted.
+    The vertices' places `inside` the atlas' brain of `atlas_week` (n, 3), of
+    `place_in_atlas`, are carried along the atlas' path, whose brains count at their age
+    by size (`resample_by_size`). One body follows the prediction from week to week of
+    the atlas, so that no element is inverted and no faces cross. Curve, ages and the
+    weeks that the body passes are those of the atlas, and the path ends two weeks of
+    the atlas after the end: so a shape does not depend on what else is predicted.
 
     `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm`,
     `fading_gw` and `lasting` vary in an ensemble; `others` as for `ages_by_size`.
     """
-    atlas_brain = path.mesh(pair_week)
-    inside = place_in_atlas(mesh, pair, atlas_brain, make_body, open_sulci=open_sulci)
-    carried = path.carry(inside, pair_week)
+    carried = path.carry(inside, atlas_week)
     ages = path.ages(others)
     grown = resample_by_size(
         mesh,

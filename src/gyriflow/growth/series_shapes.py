@@ -223,14 +223,12 @@ def fit_body(
     shape: Floats,
     target: Target | None,
     used: Ints,
-    *,
-    open_sulci: bool,
 ) -> None:
     """Let a body follow a shape, and fit its boundary to a target; `used` are the
     vertices of the boundary.
 
-    With `open_sulci` it is drawn several times, until it is close or hardly comes
-    closer.
+    A target with the tissue below has a surface with slits: to this the boundary is
+    drawn several times, until it is close or hardly comes closer.
     """
     body.follow(shape)
     if target is None:
@@ -240,7 +238,7 @@ def fit_body(
         return
     surface, inner = target
     gap_mm = np.inf
-    for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
+    for _ in range(0 if inner is None else MAX_OPENING_DRAWS):
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
         last_mm = gap_mm
         gap_mm = rms_length(goals - body.boundary.vertices)
@@ -269,7 +267,7 @@ def follow_series(
     surfaces: Sequence[TriangleMesh],
     body: FittedBody | None = None,
     *,
-    open_sulci: bool = False,
+    has_slits: bool = False,
     earlier: SeriesShapes | None = None,
     after_week: Callable[[SeriesShapes], None] | None = None,
 ) -> SeriesShapes:
@@ -285,7 +283,7 @@ def follow_series(
     of this mesh follows it week by week to a shape without these, and is fitted to the
     surface once more from there; the next week starts from it.
 
-    With `open_sulci` the surfaces have slits that registration by labels does not show.
+    `has_slits`: the surfaces have slits, which registration by labels does not show.
     Then points are matched by the tissue below them, too, and a body is drawn to its
     surface several times.
 
@@ -309,7 +307,7 @@ def follow_series(
     if body is not None:
         body.positions_mm = shapes[-1].positions
     # lazy: each week is carried from the last of `shapes`, which this loop extends
-    carried = _carried(boundary, used, shapes, pairs, surfaces, open_sulci)
+    carried = _carried(boundary, used, shapes, pairs, surfaces, has_slits)
     later_weeks = weeks[n_later_done + 1 :]
     for week, (places, goals, target) in zip(later_weeks, carried, strict=True):
         before = shapes[-1]
@@ -326,8 +324,7 @@ def follow_series(
                 before.positions, pieces, used, CONTINUATION_TOL
             )
             shape = places + extend(goals - places[used])
-            is_open = open_sulci and target is not None
-            fit_body(body, shape, target, used, open_sulci=is_open)
+            fit_body(body, shape, target, used)
             if target is not None:
                 warn_of_misfit(body.boundary, target[0], week)
             shapes += with_stops(before, week, body)
@@ -342,7 +339,7 @@ def _carried(
     shapes: Sequence[WeekShape],
     pairs: Sequence[Correspondence],
     surfaces: Sequence[TriangleMesh],
-    open_sulci: bool,
+    has_slits: bool,
 ) -> Iterator[tuple[Floats, Floats, Target | None]]:
     """Yield for each week that has no shape yet the (n, 3) places of the mesh before
     its fit, those of its boundary, and the target of the fit, None for matched
@@ -362,7 +359,7 @@ def _carried(
         assert isinstance(pair, Deformation)
         places = carry_over_weeks(now, [pair])[-1]
         inner = None
-        if open_sulci:
+        if has_slits:
             before = TriangleMesh(now[used], boundary.faces)
             # below the observed surface: with the body's normals its roughness would
             # add up from week to week

@@ -1,4 +1,4 @@
-"""Hull and envelope of pial surfaces, sulcal depth below the envelope, and gyrification
+"""Hull and envelope of pial surfaces, sulcal depth below the hull, and gyrification
 indices."""
 
 from dataclasses import dataclass
@@ -98,18 +98,17 @@ def envelope(mesh: TriangleMesh) -> TriangleMesh:
     )
 
 
-def sulcal_depth(mesh: TriangleMesh, around: TriangleMesh) -> Floats:
-    """Return the (n,) straight distance in mm from each vertex outwards to the closed
-    surface around; 0 outside it.
+def sulcal_depth(mesh: TriangleMesh, hull: TriangleMesh) -> Floats:
+    """Return the (n,) straight distance in mm from each vertex outwards to the convex
+    hull of the hemisphere; 0 outside it.
 
-    Around is the convex hull of the hemisphere: of the measures that were compared it
-    is nearest to the known depths of shapes, and does not jump when the lips of a
-    fissure close.
+    Of the measures that were compared it is nearest to the known depths of shapes, and
+    does not jump when the lips of a fissure close.
     """
     signed, *_ = igl.signed_distance(
         mesh.vertices,
-        around.vertices,
-        around.faces,
+        hull.vertices,
+        hull.faces,
         igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
     )
     return np.maximum(-signed, 0.0)
@@ -124,7 +123,7 @@ class Pieces:
     areas: Floats
 
 
-def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
+def pieces_without_cuts(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     """Return a surface around `mesh` in pieces of 2 mm, without what lies over the cuts
     that `mesh` is open at.
 

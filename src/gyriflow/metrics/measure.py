@@ -47,7 +47,7 @@ from .gyrification import (
     envelope,
     gyrification_index,
     local_gyrification_index,
-    pieces_over,
+    pieces_without_cuts,
     sulcal_depth,
 )
 from .spangy import SpangyModes, Spectrum, spectral_basis, spectrum, weyl_number
@@ -79,17 +79,24 @@ def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
     """Return the folds of a hemisphere's surface; see `curvature.curvature` for the
     radius."""
     fitted = curvature(mesh, radius_mm=curvature_radius_mm)
-    hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
+    hull = convex_hull(mesh)
+    envelope_pieces = pieces_without_cuts(envelope(mesh), mesh)
     maps: dict[str, NDArray] = {
         "shape_index": fitted.shape_index,
         "curvedness": fitted.curvedness,
         "mean_curvature": fitted.mean,
         "gaussian_curvature": fitted.gaussian,
         "sulcal_depth_mm": sulcal_depth(mesh, hull),
-        "local_gyrification_index": local_gyrification_index(mesh, around),
+        "local_gyrification_index": local_gyrification_index(mesh, envelope_pieces),
         "reliable": fitted.reliable.astype(np.int32),
     }
-    return Folds(mesh, fitted, pieces_over(hull, mesh), around, maps)
+    return Folds(
+        mesh,
+        curvature_maps=fitted,
+        hull=pieces_without_cuts(hull, mesh),
+        envelope=envelope_pieces,
+        maps=maps,
+    )
 
 
 def hemisphere_spectra(

@@ -19,6 +19,7 @@ from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.growth import GROWTH_MODELS
 from ..settings.terms import (
     ELEMENTS_NEEDED,
+    FUSED_AFTER_GW,
     LARGE_ELEMENT_ERROR,
     OBSERVED,
     SPREAD_UNKNOWN,
@@ -330,7 +331,7 @@ def methods_text(template: str, **used: Any) -> str:
     template.
 
     The template gets `growth_sentence(run, number)`, the sentence of the run's growth
-    model; `number` formats numbers.
+    model, and `fused_after_gw`; `number` formats numbers.
     """
 
     def growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
@@ -338,7 +339,7 @@ def methods_text(template: str, **used: Any) -> str:
 
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(
-        growth_sentence=growth_sentence, **used
+        growth_sentence=growth_sentence, fused_after_gw=FUSED_AFTER_GW, **used
     )
 
 

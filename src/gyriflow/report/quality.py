@@ -476,7 +476,7 @@ def quality_table(
     order: Sequence[str],
 ) -> pd.DataFrame:
     """Return the rows of all brains, outputs of `quality_row`, in an order of their
-    ids.
+    ids, others last.
 
     `refused` are labels and cause of refused brains.
     """
@@ -493,4 +493,5 @@ def quality_table(
     ]
     table = pd.DataFrame(every).set_index("subject", drop=False)
     ids = [name for name in order if name in table.index]
+    ids += [name for name in table.index if name not in ids]
     return table.loc[ids, [*table.columns.drop("page"), "page"]].reset_index(drop=True)

@@ -39,8 +39,8 @@ SIDE_NAMES = {
 
 @styled
 def validation_figure(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw by week how much better a run's curvature correlates with the observed
-    brain's than the scaled start's.
+    """Draw by week how much better a run's shape index and mean curvature correlate
+    with the observed brain's than the scaled start's.
 
     Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open
     ones predicted.

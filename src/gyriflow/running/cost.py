@@ -185,13 +185,8 @@ def _brain_seconds(
         (stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None
     )
     if volume_stage and brain.labels is not None:
-        opening = (
-            1.0
-            if study.config.surface.open_sulci
-            else FUSED_SHARE.get(volume_stage, 1.0)
-        )
         return (
-            opening
+            _fused_share(study, volume_stage)
             * SECONDS_PER_ML[volume_stage]
             * share
             * expected_volume_ml(brain.week)
@@ -206,11 +201,12 @@ def _brain_seconds(
         )
         vertices = share * _surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
         has_slits = (
-            brain.labels is not None
+            study.config.surface.open_sulci
+            and brain.labels is not None
             and brain.thickness is not None
-            and study.config.surface.open_sulci
+            and not is_simulated
         )
-        if has_slits and not is_simulated:
+        if has_slits:
             vertices *= 1 + OPENED_PER_GW * max(brain.week - OPENED_FROM_GW, 0.0)
         modes = study.config.metrics.spangy_modes
         n_modes = modes if isinstance(modes, int) else BAND_MODES[modes]
@@ -250,9 +246,7 @@ def _prediction_seconds(
     )
     elements = linear_elements(start, study.config.mesh)
     following_s = PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
-    if not study.config.surface.open_sulci:
-        following_s *= FUSED_SHARE["prediction"]
-    return PREDICTION_SECONDS + following_s
+    return PREDICTION_SECONDS + following_s * _fused_share(study, "prediction")
 
 
 def _series_seconds(
@@ -267,11 +261,15 @@ def _series_seconds(
     elements = linear_elements(first, mesh)
     per_week_s = SERIES_SECONDS_PER_ELEMENT_AND_WEEK * elements
     duration_gw = last - first
-    if not study.config.surface.open_sulci:
-        return FUSED_SHARE["series"] * per_week_s * duration_gw
-    deep_gw = max(last - max(first, DEEP_FOLDS_GW), 0.0)
-    more_gw = (DEEP_FOLDS_FACTOR - 1) * deep_gw
-    return per_week_s * (duration_gw + more_gw)
+    if study.config.surface.open_sulci:
+        deep_gw = max(last - max(first, DEEP_FOLDS_GW), 0.0)
+        duration_gw += (DEEP_FOLDS_FACTOR - 1) * deep_gw
+    return _fused_share(study, "series") * per_week_s * duration_gw
+
+
+def _fused_share(study: Study, stage: str) -> float:
+    """Return what a stage takes over what it takes with opened sulci."""
+    return 1.0 if study.config.surface.open_sulci else FUSED_SHARE.get(stage, 1.0)
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:

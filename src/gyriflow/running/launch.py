@@ -289,24 +289,6 @@ def output_to(log: Path) -> Iterator[None]:
             setattr(sys, name, stream)
 
 
-def refused_brains() -> dict[str, str]:
-    """Return the causes of the brains that an earlier pass of this call refused, by
-    id."""
-    path = os.environ.get(REFUSED_FILE_VAR)
-    return read_json(path) if path else {}
-
-
-def _failed_brains(failures: Sequence[Message]) -> dict[str, str]:
-    """Return the causes of the brains with a failed step, by id, from the errors of
-    steps."""
-    causes: dict[str, str] = {}
-    for failure in failures:
-        # a failed run refuses no brain
-        if failure.brain and not failure.run:
-            causes.setdefault(failure.brain, failure.first_line)
-    return causes
-
-
 def stop_jobs() -> None:
     """Stop all processes below this one, MPI ranks included. Simulations keep their
     last checkpoint."""
@@ -327,6 +309,17 @@ def _is_running(process: psutil.Process) -> bool:
     with suppress(psutil.Error):
         return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
     return False
+
+
+def _brains_to_refuse(failures: Sequence[Message]) -> dict[str, str]:
+    """Return the causes of the brains that the study is finished without, by id: those
+    with a failed step, from the errors of steps."""
+    causes: dict[str, str] = {}
+    for failure in failures:
+        # a failed run refuses no brain
+        if failure.brain and not failure.run:
+            causes.setdefault(failure.brain, failure.first_line)
+    return causes
 
 
 def _finish_without(
@@ -363,6 +356,13 @@ def _finish_without(
     finally:
         path.unlink(missing_ok=True)
     return 0
+
+
+def refused_brains() -> dict[str, str]:
+    """Return the causes of the brains that an earlier pass of this call refused, by
+    id, for the rules (`common.smk`)."""
+    path = os.environ.get(REFUSED_FILE_VAR)
+    return read_json(path) if path else {}
 
 
 def exit_code(
@@ -736,7 +736,7 @@ def main(
     messages = study_messages(directory, began_s)
     failures = [message for message in messages if message.level == "error"]
     if options.keep_going and not is_second_pass:
-        brains = _failed_brains(failures)
+        brains = _brains_to_refuse(failures)
         if brains and (interrupted := _finish_without(brains, arguments, directory)):
             return interrupted
     return exit_code(code, failures, directory)

@@ -21,7 +21,7 @@ from .launch import hold_lock
 
 STATE = Path(".snakemake", "gyriflow-run.json")
 """State of the live or last run, in the working directory."""
-REPORT = Path("results", "report", "report.html")
+REPORT_PAGE = Path("results", "report", "report.html")
 BRAIN_RESULTS = {
     "surface": "surface/pial.surf.gii",
     "mesh": "mesh/brain.xdmf",
@@ -82,8 +82,8 @@ def status(directory: Path) -> Iterator[str]:
                 tablefmt="plain",
                 disable_numparse=True,
             )
-    if (directory / REPORT).is_file():
-        yield f"\nreport: {(directory / REPORT).absolute()}"
+    if (directory / REPORT_PAGE).is_file():
+        yield f"\nreport: {(directory / REPORT_PAGE).absolute()}"
 
 
 def format_duration(seconds: float) -> str:
@@ -107,11 +107,11 @@ def format_progress(step: Mapping[str, Any]) -> str:
 def find_report(directory: Path) -> Path:
     """Return the report of the study in a working directory or an export; InputError if
     there is none."""
-    for report in (directory / REPORT, directory / "report" / REPORT.name):
+    for report in (directory / REPORT_PAGE, directory / "report" / REPORT_PAGE.name):
         if report.is_file():
             return report.absolute()
     raise InputError(
-        "has no report yet", path=directory.resolve(), expected=str(REPORT)
+        "has no report yet", path=directory.resolve(), expected=str(REPORT_PAGE)
     )
 
 

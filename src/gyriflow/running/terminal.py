@@ -29,7 +29,7 @@ from ..messages import (
     write_message,
 )
 from .launch import full_disk, received_signals
-from .status import REPORT, STATE, format_duration, format_progress
+from .status import REPORT_PAGE, STATE, format_duration, format_progress
 
 WEIGHTS = {
     "simulate": 40.0,
@@ -281,7 +281,9 @@ class RunDisplay:
         elif self.failure_messages:
             self.console.print("\n".join(self.failure_messages))
         elif self.total and not self.has_errors:
-            report = f"; report: {REPORT.absolute()}" if REPORT.is_file() else ""
+            report = (
+                f"; report: {REPORT_PAGE.absolute()}" if REPORT_PAGE.is_file() else ""
+            )
             # with `--until`, some steps are left
             steps = "" if self.done == self.total else f", {done}"
             self.console.print(f"gyriflow: done in {took}{steps}{report}")

@@ -157,9 +157,9 @@ def mapped_parameters(settings: FoldingSettings) -> dict[str, Varying]:
     return mapped
 
 
-def parameters(settings: FoldingSettings) -> dict[str, Any]:
-    """Return the settings of a run for its `params.yaml` (see `run_parameters`). A map
-    has the name of its parameter.
+def plain_settings(settings: FoldingSettings) -> dict[str, Any]:
+    """Return the settings of a run as plain values for `params_content`. A map has the
+    name of its parameter.
 
     The number of ranks is left out, since results do not depend on it.
     """
@@ -295,7 +295,7 @@ def value_problems(
         )
 
 
-def run_parameters(
+def params_content(
     settings: Mapping[str, Any],
     growth: Mapping[str, Any],
     weeks: Sequence[float],
@@ -306,8 +306,8 @@ def run_parameters(
     """Return the content of the `params.yaml` of a run, `FoldingParameters` as plain
     values.
 
-    `settings` are its `parameters`, `growth` is their section with sizes as numbers by
-    week, `weeks` its output weeks, `surface` is the report of the start brain's
+    `settings` are its `plain_settings`, `growth` is their section with sizes as numbers
+    by week, `weeks` its output weeks, `surface` is the report of the start brain's
     surface. `target_weeks` are those of the shapes that it grows towards, `stops` the
     ones of them without an observed brain; both are empty for other growth.
     """

@@ -34,6 +34,9 @@ REGION_FIELDS: tuple[RegionField, ...] = get_args(RegionField)
 
 Mesher = Literal["pytetwild", "tetgen"]
 """The programs that fill a surface with tetrahedra."""
+FUSED_AFTER_GW = 26.0
+"""Up to this week labels of 0.8 mm close no sulci: CRL has the same area with fused and
+opened ones."""
 Coordinates = Literal["auto", "ras", "lps"]
 """Axes of the coordinates in surface files; `auto`: determined from the shape."""
 AffineSource = Literal["auto", "sform", "qform"]

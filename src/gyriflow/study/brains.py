@@ -64,7 +64,7 @@ def _brain(
     files: dict[str, Any] = measured_files(
         settings.sides,
         paths.SURFACE.format(**names),
-        paths.METRICS.format(**names),
+        paths.METRICS_FOLDER.format(**names),
         None,
     )
     thickness = paths.THICKNESS["measured"].format(**names) if has_thickness else None

@@ -322,7 +322,13 @@ def _growth(config: Config) -> Problems:
 
 
 def norm_settings(config: Config) -> dict[str, Any]:
-    """Return the version and the settings that the norms of metrics depend on."""
+    """Return the version and the settings that the norms of metrics depend on.
+
+    They are compared key by key with those that norms were made with. Norms of a study
+    (`_norms_problems`) have to have all keys here; the record of the shipped atlases
+    (`metrics.atlas_curves`) only those that it has, since it is valid for any version
+    and any schemes.
+    """
     return {
         "version": RELEASE,
         # raised with the definition of a metric or of the norms

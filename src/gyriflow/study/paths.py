@@ -10,7 +10,7 @@ from ..units import week_tag
 
 BRAIN = "results/brains/{brain}"
 SURFACE = f"{BRAIN}/surface"
-METRICS = f"{BRAIN}/metrics"
+METRICS_FOLDER = f"{BRAIN}/metrics"
 RUN = "results/runs/{run}/{brain}"
 STUDY = "results/study"
 PLAN = "results/plan"
@@ -23,8 +23,9 @@ PLACE = "results/{where}"
 PUBLISHED = str(SHIPPED / "workflow" / "published" / "fetalfoldsim.yaml")
 """Values reported by the paper."""
 PREDICTION_TESTS = str(SHIPPED / "norms" / "predictions.yaml")
-NORMAL_VOLUMES = str(SHIPPED / "norms" / "volumes.yaml")
 """Accuracy of predictions of brains with a later scan."""
+NORMAL_VOLUMES = str(SHIPPED / "norms" / "volumes.yaml")
+"""Volumes of normal atlases by week, by which the ages of an atlas' brains are set."""
 
 
 def file_of(pattern: str, **names: str | float) -> str:
@@ -91,8 +92,8 @@ def white_of(*sides: Side) -> dict[str, str]:
     for side in sides:
         files[f"{side}_surface"] = f"{SURFACE}/{side}.white.surf.gii"
     for side in sides:
-        files[f"{side}_maps"] = f"{METRICS}/{side}.white.shape.gii"
-    return files | {"metrics": f"{METRICS}/white.csv"}
+        files[f"{side}_maps"] = f"{METRICS_FOLDER}/{side}.white.shape.gii"
+    return files | {"metrics": f"{METRICS_FOLDER}/white.csv"}
 
 
 def region_files(folder: str) -> dict[str, str]:
@@ -136,10 +137,12 @@ CURVES = {
 PARAMETERS = f"{RUN}/params.yaml"
 MAPS = f"{RUN}/folding/maps.h5"
 GROWTH_MAPS = f"{RUN}/surfaces/growth.shape.gii"
-REGIONS = {
+MESH_REGIONS = {
     "mesh": f"{RUN}/folding/regions.xdmf",
     "data": f"{RUN}/folding/regions.h5",
 }
+"""Zones, layers and hemispheres of a run's start mesh; `region_files` are the regions
+of the cortex."""
 FOLDING = {
     "steps": f"{RUN}/folding/steps.csv",
     "frames": f"{RUN}/folding/frames.h5",

@@ -19,11 +19,11 @@ from gyriflow.anatomy.labels import (
     REPORTED_LOSS,
     Layout,
     border_share,
-    cerebrum_mask,
     layout_of,
     outside_ventricles,
     read_cerebrum,
     require_cortex_outside,
+    require_labels,
     require_sides,
     scheme_contradictions,
     unlabelled_ventricles,
@@ -71,13 +71,15 @@ def test_schemes_name_only_labels_that_they_have(scheme):
 )
 def test_unknown_labels_and_missing_tissues_are_named(labels, facts):
     with pytest.raises(InputError, check=Facts(*facts)):
-        cerebrum_mask(np.array([[[*labels]]]), ATLAS)
+        require_labels(np.array([[[*labels]]]), ATLAS)
 
 
 def test_transient_zones_stand_for_white_matter():
     # CRL's volumes have white matter at late weeks only
-    labels = np.array([[[112, 113, 114, 115, 92, 93]]])
-    assert cerebrum_mask(labels, SCHEMES["crl"]).all()
+    labels = [112, 113, 114, 115, 92, 93]
+    scheme = SCHEMES["crl"]
+    require_labels(np.array([[labels]]), scheme)
+    assert set(labels) <= set(scheme.cerebrum)
 
 
 def test_a_scheme_whose_cortex_lies_inside_is_another_volumes():

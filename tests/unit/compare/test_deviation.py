@@ -177,7 +177,7 @@ def test_the_script_takes_each_surface_with_its_own_thickness(tmp_path):
         write_vertex_maps(tmp_path / f"{name}.shape.gii", {"thickness_mm": values})
         inputs[name] = f"{name}.gii"
     inputs["sides"] = ["expected.gii"]
-    params = {"sides": ["left"], "labels": {"run": "r", "subject": "b", "week": 24.0}}
+    params = {"sides": ["left"], "columns": {"run": "r", "subject": "b", "week": 24.0}}
     run_script(
         "deviation.py",
         tmp_path,

@@ -65,9 +65,8 @@ def made(tmp_path_factory):
     }
     tables = {table: f"{table}.csv" for table in ("metrics", "spectra", "coefficients")}
     frames = {"frames": "frames.h5", "regions": "regions.xdmf"}
-    labels = {"subject": "a", "run": "r", "week": 22.0}
     params = {
-        "labels": labels,
+        "columns": {"subject": "a", "run": "r", "week": 22.0},
         "settings": {"curvature_radius_mm": 8.0, "spangy_modes": 30},
     }
     run_script("measure.py", folder, frames, parts | tables, params)

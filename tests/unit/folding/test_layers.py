@@ -57,7 +57,7 @@ def test_the_layers_of_a_week_have_its_thickness_stiffness_and_growth():
         rate = (1 + 2 * part) * 1e-7
         np.testing.assert_allclose(
             fields["tangential_growth_per_step"],
-            rate * p.step_s * weight * zones.growth,
+            rate * p.step_s * weight * zones.growing,
             atol=1e-15,
         )
 

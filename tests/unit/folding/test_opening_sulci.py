@@ -86,7 +86,7 @@ def test_a_body_opens_a_slit_that_registration_does_not_know():
         pairs,
         surfaces[1:],
         ElasticFit(mesh),
-        open_sulci=True,
+        has_slits=True,
     )
     faces, used = boundary_surface(mesh)[0].faces, boundary_surface(mesh)[1]
     start = area_at_slit(surfaces[0])

@@ -125,7 +125,7 @@ def test_numbers_of_layers_and_zones(recorded):
     zones = zones_of_run(mesh, planes, 2.0)
     names = ["distance", "cortex_weight", "shear_modulus", "growth", "zone"]
     maps = {"thickness_mm": thickness}
-    growths = growth.increments_at(parameters, weight, zones.growth, {}, 21.5, 1e5)
+    growths = growth.increments(parameters, weight, zones.growing, {}, 21.5, 1e5)
     inputs = growth.GrowthInputs(mesh, zones, {})
     before = inputs.size(mesh.vertices)
     after = inputs.size(mesh.vertices * 1.01)

@@ -101,7 +101,7 @@ def test_growth_of_the_surface_is_a_mean_over_area_where_a_part_does_not_grow():
     p = parameters_from(RUN | {"thickness_mm": 2.0})
     inputs = GrowthInputs(mesh, zones_of_run(mesh, p, GAP_MM), {})
     faces = inputs.zones.measured_facets
-    growing = inputs.zones.growth[faces].mean(axis=1)
+    growing = inputs.zones.growing[faces].mean(axis=1)
     areas = face_areas(TriangleMesh(mesh.vertices, faces))
     share = float(np.average(growing, weights=areas))
     assert 0.1 < share < 0.95

@@ -78,7 +78,7 @@ def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
     assert inside[clamped].all()
     # nothing inside grows, at the surface or below it
     assert inside.sum() > 2 * len(clamped)
-    assert (zones.growth[inside] == 0).all()
+    assert (zones.growing[inside] == 0).all()
 
 
 @pytest.mark.usefixtures("tiny_ellipsoid")
@@ -87,8 +87,8 @@ def test_tissue_that_bridges_the_planes_does_not_grow():
     mesh = brain_mesh(6)
     zones = find_zones(mesh)
     top = np.argmax(mesh.vertices[:, 2])
-    assert zones.growth[top] == 0
-    assert zones.growth[np.argmax(mesh.vertices[:, 0])] == 1
+    assert zones.growing[top] == 0
+    assert zones.growing[np.argmax(mesh.vertices[:, 0])] == 1
 
 
 @pytest.mark.usefixtures("tiny_ellipsoid")
@@ -110,7 +110,7 @@ def test_the_planes_follow_the_fissure(gap):
     from_middle = np.abs(pair.vertices[zones.facets, 0] - MIDDLE_MM).max(axis=1)
     walls = np.abs(from_middle - gap / 2) < 1e-9
     assert set(zones.facet_zone[walls]) == {LEFT_CONTACT, RIGHT_CONTACT}
-    assert (zones.growth == 1).all()
+    assert (zones.growing == 1).all()
 
 
 def test_tissue_between_the_planes_does_not_grow_with_planes(brain):
@@ -119,7 +119,7 @@ def test_tissue_between_the_planes_does_not_grow_with_planes(brain):
     zones = find_zones(brain)
     left, right = zones.planes_mm
     x = brain.vertices[:, 0]
-    assert (zones.growth[(left < x) & (x < right)] == 0).all()
+    assert (zones.growing[(left < x) & (x < right)] == 0).all()
 
 
 def test_the_report_adds_up(brain):
@@ -183,7 +183,7 @@ def test_the_sides_of_a_box_slide_in_their_planes():
     np.testing.assert_array_equal(zones.fixed[:, 1], (np.abs(y) == 3.0) | low)
     np.testing.assert_array_equal(zones.fixed[:, 2], low)
     assert (box.vertices[zones.cortex_facets][:, :, 2] == 2.0).all()
-    assert (zones.growth == 1).all()
+    assert (zones.growing == 1).all()
 
 
 @pytest.mark.usefixtures("tiny_ellipsoid")
@@ -268,9 +268,9 @@ def test_elements_are_left_right_or_between_the_planes():
         find_zones(mesh, GAP_MM),
         (mesh.vertices[:, 1] > CENTRE_MM[1]).astype(float),
     )
-    growth = find_zones(mesh, GAP_MM).growth[mesh.tets]
-    assert set(tags["growing"][(growth > 0).any(axis=1)]) == {1}
-    assert set(tags["growing"][(growth == 0).all(axis=1)]) == {0}
+    growing = find_zones(mesh, GAP_MM).growing[mesh.tets]
+    assert set(tags["growing"][(growing > 0).any(axis=1)]) == {1}
+    assert set(tags["growing"][(growing == 0).all(axis=1)]) == {0}
     y = mesh.vertices[mesh.tets, 1] - CENTRE_MM[1]
     assert set(tags["layer"][y.min(axis=1) > 0]) == {CORTEX}
     assert set(tags["layer"][y.max(axis=1) <= 0]) == {CORE}

@@ -466,10 +466,11 @@ def prediction():
     turn = rigid(0, 0, -12)
     turn[:3, :3] /= 1.05
     pair = Deformation(turn, np.zeros((13, 13, 13, 3)), scaling(10.0, -60.0))
+    inside = place_in_atlas(start, pair, path.mesh(22.0), ElasticFit)
 
     def predict(end_week, start_week=22.3, **options):
         return start, predict_shapes(
-            start, start_week, end_week, path, pair, 22.0, ElasticFit, **options
+            start, start_week, end_week, path, inside, 22.0, ElasticFit, **options
         )
 
     return predict

@@ -21,7 +21,7 @@ from gyriflow.growth.curves import (
 from gyriflow.growth.rates import growth_rates, rates_of_series
 from gyriflow.io.files import read_table, write_json, write_table
 from gyriflow.io.surfaces import write_surface
-from gyriflow.settings.folding import run_parameters
+from gyriflow.settings.folding import params_content
 
 WEEKS = np.arange(21.0, 31.0)
 # growth that slows down: 0.16 per week at 21, 0.07 at 30
@@ -276,7 +276,7 @@ def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_to
         "end_week": 22.0,
     }
     growth = MEASURED | followed_sizes(MEASURED, curves(), "volume", weeks, False)
-    found = run_parameters(settings, growth, weeks, surface, [], [])
+    found = params_content(settings, growth, weeks, surface, [], [])
     assert {
         name: found[name]
         for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")
@@ -294,7 +294,7 @@ def test_a_run_s_parameters_have_the_sizes_it_follows_and_the_shapes_it_grows_to
         "volume_ml": {21.0: 40.0, 23.0: 60.0},
     }
     growth = followed_sizes(shapes, None, None, weeks, True)
-    found = run_parameters({}, growth, weeks, surface, [23.0], [])
+    found = params_content({}, growth, weeks, surface, [23.0], [])
     assert found["targets"] == {23.0: "target_23.00"}
     assert found["growth"]["volume_ml"][22.0] == pytest.approx(
         np.sqrt(40 * 60), rel=1e-9

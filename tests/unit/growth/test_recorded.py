@@ -30,7 +30,7 @@ from gyriflow.growth import (
     registration,
     series_shapes,
 )
-from gyriflow.settings.folding import run_parameters
+from gyriflow.settings.folding import params_content
 
 WEEKS = np.array([21.0, 21.0, 22.5, 23.0, 25.0, 25.0, 26.5, 28.0])
 
@@ -96,7 +96,7 @@ def test_numbers_of_curves(recorded):
             "intervals": [curves.interval(curve, at) for curve in (kept.curve, plain)],
             "followed": curves.followed_sizes(growth, table, "surface", weeks, False),
             "sizes": curves.sizes_on_curves({"model": "rates"}, table, "volume", weeks),
-            "parameters": run_parameters(
+            "parameters": params_content(
                 {"growth": {"model": "shapes"}, "thickness_mm": 2.0},
                 {"model": "shapes"}
                 | curves.followed_sizes(sizes, table, "volume", weeks, True),

@@ -121,14 +121,13 @@ def test_a_body_is_drawn_until_it_is_close_or_hardly_comes_closer(
         BALL.vertices,
         (larger(1.0), below if opens else None),
         EVERY,
-        open_sulci=opens,
     )
     assert body.n_draws == n_draws
 
 
 def test_a_body_without_an_observed_surface_is_drawn_to_its_shape_once():
     body = StubbornBody(1.0)
-    fit_body(body, 1.02 * BALL.vertices, None, EVERY, open_sulci=True)
+    fit_body(body, 1.02 * BALL.vertices, None, EVERY)
     assert body.n_draws == 1
     assert body.positions_mm == pytest.approx(1.02 * BALL.vertices)
 
@@ -137,9 +136,7 @@ def test_a_body_without_an_observed_surface_is_drawn_to_its_shape_once():
 def test_a_body_that_stays_from_its_shape_or_surface_is_warned_of(
     caplog, mm, is_warned
 ):
-    fit_body(
-        StubbornBody(0.0), (1 + mm / 20) * BALL.vertices, None, EVERY, open_sulci=False
-    )
+    fit_body(StubbornBody(0.0), (1 + mm / 20) * BALL.vertices, None, EVERY)
     warn_of_misfit(BALL, larger(mm), 23.0)
     warnings = [
         record.getMessage()

@@ -20,13 +20,13 @@ from gyriflow.metrics.gyrification import (
     envelope,
     gyrification_index,
     local_gyrification_index,
-    pieces_over,
+    pieces_without_cuts,
     sulcal_depth,
 )
 
 
 def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
-    return gyrification_index([mesh], [pieces_over(around, mesh)])
+    return gyrification_index([mesh], [pieces_without_cuts(around, mesh)])
 
 
 def half_sphere() -> TriangleMesh:
@@ -107,7 +107,9 @@ def test_what_spans_a_cut_in_a_pit_or_on_a_neck_is_left_out(pit: float) -> None:
 
 @pytest.mark.parametrize("pit", [3.0, -3.0])
 def test_the_envelope_over_a_cut_is_left_out_and_nothing_else(pit: float) -> None:
-    around = pieces_over(envelope(mesh := hemisphere_with_cut(pit, 25.0, 8.0)), mesh)
+    around = pieces_without_cuts(
+        envelope(mesh := hemisphere_with_cut(pit, 25.0, 8.0)), mesh
+    )
     across = np.linalg.norm(around.centres[:, 1:], axis=1)
     is_medial = np.abs(around.centres[:, 0]) < 4.0
     assert around.areas[is_medial & (across < 7.0)].sum() < 0.1 * np.pi * 8.0**2
@@ -128,7 +130,7 @@ def test_depth_beside_a_cut_is_that_below_the_hull() -> None:
 
 def test_local_index_is_high_at_a_sulcus_and_one_far_from_it() -> None:
     mesh = dented(8.0, 5.0)
-    around = pieces_over(envelope(mesh), mesh)
+    around = pieces_without_cuts(envelope(mesh), mesh)
     local = local_gyrification_index(mesh, around)
     bottom = np.linalg.norm(mesh.vertices, axis=1).argmin()
     away = np.linalg.norm(mesh.vertices - [0, 0, 25.0], axis=1)

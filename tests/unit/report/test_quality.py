@@ -102,16 +102,19 @@ def test_verdicts_and_refused_brains_stand_in_one_table():
     look = quality_row(
         LABELS | {"subject": "b", "sides": "left"}, REPORT, {}, ["one", "two"], 80.0
     )
-    refused = [{"subject": "c", "week": None, "cause": "no such file"}]
+    refused = [
+        {"subject": "c", "week": None, "cause": "no such file"},
+        {"subject": "e", "week": 22.0, "cause": "no labels"},
+    ]
     table = quality_table([fine, look], refused, ["c", "b", "a", "d"])
-    assert table["subject"].tolist() == ["c", "b", "a"]
-    assert table["verdict"].tolist() == ["refused", "needs review", "fine"]
-    assert table["cause"].tolist() == ["no such file", "", ""]
+    assert table["subject"].tolist() == ["c", "b", "a", "e"]
+    assert table["verdict"].tolist() == ["refused", "needs review", "fine", "refused"]
+    assert table["cause"].tolist() == ["no such file", "", "", "no labels"]
     assert table["warnings"].tolist()[1] == "one | two"
     assert table["area_ratio"].tolist()[2] == 0.93
-    assert table["cut_share"].tolist()[1:] == [0.31, 0.31]
+    assert table["cut_share"].tolist()[1:3] == [0.31, 0.31]
     # of one hemisphere half a brain is expected
-    assert table["share_of_expected_volume"].tolist()[1:] == [1.0, 0.5]
+    assert table["share_of_expected_volume"].tolist()[1:3] == [1.0, 0.5]
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from facts import Facts
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings.atlas import Atlas
-from gyriflow.settings.folding import output_weeks, parameters, parameters_from
+from gyriflow.settings.folding import output_weeks, parameters_from, plain_settings
 from gyriflow.settings.root import Config
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.study import resolve
@@ -228,7 +228,7 @@ def test_parameters_of_a_run_are_what_the_folding_program_reads():
         folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}
     ).run_simulations
     known = {"start_week": one.weeks[0], "output_weeks": one.weeks, "fissure_x_mm": 0.0}
-    plain = parameters(one.settings)
+    plain = plain_settings(one.settings)
     read = parameters_from(known | plain)
     assert read.stress_memory_gw == math.inf
     assert plain["stress_memory_gw"] == "infinite"

@@ -4,7 +4,7 @@ import pytest
 from configurations import both_kinds, labelled, problems
 from facts import Facts
 
-from gyriflow.settings.folding import mapped_parameters, parameters
+from gyriflow.settings.folding import mapped_parameters, plain_settings
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
@@ -46,7 +46,7 @@ def test_a_map_has_its_parameter_s_name_and_its_files_are_listed(tmp_path):
             tmp_path,
         )
     ).run_simulations
-    settings = parameters(with_maps.settings)
+    settings = plain_settings(with_maps.settings)
     assert {name: settings[name] for name in mapped} == {
         "thickness_mm": {"map": "thickness_mm"},
         "growth_rate_per_s": {
@@ -69,7 +69,7 @@ def test_a_map_has_its_parameter_s_name_and_its_files_are_listed(tmp_path):
         "shear_modulus_core_pa": (str(tmp_path / "soft.nii.gz"), None),
     }
     assert mapped_parameters(plain.settings) == {}
-    assert parameters(plain.settings)["thickness_mm"] == 1e-8
+    assert plain_settings(plain.settings)["thickness_mm"] == 1e-8
 
 
 @pytest.mark.parametrize(
