@@ -31,10 +31,7 @@ rule metrics_tables:
     params:
         labelled=[(brain.id, brain.week, brain.sides, label_source(CONFIG, brain).scheme) for brain in LABELLED],
         scans=study.scans,
-        covariates={
-            brain.id: {"person": brain.subject_name, **brain.covariates}
-            for brain in BRAINS.values()
-        },
+        covariates={brain.id: {"person": brain.subject_name, **brain.covariates} for brain in BRAINS.values()},
         reference=study.norm_reference,
         individuals=study.are_individuals(study.norm_reference),
         subjects={brain.id: brain.subject_name for brain in BRAINS.values()},
