@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from known_fits import fit_found_once, rough_templates
 from recording import DIGITS, contents, numbers_in, renewed, table_of
 from scripts import OUTPUTS
 from xdist.scheduler import LoadScopeScheduling
 
 # dolfinx, PETSc and MPI in the order that their wheels need
 import gyriflow.folding  # noqa: F401
+from gyriflow.anatomy import template
 
 LONGEST_FIRST = ("tests/mpi/", "tests/mpi/test_ranks.py", "tests/workflow/", "tests/")
 """Cases on several ranks come after the same on one, which compile their forms while no
@@ -35,6 +37,20 @@ class Sets(LoadScopeScheduling):
 def default_logging_level():
     """Start each test at the default level, which scripts run in this process lower."""
     logging.getLogger().setLevel(logging.WARNING)
+
+
+@pytest.fixture
+def shapes_once(monkeypatch):
+    """Search the pose of a shape once, however its copies are turned, shifted and
+    scaled."""
+    monkeypatch.setattr(template, "register_from_all_sides", fit_found_once)
+
+
+@pytest.fixture
+def quick_poses(monkeypatch, shapes_once):
+    """Search poses with a third of the points, for tests of what follows from a pose."""
+    monkeypatch.setattr(template, "POINTS", template.POINTS // 3)
+    monkeypatch.setattr(template, "template_shapes", rough_templates)
 
 
 @pytest.fixture

@@ -206,11 +206,14 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
 
 
 def test_a_result_of_an_unknown_brain_is_refused_with_the_name_of_a_similar_one(
-    workflow,
+    workflow, capfd
 ):
     name = workflow.write("study.yaml", SMALL_STUDY)
     metrics = "results/brains/{}/metrics/metrics.csv".format
     assert workflow.jobs(metrics("a"), "--configfile", name)
-    outcome = workflow.run("-n", metrics("aa"), "--configfile", name)
-    assert outcome.returncode == InputError.exit_code
-    assert outcome.stderr == Facts(metrics("aa"), "no brain aa", "did you mean a?")
+    capfd.readouterr()
+    with launching(workflow.directory):
+        code = main(["-n", metrics("aa"), "--configfile", name])
+    assert code == InputError.exit_code
+    said = capfd.readouterr().err
+    assert said == Facts(metrics("aa"), "no brain aa", "did you mean a?")

@@ -19,7 +19,7 @@ from gyriflow.settings.terms import SIDES
 
 QUICK = {"week": 24.0, "edge_length_mm": 3.0}
 DHCP = SCHEMES["dhcp-19"]
-pytestmark = pytest.mark.usefixtures("few_starts", "shapes_once")
+pytestmark = pytest.mark.usefixtures("few_starts", "quick_poses")
 
 
 @pytest.fixture(scope="module")

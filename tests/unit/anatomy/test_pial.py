@@ -53,7 +53,7 @@ ATLAS = SCHEMES["spina-bifida-atlas"]
 VOXEL_MM = 1.6
 QUICK = {"edge_length_mm": 2.0}
 COARSE = {"week": 24.0, "edge_length_mm": 3.0}
-pytestmark = pytest.mark.usefixtures("few_starts", "shapes_once")
+pytestmark = pytest.mark.usefixtures("few_starts", "quick_poses")
 
 
 @pytest.fixture(scope="module")

@@ -252,6 +252,7 @@ def test_files_that_name_one_system_stay_together_however_they_lie(halves):
     np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))
 
 
+@pytest.mark.usefixtures("shapes_once")
 @pytest.mark.parametrize(
     "change",
     [3.0 * np.diag([1.05, 0.95, 1.03]), [[1, 0.03, 0], [0.05, 1, 0], [0, 0.03, 1]]],
@@ -388,6 +389,7 @@ def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
             assert is_told == (exchanged not in ("RAS", "LPS"))
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_shapes_without_a_pose_are_refused():
     shape = transformed(
         ellipsoid((9, 24, 16)),
@@ -411,6 +413,7 @@ def test_a_wall_that_was_cut_is_found_to_half_a_degree():
     assert offset * shape.size_mm == pytest.approx(shape.centre[0], abs=0.01)
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
     left, right = (
         flipped(transformed(half, drawn(seed)))
@@ -561,6 +564,7 @@ def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
     )
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_reported():
     # neither front nor back, up nor down, and its axes are no file's
     mesh = transformed(ellipsoid((24, 33, 22)), rigid(50, 40, 30))
@@ -597,6 +601,7 @@ def test_the_shape_of_a_surface_tells_its_pose(turn, most_deg, warnings):
     assert list(pose.warnings) == warnings
 
 
+@pytest.mark.usefixtures("shapes_once")
 def test_coordinates_that_are_named_are_kept_and_doubted():
     pose = pose_of_surface(transformed(atlas_brain(), rigid(180, 0, 0)), "ras")
     assert np.array_equal(pose.world[:3, :3], np.eye(3))

@@ -17,7 +17,7 @@ from gyriflow.geometry.triangles import area, corners, face_areas, merged, signe
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.schemes import LabelScheme
 
-pytestmark = pytest.mark.usefixtures("few_starts")
+pytestmark = pytest.mark.usefixtures("few_starts", "quick_poses")
 SIDED = LabelScheme(
     name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4)
 )

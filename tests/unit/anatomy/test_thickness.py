@@ -43,11 +43,13 @@ def depth_below(points, folds_mm):
             - folds_mm * np.cos(9 * x / r) * np.cos(9 * y / r) * np.cos(9 * z / r + 1)
         )
 
+    inside = level(*np.moveaxis(points, -1, 0)) < 0
+    if not folds_mm:
+        return 20.0 - np.linalg.norm(points, axis=-1), inside
     axis = np.arange(-26, 26, 0.4)
     vertices, faces, _, _ = marching_cubes(
         level(*np.meshgrid(axis, axis, axis, indexing="ij")), 0.0
     )
-    inside = level(*np.moveaxis(points, -1, 0)) < 0
     depth = np.zeros(inside.shape)
     vertices = vertices * 0.4 + axis[0]
     depth[inside] = np.sqrt(

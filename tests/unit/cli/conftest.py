@@ -1,4 +1,5 @@
-"""Each test of commands keeps what it has read in a folder of its own."""
+"""Each test of commands keeps what it has read in a folder of its own, and searches the
+pose of a shape once."""
 
 import pytest
 
@@ -9,3 +10,8 @@ def own_cache(tmp_path_factory, monkeypatch):
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     return folder / "gyriflow"
+
+
+@pytest.fixture(autouse=True)
+def poses_searched_once(quick_poses):
+    """The searches themselves have tests of their own."""

@@ -10,10 +10,10 @@ import nibabel as nib
 import numpy as np
 import pytest
 import yaml
-from atlas_brains import atlas_halves
+from atlas_brains import atlas_halves, atlas_labels
 from configurations import LABELLED, labelled, resolved
 from facts import Facts
-from shapes import hemisphere, inner, moved
+from shapes import hemisphere, inner, moved, save_labels
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.cli import check as checking
@@ -51,7 +51,6 @@ from gyriflow.running.cost import (
 from gyriflow.running.status import format_duration
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.settings.terms import ELEMENTS_NEEDED, element_error, is_too_coarse
-from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
@@ -331,21 +330,12 @@ def test_a_size_that_is_not_that_of_the_week_is_reported(tmp_path, mm, doubts):
     assert [(text, bad) for _, text, bad in input_problems(config)] == doubts
 
 
-def test_labels_that_lie_as_those_of_another_scheme_are_refused():
-    labels = "fetal_SB_atlas_GA28_operated/parcellation.nii.gz"
-    said = problems(
-        SHIPPED / "atlases" / "spina-bifida", week=28, labels=labels, scheme="dhcp-19"
-    )
-    assert said[0] == Facts(labels, "spina-bifida-atlas", "dhcp-19", "49%")
-    assert (
-        problems(
-            SHIPPED / "atlases" / "spina-bifida",
-            week=28,
-            labels=labels,
-            scheme="spina-bifida-atlas",
-        )
-        == []
-    )
+def test_labels_that_lie_as_those_of_another_scheme_are_refused(tmp_path):
+    save_labels(tmp_path / "l.nii.gz", *atlas_labels())
+    brain = {"week": 24, "labels": "l.nii.gz"}
+    said = problems(tmp_path, **brain, scheme="dhcp-19")
+    assert said[0] == Facts("l.nii.gz", "spina-bifida-atlas", "dhcp-19", "49%")
+    assert problems(tmp_path, **brain, scheme="spina-bifida-atlas") == []
 
 
 def test_a_header_without_a_unit_is_reported_once_and_is_no_warning(

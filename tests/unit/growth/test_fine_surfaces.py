@@ -62,7 +62,7 @@ def test_folds_finer_than_the_mesh_move_with_it():
 def test_a_surface_that_would_cross_itself_is_that_of_the_mesh(caplog):
     fine = folded()
     _, _, places = nearest_on(COARSE.vertices, fine)
-    shaken = places + np.random.default_rng(0).normal(scale=60.0, size=places.shape)
+    shaken = places + np.random.default_rng(0).normal(scale=20.0, size=places.shape)
     # of one size, since only the displacements matter
     boundary = TriangleMesh(shaken, COARSE.faces)
     assert moved_surface(ObservedSurface(fine, places), boundary) is boundary

@@ -219,11 +219,8 @@ def test_a_flipped_bit_of_a_compressed_volume_changes_no_label(tmp_path, name, f
     kind = {"a.nii.gz": nib.Nifti1Image, "a.mgz": nib.MGHImage}.get(
         name, nib.Nifti1Pair
     )
-    nib.save(
-        kind(np.asarray(volume.dataobj, np.int16), volume.affine.astype("f4")), path
-    )
-    if name == "a.nii.gz":
-        path.write_bytes(shipped.read_bytes())
+    labels = np.asarray(volume.dataobj, np.int16)[::3, ::3, ::3]
+    nib.save(kind(labels, volume.affine.astype("f4")), path)
     whole, true, refused = path.read_bytes(), read_label_volume(path), 0
     for place in random.integers(8 * len(whole), size=flips):
         damaged = bytearray(whole)

@@ -140,9 +140,11 @@ from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.folding.folded_surfaces import folded_surfaces
 from gyriflow.running import launch
-sphere = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
+sphere = trimesh.creation.icosphere(subdivisions=3, radius=20.0)
 whole = TriangleMesh(sphere.vertices, sphere.faces)
-found = measure_brain(whole, whole, None, curvature_radius_mm=4.0)
+found = measure_brain(
+    whole, whole, None, curvature_radius_mm=8.0, spangy_modes=20
+)
 print(len(found.spectra))
 """
 

@@ -1,13 +1,13 @@
 """What gyriflow uses of Snakemake's internals, tried with the Snakemake that is
 installed."""
 
-import sys
+from contextlib import chdir
 from hashlib import sha256
 
 import pytest
 from configurations import touched
 from facts import Facts
-from processes import ran
+from snakemake import cli
 
 from gyriflow.code_hash import code_hash
 from gyriflow.io.files import files_in, write_json
@@ -60,17 +60,23 @@ def study(tmp_path):
     return folder
 
 
-def said(folder, *arguments):
-    """Return what Snakemake prints when it reads the rules."""
-    command = (sys.executable, "-m", "snakemake", "--cores", "1", *arguments)
-    outcome = ran(*command, cwd=folder)
-    assert outcome.returncode == 0, outcome.stderr
-    return outcome.stdout
+@pytest.fixture
+def said(study, capfd):
+    """A function that returns what Snakemake prints when it reads the rules."""
+
+    def read(*arguments):
+        with chdir(study), pytest.raises(SystemExit) as ended:
+            cli.main(["--cores", "1", *arguments])
+        printed = capfd.readouterr()
+        assert ended.value.code == 0, printed.err
+        return printed.out
+
+    return read
 
 
-def test_rules_have_hashes_of_their_code(study):
+def test_rules_have_hashes_of_their_code(study, said):
     script = study / "scripts" / "copy.py"
-    first = said(study, "-n")
+    first = said("-n")
     assert first == Facts(str([None, code_hash(script), "own"]))
     # of a script its text, whatever its date, and of a shell command
     texts = (SCRIPT, "touch {output}")
@@ -79,7 +85,7 @@ def test_rules_have_hashes_of_their_code(study):
 
 
 def test_only_files_that_a_run_made_are_removed_where_no_rule_makes_them_any_more(
-    study, monkeypatch
+    study, said, monkeypatch
 ):
     monkeypatch.chdir(study)
     touched(study, "results/mine.csv", "results/tables/mine.png")
@@ -92,6 +98,6 @@ def test_only_files_that_a_run_made_are_removed_where_no_rule_makes_them_any_mor
         write_json(manifest_of(f"results/logs/{name}.log"), manifest)
     # of two that are not made any more, a user has changed one
     (study / "results" / "made-a.csv").write_text("mine")
-    said(study, "-n", "--config", "names=c")
+    said("-n", "--config", "names=c")
     left = {path.name for path in files_in(study) if path.suffix in (".csv", ".png")}
     assert left == {"mine.csv", "mine.png", "made-a.csv"}

@@ -42,7 +42,7 @@ class Run:
         self.display.show(record)
 
     def begin(self, rule, number=1, **wildcards):
-        log = self.folder / f"{rule}.log"
+        log = self.folder / f"{rule}{number}.log"
         self.tell(
             "job_info",
             jobid=number,
@@ -171,7 +171,7 @@ def test_what_has_ended_a_program_from_outside_is_reported(run, message, facts, 
 
 
 def test_messages_of_an_earlier_try_are_not_shown(run):
-    log = run.folder / "measure.log"
+    log = run.folder / "measure1.log"
     write_message(log, Message("warning", "thin cortex"))
     write_message(log, Message("error", "a.nii: is no image"))
     run.begin("measure", brain="a")
@@ -203,7 +203,7 @@ def test_a_failed_step_without_a_message_names_its_log_and_not_the_shell_command
     run.fail(
         "measure",
         "CalledProcessError in file x:\nCommand 'set -e; python x.py' returned 1",
-        [str(run.folder / "measure.log")],
+        [str(run.folder / "measure1.log")],
     )
     assert run.lines[0] == Facts("measure", run.display.details)
     assert "python" not in run.lines[0]
