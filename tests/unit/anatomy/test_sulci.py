@@ -314,7 +314,7 @@ def test_it_does_not_depend_on_where_the_brain_lies():
 
 @pytest.mark.parametrize(("n_arcs", "noise"), [(0, 0.2), (20, 0.1)])
 def test_branching_sulci_have_their_area_and_crowns_stay_whole(n_arcs, noise):
-    shape = {"radius_mm": 14.0, "depth_mm": 5.0, "thickness_mm": 1.8, "n_arcs": n_arcs}
+    shape = {"radius_mm": 11.0, "depth_mm": 4.0, "thickness_mm": 1.8, "n_arcs": n_arcs}
     found = try_branching(0.8, (20, 30, 10), noise, **shape)
     assert found["opened"] == pytest.approx(0.0, abs=0.05)
     # without opening, what the sulci hide is missing
