@@ -478,7 +478,7 @@ def test_named_coordinates_are_kept_by_a_body_with_many_mirror_planes(centred):
     )
 
 
-@pytest.mark.usefixtures("few_starts", "quick_poses")
+@pytest.mark.usefixtures("quick_poses")
 @pytest.mark.parametrize("deep", [False, True])
 def test_a_mask_whose_fissure_is_closed_is_reported(deep):
     x, y, z = np.indices((56, 66, 56)) - np.array([28, 33, 28])[:, None, None, None]
