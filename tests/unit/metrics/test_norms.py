@@ -217,8 +217,8 @@ def test_values_and_scores_are_inverse(
 
 def test_whole_weeks_of_many_subjects_have_their_own_scatter() -> None:
     random = np.random.default_rng(3)
-    weeks = random.integers(22, 29, 300).astype(float)
-    values = growing(weeks) + (weeks - 20) * random.standard_normal(300)
+    weeks = random.integers(22, 29, 500).astype(float)
+    values = growing(weeks) + (weeks - 20) * random.standard_normal(500)
     found = scores(*table(weeks, values))
     assert set(found["flag"]) == {"ok"}
     for week in (22.0, 28.0):
