@@ -7,7 +7,6 @@ import json
 import re
 import sys
 import tomllib
-from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -129,12 +128,6 @@ OPENING_FUNCTIONS = {
 }
 
 
-@cache
-def nodes_of(path: Path) -> list[ast.AST]:
-    """Return the nodes of a source's syntax tree."""
-    return list(ast.walk(ast.parse(path.read_text())))
-
-
 def rooms_imported(path: Path) -> set[str]:
     """Return the other rooms of gyriflow that a source file imports, at the top or
     inside functions."""
@@ -153,22 +146,22 @@ def makes_buffer(node: ast.AST) -> bool:
 
 def opened_files(path: Path) -> list[str]:
     """Return the calls of a source file that open files, as `line: name`."""
-    nodes = nodes_of(path)
+    tree = ast.parse(path.read_text())
     modules = {
         alias.asname or alias.name: alias.name
-        for node in nodes
+        for node in ast.walk(tree)
         if isinstance(node, ast.Import)
         for alias in node.names
     }
     in_memory = {
         target.id
-        for node in nodes
+        for node in ast.walk(tree)
         if isinstance(node, ast.Assign) and makes_buffer(node.value)
         for target in node.targets
         if isinstance(target, ast.Name)
     }
     found = []
-    for node in nodes:
+    for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
             continue
         if node.args and (
@@ -236,7 +229,7 @@ def test_scripts_read_call_and_write():
     computed = [
         f"{short(path)}:{node.lineno}: {ast.unparse(node)}"
         for path in SCRIPTS
-        for node in nodes_of(path)
+        for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.While)
         or (isinstance(node, ast.BinOp) and isinstance(node.op, arithmetic))
     ]
@@ -255,7 +248,7 @@ def test_what_scripts_and_benchmarks_import_is_there():
     imported = [
         (path.name, node.module, alias.name)
         for path in PROGRAMS
-        for node in nodes_of(path)
+        for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.ImportFrom)
         and (node.module or "").startswith("gyriflow")
         for alias in node.names
@@ -274,7 +267,7 @@ def test_no_vague_names():
     )
     names = [(short(path), path.stem) for path in [*SOURCES, *SCRIPTS, *RULE_FILES]]
     for path in [*SOURCES, *SCRIPTS]:
-        for node in nodes_of(path):
+        for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ClassDef | ast.FunctionDef):
                 names.append((short(path), node.name))
                 names += [
@@ -368,7 +361,7 @@ def test_imported_packages_are_dependencies():
         listed |= import_names(requirements)
     imported = set()
     for path in [*(ROOT / "src").rglob("*.py"), *SCRIPTS]:
-        for node in nodes_of(path):
+        for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
                 imported |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.level == 0:

@@ -13,7 +13,7 @@ import yaml
 from atlas_brains import atlas_halves
 from configurations import LABELLED, labelled, resolved
 from facts import Facts
-from shapes import hemisphere, inner, moved, phantom, save_labels
+from shapes import hemisphere, inner, moved
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.cli import check as checking
@@ -51,6 +51,7 @@ from gyriflow.running.cost import (
 from gyriflow.running.status import format_duration
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.settings.terms import ELEMENTS_NEEDED, element_error, is_too_coarse
+from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
@@ -330,12 +331,21 @@ def test_a_size_that_is_not_that_of_the_week_is_reported(tmp_path, mm, doubts):
     assert [(text, bad) for _, text, bad in input_problems(config)] == doubts
 
 
-def test_labels_that_lie_as_those_of_another_scheme_are_refused(tmp_path):
-    save_labels(tmp_path / "l.nii.gz", *phantom(24.0, 1.6))
-    brain = {"week": 24, "labels": "l.nii.gz"}
-    said = problems(tmp_path, **brain, scheme="dhcp-19")
-    assert said[0] == Facts("l.nii.gz", "spina-bifida-atlas", "dhcp-19", "50%")
-    assert problems(tmp_path, **brain, scheme="spina-bifida-atlas") == []
+def test_labels_that_lie_as_those_of_another_scheme_are_refused():
+    labels = "fetal_SB_atlas_GA28_operated/parcellation.nii.gz"
+    said = problems(
+        SHIPPED / "atlases" / "spina-bifida", week=28, labels=labels, scheme="dhcp-19"
+    )
+    assert said[0] == Facts(labels, "spina-bifida-atlas", "dhcp-19", "49%")
+    assert (
+        problems(
+            SHIPPED / "atlases" / "spina-bifida",
+            week=28,
+            labels=labels,
+            scheme="spina-bifida-atlas",
+        )
+        == []
+    )
 
 
 def test_a_header_without_a_unit_is_reported_once_and_is_no_warning(

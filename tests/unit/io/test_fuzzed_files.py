@@ -5,9 +5,6 @@ Nothing else is raised, and nothing is left beside the file.
 """
 
 import gzip
-import os
-import subprocess
-from types import SimpleNamespace
 
 import nibabel as nib
 import numpy as np
@@ -22,7 +19,6 @@ from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.io import vtk_files
 from gyriflow.io.files import read_json, read_table, read_text_table
 from gyriflow.io.surfaces import (
     read_surface,
@@ -100,30 +96,6 @@ def wholes(tmp_path_factory):
     return Wholes({path.name: path.read_bytes() for path in folder.iterdir()} | TEXTS)
 
 
-def run_in_copy(command, **_):
-    """Read a VTK file in a copy of this process, which has VTK loaded already."""
-    ends = os.pipe(), os.pipe()
-    pid = os.fork()
-    if pid == 0:
-        for number, (_, end) in enumerate(ends, start=1):
-            os.dup2(end, number)
-        code = 0
-        try:
-            vtk_files._send_surface(command[-1])
-        except BaseException as error:
-            os.write(2, str(error).encode())
-            code = 1
-        os._exit(code)
-    said = []
-    for end, other in ends:
-        os.close(other)
-        with os.fdopen(end, "rb") as stream:
-            said.append(stream.read())
-    _, status = os.waitpid(pid, 0)
-    code = os.waitstatus_to_exitcode(status)
-    return subprocess.CompletedProcess(command, code, *said)
-
-
 @pytest.mark.parametrize(
     ("name", "read", "header"),
     [
@@ -150,9 +122,8 @@ def run_in_copy(command, **_):
 @BOUNDED
 @given(data=st.data())
 def test_damaged_files_give_something_sound_or_are_refused(
-    tmp_path, wholes, monkeypatch, name, read, header, data
+    tmp_path, wholes, name, read, header, data
 ):
-    monkeypatch.setattr(vtk_files, "subprocess", SimpleNamespace(run=run_in_copy))
     (tmp_path / name).write_bytes(data.draw(damaged(wholes[name], header)))
     found = outcome(read, tmp_path / name)
     if isinstance(found, TriangleMesh):
