@@ -79,13 +79,15 @@ def read(name, paths):
 
 
 def read_brain(placed):
-    """Return a brain of a grid with its surfaces, and their maps or regions."""
+    """Return a brain of a grid with its surfaces, and their maps or regions.
+
+    `placed` are its files and its place in the grid; it may have no maps.
+    """
     contents = [{} for _ in placed["surfaces"]]
     for number, path in enumerate(placed["maps"]):
         is_regions = path.endswith(".label.gii")
-        contents[number] = (read_vertex_labels if is_regions else read_vertex_maps)(
-            path
-        )
+        read = read_vertex_labels if is_regions else read_vertex_maps
+        contents[number] = read(path)
     surfaces = [read_surface(path) for path in placed["surfaces"]]
     halves = list(zip(surfaces, contents, strict=True))
     return GridBrain(
