@@ -53,7 +53,7 @@ rule quality_table:
     output:
         f"{STUDY}/quality.csv",
     params:
-        refused=list(map(left_out_row, WITHOUT_SURFACE)),
+        left_out=list(map(left_out_row, WITHOUT_SURFACE)),
         # rows of a table that cannot be used come last
         order=[brain.id for brain in CONFIG.brains],
     script:

@@ -472,13 +472,13 @@ def quality_row(
 
 def quality_table(
     rows: Sequence[Mapping[str, Any]],
-    refused: Sequence[Mapping[str, Any]],
+    left_out: Sequence[Mapping[str, Any]],
     order: Sequence[str],
 ) -> pd.DataFrame:
     """Return the rows of all brains, outputs of `quality_row`, in an order of their
     ids, others last.
 
-    `refused` are labels and cause of refused brains.
+    `left_out` are columns and cause of the brains without a surface.
     """
     every = [
         *rows,
@@ -488,7 +488,7 @@ def quality_table(
                 "verdict": "refused",
                 "warning_count": 0,
             }
-            for row in refused
+            for row in left_out
         ),
     ]
     table = pd.DataFrame(every).set_index("subject", drop=False)
