@@ -177,7 +177,7 @@ HAS_FEW_SERIES = len(study.series) <= MAX_SERIES
 
 def common_growth_rate():
     """Return the growth rate or its curve, if all runs that have one share it."""
-    # runs that follow sizes or shapes have no given rate
+    # other growth models have no rate, or change it
     rates = [
         simulation.settings.growth_rate_per_s
         for simulation in study.simulations.values()
@@ -412,8 +412,11 @@ rule zones_figure:
 
 show(rules.zones_figure.output, names_of(ZONED))
 
-BY_RATE = [
-    simulation for simulation in study.run_simulations if simulation.has_growth_rate and not simulation.maps
+# growth that follows measured sizes differs by step, and that towards shapes by element
+BY_LAW = [
+    simulation
+    for simulation in study.run_simulations
+    if simulation.settings.growth.definition.measured is None and not simulation.maps
 ]
 
 
@@ -424,14 +427,14 @@ rule model_figure:
     output:
         model_figure=multiext(f"{RUN}/figures/model", ".png", ".pdf"),
     wildcard_constraints:
-        **only(BY_RATE),
+        **only(BY_LAW),
     params:
         **drawn_by("sections"),
     script:
         "../scripts/figures.py"
 
 
-show(rules.model_figure.output, names_of(BY_RATE))
+show(rules.model_figure.output, names_of(BY_LAW))
 
 if study.run_simulations:
 

@@ -7,7 +7,8 @@ from matplotlib.text import Text
 from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, ellipsoid_mesh, sphere
 
-from gyriflow.folding.zones import model_fields, zones_of_run
+from gyriflow.folding.growth import GrowthByRates, StepStart, model_fields
+from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.quantities import name_in_interval
 from gyriflow.report.panels import LINES_MM, direction_lines
@@ -388,8 +389,9 @@ def test_the_models_fields_are_drawn_in_the_elements_at_the_start_and_at_the_end
     }
     p = parameters_from(run | {"thickness_mm": 4.0})
     zones, sizes = zones_of_run(mesh, p), {21.0: 1.0, 22.0: 1.2}
+    growth = GrowthByRates(p, StepStart(mesh.vertices, 0.0, p.step_s))
     weeks = {
-        week: model_fields(zones, size * mesh.vertices, p, week)
+        week: model_fields(growth, zones, size * mesh.vertices, week)
         for week, size in sizes.items()
     }
     figure = model_figure((mesh.tets, weeks))
