@@ -240,9 +240,10 @@ def _atlas_lines(
     `panels` are those of a hemisphere, or "whole", and a metric.
     """
     keys = zip(atlases["hemisphere"], atlases["metric"], strict=True)
-    rows = atlases.assign(panel=[panels.get(key) for key in keys])
+    # of no panel, of hemispheres or metrics that the chart does not show
+    rows = atlases.assign(panel=[panels.get(key, "") for key in keys])
     is_near = rows["week"].between(weeks.min() - NEAR_GW, weeks.max() + NEAR_GW)
-    rows = rows[rows["panel"].notna() & is_near]
+    rows = rows[(rows["panel"] != "") & is_near]
     layers = []
     entries: list[Artist] = []
     # an atlas may have no brain of these weeks
