@@ -109,7 +109,7 @@ def test_shipped_atlases_are_those_of_the_default_settings(tmp_path):
         assert (wide[growing].iloc[-1] > wide[growing].iloc[0]).all(), hemisphere
 
 
-def test_the_documentation_has_what_a_week_is_worth_by_the_shipped_curves():
+def test_the_documentation_has_what_weeks_and_segmentation_are_worth():
     content = read_yaml(SHIPPED / "norms" / "atlases.yaml")
     percent = {}
     for atlas, facts in content["atlases"].items():
@@ -119,10 +119,22 @@ def test_the_documentation_has_what_a_week_is_worth_by_the_shipped_curves():
             percent[atlas, week] = value
     jumps = [percent.pop((atlas, 24.0)) for atlas in ("crl", "chinese")]
     words = (DOCS / "how-to" / "usual.md").read_text()
-    (sentence,) = [part for part in words.split("\n- **") if part.startswith("Age")]
+    parts = {part.split()[0]: part for part in words.split("\n- **")}
+    sentence = parts["Age"]
     low, high = min(percent.values()), max(percent.values())
     assert sentence == Facts(
         f"{low:.0f} to +{high:.0f} %".replace("-", "−"),
         f"{jumps[0]:.0f} % (CRL)",
         f"{jumps[1]:.0f} % (Chinese)",
     )
+    thickness = {
+        atlas: dict(
+            zip(facts["weeks"], facts["values"]["whole"]["mean_thickness"], strict=True)
+        )
+        for atlas, facts in content["atlases"].items()
+    }
+    thinner = [
+        100 * (1 - value / thickness["crl"][week])
+        for week, value in thickness["chinese"].items()
+    ]
+    assert parts["Segmentation"] == Facts(f"{min(thinner):.0f} to {max(thinner):.0f} %")
