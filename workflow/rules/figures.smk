@@ -28,9 +28,9 @@ SECTIONS = {
     "Resources": ["study_resources"],
 }
 # those of the page of each brain
-BRAIN_SECTIONS = {"Metrics": ["brain_maps", "brain_regions"], "Quality": ["quality_page"]}
+BRAIN_SECTIONS = {"Quality": ["quality_page"], "Metrics": ["brain_depth", "brain_maps", "brain_regions"]}
 # the first of these that there is stands at the top of a page
-IN_SUMMARY = ("predicted_figure", "weekly_figure", "brain_maps")
+IN_SUMMARY = ("predicted_figure", "weekly_figure", "brain_depth")
 # collapsed in the report
 TECHNICAL = ("mesh_quality", "run_tables", "study_resources")
 # the files of each figure of this study, and the values of the wildcards in them, of each brain, run or sweep that has one
@@ -92,6 +92,10 @@ def files_in_grid(grid):
 
 show(
     {"quality_page": [f"{BRAIN}/figures/quality.png", f"{BRAIN}/figures/quality.pdf"]},
+    names_of(BRAINS.values()),
+)
+show(
+    {"brain_depth": [f"{BRAIN}/figures/depth.png", f"{BRAIN}/figures/depth.pdf"]},
     names_of(BRAINS.values()),
 )
 show(
@@ -190,7 +194,10 @@ def common_growth_rate():
     return dict(rates[0].weeks or {}) if rates[0].map is None else None
 
 
-if study.growth_brains and (HAS_FEW_SERIES or study.run_simulations):
+# without rates, brains of different weeks are different fetuses, and the charts of metrics have their sizes
+HAS_RATES = any(series.has_rates and len(series.brains) > 1 for series in study.series.values())
+
+if study.growth_brains and (study.run_simulations or (HAS_RATES and HAS_FEW_SERIES)):
 
     rule growth_figure:
         input:

@@ -21,6 +21,8 @@ rule brain_figures:
     output:
         quality=f"{BRAIN}/figures/quality.png",
         quality_pdf=f"{BRAIN}/figures/quality.pdf",
+        depth=f"{BRAIN}/figures/depth.png",
+        depth_pdf=f"{BRAIN}/figures/depth.pdf",
         maps=f"{BRAIN}/figures/shape_index.png",
         maps_pdf=f"{BRAIN}/figures/shape_index.pdf",
         small=f"{BRAIN}/figures/small.png",

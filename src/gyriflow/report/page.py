@@ -28,18 +28,21 @@ from ..settings.terms import (
     rounded_elements,
     run_names,
 )
-from .labels import metric_title, plain, week_label
+from .labels import atlas_label, cited_atlas, metric_title, plain, week_label
 from .tables import (
-    FROM_ATLAS,
     VERDICTS,
     accuracy_table,
     brain_table,
     centile_text,
+    difference_texts,
+    doubtful_metrics,
+    doubtful_title,
     html_table,
     kept_sentence,
     kept_table,
     predicted_table,
     range_text,
+    week_errors,
 )
 
 PATH_PLACEHOLDER = "(file)"
@@ -135,16 +138,17 @@ def sections(
 class Tables:
     """The tables of a study on its pages.
 
-    `quality`, `metrics` and `centiles` are as for `brain_rows`, `differences` those of
-    `metrics.atlas_curves`; `warnings` has the columns subject, run, step, level,
-    message. `runs` and `validation` are as for
-    `scores_table`, None if nothing was simulated; `intervals` those of the ensemble of
-    the one prediction, if any.
+    `quality`, `metrics` and `centiles` are as for `brain_rows`, `curves` and
+    `differences` those of `metrics.atlas_curves`; `warnings` has the columns subject,
+    run, step, level, message. `runs` and `validation` are as for `scores_table`, None
+    if nothing was simulated; `intervals` those of the ensemble of the one prediction,
+    if any.
     """
 
     quality: pd.DataFrame
     metrics: pd.DataFrame
     centiles: pd.DataFrame
+    curves: pd.DataFrame
     differences: pd.DataFrame
     warnings: pd.DataFrame
     runs: pd.DataFrame | None = None
@@ -230,12 +234,12 @@ def study_page(
         "folded": [] if runs is None else runs.to_dict("records"),
         "alone": False,
         "usual": "",
-        "has_atlases": False,
+        "atlases": _cited_atlases(tables.differences),
+        "week_errors": [],
+        "has_norm": bool(own["expected"].notna().any()),
         "numbers": "",
         "runs": scores,
-        "brains": brain_rows(
-            brains, tables.quality, tables.metrics, centiles, pictures
-        ),
+        "brains": brain_rows(brains, replace(tables, centiles=centiles), pictures),
         "pictures": pictures,
         "norm": norm,
         "flags": flags,
@@ -273,16 +277,28 @@ def brain_page(
         norm=norm,
         pictures={},
     )
-    every = brain_table(metrics, tables.centiles, tables.differences)
-    main = [metric_title(name) for name in metrics_shown(Shown.BRAINS)]
+    own_quality = tables.quality[tables.quality["subject"] == brain["id"]]
+    doubts = doubtful_metrics(own_quality.iloc[0].to_dict())
+    every = brain_table(metrics, tables.centiles, tables.differences, doubts)
+    sheet = [doubtful_title(name, doubts) for name in metrics_shown(Shown.SHEET)]
+    sheet = [title for title in sheet if title in every.index]
+    differences = tables.differences[tables.differences["subject"] == brain["id"]]
+    atlases = list(differences["atlas"].unique())
+    curves = tables.curves[tables.curves["atlas"].isin(atlases)]
     return page | {
         "title": f"Cortical folding of {brain['id']}",
         "verdict": "",
         "alone": True,
-        "usual": html_table(every[every.index.isin(main)]),
-        "has_atlases": any(str(name).startswith(FROM_ATLAS) for name in every),
+        "usual": html_table(every.loc[sheet]),
+        "atlases": _cited_atlases(differences),
+        "week_errors": week_errors(curves, brain["week"]),
         "numbers": html_table(every),
     }
+
+
+def _cited_atlases(differences: pd.DataFrame) -> list[str]:
+    """Return the atlases of a table of differences, with their citations."""
+    return [cited_atlas(str(name)) for name in differences["atlas"].unique()]
 
 
 def report_page(
@@ -331,7 +347,7 @@ def methods_text(template: str, **used: Any) -> str:
     template.
 
     The template gets `growth_sentence(run, number)`, the sentence of the run's growth
-    model, and `fused_after_gw`; `number` formats numbers.
+    model, where `number` formats numbers; `fused_after_gw`; and `atlas_label`.
     """
 
     def growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
@@ -339,7 +355,10 @@ def methods_text(template: str, **used: Any) -> str:
 
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(
-        growth_sentence=growth_sentence, fused_after_gw=FUSED_AFTER_GW, **used
+        growth_sentence=growth_sentence,
+        fused_after_gw=FUSED_AFTER_GW,
+        atlas_label=atlas_label,
+        **used,
     )
 
 
@@ -357,25 +376,23 @@ def caption_html(caption: str) -> Markup:
 
 def brain_rows(
     brains: Sequence[Mapping[str, Any]],
-    quality: pd.DataFrame,
-    metrics: pd.DataFrame,
-    centiles: pd.DataFrame,
+    tables: Tables,
     linked: Collection[str] = (),
 ) -> list[dict[str, Any]]:
     """Return what a page says of each brain: its facts, its numbers, and its verdict
     with the cause or the warnings.
 
-    Numbers are by title of the metric, each with the text below it: `centile_text`.
-    Brains have id, week, population, source, licence, covariates and whether they are
-    synthetic, as configured. `quality`, the table of quality control, has the columns
-    subject, verdict, cause, warnings; `metrics` and `centiles` are the study's.
+    Numbers are by title of the metric, each with the texts below it: doubts about it,
+    and its `centile_text` or else its differences from atlases. Brains have id, week,
+    population, source, licence, covariates and whether they are synthetic, as
+    configured. The table `quality` has the columns subject, verdict, cause, warnings.
     `linked` are the ids of the brains whose source is on a page of their own.
     """
-    judged = quality.set_index("subject").fillna("")
-    measured = _by_brain(metrics)
+    judged = tables.quality.set_index("subject").fillna("")
+    measured = _by_brain(tables.metrics)
     values = measured["value"].to_dict()
     names = set(measured["metric"])
-    rated = _by_brain(centiles)
+    rated = _by_brain(tables.centiles)
     texts = dict(
         zip(
             rated.index,
@@ -387,12 +404,23 @@ def brain_rows(
     rows = []
     for brain in brains:
         key = brain["id"]
+        doubts = doubtful_metrics(judged.loc[key].to_dict())
+        from_atlases = difference_texts(tables.differences, key, with_noise=False)
         numbers = {}
         for name in shown:
-            number = ("–", "")
+            number: tuple[str, list[str]] = ("–", [])
             if (key, name) in values:
-                value = METRICS[name].text(values[key, name])
-                number = (value, texts.get((key, name), ""))
+                below = [doubts[name]] if name in doubts else []
+                centile = texts.get((key, name), "–")
+                if centile != "–":
+                    below.append(centile)
+                else:
+                    below += [
+                        f"{words[name]} {atlas_label(atlas)}"
+                        for atlas, words in from_atlases.items()
+                        if name in words
+                    ]
+                number = (METRICS[name].text(values[key, name]), below)
             numbers[metric_title(name)] = number
         is_linked, is_synthetic = key in linked, brain["synthetic"]
         licence = brain["licence"] or (

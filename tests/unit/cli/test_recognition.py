@@ -16,7 +16,13 @@ from shapes import sphere
 
 from gyriflow.cli.commands import main
 from gyriflow.cli.init import write_configuration
-from gyriflow.cli.recognition import UNSET, recognise, scheme_fits
+from gyriflow.cli.recognition import (
+    UNSET,
+    FoundBrain,
+    recognise,
+    scheme_fits,
+    scheme_reasons,
+)
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
@@ -561,3 +567,19 @@ def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
         len(resolve(folded).run_simulations),
         resolve(folded.measured_only).run_simulations,
     ) == (1, [])
+
+
+def test_the_chosen_scheme_has_its_contradiction_and_others_their_names_only():
+    fits = {"a": "", "b": "cortex is missing", "c": "too little cortex"}
+    brains = [
+        FoundBrain(Path(f"{number}.nii"), {"scheme": "a"}, fits=fits)
+        for number in range(2)
+    ]
+    head, others = scheme_reasons(brains)
+    assert head == Facts("a", 2)
+    assert others == Facts("b, c")
+    assert "cortex" not in others
+    given = FoundBrain(Path("x.nii"), {"scheme": "b"}, fits=fits)
+    head, contradiction, others = scheme_reasons([given])
+    assert (head, contradiction) == (Facts("b", 1), Facts("cortex is missing"))
+    assert others.endswith(": c")

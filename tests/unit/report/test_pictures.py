@@ -14,6 +14,7 @@ from gyriflow.quantities import name_in_interval
 from gyriflow.report.panels import LINES_MM, direction_lines
 from gyriflow.report.pictures import (
     GridBrain,
+    brain_depth,
     brain_grid,
     brain_maps,
     displacement_maps,
@@ -457,3 +458,28 @@ def test_a_brain_is_shown_from_outside_and_each_hemisphere_from_within(sides, in
     # outside red, inside blue
     assert all(red > blue for red, _, blue in (tones[0], tones[1]) if sides == "lr")
     assert all(blue > red for red, _, blue in tones[3:])
+
+
+def test_brains_of_several_pages_have_one_scale_and_one_depth():
+    figures = []
+    for size, deep in ((60.0, 2.0), (80.0, 9.0)):
+        mesh = box((size, size, size))
+        depth = {"sulcal_depth_mm": np.full(len(mesh.vertices), deep)}
+        figures.append(brain_depth([(mesh, depth)], sides=["left"]))
+    assert figures[0].get_figwidth() == figures[1].get_figwidth()
+    # dots per mm of the pictures and of the scale bars
+    scales = set()
+    for figure in figures:
+        (bar,) = [axes for axes in figure.axes if axes.get_label() == "scale bar"]
+        assert "20 mm" in words(figure)
+        for axes in (bar, *pictures(figure)):
+            dots = axes.get_window_extent().width
+            scales.add(round(dots / np.ptp(axes.get_xlim()), 2))
+    assert len(scales) == 1
+    ends = [colour_bar(figure, "sulcal depth").get_xlim() for figure in figures]
+    assert ends[0] == ends[1] == (0.0, 5.0)
+    # what is wider than the page is smaller
+    mesh = box((400.0, 400.0, 400.0))
+    depth = {"sulcal_depth_mm": np.zeros(len(mesh.vertices))}
+    wide = brain_depth([(mesh, depth)], sides=["left"])
+    assert wide.get_figwidth() == figures[0].get_figwidth()
