@@ -5,7 +5,8 @@ import os
 import shlex
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -353,14 +354,18 @@ def check(
     gyriflow.yaml by default. A FOLDER without gyriflow.yaml is checked as `gyriflow
     measure` would measure it.
     """
+    from ..running.launch import MEASURE_ONLY_VAR
     from .check import check_study
+    from .init import write_configuration
 
     is_folder = data is not None and data.is_dir() and not (data / CONFIG).exists()
     problems = 0
     with TemporaryDirectory() as scratch:
         if data is not None and is_folder:
             config = Path(scratch) / CONFIG
-            found = _write_measured(data, config, **selection)
+            os.environ[MEASURE_ONLY_VAR] = "1"
+            found = _recognise(data, **selection)
+            write_configuration(found, data, config, only_measured=True)
             problems += sum(bool(brain.causes) for brain in found.brains)
             _show_unused(found)
         else:
@@ -380,20 +385,23 @@ def check(
         sys.exit(2)
 
 
-def _write_measured(
-    data: Path,
-    config: Path,
-    **selection: Any,
-) -> "FoundScans":
-    """Write a configuration to measure the brains of a folder, and have this process
-    fold nothing."""
-    from ..running.launch import MEASURE_ONLY_VAR
-    from .init import write_configuration
+@contextmanager
+def _place_to_write(
+    directory: Path, dry_run: bool, option: str = "--directory"
+) -> Iterator[Path]:
+    """Yield the working directory to write a configuration into, locked; for a dry run
+    a temporary folder.
 
-    os.environ[MEASURE_ONLY_VAR] = "1"
-    found = _recognise(data, **selection)
-    write_configuration(found, data, config, only_measured=True)
-    return found
+    StorageError if another run uses the directory; `option` names another one.
+    """
+    if dry_run:
+        with TemporaryDirectory() as scratch:
+            yield Path(scratch)
+        return
+    from ..running.launch import locked
+
+    with locked(directory, option):
+        yield directory
 
 
 def _require_no_selection(data: Path | None, **selection: Any) -> None:
@@ -520,20 +528,25 @@ def measure(
     first failure.
     """
     from ..running.launch import MEASURE_ONLY_VAR
-    from .init import commented_scans
+    from .init import commented_scans, write_configuration
 
     config = data / CONFIG if data.is_dir() else data
     os.environ[MEASURE_ONLY_VAR] = "1"
     refused = 0
-    with TemporaryDirectory() as scratch:
-        if not config.exists():
-            config = Path(scratch) / CONFIG if dry_run else config
-            refused = _show_scans(_write_measured(data, config, **selection))
-        else:
-            _require_no_selection(data, **selection)
-            for line in commented_scans(config) if data.is_dir() else ():
-                click.echo(f"not used, by {config}: {line}")
-                refused = InputError.exit_code
+    found = None
+    if not config.exists():
+        found = _recognise(data, **selection)
+    else:
+        _require_no_selection(data, **selection)
+        for line in commented_scans(config) if data.is_dir() else ():
+            click.echo(f"not used, by {config}: {line}")
+            refused = InputError.exit_code
+    with _place_to_write(directory, dry_run) as place:
+        if found is not None:
+            # a dry run writes nothing beside the data
+            config = place / CONFIG if dry_run else config
+            write_configuration(found, data, config, only_measured=True)
+            refused = _show_scans(found)
         code = _run(
             config,
             directory,
@@ -621,16 +634,26 @@ def predict(
     where the predicted surfaces and labels are. After an interruption, the same command
     resumes.
     """
-    from .init import write_prediction
+    from .init import predicted_study, write_prediction
 
-    with TemporaryDirectory() as scratch:
-        config = Path(scratch if dry_run else directory) / CONFIG
+    force = settings.pop("force")
+    prediction = predicted_study(files, (week, until), **settings)
+    for line in prediction.warnings:
+        click.echo(line)
+    shown_path = directory / CONFIG
+    with _place_to_write(directory, dry_run) as place:
         for line in write_prediction(
-            config, directory / CONFIG, files, (week, until), **settings
+            prediction, place / CONFIG, shown_path, force=force
         ):
             click.echo(line)
         code = _run(
-            config, directory, cores, dry_run, ["--cores", str(cores)], "all", "export"
+            place / CONFIG,
+            directory,
+            cores,
+            dry_run,
+            ["--cores", str(cores)],
+            "all",
+            "export",
         )
     sys.exit(code)
 
@@ -705,22 +728,31 @@ def bids(
     found = _recognise(
         data, **{key: value for key, value in selection.items() if key not in folding}
     )
-    brains = write_bids(found, data, config, **folding)
-    if level == "participant" and not dry_run:
-        store_options(options, selection)
-    work_to_do = (
-        "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
-    )
-    scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
-    click.echo(f"{scans} to {work_to_do}: {', '.join(brains)}")
-    click.echo(f"configuration: {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
-    code = _run(
-        config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets
-    )
-    if not dry_run and (exported / "dataset_description.json").is_file():
-        publish_derivatives(exported, out, data, brains, whole=level == "group")
-        click.echo(f"derivatives: {out}")
+    with _place_to_write(work, dry_run, "--work-dir") as place:
+        brains = write_bids(found, data, place / CONFIG, config, **folding)
+        if level == "participant" and not dry_run:
+            store_options(options, selection)
+        work_to_do = (
+            "measure and fold"
+            if selection["fold"]
+            else "measure (--fold adds simulations)"
+        )
+        scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
+        click.echo(f"{scans} to {work_to_do}: {', '.join(brains)}")
+        if not dry_run:
+            click.echo(f"configuration: {config}")
+        code = _run(
+            place / CONFIG,
+            work,
+            cores,
+            dry_run,
+            ["--cores", str(cores), "--keep-going"],
+            *targets,
+        )
+        if not dry_run and (exported / "dataset_description.json").is_file():
+            publish_derivatives(exported, out, data, brains, whole=level == "group")
+            click.echo(f"derivatives: {out}")
     refused = _show_scans(found, {} if dry_run else measured_verdicts(work))
     sys.exit(code or refused)
 

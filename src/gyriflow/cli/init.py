@@ -3,6 +3,7 @@ or for a BIDS data set."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from string import Template
@@ -141,9 +142,16 @@ def _grouped_causes(scans: Iterable[tuple[str, str]]) -> list[str]:
     return [line for line, _ in grouped(messages)]
 
 
-def write_prediction(
-    path: Path,
-    shown_path: Path,
+@dataclass(frozen=True)
+class PredictedStudy:
+    """The configuration that predicts a brain, what it says, and warnings about it."""
+
+    text: str
+    description: str
+    warnings: list[str]
+
+
+def predicted_study(
     files: Sequence[Path],
     weeks: tuple[float, float],
     *,
@@ -155,18 +163,16 @@ def write_prediction(
     accepted: bool,
     ensemble: int | None,
     quick: bool,
-    force: bool,
-) -> Iterator[str]:
-    """Write a configuration that folds a brain by the growth of an atlas; yield lines
-    about it.
+) -> PredictedStudy:
+    """Return a configuration that folds a brain by the growth of an atlas.
 
     `files` are its label volume or pial surfaces; `weeks` are the week of the brain and
     the week to predict; `folder` has the atlas' files; `accepted` is about its licence.
-    InputError if anything is missing, or if the configuration at `shown_path` exists
-    with different content and `force` is not set.
+    InputError if anything is missing.
     """
+    warnings = []
     if atlas is None:
-        yield (
+        warnings.append(
             f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina"
             " bifida aperta and are not normal; unoperated ones end at 25 GW"
         )
@@ -207,7 +213,30 @@ def write_prediction(
     }
     config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
     load(config)
+    span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
+    given = entry.get(
+        "scheme",
+        f"pial{' and white' if white else ''} surfaces",
+    )
+    names = (
+        ", ".join(
+            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
+        )
+        or files[0]
+    )
     text = yaml.safe_dump(config, sort_keys=False)
+    return PredictedStudy(text, f"{entry['id']}: {names} ({given}), {span}", warnings)
+
+
+def write_prediction(
+    prediction: PredictedStudy, path: Path, shown_path: Path, *, force: bool
+) -> Iterator[str]:
+    """Write the configuration of a prediction; yield lines about it.
+
+    InputError if the one at `shown_path` exists with different content and `force` is
+    not set.
+    """
+    text = prediction.text
     if (
         shown_path.exists()
         and shown_path.read_text(encoding="utf-8") != text
@@ -220,18 +249,7 @@ def write_prediction(
     if kept := _keep_other(path, text):
         yield f"the earlier configuration is now {kept}"
     write_text(path, text)
-    span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
-    given = entry.get(
-        "scheme",
-        f"pial{' and white' if white else ''} surfaces",
-    )
-    names = (
-        ", ".join(
-            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
-        )
-        or files[0]
-    )
-    yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
+    yield f"{prediction.description}; configuration: {shown_path}"
 
 
 def with_earlier_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:
@@ -262,12 +280,13 @@ def write_bids(
     found: FoundScans,
     folder: Path,
     path: Path,
+    shown_path: Path,
     *,
     settings: str | None = None,
     fold: bool | None = None,
 ) -> list[str]:
     """Write a configuration for the scans of a BIDS data set that can be used; return
-    their ids.
+    their ids. The one at `shown_path` has to be of an earlier call.
 
     `settings` is a configuration without brains. The scans are measured; with `fold`
     the first of several scans of a subject is also folded. Scans without `sub-` in
@@ -319,14 +338,14 @@ def write_bids(
             if key not in FOLDING_SECTIONS:
                 text[key] = value
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
-    is_own = path.with_name(BIDS_OPTIONS).exists() or (
-        path.exists() and read_text(path).startswith(BIDS_HEAD)
+    is_own = shown_path.with_name(BIDS_OPTIONS).exists() or (
+        shown_path.exists() and read_text(shown_path).startswith(BIDS_HEAD)
     )
-    if path.exists() and not is_own:
+    if shown_path.exists() and not is_own:
         remedy = "Choose another folder with --work-dir."
         raise InputError(
             "was not written by gyriflow bids and is not replaced",
-            path=path,
+            path=shown_path,
             remedy=remedy,
         )
     write_text(path, BIDS_HEAD + yaml.safe_dump(text, sort_keys=False))

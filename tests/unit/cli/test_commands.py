@@ -295,6 +295,68 @@ def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path
     assert (tmp_path / "gyriflow.yaml").read_text() == "start: mine"
 
 
+@pytest.fixture
+def data_set(monkeypatch, tmp_path):
+    """A BIDS data set of two participants in the current folder, data."""
+    monkeypatch.chdir(tmp_path)
+    # set in this process, and removed after the test
+    monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
+    make_tree(
+        tmp_path / "data",
+        labels=[f"sub-0{number}/anat/sub-0{number}_dseg.nii.gz" for number in (1, 2)],
+        tables={
+            "participants.tsv": [
+                "participant_id scan_age",
+                "sub-01 24.1",
+                "sub-02 25.3",
+            ]
+        },
+    )
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "directory", "option"),
+    [
+        (
+            ("data", "out", "participant", "--participant-label", "02"),
+            "out/work",
+            "--work-dir",
+        ),
+        (("measure", "data", "-d", "study"), "study", "--directory"),
+        (
+            ("predict", LABELS, "--week", "22", "--until", "24", "-d", "study"),
+            "study",
+            "--directory",
+        ),
+    ],
+)
+def test_beside_a_live_run_a_command_writes_nothing_and_names_its_option(
+    monkeypatch, data_set, arguments, directory, option
+):
+    monkeypatch.setattr(launch, "LOCK_WAIT_S", 0.0)
+    with launch.hold_lock(data_set / directory):
+        before = {path: path.stat().st_mtime_ns for path in data_set.rglob("*")}
+        done = CliRunner().invoke(main, [*arguments, "--cores", "1"])
+        assert done.exit_code == 5
+        assert done.output == Facts(data_set / directory, option)
+        assert before == {path: path.stat().st_mtime_ns for path in data_set.rglob("*")}
+
+
+def test_a_dry_call_for_a_bids_data_set_leaves_the_configuration_of_a_run(
+    monkeypatch, data_set
+):
+    seen = []
+    monkeypatch.setattr(
+        checking, "plan", lambda config, *_, **__: seen.append(read_keys(config)) or []
+    )
+    before = set(data_set.rglob("*"))
+    dry = ("data", "out", "participant", "--participant-label", "02", "-n")
+    assert CliRunner().invoke(main, dry).exit_code == 0
+    assert [brain["id"] for brain in seen[0]["brains"]] == ["sub-02"]
+    assert set(data_set.rglob("*")) == before
+
+
 @pytest.mark.parametrize(
     ("until", "more", "facts"),
     [
