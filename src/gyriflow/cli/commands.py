@@ -31,6 +31,10 @@ BIDS_LABEL_OPTIONS = (
     "--session_label",
 )
 """Options of BIDS apps with several values after each other."""
+NOTHING_TO_FOLD = (
+    "gyriflow: --fold: no subject has several scans, so none is folded. To fold others,"
+    " name start and folding.end_week in --settings."
+)
 REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 """Options of Snakemake with which jobs run on other machines."""
 
@@ -730,16 +734,15 @@ def bids(
     )
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     with _place_to_write(work, dry_run, "--work-dir") as place:
-        brains = write_bids(found, data, place / CONFIG, config, **folding)
+        brains, folded = write_bids(found, data, place / CONFIG, config, **folding)
         if level == "participant" and not dry_run:
             store_options(options, selection)
-        work_to_do = (
-            "measure and fold"
-            if selection["fold"]
-            else "measure (--fold adds simulations)"
-        )
         scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
-        click.echo(f"{scans} to {work_to_do}: {', '.join(brains)}")
+        click.echo(f"{scans} to measure: {', '.join(brains)}")
+        if folded:
+            click.echo(f"{len(folded)} of them to fold: {', '.join(folded)}")
+        elif selection["fold"]:
+            click.echo(NOTHING_TO_FOLD, err=True)
         if not dry_run:
             click.echo(f"configuration: {config}")
         code = _run(

@@ -2,7 +2,7 @@
 or for a BIDS data set."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -21,6 +21,7 @@ from ..settings.base import own_name, validated
 from ..settings.brains import BrainConfig
 from ..settings.growth import BEFORE_GW
 from ..settings.root import FOLDING_SECTIONS
+from ..settings.runs import chosen_starts
 from ..shipped import SHIPPED
 from ..study.loading import load
 from ..study.series import unmatched_reason
@@ -284,13 +285,15 @@ def write_bids(
     *,
     settings: str | None = None,
     fold: bool | None = None,
-) -> list[str]:
+) -> tuple[list[str], list[str]]:
     """Write a configuration for the scans of a BIDS data set that can be used; return
-    their ids. The one at `shown_path` has to be of an earlier call.
+    their ids, and those of the folded ones. The one at `shown_path` has to be of an
+    earlier call.
 
-    `settings` is a configuration without brains. The scans are measured; with `fold`
-    the first of several scans of a subject is also folded. Scans without `sub-` in
-    their path become unused. InputError if no scan can be used.
+    `settings` is a configuration without brains. The scans are measured. With `fold`
+    those that `start` of the settings names are also folded, or else the first of
+    several scans of a subject. Scans without `sub-` in their path become unused.
+    InputError if no scan can be used.
     """
     with_subject = []
     for brain in found.brains:
@@ -317,22 +320,21 @@ def write_bids(
     require_bids_names(
         brain.entry.get("subject", brain.entry["id"]) for brain in brains
     )
-    youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     further = read_keys(Path(settings)) if settings else {}
     text: dict[str, Any] = {
         "brains": [_absolute(brain.entry, folder) for brain in brains]
     }
-    if fold:
-        series = _series(brains)
+    series = _series(brains)
+    if fold and (series or "start" in further):
         runs: dict[str, Any] = {"reference": {}}
         if series and all(_have_shapes(scans, folder) for scans in series):
             runs["measured"] = {"preset": "measured"}
         starts = [scans[0].entry["id"] for scans in series]
-        text |= {"start": starts or youngest, "runs": runs, **further}
-        weeks = _weeks(brains)
-        end_week = max(max(weeks), min(weeks) + 1)
-        text["folding"] = {"end_week": end_week} | (further.get("folding") or {})
+        text |= {"start": starts, "runs": runs, **further}
+        # without later scans it is not known how far to fold
+        end = {"end_week": _weeks(brains)[-1]} if series else {}
+        text["folding"] = end | (further.get("folding") or {})
     else:
         for key, value in further.items():
             if key not in FOLDING_SECTIONS:
@@ -349,7 +351,17 @@ def write_bids(
             remedy=remedy,
         )
     write_text(path, BIDS_HEAD + yaml.safe_dump(text, sort_keys=False))
-    return [brain.entry["id"] for brain in brains]
+    names = [brain.entry["id"] for brain in brains]
+    return names, _folded(text, names)
+
+
+def _folded(config: Mapping[str, Any], names: Sequence[str]) -> list[str]:
+    """Return which brains a configuration folds, of all its `names`."""
+    starts: set[str] = set()
+    for section in (config, *(config.get("runs") or {}).values()):
+        start = (section or {}).get("start")
+        starts.update(chosen_starts(start, names))
+    return [name for name in names if name in starts]
 
 
 def _series(brains: Sequence[FoundBrain]) -> list[list[FoundBrain]]:
