@@ -364,6 +364,7 @@ def check(
 
     is_folder = data is not None and data.is_dir() and not (data / CONFIG).exists()
     problems = 0
+    age_sources = {}
     with TemporaryDirectory() as scratch:
         if data is not None and is_folder:
             config = Path(scratch) / CONFIG
@@ -371,6 +372,8 @@ def check(
             found = _recognise(data, **selection)
             write_configuration(found, data, config, only_measured=True)
             problems += sum(bool(brain.causes) for brain in found.brains)
+            for brain in found.brains:
+                age_sources[brain.entry["id"]] = brain.age_source
             _show_unused(found)
         else:
             _require_no_selection(data, **selection)
@@ -378,7 +381,12 @@ def check(
                 data / CONFIG if data is not None and data.is_dir() else data, directory
             )
         for line, bad in check_study(
-            config, directory, cores, stages, name=data if is_folder else None
+            config,
+            directory,
+            cores,
+            stages,
+            name=data if is_folder else None,
+            age_sources=age_sources,
         ):
             click.echo(line)
             problems += bad

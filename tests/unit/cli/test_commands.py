@@ -431,6 +431,8 @@ def test_a_file_that_is_not_there_is_answered_with_what_is(predicted_from):
     done = predicted_from("brain.stl", "--week", "23.4", "--folder", "half.stl")
     assert (done.exit_code, "there is" in done.output) == (2, False)
 
+    # where the age is from
+    assert done.output == Facts("participants.tsv row 2")
 
 @pytest.fixture(scope="module")
 def surfaces(tmp_path_factory):
