@@ -473,16 +473,27 @@ def run(
         click.get_current_context().get_parameter_source("cores")
         == ParameterSource.DEFAULT
     )
-    if not (
-        default
-        and any(argument.partition("=")[0] in REMOTE_OPTIONS for argument in further)
-    ):
+    is_remote = any(
+        argument.partition("=")[0] in REMOTE_OPTIONS for argument in further
+    )
+    if not (default and is_remote):
         options += ["--cores", str(cores)]
+    elif dry_run:
+        cores = _remote_cores(further, cores)
     sys.exit(
         _run(
             config, directory, cores, dry_run, options, *stages, *further[int(named) :]
         )
     )
+
+
+def _remote_cores(further: Sequence[str], default: int) -> int:
+    """Return the cores for the forecast of jobs on other machines: one for each of the
+    jobs that run at the same time."""
+    from ..running.snakemake_internals import max_jobs, shorten_usage_errors
+
+    shorten_usage_errors()
+    return max_jobs(further) or default
 
 
 def _run(

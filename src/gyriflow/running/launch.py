@@ -55,6 +55,7 @@ from .planning import (
     restore_results,
     view_of,
 )
+from .snakemake_internals import shorten_usage_errors
 
 ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
 """The conda environment, whose variables of MPI and BLAS are defaults in any other one,
@@ -708,6 +709,7 @@ def main(
     # takes a second to import; the Snakefile imports this module without needing it
     from snakemake import cli
 
+    shorten_usage_errors()
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)
     _check_options(unknown, parser.format_usage())

@@ -3,6 +3,7 @@ code they end."""
 
 import os
 import shutil
+from contextlib import chdir
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,6 +24,7 @@ from gyriflow.io.yaml_files import read_keys
 from gyriflow.messages import Message
 from gyriflow.running import launch
 from gyriflow.running.machine import available_cores
+from gyriflow.running.snakemake_internals import max_jobs
 from gyriflow.settings.runs import GrowthSettings
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
@@ -99,6 +101,35 @@ def test_an_unknown_option_is_refused_with_the_nearest_one(tmp_path):
     with pytest.raises(InputError, check=Facts("--corse", "--cores")):
         launch.main(["--directory", str(tmp_path), "--corse", "2"])
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("in_profile", [False, True])
+def test_an_executor_that_is_not_installed_is_one_line_with_its_package(
+    tmp_path, capsys, in_profile
+):
+    profile = tmp_path / "profile"
+    profile.mkdir()
+    (profile / "config.yaml").write_text("executor: moon\njobs: 70\n")
+    place = ["-n", "--directory", str(tmp_path)]
+    arguments = ["--profile", str(profile)] if in_profile else ["-e", "moon"]
+    with chdir(tmp_path):
+        try:
+            code = launch.main([*place, *arguments])
+        except SystemExit as end:
+            code = end.code
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "moon" in line]
+    assert code == 2
+    assert line == Facts("gyriflow:", "snakemake-executor-plugin-moon", "cluster.md")
+
+
+def test_a_forecast_for_a_cluster_is_for_the_jobs_that_its_profile_runs_at_once(
+    tmp_path,
+):
+    (tmp_path / "config.yaml").write_text("jobs: 70\n")
+    profile = ["--profile", str(tmp_path)]
+    assert max_jobs(profile) == 70
+    assert max_jobs([*profile, "--jobs", "90"]) == 90
+    assert max_jobs(["--retries", "2"]) is None
 
 
 @pytest.mark.parametrize("folder", ["bids", "run", "data"])
@@ -400,6 +431,8 @@ def test_check_takes_a_folder_as_measure_does_and_writes_nothing(tmp_path, monke
     assert (done.exit_code, set(tmp_path.rglob("*"))) == (2, before)
     assert [brain["id"] for brain in planned[0]["brains"]] == ["sub-01"]
     assert done.output == Facts(f"{tmp_path}: 1 brain, measured only", "6 problems")
+    # where the age is from
+    assert done.output == Facts("participants.tsv row 2")
     # six scans with one fault: three lines and a number
     assert done.output.count("n/a") == 3
     assert done.output == Facts("3 more")
@@ -431,8 +464,6 @@ def test_a_file_that_is_not_there_is_answered_with_what_is(predicted_from):
     done = predicted_from("brain.stl", "--week", "23.4", "--folder", "half.stl")
     assert (done.exit_code, "there is" in done.output) == (2, False)
 
-    # where the age is from
-    assert done.output == Facts("participants.tsv row 2")
 
 @pytest.fixture(scope="module")
 def surfaces(tmp_path_factory):
