@@ -1,7 +1,8 @@
 """Forecast what a cohort takes on a cluster, as `gyriflow check` does: scans that are
 measured only, and scans that are also folded.
 
-    ./run python benchmarks/cluster.py FOLDER [--measured 100] [--folded 20] [--cores 200]
+    ./run python benchmarks/cluster.py FOLDER [--measured 100] [--folded 20]
+        [--cores 200]
 
 The scans of FOLDER/measured are links to the shipped label volumes, in turn, from 21 to
 34 GW; those of FOLDER/folded are of 21 to 25 GW, each folded for five weeks by the
