@@ -139,6 +139,8 @@ def _kind_text(kind: dict[str, Any]) -> str:
     """Return one kind of values; '' for none."""
     if "$ref" in kind:
         return "section"
+    if kind.get("format") == "age":
+        return "an age such as `24+2`"
     values = kind.get("enum") or ([kind["const"]] if "const" in kind else [])
     if values:
         return ", ".join(f"`{value}`" for value in values)
