@@ -180,80 +180,96 @@ def study_page(
     `Study.prediction_facts`, with `accuracy`, the content of `norms/predictions.yaml`,
     and `tests`, the output of `compare.accuracy.prediction_facts`.
     """
-    runs, validation, centiles = tables.runs, tables.validation, tables.centiles
-    title = "Measured cortical folding"
-    sentence = _quality_verdict(tables.quality)
-    scores = ""
-    if runs is not None:
-        title = (
-            f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
-        )
-        sentence = accuracy_sentence(prediction) if prediction else NOT_COMPARED
-        sentence = verdict(runs, validation, tables.warnings, sentence)
-        if prediction and validation is not None and len(validation):
-            sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
-        # without observed brains, a prediction has no scores
-        scores = (
-            ""
-            if prediction and validation is None
-            else html_table(scores_table(runs, validation))
-        )
-    if prediction:
-        title = (
-            f"Prediction of {prediction['brain']} to {week_label(prediction['week'])},"
-            " by the growth of "
-        )
-        title += (
-            f"the atlas {atlas['name']}"
-            if (atlas := prediction["atlas"])
-            else prediction["population"]
-        )
-        numbers = predicted_table(
-            tables.metrics, prediction, centiles, tables.intervals
-        )
-        accuracy = accuracy_table(prediction["accuracy"])
-        has_centiles = any("centile" in str(head) for head in numbers)
-        prediction = {
-            **prediction,
-            "numbers": html_table(numbers),
-            "accuracy_table": html_table(accuracy),
-        }
-        kept = prediction["kept"]
-        prediction["kept_table"] = html_table(kept_table(kept, prediction["week"]))
-        prediction["kept_sentence"] = kept_sentence(kept, prediction["week"])
-        prediction["individuals"] = norm if has_centiles else ""
-    centiles = centiles[centiles["run"] == OBSERVED]
-    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
-    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
-    # an atlas has too few brains for centiles among themselves
-    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
-    return {
-        "title": title,
-        "verdict": sentence,
+    observed = tables.centiles[tables.centiles["run"] == OBSERVED]
+    own = observed[observed["subject"].isin([brain["id"] for brain in brains])]
+    summary = [figure for figure in figures if figure["first"]]
+    others = [figure for figure in figures if not figure["first"]]
+    page = {
+        "title": "Measured cortical folding",
+        "verdict": _quality_verdict(tables.quality),
         "prediction": prediction,
-        "folded": [] if runs is None else runs.to_dict("records"),
-        "alone": False,
-        "usual": "",
+        "folded": [],
+        "runs": "",
         "atlases": _cited_atlases(tables.differences),
-        "week_errors": [],
         "has_norm": bool(own["expected"].notna().any()),
-        "numbers": "",
-        "runs": scores,
-        "brains": brain_rows(brains, replace(tables, centiles=centiles), pictures),
+        "brains": brain_rows(brains, replace(tables, centiles=observed), pictures),
         "pictures": pictures,
         "norm": norm,
-        "flags": flags,
+        "flags": _centile_flags(own),
         "spread_unknown": SPREAD_UNKNOWN,
         "warnings": (
             ""
             if tables.warnings.empty
             else html_table(_group_warnings(tables.warnings))
         ),
-        "weeks": next(
-            (item for item in figures if item["first"]),
-            None,
-        ),
-        "sections": sections([item for item in figures if not item["first"]]),
+        "summary_figure": summary[0] if summary else None,
+        "sections": sections(others),
+    }
+    # of the page of a single brain
+    page |= {"alone": False, "usual": "", "week_errors": [], "numbers": ""}
+    if tables.runs is not None:
+        subjects = ", ".join(dict.fromkeys(tables.runs["subject"]))
+        page["title"] = f"Simulated cortical folding of {subjects}"
+        page["folded"] = tables.runs.to_dict("records")
+        page["verdict"] = _simulation_verdict(tables, prediction)
+        # without observed brains, a prediction has no scores
+        if not prediction or tables.validation is not None:
+            page["runs"] = html_table(scores_table(tables.runs, tables.validation))
+    if prediction:
+        page["title"] = _prediction_title(prediction)
+        page["prediction"] = _with_tables(prediction, tables, norm)
+    return page
+
+
+def _centile_flags(centiles: pd.DataFrame) -> set[str]:
+    """Return the flags of the metrics in the table of brains."""
+    is_shown = centiles["metric"].isin(metrics_shown(Shown.BRAINS))
+    flags = set(centiles.loc[is_shown, "flag"])
+    if SPREAD_UNKNOWN in flags:
+        # an atlas has too few brains for centiles among themselves
+        flags.discard("too few brains")
+    return flags
+
+
+def _simulation_verdict(tables: Tables, prediction: Mapping[str, Any] | None) -> str:
+    """Return the verdict on simulations; on predictions that were compared, after how
+    much better they are than simpler ones."""
+    runs, validation = tables.runs, tables.validation
+    assert runs is not None
+    untested = accuracy_sentence(prediction) if prediction else NOT_COMPARED
+    sentence = verdict(runs, validation, tables.warnings, untested)
+    if prediction and validation is not None and len(validation):
+        # these verdicts are without the sentence of accuracy, which begins so
+        sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
+    return sentence
+
+
+def _prediction_title(prediction: Mapping[str, Any]) -> str:
+    atlas = prediction["atlas"]
+    source = f"the atlas {atlas['name']}" if atlas else prediction["population"]
+    week = week_label(prediction["week"])
+    return f"Prediction of {prediction['brain']} to {week}, by the growth of {source}"
+
+
+def _with_tables(
+    prediction: Mapping[str, Any], tables: Tables, norm: str
+) -> dict[str, Any]:
+    """Return the facts of a prediction with its tables and sentences."""
+    numbers = predicted_table(
+        tables.metrics,
+        prediction,
+        tables.centiles,
+        tables.intervals,
+    )
+    has_centiles = any("centile" in str(head) for head in numbers)
+    kept, week = prediction["kept"], prediction["week"]
+    return {
+        **prediction,
+        "numbers": html_table(numbers),
+        "accuracy_table": html_table(accuracy_table(prediction["accuracy"])),
+        "kept_table": html_table(kept_table(kept, week)),
+        "kept_sentence": kept_sentence(kept, week),
+        "individuals": norm if has_centiles else "",
     }
 
 
