@@ -2,6 +2,7 @@
 measured only, and scans that are also folded.
 
     ./run python benchmarks/cluster.py FOLDER [--measured 100] [--folded 20]
+        [--cores 200]
 
 The scans of FOLDER/measured are links to the shipped label volumes, in turn, from 21 to
 34 GW; those of FOLDER/folded are of 21 to 25 GW, each folded for five weeks by the
@@ -28,7 +29,7 @@ from gyriflow.study.loading import load
 from gyriflow.study.study import Study
 
 ATLAS = ROOT / "atlases/spina-bifida"
-LAST_START_GW, FOLDED_WEEKS, CORES = 25, 5, 200
+LAST_START_GW, FOLDED_WEEKS = 25, 5
 MEASURING = ("pial_with_thickness", "measure", "brain_figures")
 FOLDING = ("tetrahedralise", "simulate", "measure_simulated")
 RUN = "reference"
@@ -77,11 +78,11 @@ def write_study(folder: Path, number: int, *, is_folded: bool) -> Path:
     return path
 
 
-def forecast(config: Path, study: Study) -> dict[str, str]:
+def forecast(config: Path, study: Study, n_cores: int) -> dict[str, str]:
     """Return the last lines of `gyriflow check`, by the word that they begin with."""
-    cores = ["--cores", str(CORES)]
+    cores = ["--cores", str(n_cores)]
     lines = {}
-    for line, _ in work_of(config, config.parent, CORES, cores, study):
+    for line, _ in work_of(config, config.parent, n_cores, cores, study):
         word, _, rest = line.partition(" ")
         if word in ("to", "time", "work", "memory", "disk"):
             lines[word] = rest.strip()
@@ -112,6 +113,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--measured", type=int, default=100)
     parser.add_argument("--folded", type=int, default=20)
+    parser.add_argument("--cores", type=int, default=200)
     arguments = parser.parse_args()
     rows: dict[str, Any] = {}
     for name, number in (
@@ -124,7 +126,7 @@ def main() -> None:
             study = resolve(load(read_keys(path), folder_of(path)))
         rows[name] = {
             "scans": number,
-            "check": forecast(path, study),
+            "check": forecast(path, study, arguments.cores),
             "stages": stages(study, MEASURING + (FOLDING if is_folded else ())),
         }
         if is_folded:

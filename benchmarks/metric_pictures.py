@@ -9,6 +9,7 @@ the numbers that the picture shows.
 
 import argparse
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from string import ascii_lowercase
 from typing import Any
@@ -67,6 +68,7 @@ BANDS = (4, 5)
 LINES_EVERY = 3
 SECTION_MM = 1.0
 ZOOM_MM = 12.0
+LOWER_LABEL = 0.7
 QUANTILES = ("q05", "q25", "q50", "q75", "q95")
 COMPARED = (
     "volume",
@@ -209,7 +211,7 @@ def draw_map(
 
 def write_below(axes: Axes, note: str) -> None:
     """Write what a panel shows below it."""
-    text = axes.text(
+    axes.text(
         0.5,
         -0.02,
         note,
@@ -218,7 +220,6 @@ def write_below(axes: Axes, note: str) -> None:
         va="top",
         fontsize=5.5,
     )
-    text.set_in_layout(False)
 
 
 def draw_cut(axes: Axes, mesh: TriangleMesh) -> None:
@@ -287,10 +288,13 @@ def draw_quantiles(axes: Axes, mesh: TriangleMesh, brain: BrainMetrics) -> None:
     )
     table = brain.table.query("hemisphere == 'left'").set_index("metric")["value"]
     top = axes.get_ylim()[1]
-    for quantile in QUANTILES:
+    # neighbours at two heights, as they are close to each other
+    heights = cycle((top, LOWER_LABEL * top))
+    for quantile, height in zip(QUANTILES, heights, strict=False):
         value = table[f"mean_curvature_{quantile}"]
         axes.axvline(value, color="black", linewidth=0.8)
-        axes.text(value, top, quantile, rotation=90, fontsize=5.5, ha="right", va="top")
+        style: Any = {"rotation": 90, "fontsize": 5.5, "ha": "right", "va": "top"}
+        axes.text(value, height, quantile, **style)
         print(f"mean_curvature_{quantile}: {value:.3f} 1/mm")
     axes.set(xlabel="mean curvature (1/mm)", ylabel="share of the area")
     axes.set_title("mean_curvature_q05 … q95")

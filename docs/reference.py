@@ -11,8 +11,14 @@ from pydantic import BaseModel
 
 from gyriflow.geometry.triangles import TriangleMesh, area, convex_hull
 from gyriflow.growth.rates import growth_rates
+from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.surfaces import read_surface, read_vertex_maps, write_surface
-from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.io.tetmeshes import (
+    Regions,
+    read_maps,
+    read_regions,
+    read_tetrahedral_mesh,
+)
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.metrics.curvature import curvature
@@ -95,6 +101,15 @@ FUNCTIONS: dict[str, list[Callable[..., Any]]] = {
         read_tetrahedral_mesh,
         TriangleMesh,
     ],
+    "Results of a simulation": [
+        read_weeks,
+        read_positions,
+        read_field,
+        read_tets,
+        read_regions,
+        Regions,
+        read_maps,
+    ],
     "Metrics": [
         measure_brain,
         curvature,
@@ -124,6 +139,8 @@ def _kind_text(kind: dict[str, Any]) -> str:
     """Return one kind of values; '' for none."""
     if "$ref" in kind:
         return "section"
+    if kind.get("format") == "age":
+        return "an age such as `24+2`"
     values = kind.get("enum") or ([kind["const"]] if "const" in kind else [])
     if values:
         return ", ".join(f"`{value}`" for value in values)

@@ -47,7 +47,8 @@ printf 'participant_id\tgestational_age\nsub-01\t21\n' >"$work/study/data/partic
 cat >"$work/study/settings.yaml" <<'STUDY'
 surface: {edge_length_mm: 3.0}
 mesh: {order: 1, surface_edge_mm: 3.0, core_edge_mm: 6.0, mesher: tetgen, max_surface_distance_mm: 1.5}
-folding: {thickness_mm: 4.0, step_s: 302400, ranks: 2}
+start: all
+folding: {end_week: 22, thickness_mm: 4.0, step_s: 302400, ranks: 2}
 metrics: {curvature_radius_mm: 7.0, spangy_modes: 60}
 runs: {reference: {}}
 STUDY

@@ -63,9 +63,10 @@ def error_message(error: BaseException) -> Message:
     if isinstance(error, KeyboardInterrupt):
         return Message("error", STOPPED, exit_code=INTERRUPTED)
     if isinstance(error, MemoryError):
-        text = f"memory ran out ({error}). Free memory, or run fewer jobs at once"
+        cause = f" ({error})" if str(error) else ""
+        text = f"memory ran out{cause}. Free memory, or run fewer jobs at once"
         return Message("error", text, exit_code=KILLED)
-    raised = traceback.format_exception_only(error)[-1].strip()
+    raised = "".join(traceback.format_exception_only(error)).strip()
     return Message("error", f"unexpected {raised}", exit_code=1)
 
 

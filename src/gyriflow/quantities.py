@@ -26,13 +26,14 @@ class Shown(Flag):
     NORMS = auto()  # chart of norms (norms_figure)
     REGIONS = auto()  # chart of regions (regions_chart)
     BRAINS = auto()  # the report's table of brains (brain_rows)
+    SHEET = auto()  # the first sheet of a brain's page (brain_page)
     PREDICTION = auto()  # the report's table of a predicted brain (predicted_table)
     INTERVALS = auto()  # intervals of ensembles (interval_table, intervals_figure)
     SIZE = auto()  # relative difference of a sweep's runs (member_comparison)
     WHITE = auto()  # also of white surfaces, as `white_…` (measure_white)
 
 
-CHART, NORMS, REGIONS, BRAINS, PREDICTION, INTERVALS, SIZE, WHITE = Shown
+CHART, NORMS, REGIONS, BRAINS, SHEET, PREDICTION, INTERVALS, SIZE, WHITE = Shown
 NOWHERE = Shown(0)
 
 
@@ -253,25 +254,36 @@ COMPARED_MAPS = ("shape_index", "mean_curvature")
 
 _SIZES = (
     Metric(
-        "volume", "mL", "volume", CHART | NORMS | BRAINS | PREDICTION | INTERVALS | SIZE
+        "volume",
+        "mL",
+        "volume, with ventricles",
+        CHART | NORMS | BRAINS | SHEET | PREDICTION | INTERVALS | SIZE,
     ),
+    Metric("volume_tissue", "mL", "volume of tissue", SHEET),
+    Metric("volume_ventricles", "mL", "volume of ventricles", SHEET),
+    Metric("volume_cortex", "mL", "volume of cortex"),
     Metric(
         "area",
         "cm2",
         "pial area",
-        CHART | NORMS | REGIONS | BRAINS | PREDICTION | INTERVALS | SIZE | WHITE,
+        CHART
+        | NORMS
+        | REGIONS
+        | BRAINS
+        | SHEET
+        | PREDICTION
+        | INTERVALS
+        | SIZE
+        | WHITE,
     ),
     Metric("area_share", "1", "area share"),
     # cm² over mL^(2/3) is a number
     Metric("relative_area", "1", "area / volume^(2/3)", PREDICTION),
-    Metric("volume_tissue", "mL", "volume of tissue"),
-    Metric("volume_ventricles", "mL", "volume of ventricles"),
-    Metric("volume_cortex", "mL", "volume of cortex"),
     Metric("area_ratio", "1", "area ratio", has_norm=False),
     Metric("crossing_faces", "1", "crossing faces", has_norm=False, is_reported=False),
 )
-_GYRIFICATION = CHART | NORMS | BRAINS | PREDICTION | INTERVALS | SIZE | WHITE
-_DEPTH = CHART | NORMS | REGIONS | BRAINS | PREDICTION | INTERVALS | WHITE
+_GYRIFICATION = CHART | NORMS | BRAINS | SHEET | PREDICTION | INTERVALS | SIZE | WHITE
+_DEPTH = CHART | NORMS | REGIONS | BRAINS | SHEET | PREDICTION | INTERVALS | WHITE
 _FOLDING = (
     Metric("gyrification_index", "1", "gyrification index, hulls", _GYRIFICATION),
     Metric(
@@ -311,7 +323,7 @@ _THICKNESS = (
         "mean_thickness",
         "mm",
         "mean cortical thickness",
-        CHART | NORMS | REGIONS | BRAINS,
+        CHART | NORMS | REGIONS | BRAINS | SHEET,
     ),
     Metric("thickness_sd", "mm", "cortical thickness, SD"),
     Metric("thickness_q05", "mm", "thickness q05", is_reported=False),

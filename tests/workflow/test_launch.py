@@ -8,6 +8,7 @@ import pwd
 import re
 import sys
 import threading
+from types import SimpleNamespace
 
 import pytest
 from facts import Facts
@@ -15,13 +16,14 @@ from mpi4py import MPI
 from processes import ran
 
 from gyriflow.errors import InputError, StorageError
-from gyriflow.folding.__main__ import locked
+from gyriflow.folding.__main__ import locked as locked_simulation
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
+from gyriflow.running import launch
 from gyriflow.running.launch import (
-    clear_stale_lock,
     end_scheduler_timers,
     hold_lock,
+    locked,
     main,
     set_user_name,
     stop_jobs,
@@ -89,9 +91,49 @@ def stale(directory):
 
 def test_a_stale_lock_is_cleared(tmp_path, capsys):
     lock = stale(tmp_path)
-    clear_stale_lock(tmp_path)
-    assert not lock.exists()
+    with locked(tmp_path):
+        assert not lock.exists()
+        assert hold_lock(tmp_path) is None
+        # a command locks the directory, and its run once more
+        with locked(tmp_path):
+            pass
+        assert hold_lock(tmp_path) is None
     assert capsys.readouterr().err == Facts("gyriflow:", "lock")
+    with hold_lock(tmp_path):
+        pass
+
+
+def test_a_run_is_locked_before_it_reads_the_rules_that_write_its_plan(
+    tmp_path, monkeypatch
+):
+    seen = []
+    monkeypatch.setattr(
+        launch, "plan_and_run", lambda _: seen.append(hold_lock(tmp_path)) or 0
+    )
+    with launching(tmp_path):
+        assert main(["--cores", "1", "--directory", str(tmp_path)]) == 0
+        assert main(["-n", "--directory", str(tmp_path)]) == 0
+    first, dry = seen
+    assert first is None
+    # it only looks
+    dry.close()
+
+
+def test_a_second_pass_keeps_the_directory_locked_if_the_first_one_is_killed(
+    tmp_path, monkeypatch
+):
+    def popen(*_, pass_fds, **__):
+        handed_on.extend(map(os.dup, pass_fds))
+        return SimpleNamespace(wait=lambda: 0)
+
+    handed_on = []
+    monkeypatch.setattr(launch.subprocess, "Popen", popen)
+    with locked(tmp_path):
+        assert launch._finish_without({"a": "cause"}, [], tmp_path) == 0
+    assert hold_lock(tmp_path) is None
+    for number in handed_on:
+        os.close(number)
+    hold_lock(tmp_path).close()
 
 
 def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_look(
@@ -117,9 +159,9 @@ def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     locks.UNLOCKABLE.clear()
     lock = stale(tmp_path)
-    clear_stale_lock(tmp_path)
-    assert lock.exists()
-    with locked(tmp_path / "folding"), form_compiler(MPI.COMM_SELF):
+    with locked(tmp_path):
+        assert lock.exists()
+    with locked_simulation(tmp_path / "folding"), form_compiler(MPI.COMM_SELF):
         warned = capsys.readouterr().err
     assert warned == Facts(
         "gyriflow: warning:",

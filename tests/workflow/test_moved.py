@@ -11,6 +11,9 @@ from processes import ran
 from scan_trees import make_tree
 from shapes import phantom, save_labels
 
+from gyriflow.cli.init import write_bids
+from gyriflow.cli.recognition import recognise
+
 from .conftest import SMALL_STUDY, Workflow
 
 pytestmark = pytest.mark.slow
@@ -89,7 +92,9 @@ def test_a_moved_data_set_is_up_to_date_for_measuring_and_for_the_bids_app(
     )
     bids = ("data", "out", "group", "-n")
     measure = ("measure", "data", "-d", "measured", "-n")
-    commands(workflow, *bids)
+    config = workflow.directory / "out" / "work" / "gyriflow.yaml"
+    data = workflow.directory / "data"
+    write_bids(recognise(data), data, config, config)
     commands(workflow, "init", "data")
     for directory, config, targets in (
         ("out/work", "out/work/gyriflow.yaml", ("all", "export")),

@@ -42,3 +42,19 @@ def test_the_wide_table_says_who_was_scanned_beside_the_covariates(workflow):
         "b22": {"person": "x", "sex": "F"},
         "single": {"person": "single"},
     }
+
+
+@pytest.mark.parametrize(
+    ("subjects", "has_growth"),
+    # two scans of one fetus; a fetus each; unknown
+    [(("x", "x"), True), (("x", "y"), False), ((None, None), False)],
+)
+def test_only_scans_of_one_subject_have_a_figure_of_growth(
+    tmp_path, subjects, has_growth
+):
+    brains = [
+        brain | ({"subject": subject} if subject else {})
+        for brain, subject in zip(SHAPES, subjects, strict=True)
+    ]
+    figures, _ = planned_figures(tmp_path, {"brains": brains})
+    assert ("growth_figure" in {figure.name for figure in figures}) == has_growth

@@ -11,7 +11,7 @@ from gyriflow.study.atlases import known_checksums
 from gyriflow.study.brains import label_source, registered_source
 from gyriflow.study.paths import *
 from gyriflow.study.study import read_plan, write_plan
-from gyriflow.running.launch import MEASURE_ONLY_VAR, hold_lock, refused_brains, session
+from gyriflow.running.launch import MEASURE_ONLY_VAR, refused_brains, session
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.running.snakemake_internals import remove_stale
 
@@ -97,11 +97,6 @@ if PRINTS:
             messages.append((row.brain, f"left out: {row.cause}"))
     for line, _ in grouped(messages):
         print(f"gyriflow: {line}", file=sys.stderr)
-
-# held as long as this process lives, so that `gyriflow.running.launch` can distinguish a live from an interrupted run
-if RUNS:
-    LOCK = hold_lock(Path.cwd())
-
 
 # the environment of each rule, for Snakemake's software deployment with conda
 ENVIRONMENT = f"{workflow.basedir}/envs/gyriflow.yaml"

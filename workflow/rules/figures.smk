@@ -28,9 +28,9 @@ SECTIONS = {
     "Resources": ["study_resources"],
 }
 # those of the page of each brain
-BRAIN_SECTIONS = {"Metrics": ["brain_maps", "brain_regions"], "Quality": ["quality_page"]}
+BRAIN_SECTIONS = {"Quality": ["quality_page"], "Metrics": ["brain_depth", "brain_maps", "brain_regions"]}
 # the first of these that there is stands at the top of a page
-IN_SUMMARY = ("predicted_figure", "weekly_figure", "brain_maps")
+IN_SUMMARY = ("predicted_figure", "weekly_figure", "brain_depth")
 # collapsed in the report
 TECHNICAL = ("mesh_quality", "run_tables", "study_resources")
 # the files of each figure of this study, and the values of the wildcards in them, of each brain, run or sweep that has one
@@ -92,6 +92,10 @@ def files_in_grid(grid):
 
 show(
     {"quality_page": [f"{BRAIN}/figures/quality.png", f"{BRAIN}/figures/quality.pdf"]},
+    names_of(BRAINS.values()),
+)
+show(
+    {"brain_depth": [f"{BRAIN}/figures/depth.png", f"{BRAIN}/figures/depth.pdf"]},
     names_of(BRAINS.values()),
 )
 show(
@@ -177,7 +181,7 @@ HAS_FEW_SERIES = len(study.series) <= MAX_SERIES
 
 def common_growth_rate():
     """Return the growth rate or its curve, if all runs that have one share it."""
-    # runs that follow sizes or shapes have no given rate
+    # other growth models have no rate, or change it
     rates = [
         simulation.settings.growth_rate_per_s
         for simulation in study.simulations.values()
@@ -190,7 +194,10 @@ def common_growth_rate():
     return dict(rates[0].weeks or {}) if rates[0].map is None else None
 
 
-if study.growth_brains and (HAS_FEW_SERIES or study.run_simulations):
+# without rates, brains of different weeks are different fetuses, and the charts of metrics have their sizes
+HAS_RATES = any(series.has_rates and len(series.brains) > 1 for series in study.series.values())
+
+if study.growth_brains and (study.run_simulations or (HAS_RATES and HAS_FEW_SERIES)):
 
     rule growth_figure:
         input:
@@ -412,8 +419,11 @@ rule zones_figure:
 
 show(rules.zones_figure.output, names_of(ZONED))
 
-BY_RATE = [
-    simulation for simulation in study.run_simulations if simulation.has_growth_rate and not simulation.maps
+# growth that follows measured sizes differs by step, and that towards shapes by element
+BY_LAW = [
+    simulation
+    for simulation in study.run_simulations
+    if simulation.settings.growth.definition.measured is None and not simulation.maps
 ]
 
 
@@ -424,14 +434,14 @@ rule model_figure:
     output:
         model_figure=multiext(f"{RUN}/figures/model", ".png", ".pdf"),
     wildcard_constraints:
-        **only(BY_RATE),
+        **only(BY_LAW),
     params:
         **drawn_by("sections"),
     script:
         "../scripts/figures.py"
 
 
-show(rules.model_figure.output, names_of(BY_RATE))
+show(rules.model_figure.output, names_of(BY_LAW))
 
 if study.run_simulations:
 

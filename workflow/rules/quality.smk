@@ -21,6 +21,8 @@ rule brain_figures:
     output:
         quality=f"{BRAIN}/figures/quality.png",
         quality_pdf=f"{BRAIN}/figures/quality.pdf",
+        depth=f"{BRAIN}/figures/depth.png",
+        depth_pdf=f"{BRAIN}/figures/depth.pdf",
         maps=f"{BRAIN}/figures/shape_index.png",
         maps_pdf=f"{BRAIN}/figures/shape_index.pdf",
         small=f"{BRAIN}/figures/small.png",
@@ -53,7 +55,7 @@ rule quality_table:
     output:
         f"{STUDY}/quality.csv",
     params:
-        refused=list(map(left_out_row, WITHOUT_SURFACE)),
+        left_out=list(map(left_out_row, WITHOUT_SURFACE)),
         # rows of a table that cannot be used come last
         order=[brain.id for brain in CONFIG.brains],
     script:

@@ -24,7 +24,7 @@ def descriptions(brains):
 
 
 # figures that need not be asked for: of this rule, and those that are made with the rows of the quality table
-MADE_WITH_OTHERS = ("study_resources", "quality_page", "brain_maps")
+MADE_WITH_OTHERS = ("study_resources", "quality_page", "brain_depth", "brain_maps")
 
 
 # also of the report's own tables, so that they exist if the page cannot be made
@@ -38,6 +38,8 @@ rule study_records:
         run_params=study.files(PARAMETERS),
         summaries=study.files(FOLDING["summary"]),
         template=f"{PAGE}/methods.rst",
+        atlases=f"{workflow.basedir}/norms/atlases.yaml",
+        differences=rules.metrics_tables.output.atlas_differences,
     output:
         resources=f"{STUDY}/resources.csv",
         resources_page=f"{STUDY}/resources.html",
@@ -139,6 +141,7 @@ rule html_report:
         quality=rules.quality_table.output[0],
         metrics=f"{STUDY}/metrics.csv",
         centiles=rules.metrics_tables.output.centiles,
+        curves=rules.metrics_tables.output.atlas_curves,
         differences=rules.metrics_tables.output.atlas_differences,
         warnings=rules.study_records.output.warnings,
         runs=rules.run_tables.output.csv if study.run_simulations else [],

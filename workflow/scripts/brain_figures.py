@@ -2,14 +2,14 @@
 pictures."""
 
 from gyriflow.anatomy.plausible import expected_volume_ml
-from gyriflow.anatomy.thickness import posed_whites
+from gyriflow.anatomy.thickness import hides_area, is_inaccurate, posed_whites
 from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_volume_map
 from gyriflow.messages import read_messages
-from gyriflow.report.pictures import brain_maps, small_pictures
+from gyriflow.report.pictures import brain_depth, brain_maps, small_pictures
 from gyriflow.report.quality import (
     QualityBrain,
     quality_page,
@@ -45,12 +45,15 @@ with step(snakemake.log[0]):
         )
     )
     expected = expected_volume_ml(report["week"])
+    measured = read_json(files.measured) if files.measured else {}
     row = quality_row(
         params.columns,
         report,
-        read_json(files.measured) if files.measured else {},
+        measured,
         warnings,
         expected,
+        thickness_is_inaccurate=is_inaccurate(measured),
+        area_is_lower_bound=hides_area(measured),
     )
     brain = QualityBrain(
         surface, report["fissure_x_mm"], thickness, white, image, tissues
@@ -63,10 +66,12 @@ with step(snakemake.log[0]):
             strict=True,
         )
     ]
+    depth = brain_depth(halves, sides=params.sides)
     maps = brain_maps(halves, sides=params.sides)
     notes = [report["hindbrain"]] if "hindbrain" in report else []
     page = quality_page(brain, row, warnings, notes)
     write_figure(output.quality, output.quality_pdf, page)
+    write_figure(output.depth, output.depth_pdf, depth)
     write_figure(output.maps, output.maps_pdf, maps)
     write_figure(
         output.small,

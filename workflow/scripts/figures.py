@@ -6,7 +6,7 @@ from inspect import signature
 
 import pandas as pd
 
-from gyriflow.folding.zones import model_fields, zones_of_run
+from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure, write_html
@@ -38,6 +38,10 @@ def _read_boundary(path):
 def _read_elements(frames):
     """Return the elements of a run, and the fields of the model at its first and last
     week."""
+    # only here, as importing them takes half a second of each figure
+    from gyriflow.folding.growth import GrowthInputs, StepStart, model_fields
+    from gyriflow.folding.growth_models import growth_model
+
     parameters = _read_parameters(files.parameters)
     weeks = read_weeks(frames)
     mesh = TetrahedralMesh(
@@ -45,10 +49,12 @@ def _read_elements(frames):
         read_tets(frames),
     )
     zones = zones_of_run(mesh, parameters)
+    model = growth_model(parameters, GrowthInputs(mesh, zones, {}))
+    growth = model(StepStart(mesh.vertices, 0.0, parameters.step_s))
     fields = {}
     for week in (weeks[0], weeks[-1]):
-        positions = read_positions(frames, week)
-        fields[week] = model_fields(zones, positions, parameters, week)
+        positions_mm = read_positions(frames, week)
+        fields[week] = model_fields(growth, zones, positions_mm, week)
     return mesh.tets, fields
 
 
@@ -79,13 +85,15 @@ def read(name, paths):
 
 
 def read_brain(placed):
-    """Return a brain of a grid with its surfaces, and their maps or regions."""
+    """Return a brain of a grid with its surfaces, and their maps or regions.
+
+    `placed` are its files and its place in the grid; it may have no maps.
+    """
     contents = [{} for _ in placed["surfaces"]]
     for number, path in enumerate(placed["maps"]):
         is_regions = path.endswith(".label.gii")
-        contents[number] = (read_vertex_labels if is_regions else read_vertex_maps)(
-            path
-        )
+        read = read_vertex_labels if is_regions else read_vertex_maps
+        contents[number] = read(path)
     surfaces = [read_surface(path) for path in placed["surfaces"]]
     halves = list(zip(surfaces, contents, strict=True))
     return GridBrain(

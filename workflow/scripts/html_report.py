@@ -25,6 +25,7 @@ TABLES = (
     "quality",
     "metrics",
     "centiles",
+    "curves",
     "differences",
     "warnings",
     "runs",

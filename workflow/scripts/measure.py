@@ -21,30 +21,31 @@ from gyriflow.step import step
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 settings = dict(params.settings)
 with step(snakemake.log[0]):
-    brain = files
+    surfaces = files
     if files.get("frames"):
-        regions, brain = read_regions(files.regions), output
+        regions = read_regions(files.regions)
+        surfaces = output
         positions = read_positions(files.frames, params.columns["week"])
         whole, left, right = folded_surfaces(regions, positions)
         write_brain(output, whole, left, right)
         depth = depth_of_weight(regions.fields["cortex_weight"])
         thickness = simulated_thickness(regions.mesh, depth, positions, whole)
         write_vertex_maps(output.thickness, {"thickness_mm": thickness})
-    if brain.get("thickness"):
-        (settings["thickness_mm"],) = read_vertex_maps(brain.thickness).values()
-    if brain.get("report"):
-        settings["label_volumes_ml"] = read_json(brain.report).get(
+    if surfaces.get("thickness"):
+        (settings["thickness_mm"],) = read_vertex_maps(surfaces.thickness).values()
+    if surfaces.get("report"):
+        settings["label_volumes_ml"] = read_json(surfaces.report).get(
             "label_volumes_mL", {}
         )
     left, right = (
-        read_surface(brain[side]) if brain.get(side) else None for side in SIDES
+        read_surface(surfaces[side]) if surfaces.get(side) else None for side in SIDES
     )
-    found = measure_brain(read_surface(brain.whole), left, right, **settings)
+    found = measure_brain(read_surface(surfaces.whole), left, right, **settings)
     maps = found.maps
     if files.get("fine"):
         # tables are of the finer surfaces, maps of those of the mesh, whose vertices
         # are the same in all weeks
-        mesh_surface = read_surface(brain.whole)
+        mesh_surface = read_surface(surfaces.whole)
         whole, left, right = map(read_surface, files.fine)
         match = match_surface(whole, mesh_surface)
         settings["thickness_mm"] = values_at(match, settings["thickness_mm"])

@@ -8,6 +8,6 @@ from gyriflow.step import step
 params = snakemake.params
 with step(snakemake.log[0]):
     table = quality_table(
-        [read_json(file) for file in snakemake.input], params.refused, params.order
+        [read_json(file) for file in snakemake.input], params.left_out, params.order
     )
     write_table(snakemake.output[0], table)

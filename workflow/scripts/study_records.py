@@ -11,6 +11,7 @@ from gyriflow.io.files import (
     files_in,
     fingerprints,
     read_json,
+    read_table,
     read_text,
     write_json,
     write_table,
@@ -110,9 +111,13 @@ with step(snakemake.log[0]):
     ]
     write_json(output.report, used | {"files": hashed})
     template = read_text(files.template)
+    # normal atlases that brains were compared with
+    atlases = read_yaml(files.atlases)["atlases"]
+    compared = read_table(files.differences)["atlas"].unique()
     methods = methods_text(
         template,
         runs=runs,
+        atlases={name: atlases[name]["reference"] for name in compared},
         software=used,
         **params.method,
     )

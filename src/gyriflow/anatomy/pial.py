@@ -586,7 +586,7 @@ def from_surface(
     else:
         brain.warn(plausible.require_whole(even.mesh, "surface"))
         pose = posing.pose_of_surface(even.mesh, coordinates)
-    # "lps" if these were found, else the configured coordinates
+    # files that were found in LPS are turned to RAS+, volumes are in RAS+ already
     brain.report["coordinates"] = (
         coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
     )
@@ -597,19 +597,16 @@ def from_surface(
         even,
         mesh=triangles.transformed(even.mesh, pose.of_file()),
     )
-    named = coordinates != "auto"
-    plane = fissure.mid_plane(even.mesh, named=named)
+    is_configured = coordinates != "auto"
+    plane = fissure.mid_plane(even.mesh, named=is_configured)
     heights = fissure.fissure_between(even.mesh, plane).height_above(
         triangles.corners(even.mesh).mean(axis=1)
     )
     is_left = fissure.left_faces(even.mesh, heights)
-    if all(
-        map(
-            triangles.is_closed,
-            fissure.cut_sides(even.mesh, is_left),
-        )
-    ):
-        return _two_pieces(even, is_left, plane, pose, brain, named=named)
+    sides = fissure.cut_sides(even.mesh, is_left)
+    # sides that share no edge need no cut
+    if all(triangles.is_closed(side) for side in sides):
+        return _two_pieces(even, is_left, plane, pose, brain, named=is_configured)
     return _two_sides(even, is_left, plane, pose, brain)
 
 

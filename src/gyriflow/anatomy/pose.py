@@ -80,10 +80,10 @@ class PosedShape:
     """A right hemisphere, a mirrored left one, or a brain, by its `kind`, with the pose
     estimated from its shape.
 
-    `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from
-    the centre of volume. `residual` is in sizes; `confidence` is that of the next best
-    pose over it, `side_ratio` that of the mirrored shape, which `mirrored_rotation`
-    leads to RAS+.
+    `rotation` (3, 3) leads to RAS+, where the medial wall faces −x and is at x =
+    `wall_mm`, which is negative, from the centre of volume. `residual` is in sizes;
+    `confidence` is that of the next best pose over it, `side_ratio` that of the
+    mirrored shape, which `mirrored_rotation` leads to RAS+.
     """
 
     kind: Literal["hemisphere", "brain"]
@@ -107,13 +107,17 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
     templates = template.template_shapes("hemisphere")
     fit, confidence = template.register_from_all_sides(shape, templates)
     mirrored, _ = template.register_from_all_sides(shape.mirrored(), templates)
-    normal, offset = template.medial_wall(shape, -fit.rotation[0])
+    # −x of RAS+ in the coordinates of the shape
+    to_medial = -fit.rotation[0]
+    normal, offset = template.medial_wall(shape, to_medial)
+    # the smallest turn that makes the wall face −x exactly
     turn, _ = Rotation.align_vectors(
         [[-1.0, 0.0, 0.0]],
         [fit.rotation @ normal],
     )
     side_ratio = mirrored.residual / fit.residual
-    rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
+    rotation = turn.as_matrix() @ fit.rotation
+    wall_mm = -offset * shape.size_mm
     return PosedShape(
         "hemisphere",
         shape,

@@ -246,19 +246,36 @@ def thickness_from_labels(
         log.warning(
             "the cortex is %.1f mm thick on average: are its labels correct?", mean
         )
-    if (voxels := thickness.report["voxels_through_cortex"]) < MIN_VOXELS:
+    if is_inaccurate(thickness.report):
         log.warning(
             "the labels of the cortex are %.1f voxels thick: its thickness is"
             " inaccurate",
-            voxels,
+            thickness.report["voxels_through_cortex"],
         )
-    elif (ratio := thickness.report["area_ratio"]) < MIN_AREA_RATIO:
+    if hides_area(thickness.report):
         log.warning(
             "the pial area is %.2f of a complete surface's around this cortex: %s",
-            ratio,
+            thickness.report["area_ratio"],
             HIDDEN,
         )
     return thickness
+
+
+def is_inaccurate(report: Mapping[str, Any]) -> bool:
+    """Return whether the cortex is too thin for its voxels, by the report of its
+    thickness."""
+    return report.get("voxels_through_cortex", MIN_VOXELS) < MIN_VOXELS
+
+
+def hides_area(report: Mapping[str, Any]) -> bool:
+    """Return whether a part of the pial surface is hidden in fused sulci, by the report
+    of its thickness.
+
+    It is not known where the thickness is inaccurate, as the complete surface is volume
+    over thickness.
+    """
+    ratio = report.get("area_ratio", MIN_AREA_RATIO)
+    return not is_inaccurate(report) and ratio < MIN_AREA_RATIO
 
 
 def summary(

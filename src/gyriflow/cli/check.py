@@ -5,7 +5,7 @@ import math
 import shutil
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
 from functools import cache
 from pathlib import Path
@@ -82,11 +82,13 @@ def check_study(
     stages: Sequence[str] = (),
     *,
     name: Path | None = None,
+    age_sources: Mapping[str, str] | None = None,
 ) -> Iterator[tuple[str, int]]:
     """Yield lines on a study, its files and what would run up to some stages, each with
     its number of problems.
 
-    `name` stands for a temporary configuration.
+    `name` stands for a temporary configuration; `age_sources` say where its ages come
+    from, by brain.
     """
     # takes half a second, which other commands need not wait for
     from .inputs import check_other_files, input_facts
@@ -130,7 +132,7 @@ def check_study(
         yield from work_of(path, directory, cores, options, study)
     for line in commented_scans(path):
         yield f"not used: {line}", 0
-    for line in scan_lines(_scans(study, problems)):
+    for line in scan_lines(_scans(study, problems, age_sources or {})):
         yield line, 0
 
 
@@ -353,7 +355,9 @@ def _memory_doubts(brain: BrainConfig) -> list[str]:
 
 
 def _scans(
-    study: Study, problems: Sequence[tuple[str, str, bool]]
+    study: Study,
+    problems: Sequence[tuple[str, str, bool]],
+    age_sources: Mapping[str, str],
 ) -> Iterator[ScanRow]:
     config = study.config
     verdicts = {}
@@ -363,7 +367,7 @@ def _scans(
         else:
             verdicts.setdefault(brain_id, "warning")
     for brain in config.brains:
-        source = config.age_sources.get(brain.id)
+        source = age_sources.get(brain.id) or config.age_sources.get(brain.id)
         if not source and brain.id in study.atlases:
             source = study.atlases[brain.id].atlas.name
         files = [Path(file).name for file in brain.files]

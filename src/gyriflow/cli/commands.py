@@ -5,7 +5,8 @@ import os
 import shlex
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,10 @@ BIDS_LABEL_OPTIONS = (
     "--session_label",
 )
 """Options of BIDS apps with several values after each other."""
+NOTHING_TO_FOLD = (
+    "gyriflow: --fold: no subject has several scans, so none is folded. To fold others,"
+    " name start and folding.end_week in --settings."
+)
 REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 """Options of Snakemake with which jobs run on other machines."""
 
@@ -353,15 +358,22 @@ def check(
     gyriflow.yaml by default. A FOLDER without gyriflow.yaml is checked as `gyriflow
     measure` would measure it.
     """
+    from ..running.launch import MEASURE_ONLY_VAR
     from .check import check_study
+    from .init import write_configuration
 
     is_folder = data is not None and data.is_dir() and not (data / CONFIG).exists()
     problems = 0
+    age_sources = {}
     with TemporaryDirectory() as scratch:
         if data is not None and is_folder:
             config = Path(scratch) / CONFIG
-            found = _write_measured(data, config, **selection)
+            os.environ[MEASURE_ONLY_VAR] = "1"
+            found = _recognise(data, **selection)
+            write_configuration(found, data, config, only_measured=True)
             problems += sum(bool(brain.causes) for brain in found.brains)
+            for brain in found.brains:
+                age_sources[brain.entry["id"]] = brain.age_source
             _show_unused(found)
         else:
             _require_no_selection(data, **selection)
@@ -369,7 +381,12 @@ def check(
                 data / CONFIG if data is not None and data.is_dir() else data, directory
             )
         for line, bad in check_study(
-            config, directory, cores, stages, name=data if is_folder else None
+            config,
+            directory,
+            cores,
+            stages,
+            name=data if is_folder else None,
+            age_sources=age_sources,
         ):
             click.echo(line)
             problems += bad
@@ -380,20 +397,23 @@ def check(
         sys.exit(2)
 
 
-def _write_measured(
-    data: Path,
-    config: Path,
-    **selection: Any,
-) -> "FoundScans":
-    """Write a configuration to measure the brains of a folder, and have this process
-    fold nothing."""
-    from ..running.launch import MEASURE_ONLY_VAR
-    from .init import write_configuration
+@contextmanager
+def _place_to_write(
+    directory: Path, dry_run: bool, option: str = "--directory"
+) -> Iterator[Path]:
+    """Yield the working directory to write a configuration into, locked; for a dry run
+    a temporary folder.
 
-    os.environ[MEASURE_ONLY_VAR] = "1"
-    found = _recognise(data, **selection)
-    write_configuration(found, data, config, only_measured=True)
-    return found
+    StorageError if another run uses the directory; `option` names another one.
+    """
+    if dry_run:
+        with TemporaryDirectory() as scratch:
+            yield Path(scratch)
+        return
+    from ..running.launch import locked
+
+    with locked(directory, option):
+        yield directory
 
 
 def _require_no_selection(data: Path | None, **selection: Any) -> None:
@@ -453,16 +473,27 @@ def run(
         click.get_current_context().get_parameter_source("cores")
         == ParameterSource.DEFAULT
     )
-    if not (
-        default
-        and any(argument.partition("=")[0] in REMOTE_OPTIONS for argument in further)
-    ):
+    is_remote = any(
+        argument.partition("=")[0] in REMOTE_OPTIONS for argument in further
+    )
+    if not (default and is_remote):
         options += ["--cores", str(cores)]
+    elif dry_run:
+        cores = _remote_cores(further, cores)
     sys.exit(
         _run(
             config, directory, cores, dry_run, options, *stages, *further[int(named) :]
         )
     )
+
+
+def _remote_cores(further: Sequence[str], default: int) -> int:
+    """Return the cores for the forecast of jobs on other machines: one for each of the
+    jobs that run at the same time."""
+    from ..running.snakemake_internals import max_jobs, shorten_usage_errors
+
+    shorten_usage_errors()
+    return max_jobs(further) or default
 
 
 def _run(
@@ -520,20 +551,25 @@ def measure(
     first failure.
     """
     from ..running.launch import MEASURE_ONLY_VAR
-    from .init import commented_scans
+    from .init import commented_scans, write_configuration
 
     config = data / CONFIG if data.is_dir() else data
     os.environ[MEASURE_ONLY_VAR] = "1"
     refused = 0
-    with TemporaryDirectory() as scratch:
-        if not config.exists():
-            config = Path(scratch) / CONFIG if dry_run else config
-            refused = _show_scans(_write_measured(data, config, **selection))
-        else:
-            _require_no_selection(data, **selection)
-            for line in commented_scans(config) if data.is_dir() else ():
-                click.echo(f"not used, by {config}: {line}")
-                refused = InputError.exit_code
+    found = None
+    if not config.exists():
+        found = _recognise(data, **selection)
+    else:
+        _require_no_selection(data, **selection)
+        for line in commented_scans(config) if data.is_dir() else ():
+            click.echo(f"not used, by {config}: {line}")
+            refused = InputError.exit_code
+    with _place_to_write(directory, dry_run) as place:
+        if found is not None:
+            # a dry run writes nothing beside the data
+            config = place / CONFIG if dry_run else config
+            write_configuration(found, data, config, only_measured=True)
+            refused = _show_scans(found)
         code = _run(
             config,
             directory,
@@ -621,16 +657,26 @@ def predict(
     where the predicted surfaces and labels are. After an interruption, the same command
     resumes.
     """
-    from .init import write_prediction
+    from .init import predicted_study, write_prediction
 
-    with TemporaryDirectory() as scratch:
-        config = Path(scratch if dry_run else directory) / CONFIG
+    force = settings.pop("force")
+    prediction = predicted_study(files, (week, until), **settings)
+    for line in prediction.warnings:
+        click.echo(line)
+    shown_path = directory / CONFIG
+    with _place_to_write(directory, dry_run) as place:
         for line in write_prediction(
-            config, directory / CONFIG, files, (week, until), **settings
+            prediction, place / CONFIG, shown_path, force=force
         ):
             click.echo(line)
         code = _run(
-            config, directory, cores, dry_run, ["--cores", str(cores)], "all", "export"
+            place / CONFIG,
+            directory,
+            cores,
+            dry_run,
+            ["--cores", str(cores)],
+            "all",
+            "export",
         )
     sys.exit(code)
 
@@ -705,22 +751,30 @@ def bids(
     found = _recognise(
         data, **{key: value for key, value in selection.items() if key not in folding}
     )
-    brains = write_bids(found, data, config, **folding)
-    if level == "participant" and not dry_run:
-        store_options(options, selection)
-    work_to_do = (
-        "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
-    )
-    scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
-    click.echo(f"{scans} to {work_to_do}: {', '.join(brains)}")
-    click.echo(f"configuration: {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
-    code = _run(
-        config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets
-    )
-    if not dry_run and (exported / "dataset_description.json").is_file():
-        publish_derivatives(exported, out, data, brains, whole=level == "group")
-        click.echo(f"derivatives: {out}")
+    with _place_to_write(work, dry_run, "--work-dir") as place:
+        brains, folded = write_bids(found, data, place / CONFIG, config, **folding)
+        if level == "participant" and not dry_run:
+            store_options(options, selection)
+        scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
+        click.echo(f"{scans} to measure: {', '.join(brains)}")
+        if folded:
+            click.echo(f"{len(folded)} of them to fold: {', '.join(folded)}")
+        elif selection["fold"]:
+            click.echo(NOTHING_TO_FOLD, err=True)
+        if not dry_run:
+            click.echo(f"configuration: {config}")
+        code = _run(
+            place / CONFIG,
+            work,
+            cores,
+            dry_run,
+            ["--cores", str(cores), "--keep-going"],
+            *targets,
+        )
+        if not dry_run and (exported / "dataset_description.json").is_file():
+            publish_derivatives(exported, out, data, brains, whole=level == "group")
+            click.echo(f"derivatives: {out}")
     refused = _show_scans(found, {} if dry_run else measured_verdicts(work))
     sys.exit(code or refused)
 

@@ -2,7 +2,8 @@
 or for a BIDS data set."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from string import Template
@@ -20,6 +21,7 @@ from ..settings.base import own_name, validated
 from ..settings.brains import BrainConfig
 from ..settings.growth import BEFORE_GW
 from ..settings.root import FOLDING_SECTIONS
+from ..settings.runs import chosen_starts
 from ..shipped import SHIPPED
 from ..study.loading import load
 from ..study.series import unmatched_reason
@@ -141,9 +143,16 @@ def _grouped_causes(scans: Iterable[tuple[str, str]]) -> list[str]:
     return [line for line, _ in grouped(messages)]
 
 
-def write_prediction(
-    path: Path,
-    shown_path: Path,
+@dataclass(frozen=True)
+class PredictedStudy:
+    """The configuration that predicts a brain, what it says, and warnings about it."""
+
+    text: str
+    description: str
+    warnings: list[str]
+
+
+def predicted_study(
     files: Sequence[Path],
     weeks: tuple[float, float],
     *,
@@ -155,18 +164,16 @@ def write_prediction(
     accepted: bool,
     ensemble: int | None,
     quick: bool,
-    force: bool,
-) -> Iterator[str]:
-    """Write a configuration that folds a brain by the growth of an atlas; yield lines
-    about it.
+) -> PredictedStudy:
+    """Return a configuration that folds a brain by the growth of an atlas.
 
     `files` are its label volume or pial surfaces; `weeks` are the week of the brain and
     the week to predict; `folder` has the atlas' files; `accepted` is about its licence.
-    InputError if anything is missing, or if the configuration at `shown_path` exists
-    with different content and `force` is not set.
+    InputError if anything is missing.
     """
+    warnings = []
     if atlas is None:
-        yield (
+        warnings.append(
             f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina"
             " bifida aperta and are not normal; unoperated ones end at 25 GW"
         )
@@ -207,7 +214,30 @@ def write_prediction(
     }
     config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
     load(config)
+    span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
+    given = entry.get(
+        "scheme",
+        f"pial{' and white' if white else ''} surfaces",
+    )
+    names = (
+        ", ".join(
+            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
+        )
+        or files[0]
+    )
     text = yaml.safe_dump(config, sort_keys=False)
+    return PredictedStudy(text, f"{entry['id']}: {names} ({given}), {span}", warnings)
+
+
+def write_prediction(
+    prediction: PredictedStudy, path: Path, shown_path: Path, *, force: bool
+) -> Iterator[str]:
+    """Write the configuration of a prediction; yield lines about it.
+
+    InputError if the one at `shown_path` exists with different content and `force` is
+    not set.
+    """
+    text = prediction.text
     if (
         shown_path.exists()
         and shown_path.read_text(encoding="utf-8") != text
@@ -220,18 +250,7 @@ def write_prediction(
     if kept := _keep_other(path, text):
         yield f"the earlier configuration is now {kept}"
     write_text(path, text)
-    span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
-    given = entry.get(
-        "scheme",
-        f"pial{' and white' if white else ''} surfaces",
-    )
-    names = (
-        ", ".join(
-            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
-        )
-        or files[0]
-    )
-    yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
+    yield f"{prediction.description}; configuration: {shown_path}"
 
 
 def with_earlier_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:
@@ -262,16 +281,19 @@ def write_bids(
     found: FoundScans,
     folder: Path,
     path: Path,
+    shown_path: Path,
     *,
     settings: str | None = None,
     fold: bool | None = None,
-) -> list[str]:
+) -> tuple[list[str], list[str]]:
     """Write a configuration for the scans of a BIDS data set that can be used; return
-    their ids.
+    their ids, and those of the folded ones. The one at `shown_path` has to be of an
+    earlier call.
 
-    `settings` is a configuration without brains. The scans are measured; with `fold`
-    the first of several scans of a subject is also folded. Scans without `sub-` in
-    their path become unused. InputError if no scan can be used.
+    `settings` is a configuration without brains. The scans are measured. With `fold`
+    those that `start` of the settings names are also folded, or else the first of
+    several scans of a subject. Scans without `sub-` in their path become unused.
+    InputError if no scan can be used.
     """
     with_subject = []
     for brain in found.brains:
@@ -298,39 +320,48 @@ def write_bids(
     require_bids_names(
         brain.entry.get("subject", brain.entry["id"]) for brain in brains
     )
-    youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     further = read_keys(Path(settings)) if settings else {}
     text: dict[str, Any] = {
         "brains": [_absolute(brain.entry, folder) for brain in brains]
     }
-    if fold:
-        series = _series(brains)
+    series = _series(brains)
+    if fold and (series or "start" in further):
         runs: dict[str, Any] = {"reference": {}}
         if series and all(_have_shapes(scans, folder) for scans in series):
             runs["measured"] = {"preset": "measured"}
         starts = [scans[0].entry["id"] for scans in series]
-        text |= {"start": starts or youngest, "runs": runs, **further}
-        weeks = _weeks(brains)
-        end_week = max(max(weeks), min(weeks) + 1)
-        text["folding"] = {"end_week": end_week} | (further.get("folding") or {})
+        text |= {"start": starts, "runs": runs, **further}
+        # without later scans it is not known how far to fold
+        end = {"end_week": _weeks(brains)[-1]} if series else {}
+        text["folding"] = end | (further.get("folding") or {})
     else:
         for key, value in further.items():
             if key not in FOLDING_SECTIONS:
                 text[key] = value
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
-    is_own = path.with_name(BIDS_OPTIONS).exists() or (
-        path.exists() and read_text(path).startswith(BIDS_HEAD)
+    is_own = shown_path.with_name(BIDS_OPTIONS).exists() or (
+        shown_path.exists() and read_text(shown_path).startswith(BIDS_HEAD)
     )
-    if path.exists() and not is_own:
+    if shown_path.exists() and not is_own:
         remedy = "Choose another folder with --work-dir."
         raise InputError(
             "was not written by gyriflow bids and is not replaced",
-            path=path,
+            path=shown_path,
             remedy=remedy,
         )
     write_text(path, BIDS_HEAD + yaml.safe_dump(text, sort_keys=False))
-    return [brain.entry["id"] for brain in brains]
+    names = [brain.entry["id"] for brain in brains]
+    return names, _folded(text, names)
+
+
+def _folded(config: Mapping[str, Any], names: Sequence[str]) -> list[str]:
+    """Return which brains a configuration folds, of all its `names`."""
+    starts: set[str] = set()
+    for section in (config, *(config.get("runs") or {}).values()):
+        start = (section or {}).get("start")
+        starts.update(chosen_starts(start, names))
+    return [name for name in names if name in starts]
 
 
 def _series(brains: Sequence[FoundBrain]) -> list[list[FoundBrain]]:

@@ -1038,8 +1038,8 @@ def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> 
 
 
 def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
-    """Yield the number of volumes of each chosen scheme, then contradictions to it and
-    to the other schemes."""
+    """Yield the number of volumes of each chosen scheme, then contradictions to it, and
+    the schemes that do not fit."""
     by_scheme: dict[str, list[FoundBrain]] = defaultdict(list)
     for brain in brains:
         by_scheme[brain.entry.get("scheme", UNSET)].append(brain)
@@ -1052,5 +1052,7 @@ def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
             for scheme, cause in (brain.fits or {}).items():
                 if cause:
                     causes[scheme] = cause
-        for scheme, cause in causes.items():
-            yield f"  but {cause}" if scheme == name else f"  not {scheme}: {cause}"
+        if name in causes:
+            yield f"  but {causes.pop(name)}"
+        if causes:
+            yield f"  label schemes that do not fit: {', '.join(causes)}"

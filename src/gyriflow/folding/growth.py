@@ -3,7 +3,7 @@ G, and growth by rates."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,7 @@ from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, area, signed_
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
+from .layers import PialSearch, cortical_weight
 from .tissue import Elements, Tissue
 from .zones import Zones
 
@@ -87,8 +88,7 @@ class StepStart:
 class StepGrowth(ABC):
     """Growth of tissue in one step.
 
-    `parameters` are those of the run, with the growth rates of this step, which are
-    written to frames.
+    `parameters` are those of the run, with the growth rates of this step.
     """
 
     parameters: FoldingParameters
@@ -96,7 +96,10 @@ class StepGrowth(ABC):
 
     @abstractmethod
     def inverse(self, tissue: Tissue) -> Floats:
-        """Return G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
+        """Return G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements.
+
+        For maps of growth, the elements are the mesh's vertices (`Tissue.at_vertices`).
+        """
 
     def deformation(self, elements: Elements) -> Floats | None:
         """Return R·G (c, q, 3, 3), the deformation of free tissue at the points of
@@ -181,6 +184,61 @@ def increments(
     tangential_growth = (tangential * weight + isotropic) * (growing * step_s)
     radial_growth = isotropic * (growing * step_s)
     return tangential_growth, radial_growth
+
+
+def growth_at_vertices(
+    growth: StepGrowth,
+    tissue: Tissue,
+    week: float,
+) -> tuple[Floats, Floats]:
+    """Return tangential and radial growth (n,), as stretches minus 1, from the tensor G
+    of a growth model for tissue at the vertices in the shape of a week.
+
+    G is that of a step of the length `step_s` with this week in its middle.
+    """
+    p = growth.parameters
+    start = replace(
+        growth.start,
+        positions_mm=tissue.places_mm,
+        time_s=(week - p.start_week) * SECONDS_PER_GW - p.step_s / 2,
+        step_s=p.step_s,
+    )
+    inverse = replace(growth, start=start).inverse(tissue)
+    tensors = np.linalg.inv(inverse[:, 0])
+    everywhere = np.ones(len(tensors), dtype=bool)
+    _, at_points = tissue.normals(everywhere)
+    normals = at_points[:, 0]
+    # n: vertex, ij: tensor
+    radial = np.einsum("ni,nij,nj->n", normals, tensors, normals)
+    tangential = (np.trace(tensors, axis1=1, axis2=2) - radial) / 2
+    return tangential - 1, radial - 1
+
+
+def model_fields(
+    growth: StepGrowth,
+    zones: Zones,
+    positions_mm: Floats,
+    week: float,
+) -> dict[str, Floats]:
+    """Return the fields of a run without maps at its nodes, with the (n, 3) positions
+    of a week.
+
+    They are positions, weight (of the cortex), growing (0 or 1), increment (tangential
+    growth in a step) and the normals (n, 3) of the pial surface at the nearest points.
+    """
+    pial = PialSearch(positions_mm, zones.cortex_facets)
+    distance_mm = pial.distance(positions_mm)
+    thickness_mm = value_at(growth.parameters.thickness_mm, week, {})
+    weight = cortical_weight(distance_mm, thickness_mm)
+    tissue = Tissue.at_vertices(positions_mm, zones, distance_mm, weight, {})
+    tangential, _ = growth_at_vertices(growth, tissue, week)
+    return {
+        "positions": positions_mm,
+        "weight": weight,
+        "growing": zones.growing,
+        "increment": tangential,
+        "normals": pial.nearest_normals(positions_mm),
+    }
 
 
 def layered_inverse(

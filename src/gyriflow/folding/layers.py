@@ -73,12 +73,14 @@ class PialSearch:
     ) -> Floats:
         """Return the distances of (k, 3) points to the pial triangles.
 
-        A distance beyond `reach` may be that to the nearest vertex instead. `to_vertex`
-        are the distances to the nearest vertices, if they have been computed before.
+        To save time, a distance beyond `reach` may be the one to the nearest vertex,
+        which is not smaller. `to_vertex` are the distances to the nearest vertices, if
+        they have been computed before.
         """
         if to_vertex is None:
             to_vertex, _ = self.tree.query(points)
         distance = to_vertex.copy()
+        # a point at a vertex is on the surface, at exactly 0
         near = (distance > 0) & self._within(distance, reach)
         if near.any():
             distance[near], _, _ = nearest_on(points[near], self.surface)

@@ -1,7 +1,7 @@
 """Output of a run: progress lines, and the fields of frames for ParaView."""
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
-from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
-from .growth import GrowthInputs, increments
+from .growth import GrowthInputs, StepGrowth, growth_at_vertices
 from .layers import PialSearch, cortical_weight, shear_modulus
 from .stretches import log_stretch, packed, unpacked
+from .tissue import Tissue
 from .zones import Zones
 
 log = logging.getLogger(__name__)
@@ -38,31 +38,41 @@ def print_line(
 def layer_fields(
     positions_mm: Floats,
     zones: Zones,
-    parameters: FoldingParameters,
+    growth: StepGrowth,
     maps: Maps,
     week: float,
-    names: Iterable[str],
+    names: Collection[str],
     log_growth: Floats | None = None,
 ) -> dict[str, NDArray]:
     """Return the fields of a shape at its vertices, for names of the parameter
     `fields`.
 
-    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth is
-    computed from its logarithm (n, 6) if given, else from the rates of the parameters.
+    Positions are (n, 3) in mm. The names of the arrays contain their units. The map of
+    growth is made from its logarithm (n, 6) if given, else from the tensor of the
+    growth model.
     """
+    parameters = growth.parameters
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
     weight = cortical_weight(distance, value_at(parameters.thickness_mm, week, maps))
-    if log_growth is None:
-        tangential, radial = increments(
-            parameters, weight, zones.growing, maps, week, parameters.step_s
+    growth_maps: dict[str, Floats] = {}
+    if "growth" in names and log_growth is not None:
+        growth_maps = growth_components(
+            log_growth, search.nearest_normals(positions_mm)
         )
-        growth = {
+    elif "growth" in names:
+        tissue = Tissue.at_vertices(
+            positions_mm,
+            zones,
+            distance,
+            weight,
+            {name: maps[name] for name in parameters.varying_maps},
+        )
+        tangential, radial = growth_at_vertices(growth, tissue, week)
+        growth_maps = {
             "tangential_growth_per_step": tangential,
             "radial_growth_per_step": radial,
         }
-    else:
-        growth = growth_components(log_growth, search.nearest_normals(positions_mm))
     # a vertex gets the highest of its facets' zones
     zone = np.zeros(len(positions_mm), dtype=np.int32)
     zone_at_corners = np.repeat(zones.facet_zone, 3).astype(np.int32)
@@ -72,7 +82,7 @@ def layer_fields(
     by_name: dict[str, dict[str, NDArray]] = {
         "distance": {"distance_to_pial_mm": distance},
         "cortex_weight": {"cortex_weight": weight},
-        "growth": growth,
+        "growth": growth_maps,
         "shear_modulus": {"shear_modulus_pa": modulus},
         "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * modulus},
         "zones": {"zone": zone, "growing": zones.growing},

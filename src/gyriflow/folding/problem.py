@@ -280,7 +280,10 @@ class NonlinearProblem:
         return total + sum(part.energy(u) for part in self.contributions)
 
     def residual(self, u: Floats) -> Residual:
-        """Return the residual, zero where the displacement is fixed."""
+        """Return the forces (N) at a displacement, zero where it is fixed: the elastic
+        ones, with those of the fissure's planes, and all. A free body's have no rigid
+        motions."""
+        # a view that the next call overwrites, so the result has `u`
         loaded = self._load(u)
         forces = self._forces
         forces.array[:] = 0.0
@@ -292,8 +295,8 @@ class NonlinearProblem:
         elastic = forces.array[: 3 * self.domain.n_owned].copy()
         self.clear_fixed(elastic)
         total = elastic.copy()
-        for part in self.contributions:
-            part.add_forces(u, total)
+        for contribution in self.contributions:
+            contribution.add_forces(u, total)
         self.clear_fixed(total)
         if self._tangent.motions is not None:
             self._tangent.motions.remove(total)

@@ -216,7 +216,7 @@ def _save_frame(
         fields |= layer_fields(
             positions,
             folding.zones,
-            step_growth.parameters,
+            step_growth,
             folding.maps,
             week,
             p.fields,

@@ -51,7 +51,7 @@ def start_regions(
     fields = layer_fields(
         mesh.vertices,
         zones,
-        growth.parameters,
+        growth,
         maps,
         parameters.start_week,
         REGION_FIELDS,

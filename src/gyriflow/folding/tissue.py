@@ -103,6 +103,37 @@ class Tissue:
             maps,
         )
 
+    @classmethod
+    def at_vertices(
+        cls,
+        positions_mm: Floats,
+        zones: Zones,
+        distance_mm: Floats,
+        weight: Floats,
+        maps: Maps,
+    ) -> "Tissue":
+        """Return the tissue at the (n, 3) positions of all vertices, each an element
+        of its own with one point, for maps of growth.
+
+        Distance to the pial surface, cortical weight and maps are (n,).
+        """
+        positions = positions_mm * M_PER_MM
+        pial = PialSearch(positions, zones.cortex_facets)
+        vertices = np.arange(len(positions))
+        points = IntegrationPoints(1, np.ones((1, 1)), np.ones(1))
+        elements = Elements(vertices[:, None], vertices, points)
+        _, nearest = pial.tree.query(positions)
+        return cls(
+            elements,
+            positions,
+            distance_mm * M_PER_MM,
+            pial,
+            nearest,
+            weight,
+            zones.growing,
+            maps,
+        )
+
     @property
     def places_mm(self) -> Floats:
         """The positions (k, 3) or (c, q, 3) in mm that `weight` and the others are

@@ -21,8 +21,7 @@ from ..geometry.triangles import (
 from ..settings import terms
 from ..settings.folding import FoldingParameters
 from ..settings.terms import Side
-from ..settings.varying import value_at
-from .layers import PialSearch, cortical_weight
+from .layers import PialSearch
 
 Tags = dict[str, NDArray[np.int32]]
 GAP_MM = 2.5
@@ -315,31 +314,6 @@ def _medial_vertices(
     )
     is_between = (medial > left_plane) & (medial < right_plane)
     return np.unique(mesh.tets[is_between])
-
-
-def model_fields(
-    zones: Zones,
-    positions: Floats,
-    p: FoldingParameters,
-    week: float,
-) -> dict[str, Floats]:
-    """Return the fields of a run without maps at its nodes, whose `positions` (n, 3) of
-    a week are in mm.
-
-    They are positions, weight (of the cortex), growing (0 or 1), increment (tangential
-    growth in a step) and the normals (n, 3) of the pial surface at the nearest points.
-    """
-    pial = PialSearch(positions, zones.cortex_facets)
-    thickness = value_at(p.thickness_mm, week, {})
-    weight = cortical_weight(pial.distance(positions), thickness)
-    rate = value_at(p.growth_rate_per_s, week, {})
-    return {
-        "positions": positions,
-        "weight": weight,
-        "growing": zones.growing,
-        "increment": rate * p.step_s * weight * zones.growing,
-        "normals": pial.nearest_normals(positions),
-    }
 
 
 def cell_tags(

@@ -341,8 +341,11 @@ def labels_at(match: Match, labels: Indices) -> Ints:
 
 
 def barycentric(points: Floats, triangles: Floats) -> Floats:
-    """Return the (n, 3) coordinates of points in the planes of (n, 3, 3) triangles;
-    flat triangles give a corner."""
+    """Return the (n, 3) barycentric coordinates of points in (n, 3, 3) triangles.
+
+    The points are in their triangles but for rounding, which is clipped. Flat triangles
+    give their first corner.
+    """
     a, b, c = triangles.transpose(1, 0, 2)
     u = b - a
     v = c - a

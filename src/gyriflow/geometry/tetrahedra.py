@@ -144,6 +144,7 @@ def volumes_between(vertices: Floats, tets: Indices) -> Floats:
     """Return the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in
     cubes of the vertices' unit."""
     if tets.shape[1] == NODES_OF_ORDER[2]:
+        # the mean of the Bernstein coefficients of the Jacobian determinant is its mean
         return coefficients(vertices, tets).mean(axis=1) / 6
     volumes = np.empty(len(tets))
     for chunk in chunks(len(tets)):

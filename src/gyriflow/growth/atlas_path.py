@@ -250,7 +250,7 @@ def _frames(surface: TriangleMesh, faces: Ints) -> Floats:
 
 def resample_by_size(
     mesh: TetrahedralMesh,
-    atlas: Floats,
+    shapes: Floats,
     weeks: Sequence[float] | Floats,
     ages: AtlasAges,
     knots: Floats,
@@ -258,25 +258,25 @@ def resample_by_size(
     """Return the (w, n, 3) positions of a mesh at w weeks, as an atlas that grows along
     its curve of volume.
 
-    `atlas` (k, n, 3) are the mesh's positions where the atlas has the k ages `knots`.
-    At each week the shape is that between the shapes whose ages are around it. Its
-    volume is that of the curve, as a multiple of the curve's at the age of the first
-    shape.
+    `shapes` (k, n, 3) are the mesh's positions where the atlas has the k ages `knots`.
+    At each week the shape is interpolated between those of the ages around it; before
+    the first and after the last age it is that of this age. Its volume is the curve's
+    at that week, times the mean ratio of the mesh's volumes to the curve's over all
+    ages.
     """
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    # a mesh that is not quite the atlas' has another volume: the mean ratio over all
-    # its weeks
+    # the mesh is not quite the atlas' brain
     atlas_volumes = np.array([ages.volume(age) for age in knots])
-    own_volumes = sizes_of(mesh, atlas)["volume_ml"]
+    own_volumes = sizes_of(mesh, shapes)["volume_ml"]
     ratio = np.exp(np.mean(np.log(own_volumes / atlas_volumes)))
     resampled = []
     for week in weeks:
-        inside = np.clip(
+        age = np.clip(
             week,
             knots[0],
             knots[-1],
         )
-        shape = positions_at(inside, atlas, knots, sizes)
+        shape = positions_at(age, shapes, knots, sizes)
         volume = sizes_of(mesh, [shape])["volume_ml"][0]
         scale = (ratio * ages.volume(week) / volume) ** (1 / 3)
         centre = np.average(shape, axis=0, weights=sizes)

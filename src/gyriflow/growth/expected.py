@@ -140,8 +140,8 @@ def place_in_atlas(
     """Return the (n, 3) places of a mesh's vertices inside the atlas' brain, with its
     boundary fitted to the atlas'.
 
-    `pair` is the registration to that brain, whose mesh is `atlas`. A body makes the
-    map, so that no element is inverted.
+    `pair` is the registration to that brain, whose mesh is `atlas`; `has_slits` as in
+    `follow_series`. A body makes the map, so that no element is inverted.
     """
     boundary, used = boundary_surface(mesh)
     surface, _ = boundary_surface(atlas)

@@ -444,22 +444,25 @@ COMMENT = re.compile(rb"#[^\r\n]*")
 
 def _require_all_lines(path: Path) -> None:
     """Raise InputError if a PLY or OFF file of text has fewer lines than its header
-    specifies, each of a vertex or a face.
+    specifies: one for each vertex, face or other element.
 
     Trimesh takes such a file for a surface with fewer faces.
     """
     content = path.read_bytes()
     ending = path.suffix.lower()
-    numbers: list[bytes] = []
-    if ending == ".ply" and (head := PLY_HEADER.match(content)):
-        numbers = PLY_ELEMENT.findall(head[0])
+    counts: list[bytes] = []
+    if ending == ".ply":
+        head = PLY_HEADER.match(content)
+        counts = PLY_ELEMENT.findall(head[0]) if head else []
     elif ending == ".off":
         content = COMMENT.sub(b"", content)
         head = OFF_HEADER.match(content)
-        numbers = list(head.groups()) if head else []
-    if not numbers or head is None:
+        counts = list(head.groups()) if head else []
+    else:
         return
-    expected = sum(map(int, numbers))
+    if head is None:
+        return
+    expected = sum(map(int, counts))
     lines = [line for line in content[head.end() :].splitlines() if line.strip()]
     if len(lines) < expected:
         raise InputError(

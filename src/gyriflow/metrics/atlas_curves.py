@@ -76,11 +76,11 @@ def atlas_differences(
     between two measurements of a brain), times_noise (difference / noise).
     """
     # the whole of a single hemisphere is half of a brain
-    sides = metrics[metrics["hemisphere"].isin(SIDES)]
-    n_sides = sides.groupby(BRAIN)["hemisphere"].nunique()
-    has_both = metrics[BRAIN].apply(tuple, axis=1).map(n_sides) == len(SIDES)
-    comparable = metrics[has_both | (metrics["hemisphere"] != "whole")]
-    parts = [pd.DataFrame(columns=DIFFERENCES)]
+    side = metrics["hemisphere"].where(metrics["hemisphere"].isin(SIDES))
+    n_sides = side.groupby([metrics[name] for name in BRAIN]).transform("nunique")
+    is_half = (metrics["hemisphere"] == "whole") & (n_sides < len(SIDES))
+    comparable = metrics[~is_half]
+    parts = []
     by_curve = curves.groupby(["atlas", "hemisphere", "metric"], sort=False)
     for names, curve in by_curve:
         atlas, hemisphere, metric = map(str, names)
@@ -99,6 +99,8 @@ def atlas_differences(
         noise = np.array(
             [difference_noise(metric, value, record) for value in expected]
         )
+        if rows.empty:
+            continue
         parts.append(
             rows.assign(
                 atlas=atlas,
@@ -109,5 +111,6 @@ def atlas_differences(
                 times_noise=difference / noise,
             )
         )
-    filled = [part for part in parts if len(part)]
-    return pd.concat(filled or parts, ignore_index=True)[DIFFERENCES]
+    if not parts:
+        return pd.DataFrame(columns=DIFFERENCES)
+    return pd.concat(parts, ignore_index=True)[DIFFERENCES]

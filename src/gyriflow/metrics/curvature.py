@@ -263,6 +263,8 @@ def _balls(
     radii_mm: Floats,
     links: sparse.csr_matrix,
 ) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
+    """Yield centres, in chunks of c, and the Boolean (c, n) matrix of the vertices in
+    the ball of each: those that edges inside the ball link to its centre."""
     for start in range(0, len(vertices), CHUNK):
         centres = np.arange(
             start,
@@ -273,10 +275,11 @@ def _balls(
             dtype=bool,
         )
         found = []
+        # at first each centre by itself, then the neighbours of what came last
         ring = sparse.eye(
             len(centres),
             len(vertices),
-            start,
+            k=start,
             dtype=bool,
             format="csr",
         )

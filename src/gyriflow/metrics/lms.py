@@ -517,16 +517,18 @@ class _Model:
         )
 
     def covariance(self, rows: Floats, state: "_State") -> Floats:
-        """Return the covariance (k, k) of the parameters, whose scans of a subject may
-        be correlated."""
+        """Return the covariance (k, k) of the parameters.
+
+        It is the inverse I⁻¹ of the information or, if subjects have several scans, I⁻¹
+        B I⁻¹ with the covariance B of the slopes, to which the prior adds its penalty.
+        """
         inverse = np.linalg.inv(state.information)
         scans = state.scans
         if scans.correlation is None:
             return inverse
-        # the scatter of the slopes: they are about Hermite polynomials of z, whose
-        # correlation between scans is a power of that of z
         size, count = rows.shape[1], len(inverse)
         scale_end = size + self.scale_rows.shape[1]
+        # no column if skewness is not estimated
         ones = np.ones((len(rows), count - scale_end))
         parts = [
             (slice(0, size), rows),
@@ -539,13 +541,18 @@ class _Model:
             [e.location_scale, e.scale * state.remaining, e.scale_skewness],
             [e.location_skewness, e.scale_skewness, e.skewness],
         ]
+        # slopes are about Hermite polynomials of z, of degree 1 for location, 2 for
+        # scale, 1 and 3 for skewness. Those of two scans correlate as the correlation
+        # of z to the power of the degree that they share
         powers = [[1, 2, 1], [2, 2, 2], [1, 2, 3]]
         scatter = self.penalty.copy()
         for i, (here, own) in enumerate(parts):
             for j, (there, other) in enumerate(parts):
                 each = expected[i][j][:, None] * other
                 scatter[here, there] += own.T @ scans.spread(each, powers[i][j])
-        return inverse @ (0.5 * (scatter + scatter.T)) @ inverse
+        # each product took the expectation at one of its two scans
+        scatter = 0.5 * (scatter + scatter.T)
+        return inverse @ scatter @ inverse
 
 
 @dataclass(frozen=True, eq=False)

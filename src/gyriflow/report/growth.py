@@ -1,6 +1,6 @@
 """Chart of growth: areas, volumes and growth rates of series of brains."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import cycle
 from typing import Any
 
@@ -45,11 +45,14 @@ def growth_figure(
     figure, (area_axes, volume_axes, *rate_axes) = panel_figure(
         2 + panels, panel_in=2.4, foot_in=0.0
     )
-    labels = {"area_cm2": "pial area (cm²)", "volume_ml": "volume (mL)"}
+    labels = {
+        "area_cm2": "pial area (cm²)",
+        "volume_ml": "volume, with ventricles (mL)",
+    }
     for axes, (column, label) in zip(
         (area_axes, volume_axes), labels.items(), strict=True
     ):
-        _sizes_panel(axes, areas, column, colours)
+        _sizes_panel(axes, areas, column, colours, set(with_rates))
         axes.set_ylabel(label)
         if len(names) == 1:
             axes.set_title(wrap(observed_name, 32))
@@ -81,8 +84,12 @@ def _sizes_panel(
     areas: pd.DataFrame,
     column: str,
     colours: Mapping[str, str],
+    with_rates: Collection[str],
 ) -> None:
-    """Draw areas or volumes over weeks, a colour per series."""
+    """Draw areas or volumes over weeks, a colour per series.
+
+    Only the brains of series `with_rates` are joined: others may be different fetuses.
+    """
     for number, (name, colour) in enumerate(reversed(list(colours.items()))):
         rows = areas[areas["series"] == name].sort_values("week")
         # series often agree: smaller marks of later series stay visible within those of
@@ -94,7 +101,7 @@ def _sizes_panel(
         axes.plot(
             rows["week"],
             rows[column],
-            "o-",
+            "o-" if name in with_rates else "o",
             color=colour,
             zorder=2 - 0.1 * number,
             label=name,

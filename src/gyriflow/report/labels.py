@@ -12,6 +12,12 @@ SIMPLER_PREDICTIONS = {
     "target": "target shape of the run",
 }
 """Labels of the simpler predictions of a brain, by their names in the study's table."""
+ATLAS_LABELS = {
+    "crl": ("CRL", "Gholipour et al. 2017"),
+    "chinese": ("Chinese", "Wu et al. 2021"),
+}
+"""Label and citation of the normal atlases with curves, by their names in
+`norms/atlases.yaml`."""
 PARAMETER_TITLES = {
     "thickness": "cortical thickness",
     "shear_modulus_cortex": "shear modulus of the cortex",
@@ -69,6 +75,18 @@ def map_title(name: str) -> str:
     return with_unit(
         VERTEX_MAPS[name].label, VERTEX_MAPS[name].ends or VERTEX_MAPS[name].unit
     )
+
+
+def atlas_label(name: str) -> str:
+    """Return the label of an atlas; its name if it has none."""
+    return ATLAS_LABELS.get(name, (name,))[0]
+
+
+def cited_atlas(name: str) -> str:
+    """Return the label of an atlas with its citation, for example "CRL (Gholipour et
+    al. 2017)"."""
+    label, *citation = ATLAS_LABELS.get(name, (name,))
+    return f"{label} ({citation[0]})" if citation else label
 
 
 def plain(name: str) -> str:

@@ -28,18 +28,21 @@ from ..settings.terms import (
     rounded_elements,
     run_names,
 )
-from .labels import metric_title, plain, week_label
+from .labels import atlas_label, cited_atlas, metric_title, plain, week_label
 from .tables import (
-    FROM_ATLAS,
     VERDICTS,
     accuracy_table,
     brain_table,
     centile_text,
+    difference_texts,
+    doubtful_metrics,
+    doubtful_title,
     html_table,
     kept_sentence,
     kept_table,
     predicted_table,
     range_text,
+    week_errors,
 )
 
 PATH_PLACEHOLDER = "(file)"
@@ -135,16 +138,17 @@ def sections(
 class Tables:
     """The tables of a study on its pages.
 
-    `quality`, `metrics` and `centiles` are as for `brain_rows`, `differences` those of
-    `metrics.atlas_curves`; `warnings` has the columns subject, run, step, level,
-    message. `runs` and `validation` are as for
-    `scores_table`, None if nothing was simulated; `intervals` those of the ensemble of
-    the one prediction, if any.
+    `quality`, `metrics` and `centiles` are as for `brain_rows`, `curves` and
+    `differences` those of `metrics.atlas_curves`; `warnings` has the columns subject,
+    run, step, level, message. `runs` and `validation` are as for `scores_table`, None
+    if nothing was simulated; `intervals` those of the ensemble of the one prediction,
+    if any.
     """
 
     quality: pd.DataFrame
     metrics: pd.DataFrame
     centiles: pd.DataFrame
+    curves: pd.DataFrame
     differences: pd.DataFrame
     warnings: pd.DataFrame
     runs: pd.DataFrame | None = None
@@ -176,80 +180,96 @@ def study_page(
     `Study.prediction_facts`, with `accuracy`, the content of `norms/predictions.yaml`,
     and `tests`, the output of `compare.accuracy.prediction_facts`.
     """
-    runs, validation, centiles = tables.runs, tables.validation, tables.centiles
-    title = "Measured cortical folding"
-    sentence = _quality_verdict(tables.quality)
-    scores = ""
-    if runs is not None:
-        title = (
-            f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
-        )
-        sentence = accuracy_sentence(prediction) if prediction else NOT_COMPARED
-        sentence = verdict(runs, validation, tables.warnings, sentence)
-        if prediction and validation is not None and len(validation):
-            sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
-        # without observed brains, a prediction has no scores
-        scores = (
-            ""
-            if prediction and validation is None
-            else html_table(scores_table(runs, validation))
-        )
-    if prediction:
-        title = (
-            f"Prediction of {prediction['brain']} to {week_label(prediction['week'])},"
-            " by the growth of "
-        )
-        title += (
-            f"the atlas {atlas['name']}"
-            if (atlas := prediction["atlas"])
-            else prediction["population"]
-        )
-        numbers = predicted_table(
-            tables.metrics, prediction, centiles, tables.intervals
-        )
-        accuracy = accuracy_table(prediction["accuracy"])
-        has_centiles = any("centile" in str(head) for head in numbers)
-        prediction = {
-            **prediction,
-            "numbers": html_table(numbers),
-            "accuracy_table": html_table(accuracy),
-        }
-        kept = prediction["kept"]
-        prediction["kept_table"] = html_table(kept_table(kept, prediction["week"]))
-        prediction["kept_sentence"] = kept_sentence(kept, prediction["week"])
-        prediction["individuals"] = norm if has_centiles else ""
-    centiles = centiles[centiles["run"] == OBSERVED]
-    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
-    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
-    # an atlas has too few brains for centiles among themselves
-    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
-    return {
-        "title": title,
-        "verdict": sentence,
+    observed = tables.centiles[tables.centiles["run"] == OBSERVED]
+    own = observed[observed["subject"].isin([brain["id"] for brain in brains])]
+    summary = [figure for figure in figures if figure["first"]]
+    others = [figure for figure in figures if not figure["first"]]
+    page = {
+        "title": "Measured cortical folding",
+        "verdict": _quality_verdict(tables.quality),
         "prediction": prediction,
-        "folded": [] if runs is None else runs.to_dict("records"),
-        "alone": False,
-        "usual": "",
-        "has_atlases": False,
-        "numbers": "",
-        "runs": scores,
-        "brains": brain_rows(
-            brains, tables.quality, tables.metrics, centiles, pictures
-        ),
+        "folded": [],
+        "runs": "",
+        "atlases": _cited_atlases(tables.differences),
+        "has_norm": bool(own["expected"].notna().any()),
+        "brains": brain_rows(brains, replace(tables, centiles=observed), pictures),
         "pictures": pictures,
         "norm": norm,
-        "flags": flags,
+        "flags": _centile_flags(own),
         "spread_unknown": SPREAD_UNKNOWN,
         "warnings": (
             ""
             if tables.warnings.empty
             else html_table(_group_warnings(tables.warnings))
         ),
-        "weeks": next(
-            (item for item in figures if item["first"]),
-            None,
-        ),
-        "sections": sections([item for item in figures if not item["first"]]),
+        "summary_figure": summary[0] if summary else None,
+        "sections": sections(others),
+    }
+    # of the page of a single brain
+    page |= {"alone": False, "usual": "", "week_errors": [], "numbers": ""}
+    if tables.runs is not None:
+        subjects = ", ".join(dict.fromkeys(tables.runs["subject"]))
+        page["title"] = f"Simulated cortical folding of {subjects}"
+        page["folded"] = tables.runs.to_dict("records")
+        page["verdict"] = _simulation_verdict(tables, prediction)
+        # without observed brains, a prediction has no scores
+        if not prediction or tables.validation is not None:
+            page["runs"] = html_table(scores_table(tables.runs, tables.validation))
+    if prediction:
+        page["title"] = _prediction_title(prediction)
+        page["prediction"] = _with_tables(prediction, tables, norm)
+    return page
+
+
+def _centile_flags(centiles: pd.DataFrame) -> set[str]:
+    """Return the flags of the metrics in the table of brains."""
+    is_shown = centiles["metric"].isin(metrics_shown(Shown.BRAINS))
+    flags = set(centiles.loc[is_shown, "flag"])
+    if SPREAD_UNKNOWN in flags:
+        # an atlas has too few brains for centiles among themselves
+        flags.discard("too few brains")
+    return flags
+
+
+def _simulation_verdict(tables: Tables, prediction: Mapping[str, Any] | None) -> str:
+    """Return the verdict on simulations; on predictions that were compared, after how
+    much better they are than simpler ones."""
+    runs, validation = tables.runs, tables.validation
+    assert runs is not None
+    untested = accuracy_sentence(prediction) if prediction else NOT_COMPARED
+    sentence = verdict(runs, validation, tables.warnings, untested)
+    if prediction and validation is not None and len(validation):
+        # these verdicts are without the sentence of accuracy, which begins so
+        sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
+    return sentence
+
+
+def _prediction_title(prediction: Mapping[str, Any]) -> str:
+    atlas = prediction["atlas"]
+    source = f"the atlas {atlas['name']}" if atlas else prediction["population"]
+    week = week_label(prediction["week"])
+    return f"Prediction of {prediction['brain']} to {week}, by the growth of {source}"
+
+
+def _with_tables(
+    prediction: Mapping[str, Any], tables: Tables, norm: str
+) -> dict[str, Any]:
+    """Return the facts of a prediction with its tables and sentences."""
+    numbers = predicted_table(
+        tables.metrics,
+        prediction,
+        tables.centiles,
+        tables.intervals,
+    )
+    has_centiles = any("centile" in str(head) for head in numbers)
+    kept, week = prediction["kept"], prediction["week"]
+    return {
+        **prediction,
+        "numbers": html_table(numbers),
+        "accuracy_table": html_table(accuracy_table(prediction["accuracy"])),
+        "kept_table": html_table(kept_table(kept, week)),
+        "kept_sentence": kept_sentence(kept, week),
+        "individuals": norm if has_centiles else "",
     }
 
 
@@ -273,16 +293,28 @@ def brain_page(
         norm=norm,
         pictures={},
     )
-    every = brain_table(metrics, tables.centiles, tables.differences)
-    main = [metric_title(name) for name in metrics_shown(Shown.BRAINS)]
+    own_quality = tables.quality[tables.quality["subject"] == brain["id"]]
+    doubts = doubtful_metrics(own_quality.iloc[0].to_dict())
+    every = brain_table(metrics, tables.centiles, tables.differences, doubts)
+    sheet = [doubtful_title(name, doubts) for name in metrics_shown(Shown.SHEET)]
+    sheet = [title for title in sheet if title in every.index]
+    differences = tables.differences[tables.differences["subject"] == brain["id"]]
+    atlases = list(differences["atlas"].unique())
+    curves = tables.curves[tables.curves["atlas"].isin(atlases)]
     return page | {
         "title": f"Cortical folding of {brain['id']}",
         "verdict": "",
         "alone": True,
-        "usual": html_table(every[every.index.isin(main)]),
-        "has_atlases": any(str(name).startswith(FROM_ATLAS) for name in every),
+        "usual": html_table(every.loc[sheet]),
+        "atlases": _cited_atlases(differences),
+        "week_errors": week_errors(curves, brain["week"]),
         "numbers": html_table(every),
     }
+
+
+def _cited_atlases(differences: pd.DataFrame) -> list[str]:
+    """Return the atlases of a table of differences, with their citations."""
+    return [cited_atlas(str(name)) for name in differences["atlas"].unique()]
 
 
 def report_page(
@@ -331,7 +363,7 @@ def methods_text(template: str, **used: Any) -> str:
     template.
 
     The template gets `growth_sentence(run, number)`, the sentence of the run's growth
-    model, and `fused_after_gw`; `number` formats numbers.
+    model, where `number` formats numbers; `fused_after_gw`; and `atlas_label`.
     """
 
     def growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
@@ -339,7 +371,10 @@ def methods_text(template: str, **used: Any) -> str:
 
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(
-        growth_sentence=growth_sentence, fused_after_gw=FUSED_AFTER_GW, **used
+        growth_sentence=growth_sentence,
+        fused_after_gw=FUSED_AFTER_GW,
+        atlas_label=atlas_label,
+        **used,
     )
 
 
@@ -357,25 +392,23 @@ def caption_html(caption: str) -> Markup:
 
 def brain_rows(
     brains: Sequence[Mapping[str, Any]],
-    quality: pd.DataFrame,
-    metrics: pd.DataFrame,
-    centiles: pd.DataFrame,
+    tables: Tables,
     linked: Collection[str] = (),
 ) -> list[dict[str, Any]]:
     """Return what a page says of each brain: its facts, its numbers, and its verdict
     with the cause or the warnings.
 
-    Numbers are by title of the metric, each with the text below it: `centile_text`.
-    Brains have id, week, population, source, licence, covariates and whether they are
-    synthetic, as configured. `quality`, the table of quality control, has the columns
-    subject, verdict, cause, warnings; `metrics` and `centiles` are the study's.
+    Numbers are by title of the metric, each with the texts below it: doubts about it,
+    and its `centile_text` or else its differences from atlases. Brains have id, week,
+    population, source, licence, covariates and whether they are synthetic, as
+    configured. The table `quality` has the columns subject, verdict, cause, warnings.
     `linked` are the ids of the brains whose source is on a page of their own.
     """
-    judged = quality.set_index("subject").fillna("")
-    measured = _by_brain(metrics)
+    judged = tables.quality.set_index("subject").fillna("")
+    measured = _by_brain(tables.metrics)
     values = measured["value"].to_dict()
     names = set(measured["metric"])
-    rated = _by_brain(centiles)
+    rated = _by_brain(tables.centiles)
     texts = dict(
         zip(
             rated.index,
@@ -387,12 +420,23 @@ def brain_rows(
     rows = []
     for brain in brains:
         key = brain["id"]
+        doubts = doubtful_metrics(judged.loc[key].to_dict())
+        from_atlases = difference_texts(tables.differences, key, with_noise=False)
         numbers = {}
         for name in shown:
-            number = ("–", "")
+            number: tuple[str, list[str]] = ("–", [])
             if (key, name) in values:
-                value = METRICS[name].text(values[key, name])
-                number = (value, texts.get((key, name), ""))
+                below = [doubts[name]] if name in doubts else []
+                centile = texts.get((key, name), "–")
+                if centile != "–":
+                    below.append(centile)
+                else:
+                    below += [
+                        f"{words[name]} {atlas_label(atlas)}"
+                        for atlas, words in from_atlases.items()
+                        if name in words
+                    ]
+                number = (METRICS[name].text(values[key, name]), below)
             numbers[metric_title(name)] = number
         is_linked, is_synthetic = key in linked, brain["synthetic"]
         licence = brain["licence"] or (

@@ -40,6 +40,11 @@ MIN_FACING_COSINE = 0.3
 """Minimum cosine between a normal and the view for lines: closer to the outline they
 would be foreshortened."""
 _PANEL_IN = 1.75
+PAGE_IN_PER_MM, PAGE_BAR_MM = 0.0117, 20.0
+"""Scale of pictures that are compared between pages, in inches per mm, and their scale
+bar: at 38 GW, a brain from five sides is as wide as a page."""
+_PAGE_COLUMN_IN = 0.8
+"""Least width of their columns, for the headings of small brains."""
 # no column is narrower than this part of the widest
 _NARROWEST = 0.7
 _EDGE_IN = 0.1
@@ -105,9 +110,13 @@ def panel_grid(
     *,
     colour_bar: tuple[ScalarMappable, str] | None = None,
     legend: Sequence[Patch] = (),
+    at_page_scale: bool = False,
 ) -> Figure:
     """Draw rows of surfaces under column headings, all at one scale in mm, with a scale
     bar below.
+
+    They are as large as the page allows, or `at_page_scale`, so that figures of several
+    brains have one scale, in which a wider one is smaller.
 
     More than eight columns continue in a further block below. The row's label names the
     view, and the first panel of a view has the letters of its ends. Several rows, or
@@ -123,9 +132,13 @@ def panel_grid(
     ]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
-    widths_in, blocks, inches_per_mm = _lay_out_columns(rows, FULL_WIDTH_IN - label_in)
+    widths_in, blocks, inches_per_mm = _lay_out_columns(
+        rows, FULL_WIDTH_IN - label_in, PAGE_IN_PER_MM if at_page_scale else np.inf
+    )
     widest_in = max(widths_in[part].sum() for part in blocks)
-    width = _dots(max(SINGLE_COLUMN_IN, label_in + widest_in))
+    # a page shrinks all figures of one width by the same factor
+    narrowest_in = FULL_WIDTH_IN if at_page_scale else SINGLE_COLUMN_IN
+    width = _dots(max(narrowest_in, label_in + widest_in))
     left_in = _dots(label_in + (width - label_in - widest_in) / 2)
     heads = []
     for head, panel_in in zip(columns, widths_in, strict=True):
@@ -194,7 +207,11 @@ def panel_grid(
                         (0, 36 * head_in),
                         va="center",
                     )
-    _draw_scale_bar(figure, rows, foot_in, widths_in.max(), inches_per_mm)
+    bar_mm = PAGE_BAR_MM
+    if not at_page_scale:
+        longest_in = min(0.6 * widths_in.max(), _SCALE_SHARE * width - 2 * _EDGE_IN)
+        bar_mm = _round_length(longest_in / inches_per_mm)
+    _draw_scale_bar(figure, rows, foot_in, bar_mm, inches_per_mm)
     if colour_bar:
         _draw_colour_bar(figure, *colour_bar)
     if legend:
@@ -248,7 +265,7 @@ def _write_letters(
 
 
 def _lay_out_columns(
-    rows: Sequence[Row], room_in: float
+    rows: Sequence[Row], room_in: float, max_inches_per_mm: float
 ) -> tuple[Floats, list[slice], float]:
     """Return the widths of all columns in inches, the columns of each block (at most
     `MAX_COLUMNS` side by side), and the scale in inches per mm."""
@@ -262,11 +279,13 @@ def _lay_out_columns(
     half_widths_mm = np.array(half_widths)
     narrowest_mm = _NARROWEST * half_widths_mm.max()
     widths_mm = 2 * _MARGIN * np.maximum(half_widths_mm, narrowest_mm)
+    widths_mm = np.maximum(widths_mm, _PAGE_COLUMN_IN / max_inches_per_mm)
     # blocks with as equal numbers of columns as possible
     n_blocks = math.ceil(len(widths_mm) / MAX_COLUMNS)
     size = math.ceil(len(widths_mm) / n_blocks)
     blocks = [slice(start, start + size) for start in range(0, len(widths_mm), size)]
     inches_per_mm = min(
+        max_inches_per_mm,
         _PANEL_IN / widths_mm.max(),
         room_in / max(widths_mm[block].sum() for block in blocks),
     )
@@ -474,14 +493,12 @@ def _draw_scale_bar(
     figure: Figure,
     rows: Sequence[Row],
     foot_in: float,
-    widest_in: float,
+    length: float,
     inches_per_mm: float,
 ) -> None:
-    """Draw the scale bar, and below it what the letters of the views mean."""
+    """Draw the scale bar of a length in mm, and below it what the letters of the views
+    mean."""
     width, total = figure.get_size_inches()
-    length = _round_length(
-        min(0.6 * widest_in, _SCALE_SHARE * width - 2 * _EDGE_IN) / inches_per_mm
-    )
     axes = figure.add_axes(
         (
             _EDGE_IN / width,

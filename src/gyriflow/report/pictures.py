@@ -71,9 +71,10 @@ ZONE_COLOURS = {
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and
 purple."""
-SMALL_DEEP_MM, SMALL_PER_MM, SMALL_PER_INCH = 5.0, 4.0, 400
-"""Small pictures: upper end of the depth scale, and dots per mm of the brain and per
-inch of print."""
+DEEP_MM = 5.0
+"""Upper end of the depth scale of observed brains, the same on all pages."""
+SMALL_PER_MM, SMALL_PER_INCH = 4.0, 400
+"""Small pictures: dots per mm of the brain and per inch of print."""
 TINTS = (0.0, 0.4, 0.7)
 """Shares of white in the colours of further regions."""
 
@@ -125,12 +126,15 @@ def brain_grid(
     title: str = "",
     legend: Sequence[Patch] = (),
     absent: str = "",
+    limit: float | None = None,
+    at_page_scale: bool = False,
 ) -> Figure:
     """Draw brains in their rows and columns, in the order in which these occur.
 
     Brains with maps have the colours of a quantity, a name of `VERTEX_MAPS`, on one
-    scale with the `title` (default: that of the map). `absent` is the text where a row
-    has no brain.
+    scale with the `title` (default: that of the map), from 0 to `limit` if that is
+    given. `absent` is the text where a row has no brain; `at_page_scale` that of
+    `panel_grid`.
     """
     # each brain once, in however many views it is
     mapped = {id(brain.halves): brain for brain in grid if brain.is_mapped}
@@ -140,6 +144,8 @@ def brain_grid(
         values = [brain.surface_map(quantity)[1] for brain in mapped.values()]
         every = np.concatenate(values)
         scale = scale_of(quantity, every)
+        if limit is not None:
+            scale = colour_scale(VERTEX_MAPS[quantity].colours, 0.0, limit, cut=True)
         colour_bar = (scale, title or map_title(quantity))
         if not np.isfinite(every).all():
             legend = [*legend, Patch(color=UNKNOWN_COLOUR, label="not measured")]
@@ -157,7 +163,13 @@ def brain_grid(
                 absent,
             )
         )
-    return panel_grid(columns, rows, colour_bar=colour_bar, legend=legend)
+    return panel_grid(
+        columns,
+        rows,
+        colour_bar=colour_bar,
+        legend=legend,
+        at_page_scale=at_page_scale,
+    )
 
 
 def _panel(
@@ -356,9 +368,23 @@ def shape_maps(grid: Grid) -> Figure:
 
 
 @styled
+def brain_depth(halves: Halves, *, sides: Sequence[str]) -> Figure:
+    """Draw the sulcal depth of a brain, at the scale and in the colours of all brains'
+    pages; `sides` are those of its `halves`."""
+    grid = _brain_views(halves, sides)
+    return brain_grid(grid, "sulcal_depth_mm", limit=DEEP_MM, at_page_scale=True)
+
+
+@styled
 def brain_maps(halves: Halves, *, sides: Sequence[str]) -> Figure:
-    """Draw the shape index of a brain from outside, from above, and on the inner face
-    of each hemisphere; `sides` are those of its `halves`."""
+    """Draw the shape index of a brain at the scale of all brains' pages; `sides` are
+    those of its `halves`."""
+    return brain_grid(_brain_views(halves, sides), "shape_index", at_page_scale=True)
+
+
+def _brain_views(halves: Halves, sides: Sequence[str]) -> list[GridBrain]:
+    """Return a brain from outside, from above, and the inner face of each
+    hemisphere."""
     grid = []
     for name in BRAIN_VIEWS:
         view = VIEWS[name]
@@ -369,7 +395,7 @@ def brain_maps(halves: Halves, *, sides: Sequence[str]) -> Figure:
         ]
         if shown:
             grid.append(GridBrain("", name, shown, view=view))
-    return brain_grid(grid, "shape_index")
+    return grid
 
 
 @styled
@@ -498,12 +524,12 @@ def growth_grid(
 @styled
 def small_pictures(halves: Halves, *, side: str) -> Figure:
     """Draw a small picture without text: shape index from a side, and depth from above,
-    0 to `SMALL_DEEP_MM`.
+    0 to `DEEP_MM`.
 
     All brains have one scale.
     """
     mesh, maps = whole_maps(halves, ("shape_index", "sulcal_depth_mm"))
-    depth = colour_scale(VERTEX_MAPS["sulcal_depth_mm"].colours, 0.0, SMALL_DEEP_MM)
+    depth = colour_scale(VERTEX_MAPS["sulcal_depth_mm"].colours, 0.0, DEEP_MM)
     views = {
         side: ("shape_index", scale_of("shape_index", np.empty(0))),
         "top": ("sulcal_depth_mm", depth),

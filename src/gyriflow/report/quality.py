@@ -51,7 +51,8 @@ THICKNESS_LIMITS_MM = (0.0, 4.0)
 SHAPE_VIEWS = ("left", "right", "top", "bottom")
 THICKNESS_VIEWS = ("left", "right", "left medial", "right medial")
 OTHER_VIEWS = ("front", "back", "left medial", "right medial")
-LINE_LETTERS = 138
+# letters of a line, and of one beside the verdict
+LINE_LETTERS, FACT_LETTERS = 138, 112
 # in inches
 ROWS_IN, HEAD_IN, LINE_IN = (2.4, 1.42, 1.42), 0.9, 0.13
 PIXELS_PER_INCH = 200
@@ -124,7 +125,7 @@ def quality_page(
         f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}")
         for name, value in _facts(row).items()
     ]
-    words = wrap("   ".join(facts), LINE_LETTERS)
+    words = wrap("   ".join(facts), FACT_LETTERS)
     title = f"{row['subject']}, {row['week']:g} GW"
     figure.suptitle(
         title,
@@ -176,7 +177,7 @@ def quality_page(
     for letter, part in zip("abc", rows, strict=True):
         part.text(
             0.015,
-            0.85 if part is planes else 1.0,
+            0.82 if part is planes else 1.0,
             letter,
             ha="left",
             va="top",
@@ -403,10 +404,7 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
         "source": str(row["source"]),
         "hemispheres": " and ".join(sides),
         "area": f"{row['area_cm2']:.1f} cm² ({both})",
-        "volume": (
-            f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} %"
-            " of the expected)"
-        ),
+        "volume, with ventricles": f"{row['volume_ml']:.1f} mL",
         "pose": (
             f"by {row['pose_by']}, turned by {turned:.1f}°"
             if turned >= 0.05
@@ -421,12 +419,11 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
             f"{100 * row['cut_share']:.0f} % of the medial wall ({usual})"
         )
     if thickness is not None:
+        doubt = "inaccurate, " if row["thickness_is_inaccurate"] else ""
         facts["thickness"] = (
-            f"{thickness:.2f} mm (measured on"
+            f"{thickness:.2f} mm ({doubt}measured on"
             f" {100 * row['thickness_measured_share']:.0f} %)"
         )
-    if row["area_ratio"] is not None:
-        facts["area / area of a complete surface"] = f"{row['area_ratio']:.2f}"
     return facts
 
 
@@ -436,6 +433,9 @@ def quality_row(
     thickness: Mapping[str, Any],
     warnings: Sequence[str],
     expected_ml: float,
+    *,
+    thickness_is_inaccurate: bool = False,
+    area_is_lower_bound: bool = False,
 ) -> dict[str, Any]:
     """Return the row of a brain with a surface; its verdict is "needs review" if there
     are warnings, else "fine".
@@ -443,7 +443,8 @@ def quality_row(
     `labels` are subject, week, population, source, sides and page; `report` and
     `thickness` the contents of `surface.json` and `thickness.json`. `expected_ml` is
     the approximate volume of a cerebrum of the week; half of it is expected of a single
-    hemisphere.
+    hemisphere. The last two are those of `anatomy.thickness.is_inaccurate` and
+    `hides_area`.
     """
     area, sides = report["area_cm2"], str(labels["sides"]).split()
     pose = pose_from(report["pose"])
@@ -461,7 +462,8 @@ def quality_row(
         "mean_thickness_mm": thickness.get("mean_mm"),
         "thickness_measured_share": thickness.get("measured_area_share"),
         "voxels_through_cortex": thickness.get("voxels_through_cortex"),
-        "area_ratio": thickness.get("area_ratio"),
+        "thickness_is_inaccurate": thickness_is_inaccurate,
+        "area_is_lower_bound": area_is_lower_bound,
         "pose_by": pose.by,
         "rotation_deg": angle_deg(pose.of_file()[:3, :3]),
         "asymmetry_mm": report.get("asymmetry_mm"),
@@ -472,13 +474,13 @@ def quality_row(
 
 def quality_table(
     rows: Sequence[Mapping[str, Any]],
-    refused: Sequence[Mapping[str, Any]],
+    left_out: Sequence[Mapping[str, Any]],
     order: Sequence[str],
 ) -> pd.DataFrame:
     """Return the rows of all brains, outputs of `quality_row`, in an order of their
     ids, others last.
 
-    `refused` are labels and cause of refused brains.
+    `left_out` are columns and cause of the brains without a surface.
     """
     every = [
         *rows,
@@ -488,7 +490,7 @@ def quality_table(
                 "verdict": "refused",
                 "warning_count": 0,
             }
-            for row in refused
+            for row in left_out
         ),
     ]
     table = pd.DataFrame(every).set_index("subject", drop=False)

@@ -105,7 +105,7 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
 
     Columns are the cortical weight with the elements, the growth zone (0 or 1), the
     tangential growth in a step, and the normals in the cortex. `elements` are their
-    nodes (m, 4) or (m, 10), and by week the arrays of `folding.zones.model_fields` at
+    nodes (m, 4) or (m, 10), and by week the arrays of `folding.growth.model_fields` at
     the nodes.
     """
     tets, weeks = elements

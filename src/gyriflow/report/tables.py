@@ -20,6 +20,7 @@ from ..settings.terms import (
 )
 from .labels import (
     SIMPLER_PREDICTIONS,
+    atlas_label,
     metric_title,
     parameter_label,
     plain,
@@ -29,8 +30,28 @@ from .style import run_colours, runs_by_name
 
 FROM_ATLAS = "difference from"
 """Beginning of the names of columns with differences from an atlas."""
-MIN_TIMES_NOISE = 2.0
-"""A difference below so many times the noise of measuring is none."""
+NOISE_HEAD = "noise: of measuring again only"
+"""End of the names of these columns."""
+MIN_TIMES_NOISE, MAX_TIMES_NOISE = 2.0, 10.0
+"""A difference below so many times the noise of measuring is none; larger multiples are
+not given, as other errors are then larger than this noise."""
+DOUBTS = {
+    "thickness_is_inaccurate": (
+        "inaccurate",
+        ("mean_thickness", "thickness_sd", "area_ratio"),
+    ),
+    "area_is_lower_bound": (
+        "lower bound",
+        (
+            "area",
+            "relative_area",
+            "gyrification_index",
+            "gyrification_index_envelope",
+        ),
+    ),
+}
+"""What a column of the quality table says of a brain's metrics, if it is true."""
+NO_DOUBTS: Mapping[str, str] = {}
 VERDICTS = ("fine", "needs review", "refused")
 _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+| %| \([+−][\d.]+\))?|–")
@@ -179,17 +200,37 @@ def centile_text(centiles: pd.DataFrame) -> list[str]:
     ]
 
 
+def doubtful_metrics(row: Mapping[Any, Any]) -> dict[str, str]:
+    """Return the metrics of a brain that its warnings say are wrong, and how, by its
+    row of the quality table."""
+    doubts: dict[str, str] = {}
+    for column, (words, names) in DOUBTS.items():
+        # a refused brain has neither
+        if row.get(column) is True or row.get(column) == "True":
+            doubts |= dict.fromkeys(names, words)
+    return doubts
+
+
+def doubtful_title(name: str, doubts: Mapping[str, str]) -> str:
+    """Return the title of a metric, with the doubt about it."""
+    title = metric_title(name)
+    return f"{title}: {doubts[name]}, see the warning" if name in doubts else title
+
+
 def brain_table(
     metrics: pd.DataFrame,
     centiles: pd.DataFrame,
     differences: pd.DataFrame,
+    doubts: Mapping[str, str] = NO_DOUBTS,
 ) -> pd.DataFrame:
-    """Return the metrics of an observed brain, whole and by hemisphere; of the whole
-    brain also the differences from the average brains of atlases, and the centiles.
+    """Return the metrics of an observed brain, whole and by hemisphere, with the
+    differences from the average brains of atlases, and the centiles of the whole brain.
 
-    `metrics` has the columns hemisphere, metric, value, unit, of this brain;
-    `centiles`, of the study, subject, run, hemisphere, metric, value, expected, z,
-    centile, flag; `differences` are those of `metrics.atlas_curves`, of the study.
+    Metrics that only hemispheres have also have only their differences. `metrics` has
+    the columns hemisphere, metric, value, unit, of this brain; `centiles`, of the
+    study, subject, run, hemisphere, metric, value, expected, z, centile, flag;
+    `differences` are those of `metrics.atlas_curves`, of the study; `doubts` the output
+    of `doubtful_metrics`.
     """
     rows = _reported(metrics).assign(name=_named)
     wide = rows.pivot_table(
@@ -200,10 +241,10 @@ def brain_table(
     ).reindex(rows["name"].unique())
     table = wide[[part for part in ("whole", *SIDES) if part in wide]]
     brain = metrics["subject"].iloc[0]
-    from_atlases = _of_whole(differences, brain)
-    for atlas, rows_of_atlas in from_atlases.groupby("atlas", sort=False):
-        texts = rows_of_atlas.assign(text=_difference_text).set_index("name")["text"]
-        table = table.assign(**{f"{FROM_ATLAS} {atlas}": texts})
+    for atlas, texts in difference_texts(differences, brain, doubts).items():
+        head = f"{FROM_ATLAS} {atlas_label(atlas)} ({NOISE_HEAD})"
+        titled = {metric_title(name): text for name, text in texts.items()}
+        table = table.assign(**{head: table.index.to_series().map(titled)})
     scores = _of_whole(centiles, brain)
     # without a norm there are only flags
     if scores["expected"].notna().any():
@@ -213,7 +254,8 @@ def brain_table(
             "note": scores["flag"],
         }
         table = table.assign(norm=scores["expected"], **columns)
-    return table.dropna(how="all").rename_axis("metric")
+    named = {metric_title(name): doubtful_title(name, doubts) for name in doubts}
+    return table.dropna(how="all").rename(index=named).rename_axis("metric")
 
 
 def _of_whole(table: pd.DataFrame, brain: str) -> pd.DataFrame:
@@ -222,21 +264,67 @@ def _of_whole(table: pd.DataFrame, brain: str) -> pd.DataFrame:
     return table[is_own & (table["hemisphere"] == "whole")].assign(name=_named)
 
 
-def _difference_text(rows: pd.DataFrame) -> list[str]:
-    """Return differences from an atlas in %, or in the metric's unit if it may be
-    negative, and as multiples of the noise of measuring."""
-    texts = []
-    for row in rows.to_dict("records"):
-        text = _signed(100 * row["relative_difference"], " %")
-        if np.isnan(row["relative_difference"]):
-            text = f"{row['difference']:+.2g}".replace("-", "−")
-        times = abs(row["times_noise"])
-        if times < MIN_TIMES_NOISE:
-            text += " (within noise)"
-        elif np.isfinite(times):
-            text += f" ({times:.0f} × noise)"
-        texts.append(text)
+def difference_texts(
+    differences: pd.DataFrame,
+    brain: str,
+    doubts: Mapping[str, str] = NO_DOUBTS,
+    *,
+    with_noise: bool = True,
+) -> dict[str, dict[str, str]]:
+    """Return the differences of an observed brain from atlases as text, by atlas and
+    metric: those of the whole brain, or else of both hemispheres."""
+    own = differences["subject"] == brain
+    rows = differences[own & (differences["run"] == OBSERVED)]
+    texts: dict[str, dict[str, str]] = {}
+    for names, parts in rows.groupby(["atlas", "metric"], sort=False):
+        atlas, metric = map(str, names)
+        doubt = doubts.get(metric, "")
+        by_part = {}
+        for row in parts.to_dict("records"):
+            words = _difference_text(row, with_noise=with_noise and not doubt)
+            by_part[row["hemisphere"]] = f"{words} ({doubt})" if doubt else words
+        if "whole" in by_part:
+            text = by_part["whole"]
+        else:
+            text = "; ".join(f"{side} {words}" for side, words in by_part.items())
+        texts.setdefault(atlas, {})[metric] = text
     return texts
+
+
+def week_errors(curves: pd.DataFrame, week: float) -> list[str]:
+    """Return by how much the pial area of each atlas differs a week earlier and later,
+    as far as it has these weeks: what an error of a week in a brain's age is worth.
+
+    `curves` are those of `metrics.atlas_curves`.
+    """
+    is_area = (curves["hemisphere"] == "whole") & (curves["metric"] == "area")
+    texts = []
+    for atlas, curve in curves[is_area].groupby("atlas", sort=False):
+        parts = []
+        for other in (week - 1.0, week + 1.0):
+            if curve["week"].min() <= other <= curve["week"].max():
+                areas = np.interp([week, other], curve["week"], curve["value"])
+                percent = 100 * (areas[1] / areas[0] - 1)
+                parts.append(f"{_signed(percent, ' %')} at {week_label(other)}")
+        if parts:
+            texts.append(f"{atlas_label(str(atlas))} {' and '.join(parts)}")
+    return texts
+
+
+def _difference_text(row: Mapping[Any, Any], *, with_noise: bool) -> str:
+    """Return a difference from an atlas in %, or in the metric's unit if it may be
+    negative, and as a multiple of the noise of measuring."""
+    text = _signed(100 * row["relative_difference"], " %")
+    if np.isnan(row["relative_difference"]):
+        text = f"{row['difference']:+.2g}".replace("-", "−")
+    times = abs(row["times_noise"])
+    if not with_noise or np.isnan(times):
+        return text
+    if times < MIN_TIMES_NOISE:
+        return f"{text} (within noise)"
+    if times > MAX_TIMES_NOISE:
+        return f"{text} (> {MAX_TIMES_NOISE:.0f} × noise)"
+    return f"{text} ({times:.0f} × noise)"
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:

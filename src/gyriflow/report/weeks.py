@@ -24,7 +24,13 @@ from matplotlib.transforms import Transform
 from ..errors import InputError
 from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.terms import FOLD_BANDS, OBSERVED, OBSERVED_BRAIN, PROXIES, SIDES
-from .labels import SIMPLER_PREDICTIONS, metric_title, plain, value_labels
+from .labels import (
+    SIMPLER_PREDICTIONS,
+    cited_atlas,
+    metric_title,
+    plain,
+    value_labels,
+)
 from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
@@ -225,21 +231,19 @@ def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str,
 
 def _atlas_lines(
     atlases: pd.DataFrame,
-    titles: Mapping[str, str],
+    panels: Mapping[tuple[str, str], str],
     weeks: pd.Series,
 ) -> tuple[list[Layer], list[Artist]]:
     """Return the thin lines of atlases over the weeks of a chart, and their legend
-    entries."""
-    is_drawn = (
-        (atlases["hemisphere"] == "whole")
-        & atlases["metric"].isin(titles)
-        & atlases["week"].between(
-            weeks.min() - NEAR_GW,
-            weeks.max() + NEAR_GW,
-        )
-    )
-    rows = atlases[is_drawn]
-    rows = rows.assign(panel=rows["metric"])
+    entries.
+
+    `panels` are those of a hemisphere, or "whole", and a metric.
+    """
+    keys = zip(atlases["hemisphere"], atlases["metric"], strict=True)
+    # of no panel, of hemispheres or metrics that the chart does not show
+    rows = atlases.assign(panel=[panels.get(key, "") for key in keys])
+    is_near = rows["week"].between(weeks.min() - NEAR_GW, weeks.max() + NEAR_GW)
+    rows = rows[(rows["panel"] != "") & is_near]
     layers = []
     entries: list[Artist] = []
     # an atlas may have no brain of these weeks
@@ -265,7 +269,7 @@ def _atlas_lines(
             Line2D(
                 [],
                 [],
-                label=f"{name}: average of many fetuses",
+                label=f"{cited_atlas(name)}: average of many fetuses",
                 **style,
             )
         )
@@ -305,7 +309,8 @@ def metrics_figure(
         markers=markers,
         shades=shades,
     )
-    lines, names = _atlas_lines(atlases, titles, whole["week"])
+    panels = {("whole", name): name for name in titles}
+    lines, names = _atlas_lines(atlases, panels, whole["week"])
     layers = [*lines, *_run_lines(rows, colours), *marks]
     figure, _ = weeks_chart(titles, layers, whole["week"])
     named = [*(subjects if markers else ()), *shades]
@@ -832,6 +837,7 @@ def _sides_in(rows: pd.DataFrame) -> list[str]:
 @styled
 def spectra_figure(
     spectra: pd.DataFrame,
+    atlases: pd.DataFrame,
     *,
     runs: Sequence[str] = (),
     observed_name: str = OBSERVED_BRAIN,
@@ -842,7 +848,8 @@ def spectra_figure(
     hemisphere, a column per band.
 
     Runs are lines, observed brains black stars; scans of a subject are joined and
-    groups coloured. Markers are open if the band, or one in the denominator of the
+    groups coloured. Thin lines are the `atlases`, as in `metrics_figure`. Markers are
+    open if the band, or one in the denominator of the
     relative power, is cut off, or if the surface does not resolve it. `spectra` has the
     columns subject, run, week, hemisphere, proxy, band, relative_power, complete,
     denominator_complete, resolved.
@@ -856,10 +863,16 @@ def spectra_figure(
     )
     sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
     shades, entries = _group_shades(groups, colours)
-    layers = _run_lines(rows, colours) + _observed_marks(
+    cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}
+    curves = {
+        (side, f"spangy_B{band}_relative_power"): cell
+        for cell, (side, band) in cells.items()
+    }
+    lines, names = _atlas_lines(atlases, curves, rows["week"])
+    marks = _observed_marks(
         rows[rows["run"] == OBSERVED], subjects=subjects, shades=shades
     )
-    cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}
+    layers = [*lines, *_run_lines(rows, colours), *marks]
     heads = [f"B{band}, {_FOLDS[band]} folds" for band in bands]
     titles = dict(zip_longest(cells, heads, fillvalue=""))
     layout: dict[str, Any] = {
@@ -880,6 +893,7 @@ def spectra_figure(
             axes.set_ylabel(f"{side} hemisphere\nrelative power")
         if side == sides[0]:
             from_zero(axes)
+    entries += names
     _spectra_legend(figure, rows, colours, observed_name, entries, bars=False)
     return figure
 

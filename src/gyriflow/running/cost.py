@@ -200,13 +200,13 @@ def _brain_seconds(
             else study.config.surface.edge_length_mm
         )
         vertices = share * _surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
-        has_slits = (
+        has_opened_sulci = (
             study.config.surface.open_sulci
             and brain.labels is not None
             and brain.thickness is not None
             and not is_simulated
         )
-        if has_slits:
+        if has_opened_sulci:
             vertices *= 1 + OPENED_PER_GW * max(brain.week - OPENED_FROM_GW, 0.0)
         modes = study.config.metrics.spangy_modes
         n_modes = modes if isinstance(modes, int) else BAND_MODES[modes]

@@ -55,6 +55,7 @@ from .planning import (
     restore_results,
     view_of,
 )
+from .snakemake_internals import shorten_usage_errors
 
 ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
 """The conda environment, whose variables of MPI and BLAS are defaults in any other one,
@@ -65,6 +66,9 @@ they do not count as failed."""
 GRACE_S = 4.0
 """Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers
 allow 10 s or more in all."""
+LOCK_WAIT_S = 3.0
+"""Time that another run has to end, before a run of the same working directory is
+refused."""
 READ_ONLY_OPTIONS = (
     "dryrun",
     "nolock",
@@ -129,7 +133,8 @@ MIN_FREE_FILES = 16
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 """Where Snakemake finds a workflow by itself."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
-_held_locks: list[IO[str]] = []
+_held_locks: dict[Path, IO[str]] = {}
+"""The locks that this process holds, by their working directories."""
 received_signals: list[int] = []
 """Signals that have interrupted the run of this process."""
 
@@ -172,36 +177,45 @@ def hold_lock(directory: Path) -> IO[str] | None:
     if not lock_file(file):
         file.close()
         return None
-    _held_locks.append(file)
     return file
 
 
-def release_locks() -> None:
-    """Have the working directories that this process has locked free for others."""
-    while _held_locks:
-        _held_locks.pop().close()
+@contextmanager
+def locked(directory: Path, option: str = "--directory") -> Iterator[None]:
+    """Lock a working directory before anything is written there, and remove Snakemake's
+    own locks of an interrupted run.
 
-
-def clear_stale_lock(directory: Path) -> None:
-    """Remove Snakemake's locks from a working directory; StorageError if it is in use
-    or cannot be written."""
-    # a run may be about to end
-    deadline = time.monotonic() + 3.0
+    Within a block of the same directory nothing happens. StorageError if the directory
+    is in use or cannot be written; `option` of the command names another one.
+    """
+    place = directory.resolve()
+    # a second pass runs under the lock of the first one
+    if place in _held_locks or REFUSED_FILE_VAR in os.environ:
+        yield
+        return
+    deadline = time.monotonic() + LOCK_WAIT_S
     while (file := hold_lock(directory)) is None:
         if time.monotonic() > deadline:
-            remedy = "Wait for it to end, or choose another folder with --directory"
+            remedy = f"Wait for it to end, or choose another folder with {option}"
             problem = "another gyriflow run is using this working directory"
-            raise StorageError(problem, path=directory.resolve(), remedy=remedy)
+            raise StorageError(problem, path=place, remedy=remedy)
         time.sleep(0.2)
     with file:
         # if files cannot be locked, Snakemake's locks may be those of a live run
-        stale = (
-            []
-            if file.name in UNLOCKABLE
-            else list((directory / ".snakemake" / "locks").glob("*.lock"))
-        )
-        for lock in stale:
-            lock.unlink()
+        if file.name not in UNLOCKABLE:
+            _clear_stale_locks(directory)
+        _held_locks[place] = file
+        try:
+            yield
+        finally:
+            del _held_locks[place]
+
+
+def _clear_stale_locks(directory: Path) -> None:
+    """Remove Snakemake's own locks from a working directory that is locked."""
+    stale = list((directory / ".snakemake" / "locks").glob("*.lock"))
+    for lock in stale:
+        lock.unlink()
     if stale:
         print(
             "gyriflow: removed the lock of an interrupted run; resuming it",
@@ -342,11 +356,15 @@ def _finish_without(
     write_json(path, refused)
     again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
     environment = os.environ | {REFUSED_FILE_VAR: str(path)}
+    # if this process is killed, the second pass keeps the directory locked; Windows
+    # hands on no files
+    files = list(_held_locks.values()) if sys.platform != "win32" else []
     process = subprocess.Popen(
         again,
         env=environment,
         stdout=sys.stdout,
         stderr=sys.stderr,
+        pass_fds=[file.fileno() for file in files],
     )
     try:
         process.wait()
@@ -668,6 +686,13 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
     return code, events.ended
 
 
+def _is_dry(options: Namespace) -> bool:
+    """Return whether a call runs nothing and takes no lock."""
+    return any(
+        getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS
+    )
+
+
 def main(
     arguments: Sequence[str],
     take_plan: Callable[[Plan], None] | None = None,
@@ -684,6 +709,7 @@ def main(
     # takes a second to import; the Snakefile imports this module without needing it
     from snakemake import cli
 
+    shorten_usage_errors()
     parser = cli.get_argument_parser()
     options, unknown = parser.parse_known_args(arguments)
     _check_options(unknown, parser.format_usage())
@@ -692,11 +718,21 @@ def main(
     if not (options.configfile or options.snakefile or is_second_pass):
         print(f"gyriflow: {what_runs(directory)}", file=sys.stderr)
     _check_configfiles(options.configfile or [], directory)
-    dry_run = any(
-        getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS
-    )
-    if not dry_run:
-        clear_stale_lock(directory)
+    with nullcontext() if _is_dry(options) else locked(directory):
+        return _run_workflow(arguments, options, take_plan, is_shown=is_shown)
+
+
+def _run_workflow(
+    arguments: Sequence[str],
+    options: Namespace,
+    take_plan: Callable[[Plan], None] | None,
+    *,
+    is_shown: bool,
+) -> int:
+    """Run Snakemake as `main` does, in a working directory that is locked unless
+    nothing is run."""
+    directory = options.directory or Path()
+    dry_run = _is_dry(options)
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)
@@ -721,10 +757,7 @@ def main(
             if directory.is_dir():
                 session.viewed = directory.absolute()
         call = Call(complete, options, directory, place, take_plan, is_shown)
-        try:
-            code = plan_and_run(call)
-        finally:
-            release_locks()
+        code = plan_and_run(call)
     if code > 128:
         print(
             "gyriflow: interrupted; run the same command again to resume",
@@ -735,7 +768,7 @@ def main(
         return code
     messages = study_messages(directory, began_s)
     failures = [message for message in messages if message.level == "error"]
-    if options.keep_going and not is_second_pass:
+    if options.keep_going and REFUSED_FILE_VAR not in os.environ:
         brains = _brains_to_refuse(failures)
         if brains and (interrupted := _finish_without(brains, arguments, directory)):
             return interrupted

@@ -218,19 +218,19 @@ def _required(
     producers: Mapping[str, str],
     targets: Collection[str],
 ) -> list[str]:
-    """Return the files that a call asks for.
+    """Return the files that a call asks for, with the names of rules among its targets.
 
     A rule without results, such as `all`, asks for all results of the jobs that make
-    its inputs: it names one of each, as each file costs Snakemake time.
+    its inputs. Such a rule lists only one result of each job, since every listed file
+    costs Snakemake time.
     """
     files = list(targets)
-    asked = {key: job for key, job in jobs.items() if job.rule in targets}
+    asked = [key for key, job in jobs.items() if job.rule in targets]
     for job in jobs.values():
         if not job.outputs:
-            makers = [producers[file] for file in job.files if file in producers]
-            asked |= {key: jobs[key] for key in makers}
-    for job in asked.values():
-        files += job.outputs
+            asked += [producers[file] for file in job.files if file in producers]
+    for key in dict.fromkeys(asked):
+        files += jobs[key].outputs
     return files
 
 

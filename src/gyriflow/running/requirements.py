@@ -58,11 +58,7 @@ def require_for(programs: Mapping[str, Path]) -> None:
         extras = sorted({EXTRAS[name] for name in missing})
         remedy = f'Install what is missing: pip install "gyriflow[{",".join(extras)}]"'
         if "dolfinx" in missing and not has_dolfinx_wheels():
-            where = "in WSL, use" if sys.platform == "win32" else "use"
-            remedy = (
-                f"PyPI has no dolfinx with PETSc for this system: {where} conda,"
-                f" {CONDA}"
-            )
+            remedy = f"PyPI has no dolfinx with PETSc for this system: {_elsewhere()}"
         names = ", ".join(missing)
         problem = (
             "simulations, registrations and calibrations need packages that are not"
@@ -90,6 +86,15 @@ def require_for(programs: Mapping[str, Path]) -> None:
             "simulations need Python.h, and there is none",
             remedy=_install([_headers_package()]),
         )
+
+
+def _elsewhere() -> str:
+    """Return how simulations run on a system for which PyPI has no solver."""
+    if sys.platform == "win32":
+        return "use WSL with Ubuntu 22.04 or later, and install gyriflow[fold] there"
+    if sys.platform == "linux":
+        return f"use conda, {CONDA}"
+    return f"use conda, {CONDA}, without its lines for Linux (docs/environment.md)"
 
 
 def packages_behind(program: Path) -> list[str]:

@@ -2,7 +2,9 @@
 Snakemake 9.27.0 and 9.27.1."""
 
 import hashlib
-from collections.abc import Collection, Iterable
+import re
+import sys
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,39 @@ from ..settings.base import did_you_mean
 from ..study.paths import log_of
 from .manifest import recorded_results
 
+UNKNOWN_EXECUTOR = re.compile(r"--executor.*invalid choice: '([\w-]+)'")
 REMOVED = (".csv", ".html", ".png", ".pdf")
+
+
+def shorten_usage_errors() -> None:
+    """Have Snakemake end with one line if its options or profiles are wrong, without
+    its whole usage, and say which package an executor needs."""
+    from snakemake.common.argparse import ArgumentParser
+
+    def end(_: Any, message: str) -> None:
+        text = f"{message}. See `./run snakemake --help`."
+        if executor := UNKNOWN_EXECUTOR.search(message):
+            package = f"snakemake-executor-plugin-{executor[1]}"
+            text = (
+                f"the executor {executor[1]} needs the package {package}, which this"
+                " environment has not. Install it as in docs/how-to/cluster.md"
+            )
+        print(f"gyriflow: {text}", file=sys.stderr)
+        sys.exit(InputError.exit_code)
+
+    ArgumentParser.error = end
+
+
+def max_jobs(arguments: Sequence[str]) -> int | None:
+    """Return how many jobs run at the same time by a call's options and profiles; None
+    if they do not say."""
+    from snakemake import cli
+
+    options, _ = cli.get_argument_parser().parse_known_args(arguments)
+    if options.profile:
+        parser = cli.get_argument_parser(profiles=options.profile)
+        options, _ = parser.parse_known_args(arguments)
+    return options.jobs
 
 
 def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:

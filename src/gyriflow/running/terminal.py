@@ -37,9 +37,24 @@ WEIGHTS = {
     "tetrahedralise": 15.0,
     "register": 7.0,
     "validation": 7.0,
+    # each with its variants of hemispheres
+    **dict.fromkeys(
+        [
+            f"{rule}{side}{ending}"
+            for side in ("", "_left", "_right")
+            for rule, ending in (
+                ("pial", ""),
+                ("pial", "_with_thickness"),
+                ("measure", ""),
+            )
+        ],
+        4.0,
+    ),
+    "brain_figures": 3.0,
+    "metrics_charts": 3.0,
 }
 """Relative durations of the slow rules' jobs, for the bar and the remaining time; all
-others count 1."""
+others count 1. Those of measured brains are of the resources of a study of two."""
 SIGNAL_S = 0.2
 """Time to notice a signal."""
 PERCENT_PER_LINE = 5

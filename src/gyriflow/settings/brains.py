@@ -259,5 +259,6 @@ class ParticipantsSettings(Settings):
     table could be days."""
     columns: dict[str, str] = Field({})
     """Columns to add to the table, with one value for all rows. In it `{subject}`,
-    `{session}` and `{id}`, such as `sub-01_ses-1`, are the row's: `{labels:
-    '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme: feta-7}`."""
+    `{session}` and `{id}` are the row's, such as `sub-01`, `ses-1` and
+    `sub-01_ses-1`: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme:
+    feta-7}`. A session has its `ses-`, whether the table has it or not."""

@@ -157,7 +157,11 @@ def starts_of(
     ids: Sequence[str],
 ) -> list[str]:
     """Return the ids of the brains that a run folds, in the order of `ids`."""
-    start = study_start if run.start is None else run.start
+    return chosen_starts(study_start if run.start is None else run.start, ids)
+
+
+def chosen_starts(start: Start | None, ids: Sequence[str]) -> list[str]:
+    """Return the ids that a value of `start` means, in the order of all `ids`."""
     if start is None:
         return []
     if start == ALL:

@@ -4,7 +4,7 @@ and names of files."""
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from .base import refused
 
@@ -74,6 +74,7 @@ _InRange = Annotated[
         le=WEEK_RANGE[1],
     ),
 ]
+_AgeText = Annotated[str, WithJsonSchema({"type": "string", "format": "age"})]
 _LaterInRange = Annotated[
     float,
     Field(
@@ -82,7 +83,7 @@ _LaterInRange = Annotated[
     ),
 ]
 AnyWeek = Annotated[
-    _InRange, BeforeValidator(week_of, json_schema_input_type=_InRange | str)
+    _InRange, BeforeValidator(week_of, json_schema_input_type=_InRange | _AgeText)
 ]
 """A gestational week, such as one that a curve has a value at."""
 Week = Annotated[AnyWeek, _two_decimals]
@@ -90,7 +91,7 @@ Week = Annotated[AnyWeek, _two_decimals]
 weeks are equal numbers."""
 EndWeek = Annotated[
     _LaterInRange,
-    BeforeValidator(week_of, json_schema_input_type=_LaterInRange | str),
+    BeforeValidator(week_of, json_schema_input_type=_LaterInRange | _AgeText),
     _two_decimals,
 ]
 """The last week of a simulation, rounded likewise."""

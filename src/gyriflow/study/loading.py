@@ -64,7 +64,11 @@ def load(
         if any(details["type"] != PROBLEM for details in error.errors()):
             hints.append("once each key is valid, they are checked against each other")
     else:
-        problems += _lines(problems_between(config))
+        between = problems_between(config)
+        if (problems or causes) and not plain.get("brains"):
+            # the table of brains says why there are none
+            between = [problem for problem in between if problem.key != ("brains",)]
+        problems += _lines(between)
     if not problems and not causes:
         config.left_out.update(left_out)
         config.age_sources.update(sources)

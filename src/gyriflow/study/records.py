@@ -211,8 +211,8 @@ class Simulation:
 
     @property
     def has_growth_rate(self) -> bool:
-        """True if its cortex grows at a rate of the settings."""
-        return "growth_rate_per_s" in self.settings.growth.definition.rates
+        """True if its cortex grows at the rate of the settings, changed by no law."""
+        return self.settings.growth.model == "rates"
 
     @property
     def has_growth_maps(self) -> bool:

@@ -3,6 +3,7 @@ code they end."""
 
 import os
 import shutil
+from contextlib import chdir
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,6 +24,7 @@ from gyriflow.io.yaml_files import read_keys
 from gyriflow.messages import Message
 from gyriflow.running import launch
 from gyriflow.running.machine import available_cores
+from gyriflow.running.snakemake_internals import max_jobs
 from gyriflow.settings.runs import GrowthSettings
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
@@ -99,6 +101,35 @@ def test_an_unknown_option_is_refused_with_the_nearest_one(tmp_path):
     with pytest.raises(InputError, check=Facts("--corse", "--cores")):
         launch.main(["--directory", str(tmp_path), "--corse", "2"])
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("in_profile", [False, True])
+def test_an_executor_that_is_not_installed_is_one_line_with_its_package(
+    tmp_path, capsys, in_profile
+):
+    profile = tmp_path / "profile"
+    profile.mkdir()
+    (profile / "config.yaml").write_text("executor: moon\njobs: 70\n")
+    place = ["-n", "--directory", str(tmp_path)]
+    arguments = ["--profile", str(profile)] if in_profile else ["-e", "moon"]
+    with chdir(tmp_path):
+        try:
+            code = launch.main([*place, *arguments])
+        except SystemExit as end:
+            code = end.code
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "moon" in line]
+    assert code == 2
+    assert line == Facts("gyriflow:", "snakemake-executor-plugin-moon", "cluster.md")
+
+
+def test_a_forecast_for_a_cluster_is_for_the_jobs_that_its_profile_runs_at_once(
+    tmp_path,
+):
+    (tmp_path / "config.yaml").write_text("jobs: 70\n")
+    profile = ["--profile", str(tmp_path)]
+    assert max_jobs(profile) == 70
+    assert max_jobs([*profile, "--jobs", "90"]) == 90
+    assert max_jobs(["--retries", "2"]) is None
 
 
 @pytest.mark.parametrize("folder", ["bids", "run", "data"])
@@ -295,6 +326,68 @@ def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path
     assert (tmp_path / "gyriflow.yaml").read_text() == "start: mine"
 
 
+@pytest.fixture
+def data_set(monkeypatch, tmp_path):
+    """A BIDS data set of two participants in the current folder, data."""
+    monkeypatch.chdir(tmp_path)
+    # set in this process, and removed after the test
+    monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
+    make_tree(
+        tmp_path / "data",
+        labels=[f"sub-0{number}/anat/sub-0{number}_dseg.nii.gz" for number in (1, 2)],
+        tables={
+            "participants.tsv": [
+                "participant_id scan_age",
+                "sub-01 24.1",
+                "sub-02 25.3",
+            ]
+        },
+    )
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "directory", "option"),
+    [
+        (
+            ("data", "out", "participant", "--participant-label", "02"),
+            "out/work",
+            "--work-dir",
+        ),
+        (("measure", "data", "-d", "study"), "study", "--directory"),
+        (
+            ("predict", LABELS, "--week", "22", "--until", "24", "-d", "study"),
+            "study",
+            "--directory",
+        ),
+    ],
+)
+def test_beside_a_live_run_a_command_writes_nothing_and_names_its_option(
+    monkeypatch, data_set, arguments, directory, option
+):
+    monkeypatch.setattr(launch, "LOCK_WAIT_S", 0.0)
+    with launch.hold_lock(data_set / directory):
+        before = {path: path.stat().st_mtime_ns for path in data_set.rglob("*")}
+        done = CliRunner().invoke(main, [*arguments, "--cores", "1"])
+        assert done.exit_code == 5
+        assert done.output == Facts(data_set / directory, option)
+        assert before == {path: path.stat().st_mtime_ns for path in data_set.rglob("*")}
+
+
+def test_a_dry_call_for_a_bids_data_set_leaves_the_configuration_of_a_run(
+    monkeypatch, data_set
+):
+    seen = []
+    monkeypatch.setattr(
+        checking, "plan", lambda config, *_, **__: seen.append(read_keys(config)) or []
+    )
+    before = set(data_set.rglob("*"))
+    dry = ("data", "out", "participant", "--participant-label", "02", "-n")
+    assert CliRunner().invoke(main, dry).exit_code == 0
+    assert [brain["id"] for brain in seen[0]["brains"]] == ["sub-02"]
+    assert set(data_set.rglob("*")) == before
+
+
 @pytest.mark.parametrize(
     ("until", "more", "facts"),
     [
@@ -338,6 +431,8 @@ def test_check_takes_a_folder_as_measure_does_and_writes_nothing(tmp_path, monke
     assert (done.exit_code, set(tmp_path.rglob("*"))) == (2, before)
     assert [brain["id"] for brain in planned[0]["brains"]] == ["sub-01"]
     assert done.output == Facts(f"{tmp_path}: 1 brain, measured only", "6 problems")
+    # where the age is from
+    assert done.output == Facts("participants.tsv row 2")
     # six scans with one fault: three lines and a number
     assert done.output.count("n/a") == 3
     assert done.output == Facts("3 more")

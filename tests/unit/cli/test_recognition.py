@@ -16,7 +16,13 @@ from shapes import sphere
 
 from gyriflow.cli.commands import main
 from gyriflow.cli.init import write_configuration
-from gyriflow.cli.recognition import UNSET, recognise, scheme_fits
+from gyriflow.cli.recognition import (
+    UNSET,
+    FoundBrain,
+    recognise,
+    scheme_fits,
+    scheme_reasons,
+)
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
@@ -395,9 +401,27 @@ def test_a_bids_app_measures_and_on_request_folds_the_first_of_several_scans(
     assert "start" not in app("group", "--no-fold")[1]
 
 
+def test_a_bids_app_says_which_scans_it_folds_and_none_without_a_series(app, tmp_path):
+    arguments = [str(tmp_path / "data"), str(tmp_path / "out"), "participant", "--fold"]
+    done = CliRunner().invoke(main, arguments)
+    assert "1 of them to fold: sub-01_ses-1\n" in done.output
+    alone = ("--session-label", "1")
+    _, written = app("participant", "--fold", *alone)
+    assert list(written) == ["brains", "metrics"]
+    done = CliRunner().invoke(main, [*arguments, *alone])
+    assert done.output == Facts("none is folded", "folding.end_week", "--settings")
+    # what to fold may be named, but not without its end
+    settings = tmp_path / "own.yaml"
+    settings.write_text("{start: all}")
+    _, written = app("participant", "--fold", *alone, "--settings", str(settings))
+    with pytest.raises(InputError, check=Facts("folding.end_week")):
+        load(written, tmp_path)
+
+
 def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     (tmp_path / "own.yaml").write_text(
-        "{mesh: {order: 1}, runs: {mine: {}}, folding: {poisson_ratio: 0.4}}"
+        "{start: first, mesh: {order: 1}, runs: {mine: {}},"
+        " folding: {end_week: 26, poisson_ratio: 0.4}}"
     )
     options = (
         "--participant-label",
@@ -411,11 +435,11 @@ def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     _, written = app("participant", *options, "--fold")
     assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-2"]
     assert (written["start"], written["runs"], written["mesh"]) == (
-        "sub-01_ses-2",
+        "first",
         {"mine": {}},
         {"order": 1},
     )
-    assert written["folding"] == {"end_week": 25.43, "poisson_ratio": 0.4}
+    assert written["folding"] == {"end_week": 26, "poisson_ratio": 0.4}
     assert app("participant", "--participant-label", "07", code=2) == Facts(
         tmp_path / "data", "sub-07"
     )
@@ -561,3 +585,19 @@ def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
         len(resolve(folded).run_simulations),
         resolve(folded.measured_only).run_simulations,
     ) == (1, [])
+
+
+def test_the_chosen_scheme_has_its_contradiction_and_others_their_names_only():
+    fits = {"a": "", "b": "cortex is missing", "c": "too little cortex"}
+    brains = [
+        FoundBrain(Path(f"{number}.nii"), {"scheme": "a"}, fits=fits)
+        for number in range(2)
+    ]
+    head, others = scheme_reasons(brains)
+    assert head == Facts("a", 2)
+    assert others == Facts("b, c")
+    assert "cortex" not in others
+    given = FoundBrain(Path("x.nii"), {"scheme": "b"}, fits=fits)
+    head, contradiction, others = scheme_reasons([given])
+    assert (head, contradiction) == (Facts("b", 1), Facts("cortex is missing"))
+    assert others.endswith(": c")

@@ -6,9 +6,12 @@ from typing import get_args
 import pytest
 from facts import Facts
 from pydantic import ValidationError
+from shapes import ellipsoid_mesh
 
 from gyriflow.errors import InputError
+from gyriflow.folding.growth import GrowthInputs, StepGrowth, StepStart
 from gyriflow.folding.growth_models import BUILDERS, growth_model
+from gyriflow.folding.zones import zones_of_run
 from gyriflow.report.page import methods_text
 from gyriflow.settings.folding import GROWTH_RATES, FoldingSettings, parameters_from
 from gyriflow.settings.growth import GROWTH_MODELS, Growth, ModelName
@@ -30,9 +33,27 @@ def run_of(model, growth_of="own"):
 
 
 def test_a_model_is_named_in_the_configuration_the_registry_and_the_solver():
-    assert get_args(ModelName) == tuple(GROWTH_MODELS) == tuple(BUILDERS)
+    assert set(get_args(ModelName)) == set(GROWTH_MODELS) == set(BUILDERS)
     described = Growth.model_fields["model"].description
     assert [name for name in GROWTH_MODELS if f"`{name}`" not in described] == []
+
+
+@pytest.mark.parametrize("name", BUILDERS)
+def test_a_model_gives_the_growth_of_a_step(name):
+    mesh = ellipsoid_mesh(4, (20.0, 26.0, 18.0))
+    model, sizes, targets, maps = GROWTH_MODELS[name], {}, {}, {}
+    for key, size in (("area_cm2", 50.0), ("volume_ml", 30.0)):
+        if key in (*model.keys, *model.resolved):
+            sizes[key] = {21.0: size, 22.0: 1.1 * size}
+    if model.measured == "shapes":
+        targets = {22.0: "target"}
+        for axis, values in zip("xyz", 1.05 * mesh.vertices.T, strict=True):
+            maps[f"target_{axis}"] = values
+    growth = {"model": name, **sizes}
+    p = parameters_from(VALUES | {"growth": growth, "targets": targets})
+    inputs = GrowthInputs(mesh, zones_of_run(mesh, p), maps)
+    step = growth_model(p, inputs)(StepStart(mesh.vertices, 0.0, p.step_s))
+    assert isinstance(step, StepGrowth)
 
 
 @pytest.mark.parametrize("name", GROWTH_MODELS)

@@ -45,9 +45,10 @@ def test_the_layers_of_a_week_have_its_thickness_stiffness_and_growth():
     }
     p = parameters_from(RUN | by_week)
     zones = zones_of_run(mesh, p, GAP_MM)
+    growth = GrowthByRates(p, StepStart(mesh.vertices, 0.0, p.step_s))
     names = ["distance", "cortex_weight", "shear_modulus", "growth"]
     for week, part in ((21.0, 0.0), (22.5, 0.75), (23.0, 1.0)):
-        fields = layer_fields(mesh.vertices, zones, p, {}, week, names)
+        fields = layer_fields(mesh.vertices, zones, growth, {}, week, names)
         weight = cortical_weight(fields["distance_to_pial_mm"], 2.0 + part)
         np.testing.assert_allclose(fields["cortex_weight"], weight, rtol=1e-12)
         core_pa, cortex_pa = 200.0 + 200.0 * part, 300.0 + 600.0 * part

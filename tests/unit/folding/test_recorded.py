@@ -129,6 +129,8 @@ def test_numbers_of_layers_and_zones(recorded):
     inputs = growth.GrowthInputs(mesh, zones, {})
     before = inputs.size(mesh.vertices)
     after = inputs.size(mesh.vertices * 1.01)
+    first = growth.StepStart(mesh.vertices, 0.0, planes.step_s)
+    by_rates = growth.GrowthByRates(planes, first)
     is_left = x_of(mesh) < CENTRE_MM[0]
     recorded(
         {
@@ -140,7 +142,7 @@ def test_numbers_of_layers_and_zones(recorded):
             "free zones": zones_of_run(mesh, parameters),
             "report": zone_report(mesh, zones, 4.0),
             "fields": output.layer_fields(
-                mesh.vertices, zones, planes, {}, 21.5, names[:4]
+                mesh.vertices, zones, by_rates, {}, 21.5, names[:4]
             ),
             "increments": growths,
             "sizes": [before, after],

@@ -1,9 +1,12 @@
 """Differences from atlases are those of straight lines between their weeks, of
 comparable brains only."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
+from facts import Facts
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.atlas_curves import atlas_curves, atlas_differences
@@ -12,6 +15,7 @@ from gyriflow.shipped import SHIPPED
 from gyriflow.study.checks import norm_settings
 from gyriflow.study.loading import load
 
+DOCS = Path(__file__).parents[3] / "docs"
 SETTINGS = {"norms": 3, "edge_length_mm": 1.0}
 WEEKS = [24.0, 25.0, 27.0]
 VALUES = {
@@ -103,3 +107,34 @@ def test_shipped_atlases_are_those_of_the_default_settings(tmp_path):
         # brains grow and fold
         growing = ["volume", "area", "gyrification_index", "mean_sulcal_depth"]
         assert (wide[growing].iloc[-1] > wide[growing].iloc[0]).all(), hemisphere
+
+
+def test_the_documentation_has_what_weeks_and_segmentation_are_worth():
+    content = read_yaml(SHIPPED / "norms" / "atlases.yaml")
+    percent = {}
+    for atlas, facts in content["atlases"].items():
+        areas = np.array(facts["values"]["whole"]["area"])
+        growth = 100 * (areas[1:] / areas[:-1] - 1)
+        for week, value in zip(facts["weeks"], growth, strict=False):
+            percent[atlas, week] = value
+    jumps = [percent.pop((atlas, 24.0)) for atlas in ("crl", "chinese")]
+    words = (DOCS / "how-to" / "usual.md").read_text()
+    parts = {part.split()[0]: part for part in words.split("\n- **")}
+    sentence = parts["Age"]
+    low, high = min(percent.values()), max(percent.values())
+    assert sentence == Facts(
+        f"{low:.0f} to +{high:.0f} %".replace("-", "−"),
+        f"{jumps[0]:.0f} % (CRL)",
+        f"{jumps[1]:.0f} % (Chinese)",
+    )
+    thickness = {
+        atlas: dict(
+            zip(facts["weeks"], facts["values"]["whole"]["mean_thickness"], strict=True)
+        )
+        for atlas, facts in content["atlases"].items()
+    }
+    thinner = [
+        100 * (1 - value / thickness["crl"][week])
+        for week, value in thickness["chinese"].items()
+    ]
+    assert parts["Segmentation"] == Facts(f"{min(thinner):.0f} to {max(thinner):.0f} %")

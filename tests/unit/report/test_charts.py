@@ -25,7 +25,7 @@ from gyriflow.report.weeks import (
     regions_chart,
     spectra_figure,
 )
-from gyriflow.settings.terms import SPREAD_UNKNOWN
+from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
 REGIONS = pd.DataFrame(
@@ -200,7 +200,7 @@ def a_band_of_a_brain_that_is_cut_off():
 
 def a_band_of_a_brain_that_is_cut_off_over_weeks():
     found = cut_off("observed")
-    return spectra_figure(pd.concat([*found["thin"], *found["observed"]]))
+    return spectra_figure(pd.concat([*found["thin"], *found["observed"]]), NO_ATLASES)
 
 
 def spectra_over_weeks():
@@ -211,7 +211,11 @@ def spectra_over_weeks():
     for brain, week, power in (("a1", 26.0, {4: 0.25}), ("a2", 27.5, {4: 0.15})):
         parts = spectrum_rows("observed", week, power)
         scans += [part.assign(subject=brain) for part in parts]
-    return spectra_figure(pd.concat([*thin, *scans]), subjects={"a1": "a", "a2": "a"})
+    metric = "spangy_B4_relative_power"
+    rows = [("one", "left", metric, week, 0.01 * week) for week in (26.0, 27.0)]
+    atlases = pd.DataFrame(rows, columns=CURVES)
+    subjects = {"a1": "a", "a2": "a"}
+    return spectra_figure(pd.concat([*thin, *scans]), atlases, subjects=subjects)
 
 
 def sums_of_areas_and_means_of_depths_of_regions():
@@ -510,6 +514,26 @@ def test_a_brain_has_its_differences_from_atlases_beside_the_noise():
     )
     scores = measured_scores(own, [], cohort_norms(own, []))
     row = brain_table(own, scores, differences).loc["pial area (cm²)"]
-    assert row["difference from one"] == Facts("−3.1 %", 22)
-    assert row["difference from two"] == Facts("+0.1 %", "within noise")
-    assert row["difference from three"] == Facts("+1", 3)
+    row = row.rename(lambda head: head.partition(" (")[0])
+    # other errors are larger than such a multiple of this noise
+    assert row["difference from one"] == "−3.1 % (> 10 × noise)"
+    assert row["difference from two"] == "+0.1 % (within noise)"
+    assert row["difference from three"] == "+1 (3 × noise)"
+    # a metric that a warning is of has no multiple, and one of hemispheres both of them
+    power = {"metric": "spangy_B4_power", "value": 9.0, "unit": "1"}
+    sides = [own.iloc[:1].assign(hemisphere=side, **power) for side in SIDES]
+    by_side = differences[:2].assign(
+        subject="case", hemisphere=list(SIDES), metric="spangy_B4_power", atlas="one"
+    )
+    table = brain_table(
+        pd.concat([own, *sides]),
+        scores,
+        pd.concat([differences, by_side]),
+        {"area": "lower bound"},
+    )
+    table = table.rename(columns=lambda head: head.partition(" (")[0])
+    found = table["difference from one"]
+    assert found["pial area (cm²): lower bound, see the warning"] == (
+        "−3.1 % (lower bound)"
+    )
+    assert found["SpAnGy B4 power"] == Facts("left −3.1 %", "right +0.1 %")

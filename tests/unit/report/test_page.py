@@ -10,7 +10,7 @@ from facts import Facts
 from markupsafe import Markup, escape
 
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.metrics.atlas_curves import DIFFERENCES
+from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
 from gyriflow.report.page import (
     NOT_COMPARED,
     Tables,
@@ -124,6 +124,10 @@ CENTILES = METRICS.iloc[:2].assign(
 )
 MEASURES = {"quality": QUALITY, "metrics": METRICS, "centiles": CENTILES}
 MEASURES["differences"] = pd.DataFrame(columns=DIFFERENCES)
+MEASURES["curves"] = pd.DataFrame(columns=CURVES)
+FROM_ATLAS = METRICS[1:2].assign(
+    atlas="crl", relative_difference=-0.1, difference=-10.0, times_noise=-40.0
+)
 PROVENANCE = {
     "commit": "abc-dirty",
     "recorded": "2026-01-01T12:30:00+00:00",
@@ -422,18 +426,30 @@ def test_paths_are_hidden():
 
 
 def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
-    measures = (QUALITY, METRICS, CENTILES)
-    young, old = brain_rows(BRAINS, *measures, linked=PICTURES)
+    tables = Tables(**TABLES)
+    young, old = brain_rows(BRAINS, tables, linked=PICTURES)
     assert (young["verdict"], young["cause"]) == ("needs review", "a bridge was cut")
     assert (old["verdict"], old["cause"]) == ("refused", "cropped")
     assert young["facts"] == ["21 GW", "healthy", "sex: F", "CC0 1.0"]
     assert old["facts"][:3] == ["23 GW", "healthy", "labels"]
-    assert [row["numbers"]["volume (mL)"] for row in (young, old)] == [
-        ("46.2", "88 (70 to 96), +1.2"),
-        ("–", ""),
+    assert [row["numbers"]["volume, with ventricles (mL)"] for row in (young, old)] == [
+        ("46.2", ["88 (70 to 96), +1.2"]),
+        ("–", []),
     ]
     # averages give no centile
-    assert young["numbers"]["pial area (cm²)"] == ("90", "−10.0 %")
+    assert young["numbers"]["pial area (cm²)"] == ("90", ["−10.0 %"])
+    # without a norm, atlases, and what a warning says of a metric
+    quality = QUALITY.assign(area_is_lower_bound=[True, np.nan])
+    unrated = {"quality": quality, "centiles": CENTILES.assign(centile=np.nan)}
+    unrated["centiles"]["expected"] = np.nan
+    unrated["differences"] = FROM_ATLAS
+    young, old = brain_rows(BRAINS, Tables(**TABLES | unrated), linked=PICTURES)
+    assert young["numbers"]["pial area (cm²)"] == ("90", ["lower bound", "−10.0 % CRL"])
+    assert young["numbers"]["volume, with ventricles (mL)"] == ("46.2", [])
+    text = page([], **unrated)
+    assert [words for words in elements(text, "p") if "CRL" in words] == [
+        Facts("CRL (Gholipour et al. 2017)")
+    ]
     rows = re.findall(
         "<tr>.*?</tr>", page([]).partition('<div class="wide brains">')[2], re.DOTALL
     )[1:3]
@@ -470,18 +486,23 @@ def test_a_brain_has_a_page_of_its_own():
             "message": ["own", "of a run", "of another"],
         }
     )
-    differences = METRICS[1:2].assign(
-        atlas="crl", relative_difference=-0.1, difference=-10.0, times_noise=-40.0
+    areas = {"week": [20.0, 21.0, 22.0], "value": [80.0, 100.0, 125.0]}
+    curves = pd.DataFrame(
+        {"atlas": "crl", "hemisphere": "whole", "metric": "area", **areas}
     )
-    tables = Tables(**TABLES | {"warnings": warnings, "differences": differences})
+    own = {"warnings": warnings, "differences": FROM_ATLAS, "curves": curves}
+    tables = Tables(**TABLES | own)
     text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert 'href="../report.html"' in text
     assert text.index("<th>left</th>") < text.index(">own<") < text.index("<h2>quality")
     assert ("of a run" in text, "of another" in text) == (False, False)
     # first both hemispheres, and where the brain stands
     before, _, _ = text.partition("<h2>quality")
-    assert re.search(r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 % \(40 ×", before)
+    row = r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 % \(&gt; 10 ×"
+    assert re.search(row, before)
     assert "medical device" in before
+    (compared,) = [words for words in elements(before, "p") if "Gholipour" in words]
+    assert compared == Facts("CRL", "2017", "−20.0 % at 20 GW", "+25.0 % at 22 GW")
     tables = Tables(**TABLES)
     text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert "no atlas to compare with" in text
@@ -622,6 +643,7 @@ def test_the_methods_say_what_was_run():
         runs=runs,
         software=software,
         metrics=metrics,
+        atlases={},
         filled=[surface, atlas],
         surface={"edge_length_mm": 0.8, "open_sulci": False},
         mesh={"order": 2, "mesher": "tetgen"},
@@ -662,6 +684,7 @@ def test_the_methods_say_what_was_run():
             runs=[],
             software=software,
             metrics=metrics,
+            atlases={"crl": "G. et al.: Curves", "own": "Own curves"} if opens else {},
             filled=[],
             surface={"edge_length_mm": 1, "open_sulci": opens},
         )
@@ -671,7 +694,11 @@ def test_the_methods_say_what_was_run():
     assert "Tallinen" not in opened
     assert opened == Facts("Koenderink", "[1]") != Facts(26)
     assert alone == Facts(26) != Facts("slits")
-    assert opened == Facts("slits")
+    assert opened == Facts(
+        "slits", "CRL [4]", "own [5]", "4. G. et al.: Curves", "5. Own curves"
+    )
+    assert caption_html(opened).count("<li><p>") == 5
+    assert "atlas" not in alone
     assert "filled" not in opened
     assert caption_html(text).count("<li><p>") == 3 + 7
     assert "system-message" not in caption_html(text)

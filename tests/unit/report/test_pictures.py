@@ -7,12 +7,14 @@ from matplotlib.text import Text
 from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, ellipsoid_mesh, sphere
 
-from gyriflow.folding.zones import model_fields, zones_of_run
+from gyriflow.folding.growth import GrowthByRates, StepStart, model_fields
+from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.quantities import name_in_interval
 from gyriflow.report.panels import LINES_MM, direction_lines
 from gyriflow.report.pictures import (
     GridBrain,
+    brain_depth,
     brain_grid,
     brain_maps,
     displacement_maps,
@@ -388,8 +390,9 @@ def test_the_models_fields_are_drawn_in_the_elements_at_the_start_and_at_the_end
     }
     p = parameters_from(run | {"thickness_mm": 4.0})
     zones, sizes = zones_of_run(mesh, p), {21.0: 1.0, 22.0: 1.2}
+    growth = GrowthByRates(p, StepStart(mesh.vertices, 0.0, p.step_s))
     weeks = {
-        week: model_fields(zones, size * mesh.vertices, p, week)
+        week: model_fields(growth, zones, size * mesh.vertices, week)
         for week, size in sizes.items()
     }
     figure = model_figure((mesh.tets, weeks))
@@ -455,3 +458,28 @@ def test_a_brain_is_shown_from_outside_and_each_hemisphere_from_within(sides, in
     # outside red, inside blue
     assert all(red > blue for red, _, blue in (tones[0], tones[1]) if sides == "lr")
     assert all(blue > red for red, _, blue in tones[3:])
+
+
+def test_brains_of_several_pages_have_one_scale_and_one_depth():
+    figures = []
+    for size, deep in ((60.0, 2.0), (80.0, 9.0)):
+        mesh = box((size, size, size))
+        depth = {"sulcal_depth_mm": np.full(len(mesh.vertices), deep)}
+        figures.append(brain_depth([(mesh, depth)], sides=["left"]))
+    assert figures[0].get_figwidth() == figures[1].get_figwidth()
+    # dots per mm of the pictures and of the scale bars
+    scales = set()
+    for figure in figures:
+        (bar,) = [axes for axes in figure.axes if axes.get_label() == "scale bar"]
+        assert "20 mm" in words(figure)
+        for axes in (bar, *pictures(figure)):
+            dots = axes.get_window_extent().width
+            scales.add(round(dots / np.ptp(axes.get_xlim()), 2))
+    assert len(scales) == 1
+    ends = [colour_bar(figure, "sulcal depth").get_xlim() for figure in figures]
+    assert ends[0] == ends[1] == (0.0, 5.0)
+    # what is wider than the page is smaller
+    mesh = box((400.0, 400.0, 400.0))
+    depth = {"sulcal_depth_mm": np.zeros(len(mesh.vertices))}
+    wide = brain_depth([(mesh, depth)], sides=["left"])
+    assert wide.get_figwidth() == figures[0].get_figwidth()

@@ -55,7 +55,10 @@ def test_the_page_shows_planes_views_and_warnings():
         [radius < 5, radius < 18, radius < 20, radius < 24], [3, 2, 1, 4], 0
     )
     warnings = ["it is crooked"]
-    row = quality_row(LABELS, REPORT, {}, warnings, 80.0)
+    thin = {"mean_mm": 0.84, "measured_area_share": 0.7}
+    row = quality_row(
+        LABELS, REPORT, thin, warnings, 80.0, thickness_is_inaccurate=True
+    )
     figure = quality_page(
         QualityBrain(sphere(20.0, 3), 0.0, tissues=(groups, scaling(1.0, -30))),
         row,
@@ -78,8 +81,8 @@ def test_the_page_shows_planes_views_and_warnings():
         "100.0 cm²",
         49,
         51,
-        "40.0 mL",
-        "50 %",
+        "with ventricles: 40.0 mL",
+        "0.84 mm (inaccurate, measured on 70 %)",
         "180.0°",
         "0.5 mm",
         "31 %",
@@ -97,8 +100,8 @@ def test_the_page_shows_planes_views_and_warnings():
 
 
 def test_verdicts_and_refused_brains_stand_in_one_table():
-    known = {"mean_mm": 1.5, "measured_area_share": 0.9, "area_ratio": 0.93}
-    fine = quality_row(LABELS, REPORT, known, [], 80.0)
+    known = {"mean_mm": 1.5, "measured_area_share": 0.9}
+    fine = quality_row(LABELS, REPORT, known, [], 80.0, area_is_lower_bound=True)
     look = quality_row(
         LABELS | {"subject": "b", "sides": "left"}, REPORT, {}, ["one", "two"], 80.0
     )
@@ -111,7 +114,8 @@ def test_verdicts_and_refused_brains_stand_in_one_table():
     assert table["verdict"].tolist() == ["refused", "needs review", "fine", "refused"]
     assert table["cause"].tolist() == ["no such file", "", "", "no labels"]
     assert table["warnings"].tolist()[1] == "one | two"
-    assert table["area_ratio"].tolist()[2] == 0.93
+    assert table["area_is_lower_bound"].tolist()[1:3] == [False, True]
+    assert table["thickness_is_inaccurate"].tolist()[1:3] == [False, False]
     assert table["cut_share"].tolist()[1:3] == [0.31, 0.31]
     # of one hemisphere half a brain is expected
     assert table["share_of_expected_volume"].tolist()[1:3] == [1.0, 0.5]
@@ -200,7 +204,13 @@ def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
     )
     write_json(tmp_path / "surface.json", REPORT | {"week": 24.0, "fissure_x_mm": 0.0})
     write_json(
-        tmp_path / "thickness.json", {"mean_mm": 1.5, "measured_area_share": 0.9}
+        tmp_path / "thickness.json",
+        {
+            "mean_mm": 1.5,
+            "measured_area_share": 0.9,
+            "voxels_through_cortex": 1.4,
+            "area_ratio": 0.9,
+        },
     )
     for _ in range(2):
         write_message(tmp_path / "surface.log", Message("warning", "it is crooked"))
@@ -215,7 +225,8 @@ def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
         "hemispheres": [f"{side}.surf.gii" for side in sides],
     }
     inputs |= {"maps": [f"{side}.shape.gii" for side in sides]}
-    pictures = {name: f"{name}.png" for name in ("quality", "maps", "small")}
+    names = ("quality", "depth", "maps", "small")
+    pictures = {name: f"{name}.png" for name in names}
     outputs = (
         pictures
         | {f"{name}_pdf": f"{name}.pdf" for name in pictures}
@@ -238,9 +249,12 @@ def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
             "warnings",
             "area_left_cm2",
             "mean_thickness_mm",
+            # a thickness that is inaccurate tells nothing of the area
+            "thickness_is_inaccurate",
+            "area_is_lower_bound",
         )
     ]
-    assert found == ["a", "needs review", "it is crooked", 49.0, 1.5]
+    assert found == ["a", "needs review", "it is crooked", 49.0, 1.5, True, False]
     assert all((tmp_path / file).stat().st_size for file in outputs.values())
     # all red, as ridges are
     tones = [

@@ -29,6 +29,7 @@ from gyriflow.step import Usage, record_usage
 
 from .test_page import (
     BRAINS,
+    FROM_ATLAS,
     MEASURES,
     METRICS,
     PAGE,
@@ -150,7 +151,7 @@ def pictured(text):
 def pages(folder):
     """Return the report and the pages of both brains."""
     tables = ("quality", "warnings", "metrics", "centiles", "runs", "validation")
-    tables = (*tables, "differences")
+    tables = (*tables, "curves", "differences")
     inputs = {name: f"{name}.csv" for name in tables} | {
         name: PAGE / file for name, file in PARTS.items()
     }
@@ -257,10 +258,16 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
     shown = (
         "{{ run.run }} {{ run.start }}: {{ run.growth_of }}, {{ run.summary.steps }}; "
     )
-    write_text("template.rst", f"{{% for run in runs %}}{shown}{{% endfor %}}")
+    cited = "{{ atlas_label('crl') }}: {{ atlases.crl }}"
+    write_text("template.rst", f"{{% for run in runs %}}{shown}{{% endfor %}}{cited}")
+    references = {"crl": {"reference": "G. et al."}, "chinese": {"reference": "W."}}
+    write_yaml("atlases.yaml", {"atlases": references})
+    write_table("differences.csv", FROM_ATLAS)
     inputs = {
         "run_params": of_runs("params.yaml"),
         "summaries": of_runs("folding/summary.json"),
+        "atlases": "atlases.yaml",
+        "differences": "differences.csv",
     }
     outputs = {name: f"results/{name}/provenance.json" for name in ("study", "report")}
     outputs |= {
@@ -303,7 +310,8 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
         ["thin", "young", "of thin"],
     ]
     assert (
-        read_text("methods.rst") == "thin young: own, 7; thick old: population P, 8; "
+        read_text("methods.rst")
+        == "thin young: own, 7; thick old: population P, 8; CRL: G. et al."
     )
     for brain, run, (name, start), thickness in zip(
         brains, outputs["runs"], FOLDED, (1.5, 2.5), strict=True

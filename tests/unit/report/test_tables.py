@@ -113,8 +113,14 @@ def test_a_predicted_brain_is_between_its_start_and_the_atlas_brain_nearest_in_w
         "largest error in 4 tests of 2 start brains: ± 8 %",
     ]
     # what a brain has not is a dash
-    assert found.index.tolist() == ["pial area (cm²)", "volume (mL)"]
-    assert found.loc["volume (mL)"].isna().tolist() == [True, False, True, False, True]
+    assert found.index.tolist() == ["pial area (cm²)", "volume, with ventricles (mL)"]
+    assert found.loc["volume, with ventricles (mL)"].isna().tolist() == [
+        True,
+        False,
+        True,
+        False,
+        True,
+    ]
     # with a norm of individuals, and an ensemble
     is_scored = centiles["metric"] == "area"
     centiles.loc[is_scored, ["z", "centile", "centile_low", "centile_high"]] = [

@@ -67,7 +67,16 @@ def test_where_pypi_has_no_dolfinx_conda_is_named(monkeypatch):
 def test_windows_is_sent_to_wsl(monkeypatch):
     monkeypatch.setattr(requirements, "is_installed", lambda name: False)
     monkeypatch.setattr(requirements.sys, "platform", "win32")
-    with pytest.raises(InputError, check=Facts("dolfinx", "WSL", "envs/gyriflow.yaml")):
+    with pytest.raises(InputError, check=Facts("dolfinx", "WSL", "gyriflow[fold]")):
+        require_for({"simulate": requirements.SOLVER})
+
+
+def test_a_mac_is_told_to_leave_out_what_conda_has_for_linux_only(monkeypatch):
+    monkeypatch.setattr(requirements, "is_installed", lambda name: False)
+    monkeypatch.setattr(requirements.sys, "platform", "darwin")
+    with pytest.raises(
+        InputError, check=Facts("conda", "envs/gyriflow.yaml", "docs/environment.md")
+    ):
         require_for({"simulate": requirements.SOLVER})
 
 

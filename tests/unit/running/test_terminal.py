@@ -98,6 +98,18 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
     )
 
 
+def test_surfaces_and_metrics_count_more_than_tables(run):
+    stats = {"pial_with_thickness": 1, "measure": 1, "metrics_tables": 2}
+    run.tell("run_info", stats=stats | {"total": 4})
+    for number, rule in enumerate(("pial_with_thickness", "measure")):
+        run.begin(rule, number, brain="a")
+        run.display.tick()
+        run.end(number, number + 1, 4)
+    run.begin("metrics_tables", 2)
+    run.display.tick()
+    assert [line.split("%")[0].strip() for line in run.lines[1:]] == ["0", "40", "80"]
+
+
 def test_a_folding_tells_its_size_weeks_and_warnings(run):
     run.tell("run_info", stats={"simulate": 1})
     log = run.begin("simulate", run="r", brain="a")

@@ -113,6 +113,9 @@ def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(fold
     write(folder, head, ("sub-1", "n/a", "a.nii.gz", "feta-7"))
     with pytest.raises(InputError, check=Facts("sub-1: gestational_age:", "n/a")):
         config(folder, keep_going=True)
+    # the row says why there is no brain
+    (problem,) = problems(RAW, folder)
+    assert problem == Facts("sub-1:")
 
 
 @pytest.mark.parametrize(
