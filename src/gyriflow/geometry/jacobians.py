@@ -174,10 +174,10 @@ def inverted_on_the_way(
             inverted |= lower_bounds(places, tets) <= 0
         return inverted
     for chunk in chunks(len(tets)):
-        first = _maps(before, tets[chunk])[0]
-        last = _maps(after, tets[chunk])[0]
-        first_cofactors = _cofactors(first)
-        last_cofactors = _cofactors(last)
+        (first,) = element_maps(before, tets[chunk], SLOPES[None])
+        (last,) = element_maps(after, tets[chunk], SLOPES[None])
+        first_cofactors = cofactors_of(first)
+        last_cofactors = cofactors_of(last)
         # each row of a matrix times its cofactors is the determinant
         sums = [
             (first * first_cofactors).sum(axis=(0, 1)),
@@ -201,12 +201,14 @@ def may_be_inverted(shapes: Floats, tets: Indices) -> Mask:
     corners, in all of the shapes, have |F − 1| < 1. This also holds for all means of
     these maps, and then det F > 0.
     """
+    # the map of a linear element is the same everywhere
+    slopes = CORNER_SLOPES if tets.shape[1] == len(NODES) else SLOPES[None]
     may_be = np.empty(len(tets), dtype=bool)
     for chunk in chunks(len(tets)):
-        by_shape = [_maps(shape, tets[chunk]) for shape in shapes]
+        by_shape = [element_maps(shape, tets[chunk], slopes) for shape in shapes]
         maps = np.concatenate(by_shape)
         mean = maps.mean(axis=0)
-        cofactors = _cofactors(mean)
+        cofactors = cofactors_of(mean)
         volumes = (mean * cofactors).sum(axis=(0, 1)) / 3
         largest = np.zeros(len(volumes))
         for corner_map in maps:
@@ -218,20 +220,28 @@ def may_be_inverted(shapes: Floats, tets: Indices) -> Mask:
     return may_be
 
 
-def _maps(places: Floats, tets: Indices) -> Floats:
-    """Return the maps from the regular element to (m, 4) or (m, 10) elements at their
-    corners, as (p, 3, 3, m) arrays: p is 1 for linear elements, whose map is the same
-    everywhere, and 4 for quadratic ones."""
+def element_maps(
+    places: Floats,
+    tets: Indices,
+    slopes: Floats,
+) -> Floats:
+    """Return the (p, 3, 3, m) maps from the regular element to (m, 4) or (m, 10)
+    elements at points, from the gradients (p, n, 3) of the shape functions there.
+
+    Rows are axes of the regular element, columns those of space. The elements come
+    last, since products by component are many times faster than those of small
+    matrices.
+    """
     nodes = np.take(places, tets.T, axis=0)
     if len(nodes) == len(NODES):
-        by_node = CORNER_SLOPES.transpose(0, 2, 1)
-        maps = np.tensordot(by_node, nodes, axes=1)
+        maps = np.tensordot(slopes.transpose(0, 2, 1), nodes, axes=1)
     else:
-        maps = (nodes[1:] - nodes[0])[None]
+        edges = nodes[1:] - nodes[0]
+        maps = np.tile(edges, (len(slopes), 1, 1, 1))
     return np.ascontiguousarray(maps.swapaxes(2, 3))
 
 
-def _cofactors(maps: Floats) -> Floats:
+def cofactors_of(maps: Floats) -> Floats:
     """Return the cofactors of (3, 3, m) matrices: cross products of two rows each."""
     found = np.empty_like(maps)
     for row, axis in product(range(3), repeat=2):
