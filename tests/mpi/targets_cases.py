@@ -19,6 +19,7 @@ from gyriflow.folding.simulation import Folding, advance
 from gyriflow.folding.step_fields import von_mises
 from gyriflow.folding.stretches import (
     deformation_gradients,
+    inverse_growth,
     inverse_stretch,
     log_stretch,
 )
@@ -364,6 +365,16 @@ def test_stretches_and_their_logarithms_are_those_of_the_gradient_whatever_its_r
     found, is_limited = inverse_stretch(F, limit=0.1)
     assert found[1] == pytest.approx(clipped)
     assert is_limited.tolist() == [max(np.abs(np.log(lengths))) > 0.1] * 2
+    # with all of it, growth may turn with the tissue
+    found, is_limited = inverse_growth(F, np.ones(2), 0.7)
+    assert found @ F == pytest.approx(np.stack([np.eye(3)] * 2))
+    assert not is_limited.any()
+    found, is_limited = inverse_growth(F, np.array([0.5, 0.0]), 0.7)
+    assert found == pytest.approx(np.stack([half, np.eye(3)]))
+    found, is_limited = inverse_growth(F, np.ones(2), 0.01)
+    expected, are_expected = inverse_stretch(F, limit=0.01)
+    assert found == pytest.approx(expected)
+    assert is_limited.tolist() == are_expected.tolist() == [True, True]
     logs = axes @ np.diag(np.log(lengths)) @ axes.T
     assert log_stretch(F) == pytest.approx(np.stack([logs] * 2))
     assert log_stretch(F, left=True) == pytest.approx(np.stack([R @ logs @ R.T, logs]))

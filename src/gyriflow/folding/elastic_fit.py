@@ -245,7 +245,9 @@ class ElasticFit:
         self._solver = NewtonSolver(self._problem, SETTINGS, floor)
         # the pieces in the order of the solver
         self._cells = self._domain.vertex_of_node[self._domain.cells]
-        self._inverse_edges = np.linalg.inv(self._edges())
+        start_edges = self._edges()
+        self._inverse_edges = np.linalg.inv(start_edges)
+        self._cell_volumes = determinants(start_edges)
         n_cells = len(self._cells)
         element = np.repeat(np.arange(n_cells), 4)
         self._incidence = sparse.csr_array(
@@ -290,10 +292,15 @@ class ElasticFit:
         )
         goal = transform_points(shape, motion)
         lengths = np.full(len(self._used), SPRING_LENGTH_MM)
-        for steps_left in range(self._step_count(goal), 0, -1):
+        strain_to_goal = self._strain_to(goal)
+        n_steps = self._step_count(goal, strain_to_goal)
+        for steps_left in range(n_steps, 0, -1):
             places = self.positions_mm
             next_places = places + (goal - places) / steps_left
-            logs = packed(self._strain_to(next_places))
+            is_whole_way = n_steps == 1
+            logs = packed(
+                strain_to_goal if is_whole_way else self._strain_to(next_places)
+            )
             integrals = integrals_at_vertices(places, self._pieces, logs)
             strain = smooth_integrals(places, self._pieces, integrals, SMOOTHING_MM)
             problem = self._step(next_places[self._used], lengths, strain)
@@ -319,14 +326,13 @@ class ElasticFit:
             )
         return self._place_back(valid, motion)
 
-    def _step_count(self, goal: Floats) -> int:
+    def _step_count(self, goal: Floats, strain: Floats) -> int:
         """Return the number of steps to a goal (n, 3), by the strain of the whole and
-        of nine elements in ten."""
+        of nine elements in ten, whose own are (m, 3, 3)."""
         volume = signed_volume(self.boundary)
         goal_volume = signed_volume(self._boundary_at(goal))
         ratio = max(goal_volume / volume, 1e-3)
         of_whole = abs(math.log(ratio))
-        strain = self._strain_to(goal)
         norms = np.linalg.norm(strain, axis=(1, 2))
         of_elements = float(np.quantile(norms, 0.9))
         mean_strain = max(of_whole, of_elements) / 3
@@ -752,30 +758,40 @@ class ElasticFit:
         difference, while the body is without stress otherwise.
         """
         edges = self._edges()
-        logs = log_stretch(edges @ self._inverse_edges, left=True)
         volumes = determinants(edges)
+        stretches = np.tile(
+            np.eye(3),
+            (len(self._cells), 1, 1, 1),
+        )
+        ratios = volumes / self._cell_volumes
+        may_be_flat = ratios < math.exp(-MIN_FLATTENING)
+        if not may_be_flat.any():
+            return stretches
+        # only elements that the averages reach
+        is_near = may_be_flat
+        for _ in range(FLATTENING_ROUNDS):
+            is_near = self._incidence.T @ (self._incidence @ is_near) > 0
+        near = np.flatnonzero(is_near)
+        incidence = self._incidence[:, near]
+        logs = log_stretch(edges[near] @ self._inverse_edges[near], left=True)
         volumes_around = (self._incidence @ volumes)[:, None]
         around = packed(logs)
         for _ in range(FLATTENING_ROUNDS):
-            sums = self._incidence @ (volumes[:, None] * around)
+            sums = incidence @ (volumes[near, None] * around)
             at_vertices = sums / volumes_around
-            around = at_vertices[self._cells].mean(axis=1)
+            around = at_vertices[self._cells[near]].mean(axis=1)
         excess = logs - unpacked(around)
         grown = np.trace(logs, axis1=1, axis2=2)
         grown_more = np.trace(excess, axis1=1, axis2=2)
         lost = -np.maximum(grown, grown_more)
-        flat = np.flatnonzero(lost > MIN_FLATTENING)
+        flat = np.flatnonzero(may_be_flat[near] & (lost > MIN_FLATTENING))
         range_of_loss = MAX_FLATTENING - MIN_FLATTENING
         weight = np.minimum(
             (lost[flat] - MIN_FLATTENING) / range_of_loss,
             1.0,
         )
         taken_back = weight[:, None, None] * excess[flat]
-        stretches = np.tile(
-            np.eye(3),
-            (len(self._cells), 1, 1, 1),
-        )
-        stretches[flat, 0] = exponential(taken_back, MAX_OPENING)
+        stretches[near[flat], 0] = exponential(taken_back, MAX_OPENING)
         return stretches
 
 

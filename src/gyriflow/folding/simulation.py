@@ -131,12 +131,6 @@ class Folding:
         displacement = self.domain.gather(u[: self.domain.n_owned])
         positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
-        thickness_mm = value_at(
-            p.thickness_mm,
-            growth.start.week(p, 0.5),
-            self.maps,
-        )
-        thickness = float(np.mean(thickness_mm)) * M_PER_MM
         stretch = None
         if p.stress_memory_gw > 0:
             elastic = self.problem.evaluate("elastic", u)
@@ -148,9 +142,7 @@ class Folding:
             **self._solution_row(solution, displacement),
             **self._contact_row(u, positions),
             **growth.row(size),
-            "elements_through_cortex": elements_through(
-                self.domain, tissue.depth, thickness
-            ),
+            "elements_through_cortex": self._elements_through_cortex(tissue, growth),
             "rung": RUNGS[solution.rung],
         }
         self.solved = SolvedStep(u, step_s, growth)
@@ -205,7 +197,7 @@ class Folding:
             step_gw = step_s / SECONDS_PER_GW
             stretch = relaxed(before, step_gw, p.stress_memory_gw)
         growth = self.model(start)
-        modulus = shear_modulus(p, tissue.weight, tissue.maps, week)
+        modulus = modulus_of_tissue(p, tissue, week)
         inverse = growth.inverse(tissue)
         self.problem.set_step(
             tissue.at_points(modulus),
@@ -229,6 +221,17 @@ class Folding:
             return None
         grown = self.domain.gather_cells(mean)
         return grown if state.growth is None else grown @ state.growth
+
+    def _elements_through_cortex(self, tissue: Tissue, growth: StepGrowth) -> float:
+        """Return the elements through the cortex at mid-step, NaN if growth has no
+        layers, so that depths are not needed."""
+        p = self.parameters
+        if not p.growth.definition.has_layers:
+            return math.nan
+        week = growth.start.week(p, 0.5)
+        thickness_mm = value_at(p.thickness_mm, week, self.maps)
+        thickness = float(np.mean(thickness_mm)) * M_PER_MM
+        return elements_through(self.domain, tissue.depth, thickness)
 
     def _solution_row(
         self, solution: Solution, displacement: Floats
@@ -315,6 +318,18 @@ def advance(
                 successes=0,
             )
         return after
+
+
+def modulus_of_tissue(
+    p: FoldingParameters,
+    tissue: Tissue,
+    week: float,
+) -> Floats:
+    """Return the shear modulus in Pa of tissue like its `weight`, which is not needed
+    where cortex and core are equally stiff."""
+    is_uniform = p.shear_modulus_cortex_pa == p.shear_modulus_core_pa
+    weight = np.zeros_like(tissue.growing) if is_uniform else tissue.weight
+    return shear_modulus(p, weight, tissue.maps, week)
 
 
 def elements_through(

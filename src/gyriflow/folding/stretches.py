@@ -3,11 +3,13 @@ six values."""
 
 import numpy as np
 
-from ..geometry.jacobians import chunks
+from ..geometry.jacobians import chunks, cofactors_of, element_maps
 from ..geometry.triangles import Floats, Indices, Mask
 
 MIN_SQUARED_STRETCH = 1e-6
 """Squared principal stretches below this count as this: those of flat elements."""
+ROUND_OFF = 1e-12
+"""Difference from 1 below which tissue grows by its whole stretch."""
 ROWS = np.array([0, 1, 2, 0, 0, 1])
 COLUMNS = np.array([0, 1, 2, 1, 2, 2])
 """Rows and columns of the six values of a symmetric tensor."""
@@ -54,13 +56,15 @@ def deformation_gradients(
             3,
         )
     )
-    across = slopes.transpose(0, 2, 1)
     for chunk in chunks(len(cells)):
-        nodes = cells[chunk]
-        # the transposed maps from the regular element: those after = those before · Fᵀ
-        map_before = np.matmul(across, before[nodes][:, None])
-        map_after = np.matmul(across, after[nodes][:, None])
-        found[chunk] = np.linalg.solve(map_before, map_after).swapaxes(-1, -2)
+        maps_before = element_maps(before, cells[chunk], slopes)
+        maps_after = element_maps(after, cells[chunk], slopes)
+        for point, first in enumerate(maps_before):
+            cofactors = cofactors_of(first)
+            volumes = (first * cofactors).sum(axis=(0, 1)) / 3
+            # a: axis of the regular element, i, j: axes in space, e: element
+            turned = np.einsum("aie,aje->ije", maps_after[point], cofactors)
+            found[chunk, point] = np.moveaxis(turned / volumes, 2, 0)
     return found
 
 
@@ -80,6 +84,30 @@ def inverse_stretch(
     powers = np.asarray(power)[..., None]
     inverses = np.exp(-powers * limited)
     return from_principal(inverses, axes), is_limited
+
+
+def inverse_growth(
+    F: Floats,
+    power: Floats,
+    limit: float,
+) -> tuple[Floats, Mask]:
+    """Return the inverse (..., 3, 3) of growth by U^power of F = R·U as in
+    `inverse_stretch`, and where U is limited.
+
+    Where growth is the whole of U, and surely below the limit, it is F⁻¹ = U⁻¹·Rᵀ,
+    which costs less: an isotropic material does not depend on the rotation.
+    """
+    squared = F.swapaxes(-1, -2) @ F
+    strains = np.linalg.norm(squared - np.eye(3), axis=(-2, -1))
+    is_whole = (np.abs(power - 1) < ROUND_OFF) & (strains < 1 - np.exp(-2 * limit))
+    inverse = np.empty_like(F)
+    inverse[is_whole] = np.linalg.inv(F[is_whole])
+    is_limited = np.zeros(is_whole.shape, dtype=bool)
+    others = ~is_whole
+    inverse[others], is_limited[others] = inverse_stretch(
+        F[others], power[others], limit
+    )
+    return inverse, is_limited
 
 
 def _principal_logs(squared: Floats) -> tuple[Floats, Floats]:

@@ -25,7 +25,7 @@ from ..settings.folding import AXES, FoldingParameters
 from ..settings.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
-from .stretches import deformation_gradients, inverse_stretch
+from .stretches import deformation_gradients, inverse_growth
 from .tissue import Elements, Tissue
 
 FEEDBACK_GW = 0.2
@@ -67,6 +67,8 @@ class TargetGrowth(StepGrowth):
     shrinking: int
     total: Callable[[int], int]
     held: list[int] = field(default_factory=list)
+    # computed once: the step's growth and the growth of all steps need it
+    _deformations: dict[Elements, Floats] = field(default_factory=dict, init=False)
 
     def inverse(self, tissue: Tissue) -> Floats:
         elements = tissue.elements
@@ -76,7 +78,7 @@ class TargetGrowth(StepGrowth):
             tissue.at_points(tissue.growing),
             0.0,
         )
-        inverse, is_limited = inverse_stretch(
+        inverse, is_limited = inverse_growth(
             self.deformation(elements), growing, MAX_LOG_STRETCH
         )
         is_held = ~is_valid | is_limited.any(axis=1)
@@ -84,12 +86,14 @@ class TargetGrowth(StepGrowth):
         return inverse
 
     def deformation(self, elements: Elements) -> Floats:
-        return deformation_gradients(
-            self.start.positions_mm[elements.vertices],
-            self.goal_mm[elements.vertices],
-            elements.cells,
-            elements.points.gradients,
-        )
+        if elements not in self._deformations:
+            self._deformations[elements] = deformation_gradients(
+                self.start.positions_mm[elements.vertices],
+                self.goal_mm[elements.vertices],
+                elements.cells,
+                elements.points.gradients,
+            )
+        return self._deformations[elements]
 
     def guess(self, fixed: Mask) -> Floats:
         return np.where(

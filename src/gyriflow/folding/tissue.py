@@ -1,12 +1,14 @@
 """The tissue of a step: the depth of a rank's elements, where they grow, and the
 normals of the pial surface there."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.triangles import Floats, Indices, Mask
+from ..geometry.triangles import Floats, Indices, Ints, Mask
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
 from ..units import M_PER_MM, MM_PER_M
@@ -29,6 +31,41 @@ class Elements:
 
 
 @dataclass(frozen=True, eq=False)
+class Layers:
+    """Depth, nearest places of the pial surface and cortical weight of a rank's
+    tissue, as in `Tissue`."""
+
+    pial: PialSearch
+    depth: Floats
+    nearest: NDArray
+    weight: Floats
+
+
+def layers_of(
+    elements: Elements,
+    positions: Floats,
+    facets: Ints,
+    thickness_mm: Floats | float,
+    reach: float,
+) -> Layers:
+    """Return the layers at (n, 3) positions of all vertices in m below the pial
+    `facets`; depths are exact up to `reach`, in m."""
+    pial = PialSearch(positions, facets)
+    nodes = positions[elements.vertices]
+    nearest: NDArray
+    if elements.points.order == 1:
+        to_vertex, nearest = pial.tree.query(nodes)
+        depth = pial.distance(nodes, reach, to_vertex)
+        value_depth = depth
+    else:
+        depth, nearest = pial.distance_and_normals(nodes, reach)
+        interpolation = elements.points.interpolation
+        value_depth = np.maximum(depth[elements.cells] @ interpolation.T, 0.0)
+    weight = cortical_weight(value_depth * MM_PER_M, thickness_mm)
+    return Layers(pial, depth, nearest, weight)
+
+
+@dataclass(frozen=True, eq=False)
 class Tissue:
     """The tissue of a rank's elements in a step.
 
@@ -40,17 +77,15 @@ class Tissue:
 
     `depth` (k,) is the distance in m of the nodes, at `nodes` (k, 3), to the pial
     surface. `nearest` are the pial vertices (k,) nearest to the nodes of linear
-    elements, or the pial normals (k, 3) there for quadratic ones.
+    elements, or the pial normals (k, 3) there for quadratic ones. These and `weight`
+    are computed when they are first used: growth towards shapes does not use them.
     """
 
     elements: Elements
     nodes: Floats
-    depth: Floats
-    pial: PialSearch
-    nearest: NDArray
-    weight: Floats
     growing: Floats
     maps: Maps
+    find_layers: Callable[[], Layers]
 
     @classmethod
     def of(
@@ -69,38 +104,25 @@ class Tissue:
         """
         points = elements.points
         cells = elements.cells
-        pial = PialSearch(positions, zones.cortex_facets)
-        nodes = positions[elements.vertices]
         # the maximum over the whole mesh, so that all ranks search equally far
         thickest_mm = float(np.max(value_at(p.thickness_mm, week, maps)))
         reach = WEIGHT_REACH * thickest_mm * M_PER_MM
         growing = zones.growing[elements.vertices]
         maps = {name: maps[name][elements.vertices] for name in p.varying_maps}
-        nearest: NDArray
-        if points.order == 1:
-            to_vertex, nearest = pial.tree.query(nodes)
-            depth = pial.distance(nodes, reach, to_vertex)
-            value_depth = depth
-        else:
-            depth, nearest = pial.distance_and_normals(nodes, reach)
+        if points.order == 2:
             linear = points.piecewise_linear.T
             growing = growing[cells] @ linear
             maps = {name: values[cells] @ linear for name, values in maps.items()}
-            value_depth = np.maximum(
-                depth[cells] @ points.interpolation.T,
-                0.0,
-            )
         thickness_mm = value_at(p.thickness_mm, week, maps)
-        weight = cortical_weight(value_depth * MM_PER_M, thickness_mm)
+        find_layers = partial(
+            layers_of, elements, positions, zones.cortex_facets, thickness_mm, reach
+        )
         return cls(
             elements,
-            nodes,
-            depth,
-            pial,
-            nearest,
-            weight,
+            positions[elements.vertices],
             growing,
             maps,
+            find_layers,
         )
 
     @classmethod
@@ -123,16 +145,29 @@ class Tissue:
         points = IntegrationPoints(1, np.ones((1, 1)), np.ones(1))
         elements = Elements(vertices[:, None], vertices, points)
         _, nearest = pial.tree.query(positions)
-        return cls(
-            elements,
-            positions,
-            distance_mm * M_PER_MM,
-            pial,
-            nearest,
-            weight,
-            zones.growing,
-            maps,
-        )
+        layers = Layers(pial, distance_mm * M_PER_MM, nearest, weight)
+        return cls(elements, positions, zones.growing, maps, lambda: layers)
+
+    @cached_property
+    def layers(self) -> Layers:
+        """Where the tissue is in cortex and core."""
+        return self.find_layers()
+
+    @property
+    def pial(self) -> PialSearch:
+        return self.layers.pial
+
+    @property
+    def depth(self) -> Floats:
+        return self.layers.depth
+
+    @property
+    def nearest(self) -> NDArray:
+        return self.layers.nearest
+
+    @property
+    def weight(self) -> Floats:
+        return self.layers.weight
 
     @property
     def places_mm(self) -> Floats:

@@ -70,6 +70,7 @@ def _bernstein(places: Floats) -> Floats:
 FROM_VALUES = np.linalg.inv(_bernstein(POWERS / 3))
 """Matrix from a polynomial's values at the 20 lattice points to its coefficients."""
 LATTICE_SLOPES = shape_slopes(POWERS / 3)
+CORNER_SLOPES = shape_slopes(np.eye(4))
 ON_PARTS = np.stack(
     [FROM_VALUES @ _bernstein(POWERS / 3 @ NODES[list(part)]) for part in PARTS]
 )
@@ -173,15 +174,18 @@ def inverted_on_the_way(
             inverted |= lower_bounds(places, tets) <= 0
         return inverted
     for chunk in chunks(len(tets)):
-        first = edge_vectors(before, tets[chunk])
-        last = edge_vectors(after, tets[chunk])
-        on_way = [
-            determinants(first),
-            _mixed_determinants(first, last),
-            _mixed_determinants(last, first),
-            determinants(last),
+        (first,) = element_maps(before, tets[chunk], SLOPES[None])
+        (last,) = element_maps(after, tets[chunk], SLOPES[None])
+        first_cofactors = cofactors_of(first)
+        last_cofactors = cofactors_of(last)
+        # each row of a matrix times its cofactors is the determinant
+        sums = [
+            (first * first_cofactors).sum(axis=(0, 1)),
+            (last * first_cofactors).sum(axis=(0, 1)),
+            (first * last_cofactors).sum(axis=(0, 1)),
+            (last * last_cofactors).sum(axis=(0, 1)),
         ]
-        values = np.stack(on_way, axis=1)
+        values = np.stack(sums, axis=1) / 3
         values -= least * np.maximum(values[:, :1], 0.0)
         undecided = np.flatnonzero(values.min(axis=1) <= 0)
         for element in undecided:
@@ -189,20 +193,69 @@ def inverted_on_the_way(
     return inverted
 
 
+def may_be_inverted(shapes: Floats, tets: Indices) -> Mask:
+    """Return whether each (m, 4) or (m, 10) element may be inverted anywhere in a shape
+    between (k, n, 3) shapes, a mean of these with any weights.
+
+    It is not where the deformation gradients F from its mean map to those at its
+    corners, in all of the shapes, have |F − 1| < 1. This also holds for all means of
+    these maps, and then det F > 0.
+    """
+    # the map of a linear element is the same everywhere
+    slopes = CORNER_SLOPES if tets.shape[1] == len(NODES) else SLOPES[None]
+    may_be = np.empty(len(tets), dtype=bool)
+    for chunk in chunks(len(tets)):
+        by_shape = [element_maps(shape, tets[chunk], slopes) for shape in shapes]
+        maps = np.concatenate(by_shape)
+        mean = maps.mean(axis=0)
+        cofactors = cofactors_of(mean)
+        volumes = (mean * cofactors).sum(axis=(0, 1)) / 3
+        largest = np.zeros(len(volumes))
+        for corner_map in maps:
+            # a: axis of the regular element, i, j: axes in space, e: element
+            change = np.einsum("aie,aje->ije", corner_map - mean, cofactors)
+            squares = (change**2).sum(axis=(0, 1))
+            largest = np.maximum(largest, squares)
+        may_be[chunk] = (volumes <= 0) | (largest >= volumes**2)
+    return may_be
+
+
+def element_maps(
+    places: Floats,
+    tets: Indices,
+    slopes: Floats,
+) -> Floats:
+    """Return the (p, 3, 3, m) maps from the regular element to (m, 4) or (m, 10)
+    elements at points, from the gradients (p, n, 3) of the shape functions there.
+
+    Rows are axes of the regular element, columns those of space. The elements come
+    last, since products by component are many times faster than those of small
+    matrices.
+    """
+    nodes = np.take(places, tets.T, axis=0)
+    if len(nodes) == len(NODES):
+        maps = np.tensordot(slopes.transpose(0, 2, 1), nodes, axes=1)
+    else:
+        edges = nodes[1:] - nodes[0]
+        maps = np.tile(edges, (len(slopes), 1, 1, 1))
+    return np.ascontiguousarray(maps.swapaxes(2, 3))
+
+
+def cofactors_of(maps: Floats) -> Floats:
+    """Return the cofactors of (3, 3, m) matrices: cross products of two rows each."""
+    found = np.empty_like(maps)
+    for row, axis in product(range(3), repeat=2):
+        second = maps[(row + 1) % 3]
+        third = maps[(row + 2) % 3]
+        j = (axis + 1) % 3
+        k = (axis + 2) % 3
+        found[row, axis] = second[j] * third[k] - second[k] * third[j]
+    return found
+
+
 def edge_vectors(places: Floats, tets: Indices) -> Floats:
     """Return the (m, 3, 3) edges of (m, 4) elements from their first corners."""
     return np.take(places, tets[:, 1:], axis=0) - places[tets[:, :1]]
-
-
-def _mixed_determinants(first: Floats, last: Floats) -> Floats:
-    """Return the (m,) mean determinant of (m, 3, 3) matrices with one of three rows
-    taken from `last`."""
-    total = np.zeros(len(first))
-    for row in range(3):
-        mixed = first.copy()
-        mixed[:, row] = last[:, row]
-        total += determinants(mixed)
-    return total / 3
 
 
 def _has_root(

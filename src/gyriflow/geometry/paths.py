@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .alignment import rigid_fit
 from .deformations import transform_points
 from .diffusion import vertex_sizes
-from .jacobians import inverted_on_the_way
+from .jacobians import inverted_on_the_way, may_be_inverted
 from .tetrahedra import TetrahedralMesh, linear_pieces
 from .triangles import Floats, Ints
 
@@ -122,13 +122,16 @@ def _inverted_by_steps(
     mesh: TetrahedralMesh,
 ) -> Ints:
     curve = BPoly(control[:, None], [0.0, 1.0])
-    found = np.zeros(len(mesh.tets), dtype=bool)
+    # all shapes on the path and on its steps are between its control points
+    suspects = np.flatnonzero(may_be_inverted(control, mesh.tets))
+    tets = mesh.tets[suspects]
+    found = np.zeros(len(tets), dtype=bool)
     before = control[0]
     for step in range(1, steps + 1):
         after = curve(step / steps)
-        found |= inverted_on_the_way(before, after, mesh.tets)
+        found |= inverted_on_the_way(before, after, tets)
         before = after
-    return np.flatnonzero(found)
+    return suspects[found]
 
 
 def merged_shapes(

@@ -299,7 +299,8 @@ def follow_series(
     """
     boundary, used = boundary_surface(mesh)
     pieces = linear_pieces(mesh)
-    extend_at_start = harmonic_continuation(mesh.vertices, pieces, used)
+    if body is None:
+        extend_at_start = harmonic_continuation(mesh.vertices, pieces, used)
     shapes = earlier.by_week() if earlier else [WeekShape(weeks[0], mesh.vertices)]
     n_later_done = sum(not shape.is_stop for shape in shapes) - 1
     if earlier:

@@ -24,6 +24,7 @@ from gyriflow.folding.targets import (
     shapes_of_run,
     shrinkage_note,
 )
+from gyriflow.folding.tissue import Elements
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.diffusion import vertex_sizes
@@ -195,7 +196,7 @@ def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goa
         p, start, goals, 0.0, 0, lambda count: counted.append(count) or count
     )
     points = SimpleNamespace(gradients=SLOPES[None])
-    elements = SimpleNamespace(vertices=np.arange(12), cells=tets, points=points)
+    elements = Elements(tets, np.arange(12), points)
     tissue = SimpleNamespace(
         elements=elements,
         growing=np.ones(12),

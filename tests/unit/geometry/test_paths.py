@@ -8,7 +8,12 @@ from shapes import box_mesh, ellipsoid_mesh, rigid
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
-from gyriflow.geometry.jacobians import inverted_on_the_way
+from gyriflow.geometry.jacobians import (
+    AT_CORNERS,
+    coefficients,
+    inverted_on_the_way,
+    may_be_inverted,
+)
 from gyriflow.geometry.paths import limited_velocities, merged_shapes, path_through
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
@@ -162,6 +167,35 @@ def test_each_shape_is_aligned_with_the_one_before_by_volume():
         assert without_rigid_motion(before, after, sizes) == pytest.approx(
             after - before, abs=1e-6
         )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_every_element_that_a_mean_of_shapes_inverts_may_be_inverted(order):
+    mesh, after = turned(2.2)
+    before = mesh.vertices - mesh.vertices.mean(axis=0)
+    bent = before + 0.3 * np.sin(before[:, [1, 2, 0]])
+    shapes = [before, bent, after]
+    tets = mesh.tets
+    if order == 2:
+        curved = [quadratic(TetrahedralMesh(shape, tets)) for shape in shapes]
+        shapes = [shape.vertices for shape in curved]
+        tets = curved[0].tets
+    shapes = np.stack(shapes)
+    found = may_be_inverted(shapes, tets)
+    assert 0 < found.sum() < len(found)
+    n_inverted = 0
+    for weights in np.random.default_rng(3).dirichlet(np.ones(3), 300):
+        mean = np.tensordot(weights, shapes, axes=1)
+        if order == 1:
+            inverted = volumes_between(mean, tets) <= 0
+        else:
+            inverted = (coefficients(mean, tets)[:, AT_CORNERS] <= 0).any(axis=1)
+        n_inverted += inverted.sum()
+        assert found[inverted].all()
+    assert n_inverted > 0
+    # half of an element's volume may go, and the body may turn a little
+    small = transform_points(before * [1.0, 0.5, 1.0], rigid(0, 0, 20))
+    assert not may_be_inverted(np.stack([before, small]), mesh.tets).any()
 
 
 @pytest.mark.parametrize("order", [1, 2])
