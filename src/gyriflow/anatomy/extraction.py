@@ -200,6 +200,15 @@ def refine(
     return field, fine
 
 
+def without_holes(mask: Mask, structure: Mask = INSIDE) -> Mask:
+    """Fill the holes of an (i, j, k) mask: what voxels outside, connected by a
+    structure, do not reach. A dilation from the border takes three times as long.
+    """
+    number, _ = ndimage.label(np.pad(~mask, 1, constant_values=True), structure)
+    is_filled = number != number[0, 0, 0]
+    return is_filled[1:-1, 1:-1, 1:-1]
+
+
 def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
     """Return the mask's parts of comparable size to its largest, cavities filled; parts
     and voxels dropped."""
@@ -209,7 +218,7 @@ def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, i
     is_main = (sizes >= comparable * sizes.max()) & (sizes > 0)
     dropped = ~is_main & (sizes > 0)
     return (
-        ndimage.binary_fill_holes(is_main[number]),
+        without_holes(is_main[number]),
         int(dropped.sum()),
         int(sizes[dropped].sum()),
     )
@@ -431,7 +440,7 @@ def _apply(
         before = mask[wide]
         after = before.copy()
         after[inner] = content
-        after = ndimage.binary_fill_holes(after, closed_by)
+        after = without_holes(after, closed_by)
         gain = _euler_number(after) - _euler_number(before)
         # a part more, even if all that reach the border of the box are one, was cut off
         if gain <= 0 or _parts_if_framed(after) > _parts_if_framed(before):

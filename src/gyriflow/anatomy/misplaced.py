@@ -10,7 +10,15 @@ from scipy import ndimage
 from ..geometry.deformations import transform_points
 from ..settings.schemes import LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import INSIDE, OUTSIDE, Floats, Mask, dilated, shifted_affine
+from .extraction import (
+    INSIDE,
+    OUTSIDE,
+    Floats,
+    Mask,
+    dilated,
+    shifted_affine,
+    without_holes,
+)
 
 # Limits are from 47 label volumes of three atlases, 21 to 38 GW
 # (`benchmarks/misplaced_cortex.py`). no cortex lies further from the tissue inside it;
@@ -44,7 +52,7 @@ def misplaced_cortex(
     cortex = around.cortex
     fluid = np.isin(around.labels, scheme.ventricles)
     core = around.cerebrum & ~cortex & ~fluid
-    outside = ~ndimage.binary_fill_holes(around.cerebrum)
+    outside = ~without_holes(around.cerebrum)
     enclosed = _cortex_not_touching(outside, cortex)
     is_far = cortex & ~around.is_near(core, MAX_FROM_CORE_MM)
     detached = is_far | _cortex_not_touching(core, cortex)
@@ -141,7 +149,7 @@ def bare_surface(
     around = _cropped(labels, affine, scheme)
     if around is None:
         return
-    filled = ndimage.binary_fill_holes(around.cerebrum)
+    filled = without_holes(around.cerebrum)
     surface = filled & ~ndimage.binary_erosion(filled)
     is_fluid = np.isin(around.labels, scheme.ventricles)
     is_far = ~around.is_near(around.cortex, MAX_TO_CORTEX_MM)
