@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from gallery import SCHEME, WEEK, read_sound, save
+from gallery import WEEK, read_sound, save
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
@@ -100,9 +100,7 @@ def measure() -> Measured:
     pial = sound.pial
     left = sound.posed_sides["left"]
     thickness = thickness_from_labels(
-        sound.labels,
-        sound.affine,
-        SCHEME,
+        pial.cortex,
         pial.whole,
         pial.pose,
         pial.fissure_x_mm,

@@ -126,9 +126,7 @@ def measure_turned(
     labels, affine = turned(volume.labels, volume.affine, number)
     surface = from_labels(labels, affine, scheme, week=arguments.week)
     pose, fissure = pose_from(surface.report["pose"]), surface.report["fissure_x_mm"]
-    thickness = thickness_from_labels(
-        labels, affine, scheme, surface.whole, pose, fissure
-    )
+    thickness = thickness_from_labels(surface.cortex, surface.whole, pose, fissure)
     found = measure_brain(
         surface.whole,
         surface.left,

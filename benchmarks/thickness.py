@@ -34,7 +34,7 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import smooth_mask
 from gyriflow.anatomy.repair import surface_of_mask
-from gyriflow.anatomy.thickness import border, thickness_from_labels
+from gyriflow.anatomy.thickness import border, read_cortex, thickness_from_labels
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.matching import inside_mask, layer_thickness, nearest_on
 from gyriflow.geometry.poses import Pose
@@ -199,7 +199,8 @@ def measure(folds: Folds, voxel_mm: tuple[float, ...], seed: int) -> dict[str, A
     labels = np.where(body, np.where(core, 1, 2), 0)
     volume = float(body.sum() * size.prod())
     found = surface_of_mask(smooth_mask(body), affine, volume, EDGE_MM).mesh
-    thickness = thickness_from_labels(labels, affine, SCHEME, found, Pose())
+    cortex = read_cortex(labels, affine, SCHEME)
+    thickness = thickness_from_labels(cortex, found, Pose())
     inner = border(core, affine)
     means = {
         "error": thickness.report["mean_mm"],

@@ -54,9 +54,7 @@ with step(
         pose = read_pose(output.report)
         fissure = surface.report["fissure_x_mm"]
         if labels:
-            thickness = thickness_from_labels(
-                volume.labels, volume.affine, labels.scheme, pial, pose, fissure
-            )
+            thickness = thickness_from_labels(surface.cortex, pial, pose, fissure)
         else:
             whites = {
                 side: read_surface(path, side) for side, path in params.white.items()

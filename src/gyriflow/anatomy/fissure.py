@@ -22,7 +22,7 @@ from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on
 from ..geometry.triangles import Ints, TriangleMesh
 from ..settings.terms import Side
-from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask
+from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask, dilated
 
 SAMPLES = 600
 DIRECTIONS = 400
@@ -489,24 +489,11 @@ def hidden_fissure(
     # not whole voxels, which rounding would include or not
     sheet = np.abs(side_mm) < 1.25 * size.max()
     reach = max(0.5 * FISSURE_MM, 1.25 * size.min())
-
-    def distance(voxels: Mask) -> NDArray[np.float32]:
-        """Return each voxel's distance in mm from the nearest of some voxels, infinite
-        if there are none."""
-        if not voxels.any():
-            return np.full(
-                voxels.shape,
-                np.inf,
-                dtype=np.float32,
-            )
-        distance_mm = ndimage.distance_transform_edt(~voxels, sampling=size)
-        return distance_mm.astype(np.float32)
-
-    shows = sheet & (distance(~brain) < reach)
+    shows = sheet & dilated(~brain, reach, size)
     # small gaps between touching walls are not a fissure, and would leave tunnels when
     # it is opened
-    wide = shows & (distance(sheet & ~shows) > MIN_VISIBLE_MM)
-    hidden = sheet & (distance(wide) > MIN_VISIBLE_MM)
+    wide = shows & ~dilated(sheet & ~shows, MIN_VISIBLE_MM, size)
+    hidden = sheet & ~dilated(wide, MIN_VISIBLE_MM, size)
     if bridges:
         number, _ = ndimage.label(
             brain & ~hidden & (np.abs(side_mm) < 0.45 * size.min()), OUTSIDE
@@ -524,9 +511,8 @@ def hidden_fissure(
     )
     sizes = np.bincount(number.ravel())
     sizes[0] = 0
-    above = sheet & (
-        distance((number > 0) & (sizes >= MIN_JOINT * sizes.max())[number]) > FLOOR_MM
-    )
+    joint = (number > 0) & (sizes >= MIN_JOINT * sizes.max())[number]
+    above = sheet & ~dilated(joint, FLOOR_MM, size)
     number, _ = ndimage.label(above, OUTSIDE)
     return (
         above

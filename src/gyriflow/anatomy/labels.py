@@ -272,7 +272,7 @@ def require_cortex_outside(
 ) -> float:
     """Return the share of the cerebrum's surface with cortex; InputError below
     `minimum`: another scheme."""
-    cerebrum = ndimage.binary_fill_holes(
+    cerebrum = extraction.without_holes(
         np.pad(
             np.isin(labels, scheme.cerebrum) | unlabelled,
             1,
@@ -342,7 +342,7 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
         return fluid
     tissue = np.isin(labels, scheme.cerebrum) & ~fluid
     # rays also pass unlabelled voxels inside: choroid plexus, septum
-    clear = fluid | (ndimage.binary_fill_holes(tissue | fluid) & ~tissue)
+    clear = fluid | (extraction.without_holes(tissue | fluid) & ~tissue)
     out = fluid & (_ray_share(clear, tissue, RAY_SMOOTHING) <= ENCLOSED)
     hindbrain = np.isin(
         labels,
@@ -390,7 +390,7 @@ def unlabelled_ventricles(
     near = to_tissue <= CLOSING_MM
     to_border = ndimage.distance_transform_edt(near, sampling=size)
     closed = to_border > CLOSING_MM
-    inside = ndimage.binary_fill_holes(closed | tissue)
+    inside = extraction.without_holes(closed | tissue)
 
     hindbrain = np.isin(
         numbers,
@@ -487,7 +487,7 @@ def layout_of(labels: Labels) -> Layout:
     for box in ndimage.find_objects((labels != 0).astype(np.int8)):
         labels = np.pad(labels[box], 1)
     labels = np.where(
-        ndimage.binary_fill_holes(labels) & (labels == 0),
+        extraction.without_holes(labels != 0) & (labels == 0),
         HOLE,
         labels,
     )

@@ -10,7 +10,15 @@ from scipy import ndimage
 from ..geometry.deformations import transform_points
 from ..settings.schemes import LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import INSIDE, OUTSIDE, Floats, Mask, shifted_affine
+from .extraction import (
+    INSIDE,
+    OUTSIDE,
+    Floats,
+    Mask,
+    dilated,
+    shifted_affine,
+    without_holes,
+)
 
 # Limits are from 47 label volumes of three atlases, 21 to 38 GW
 # (`benchmarks/misplaced_cortex.py`). no cortex lies further from the tissue inside it;
@@ -44,10 +52,9 @@ def misplaced_cortex(
     cortex = around.cortex
     fluid = np.isin(around.labels, scheme.ventricles)
     core = around.cerebrum & ~cortex & ~fluid
-    outside = ~ndimage.binary_fill_holes(around.cerebrum)
+    outside = ~without_holes(around.cerebrum)
     enclosed = _cortex_not_touching(outside, cortex)
-    from_core_mm = around.distance_mm(core)
-    is_far = cortex & (from_core_mm > MAX_FROM_CORE_MM)
+    is_far = cortex & ~around.is_near(core, MAX_FROM_CORE_MM)
     detached = is_far | _cortex_not_touching(core, cortex)
     found = _pieces_in_words(detached & ~enclosed, around.affine)
     if found:
@@ -90,13 +97,10 @@ class _Cropped:
     cortex: Mask
     is_inner: Mask
 
-    def distance_mm(self, mask: Mask) -> Floats:
-        """Return the distance of each voxel from a mask."""
-        size = np.linalg.norm(
-            self.affine[:3, :3],
-            axis=0,
-        )
-        return ndimage.distance_transform_edt(~mask, sampling=size)
+    def is_near(self, mask: Mask, distance_mm: float) -> Mask:
+        """Return the mask of the voxels within a distance of a mask."""
+        size = np.linalg.norm(self.affine[:3, :3], axis=0)
+        return dilated(mask, distance_mm, size)
 
 
 def _cropped(
@@ -145,10 +149,10 @@ def bare_surface(
     around = _cropped(labels, affine, scheme)
     if around is None:
         return
-    filled = ndimage.binary_fill_holes(around.cerebrum)
+    filled = without_holes(around.cerebrum)
     surface = filled & ~ndimage.binary_erosion(filled)
     is_fluid = np.isin(around.labels, scheme.ventricles)
-    is_far = around.distance_mm(around.cortex) > MAX_TO_CORTEX_MM
+    is_far = ~around.is_near(around.cortex, MAX_TO_CORTEX_MM)
     is_bare = surface & around.is_inner & ~is_fluid & is_far
     share = is_bare.sum() / surface.sum()
     if share > MAX_BARE_SHARE:

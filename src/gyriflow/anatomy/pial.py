@@ -33,7 +33,7 @@ from .labels import (
 )
 from .repair import RepairedSurface
 from .sulci import open_fused_sulci
-from .thickness import MIN_VOXELS, border, voxels_through_cortex
+from .thickness import MIN_VOXELS, Cortex, cortex_of
 
 # the mid-plane agrees with the labels if this is the cosine between its normal and the
 # line from left to right: 45°
@@ -54,7 +54,8 @@ class PialSurface:
 
     `whole` is closed and outward, in one or two pieces. `left` and `right` (None if
     missing) are its parts, open where cut at the fissure, the plane x = `fissure_x_mm`,
-    and at capped medial walls. `pose` leads from the brain's files.
+    and at capped medial walls. `pose` leads from the brain's files. `cortex` is that of
+    the labels, in their coordinates; None without.
     """
 
     whole: TriangleMesh
@@ -63,6 +64,7 @@ class PialSurface:
     fissure_x_mm: float
     pose: Pose
     report: dict[str, Any]
+    cortex: Cortex | None = None
 
 
 @dataclass
@@ -121,21 +123,21 @@ def from_labels(
     smooth, affine = extraction.smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
     grid, removed_ml = affine, 0.0
     side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
-    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
+    cortex = cortex_of(cerebrum, scheme)
     if not side:
         plane, side_mm = _fissure_of_labels(
-            cerebrum, core, smooth, affine, scheme, brain
+            cerebrum, cortex.core, smooth, affine, scheme, brain
         )
         smooth, brain.report["slit_voxels_reopened"] = extraction.remove_bridges(
             cerebrum.mask, smooth
         )
     original = smooth, grid
     if scheme.cortex and not side:
-        smooth, affine, removed_ml = _with_fissure(smooth, affine, side_mm, core)
+        smooth, affine, removed_ml = _with_fissure(smooth, affine, side_mm, cortex.core)
         brain.report["fissure_opened_mL"] = removed_ml
     if open_sulci:
         smooth, affine, taken_ml = _with_sulci(
-            smooth, affine, cerebrum, core, scheme, None if side else side_mm, brain
+            smooth, affine, cerebrum, cortex, scheme, None if side else side_mm, brain
         )
         removed_ml += taken_ml
     even = repair.surface_of_mask(
@@ -150,24 +152,26 @@ def from_labels(
     brain.take(even)
     if side:
         plausible.require_single_hemisphere(even.mesh)
-        return _one_side(
+        surface = _one_side(
             even,
             side,
             posing.pose_of_hemisphere(even.mesh, side, "auto", of_volume=True),
             brain,
         )
-    heights = fissure.sample(
-        side_mm,
-        grid,
-        triangles.corners(even.mesh).mean(axis=1),
-    )
-    return _two_sides(
-        even,
-        fissure.left_faces(even.mesh, heights),
-        plane,
-        pose,
-        brain,
-    )
+    else:
+        heights = fissure.sample(
+            side_mm,
+            grid,
+            triangles.corners(even.mesh).mean(axis=1),
+        )
+        surface = _two_sides(
+            even,
+            fissure.left_faces(even.mesh, heights),
+            plane,
+            pose,
+            brain,
+        )
+    return replace(surface, cortex=cortex if scheme.cortex else None)
 
 
 def _checked_pose(
@@ -336,20 +340,22 @@ def _with_sulci(
     field: NDArray[np.float32],
     affine: Floats,
     cerebrum: Cerebrum,
-    core: Mask,
+    cortex: Cortex,
     scheme: LabelScheme,
     side_mm: NDArray[np.float32] | None,
     brain: _Brain,
 ) -> tuple[NDArray[np.float32], Floats, float]:
     """Open fused sulci; return the field, its affine, and the volume removed (mL), less
     what closing handles added."""
-    reason = _reason_not_to_open(cerebrum, core, scheme)
+    reason = _reason_not_to_open(cerebrum, cortex, scheme)
     if reason:
         report: dict[str, Any] = {"stays_fused": reason}
     else:
         # handles are found faster before voxels are refined
         simple, repaired = extraction.make_simple(field, cerebrum.smallest_part)
-        opened, fine_affine, report = open_fused_sulci(simple, affine, core, side_mm)
+        opened, fine_affine, report = open_fused_sulci(
+            simple, affine, cortex.core, side_mm
+        )
     brain.report["sulci"] = report
     if not report.get("sheets"):
         if "stays_fused" in report and brain.week > FUSED_AFTER_GW:
@@ -364,18 +370,16 @@ def _with_sulci(
 
 def _reason_not_to_open(
     cerebrum: Cerebrum,
-    core: Mask,
+    cortex: Cortex,
     scheme: LabelScheme,
 ) -> str:
     """Return why labels do not show where sulci are fused; or ''."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
         return "the labels have no white matter"
-    inner_border = border(core, cerebrum.affine)
-    voxels = voxels_through_cortex(cerebrum.mask, inner_border, cerebrum.affine)
-    if voxels < MIN_VOXELS:
+    if cortex.voxels_through < MIN_VOXELS:
         return (
-            f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks"
-            " like two banks"
+            f"the cortex is {cortex.voxels_through:.1f} voxels thick, so roughness of"
+            " the labels looks like two banks"
         )
     return ""
 

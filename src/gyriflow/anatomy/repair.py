@@ -9,7 +9,7 @@ from typing import Any
 import igl
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, sparse
 
 from ..errors import MeshError
 from ..geometry import remeshing, triangles
@@ -59,8 +59,9 @@ VOLUME_TOL = 0.01
 # with a larger loss, smoothing has removed structures, and moving the whole surface
 # cannot restore them
 MAX_RESTORED = 0.05
-# Taubin smoothing
+# Taubin smoothing: λ and μ
 SMOOTHING_ITERATIONS = 10
+TAUBIN_STEPS = (0.5, -0.53)
 ROUNDS = 2
 # rounds that reset crossing walls, and the rings of neighbours that are reset with them
 # after smoothing
@@ -226,10 +227,16 @@ def faults(mesh: TriangleMesh, n_crossing: int | None = None) -> str:
 
 
 def taubin_smoothed(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a surface smoothed without shrinking (Taubin 1995, λ = 0.5, μ = −0.53)."""
-    document = remeshing.in_meshlab(mesh)
-    document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
-    return remeshing.from_meshlab(document)
+    """Return a closed surface smoothed without shrinking (Taubin 1995): vertices move
+    towards the mean of their neighbours, and away from it, in turn."""
+    adjacency = sparse.csr_matrix(igl.adjacency_matrix(mesh.faces), dtype=float)
+    n_neighbours = adjacency.sum(axis=1)
+    places = mesh.vertices
+    for _ in range(SMOOTHING_ITERATIONS):
+        for step in TAUBIN_STEPS:
+            means = (adjacency @ places) / n_neighbours
+            places = places + step * (means - places)
+    return TriangleMesh(places, mesh.faces)
 
 
 def make_even(

@@ -208,23 +208,17 @@ def _usual_thickness(
     """
     every = max(1, len(surface) // N_DEPTHS)
     tree, depth = cKDTree(surface[::every]), depth[::every]
-    cell = np.rint(points / PLACES_MM).astype(np.int64)
-    shape, overall = tuple(cell.max(axis=0) + 1), float(np.median(depth))
-    nearby = tree.query_ball_point(
-        PLACES_MM * np.array(list(np.ndindex(shape))), NEARBY_MM
-    )
-    medians = np.array(
-        [
-            min(
-                np.median(depth[rows]),
-                overall,
-            )
-            if rows
-            else overall
-            for rows in nearby
-        ]
-    )
-    return medians.reshape(shape)[tuple(cell.T)]
+    cell = tuple(np.rint(points / PLACES_MM).astype(np.int64).T)
+    is_used = np.zeros([axis.max() + 1 for axis in cell], dtype=bool)
+    is_used[cell] = True
+    overall = float(np.median(depth))
+    medians = []
+    for rows in tree.query_ball_point(PLACES_MM * np.argwhere(is_used), NEARBY_MM):
+        median = np.median(depth[rows]) if rows else overall
+        medians.append(min(median, overall))
+    thickness = np.zeros(is_used.shape)
+    thickness[is_used] = medians
+    return thickness[cell]
 
 
 def _deep_sheets(

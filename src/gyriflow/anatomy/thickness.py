@@ -4,6 +4,7 @@ and labels filled from both."""
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import igl
@@ -37,7 +38,7 @@ from .extraction import (
     smooth_mask,
 )
 from .fissure import FISSURE_MM, cut_sides, nearer_left, sample
-from .labels import Labels, read_cerebrum
+from .labels import Cerebrum, Labels, read_cerebrum
 from .repair import make_sound, sound_pieces, surface_of_mask, taubin_smoothed
 
 log = logging.getLogger(__name__)
@@ -99,26 +100,67 @@ class Thickness:
         return np.where(self.is_measured, self.values_mm, np.nan)
 
 
+@dataclass(frozen=True, eq=False)
+class Cortex:
+    """The cortex in the labels of a cerebrum: (i, j, k) masks of both, and the (4, 4)
+    affine to mm."""
+
+    cerebrum: Mask
+    mask: Mask
+    affine: Floats
+
+    @cached_property
+    def core(self) -> Mask:
+        """The (i, j, k) mask of the tissue inside the cortex."""
+        return self.cerebrum & ~self.mask
+
+    @cached_property
+    def inner_border(self) -> TriangleMesh:
+        """The `border` of the tissue inside the cortex."""
+        return border(self.core, self.affine)
+
+    @cached_property
+    def voxels_through(self) -> float:
+        """The median thickness, between the borders of cerebrum and core, over a
+        voxel's longest edge."""
+        outer = border(self.cerebrum, self.affine)
+        every = max(1, len(outer.vertices) // N_SAMPLES)
+        inward, _, nearest = nearest_on(outer.vertices[::every], self.inner_border)
+        outward, _, _ = nearest_on(nearest, outer)
+        longest_mm = np.linalg.norm(self.affine[:3, :3], axis=0).max()
+        values = 0.5 * (inward + outward) / longest_mm
+        return float(np.median(values[values >= MIN_LAYER_VOXELS]))
+
+
+def read_cortex(labels: Labels, affine: Floats, scheme: LabelScheme) -> Cortex:
+    """Return the cortex of an (i, j, k) label volume with a (4, 4) affine to mm."""
+    return cortex_of(read_cerebrum(labels, affine, scheme), scheme)
+
+
+def cortex_of(cerebrum: Cerebrum, scheme: LabelScheme) -> Cortex:
+    """Return the cortex of a cerebrum; empty if the scheme does not separate it."""
+    is_cortex = np.isin(cerebrum.tissue, scheme.cortex)
+    return Cortex(cerebrum.mask, is_cortex, cerebrum.affine)
+
+
 def cortical_thickness(
     pial: TriangleMesh,
-    cerebrum: Mask,
-    cortex: Mask,
-    affine: Floats,
-    fissure_x_mm: float | None = None,
+    cortex: Cortex,
+    beyond_fissure: Mask | None = None,
 ) -> Thickness:
     """Return the cortical thickness at the vertices of a pial surface; InputError if it
     has no cortex under it.
 
     It is the `layer_thickness` to the surface of the cerebrum without its cortex. It is
     not measured without cortex below, nor where a hidden fissure or fused sulci were
-    opened (in sulci it is with `fissure_x_mm`). The (4, 4) affine leads from the (i, j,
-    k) masks to the coordinates of `pial` in mm. The report's "area_ratio" is the pial
-    area over that of a complete surface around the cortex, (1 + mean curvature ×
-    thickness) × volume / thickness.
+    opened; in sulci it is at the vertices `beyond_fissure` (n,). The `cortex` is in the
+    coordinates of `pial`. The report's "area_ratio" is the pial area over that of a
+    complete surface around the cortex, (1 + mean curvature × thickness) × volume /
+    thickness.
     """
-    inner = border(cerebrum & ~cortex, affine)
-    values = layer_thickness(pial, inner)
-    points, size = pial.vertices, np.linalg.norm(affine[:3, :3], axis=0)
+    values = layer_thickness(pial, cortex.inner_border)
+    points, affine = pial.vertices, cortex.affine
+    size = np.linalg.norm(affine[:3, :3], axis=0)
     # of long voxels, no centre may be nearer than half their diagonal
     voxel = max(
         float(np.cbrt(size.prod())),
@@ -126,18 +168,18 @@ def cortical_thickness(
     )
     to_cortex, to_outside = (
         sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points)
-        for mask in (~cortex, cerebrum)
+        for mask in (~cortex.mask, cortex.cerebrum)
     )
     at_labels = to_outside < MAX_OUTSIDE_VOXELS * voxel
     over_cortex = to_cortex < NEAR_VOXELS * voxel
-    if fissure_x_mm is not None:
-        at_labels |= np.abs(points[:, 0] - fissure_x_mm) > FISSURE_REACH_MM
+    if beyond_fissure is not None:
+        at_labels |= beyond_fissure
     is_measured = at_labels & over_cortex & (values >= MIN_LAYER_VOXELS * voxel)
     if not is_measured.any():
         raise InputError(
             "the labels of the cortex lie nowhere at the surface of the cerebrum",
             found=(
-                f"{int(cortex.sum())} voxels of cortex, all of them deep inside or"
+                f"{int(cortex.mask.sum())} voxels of cortex, all of them deep inside or"
                 " thinner than a third of a voxel"
             ),
             expected="a layer around the cerebrum",
@@ -149,7 +191,7 @@ def cortical_thickness(
     # volume over thickness is the area of the middle of the sheet; a convex brain has
     # more outside
     sheet_mm2 = (
-        float(cortex.sum())
+        float(cortex.mask.sum())
         * float(abs(np.linalg.det(affine[:3, :3])))
         / report["mean_mm"]
     )
@@ -159,8 +201,8 @@ def cortical_thickness(
     report |= {
         "area_ratio": area(pial) / complete_mm2,
         "voxel_mm": float(size.max()),
+        "voxels_through_cortex": cortex.voxels_through,
     }
-    report["voxels_through_cortex"] = voxels_through_cortex(cerebrum, inner, affine)
     return Thickness(filled, is_measured, report)
 
 
@@ -184,32 +226,6 @@ def border(mask: Mask, affine: Floats) -> TriangleMesh:
     )
 
 
-def voxels_through_cortex(
-    cerebrum: Mask,
-    inner: TriangleMesh,
-    affine: Floats,
-) -> float:
-    """Return the median cortical thickness, from mask to `inner` surface, over a
-    voxel's longest edge."""
-    outer = border(cerebrum, affine)
-    points = outer.vertices[
-        :: max(
-            1,
-            len(outer.vertices) // N_SAMPLES,
-        )
-    ]
-    inward, _, nearest = nearest_on(points, inner)
-    values = (
-        0.5
-        * (inward + nearest_on(nearest, outer)[0])
-        / np.linalg.norm(
-            affine[:3, :3],
-            axis=0,
-        ).max()
-    )
-    return float(np.median(values[values >= MIN_LAYER_VOXELS]))
-
-
 def mean_curvature(mesh: TriangleMesh, at: Mask) -> float:
     """Return the mean curvature (1/mm) of a surface over some vertices, an (n,) mask:
     half of what its area grows."""
@@ -222,23 +238,22 @@ def mean_curvature(mesh: TriangleMesh, at: Mask) -> float:
 
 
 def thickness_from_labels(
-    labels: Labels,
-    affine: Floats,
-    scheme: LabelScheme,
+    cortex: Cortex,
     surface: TriangleMesh,
     pose: Pose,
     fissure_x_mm: float | None = None,
 ) -> Thickness:
     """Return the cortical thickness on the whole `surface` that `from_labels` made of
-    the same labels.
+    the labels of a `cortex`, in their coordinates.
 
-    `pose` and `fissure_x_mm` are the surface's; the scheme has to separate cortex from
-    the tissue inside.
+    `pose` and `fissure_x_mm` are the surface's.
     """
-    cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
-    cortex = np.isin(cerebrum.tissue, scheme.cortex)
+    beyond_fissure = None
+    if fissure_x_mm is not None:
+        from_fissure_mm = np.abs(surface.vertices[:, 0] - fissure_x_mm)
+        beyond_fissure = from_fissure_mm > FISSURE_REACH_MM
     thickness = cortical_thickness(
-        surface, cerebrum.mask, cortex, cerebrum.affine, fissure_x_mm
+        transformed(surface, pose.inverse), cortex, beyond_fissure
     )
     mean = thickness.report["mean_mm"]
     log.info("cortical thickness: %.2f mm on average", mean)

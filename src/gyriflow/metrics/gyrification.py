@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-import trimesh
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
@@ -132,10 +131,7 @@ def pieces_without_cuts(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     the cut may be nearer to its banks, and one over the wall of a neck nearer to the
     cut.
     """
-    vertices, faces = trimesh.remesh.subdivide_to_size(
-        surface.vertices, surface.faces, PIECE_MM, max_iter=20
-    )
-    small = TriangleMesh(vertices, faces)
+    small = _split_to_size(surface, PIECE_MM)
     centres, areas = corners(small).mean(axis=1), face_areas(small)
     closed = cap(mesh)
     if len(closed.faces) == len(mesh.faces):
@@ -154,6 +150,28 @@ def pieces_without_cuts(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
         face[is_missed] = nearest_on(centres[is_missed], closed)[1]
     is_original = face < len(mesh.faces)
     return Pieces(centres[is_original], areas[is_original])
+
+
+def _split_to_size(mesh: TriangleMesh, length_mm: float) -> TriangleMesh:
+    """Return the faces of a surface, each apart and halved at its longest edge until
+    no edge is longer than a length."""
+    parts = []
+    remaining = corners(mesh)
+    while len(remaining):
+        lengths = np.linalg.norm(np.roll(remaining, -1, axis=1) - remaining, axis=2)
+        is_long = lengths.max(axis=1) > length_mm
+        parts.append(remaining[~is_long])
+        # the longest edge first
+        order = (lengths[is_long].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        long = np.take_along_axis(remaining[is_long], order[:, :, None], axis=1)
+        start, end, apex = long.transpose(1, 0, 2)
+        middle = 0.5 * (start + end)
+        first = np.stack([start, middle, apex], axis=1)
+        second = np.stack([middle, end, apex], axis=1)
+        remaining = np.concatenate([first, second])
+    pieces = np.concatenate(parts)
+    faces = np.arange(3 * len(pieces)).reshape(-1, 3)
+    return TriangleMesh(pieces.reshape(-1, 3), faces)
 
 
 def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> float:

@@ -125,7 +125,7 @@ class Basis:
     """
 
     eigenvalues: Floats
-    functions: Floats
+    functions: NDArray[np.floating]
     places: sparse.csr_matrix
     energy: sparse.csc_matrix
     first: float
@@ -150,13 +150,25 @@ class Basis:
     def coefficients(self, energy: Floats) -> Floats:
         """Return the (k,) coefficients of the fit of a map f by the orthonormal
         functions, from its (n,) products with `energy`."""
-        products = self.functions.T @ (self.places.T @ energy)
-        return self._by_inverse_root(products[:, None])[:, 0]
+        products = self._products(self.places.T @ energy[:, None])
+        return self._by_inverse_root(products)[:, 0]
 
     def values(self, coefficients: Floats) -> Floats:
         """Return (n, c) values on the surface of sums of the orthonormal functions,
         from (k, c) coefficients."""
-        return self.places @ (self.functions @ self._by_inverse_root(coefficients))
+        return self.places @ self._sums(self._by_inverse_root(coefficients))
+
+    def _sums(self, coefficients: Floats) -> Floats:
+        """Return the (m, c) sums of the functions with (k, c) coefficients, in the
+        precision of the functions: a copy in another would be as large."""
+        return (self.functions @ coefficients.astype(self.functions.dtype)).astype(
+            float
+        )
+
+    def _products(self, values: Floats) -> Floats:
+        """Return the (k, c) products of the functions with (m, c) values, in their
+        precision."""
+        return (self.functions.T @ values.astype(self.functions.dtype)).astype(float)
 
     def _by_inverse_root(self, vectors: Floats) -> Floats:
         """Return S^(-1/2) V for (k, c) vectors V, by the binomial series of (1 − X) for
@@ -168,8 +180,8 @@ class Basis:
         found = term = vectors
         size = np.linalg.norm(vectors)
         for number in range(1, MAX_TERMS + 1):
-            values = self.functions @ term
-            change = term - self.functions.T @ (self._energy_of_places @ values)
+            values = self._sums(term)
+            change = term - self._products(self._energy_of_places @ values)
             term = (1.0 - 0.5 / number) * change
             found = found + term
             if np.linalg.norm(term) <= SERIES_TOL * size:

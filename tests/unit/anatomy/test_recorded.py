@@ -268,7 +268,9 @@ def test_numbers_of_thickness(recorded):
     volume, affine = brain()
     mask, core, _, grid = field()
     plain = Pose()
-    found = thickness.thickness_from_labels(volume, affine, ATLAS, surface(), plain)
+    found = thickness.thickness_from_labels(
+        thickness.read_cortex(volume, affine, ATLAS), surface(), plain
+    )
     inside = shapes.inner(surface(), 1.5)
     x = surface().vertices[:, 0]
     areas = vertex_areas(surface())
@@ -276,9 +278,7 @@ def test_numbers_of_thickness(recorded):
         {
             "of labels": found,
             "border": thickness.border(core, grid),
-            "voxels": thickness.voxels_through_cortex(
-                mask, thickness.border(core, grid), grid
-            ),
+            "voxels": thickness.Cortex(mask, mask & ~core, grid).voxels_through,
             "curvature": thickness.mean_curvature(surface(), x > np.median(x)),
             "summary": thickness.summary(
                 found.values_mm, found.is_measured & (x < x.mean()), areas

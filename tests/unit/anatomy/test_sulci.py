@@ -18,7 +18,11 @@ from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import faults, pieces, surface_of_mask
 from gyriflow.anatomy.sulci import open_fused_sulci
 from gyriflow.anatomy.terraces import without_terraces
-from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
+from gyriflow.anatomy.thickness import (
+    Cortex,
+    cortical_thickness,
+    thickness_from_labels,
+)
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import (
     TriangleMesh,
@@ -72,8 +76,9 @@ def test_a_fused_sulcus_is_opened_to_its_depth(depth_mm):
     assert area(even.mesh) == pytest.approx(truth, rel=0.06)
     # half a millimetre wide
     assert taken < 0.6 * (truth - area(shut)) / 2
+    everywhere = np.ones(len(even.mesh.vertices), dtype=bool)
     found = cortical_thickness(
-        even.mesh, body, body & ~core, affine, fissure_x_mm=-100.0
+        even.mesh, Cortex(body, body & ~core, affine), everywhere
     )
     assert found.is_measured.mean() > 0.95
     assert found.report["mean_mm"] == pytest.approx(THICKNESS_MM, abs=0.25)
@@ -198,10 +203,10 @@ def test_cortex_of_a_voxel_stays_fused_and_has_one_number_of_voxels():
     surface = from_labels(
         labels, affine, scheme, week=28.0, edge_length_mm=3.0, open_sulci=True
     )
-    placed = surface.whole, surface.pose, surface.fissure_x_mm
-    voxels = thickness_from_labels(labels, affine, scheme, *placed).report[
-        "voxels_through_cortex"
-    ]
+    thickness = thickness_from_labels(
+        surface.cortex, surface.whole, surface.pose, surface.fissure_x_mm
+    )
+    voxels = thickness.report["voxels_through_cortex"]
     assert voxels == pytest.approx(1.0, abs=0.2)
     reason = surface.report["sulci"]["stays_fused"]
     assert reason == Facts(f"{voxels:.1f} voxels")

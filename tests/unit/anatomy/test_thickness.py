@@ -10,8 +10,11 @@ from skimage.measure import marching_cubes
 from gyriflow.anatomy.extraction import smooth_mask
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.anatomy.thickness import (
+    FISSURE_REACH_MM,
+    Cortex,
     cortical_thickness,
     mean_curvature,
+    read_cortex,
     summary,
     thickness_from_labels,
     thickness_from_white,
@@ -83,7 +86,9 @@ def folded():
 
 def errors(brain, thickness_mm):
     pial, depth, inside, affine = brain
-    found = cortical_thickness(pial, inside, inside & (depth < thickness_mm), affine)
+    found = cortical_thickness(
+        pial, Cortex(inside, inside & (depth < thickness_mm), affine)
+    )
     assert found.is_measured.mean() > 0.99
     return found, found.values_mm[found.is_measured] - thickness_mm
 
@@ -114,8 +119,10 @@ def test_a_turned_volume_gives_the_same(ball):
     pial, depth, inside, affine = ball
     cortex = inside & (depth < 2.4)
     turn = rigid(20, -30, 10, shift=(5, -7, 2))
-    straight = cortical_thickness(pial, inside, cortex, affine)
-    turned = cortical_thickness(transformed(pial, turn), inside, cortex, turn @ affine)
+    straight = cortical_thickness(pial, Cortex(inside, cortex, affine))
+    turned = cortical_thickness(
+        transformed(pial, turn), Cortex(inside, cortex, turn @ affine)
+    )
     np.testing.assert_allclose(turned.values_mm, straight.values_mm, atol=1e-4)
 
 
@@ -123,7 +130,7 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_reported(ba
     pial, depth, inside, affine = ball
     x = affine[0, 3] + 0.8 * np.arange(inside.shape[0])
     cortex = inside & (depth < 2.4) & (x < 10)[:, None, None]
-    found = cortical_thickness(pial, inside, cortex, affine)
+    found = cortical_thickness(pial, Cortex(inside, cortex, affine))
     # a cap of a quarter of the sphere's area is bare
     assert found.report["measured_area_share"] == pytest.approx(0.75, abs=0.03)
     bare = pial.vertices[:, 0] > 12
@@ -148,13 +155,8 @@ def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_reported(
 ):
     pial, depth, inside, affine = ball
     labels = np.where(inside, np.where(depth < thickness_mm, 5, 1), 0)
-    thickness_from_labels(
-        labels,
-        affine,
-        LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)),
-        pial,
-        Pose(),
-    )
+    scheme = LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,))
+    thickness_from_labels(read_cortex(labels, affine, scheme), pial, Pose())
     assert caplog.messages == messages
 
 
@@ -178,7 +180,7 @@ def test_area_that_fused_sulci_hide_is_reported_by_the_cortex_volume(
     banks = inside & (from_end < 2.0) & (hidden > 0)
     labels = np.where(inside, np.where((depth < 2.0) | banks, 5, 1), 0)
     scheme = LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,))
-    found = thickness_from_labels(labels, affine, scheme, pial, Pose())
+    found = thickness_from_labels(read_cortex(labels, affine, scheme), pial, Pose())
     assert found.report["area_ratio"] == pytest.approx(1.0 - hidden, abs=0.03)
     assert caplog.messages == [Facts("cortex", f"{found.report['area_ratio']:.2f}")] * (
         found.report["area_ratio"] < 0.95
@@ -201,7 +203,7 @@ def test_both_borders_are_where_the_voxels_have_them(size, tolerance):
     pial = surface_of_mask(
         smooth_mask(inside), affine, inside.sum() * np.prod(size), 1.2
     ).mesh
-    found = cortical_thickness(pial, inside, inside & (depth < 2.0), affine)
+    found = cortical_thickness(pial, Cortex(inside, inside & (depth < 2.0), affine))
     assert found.report["mean_mm"] == pytest.approx(2.0, rel=tolerance)
     assert found.report["voxel_mm"] == pytest.approx(max(size))
     if max(size) < 2.0:
@@ -224,10 +226,14 @@ def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
     larger[:3] = False
     cortex = larger & (depth < 3.0)
     with pytest.raises(InputError, check=Facts(cortex.sum())):
-        cortical_thickness(pial, larger, cortex, affine)
+        cortical_thickness(pial, Cortex(larger, cortex, affine))
     # but for opened sulci, on both sides of the fissure
     x = pial.vertices[:, 0] - 1.5
-    found = cortical_thickness(pial, larger, cortex, affine, fissure_x_mm=1.5)
+    found = cortical_thickness(
+        pial,
+        Cortex(larger, cortex, affine),
+        np.abs(x) > FISSURE_REACH_MM,
+    )
     assert found.is_measured[np.abs(x) > 3.5].all()
     assert not found.is_measured[np.abs(x) < 2.5].any()
 
@@ -243,7 +249,7 @@ def test_long_voxels_have_their_length_along_their_own_axis(ball, order):
     z = pial.vertices[:, 2]
     height = np.indices(inside.shape)[order.index(2)]
     cortex = inside & (depth < 3.2) & (height > 10)
-    found = cortical_thickness(transformed(pial, turn), inside, cortex, affine)
+    found = cortical_thickness(transformed(pial, turn), Cortex(inside, cortex, affine))
     bare = -25 + 0.13 + 2.4 * 10.5
     share = found.is_measured[z > bare + 2.4].mean()
     assert share == pytest.approx(0.968, abs=0.003)
