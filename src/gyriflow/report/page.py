@@ -184,7 +184,7 @@ def study_page(
     own = observed[observed["subject"].isin([brain["id"] for brain in brains])]
     summary = [figure for figure in figures if figure["first"]]
     others = [figure for figure in figures if not figure["first"]]
-    page = {
+    page: dict[str, Any] = {
         "title": "Measured cortical folding",
         "verdict": _quality_verdict(tables.quality),
         "prediction": prediction,
