@@ -10,7 +10,6 @@ from facts import Facts
 from folding_program import TIGHT, WEEK, command, failing_after, fold, kill
 from mpi4py import MPI
 from shapes import ellipsoid, ellipsoid_mesh
-from written_frames import element_field
 
 from gyriflow.errors import SolverError
 from gyriflow.folding.checkpoint import read_checkpoint, run_key
@@ -20,7 +19,7 @@ from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import is_closed
 from gyriflow.io.files import read_json
-from gyriflow.io.frames import read_positions, read_tets, read_weeks
+from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.mesh.nodes import curve_edges
 from gyriflow.settings.folding import parameters_from
@@ -54,11 +53,11 @@ def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(
         <= 1e-8 * moved
     )
     for field in ("von_mises_pa", "elastic_strain"):
-        values = element_field(one, 21.5, field)
+        values = read_field(one, 21.5, field)
         assert values.shape == (len(mesh.tets),)
         np.testing.assert_allclose(
             values,
-            element_field(three, 21.5, field),
+            read_field(three, 21.5, field),
             rtol=1e-4,
             atol=1e-4 * values.max(),
         )

@@ -715,7 +715,7 @@ def fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
     """
     (file,) = files
     if is_volume(file):
-        yield scheme_fits(read_label_volume(file, cropped=True).labels)
+        yield _scheme_fits_of(file)
     else:
         _require_brain(Path(file))
 
@@ -972,6 +972,21 @@ def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
     ]
 
 
+def _scheme_fits_of(file: str | Path) -> dict[str, str]:
+    """Return what `scheme_fits` does for a label volume; InputError if it cannot be
+    read or has no label."""
+    labels = read_label_volume(file, cropped=True).labels
+    if not labels.any():
+        raise InputError(
+            "has no label",
+            path=file,
+            found="0 in all voxels",
+            expected="tissue labels above 0",
+            remedy="The segmentation has failed, or this is another file.",
+        )
+    return scheme_fits(labels)
+
+
 def _recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     """Return the entry of a label volume: its id, file and scheme; InputError if the
     scheme is unknown or unclear."""
@@ -984,7 +999,7 @@ def _recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
         "labels": str(file),
         "scheme": UNSET,
     }
-    fits = scheme_fits(read_label_volume(file, cropped=True).labels)
+    fits = _scheme_fits_of(file)
     if scheme:
         require_fit(fits, scheme, file, fits.get(scheme) or "labels that are not in it")
     brain = FoundBrain(file, entry, fits=fits)

@@ -136,17 +136,25 @@ def read_field(
     week: float,
     field: str,
 ) -> NDArray:
-    """Return a field at the vertices at a week; InputError, which names the weeks there
-    are, where there is none."""
+    """Return a field at a week: at the vertices (n, …) or, such as strain, of the
+    elements (c, …); InputError, which names what there is, where there is none."""
     with _reading(path) as file:
-        name = f"{group_name(week)}/{field}"
-        if name not in file:
+        if group_name(week) not in file:
             raise InputError(
-                f"has no {field} of week {week}",
+                f"has no week {week}",
                 path=path,
                 found=f"weeks {_weeks(file)}",
             )
-        return file[name][:]
+        fields = {**file[group_name(week)]}
+        fields |= fields.pop(CELL_FIELDS, {})
+        if field not in fields:
+            raise InputError(
+                f"has no field {field} of week {week}",
+                path=path,
+                found=sorted(fields),
+                remedy="Name it in folding.fields, and run again.",
+            )
+        return fields[field][:]
 
 
 def read_pial_frames(

@@ -114,6 +114,13 @@ def saved(folder, **volumes):
         )
 
 
+def test_a_volume_without_a_label_is_refused_and_asks_for_no_scheme(tmp_path):
+    saved(tmp_path, empty=np.zeros((20, 20, 20)))
+    (brain,) = recognise(tmp_path).brains
+    assert brain.problem == Facts("has no label", "empty_week21_dseg.nii.gz")
+    assert brain.notes == []
+
+
 def test_a_scheme_is_that_of_the_data_set_or_asked_for(tmp_path):
     labels = read_label_volume(LABELS, cropped=True).labels
     either = np.array([0, 3, 3, 0, 0, 2, 3, 0, 3])[labels]
