@@ -204,9 +204,13 @@ def without_holes(mask: Mask, structure: Mask = INSIDE) -> Mask:
     """Fill the holes of an (i, j, k) mask: what voxels outside, connected by a
     structure, do not reach. A dilation from the border takes three times as long.
     """
-    number, _ = ndimage.label(np.pad(~mask, 1, constant_values=True), structure)
-    is_filled = number != number[0, 0, 0]
-    return is_filled[1:-1, 1:-1, 1:-1]
+    outside = np.pad(~mask, 1, constant_values=True)
+    number, _ = ndimage.label(outside, structure)
+    at_border = number[0, 0, 0]
+    is_filled = number != at_border
+    # without the padding
+    inner = slice(1, -1)
+    return is_filled[inner, inner, inner]
 
 
 def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
@@ -371,7 +375,11 @@ def dilated(mask: Mask, radius: float, size: Floats | None = None) -> Mask:
     """
     lengths = [1, 1, 1] if size is None else size.tolist()
     # squared distances; whole ones fit into a byte
-    squared = np.where(mask, 0, int(radius**2) + 1)
+    squared = np.where(
+        mask,
+        0,
+        int(radius**2) + 1,
+    )
     squared = squared.astype(np.uint8 if size is None else np.float32)
     for axis, length in enumerate(lengths):
         nearest = squared.copy()

@@ -99,7 +99,10 @@ class _Cropped:
 
     def is_near(self, mask: Mask, distance_mm: float) -> Mask:
         """Return the mask of the voxels within a distance of a mask."""
-        size = np.linalg.norm(self.affine[:3, :3], axis=0)
+        size = np.linalg.norm(
+            self.affine[:3, :3],
+            axis=0,
+        )
         return dilated(mask, distance_mm, size)
 
 

@@ -229,7 +229,10 @@ def faults(mesh: TriangleMesh, n_crossing: int | None = None) -> str:
 def taubin_smoothed(mesh: TriangleMesh) -> TriangleMesh:
     """Return a closed surface smoothed without shrinking (Taubin 1995): vertices move
     towards the mean of their neighbours, and away from it, in turn."""
-    adjacency = sparse.csr_matrix(igl.adjacency_matrix(mesh.faces), dtype=float)
+    adjacency = sparse.csr_matrix(
+        igl.adjacency_matrix(mesh.faces),
+        dtype=float,
+    )
     n_neighbours = adjacency.sum(axis=1)
     places = mesh.vertices
     for _ in range(SMOOTHING_ITERATIONS):

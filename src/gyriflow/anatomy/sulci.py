@@ -209,11 +209,17 @@ def _usual_thickness(
     every = max(1, len(surface) // N_DEPTHS)
     tree, depth = cKDTree(surface[::every]), depth[::every]
     cell = tuple(np.rint(points / PLACES_MM).astype(np.int64).T)
-    is_used = np.zeros([axis.max() + 1 for axis in cell], dtype=bool)
+    is_used = np.zeros(
+        [axis.max() + 1 for axis in cell],
+        dtype=bool,
+    )
     is_used[cell] = True
     overall = float(np.median(depth))
     medians = []
-    for rows in tree.query_ball_point(PLACES_MM * np.argwhere(is_used), NEARBY_MM):
+    for rows in tree.query_ball_point(
+        PLACES_MM * np.argwhere(is_used),
+        NEARBY_MM,
+    ):
         median = np.median(depth[rows]) if rows else overall
         medians.append(min(median, overall))
     thickness = np.zeros(is_used.shape)

@@ -125,9 +125,15 @@ class Cortex:
         voxel's longest edge."""
         outer = border(self.cerebrum, self.affine)
         every = max(1, len(outer.vertices) // N_SAMPLES)
-        inward, _, nearest = nearest_on(outer.vertices[::every], self.inner_border)
+        inward, _, nearest = nearest_on(
+            outer.vertices[::every],
+            self.inner_border,
+        )
         outward, _, _ = nearest_on(nearest, outer)
-        longest_mm = np.linalg.norm(self.affine[:3, :3], axis=0).max()
+        longest_mm = np.linalg.norm(
+            self.affine[:3, :3],
+            axis=0,
+        ).max()
         values = 0.5 * (inward + outward) / longest_mm
         return float(np.median(values[values >= MIN_LAYER_VOXELS]))
 
@@ -160,7 +166,10 @@ def cortical_thickness(
     """
     values = layer_thickness(pial, cortex.inner_border)
     points, affine = pial.vertices, cortex.affine
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = np.linalg.norm(
+        affine[:3, :3],
+        axis=0,
+    )
     # of long voxels, no centre may be nearer than half their diagonal
     voxel = max(
         float(np.cbrt(size.prod())),

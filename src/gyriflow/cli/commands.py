@@ -753,7 +753,13 @@ def bids(
     )
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     with _place_to_write(work, dry_run, "--work-dir") as place:
-        brains, folded = write_bids(found, data, place / CONFIG, config, **folding)
+        brains, folded = write_bids(
+            found,
+            data,
+            place / CONFIG,
+            config,
+            **folding,
+        )
         if level == "participant" and not dry_run:
             store_options(options, selection)
         scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"

@@ -226,7 +226,11 @@ def predicted_study(
         or files[0]
     )
     text = yaml.safe_dump(config, sort_keys=False)
-    return PredictedStudy(text, f"{entry['id']}: {names} ({given}), {span}", warnings)
+    return PredictedStudy(
+        text,
+        f"{entry['id']}: {names} ({given}), {span}",
+        warnings,
+    )
 
 
 def write_prediction(
@@ -358,9 +362,11 @@ def write_bids(
 def _folded(config: Mapping[str, Any], names: Sequence[str]) -> list[str]:
     """Return which brains a configuration folds, of all its `names`."""
     starts: set[str] = set()
-    for section in (config, *(config.get("runs") or {}).values()):
-        start = (section or {}).get("start")
-        starts.update(chosen_starts(start, names))
+    runs = config.get("runs") or {}
+    for section in [config, *runs.values()]:
+        if section:
+            start = section.get("start")
+            starts.update(chosen_starts(start, names))
     return [name for name in names if name in starts]
 
 

@@ -773,7 +773,10 @@ class ElasticFit:
             is_near = self._incidence.T @ (self._incidence @ is_near) > 0
         near = np.flatnonzero(is_near)
         incidence = self._incidence[:, near]
-        logs = log_stretch(edges[near] @ self._inverse_edges[near], left=True)
+        logs = log_stretch(
+            edges[near] @ self._inverse_edges[near],
+            left=True,
+        )
         volumes_around = (self._incidence @ volumes)[:, None]
         around = packed(logs)
         for _ in range(FLATTENING_ROUNDS):

@@ -98,7 +98,10 @@ def inverse_growth(
     which costs less: an isotropic material does not depend on the rotation.
     """
     squared = F.swapaxes(-1, -2) @ F
-    strains = np.linalg.norm(squared - np.eye(3), axis=(-2, -1))
+    strains = np.linalg.norm(
+        squared - np.eye(3),
+        axis=(-2, -1),
+    )
     is_whole = (np.abs(power - 1) < ROUND_OFF) & (strains < 1 - np.exp(-2 * limit))
     inverse = np.empty_like(F)
     inverse[is_whole] = np.linalg.inv(F[is_whole])

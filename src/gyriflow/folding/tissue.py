@@ -60,7 +60,10 @@ def layers_of(
     else:
         depth, nearest = pial.distance_and_normals(nodes, reach)
         interpolation = elements.points.interpolation
-        value_depth = np.maximum(depth[elements.cells] @ interpolation.T, 0.0)
+        value_depth = np.maximum(
+            depth[elements.cells] @ interpolation.T,
+            0.0,
+        )
     weight = cortical_weight(value_depth * MM_PER_M, thickness_mm)
     return Layers(pial, depth, nearest, weight)
 
@@ -142,7 +145,11 @@ class Tissue:
         positions = positions_mm * M_PER_MM
         pial = PialSearch(positions, zones.cortex_facets)
         vertices = np.arange(len(positions))
-        points = IntegrationPoints(1, np.ones((1, 1)), np.ones(1))
+        points = IntegrationPoints(
+            1,
+            np.ones((1, 1)),
+            np.ones(1),
+        )
         elements = Elements(vertices[:, None], vertices, points)
         _, nearest = pial.tree.query(positions)
         layers = Layers(pial, distance_mm * M_PER_MM, nearest, weight)

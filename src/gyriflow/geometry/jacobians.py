@@ -174,8 +174,16 @@ def inverted_on_the_way(
             inverted |= lower_bounds(places, tets) <= 0
         return inverted
     for chunk in chunks(len(tets)):
-        (first,) = element_maps(before, tets[chunk], SLOPES[None])
-        (last,) = element_maps(after, tets[chunk], SLOPES[None])
+        (first,) = element_maps(
+            before,
+            tets[chunk],
+            SLOPES[None],
+        )
+        (last,) = element_maps(
+            after,
+            tets[chunk],
+            SLOPES[None],
+        )
         first_cofactors = cofactors_of(first)
         last_cofactors = cofactors_of(last)
         # each row of a matrix times its cofactors is the determinant
@@ -234,10 +242,17 @@ def element_maps(
     """
     nodes = np.take(places, tets.T, axis=0)
     if len(nodes) == len(NODES):
-        maps = np.tensordot(slopes.transpose(0, 2, 1), nodes, axes=1)
+        maps = np.tensordot(
+            slopes.transpose(0, 2, 1),
+            nodes,
+            axes=1,
+        )
     else:
         edges = nodes[1:] - nodes[0]
-        maps = np.tile(edges, (len(slopes), 1, 1, 1))
+        maps = np.tile(
+            edges,
+            (len(slopes), 1, 1, 1),
+        )
     return np.ascontiguousarray(maps.swapaxes(2, 3))
 
 

@@ -158,12 +158,19 @@ def _split_to_size(mesh: TriangleMesh, length_mm: float) -> TriangleMesh:
     parts = []
     remaining = corners(mesh)
     while len(remaining):
-        lengths = np.linalg.norm(np.roll(remaining, -1, axis=1) - remaining, axis=2)
+        lengths = np.linalg.norm(
+            np.roll(remaining, -1, axis=1) - remaining,
+            axis=2,
+        )
         is_long = lengths.max(axis=1) > length_mm
         parts.append(remaining[~is_long])
         # the longest edge first
         order = (lengths[is_long].argmax(axis=1)[:, None] + np.arange(3)) % 3
-        long = np.take_along_axis(remaining[is_long], order[:, :, None], axis=1)
+        long = np.take_along_axis(
+            remaining[is_long],
+            order[:, :, None],
+            axis=1,
+        )
         start, end, apex = long.transpose(1, 0, 2)
         middle = 0.5 * (start + end)
         first = np.stack([start, middle, apex], axis=1)

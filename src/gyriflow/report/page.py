@@ -206,7 +206,12 @@ def study_page(
         "sections": sections(others),
     }
     # of the page of a single brain
-    page |= {"alone": False, "usual": "", "week_errors": [], "numbers": ""}
+    page |= {
+        "alone": False,
+        "usual": "",
+        "week_errors": [],
+        "numbers": "",
+    }
     if tables.runs is not None:
         subjects = ", ".join(dict.fromkeys(tables.runs["subject"]))
         page["title"] = f"Simulated cortical folding of {subjects}"

@@ -209,7 +209,10 @@ def panel_grid(
                     )
     bar_mm = PAGE_BAR_MM
     if not at_page_scale:
-        longest_in = min(0.6 * widths_in.max(), _SCALE_SHARE * width - 2 * _EDGE_IN)
+        longest_in = min(
+            0.6 * widths_in.max(),
+            _SCALE_SHARE * width - 2 * _EDGE_IN,
+        )
         bar_mm = _round_length(longest_in / inches_per_mm)
     _draw_scale_bar(figure, rows, foot_in, bar_mm, inches_per_mm)
     if colour_bar:

@@ -145,7 +145,12 @@ def brain_grid(
         every = np.concatenate(values)
         scale = scale_of(quantity, every)
         if limit is not None:
-            scale = colour_scale(VERTEX_MAPS[quantity].colours, 0.0, limit, cut=True)
+            scale = colour_scale(
+                VERTEX_MAPS[quantity].colours,
+                0.0,
+                limit,
+                cut=True,
+            )
         colour_bar = (scale, title or map_title(quantity))
         if not np.isfinite(every).all():
             legend = [*legend, Patch(color=UNKNOWN_COLOUR, label="not measured")]

@@ -276,7 +276,10 @@ def difference_texts(
     own = differences["subject"] == brain
     rows = differences[own & (differences["run"] == OBSERVED)]
     texts: dict[str, dict[str, str]] = {}
-    for names, parts in rows.groupby(["atlas", "metric"], sort=False):
+    for names, parts in rows.groupby(
+        ["atlas", "metric"],
+        sort=False,
+    ):
         atlas, metric = map(str, names)
         doubt = doubts.get(metric, "")
         by_part = {}
@@ -303,7 +306,11 @@ def week_errors(curves: pd.DataFrame, week: float) -> list[str]:
         parts = []
         for other in (week - 1.0, week + 1.0):
             if curve["week"].min() <= other <= curve["week"].max():
-                areas = np.interp([week, other], curve["week"], curve["value"])
+                areas = np.interp(
+                    [week, other],
+                    curve["week"],
+                    curve["value"],
+                )
                 percent = 100 * (areas[1] / areas[0] - 1)
                 parts.append(f"{_signed(percent, ' %')} at {week_label(other)}")
         if parts:

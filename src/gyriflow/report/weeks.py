@@ -242,7 +242,10 @@ def _atlas_lines(
     keys = zip(atlases["hemisphere"], atlases["metric"], strict=True)
     # of no panel, of hemispheres or metrics that the chart does not show
     rows = atlases.assign(panel=[panels.get(key, "") for key in keys])
-    is_near = rows["week"].between(weeks.min() - NEAR_GW, weeks.max() + NEAR_GW)
+    is_near = rows["week"].between(
+        weeks.min() - NEAR_GW,
+        weeks.max() + NEAR_GW,
+    )
     rows = rows[(rows["panel"] != "") & is_near]
     layers = []
     entries: list[Artist] = []
