@@ -76,9 +76,10 @@ def test_noise_and_curves_of_atlases_have_all_metrics_of_charts() -> None:
     charted = {name for name, metric in METRICS.items() if metric.shown & Shown.CHART}
     noise = read_yaml(SHIPPED / "norms" / "repeatability.yaml")["metrics"]
     atlases = read_yaml(SHIPPED / "norms" / "atlases.yaml")["atlases"]
-    assert charted <= set(noise)
+    assert charted <= set(noise), "benchmarks/repeatability.py measures the noise"
     for atlas in atlases.values():
-        assert charted <= set(atlas["values"]["left"]) | set(atlas["values"]["whole"])
+        curves = set(atlas["values"]["left"]) | set(atlas["values"]["whole"])
+        assert charted <= curves, "benchmarks/atlas_curves.py measures the atlases"
 
 
 def test_the_shipped_record_has_the_metrics_of_brains() -> None:
