@@ -115,13 +115,15 @@ def main() -> None:
     parser.add_argument("--folded", type=int, default=20)
     parser.add_argument("--cores", type=int, default=200)
     arguments = parser.parse_args()
+    # each study is loaded from its own folder
+    folder = arguments.folder.resolve()
     rows: dict[str, Any] = {}
     for name, number in (
         ("measured", arguments.measured),
         ("folded", arguments.folded),
     ):
         is_folded = name == "folded"
-        path = write_study(arguments.folder / name, number, is_folded=is_folded)
+        path = write_study(folder / name, number, is_folded=is_folded)
         with chdir(path.parent):
             study = resolve(load(read_keys(path), folder_of(path)))
         rows[name] = {

@@ -35,6 +35,7 @@ NOTHING_TO_FOLD = (
     "gyriflow: --fold: no subject has several scans, so none is folded. To fold others,"
     " name start and folding.end_week in --settings."
 )
+NOT_FOLDED = "gyriflow: --settings: without --fold, these are not used:"
 REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 """Options of Snakemake with which jobs run on other machines."""
 
@@ -738,7 +739,13 @@ def bids(
     """
     from ..io.exports import publish_derivatives
     from ..io.made_files import require_own_data_set
-    from .init import BIDS_OPTIONS, store_options, with_earlier_options, write_bids
+    from .init import (
+        BIDS_OPTIONS,
+        folding_sections,
+        store_options,
+        with_earlier_options,
+        write_bids,
+    )
     from .scans import measured_verdicts
 
     require_own_data_set(out)
@@ -768,6 +775,11 @@ def bids(
             click.echo(f"{len(folded)} of them to fold: {', '.join(folded)}")
         elif selection["fold"]:
             click.echo(NOTHING_TO_FOLD, err=True)
+        elif selection["fold"] is None and selection["settings"]:
+            unused = folding_sections(Path(selection["settings"]))
+            if unused:
+                keys = ", ".join(unused)
+                click.echo(f"{NOT_FOLDED} {keys}", err=True)
         if not dry_run:
             click.echo(f"configuration: {config}")
         code = _run(

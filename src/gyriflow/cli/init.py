@@ -359,6 +359,11 @@ def write_bids(
     return names, _folded(text, names)
 
 
+def folding_sections(settings: Path) -> list[str]:
+    """Return the sections of a configuration that only matter to fold."""
+    return [key for key in read_keys(settings) if key in FOLDING_SECTIONS]
+
+
 def _folded(config: Mapping[str, Any], names: Sequence[str]) -> list[str]:
     """Return which brains a configuration folds, of all its `names`."""
     starts: set[str] = set()

@@ -640,7 +640,10 @@ def _complete(
     elif age.cause:
         brain.contradiction = age.cause
     else:
-        note = "week: neither its name nor a table gives the week"
+        note = (
+            "week: neither its name nor a table gives the week; put it into the name,"
+            " such as week24.3, or into participants.tsv"
+        )
         brain.notes.append("; ".join(filter(None, (note, tables.age_problem))))
     if owners:
         entry["subject"] = f"sub-{subject}" if subject else owners[0]

@@ -389,6 +389,24 @@ def test_a_dry_call_for_a_bids_data_set_leaves_the_configuration_of_a_run(
 
 
 @pytest.mark.parametrize(
+    ("fold", "is_told"), [((), True), (("--no-fold",), False), (("--fold",), False)]
+)
+def test_settings_that_only_matter_to_fold_are_named_if_nothing_is_asked_to_fold(
+    monkeypatch, data_set, fold, is_told
+):
+    monkeypatch.setattr(checking, "plan", lambda *_, **__: [])
+    settings = "start: all\nfolding: {end_week: 30}\nmetrics: {spangy_modes: B4}\n"
+    (data_set / "my.yaml").write_text(settings)
+    dry = ("data", "out", "participant", "--settings", "my.yaml", "-n", *fold)
+    done = CliRunner().invoke(main, dry)
+    assert done.exit_code == 0
+    told = [line for line in done.stderr.splitlines() if "--settings" in line]
+    assert told == [Facts("--fold", "start, folding")] * is_told
+    # a section that measuring uses is not among them
+    assert not any("metrics" in line for line in told)
+
+
+@pytest.mark.parametrize(
     ("until", "more", "facts"),
     [
         ("30", [], ["spina-bifida", 22.4, "30 GW", "unoperated", 21, "25 GW"]),

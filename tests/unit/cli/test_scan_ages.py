@@ -1,6 +1,8 @@
 """Ages of scans: of a named column, or else of the file's name; all others are
 refused, with what was found."""
 
+import re
+
 import pytest
 from facts import Facts
 from scan_trees import make_tree
@@ -372,3 +374,10 @@ def test_a_participant_that_is_not_there_is_refused(tmp_path):
     make_tree(tmp_path, surfaces=[LONE])
     with pytest.raises(InputError, check=Facts("sub-1", "sub-01")):
         recognise(tmp_path, participants=["1"])
+
+
+def test_a_scan_without_an_age_is_told_with_a_name_that_gives_one(tmp_path):
+    cause = ages(tree(tmp_path / "none", ["fetus1.pial"], {}))["fetus1"]
+    assert cause == Facts("week24.3", TABLE)
+    name = f"fetus1_{re.search(r'week[0-9.]+[0-9]', cause)[0]}.pial"
+    assert list(ages(tree(tmp_path / "named", [name], {})).values()) == [24.3]
