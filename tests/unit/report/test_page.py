@@ -95,6 +95,15 @@ VALIDATION = pd.DataFrame(
 
 
 NO_WARNINGS = pd.DataFrame({"subject": [], "run": [], "level": [], "message": []})
+OWN_WARNING = pd.DataFrame(
+    {
+        "subject": ["young"],
+        "run": np.nan,
+        "step": "s",
+        "level": "warning",
+        "message": "own",
+    }
+)
 QUALITY = pd.DataFrame(
     {
         "subject": ["young", "old"],
@@ -506,6 +515,25 @@ def test_a_brain_has_a_page_of_its_own():
     tables = Tables(**TABLES)
     text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert "no atlas to compare with" in text
+
+
+def test_a_verdict_of_fine_says_that_faults_may_give_no_warning():
+    sentences = []
+    for judged, warnings in (
+        ("fine", NO_WARNINGS),
+        ("fine", OWN_WARNING),
+        ("needs review", OWN_WARNING),
+    ):
+        tables = Tables(
+            **TABLES | {"quality": QUALITY.assign(verdict=judged), "warnings": warnings}
+        )
+        text = written(brain_page(BRAINS[0], tables, [], norm="the norm"))
+        (found,) = [words for words in elements(text, "p") if "Quality of" in words]
+        sentences.append(found)
+    fine, warned, doubtful = sentences
+    assert fine == Facts("fine: no automatic warning.", "docs/how-to/bad-inputs.md")
+    assert warned == Facts("fine (warnings below", "docs/how-to/bad-inputs.md")
+    assert doubtful == Facts("needs review (warnings below") != Facts("bad-inputs.md")
 
 
 def test_a_measured_study_begins_with_how_many_brains_have_which_verdict():
