@@ -294,6 +294,7 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     assert told in page(shown("growth_figure")).replace("&#39;", "'")
 
 
+ATLASES = read_yaml(SHIPPED / "norms" / "atlases.yaml")["atlases"]
 ACCURACY = read_yaml(SHIPPED / "norms" / "predictions.yaml")
 
 
@@ -515,6 +516,30 @@ def test_a_brain_has_a_page_of_its_own():
     tables = Tables(**TABLES)
     text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert "no atlas to compare with" in text
+
+
+def sheet(**tables) -> str:
+    """Return the first part of the page of a brain, with others than the usual
+    tables."""
+    all_tables = Tables(**TABLES | tables)
+    text = written(brain_page(BRAINS[0], all_tables, [], norm="the norm"))
+    return text.partition('<section id="brains">')[0]
+
+
+def test_the_first_sheet_says_that_thickness_is_not_to_be_compared_with_atlases():
+    thickness = METRICS[:1].assign(metric="mean_thickness", value=1.9, unit="mm")
+    values = {
+        atlas: pd.Series(
+            facts["values"]["whole"]["mean_thickness"], index=facts["weeks"]
+        )
+        for atlas, facts in ATLASES.items()
+    }
+    ratio = (values["chinese"] / values["crl"]).dropna()
+    smallest, largest = 100 * (1 - ratio.max()), 100 * (1 - ratio.min())
+    text = sheet(differences=FROM_ATLAS, metrics=pd.concat([METRICS, thickness]))
+    (compared,) = [words for words in elements(text, "p") if "Thickness" in words]
+    assert compared == Facts(f"{smallest:.0f} to {largest:.0f} %")
+    assert "Thickness" not in sheet(differences=FROM_ATLAS)
 
 
 def test_a_verdict_of_fine_says_that_faults_may_give_no_warning():
