@@ -35,6 +35,8 @@ NOISE_HEAD = "noise: of measuring again only"
 MIN_TIMES_NOISE, MAX_TIMES_NOISE = 2.0, 10.0
 """A difference below so many times the noise of measuring is none; larger multiples are
 not given, as other errors are then larger than this noise."""
+DATED_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth")
+"""Metrics of which a page says what a week of age is worth."""
 DOUBTS = {
     "thickness_is_inaccurate": (
         "inaccurate",
@@ -295,26 +297,28 @@ def difference_texts(
 
 
 def week_errors(curves: pd.DataFrame, week: float) -> list[str]:
-    """Return by how much the pial area of each atlas differs a week earlier and later,
+    """Return by how much `DATED_METRICS` of each atlas differ a week earlier and later,
     as far as it has these weeks: what an error of a week in a brain's age is worth.
 
     `curves` are those of `metrics.atlas_curves`.
     """
-    is_area = (curves["hemisphere"] == "whole") & (curves["metric"] == "area")
+    whole = curves[curves["hemisphere"] == "whole"]
     texts = []
-    for atlas, curve in curves[is_area].groupby("atlas", sort=False):
+    for atlas, rows in whole.groupby("atlas", sort=False):
+        first, last = rows["week"].min(), rows["week"].max()
+        others = [other for other in (week - 1, week + 1) if first <= other <= last]
         parts = []
-        for other in (week - 1.0, week + 1.0):
-            if curve["week"].min() <= other <= curve["week"].max():
-                areas = np.interp(
-                    [week, other],
-                    curve["week"],
-                    curve["value"],
-                )
-                percent = 100 * (areas[1] / areas[0] - 1)
-                parts.append(f"{_signed(percent, ' %')} at {week_label(other)}")
+        for name in DATED_METRICS:
+            curve = rows[rows["metric"] == name]
+            if others and len(curve):
+                values = np.interp([week, *others], curve["week"], curve["value"])
+                changes = 100 * (values[1:] / values[0] - 1)
+                words = " and ".join(_signed(change, " %") for change in changes)
+                label, *_ = METRICS[name].label.split(",")
+                parts.append(f"{label} {words}")
         if parts:
-            texts.append(f"{atlas_label(str(atlas))} {' and '.join(parts)}")
+            weeks = " and ".join(f"{other:g}" for other in others)
+            texts.append(f"{atlas_label(str(atlas))} at {weeks} GW: {', '.join(parts)}")
     return texts
 
 
