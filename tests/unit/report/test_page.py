@@ -483,7 +483,8 @@ def test_a_page_says_how_certain_its_centiles_are():
     for text in (page(shown("growth_figure")), page([], centiles=few)):
         sentences = [sentence for sentence in elements(text, "p") if "norm" in sentence]
         assert sentences == [Facts("90 %", "z"), Facts("the norm")]
-    for flag, facts in (("few brains", (30, 5, 95)), ("too few brains", ("ten",))):
+    published = ("ten", "z", "dhcp-19", "results/study/published_centiles.csv")
+    for flag, facts in (("few brains", (30, 5, 95)), ("too few brains", published)):
         text = page([], centiles=MEASURES["centiles"].assign(flag=flag))
         assert [sentence for sentence in elements(text, "p") if "norm" in sentence] == [
             Facts(*facts)
