@@ -211,6 +211,7 @@ def study_page(
         "usual": "",
         "week_errors": [],
         "numbers": "",
+        "has_parts": False,
         "has_thickness": False,
     }
     if tables.runs is not None:
@@ -313,6 +314,7 @@ def brain_page(
         "alone": True,
         "usual": html_table(every.loc[sheet]),
         "atlases": _cited_atlases(differences),
+        "has_parts": "volume_tissue" in set(metrics["metric"]),
         "has_thickness": "mean_thickness" in set(metrics["metric"]),
         "week_errors": week_errors(curves, brain["week"]),
         "numbers": html_table(every),

@@ -543,6 +543,21 @@ def test_the_first_sheet_says_that_thickness_is_not_to_be_compared_with_atlases(
     assert "Thickness" not in sheet(differences=FROM_ATLAS)
 
 
+def test_the_first_sheet_says_by_how_much_parts_differ_from_the_volume():
+    most = 0.0
+    for facts in ATLASES.values():
+        values = pd.DataFrame(facts["values"]["whole"])
+        parts = values["volume_tissue"] + values["volume_ventricles"]
+        most = max(most, 100 * (parts / values["volume"] - 1).abs().max())
+    # those of the atlases; of small brains in large voxels it is more
+    assert 1.0 < most < 3.0
+    tissue = METRICS[:1].assign(metric="volume_tissue", value=40.0)
+    text = sheet(differences=FROM_ATLAS, metrics=pd.concat([METRICS, tissue]))
+    (told,) = [words for words in elements(text, "p") if "in voxels" in words]
+    assert told == Facts("up to 3 %")
+    assert "in voxels" not in sheet(differences=FROM_ATLAS)
+
+
 @pytest.mark.parametrize(
     ("weeks", "words"),
     [
