@@ -30,7 +30,7 @@ from .style import run_colours, runs_by_name
 
 FROM_ATLAS = "difference from"
 """Beginning of the names of columns with differences from an atlas."""
-NOISE_HEAD = "noise: of measuring again only"
+NOISE_HEAD = "in multiples of the noise of measuring again"
 """End of the names of these columns."""
 MIN_TIMES_NOISE, MAX_TIMES_NOISE = 2.0, 10.0
 """A difference below so many times the noise of measuring is none; larger multiples are

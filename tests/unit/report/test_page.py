@@ -512,6 +512,8 @@ def test_a_brain_has_a_page_of_its_own():
     row = r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 % \(&gt; 10 ×"
     assert re.search(row, before)
     assert "medical device" in before
+    heads = [head for head in elements(before, "th") if "CRL" in head]
+    assert heads == [Facts("difference from CRL", "multiples of the noise")]
     (compared,) = [words for words in elements(before, "p") if "Gholipour" in words]
     assert compared == Facts("CRL", "2017")
     tables = Tables(**TABLES)
