@@ -412,7 +412,7 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
         ),
     }
     if row["asymmetry_mm"] is not None:
-        facts["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
+        facts["distance from its mirror image"] = f"{row['asymmetry_mm']:.1f} mm"
     if row["cut_share"] is not None:
         usual = f"usually at most {100 * row['usual_cut_share']:.0f} %"
         facts["cut at the midline"] = (

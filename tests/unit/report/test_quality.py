@@ -84,7 +84,7 @@ def test_the_page_shows_planes_views_and_warnings():
         "with ventricles: 40.0 mL",
         "0.84 mm (inaccurate, measured on 70 %)",
         "180.0°",
-        "0.5 mm",
+        "mirror image: 0.5 mm",
         "31 %",
         "23 %",
     )
