@@ -591,6 +591,12 @@ def test_the_first_sheet_says_what_a_week_of_age_is_worth(weeks, words):
     ]
 
 
+def test_the_first_sheet_says_from_which_files_it_was_made_by_which_version_and_when():
+    text = sheet(differences=FROM_ATLAS)
+    (told,) = [line for line in elements(text, "p") if "SHA-256" in line]
+    assert told == Facts("labels", "12ab", "gyriflow 0.1", "2026-01-01")
+
+
 def test_a_verdict_of_fine_says_that_faults_may_give_no_warning():
     sentences = []
     for judged, warnings in (
