@@ -12,6 +12,7 @@ from gyriflow.report.page import (
     Tables,
     brain_page,
     hide_paths,
+    observed_caption,
     page_figures,
     report_page,
     study_page,
@@ -38,6 +39,8 @@ files, output, params = snakemake.input, snakemake.output, snakemake.params
 def _read_caption(path):
     """Return title and caption of a figure; the title is underlined."""
     title, _, caption = read_text(path).split("\n", 2)
+    if not files.runs:
+        caption = observed_caption(caption)
     return {"title": title, "caption": caption.strip()}
 
 

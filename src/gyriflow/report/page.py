@@ -58,6 +58,8 @@ NOT_COMPARED = (
     "No simulation is compared: an observed brain of the same population and week is"
     " missing."
 )
+SIMULATED_CAPTION = "Simulated brains: "
+"""Beginning of a paragraph of a caption that is left out if nothing was simulated."""
 MAX_PENETRATION_MM = 0.5
 """Penetration of the contact planes at the start above which the report warns."""
 
@@ -397,6 +399,18 @@ def caption_html(caption: str) -> Markup:
     return Markup(
         publish_parts(caption, writer="html5", settings_overrides=settings)["body"]
     )
+
+
+def observed_caption(caption: str) -> str:
+    """Return a caption in reStructuredText without its paragraphs on simulated
+    brains."""
+    paragraphs = caption.split("\n\n")
+    observed = [
+        paragraph
+        for paragraph in paragraphs
+        if not paragraph.startswith(SIMULATED_CAPTION)
+    ]
+    return "\n\n".join(observed)
 
 
 def brain_rows(

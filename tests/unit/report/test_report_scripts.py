@@ -148,8 +148,8 @@ def pictured(text):
     ]
 
 
-def pages(folder):
-    """Return the report and the pages of both brains."""
+def pages(folder, **others):
+    """Return the report and the pages of both brains, with some other inputs."""
     tables = ("quality", "warnings", "metrics", "centiles", "runs", "validation")
     tables = (*tables, "curves", "differences")
     inputs = {name: f"{name}.csv" for name in tables} | {
@@ -162,7 +162,8 @@ def pages(folder):
         "methods": "methods.rst",
         "captions": ["picture.rst"],
     }
-    write_text(folder / "picture.rst", "Seen\n====\na picture\n")
+    caption = "a picture\n\nSimulated brains: lines\nof runs\n\nthe end\n"
+    write_text(folder / "picture.rst", f"Seen\n====\n{caption}")
     pictures = {
         name: FIGURE | {"name": "picture", "path": str(folder / f"{name}.png")}
         for name in COLOURS
@@ -193,7 +194,7 @@ def pages(folder):
     run_script(
         "html_report.py",
         folder,
-        inputs | {"small": [f"{name}.png" for name in NAMES]},
+        inputs | {"small": [f"{name}.png" for name in NAMES]} | others,
         outputs,
         params,
     )
@@ -226,6 +227,23 @@ def test_the_report_has_pictures_numbers_and_scores_of_each_brain_and_run(folder
         "<em>processed</em>" in text,
         "Jane Roe" in text,
     ) == (True, True, False)
+
+
+def test_captions_speak_of_simulated_brains_only_if_there_are_some(folder):
+    captions = []
+    for others in ({}, {"runs": [], "validation": []}):
+        text, *_ = pages(folder, **others)
+        captions.append(
+            [
+                words
+                for words in ("a picture", "Simulated brains: lines", "the end")
+                if words in text
+            ]
+        )
+    assert captions == [
+        ["a picture", "Simulated brains: lines", "the end"],
+        ["a picture", "the end"],
+    ]
 
 
 def test_the_page_of_a_brain_is_of_that_brain_alone(folder):
