@@ -193,7 +193,8 @@ def test_the_first_line_says_what_runs_where_a_folder_has_its_own_workflow(
     own = tmp_path / "config" / "config.yaml"
     own.parent.mkdir()
     own.touch()
-    assert what_runs(tmp_path) == Facts(own, tmp_path / place) != Facts("demo")
+    assert what_runs(tmp_path) == Facts(own, tmp_path / place)
+    assert what_runs(tmp_path) != Facts("demo")
 
 
 def test_what_runs_is_said_first_without_a_configuration(workflow, capsys):

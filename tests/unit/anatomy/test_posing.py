@@ -583,7 +583,8 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_warned_of(brain):
     )
     sided = odd_brains.add_sides(*brain)
     turned = pose_of_labels(sided, rigid(0, 0, 180) @ affine, SCHEMES["dhcp-19"])
-    assert turned.warnings[0] == Facts("180°") != Facts("left")
+    assert turned.warnings[0] == Facts("180°")
+    assert turned.warnings[0] != Facts("left")
 
 
 @pytest.mark.parametrize(

@@ -286,7 +286,8 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     # a warning about one element is not the worst of several
     doubts = pd.DataFrame({"level": "warning", "message": ["one element", "coarse"]})
     assert verdict(RUNS, VALIDATION, doubts) == told
-    assert verdict(resolved, None, doubts) == Facts(2) != Facts("one element")
+    assert verdict(resolved, None, doubts) == Facts(2)
+    assert verdict(resolved, None, doubts) != Facts("one element")
     assert verdict(resolved, None, doubts[:1]) == Facts("one element")
     alone = verdict(resolved, None, none)
     assert alone == Facts(NOT_COMPARED)
@@ -784,7 +785,8 @@ def test_the_methods_say_what_was_run():
         "[4]",
     )
     assert "{" not in stiff
-    assert led == Facts("*led*", "population cohort") != Facts("atlas")
+    assert led == Facts("*led*", "population cohort")
+    assert led != Facts("atlas")
     assert not {"atlas", "population"} & set(own.split())
     alone, opened = (
         methods_text(
@@ -801,8 +803,10 @@ def test_the_methods_say_what_was_run():
     )
     assert "Simulation" not in opened
     assert "Tallinen" not in opened
-    assert opened == Facts("Koenderink", "[1]") != Facts(26)
-    assert alone == Facts(26) != Facts("slits")
+    assert opened == Facts("Koenderink", "[1]")
+    assert opened != Facts(26)
+    assert alone == Facts(26)
+    assert alone != Facts("slits")
     assert opened == Facts(
         "slits", "CRL [4]", "own [5]", "4. G. et al.: Curves", "5. Own curves"
     )
