@@ -281,8 +281,8 @@ def init(
     if kept:
         click.echo(f"the earlier configuration is now {kept}")
     argument = shlex.quote(str(path))
-    click.echo(f"wrote {path}; next: {_command_name()} check {argument}")
     code = _show_scans(found, may_fill_in=True)
+    click.echo(f"wrote {path}; next: {_command_name()} check {argument}")
     sys.exit(code)
 
 
