@@ -216,7 +216,7 @@
       shown.push([`${group.name}, simulated`, panes[pane].run(group, week, map)]);
       pane += 1;
     }
-    if (observed && panes[pane]) shown.push([observed.name, panes[pane].brain(real, week, map)]);
+    if (observed && panes[pane]) shown.push([observed.name, panes[pane].brain(observed, week, map)]);
     shown.forEach(([name, at], index) => { titles[index].textContent = `${name}: ${Number(at.toFixed(2))} GW`; });
     said.textContent = `${Number(week.toFixed(2))} GW`;
     drawBar(map);
