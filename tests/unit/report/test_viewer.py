@@ -12,30 +12,28 @@ DECLARED = (
     r"(\w+)\s*=>",
 )
 NAME = r"[A-Za-z_$][\w$]*"
-KNOWN = set(
-    [
-        "class",
-        "function",
-        "constructor",
-        "for",
-        "in",
-        "if",
-        "try",
-        "catch",
-        "return",
-        "continue",
-        "true",
-        "false",
-        "window",
-        "Float32Array",
-        "Set",
-        "setInterval",
-        "brain",
-        "paint",
-        "run",
-        "triangles",
-    ]
-)
+KNOWN = {
+    "class",
+    "function",
+    "constructor",
+    "for",
+    "in",
+    "if",
+    "try",
+    "catch",
+    "return",
+    "continue",
+    "true",
+    "false",
+    "window",
+    "Float32Array",
+    "Set",
+    "setInterval",
+    "brain",
+    "paint",
+    "run",
+    "triangles",
+}
 """Words of the language, of browsers, and methods of the view."""
 
 
