@@ -89,6 +89,8 @@ def atlas_differences(
         )
         is_between = comparable["week"].between(*curve["week"].agg(["min", "max"]))
         rows = comparable[is_of_curve & is_between & comparable["value"].notna()]
+        if rows.empty:
+            continue
         expected = np.interp(
             rows["week"],
             curve["week"],
@@ -99,8 +101,6 @@ def atlas_differences(
         noise = np.array(
             [difference_noise(metric, value, record) for value in expected]
         )
-        if rows.empty:
-            continue
         parts.append(
             rows.assign(
                 atlas=atlas,
