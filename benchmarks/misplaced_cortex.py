@@ -21,6 +21,7 @@ from scipy import ndimage
 
 from gyriflow.anatomy.extraction import dilated
 from gyriflow.anatomy.misplaced import misplaced_cortex
+from gyriflow.geometry.deformations import voxel_size
 from gyriflow.io.volumes import LabelVolume, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
 
@@ -42,9 +43,7 @@ LAYER_MM = 1.6
 
 def with_margin(volume: LabelVolume) -> LabelVolume:
     """Return a volume with empty voxels around it."""
-    voxels = int(
-        np.ceil(MARGIN_MM / np.linalg.norm(volume.affine[:3, :3], axis=0).min())
-    )
+    voxels = int(np.ceil(MARGIN_MM / voxel_size(volume.affine).min()))
     affine = volume.affine.copy()
     affine[:3, 3] -= affine[:3, :3] @ np.full(3, voxels)
     return LabelVolume(np.pad(volume.labels, voxels), affine)
@@ -53,7 +52,7 @@ def with_margin(volume: LabelVolume) -> LabelVolume:
 def faults(volume: LabelVolume) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the labels unchanged and with each fault, with its name."""
     labels, affine = volume.labels, volume.affine
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    size = voxel_size(affine)
     cerebrum = np.isin(labels, SCHEME.cerebrum)
     ventricles = np.isin(labels, SCHEME.ventricles)
     hindbrain = np.isin(labels, (*SCHEME.cerebellum, *SCHEME.brainstem))

@@ -13,6 +13,7 @@ from scipy.special import ndtr
 from skimage.measure import marching_cubes
 
 from ..errors import MeshError
+from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, transformed
 
 PAD_VOXELS = 6
@@ -599,10 +600,7 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     A ball of 3.2 mm diameter cannot pass through a stalk, and its cross-section is at
     most 12 mm²; a gyrus is wider.
     """
-    size = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    size = voxel_size(affine)
     wide = ~dilated(~mask, NECK_RADIUS_MM, size)
     number, count = ndimage.label(wide, INSIDE)
     if count < 2:

@@ -18,7 +18,7 @@ from skimage.segmentation import watershed
 from ..errors import InputError
 from ..geometry import triangles
 from ..geometry.alignment import motion
-from ..geometry.deformations import transform_points, voxel_index
+from ..geometry.deformations import transform_points, voxel_index, voxel_size
 from ..geometry.matching import nearest_on
 from ..geometry.triangles import Ints, TriangleMesh
 from ..settings.terms import Side
@@ -420,10 +420,7 @@ def side_distance(
     its distance from the core. It starts from the labels `left` and `right`, or in the
     core far from the mid-surface. So gyri may reach over the mid-surface.
     """
-    size = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    size = voxel_size(affine)
     places = np.argwhere(core)
     height = fissure.height_above(transform_points(places, affine))
     order = ndimage.distance_transform_edt(~core, sampling=size).astype(np.float32)
@@ -482,10 +479,7 @@ def hidden_fissure(
     hemispheres; small contacts elsewhere are errors of the labels. With `bridges`, bits
     of tissue that cross a visible fissure are included.
     """
-    size = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    size = voxel_size(affine)
     # not whole voxels, which rounding would include or not
     sheet = np.abs(side_mm) < 1.25 * size.max()
     reach = max(0.5 * FISSURE_MM, 1.25 * size.min())
@@ -565,10 +559,7 @@ def plane_between_labels(
 ) -> MidPlane:
     """Fit a plane half-way between (i, j, k) labels of unequal sides, in and around a
     brain."""
-    size = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    size = voxel_size(affine)
     to_left = ndimage.distance_transform_edt(~left, sampling=size)
     to_right = ndimage.distance_transform_edt(~right, sampling=size)
     side = to_left - to_right

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import InputError
+from ..geometry.deformations import voxel_size
 from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from . import extraction
@@ -373,10 +374,7 @@ def unlabelled_ventricles(
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)
-    size = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    size = voxel_size(affine)
     margin = int(np.ceil(CLOSING_MM / size.min())) + 2
     # volumes in a far larger unit are reported elsewhere
     if np.isin(labels, scheme.ventricles).any() or 2 * margin > max(labels.shape):

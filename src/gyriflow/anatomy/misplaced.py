@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ..geometry.deformations import transform_points
+from ..geometry.deformations import transform_points, voxel_size
 from ..settings.schemes import LabelScheme
 from ..units import ML_PER_MM3
 from .extraction import (
@@ -99,10 +99,7 @@ class _Cropped:
 
     def is_near(self, mask: Mask, distance_mm: float) -> Mask:
         """Return the mask of the voxels within a distance of a mask."""
-        size = np.linalg.norm(
-            self.affine[:3, :3],
-            axis=0,
-        )
+        size = voxel_size(self.affine)
         return dilated(mask, distance_mm, size)
 
 

@@ -12,6 +12,7 @@ from scipy import ndimage
 from ..errors import InputError, MeshError
 from ..geometry import triangles
 from ..geometry.alignment import angle_deg, motion
+from ..geometry.deformations import voxel_size
 from ..geometry.poses import CONVENTIONS, Pose
 from ..geometry.triangles import TriangleMesh
 from ..settings.schemes import LabelScheme
@@ -231,9 +232,7 @@ def _checked_pose(
             plausible.require_whole(surface, "volume", refuses=share <= REPORTED_LOSS)
         )
         if pose is None:
-            every = max(
-                int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1
-            )
+            every = max(int(POSE_VOXEL_MM / voxel_size(affine).max()), 1)
             coarse = extraction.unambiguous(field[::every, ::every, ::every])
             rough = extraction.isosurface(
                 coarse, cerebrum.affine @ np.diag([every, every, every, 1.0])
@@ -302,10 +301,7 @@ def _with_fissure(
     Where more than a thousandth of the brain is removed, voxels too coarse for its
     walls are refined first.
     """
-    size = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    size = voxel_size(affine)
     # an opening of less than two voxels would be lost
     factor = int(np.ceil(1.8 * size.max() / fissure.FISSURE_MM))
     for bridges in (False, True):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from ..geometry.deformations import transform_points
+from ..geometry.deformations import transform_points, voxel_size
 from ..units import ML_PER_MM3
 from .extraction import (
     INSIDE,
@@ -78,7 +78,7 @@ def open_fused_sulci(
     unchanged if no sulcus is fused, or if much cortex is far from white matter:
     "stays_fused" in the report.
     """
-    factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / MAX_VOXEL_MM))
+    factor = int(np.ceil(voxel_size(affine).max() / MAX_VOXEL_MM))
     every = field.shape[0] // core.shape[0]
     brain, part = _around_brain(field, every)
     solid, _ = refine(
@@ -141,10 +141,7 @@ def open_fused_sulci(
     # the depth of a sheet is measured on coarse voxels, in an eighth of the time
     below = ndimage.distance_transform_edt(
         near > LEVEL,
-        sampling=np.linalg.norm(
-            affine[:3, :3],
-            axis=0,
-        ),
+        sampling=voxel_size(affine),
     )
     depth = sample(
         below,

@@ -14,7 +14,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..geometry.deformations import transform_points
+from ..geometry.deformations import transform_points, voxel_size
 from ..geometry.matching import layer_thickness, nearest_on, surface_mask
 from ..geometry.poses import Pose
 from ..geometry.triangles import (
@@ -130,10 +130,7 @@ class Cortex:
             self.inner_border,
         )
         outward, _, _ = nearest_on(nearest, outer)
-        longest_mm = np.linalg.norm(
-            self.affine[:3, :3],
-            axis=0,
-        ).max()
+        longest_mm = voxel_size(self.affine).max()
         values = 0.5 * (inward + outward) / longest_mm
         return float(np.median(values[values >= MIN_LAYER_VOXELS]))
 
@@ -166,10 +163,7 @@ def cortical_thickness(
     """
     values = layer_thickness(pial, cortex.inner_border)
     points, affine = pial.vertices, cortex.affine
-    size = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    size = voxel_size(affine)
     # of long voxels, no centre may be nearer than half their diagonal
     voxel = max(
         float(np.cbrt(size.prod())),

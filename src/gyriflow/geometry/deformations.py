@@ -78,6 +78,12 @@ def transform_points(
     )
 
 
+def voxel_size(affine: ArrayLike) -> Floats:
+    """Return the (3,) lengths of a voxel in mm, for a volume's (4, 4) affine."""
+    axes = np.asarray(affine)[:3, :3]
+    return np.linalg.norm(axes, axis=0)
+
+
 def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
     """Return the (3, …) fractional voxel indices of (…, 3) points in mm, for a volume's
     (4, 4) affine."""

@@ -34,6 +34,7 @@ from ..geometry.deformations import (
     transform_points,
     volume_changes,
     voxel_index,
+    voxel_size,
 )
 from ..geometry.poses import LPS_TO_RAS
 from ..geometry.triangles import Floats, Indices, Mask
@@ -133,10 +134,7 @@ def channels(
     _require_whole(masks[CEREBRUM_BIT])
     if cortex:
         masks[CORTEX_BIT] = _mask(labels, cortex, "cortex")
-    sizes = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    sizes = voxel_size(affine)
     voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
     centres = transform_points(np.argwhere(masks[CEREBRUM_BIT]), affine)
     low = centres.min(axis=0) - MARGIN_MM

@@ -20,6 +20,7 @@ from scipy import ndimage
 
 from ..errors import InputError
 from ..formats import VOLUME_SUFFIXES, format_of
+from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats
 from ..settings.schemes import LabelScheme
 from ..settings.terms import AffineSource
@@ -189,10 +190,7 @@ def read_values(
         _affine(image, affine_from, path),
         dtype=float,
     )
-    sizes = np.linalg.norm(
-        affine[:3, :3],
-        axis=0,
-    )
+    sizes = voxel_size(affine)
     if (
         not np.isfinite(affine).all()
         or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod()
