@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from recording import answer_of
 from shapes import FAR, rigid, smooth_field, uneven_surface
 
 from gyriflow.compare import (
@@ -49,19 +48,12 @@ def observed():
 def test_numbers_of_a_comparison(recorded, observed):
     moved = transformed(body(1.05, 1.3), rigid(2.0, -1.0, 3.0, shift=(1.0, 2.0, -1.0)))
     columns, _ = comparison.compare(moved, observed, radius_mm=2.0)
-    prepared = shapes.prepare_for_comparison(moved, observed.surface, 2.0)
-    pair = comparison.pairwise_distances(moved, observed.surface)
     recorded(
         {
             "columns": columns,
             "aligned": comparison.aligned_distances(moved, observed.surface),
-            "distances": comparison.surface_distances(pair),
             "roughness": comparison.roughness_mm(moved),
             "scaled": shapes.scale_to_volume(moved, observed.surface),
-            "rms": prepared.curvature_rms,
-            "curvature": shapes.curvature_differences(prepared, observed.prepared),
-            "dice": shapes.cortex_dice(moved, observed.surface),
-            "baselines": observed.baseline_correlations,
         },
         rtol=5e-2,
         atol=5e-2,
@@ -79,7 +71,6 @@ def test_numbers_of_resamplings(recorded, observed):
             "asymmetry": found.asymmetry_mm,
             "correlations": found.correlations(truth, values),
             "correlation": placement.correlation(truth, values, areas),
-            "mirror": placement.mirror_image(observed.prepared)[1],
             "patches": placement.number_patches(
                 uneven_surface(2).vertices, np.linspace(1.0, 2.0, 162), 9.0
             ),
@@ -127,7 +118,7 @@ def test_numbers_of_simple_predictions(recorded):
     )
 
 
-def tests_of_predictions():
+def trials_of_predictions():
     """Return tests of five starts over three horizons, of three models."""
     random = np.random.default_rng(4)
     rows = []
@@ -155,25 +146,13 @@ def metrics_of(weeks, factor):
 
 
 def test_numbers_of_errors_in_tests(recorded):
-    tests = tests_of_predictions()
-    results = {}
-    for metric in ("area", "volume", "gyrification_index"):
-        errors = accuracy.log_errors(tests, metric)
-        for week, horizon in ((24.0, 2.0), (27.5, 3.0), (33.0, 9.0)):
-            found = accuracy.error_in_tests(errors, week, horizon)
-            name = f"{metric} {week} {horizon}"
-            results[name] = {
-                "error": found,
-                "words": accuracy.error_words(metric, found),
-            }
+    tests = trials_of_predictions()
     members = [metrics_of((24.0, 26.0), factor) for factor in (0.95, 1.0, 1.07)]
     surfaces = [body(factor) for factor in (0.95, 1.0, 1.08)]
+    weeks = (22.0, 24.0), (23.0, 27.0), (24.5, 27.5), (24.0, 33.0)
     recorded(
         {
-            **results,
-            "advantage": [accuracy.atlas_advantage(tests, at) for at in (2.0, 5.0)],
-            "facts": accuracy.prediction_facts(tests, 23.0, 27.0),
-            "spread": accuracy.spread_of_members(np.array([1.0, 1.2, 0.7, 1.1]), 0.9),
+            "facts": [accuracy.prediction_facts(tests, *pair) for pair in weeks],
             "intervals": accuracy.interval_table(
                 metrics_of((24.0, 26.0, 29.0), 1.01),
                 pd.concat(members),
@@ -192,41 +171,30 @@ def test_numbers_of_errors_in_tests(recorded):
 
 def test_numbers_of_a_calibration(recorded, observed):
     design = calibration.first_round(BOUNDS, 6, seed=2)
-    score = (design["thickness_mm"] - 1.9) ** 2 + 1e12 * design[
-        "growth_rate_per_s"
-    ] ** 2
+    thickness, rate = design["thickness_mm"], design["growth_rate_per_s"]
+    score = (thickness - 1.9) ** 2 + 1e12 * rate**2
     runs = design.assign(score=score, run=[f"r{n}" for n in range(6)], cause="")
     base = {"thickness_mm": 2.0, "start_week": 21.0, "shear_modulus_core_pa": 300.0}
     base["growth"] = {"area_cm2": {21.0: 90.0, 24.0: 150.0}}
-    weights = {"size": 2.0, "surface_distance": 1.0}
-    pairs = [(body(1.04), observed), (body(0.9), observed)]
+    changes = {"thickness_mm": 1.5, "growth.area_cm2": 1.1}
+    pairs = [(body(1.04, 0.2), observed), (body(0.9, -0.5), observed)]
+    names = (*calibration.SURFACE_SCORES, "spectral_distance")
+    weights = dict(zip(names, (2.0, 1.0, 0.5, 3.0, 9.0, 0.7), strict=True))
+    spectra = [(folded(1.5), folded(2.1)), (folded(1.8), folded(2.0))]
     recorded(
         {
             "first": design,
             "optimum": calibration.find_optimum(runs, BOUNDS),
-            "parameters": calibration.calibrated_parameters(
-                base,
-                {"thickness_mm": 1.5, "growth.area_cm2": 1.1},
-                23.0,
+            "parameters": calibration.calibrated_parameters(base, changes, 23.0),
+            "run": calibration.run_score(
+                pairs, weights, [], radius_mm=2.0, spectra=spectra
             ),
-            "spectra": calibration.spectral_scores(folded(1.5), folded(2.1)),
-            "scores": [
-                answer_of(
-                    calibration.brain_scores,
-                    mesh,
-                    observed,
-                    list(calibration.SURFACE_SCORES),
-                    radius_mm=2.0,
-                )
-                for mesh, _ in pairs
-            ],
-            "run": calibration.run_score(pairs, weights, [], radius_mm=2.0),
             "diverged": calibration.run_score(
-                pairs, weights, ["too large"], radius_mm=2.0
+                pairs, weights, ["too large", "no step"], radius_mm=2.0
             ),
         },
         rtol=5e-2,
-        atol=5e-2,
+        atol=1e-9,
     )
 
 
@@ -243,68 +211,36 @@ def test_numbers_of_deviations(recorded):
         for side, mesh in sides.items()
     }
     table = deviation.deviation_table({"run": "r"}, expected, maps, sides, regions)
-    tables = []
-    for number in range(12):
-        week = 24.0 + 0.5 * (number // 2)
-        brain = table.assign(subject=f"s{number}", start=f"s{number}", week=week)
-        tables.append(brain.assign(value=brain["value"] * (1 + 0.1 * np.sin(number))))
-    brains = pd.concat(tables)
-    recorded(
-        {
-            "maps": maps,
-            "table": table,
-            "scores": deviation.deviation_scores(brains, individuals=True),
-            "averages": deviation.deviation_scores(brains, individuals=False),
-        },
-        rtol=5e-2,
-        atol=5e-2,
-    )
+    recorded({"maps": maps, "table": table}, rtol=1e-3)
 
 
 def test_numbers_of_sweeps(recorded):
-    random = np.random.default_rng(6)
+    observed_parts = {"b": {"left": body()}, "c": {"left": body(1.1)}}
+    size = {"hemisphere": "left", "metric": "area", "unit": "cm2"}
     tables = []
-    for run, size in (("thin", 1.5), ("thick", 2.0), ("thicker", 2.6)):
+    for run, thickness in (("thin", 1.5), ("thick", 2.0), ("thicker", 2.6)):
         spectra, metrics = [], []
-        for name, subject, factor in (
-            (run, "a", size),
-            ("observed", "b", 1.8),
-            ("observed", "c", 2.2),
-        ):
-            spectra.append(folded(factor).assign(run=name, subject=subject, week=28.0))
-            value = {"hemisphere": "left", "metric": "area", "unit": "cm2"}
-            metrics.append(
-                {"run": name, "subject": subject, "value": 50 * factor} | value
-            )
-        parts = {"left": body(0.9 + 0.05 * size)}
-        tables.append(
-            sweeps.member_comparison(
-                run,
-                "a",
-                {"a": "p", "b": "p", "c": "q"},
-                pd.DataFrame(metrics),
-                pd.concat(spectra),
-                parts,
-                {"b": {"left": body()}, "c": {"left": body(1.1)}},
-            )
+        brains = (run, "a", thickness), ("observed", "b", 1.8), ("observed", "c", 2.2)
+        for name, subject, factor in brains:
+            labels = {"run": name, "subject": subject}
+            spectra.append(folded(factor).assign(**labels, week=28.0))
+            metrics.append(labels | size | {"value": 50 * factor})
+        table = sweeps.member_comparison(
+            run,
+            "a",
+            {"a": "p", "b": "p", "c": "q"},
+            pd.DataFrame(metrics),
+            pd.concat(spectra),
+            {"left": body(0.9 + 0.05 * thickness)},
+            observed_parts,
         )
+        tables.append(table)
     joined = sweeps.joined_comparisons(tables)
-    members = pd.DataFrame(
-        {
-            "run": ["thin", "thick", "thicker"],
-            "subject": "a",
-            "thickness_mm": [1.5, 2.0, 2.6],
-            "resolution": ["ok", "ok", "coarse"],
-            "rate": random.random(3),
-        }
+    members = pd.DataFrame({"run": ["thin", "thick", "thicker"], "subject": "a"})
+    members = members.assign(
+        thickness_mm=[1.5, 2.0, 2.6],
+        resolution=["ok", "ok", "coarse"],
+        rate=[0.2, 0.9, 0.4],
     )
-    recorded(
-        {
-            "joined": joined,
-            "nearest": answer_of(
-                sweeps.nearest_runs, joined, members, ["thickness_mm", "rate"]
-            ),
-        },
-        rtol=5e-2,
-        atol=5e-2,
-    )
+    nearest = sweeps.nearest_runs(joined, members, ["thickness_mm", "rate"])
+    recorded({"joined": joined, "nearest": nearest}, rtol=5e-2, atol=5e-2)

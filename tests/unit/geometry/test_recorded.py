@@ -3,7 +3,15 @@ origin."""
 
 import numpy as np
 import pytest
-from shapes import FAR, LONG_MM, scaling, smooth_field, uneven_body, uneven_surface
+from shapes import (
+    FAR,
+    LONG_MM,
+    inner,
+    scaling,
+    smooth_field,
+    uneven_body,
+    uneven_surface,
+)
 
 from gyriflow.geometry import (
     alignment,
@@ -30,29 +38,27 @@ def body():
 
 
 def test_numbers_of_a_surface(recorded, surface):
-    pairs, faces = triangles.edges(surface)
-    top = (
-        triangles.corners(surface)[:, :, 2].mean(axis=1) > surface.vertices[:, 2].mean()
-    )
-    part, used = triangles.submesh(surface, top)
+    functions = [
+        triangles.area_cm2,
+        triangles.volume_ml,
+        triangles.face_areas,
+        triangles.face_normals,
+        triangles.vertex_areas,
+        triangles.vertex_normals,
+        triangles.edges,
+        triangles.mean_edge_length,
+        triangles.euler_number,
+        triangles.is_closed,
+    ]
+    height = triangles.corners(surface)[:, :, 2].mean(axis=1)
+    part, used = triangles.submesh(surface, height > height.mean())
     recorded(
         {
-            "area cm2": triangles.area_cm2(surface),
-            "volume mL": triangles.volume_ml(surface),
-            "face areas": triangles.face_areas(surface),
-            "face normals": triangles.face_normals(surface),
-            "vertex areas": triangles.vertex_areas(surface),
-            "vertex normals": triangles.vertex_normals(surface),
-            "edges": pairs,
-            "faces of edges": faces,
-            "mean edge": triangles.mean_edge_length(surface),
-            "mean of edges": triangles.mean_length(surface.vertices, pairs),
-            "rms": triangles.rms_length(surface.vertices),
-            "euler": triangles.euler_number(surface),
-            "euler of a part": triangles.euler_number(part),
+            **{function.__name__: function(surface) for function in functions},
             "part": part,
             "part of": used,
-            "is closed": [triangles.is_closed(mesh) for mesh in (surface, part)],
+            "euler of a part": triangles.euler_number(part),
+            "rms": triangles.rms_length(surface.vertices),
             "hull area": triangles.area(triangles.convex_hull(surface)),
         }
     )
@@ -62,20 +68,16 @@ def test_numbers_of_matched_surfaces(recorded, surface):
     other = uneven_surface(2, 1)
     # a little apart, so that no faces lie in each other
     apart = alignment.motion(shift=(0.7, -0.4, 0.5))
-    back = apart @ FAR[0] @ np.linalg.inv(FAR[1])
-    other = triangles.transformed(other, back)
-    inside = triangles.TriangleMesh(
-        surface.vertices - 2.0 * triangles.vertex_normals(surface), surface.faces
-    )
+    other = triangles.transformed(other, apart @ FAR[0] @ np.linalg.inv(FAR[1]))
+    inside = inner(surface, 2.0)
     match = matching.match_surface(surface, other)
     deep = matching.match_layers(
         surface.vertices,
         triangles.vertex_normals(surface),
         inside.vertices,
         other,
-        other.vertices - 1.0 * triangles.vertex_normals(other),
+        inner(other, 1.0).vertices,
     )
-    values = smooth_field(other.vertices)
     thickness = matching.layer_thickness(surface, inside)
     mask, affine = matching.surface_mask(other, 3.0)
     long = scaling(np.multiply(4.0, LONG_MM), surface.vertices.min(axis=0) - 5.0)
@@ -90,7 +92,7 @@ def test_numbers_of_matched_surfaces(recorded, surface):
             "agrees": match.agrees,
             "distances by layers": deep.distance_mm,
             "places by layers": matching.values_at(deep, other.vertices),
-            "values": matching.values_at(match, values),
+            "values": matching.values_at(match, smooth_field(other.vertices)),
             "vectors": matching.values_at(match, other.vertices),
             "matrix": matching.interpolation(match, len(other.vertices)),
             "labels": matching.labels_at(match, np.arange(len(other.vertices))),
@@ -243,11 +245,12 @@ def test_numbers_of_elements(recorded, body):
 def test_numbers_of_a_path(recorded, body):
     weeks = [21.0, 21.3, 23.0, 24.0, 26.5]
     centre = body.vertices.mean(axis=0)
+    offset = body.vertices - centre
+    bent = np.sin(offset / 6.0)[:, [1, 2, 0]]
     shapes = []
     for number, week in enumerate(weeks):
-        bent = np.sin((body.vertices - centre) / 6.0)[:, [1, 2, 0]]
         factor = 1.0 + 0.04 * (week - 21.0) + 0.02 * (number % 2)
-        shapes.append(centre + factor * (body.vertices - centre) + number * bent)
+        shapes.append(centre + factor * offset + number * bent)
     path = paths.path_through(weeks, shapes, body, 0.5, stops=[24.0])
     recorded(
         {

@@ -7,7 +7,7 @@ from facts import Facts
 from shapes import ellipsoid_mesh, rigid, sphere
 
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.matching import crossing_faces, nearest_on
+from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume
 from gyriflow.growth.fine_surfaces import (
@@ -17,8 +17,7 @@ from gyriflow.growth.fine_surfaces import (
     nearest_in_age,
 )
 
-MESH = ellipsoid_mesh(8, (20.0, 20.0, 20.0))
-COARSE, USED = boundary_surface(MESH)
+COARSE, _ = boundary_surface(ellipsoid_mesh(8, (20.0, 20.0, 20.0)))
 
 
 def folded(height_mm=0.8):
@@ -33,56 +32,58 @@ def folded(height_mm=0.8):
 
 def grown(points):
     """Grow (n, 3) points by a fifth, unevenly, and turn them."""
-    uneven = np.column_stack(
-        [
-            1.2 * points[:, 0] + 0.4 * np.sin(points[:, 1] / 9),
-            1.15 * points[:, 1],
-            1.25 * points[:, 2] + 0.3 * np.cos(points[:, 0] / 8),
-        ]
-    )
-    return transform_points(uneven, rigid(20, -10, 40, shift=(5.0, -3.0, 8.0)))
+    x, y, z = points.T
+    bent = 1.2 * x + 0.4 * np.sin(y / 9), 1.15 * y, 1.25 * z + 0.3 * np.cos(x / 8)
+    pose = rigid(20, -10, 40, shift=(5.0, -3.0, 8.0))
+    return transform_points(np.column_stack(bent), pose)
+
+
+FINE = folded()
+PLACES = nearest_on(COARSE.vertices, FINE)[2]
+OBSERVED = ObservedSurface(FINE, PLACES)
 
 
 def test_folds_finer_than_the_mesh_move_with_it():
-    fine = folded()
-    _, _, places = nearest_on(COARSE.vertices, fine)
-    boundary = TriangleMesh(grown(places), COARSE.faces)
-    moved = moved_surface(ObservedSurface(fine, places), boundary)
-    assert len(moved.vertices) == len(fine.vertices)
-    misses = np.linalg.norm(moved.vertices - grown(fine.vertices), axis=1)
+    boundary = TriangleMesh(grown(PLACES), COARSE.faces)
+    moved = moved_surface(OBSERVED, boundary)
+    misses = np.linalg.norm(moved.vertices - grown(FINE.vertices), axis=1)
     assert misses.mean() < 0.25
     # the body's volume, which is that of the coarser surface
     assert signed_volume(moved) == pytest.approx(signed_volume(boundary))
-    assert signed_volume(moved) < 0.99 * signed_volume(fine) * 1.2 * 1.15 * 1.25
+    assert signed_volume(moved) < 0.99 * signed_volume(FINE) * 1.2 * 1.15 * 1.25
     # the mesh itself cuts the folds off
-    missed_by_mesh, _, _ = nearest_on(grown(fine.vertices), boundary)
+    missed_by_mesh, _, _ = nearest_on(grown(FINE.vertices), boundary)
     assert missed_by_mesh.mean() > 0.2
 
 
 def test_a_surface_that_would_cross_itself_is_that_of_the_mesh(caplog):
-    fine = folded()
-    _, _, places = nearest_on(COARSE.vertices, fine)
-    shaken = places + np.random.default_rng(0).normal(scale=20.0, size=places.shape)
     # of one size, since only the displacements matter
-    boundary = TriangleMesh(shaken, COARSE.faces)
-    assert moved_surface(ObservedSurface(fine, places), boundary) is boundary
+    shaken = np.random.default_rng(0).normal(scale=20.0, size=PLACES.shape)
+    boundary = TriangleMesh(PLACES + shaken, COARSE.faces)
+    assert moved_surface(OBSERVED, boundary) is boundary
     assert Facts("crosses itself", "mesh") == caplog.text
-    still = moved_surface(
-        ObservedSurface(fine, places), TriangleMesh(places, COARSE.faces)
-    )
-    assert crossing_faces(still) == crossing_faces(fine)
-    scale = np.cbrt(signed_volume(still) / signed_volume(fine))
+
+
+def test_a_surface_that_does_not_move_has_the_volume_of_the_mesh():
+    still = moved_surface(OBSERVED, TriangleMesh(PLACES, COARSE.faces))
+    scale = np.cbrt(signed_volume(still) / signed_volume(FINE))
     assert 0.97 < scale < 1
-    assert still.vertices == pytest.approx(scale * fine.vertices, abs=0.02)
+    assert still.vertices == pytest.approx(scale * FINE.vertices, abs=0.02)
 
 
-def test_the_brain_of_the_nearest_age_is_moved_whatever_its_stated_week():
-    ages = pd.DataFrame(
-        {"stated_week": [22.0, 24.0, 25.0, 26.0], "age_by_size": [22, 23.6, 25.9, 26.8]}
-    )
-    assert nearest_in_age(ages, [24.0, 25.0, 26.0], 25.0) == 1
-    assert nearest_in_age(ages, [24.0, 25.0, 26.0], 24.5) == 0
-    assert nearest_in_age(ages, [25.0, 26.0], 26.5) == 1
+@pytest.mark.parametrize(
+    ("weeks", "week", "number"),
+    [
+        ([24.0, 25.0, 26.0], 25.0, 1),
+        ([24.0, 25.0, 26.0], 24.5, 0),
+        ([25.0, 26.0], 26.5, 1),
+    ],
+)
+def test_the_brain_of_the_nearest_age_is_moved_whatever_its_stated_week(
+    weeks, week, number
+):
+    ages = {"stated_week": [22.0, 24, 25, 26], "age_by_size": [22, 23.6, 25.9, 26.8]}
+    assert nearest_in_age(pd.DataFrame(ages), weeks, week) == number
 
 
 def test_the_share_of_finer_differences_begins_with_all_of_them():

@@ -134,6 +134,7 @@ def test_numbers_of_rates(recorded):
             "series": answer_of(rates.rates_of_series, series(), ["volume", "surface"]),
             "per week": {str(interval): maps for interval, maps in found.items()},
             "sd": rates.growth_sd(found[22.0, 24.5], members),
+            "sd of one": rates.growth_sd(found[22.0, 24.5], members[:1]),
         }
     )
 
@@ -200,9 +201,11 @@ def test_numbers_of_what_is_carried(recorded):
     recorded(
         {
             "report": report,
+            "through surfaces": carrying.maps_on_template(
+                {"depth_mm": smooth_field(second.vertices)}, second, other, [pair]
+            ),
             "followed": carrying.follow_surfaces(other, [pair]),
             "over weeks": carrying.carry_over_weeks(body.vertices, [between]),
-            "surface": carrying.carry_surface(other, [pair, between]),
             "regions": np.bincount(carrying.carry_regions(labels, other, second, pair)),
             "on template": carrying.maps_on_template(maps, other, first, []),
             "numbers": carried_regions.number_regions(
@@ -236,8 +239,10 @@ def test_numbers_of_a_registration(recorded):
     image = (np.sin(np.arange(labels.size)).reshape(labels.shape), affine)
     first = registration.channels(labels, affine, **common, image=image)
     second = registration.channels(later, other, **common, voxel_mm=1.5)
-    between = Deformation(other @ np.linalg.inv(affine), np.zeros((3, 3, 3, 3)), affine)
-    quality = registration.measure_quality(first, second, between)
+    ticks = [np.linspace(0.0, 2.0, 4)] * 3
+    u = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1) ** 2
+    matrix, grid = other @ np.linalg.inv(affine), affine @ scaling(10.0)
+    quality = registration.measure_quality(first, second, Deformation(matrix, u, grid))
     recorded(
         {
             "first": first,
@@ -275,7 +280,6 @@ def test_numbers_of_fitted_surfaces(recorded, path):
         {
             "fitted": series_shapes.fit_onto_surface(target, near),
             "by tissue": series_shapes.fit_onto_surface(target, near, inner=below),
-            "points below": series_shapes.points_below(near),
             "tissue below": series_shapes.tissue_below(target, near, pair),
             "misfit": series_shapes.misfit_mm(boundary, later),
             "sizes": series_shapes.sizes_of(mesh, path.shapes.positions),

@@ -1,28 +1,27 @@
 """Limits of a fit to the surfaces of a series: the reach of a pull, the number of
 draws, and what is warned of."""
 
-import logging
 from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import inner, rigid, scaling, sphere, uneven
+from shapes import ellipsoid_mesh, rigid, scaling, sphere, uneven
 
 from gyriflow.geometry.deformations import Deformation
+from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh, flipped
+from gyriflow.growth import series_shapes
 from gyriflow.growth.series_shapes import (
     INNER_MM,
     MAX_OPENING_DRAWS,
     SeriesShapes,
     WeekShape,
-    _carried,
     fit_body,
     fit_onto_surface,
+    follow_series,
     misfit_mm,
-    points_below,
     tissue_below,
-    warn_of_misfit,
     with_stops,
 )
 
@@ -39,37 +38,27 @@ def radii(places: Floats) -> Floats:
     return np.linalg.norm(places, axis=1)
 
 
-@pytest.mark.parametrize(("mm", "is_reached"), [(3.5, True), (4.5, False)])
-def test_a_surface_pulls_as_far_as_registration_errs(mm, is_reached):
-    found = radii(fit_onto_surface(BALL, larger(mm)))
-    assert found == pytest.approx(np.full(len(found), 20.0 + mm * is_reached), abs=0.1)
-
-
-@pytest.mark.parametrize(("mm", "is_reached"), [(7.0, True), (9.0, False)])
-def test_a_surface_pulls_further_where_the_tissue_below_is_known(mm, is_reached):
-    surface = larger(mm)
-    below = BALL.vertices * ((20.0 + mm - INNER_MM) / 20.0)
-    found = radii(fit_onto_surface(BALL, surface, inner=below))
+@pytest.mark.parametrize(
+    ("mm", "has_tissue", "is_reached"),
+    [
+        # as far as registration errs
+        (3.5, False, True),
+        (4.5, False, False),
+        (7.0, True, True),
+        (9.0, True, False),
+    ],
+)
+def test_a_surface_pulls_further_where_the_tissue_below_is_known(
+    mm, has_tissue, is_reached
+):
+    below = BALL.vertices * ((20.0 + mm - INNER_MM) / 20.0) if has_tissue else None
+    found = radii(fit_onto_surface(BALL, larger(mm), inner=below))
     assert found == pytest.approx(np.full(len(found), 20.0 + mm * is_reached), abs=0.1)
 
 
 def test_a_surface_that_faces_the_other_way_does_not_pull():
     found = fit_onto_surface(BALL, flipped(larger(1.0)))
     assert found == pytest.approx(BALL.vertices, abs=1e-6)
-
-
-def test_the_pull_of_a_surface_is_weighted_by_area():
-    """Coarse triangles end at z = 0, where the goal changes: the smoothed pull there is
-    the mean of both sides."""
-    ball = uneven(sphere(20.0, 5), ratio=3.0)
-    half = TriangleMesh(
-        ball.vertices * np.where(ball.vertices[:, 2] > 0, 1.05, 1.0)[:, None],
-        ball.faces,
-    )
-    found = radii(fit_onto_surface(ball, half, (4.0,))) - 20.0
-    height = ball.vertices[:, 2]
-    near = np.abs(height) < 1.0
-    assert found[near].mean() == pytest.approx(0.5, abs=0.1)
 
 
 @dataclass
@@ -133,17 +122,59 @@ def test_a_body_without_an_observed_surface_is_drawn_to_its_shape_once():
 
 
 @pytest.mark.parametrize(("mm", "is_warned"), [(0.15, False), (0.4, True)])
-def test_a_body_that_stays_from_its_shape_or_surface_is_warned_of(
-    caplog, mm, is_warned
-):
+def test_a_body_that_stays_from_its_shape_is_warned_of(caplog, mm, is_warned):
     fit_body(StubbornBody(0.0), (1 + mm / 20) * BALL.vertices, None, EVERY)
-    warn_of_misfit(BALL, larger(mm), 23.0)
-    warnings = [
-        record.getMessage()
-        for record in caplog.records
-        if record.levelno >= logging.WARNING
+    assert caplog.messages == [Facts(f"{mm:.2f} mm")] * is_warned
+
+
+@dataclass
+class FixedBody(StubbornBody):
+    """A body that does not move, in a solid mesh."""
+
+    @property
+    def boundary(self) -> TriangleMesh:
+        return BOUNDARY
+
+    def draw(self, goals: Floats) -> Floats:
+        return self.positions_mm
+
+
+SOLID = ellipsoid_mesh(6, (20.0, 20.0, 20.0))
+BOUNDARY, USED = boundary_surface(SOLID)
+STILL = Deformation(np.eye(4), np.zeros((9, 9, 9, 3)), scaling(15.0, -60.0))
+
+
+@pytest.mark.parametrize(("mm", "is_warned"), [(0.15, False), (0.4, True)])
+def test_a_body_that_stays_from_its_surface_is_warned_of(caplog, mm, is_warned):
+    surface = TriangleMesh((1 + mm / 20) * BOUNDARY.vertices, BOUNDARY.faces)
+    body = FixedBody(0.0, SOLID.vertices)
+    follow_series(SOLID, [22.0, 23.0], [STILL], [surface], body)
+    assert caplog.messages == [Facts("GW 23", "mm")] * is_warned
+
+
+def test_tissue_below_is_that_of_the_observed_surface_and_of_the_body_at_the_start(
+    monkeypatch,
+):
+    """A body's own normals are rough: their errors would add up from week to week."""
+    surfaces = [
+        TriangleMesh(factor * BOUNDARY.vertices, BOUNDARY.faces)
+        for factor in (1.03, 1.06)
     ]
-    assert warnings == [Facts(f"{mm:.2f} mm"), Facts("GW 23", "mm")] * is_warned
+    observed = []
+
+    def record(boundary, surface, pair):
+        observed.append(surface.vertices)
+        return tissue_below(boundary, surface, pair)
+
+    monkeypatch.setattr(series_shapes, "tissue_below", record)
+    body = FixedBody(0.0, SOLID.vertices)
+    weeks, pairs = [22.0, 23.0, 24.0], [STILL] * 2
+    follow_series(SOLID, weeks, pairs, surfaces, body, has_slits=True)
+    assert np.array_equal(observed, [BOUNDARY.vertices, surfaces[0].vertices])
+    # 2 mm below the surface, moved by the registration
+    shift = Deformation(rigid(shift=(5.0, 0, 0)), STILL.displacement, STILL.affine)
+    below = tissue_below(BALL, larger(0.5), shift)
+    assert np.abs(radii(below - [5.0, 0, 0]) - 18.5).max() < 0.1
 
 
 def test_a_misfit_is_a_mean_over_area():
@@ -155,54 +186,11 @@ def test_a_misfit_is_a_mean_over_area():
 
 
 def test_stops_that_round_to_a_week_are_no_stops():
-    body = StubbornBody(
-        1.0,
-        way=[(0.004, BALL.vertices), (0.5, 2 * BALL.vertices), (0.996, BALL.vertices)],
-    )
-    shapes = with_stops(WeekShape(22.0, BALL.vertices), 23.0, body)
-    assert [(shape.week, shape.is_stop) for shape in shapes] == [
-        (22.5, True),
-        (23.0, False),
-    ]
-    assert shapes[0].positions == pytest.approx(2 * BALL.vertices)
+    places = BALL.vertices
+    body = StubbornBody(1.0, way=[(0.004, places), (0.5, 2 * places), (0.996, places)])
+    shapes = with_stops(WeekShape(22.0, places), 23.0, body)
     # an interrupted series goes on from what it was
-    again = SeriesShapes.of(shapes).by_week()
-    assert [(shape.week, shape.is_stop) for shape in again] == [
-        (22.5, True),
-        (23.0, False),
-    ]
-
-
-def test_tissue_below_is_that_of_the_observed_surface_and_of_the_body_at_the_start():
-    """A body's own normals are rough: their errors would add up from week to week."""
-    shift = Deformation(
-        rigid(shift=(5.0, 0.0, 0.0)), np.zeros((9, 9, 9, 3)), scaling(15.0, -60.0)
-    )
-    rough = (
-        BALL.vertices
-        * (1 + 0.02 * np.random.default_rng(0).choice([-1.0, 1.0], len(EVERY)))[:, None]
-    )
-    observed = [larger(0.5), larger(1.0)]
-    for shapes, expected in (
-        ([WeekShape(22.0, rough)], TriangleMesh(rough, BALL.faces)),
-        (
-            [
-                WeekShape(22.0, BALL.vertices),
-                WeekShape(22.5, rough, is_stop=True),
-                WeekShape(23.0, rough),
-            ],
-            observed[0],
-        ),
-    ):
-        places, _, target = next(
-            _carried(BALL, EVERY, shapes, [shift] * 2, observed, True)
-        )
-        assert places == pytest.approx(rough + [5.0, 0.0, 0.0])
-        surface, below = target
-        assert surface is observed[len(shapes) > 1]
-        assert below == pytest.approx(
-            tissue_below(TriangleMesh(rough, BALL.faces), expected, shift)
-        )
-    smooth = inner(larger(0.5), INNER_MM).vertices
-    assert points_below(larger(0.5)) == pytest.approx(smooth)
-    assert np.abs(radii(below - [5.0, 0.0, 0.0]) - 18.5).max() < 0.1
+    for found in (shapes, SeriesShapes.of(shapes).by_week()):
+        weeks = [(shape.week, shape.is_stop) for shape in found]
+        assert weeks == [(22.5, True), (23.0, False)]
+        assert found[0].positions == pytest.approx(2 * places)
