@@ -10,7 +10,7 @@ from phantoms import BRAINSTEM, CEREBELLUM, CORTEX, CSF, DEEP_GREY, VENTRICLES, 
 from shapes import rigid
 
 from gyriflow.anatomy.labels import read_cerebrum
-from gyriflow.anatomy.misplaced import bare_surface, hindbrain_note, misplaced_cortex
+from gyriflow.anatomy.misplaced import bare_surface, misplaced_cortex
 from gyriflow.io.yaml_files import SCHEMES
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
@@ -51,25 +51,26 @@ def place(mask):
     return [round(x) for x in centre]
 
 
-def relabelled(labels, mask):
-    return np.where(mask, CORTEX, labels)
+def warnings_of_cortex(labels, mask):
+    """Return the warnings of labels that have cortex in a mask."""
+    return list(misplaced_cortex(np.where(mask, CORTEX, labels), AFFINE, ATLAS))
 
 
 def test_a_brain_without_fault_has_no_warning(brain):
     assert list(misplaced_cortex(brain, AFFINE, ATLAS)) == []
-    assert hindbrain_note(brain, ATLAS) == ""
+    assert list(bare_surface(brain, AFFINE, ATLAS)) == []
+    # a cut by the border of a volume is no bare surface
+    assert list(bare_surface(brain[: len(brain) // 2], AFFINE, ATLAS)) == []
+    assert "hindbrain" not in read_cerebrum(brain, AFFINE, ATLAS).report
 
 
 def test_cerebellum_and_brainstem_labelled_as_cortex_are_named(brain):
-    faulty = relabelled(brain, np.isin(brain, (CEREBELLUM, BRAINSTEM)))
-    assert list(misplaced_cortex(faulty, AFFINE, ATLAS)) == [
-        Facts("6 mm", "cerebellum", "brainstem")
-    ]
-    assert hindbrain_note(faulty, ATLAS) == Facts("cerebellum", "brainstem")
-    # check and the surface take their warnings from here
-    cerebrum = read_cerebrum(faulty, AFFINE, ATLAS)
-    assert any("cerebellum" in warning for warning in cerebrum.warnings)
-    assert "cerebellum" in cerebrum.report["hindbrain"]
+    hindbrain = np.isin(brain, (CEREBELLUM, BRAINSTEM))
+    (found,) = warnings_of_cortex(brain, hindbrain)
+    assert found == Facts("6 mm", "cerebellum", "brainstem")
+    cerebrum = read_cerebrum(np.where(hindbrain, CORTEX, brain), AFFINE, ATLAS)
+    assert found in cerebrum.warnings
+    assert cerebrum.report["hindbrain"] == Facts("cerebellum", "brainstem")
 
 
 @pytest.mark.parametrize(
@@ -82,7 +83,6 @@ def test_cerebellum_and_brainstem_labelled_as_cortex_are_named(brain):
 def test_hindbrain_labelled_as_inner_tissue_is_named_with_its_place(
     brain, tissue, label, name
 ):
-    assert list(bare_surface(brain, AFFINE, ATLAS)) == []
     faulty = np.where(brain == tissue, label, brain)
     (found,) = bare_surface(faulty, AFFINE, ATLAS)
     assert found == Facts("8 mm", f"{label} {name}")
@@ -101,55 +101,34 @@ def test_cortex_that_lacks_a_label_on_one_side_is_named(brain, label):
     assert [int(x), int(y), int(z)] == pytest.approx(place(missing), abs=6)
 
 
-def test_a_cut_by_the_border_of_a_volume_is_no_bare_surface(brain):
-    half = len(brain) // 2
-    assert list(bare_surface(brain[:half], AFFINE, ATLAS)) == []
-
-
-def test_a_blob_outside_has_its_volume_and_place(brain):
-    blob = ball(CENTRE + [0.0, 0.0, 25.5], 2.5)
-    blob = blob & (brain != CORTEX)
-    assert list(misplaced_cortex(relabelled(brain, blob), AFFINE, ATLAS)) == [
-        Facts(f"{blob.sum() * 0.8 * 1.2e-3:.2f} mL", *place(blob))
-    ]
-
-
-def test_a_blob_in_a_ventricle_has_its_place(brain):
-    blob = ball(CENTRE, 4.0)
-    assert list(misplaced_cortex(relabelled(brain, blob), AFFINE, ATLAS)) == [
-        Facts("inside the cerebrum", *place(blob))
-    ]
+def test_a_blob_has_its_volume_outside_and_its_place(brain):
+    outside = ball(CENTRE + [0.0, 0.0, 25.5], 2.5) & (brain != CORTEX)
+    volume = f"{outside.sum() * 0.8 * 1.2e-3:.2f} mL"
+    assert warnings_of_cortex(brain, outside) == [Facts(volume, *place(outside))]
+    inside = ball(CENTRE, 4.0)
+    facts = Facts("inside the cerebrum", *place(inside))
+    assert warnings_of_cortex(brain, inside) == [facts]
 
 
 def test_a_layer_around_the_ventricle_is_found(brain):
     # joined to the outer cortex, so that it is no separate piece
-    layer = (brain == DEEP_GREY) | (
-        ball(CENTRE, 18.0) & ball(CENTRE + [19.0, 0.0, 0.0], 10.0) & (brain == WHITE)
-    )
-    found = list(misplaced_cortex(relabelled(brain, layer), AFFINE, ATLAS))
-    assert found[-1] == Facts("ventricles", "100 %")
+    joint = ball(CENTRE, 18.0) & ball(CENTRE + [19.0, 0.0, 0.0], 10.0)
+    layer = (brain == DEEP_GREY) | (joint & (brain == WHITE))
+    assert warnings_of_cortex(brain, layer)[-1] == Facts("ventricles", "100 %")
 
 
 def test_a_sheet_that_touches_no_brain_is_found(brain):
     x, _, z = (np.indices(brain.shape).T * SIZE).T
     sheet = (np.abs(x - CENTRE[0]) < 1.0) & (z > CENTRE[2] + 21.5) & ball(CENTRE, 25.0)
     # nearer to the white matter than cortex may be
-    assert list(misplaced_cortex(relabelled(brain, sheet), AFFINE, ATLAS)) == [
-        Facts("apart", *place(sheet))
-    ]
+    assert warnings_of_cortex(brain, sheet) == [Facts("apart", *place(sheet))]
 
 
-def test_strays_of_a_few_voxels_are_not_warned_of(brain):
-    blob = ball(CENTRE + [0.0, 0.0, 25.0], 1.5)
-    assert 0 < blob.sum() * 0.96e-3 < 0.05
-    assert list(misplaced_cortex(relabelled(brain, blob), AFFINE, ATLAS)) == []
-
-
-def test_pieces_that_meet_at_a_corner_count_together(brain):
-    pieces = np.zeros(brain.shape, dtype=bool)
-    pieces[32:38, 24:28, 55:57] = pieces[38:44, 28:32, 57:59] = True
-    half_ml = pieces.sum() / 2 * 0.96e-3
-    assert half_ml < 0.05 < 2 * half_ml
-    assert list(misplaced_cortex(relabelled(brain, pieces), AFFINE, ATLAS)) == [
-        Facts(f"{2 * half_ml:.2f} mL", *place(pieces))
-    ]
+def test_pieces_of_a_few_voxels_are_warned_of_only_if_they_meet_at_a_corner(brain):
+    pieces = np.zeros((2, *brain.shape), dtype=bool)
+    pieces[0, 32:38, 24:28, 55:57] = pieces[1, 38:44, 28:32, 57:59] = True
+    ml = pieces[0].sum() * 0.96e-3
+    assert ml < 0.05 < 2 * ml
+    assert warnings_of_cortex(brain, pieces[0]) == []
+    both = pieces.any(axis=0)
+    assert warnings_of_cortex(brain, both) == [Facts(f"{2 * ml:.2f} mL", *place(both))]

@@ -11,6 +11,7 @@ from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import transformed
 from gyriflow.metrics.measure import measure_white
 from gyriflow.settings.schemes import LabelScheme
+from gyriflow.settings.terms import SIDES
 
 PIAL_MM, WHITE_MM, VOXEL_MM = 20.0, 17.0, 0.8
 SCHEME = LabelScheme(name="two", cerebrum=(1, 2), cortex=(2,))
@@ -21,57 +22,45 @@ POSE = np.array([[0.0, -1, 0, 5], [1, 0, 0, -3], [0, 0, 1, 2], [0, 0, 0, 1]])
 def spheres_labels():
     axis = np.arange(-24, 24, VOXEL_MM) + 0.13
     radius = np.sqrt(sum(np.square(np.meshgrid(axis, axis, axis, indexing="ij"))))
-    return np.where(radius < WHITE_MM, 1, np.where(radius < PIAL_MM, 2, 0)), scaling(
-        VOXEL_MM, axis[0]
-    )
+    labels = np.select([radius < WHITE_MM, radius < PIAL_MM], [1, 2], 0)
+    return labels, scaling(VOXEL_MM, axis[0])
 
 
 @pytest.mark.parametrize("source", ["labels", "whole", "sides"])
 def test_the_white_surface_of_concentric_spheres_is_the_inner_one(source):
-    pial = dict(zip(("left", "right"), split(sphere(PIAL_MM, 4), 0.0), strict=True))
+    pial = dict(zip(SIDES, split(sphere(PIAL_MM, 4), 0.0), strict=True))
+    # the files lie elsewhere than the posed surface
+    to_file = np.linalg.inv(POSE)
     if source == "labels":
         labels, affine = spheres_labels()
-        # the files lie elsewhere than the posed surface
-        affine = np.linalg.inv(POSE) @ affine
         found = white_from_labels(
-            labels, affine, SCHEME, pial, Pose(POSE), edge_length_mm=1.5
+            labels, to_file @ affine, SCHEME, pial, Pose(POSE), edge_length_mm=1.5
         )
     else:
-        inner = sphere(WHITE_MM, 4)
-        given = (
-            {"whole": inner} if source == "whole" else {"left": inner, "right": inner}
-        )
-        given = {
-            name: transformed(mesh, np.linalg.inv(POSE)) for name, mesh in given.items()
-        }
+        inner = transformed(sphere(WHITE_MM, 4), to_file)
+        names = ("whole",) if source == "whole" else SIDES
         found = white_from_surfaces(
-            given, pial, Pose(files={"whole": POSE}), edge_length_mm=1.5
+            dict.fromkeys(names, inner),
+            pial,
+            Pose(files={"whole": POSE}),
+            edge_length_mm=1.5,
         )
-    radii = np.concatenate(
-        [np.linalg.norm(mesh.vertices, axis=1) for mesh in found.values()]
-    )
+    assert list(found) == ["left", "right"]
+    points = np.concatenate([mesh.vertices for mesh in found.values()])
+    radii = np.linalg.norm(points, axis=1)
     assert radii == pytest.approx(WHITE_MM, abs=VOXEL_MM / 4)
     assert radii.mean() == pytest.approx(WHITE_MM, abs=0.02)
-    assert list(found) == ["left", "right"]
-    table, maps = measure_white(found, 5.0)
-    value = table.set_index(["hemisphere", "metric"])["value"]
     # two whole spheres where the files have one for each side
-    share = {"labels": 0.5, "whole": 0.5, "sides": 1.0}[source]
-    assert value["left", "white_area"] == pytest.approx(
-        share * 4 * np.pi * WHITE_MM**2 / 100, rel=0.03
-    )
-    assert value["whole", "white_area"] == pytest.approx(
-        value["left", "white_area"] + value["right", "white_area"]
-    )
-    assert value["whole", "white_mean_curvedness"] == pytest.approx(
-        1 / WHITE_MM, rel=0.03
-    )
-    assert value["whole", "white_gyrification_index"] == pytest.approx(1, abs=0.01)
-    assert value["right", "white_mean_sulcal_depth"] == pytest.approx(0, abs=0.02)
-    assert len(maps["left"]["sulcal_depth_mm"]) == len(found["left"].vertices)
-    if source != "sides":
-        assert (
-            found["left"].vertices[:, 0].max()
-            < 1.5
-            < found["right"].vertices[:, 0].max()
-        )
+    share = 1.0 if source == "sides" else 0.5
+    if share == 0.5:
+        left, right = (mesh.vertices[:, 0].max() for mesh in found.values())
+        assert left < 1.5 < right
+    table, _ = measure_white(found, 5.0)
+    numbers = table.set_index(["hemisphere", "metric"])["value"]
+    sphere_cm2 = 4 * np.pi * WHITE_MM**2 / 100
+    assert numbers["left", "white_area"] == pytest.approx(share * sphere_cm2, rel=0.03)
+    whole = numbers["whole"]
+    assert whole["white_area"] == pytest.approx(2 * share * sphere_cm2, rel=0.03)
+    assert whole["white_mean_curvedness"] == pytest.approx(1 / WHITE_MM, rel=0.03)
+    assert whole["white_gyrification_index"] == pytest.approx(1, abs=0.01)
+    assert whole["white_mean_sulcal_depth"] == pytest.approx(0, abs=0.02)
