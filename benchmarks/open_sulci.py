@@ -24,10 +24,11 @@ from gyriflow.anatomy.extraction import make_simple, remove_bridges, smooth_mask
 from gyriflow.anatomy.fissure import sample
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.anatomy.sulci import open_fused_sulci
-from gyriflow.anatomy.thickness import Cortex, cortical_thickness
+from gyriflow.anatomy.thickness import Cortex, thickness_from_labels
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.matching import surface_mask
+from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import (
     Floats,
     TriangleMesh,
@@ -310,11 +311,9 @@ def measure(
 ) -> dict[str, float]:
     """Measure the quantities of `truth` on a surface of the body."""
     hull, weights = convex_hull(mesh), vertex_areas(mesh)
-    thickness = cortical_thickness(
-        mesh,
-        Cortex(body, body & ~core, affine),
-        beyond_fissure=np.ones(len(mesh.vertices), dtype=bool),
-    )
+    cortex = Cortex(body, body & ~core, affine)
+    # far from any fissure
+    thickness = thickness_from_labels(cortex, mesh, Pose(), fissure_x_mm=np.inf)
     depth = float(np.average(sulcal_depth(mesh, hull), weights=weights))
     result = {"area_mm2": area(mesh), "depth_mm": depth, "gi": area(mesh) / area(hull)}
     return result | {"thickness_mm": thickness.report["mean_mm"]}

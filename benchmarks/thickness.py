@@ -33,8 +33,9 @@ from scipy.sparse.linalg import cg
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import smooth_mask
+from gyriflow.anatomy.labels import read_cerebrum
 from gyriflow.anatomy.repair import surface_of_mask
-from gyriflow.anatomy.thickness import border, read_cortex, thickness_from_labels
+from gyriflow.anatomy.thickness import border, cortex_of, thickness_from_labels
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.matching import inside_mask, layer_thickness, nearest_on
 from gyriflow.geometry.poses import Pose
@@ -199,7 +200,7 @@ def measure(folds: Folds, voxel_mm: tuple[float, ...], seed: int) -> dict[str, A
     labels = np.where(body, np.where(core, 1, 2), 0)
     volume = float(body.sum() * size.prod())
     found = surface_of_mask(smooth_mask(body), affine, volume, EDGE_MM).mesh
-    cortex = read_cortex(labels, affine, SCHEME)
+    cortex = cortex_of(read_cerebrum(labels, affine, SCHEME), SCHEME)
     thickness = thickness_from_labels(cortex, found, Pose())
     inner = border(core, affine)
     means = {

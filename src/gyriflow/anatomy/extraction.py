@@ -4,6 +4,7 @@ stalk, and isosurfaces."""
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,6 @@ from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, tran
 PAD_VOXELS = 6
 # σ of the Gaussian that smooths a mask before its isosurface is extracted
 SMOOTHING_VOXELS = 1.0
-# how often what this Gaussian has taken away is added again; a third time brings back
-# more of the terraces than of the folds
-N_TWICINGS = 2
 LEVEL = 0.5
 # slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
 EDGE_SLOPE = 0.4
@@ -91,13 +89,6 @@ MIN_HANGING_MM3 = 15.0
 STALK_MM = 4.0
 
 
-def crop(mask: Mask) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
-    """Return the bounding box of an (i, j, k) mask, and the (3,) index of its first
-    voxel padded by `PAD_VOXELS`."""
-    box = ndimage.find_objects(mask.astype(np.uint8))[0]
-    return box, np.array([side.start for side in box]) - PAD_VOXELS
-
-
 def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
     """Return the affine of a volume that was cropped or padded to begin at voxel
     `first`."""
@@ -130,20 +121,6 @@ def smooth_mask(
     """Return the mask smoothed by a Gaussian of the given σ in voxels, as a field from
     0 to 1."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
-
-
-def sharp_mask(mask: Mask) -> NDArray[np.float32]:
-    """Return the mask smoothed as by `smooth_mask`, but with a third of its loss of
-    folds.
-
-    A Gaussian G lowers a wall's folds of wave number k by σ²k²/2 of their height. What
-    it takes away, smoothed as well, is added again (twicing, Tukey 1977): 1 − (1 − G)³
-    in place of G lowers them by a third of that, and moves flat walls as little.
-    """
-    field = smooth_mask(mask)
-    for _ in range(N_TWICINGS):
-        field += ndimage.gaussian_filter(mask - field, SMOOTHING_VOXELS)
-    return field
 
 
 def remove_bridges(
@@ -241,7 +218,7 @@ def make_simple(
     field = np.where(
         main, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)
     ).astype(np.float32)
-    field, handles_repaired = without_handles(field)
+    field, handles_repaired = _without_handles(field)
     dropped = {
         "parts_dropped": parts,
         "voxels_dropped": voxels,
@@ -271,7 +248,7 @@ def handles(mask: Mask) -> int:
     return parts + outside - 1 - _euler_number(mask)
 
 
-def without_handles(
+def _without_handles(
     field: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], dict[str, int]]:
     """Cut or fill the handles of the level set at one half of an (i, j, k) field;
@@ -292,7 +269,7 @@ def without_handles(
     for closed_by, radius in product((INSIDE, OUTSIDE), RADII):
         if remaining == 0:
             break
-        for fills, box, patch in _patches(mask, field, radius):
+        for _, fills, box, patch in _patches(mask, field, radius):
             # an earlier change may have touched this patch
             patch = patch & (mask[box] != fills)
             changed = np.where(patch, fills, mask[box])
@@ -406,25 +383,19 @@ def _patches(
     mask: Mask,
     field: NDArray[np.float32],
     radius: float,
-) -> list[tuple[bool, tuple[slice, ...], Mask]]:
+) -> list[tuple[tuple[int, float], bool, tuple[slice, ...], Mask]]:
+    """Return size and change of the field, whether it fills, box and mask of each patch
+    that a closing or an opening changes, the smallest first."""
     closed = ~dilated(~dilated(mask, radius), radius)
     opened = dilated(~dilated(~mask, radius), radius)
     patches = []
     for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):
         number, gains = _parts_with_gains(mask, change)
-        patches += [
-            (fills, box, patch)
-            for box, patch in parts_in_boxes(change & (gains > 0)[number])
-        ]
-
-    def size_and_change(
-        item: tuple[bool, tuple[slice, ...], Mask],
-    ) -> tuple[int, float]:
-        _, box, patch = item
-        needed = np.abs(field[box][patch] - LEVEL).sum(dtype=float)
-        return int(patch.sum()), round(float(needed), FIELD_DECIMALS)
-
-    return sorted(patches, key=size_and_change)
+        for box, patch in parts_in_boxes(change & (gains > 0)[number]):
+            needed = np.abs(field[box][patch] - LEVEL).sum(dtype=float)
+            size = int(patch.sum()), round(float(needed), FIELD_DECIMALS)
+            patches.append((size, fills, box, patch))
+    return sorted(patches, key=itemgetter(0))
 
 
 def _apply(

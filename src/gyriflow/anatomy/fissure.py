@@ -139,11 +139,11 @@ def _fit_to_fissure(
     offset: float,
     asymmetry: float,
 ) -> MidPlane:
-    fitted = _plane_through(fissure_points(mesh, normal, offset), normal, offset)
+    fitted = _plane_through(_fissure_points(mesh, normal, offset), normal, offset)
     if fitted is None:
         return MidPlane(normal, offset, asymmetry, 0)
     # the first band may have missed the fissure
-    middle = fissure_points(mesh, *fitted)
+    middle = _fissure_points(mesh, *fitted)
     fitted = _plane_through(middle, *fitted) or fitted
     count, scatter = _scatter(middle, *fitted)
     before, by_symmetry = _scatter(middle, normal, offset)
@@ -152,7 +152,7 @@ def _fit_to_fissure(
     return MidPlane(*fitted, asymmetry, count)
 
 
-def fissure_points(
+def _fissure_points(
     mesh: TriangleMesh,
     normal: Floats,
     offset: float,
@@ -357,11 +357,11 @@ class Fissure:
         """Return the (n,) distances in mm from the mid-surface along the plane's
         normal, positive to the right."""
         middle = ndimage.map_coordinates(
-            self.heights, self.cells(points), order=1, mode="nearest"
+            self.heights, self._cells(points), order=1, mode="nearest"
         )
         return points @ self.plane.normal - self.plane.offset - middle
 
-    def cells(self, points: Floats) -> Floats:
+    def _cells(self, points: Floats) -> Floats:
         """Return the (2, n) grid coordinates of (n, 3) points, in cells of
         `heights`."""
         return np.asarray(
@@ -379,9 +379,9 @@ def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
         np.ceil((flat.max(axis=0) + MARGIN_MM - corner) / SPACING_MM).astype(int) + 1
     )
     fissure = Fissure(plane, axes, corner, np.zeros(shape))
-    middle = fissure_points(walls, plane.normal, plane.offset)
+    middle = _fissure_points(walls, plane.normal, plane.offset)
     height = middle @ plane.normal - plane.offset
-    cells = np.rint(fissure.cells(middle)).astype(int)
+    cells = np.rint(fissure._cells(middle)).astype(int)
     for _ in range(N_UPDATES):
         near = np.abs(fissure.height_above(middle)) < MAX_SHIFT_MM
         weight, total = np.zeros(shape), np.zeros(shape)

@@ -114,7 +114,7 @@ def read_cerebrum(
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = unlabelled_ventricles(labels, scheme, affine)
     if scheme.cortex:
-        share = require_cortex_outside(labels, scheme, min_cortex, unlabelled)
+        share = _require_cortex_outside(labels, scheme, min_cortex, unlabelled)
         if share < LITTLE_CORTEX:
             warnings.append(
                 f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface:"
@@ -183,7 +183,8 @@ def read_cerebrum(
         name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()
     }
     report["border_share"] = border_share(main)
-    box, first = extraction.crop(main)
+    (box,) = ndimage.find_objects(main.astype(np.uint8))
+    first = np.array([side.start for side in box]) - extraction.PAD_VOXELS
     cropped = np.pad(main[box], extraction.PAD_VOXELS)
     labelled = np.pad(tissue[box], extraction.PAD_VOXELS)
     return Cerebrum(
@@ -265,11 +266,11 @@ def require_labels(labels: Labels, scheme: LabelScheme) -> None:
             )
 
 
-def require_cortex_outside(
+def _require_cortex_outside(
     labels: Labels,
     scheme: LabelScheme,
-    minimum: float = MIN_CORTEX_OUTSIDE,
-    unlabelled: Mask | bool = False,
+    minimum: float,
+    unlabelled: Mask,
 ) -> float:
     """Return the share of the cerebrum's surface with cortex; InputError below
     `minimum`: another scheme."""
@@ -575,33 +576,38 @@ def _wrong_places(
     inside."""
     cerebrum = tissues["cerebrum"]
     within_cortex = cerebrum & ~tissues["cortex"]
-    is_counted = layout.labels != HOLE
-
-    def contact_share(is_tissue: Mask, neighbours: Mask) -> float:
-        contacts = layout.contact[is_tissue].sum(axis=0) * (is_counted & ~is_tissue)
-        return float(contacts[neighbours].sum() / max(contacts.sum(), 1))
-
     for is_tissue, name, around in (
         (tissues["white_matter"], "white matter", cerebrum),
         (tissues["ventricles"], "ventricles", within_cortex),
     ):
-        share = contact_share(is_tissue, around)
+        share = _contact_share(layout, is_tissue, around)
         if is_tissue.any() and share < MIN_SHARE_INSIDE:
             yield (
                 f"{_with_numbers(layout, is_tissue, name)} would lie outside:"
                 f" {share:.0%} of their neighbours are inside"
             )
     smallest = SMALL_SHARE * _tissue_voxels(layout, tissues)
-    is_other = ~cerebrum & is_counted & (layout.labels != 0)
+    is_other = ~cerebrum & ~np.isin(layout.labels, (HOLE, 0))
     for number in layout.labels[is_other]:
         is_tissue = layout.labels == number
-        share = contact_share(is_tissue, within_cortex)
+        share = _contact_share(layout, is_tissue, within_cortex)
         if share > MAX_SHARE_INSIDE and layout.count[is_tissue].sum() > smallest:
             name = scheme.labels.get(int(number), "")
             yield (
                 f"{_with_numbers(layout, is_tissue, name)} would lie inside:"
                 f" {share:.0%} of its neighbours are there"
             )
+
+
+def _contact_share(
+    layout: Layout,
+    is_tissue: Mask,
+    neighbours: Mask,
+) -> float:
+    """Return the share of the contacts of a tissue that are with some neighbours."""
+    is_other = (layout.labels != HOLE) & ~is_tissue
+    contacts = layout.contact[is_tissue].sum(axis=0) * is_other
+    return float(contacts[neighbours].sum() / max(contacts.sum(), 1))
 
 
 def _wrong_sides(
@@ -624,12 +630,11 @@ def _wrong_sides(
     if not scheme.left or not scheme.white_matter:
         return
 
-    def voxels(tissue: str, side: Mask) -> int:
-        return int(layout.count[tissues[tissue] & side].sum())
-
-    left_cortex, right_cortex = voxels("cortex", left), voxels("cortex", right)
-    left_white = voxels("white_matter", left)
-    right_white = voxels("white_matter", right)
+    left_cortex, right_cortex, left_white, right_white = (
+        int(layout.count[tissues[tissue] & side].sum())
+        for tissue in ("cortex", "white_matter")
+        for side in (left, right)
+    )
     # a hemisphere may be small or missing, but with all of its tissues
     is_incomplete = (left_cortex > 0) != (left_white > 0) or (
         (right_cortex > 0) != (right_white > 0)

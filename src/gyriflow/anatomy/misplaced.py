@@ -54,7 +54,7 @@ def misplaced_cortex(
     core = around.cerebrum & ~cortex & ~fluid
     outside = ~without_holes(around.cerebrum)
     enclosed = _cortex_not_touching(outside, cortex)
-    is_far = cortex & ~around.is_near(core, MAX_FROM_CORE_MM)
+    is_far = cortex & ~_is_near(around, core, MAX_FROM_CORE_MM)
     detached = is_far | _cortex_not_touching(core, cortex)
     found = _pieces_in_words(detached & ~enclosed, around.affine)
     if found:
@@ -97,10 +97,10 @@ class _Cropped:
     cortex: Mask
     is_inner: Mask
 
-    def is_near(self, mask: Mask, distance_mm: float) -> Mask:
-        """Return the mask of the voxels within a distance of a mask."""
-        size = voxel_size(self.affine)
-        return dilated(mask, distance_mm, size)
+
+def _is_near(around: _Cropped, mask: Mask, distance_mm: float) -> Mask:
+    """Return the mask of the voxels within a distance of a mask."""
+    return dilated(mask, distance_mm, voxel_size(around.affine))
 
 
 def _cropped(
@@ -152,7 +152,7 @@ def bare_surface(
     filled = without_holes(around.cerebrum)
     surface = filled & ~ndimage.binary_erosion(filled)
     is_fluid = np.isin(around.labels, scheme.ventricles)
-    is_far = ~around.is_near(around.cortex, MAX_TO_CORTEX_MM)
+    is_far = ~_is_near(around, around.cortex, MAX_TO_CORTEX_MM)
     is_bare = surface & around.is_inner & ~is_fluid & is_far
     share = is_bare.sum() / surface.sum()
     if share > MAX_BARE_SHARE:

@@ -95,9 +95,9 @@ class PosedShape:
     side_ratio: float
     mirrored_rotation: Floats
 
-    @property
-    def is_clear(self) -> bool:
-        return self.confidence >= MIN_CONFIDENCE and self.residual <= MAX_RESIDUAL
+
+def _is_clear(shape: PosedShape) -> bool:
+    return shape.confidence >= MIN_CONFIDENCE and shape.residual <= MAX_RESIDUAL
 
 
 def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
@@ -147,7 +147,7 @@ def pose_of_pair(
     """
     shapes = _shapes_of_pair(left, right)
     _require_sides(shapes)
-    if not all(hemisphere.is_clear for hemisphere in shapes):
+    if not all(map(_is_clear, shapes)):
         poses = [
             _pose_as_ras(shape, f"{side} {shape.kind}")
             for shape, side in zip(shapes, SIDES, strict=True)
@@ -461,7 +461,7 @@ def require_coordinates(
             " and do not swap before"
         ]
     turns = [angle_deg(shape.rotation) for shape in shapes]
-    if all(shape.is_clear for shape in shapes) and min(turns) > MIN_TURN_DEG:
+    if all(map(_is_clear, shapes)) and min(turns) > MIN_TURN_DEG:
         return [
             _contradiction(
                 coordinates,
@@ -485,7 +485,7 @@ def _are_exchanged_in_other_axes(
         return False
     exchanged = _shapes_of_pair(right, left)
     turns = [angle_deg(shape.rotation) for shape in exchanged]
-    return all(shape.is_clear for shape in exchanged) and min(turns) > MIN_TURN_DEG
+    return all(map(_is_clear, exchanged)) and min(turns) > MIN_TURN_DEG
 
 
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
@@ -549,7 +549,7 @@ def pose_of_hemisphere(
     side_ratio, other = hemisphere.side_ratio, "right" if side == "left" else "left"
     if (
         coordinates == "auto"
-        and hemisphere.is_clear
+        and _is_clear(hemisphere)
         and side_ratio < 1 / MIN_SIDE_RATIO
     ):
         raise InputError(
@@ -594,7 +594,7 @@ def _choose_pose(
         name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()
     }
     if coordinates != "auto":
-        is_doubtful = shape.is_clear and angles[coordinates] > MIN_TURN_DEG
+        is_doubtful = _is_clear(shape) and angles[coordinates] > MIN_TURN_DEG
         doubts = (
             [
                 _contradiction(
@@ -609,7 +609,7 @@ def _choose_pose(
         return turned(
             CONVENTIONS[coordinates][:3, :3], "configuration", coordinates, *doubts
         )
-    if not shape.is_clear:
+    if not _is_clear(shape):
         return _pose_as_ras(shape, shape.kind)
     nearest = min(angles, key=lambda name: angles[name])
     if angles[nearest] >= CONVENTION_DEG:

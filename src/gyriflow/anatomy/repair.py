@@ -123,7 +123,7 @@ def sound_pieces(
         for width in repairs["medial_walls_capped_mm"]
     ]
     whole = mesh
-    mesh, stalks = surface_without_stalks(mesh)
+    mesh, stalks = _surface_without_stalks(mesh)
     if stalks:
         is_cap = is_cap[
             nearest_on(
@@ -151,12 +151,12 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
     Else it is rebuilt through voxels ("remade" in the report). MeshError if
     self-intersections remain.
     """
-    smooth, cutting, n_crossing = make_even(mesh, edge_length_mm)
+    smooth, cutting, n_crossing = _make_even(mesh, edge_length_mm)
     report: dict[str, Any] = {"self_intersections": cutting}
     if not (remaining := faults(smooth, n_crossing)):
         return RepairedSurface(smooth, report, [])
     mesh, report["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
-    smooth, _, n_crossing = make_even(mesh, edge_length_mm)
+    smooth, _, n_crossing = _make_even(mesh, edge_length_mm)
     require_sound(smooth, n_crossing)
     return RepairedSurface(
         smooth,
@@ -242,7 +242,7 @@ def taubin_smoothed(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(places, mesh.faces)
 
 
-def make_even(
+def _make_even(
     mesh: TriangleMesh, edge_length_mm: float
 ) -> tuple[TriangleMesh, int, int]:
     """Smooth, remesh and untangle a surface; also count crossing faces before, and
@@ -570,7 +570,7 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
     return remeshing.from_meshlab(document), is_cap
 
 
-def surface_without_stalks(
+def _surface_without_stalks(
     mesh: TriangleMesh,
 ) -> tuple[TriangleMesh, list[dict[str, Any]]]:
     """Remove the parts of a closed surface that hang by a stalk and close the cuts;

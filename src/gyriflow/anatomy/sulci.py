@@ -318,24 +318,11 @@ def _grow_slits(
     # voxels that may be put into the queue: they wait, are inside, and are not in it
     is_idle = bytearray(len(mask))
 
-    def is_enclosed(place: int) -> int:
-        return (
-            mask[place + 1]
-            and mask[place - 1]
-            and mask[place + row]
-            and mask[place - row]
-            and mask[place + layer]
-            and mask[place - layer]
-        )
-
-    def simple(place: int) -> bool:
-        return is_simple(
-            b"".join([mask[place + begin : place + begin + 3] for begin in rows])
-        )
-
     while queue:
         _, place = heapq.heappop(queue)
-        if is_enclosed(place) or not simple(place):
+        if _is_enclosed(mask, place, row, layer) or not _is_simple_at(
+            mask, place, rows
+        ):
             is_idle[place] = 1
             continue
         mask[place] = 0
@@ -343,10 +330,28 @@ def _grow_slits(
         for step in steps:
             near = place + step
             # an enclosed voxel comes into the queue when one at its faces is taken
-            if is_idle[near] and not is_enclosed(near):
+            if is_idle[near] and not _is_enclosed(mask, near, row, layer):
                 is_idle[near] = 0
                 heapq.heappush(queue, (waiting[near], near))
     for place in reversed(order):
-        if not sheet_bytes[place] and simple(place):
+        if not sheet_bytes[place] and _is_simple_at(mask, place, rows):
             mask[place] = 1
     return inside & (np.frombuffer(mask, dtype=np.uint8).reshape(inside.shape) == 0)
+
+
+def _is_enclosed(mask: bytearray, place: int, row: int, layer: int) -> int:
+    """Return whether the voxels at the faces of one in a flat mask are inside."""
+    return (
+        mask[place + 1]
+        and mask[place - 1]
+        and mask[place + row]
+        and mask[place - row]
+        and mask[place + layer]
+        and mask[place - layer]
+    )
+
+
+def _is_simple_at(mask: bytearray, place: int, rows: list[int]) -> bool:
+    return is_simple(
+        b"".join([mask[place + begin : place + begin + 3] for begin in rows])
+    )

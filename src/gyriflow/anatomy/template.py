@@ -59,12 +59,7 @@ class PointCloud:
 
     @cached_property
     def tree(self) -> cKDTree:
-        return cKDTree(self.features(self.points, self.normals))
-
-    @staticmethod
-    def features(points: Floats, normals: Floats) -> Floats:
-        """Return the (n, 6) features in whose space nearest points are searched."""
-        return np.hstack([points, NORMAL_WEIGHT * normals])
+        return cKDTree(_features(self.points, self.normals))
 
     def mirrored(self) -> "PointCloud":
         """Return the mirror image."""
@@ -75,6 +70,11 @@ class PointCloud:
             mirror @ self.centre,
             self.size_mm,
         )
+
+
+def _features(points: Floats, normals: Floats) -> Floats:
+    """Return the (n, 6) features in whose space nearest points are searched."""
+    return np.hstack([points, NORMAL_WEIGHT * normals])
 
 
 def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
@@ -212,7 +212,7 @@ def _descend(
     def planes(rotation: Floats, shift: Floats) -> Planes:
         moved = points @ rotation.T + shift
         facing = normals @ rotation.T
-        _, nearest = target.tree.query(target.features(moved, facing))
+        _, nearest = target.tree.query(_features(moved, facing))
         target_normals = target.normals[nearest]
         plane = unit(target_normals + facing)
         distances = np.einsum(
@@ -224,28 +224,15 @@ def _descend(
         weights = agrees / (1.0 + (distances / scale) ** 2) ** 2
         return Planes(moved, plane, distances, weights)
 
-    def is_converged(
-        _: Floats,
-        turn: Floats,
-        move: Floats,
-    ) -> bool:
-        return bool(
-            np.hypot(
-                np.linalg.norm(turn - np.eye(3)),
-                np.linalg.norm(move),
-            )
-            < 1e-3
-        )
-
     rotation, shift = alignment.follow_planes(
-        rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged
+        rotation, np.zeros(3) if shift is None else shift, planes, rounds, _is_converged
     )
     forward, _ = target.tree.query(
-        target.features(points @ rotation.T + shift, normals @ rotation.T)
+        _features(points @ rotation.T + shift, normals @ rotation.T)
     )
     target_points, facing = target.points[::every], target.normals[::every]
     backward, _ = shape.tree.query(
-        shape.features((target_points - shift) @ rotation, facing @ rotation)
+        _features((target_points - shift) @ rotation, facing @ rotation)
     )
     squares = [
         np.mean(np.minimum(distance, MAX_DISTANCE) ** 2)
@@ -256,6 +243,11 @@ def _descend(
         shift,
         float(np.sqrt(np.mean(squares))),
     )
+
+
+def _is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
+    change = np.linalg.norm(turn - np.eye(3))
+    return bool(np.hypot(change, np.linalg.norm(move)) < 1e-3)
 
 
 def medial_wall(shape: PointCloud, normal: Floats) -> tuple[Floats, float]:

@@ -1,10 +1,13 @@
 """Remove terraces, the steps that voxels leave on a surface, as far as the voxels
 allow."""
 
+from collections.abc import Sequence
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import stiffness_matrix
@@ -77,15 +80,7 @@ def without_terraces(
         for matrix in matrices
     ]
 
-    def smoothed(places: Floats) -> Floats:
-        right = (mass[:, None] * places).astype(complex)
-        return np.asarray(
-            sum(
-                (-0.5 * pole * solver.solve(right)).real
-                for pole, solver in zip(poles, solvers, strict=True)
-            )
-        )
-
+    smoothed = partial(_smoothed, mass=mass, poles=poles, solvers=solvers)
     start = mesh.vertices
     normals = vertex_normals(TriangleMesh(smoothed(start), mesh.faces))
     lowest, highest = (
@@ -119,6 +114,22 @@ def without_terraces(
         near = np.isin(mesh.faces, mesh.faces[bad]).any(axis=1)
         moves[mesh.faces[near]] = 0.0
     return mesh
+
+
+def _smoothed(
+    places: Floats,
+    *,
+    mass: Floats,
+    poles: NDArray[np.complex128],
+    solvers: Sequence[SuperLU],
+) -> Floats:
+    right = (mass[:, None] * places).astype(complex)
+    return np.asarray(
+        sum(
+            (-0.5 * pole * solver.solve(right)).real
+            for pole, solver in zip(poles, solvers, strict=True)
+        )
+    )
 
 
 def _degraded(before: TriangleMesh, after: TriangleMesh) -> NDArray[np.bool_]:

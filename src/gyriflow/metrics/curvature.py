@@ -159,45 +159,33 @@ def kept_curvature(wavelength_mm: Floats, radius_mm: float) -> Floats:
     return np.asarray(384.0 * jv(4, k) / k**4)
 
 
-def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]:
+def curvature_metrics(curvature: Curvature, areas: Floats) -> dict[str, float]:
     """Return integrals over a surface with (n,) areas of the vertices in mm², |k₁| the
-    larger principal curvature.
+    larger principal curvature, and quantiles of mean curvature.
 
     intrinsic_curvature_index is 1/4π ∫ max(K, 0) dA, 1 for all convex surfaces, and
     folding_index 1/4π ∫ |k₁|(|k₁| − |k₂|) dA, 0 for a sphere (Van Essen and Drury 1997,
     J. Neurosci. 17, 7079-7102). mean_curvature_norm is the L² norm 1/4π ∫ H² dA and
     gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1 for a sphere
-    (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
+    (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965). mean_curvature_q05 to
+    q95 are those in 1/mm below which 5, 25, 50, 75 and 95 % of the area are.
     """
+    mean, gaussian = curvature.mean, curvature.gaussian
     smaller, larger = np.sort(
         np.abs([curvature.maximum, curvature.minimum]),
         axis=0,
     )
     integrals = {
-        "intrinsic_curvature_index": np.maximum(curvature.gaussian, 0.0) @ areas,
+        "intrinsic_curvature_index": np.maximum(gaussian, 0.0) @ areas,
         "folding_index": (larger * (larger - smaller)) @ areas,
-        "mean_curvature_norm": curvature.mean**2 @ areas,
-        "gaussian_curvature_norm": np.sqrt(
-            areas.sum() * (curvature.gaussian**2 @ areas)
-        ),
+        "mean_curvature_norm": mean**2 @ areas,
+        "gaussian_curvature_norm": np.sqrt(areas.sum() * (gaussian**2 @ areas)),
     }
-    return {name: float(value) / (4.0 * np.pi) for name, value in integrals.items()}
-
-
-def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, float]:
-    """Return the mean curvatures in 1/mm below which 5, 25, 50, 75 and 95 % of the area
-    are, by name."""
-    values = np.quantile(
-        curvature.mean, QUANTILES, weights=areas, method="inverted_cdf"
-    )
-    names = (f"mean_curvature_q{round(100 * share):02d}" for share in QUANTILES)
-    return dict(
-        zip(
-            names,
-            map(float, values),
-            strict=True,
-        )
-    )
+    found = {name: float(value) / (4.0 * np.pi) for name, value in integrals.items()}
+    quantiles = np.quantile(mean, QUANTILES, weights=areas, method="inverted_cdf")
+    for share, value in zip(QUANTILES, quantiles, strict=True):
+        found[f"mean_curvature_q{round(100 * share):02d}"] = float(value)
+    return found
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:

@@ -7,10 +7,7 @@ split normal distribution (Wallis 2014, doi 10.1214/13-STS417). The scale is fit
 restricted likelihood. Scores of new subjects allow for the errors of the curves.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -250,20 +247,6 @@ class WeeklyNorm:
             subjects=self.subjects - 1,
         )
 
-    @property
-    def plain(self) -> dict[str, Any]:
-        """The fields as plain values for JSON."""
-        return {key: np.asarray(part).tolist() for key, part in asdict(self).items()}
-
-
-def norm_from_plain(plain: Mapping[str, Any]) -> WeeklyNorm:
-    """Return the norm that `WeeklyNorm.plain` gives as plain values."""
-    arrays = {
-        key: np.array(plain[key], dtype=float)
-        for key in ("location", "scale", "covariance")
-    }
-    return WeeklyNorm(**{**plain, **arrays})
-
 
 def fit_norm(
     weeks: Floats,
@@ -280,11 +263,11 @@ def fit_norm(
     of the location and a line of the scale. Fewer than four weeks have a line, one week
     a constant. The skewness is estimated from `MIN_SUBJECTS_FOR_SKEWNESS` on.
     """
-    scans = _Scans.of(people)
+    scans = _scans(people)
     subjects = int(scans.person.max()) + 1
     has_skewness = subjects >= MIN_SUBJECTS_FOR_SKEWNESS
     start = np.log(values) if is_positive else values
-    model = _Model.of(
+    model = _model(
         weeks,
         start,
         scans.weights,
@@ -303,7 +286,7 @@ def fit_norm(
     fit[size] = np.log(unit)
     shift = 0.0
     for number in range(ROUNDS):
-        state = model.state(rows, fit, values, scans)
+        state = _state(model, rows, fit, values, scans)
         scans = state.scans
         step = np.linalg.solve(state.information, state.slope)
         shifts = [
@@ -324,13 +307,10 @@ def fit_norm(
         fit += factor * step
     units = np.ones(len(fit))
     units[:size] = unit
-    covariance = model.covariance(rows, state) * np.outer(units, units)
+    covariance = _covariance(model, rows, state) * np.outer(units, units)
     fit *= units
     scale = fit[size : size + model.scale_rows.shape[1]]
-    shared = scans.spread(
-        np.ones((len(values), 1)),
-        2,
-    ).sum()
+    shared = _spread(scans, np.ones((len(values), 1)), 2).sum()
     is_wide = is_positive and np.exp(model.scale_rows @ scale).max() > SKEWED_SCALE
     is_few = not has_skewness
     return WeeklyNorm(
@@ -339,7 +319,7 @@ def fit_norm(
         is_positive,
         fit[:size],
         scale,
-        model.skewness(fit),
+        _skewness(model, fit),
         covariance,
         subjects,
         model.is_spline,
@@ -347,11 +327,6 @@ def fit_norm(
         is_skewed=bool(is_few and (is_wide or _are_skewed(state.terms.z))),
         has_converged=bool(not has_scatter or shift <= POOR_STEP),
     )
-
-
-def _usual_skewness(is_positive: bool) -> float:
-    """Return the mean of the prior of the skewness."""
-    return SKEWNESS if is_positive else SIGNED_SKEWNESS
 
 
 def _are_skewed(z: Floats) -> bool:
@@ -364,11 +339,10 @@ def _are_skewed(z: Floats) -> bool:
 class _Model:
     """The bases of location and scale at the weeks of the values, and the prior.
 
-    `mean` (k,) is that of location, scale and, if it is estimated, skewness;
-    `location_penalty` and `scale_penalty` are the inverses of their covariances.
-    `freedom` are the degrees of freedom of the location; `location` are its first
-    coefficients, by least squares, and `scatter` is the scale of all values around it,
-    on which the prior of the skewness depends.
+    `mean` (k,) is that of location, scale and, if it is estimated, skewness; `penalty`
+    (k, k) is the inverse of their covariance. `location` are its first coefficients, by
+    least squares, and `scatter` is the scale of all values around it, on which the
+    prior of the skewness depends.
     """
 
     first: float
@@ -378,181 +352,176 @@ class _Model:
     has_skewness: bool
     rows: Floats
     scale_rows: Floats
-    location_penalty: Floats
-    scale_penalty: Floats
-    freedom: float
     location: Floats
     scatter: float
+    mean: Floats
+    penalty: Floats
 
-    @classmethod
-    def of(
-        cls,
-        weeks: Floats,
-        values: Floats,
-        weights: Floats,
-        subjects: int,
-        is_positive: bool,
-        has_skewness: bool,
-    ) -> "_Model":
-        first, last = float(weeks.min()), float(weeks.max())
-        count = len(np.unique(weeks))
-        is_spline = count >= MIN_WEEKS_FOR_SPLINES
-        size = scale_size = INTERVALS + 3
-        if not is_spline:
-            size = 3 if count > 3 else min(count, 2)
-            scale_size = min(size, 2)
-        rows = _basis(weeks, first, last, size, is_spline)
-        scale_rows = _basis(weeks, first, last, scale_size, is_spline)
-        freedom = float(size)
-        location_penalty: Floats = np.zeros((size, size))
-        ends = _basis(
-            np.array([first, last]),
-            first,
-            last,
-            scale_size,
-            is_spline,
+
+def _model(
+    weeks: Floats,
+    values: Floats,
+    weights: Floats,
+    subjects: int,
+    is_positive: bool,
+    has_skewness: bool,
+) -> _Model:
+    first, last = float(weeks.min()), float(weeks.max())
+    count = len(np.unique(weeks))
+    is_spline = count >= MIN_WEEKS_FOR_SPLINES
+    size = scale_size = INTERVALS + 3
+    if not is_spline:
+        size = 3 if count > 3 else min(count, 2)
+        scale_size = min(size, 2)
+    rows = _basis(weeks, first, last, size, is_spline)
+    scale_rows = _basis(weeks, first, last, scale_size, is_spline)
+    freedom = float(size)
+    location_penalty: Floats = np.zeros((size, size))
+    ends = _basis(
+        np.array([first, last]),
+        first,
+        last,
+        scale_size,
+        is_spline,
+    )
+    half_change = 0.5 * np.diff(ends, axis=0) / HALF_CHANGE_SD
+    scale_penalty = half_change.T @ half_change
+    normal = (rows.T * weights) @ rows
+    if is_spline:
+        lowest, highest = LOCATION_FREEDOM
+        freedom = lowest + subjects / SUBJECTS_PER_LOCATION
+        freedom = min(freedom, highest, count - 1.0)
+        bending = splines.penalty(first, last, INTERVALS, order=2)
+        location_penalty = bending * splines.strength(
+            normal, bending, freedom, "location of the norm"
         )
-        half_change = 0.5 * np.diff(ends, axis=0) / HALF_CHANGE_SD
-        scale_penalty = half_change.T @ half_change
-        normal = (rows.T * weights) @ rows
-        if is_spline:
-            lowest, highest = LOCATION_FREEDOM
-            freedom = lowest + subjects / SUBJECTS_PER_LOCATION
-            freedom = min(freedom, highest, count - 1.0)
-            bending = splines.penalty(first, last, INTERVALS, order=2)
-            location_penalty = bending * splines.strength(
-                normal, bending, freedom, "location of the norm"
-            )
-            lowest, highest = SCALE_FREEDOM
-            scale_freedom = min(lowest + subjects / SUBJECTS_PER_SCALE, highest)
-            roughness = splines.penalty(first, last, INTERVALS, order=1)
-            strength = splines.strength(
-                normal, roughness, scale_freedom, "scale of the norm"
-            )
-            # the information of an observation on ln S is 2
-            scale_penalty += 2.0 * strength * roughness
-        location = np.linalg.solve(
-            normal + location_penalty, rows.T @ (weights * values)
+        lowest, highest = SCALE_FREEDOM
+        scale_freedom = min(lowest + subjects / SUBJECTS_PER_SCALE, highest)
+        roughness = splines.penalty(first, last, INTERVALS, order=1)
+        strength = splines.strength(
+            normal, roughness, scale_freedom, "scale of the norm"
         )
-        squares = float(weights @ (values - rows @ location) ** 2)
-        scatter = float(np.sqrt(squares / max(subjects - freedom, 1.0)))
-        return cls(
-            first,
-            last,
-            is_spline,
-            is_positive,
-            has_skewness,
-            rows,
-            scale_rows,
-            location_penalty,
-            scale_penalty,
-            freedom,
-            location,
-            max(scatter, MIN_SCATTER),
-        )
+        # the information of an observation on ln S is 2
+        scale_penalty += 2.0 * strength * roughness
+    location = np.linalg.solve(normal + location_penalty, rows.T @ (weights * values))
+    squares = float(weights @ (values - rows @ location) ** 2)
+    scatter = float(np.sqrt(squares / max(subjects - freedom, 1.0)))
+    scatter = max(scatter, MIN_SCATTER)
+    mean = np.zeros(size + scale_size)
+    penalties = [location_penalty, scale_penalty]
+    if has_skewness:
+        sd = SIGNED_SKEWNESS_SD
+        if is_positive:
+            sd = max(SKEWNESS_SD, SKEWNESS_BY_SCALE / scatter)
+        mean = np.append(mean, _usual_skewness(is_positive))
+        penalties.append(np.array([[sd**-2]]))
+    return _Model(
+        first,
+        last,
+        is_spline,
+        is_positive,
+        has_skewness,
+        rows,
+        scale_rows,
+        location,
+        scatter,
+        mean,
+        penalty=block_diag(*penalties),
+    )
 
-    @cached_property
-    def mean(self) -> Floats:
-        count = self.rows.shape[1] + self.scale_rows.shape[1]
-        mean = np.zeros(count + self.has_skewness)
-        mean[count:] = _usual_skewness(self.is_positive)
-        return mean
 
-    @cached_property
-    def penalty(self) -> Floats:
-        parts = [self.location_penalty, self.scale_penalty]
-        if self.has_skewness:
-            sd = SIGNED_SKEWNESS_SD
-            if self.is_positive:
-                sd = max(SKEWNESS_SD, SKEWNESS_BY_SCALE / self.scatter)
-            parts.append(np.array([[sd**-2]]))
-        return block_diag(*parts)
+def _usual_skewness(is_positive: bool) -> float:
+    """Return the mean of the prior of the skewness."""
+    return SKEWNESS if is_positive else SIGNED_SKEWNESS
 
-    def skewness(self, fit: Floats) -> float:
-        """Return the skewness of parameters (k,)."""
-        if self.has_skewness:
-            return float(fit[-1])
-        return _usual_skewness(self.is_positive)
 
-    def state(
-        self,
-        rows: Floats,
-        fit: Floats,
-        values: Floats,
-        scans: "_Scans",
-    ) -> "_State":
-        """Return slope and information of the likelihood of values (n,) at parameters
-        (k,), of which the location has the basis `rows`."""
-        size = rows.shape[1]
-        log_scale = self.scale_rows @ fit[size : size + self.scale_rows.shape[1]]
-        skewness = self.skewness(fit)
-        terms = _terms(
-            rows @ fit[:size],
-            log_scale,
-            skewness,
-            values,
-            self.is_positive,
-        )
-        scans = scans.correlated(terms.z)
-        expected = _expected(log_scale, skewness, self.is_positive)
-        information, remaining = _information(
-            rows, self.scale_rows, expected, scans, self.penalty
-        )
-        count = len(fit)
-        slope = _slope(
-            terms,
-            rows,
-            self.scale_rows,
-            scans.weights,
-            remaining,
-        )[:count]
-        return _State(
-            terms,
-            log_scale,
-            expected,
-            remaining,
-            slope - self.penalty @ (fit - self.mean),
-            information[:count, :count] + self.penalty,
-            scans,
-        )
+def _skewness(model: _Model, fit: Floats) -> float:
+    """Return the skewness of parameters (k,)."""
+    if model.has_skewness:
+        return float(fit[-1])
+    return _usual_skewness(model.is_positive)
 
-    def covariance(self, rows: Floats, state: "_State") -> Floats:
-        """Return the covariance (k, k) of the parameters.
 
-        It is the inverse I⁻¹ of the information or, if subjects have several scans, I⁻¹
-        B I⁻¹ with the covariance B of the slopes, to which the prior adds its penalty.
-        """
-        inverse = np.linalg.inv(state.information)
-        scans = state.scans
-        if scans.correlation is None:
-            return inverse
-        size, count = rows.shape[1], len(inverse)
-        scale_end = size + self.scale_rows.shape[1]
-        # no column if skewness is not estimated
-        ones = np.ones((len(rows), count - scale_end))
-        parts = [
-            (slice(0, size), rows),
-            (slice(size, scale_end), self.scale_rows),
-            (slice(scale_end, count), ones),
-        ]
-        e = state.expected
-        expected = [
-            [e.location, e.location_scale, e.location_skewness],
-            [e.location_scale, e.scale * state.remaining, e.scale_skewness],
-            [e.location_skewness, e.scale_skewness, e.skewness],
-        ]
-        # slopes are about Hermite polynomials of z, of degree 1 for location, 2 for
-        # scale, 1 and 3 for skewness. Those of two scans correlate as the correlation
-        # of z to the power of the degree that they share
-        powers = [[1, 2, 1], [2, 2, 2], [1, 2, 3]]
-        scatter = self.penalty.copy()
-        for i, (here, own) in enumerate(parts):
-            for j, (there, other) in enumerate(parts):
-                each = expected[i][j][:, None] * other
-                scatter[here, there] += own.T @ scans.spread(each, powers[i][j])
-        # each product took the expectation at one of its two scans
-        scatter = 0.5 * (scatter + scatter.T)
-        return inverse @ scatter @ inverse
+def _state(
+    model: _Model,
+    rows: Floats,
+    fit: Floats,
+    values: Floats,
+    scans: "_Scans",
+) -> "_State":
+    """Return slope and information of the likelihood of values (n,) at parameters
+    (k,), of which the location has the basis `rows`."""
+    size = rows.shape[1]
+    log_scale = model.scale_rows @ fit[size : size + model.scale_rows.shape[1]]
+    skewness = _skewness(model, fit)
+    terms = _terms(
+        rows @ fit[:size],
+        log_scale,
+        skewness,
+        values,
+        model.is_positive,
+    )
+    scans = _correlated(scans, terms.z)
+    expected = _expected(log_scale, skewness, model.is_positive)
+    information, remaining = _information(
+        rows, model.scale_rows, expected, scans, model.penalty
+    )
+    count = len(fit)
+    slope = _slope(
+        terms,
+        rows,
+        model.scale_rows,
+        scans.weights,
+        remaining,
+    )[:count]
+    return _State(
+        terms,
+        log_scale,
+        expected,
+        remaining,
+        slope - model.penalty @ (fit - model.mean),
+        information[:count, :count] + model.penalty,
+        scans,
+    )
+
+
+def _covariance(model: _Model, rows: Floats, state: "_State") -> Floats:
+    """Return the covariance (k, k) of the parameters.
+
+    It is the inverse I⁻¹ of the information or, if subjects have several scans, I⁻¹
+    B I⁻¹ with the covariance B of the slopes, to which the prior adds its penalty.
+    """
+    inverse = np.linalg.inv(state.information)
+    scans = state.scans
+    if scans.correlation is None:
+        return inverse
+    size, count = rows.shape[1], len(inverse)
+    scale_end = size + model.scale_rows.shape[1]
+    # no column if skewness is not estimated
+    ones = np.ones((len(rows), count - scale_end))
+    parts = [
+        (slice(0, size), rows),
+        (slice(size, scale_end), model.scale_rows),
+        (slice(scale_end, count), ones),
+    ]
+    e = state.expected
+    expected = [
+        [e.location, e.location_scale, e.location_skewness],
+        [e.location_scale, e.scale * state.remaining, e.scale_skewness],
+        [e.location_skewness, e.scale_skewness, e.skewness],
+    ]
+    # slopes are about Hermite polynomials of z, of degree 1 for location, 2 for
+    # scale, 1 and 3 for skewness. Those of two scans correlate as the correlation
+    # of z to the power of the degree that they share
+    powers = [[1, 2, 1], [2, 2, 2], [1, 2, 3]]
+    scatter = model.penalty.copy()
+    for i, (here, own) in enumerate(parts):
+        for j, (there, other) in enumerate(parts):
+            each = expected[i][j][:, None] * other
+            scatter[here, there] += own.T @ _spread(scans, each, powers[i][j])
+    # each product took the expectation at one of its two scans
+    scatter = 0.5 * (scatter + scatter.T)
+    return inverse @ scatter @ inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -578,50 +547,44 @@ class _Scans:
     weights: Floats
     correlation: float | None
 
-    @classmethod
-    def of(cls, people: ArrayLike) -> "_Scans":
-        _, person, counts = np.unique(
-            np.asarray(people), return_inverse=True, return_counts=True
-        )
-        return cls(
-            person,
-            1.0 / counts[person],
-            1.0 if counts.max() > 1 else None,
-        )
 
-    def correlated(self, z: Floats) -> "_Scans":
-        """Return them with the correlation that z (n,) have."""
-        if self.correlation is None:
-            return self
-        counts, sums = (
-            np.bincount(self.person, values) for values in (np.ones(len(z)), z)
-        )
-        products = sums**2 - np.bincount(self.person, z**2)
-        several = counts > 1
-        mean = np.mean(products[several] / (counts * (counts - 1))[several])
-        return replace(
-            self,
-            correlation=float(
-                np.clip(
-                    mean / (self.weights @ z**2) * len(counts),
-                    0.0,
-                    1.0,
-                )
-            ),
-        )
+def _scans(people: ArrayLike) -> _Scans:
+    _, person, counts = np.unique(
+        np.asarray(people), return_inverse=True, return_counts=True
+    )
+    return _Scans(person, 1.0 / counts[person], 1.0 if counts.max() > 1 else None)
 
-    def spread(self, rows: Floats, power: int = 1) -> Floats:
-        """Return the product (n, k) of rows with the weights, and the powers of the
-        correlations, between scans."""
-        weighted = self.weights[:, None] * rows
-        if self.correlation is None:
-            return weighted
-        both = np.zeros((self.person.max() + 1, rows.shape[1]))
-        np.add.at(both, self.person, weighted)
-        shared = self.correlation**power
-        return self.weights[:, None] * (
-            shared * both[self.person] + (1 - shared) * weighted
-        )
+
+def _correlated(scans: _Scans, z: Floats) -> _Scans:
+    """Return scans with the correlation that z (n,) have."""
+    if scans.correlation is None:
+        return scans
+    counts, sums = (
+        np.bincount(scans.person, values) for values in (np.ones(len(z)), z)
+    )
+    products = sums**2 - np.bincount(scans.person, z**2)
+    several = counts > 1
+    mean = np.mean(products[several] / (counts * (counts - 1))[several])
+    correlation = np.clip(
+        mean / (scans.weights @ z**2) * len(counts),
+        0.0,
+        1.0,
+    )
+    return replace(scans, correlation=float(correlation))
+
+
+def _spread(scans: _Scans, rows: Floats, power: int = 1) -> Floats:
+    """Return the product (n, k) of rows with the weights, and the powers of the
+    correlations, between scans."""
+    weighted = scans.weights[:, None] * rows
+    if scans.correlation is None:
+        return weighted
+    both = np.zeros((scans.person.max() + 1, rows.shape[1]))
+    np.add.at(both, scans.person, weighted)
+    shared = scans.correlation**power
+    return scans.weights[:, None] * (
+        shared * both[scans.person] + (1 - shared) * weighted
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -696,7 +659,7 @@ def _information(
     location = (rows.T * (weights * expected.location)) @ rows
     covariance = np.linalg.inv(location + penalty[:n_location, :n_location])
     scaled_rows = np.sqrt(expected.location)[:, None] * rows
-    spread_rows = scans.spread(scaled_rows)
+    spread_rows = _spread(scans, scaled_rows)
     leverage = np.einsum("ij,ij->i", scaled_rows @ covariance, spread_rows) / weights
     remaining = 1 - np.minimum(leverage, MAX_LEVERAGE)
     scale = (scale_rows.T * (weights * expected.scale * remaining)) @ scale_rows

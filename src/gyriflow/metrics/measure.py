@@ -8,6 +8,7 @@ of `measure_folds` or added by `measure_brain`. Each has a record in
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -38,14 +39,12 @@ from .curvature import (
     RESOLVED_RADII,
     Curvature,
     curvature,
-    curvature_integrals,
-    mean_curvature_quantiles,
+    curvature_metrics,
 )
 from .gyrification import (
     Pieces,
     cap,
     envelope,
-    gyrification_index,
     local_gyrification_index,
     pieces_without_cuts,
     sulcal_depth,
@@ -198,8 +197,9 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     """Return the metrics of folding of one hemisphere, or of both together; vertices
     near cuts are left out.
 
-    Indices are of both hemispheres' areas, each in its own hull; means are over the
-    vertices of both, by area.
+    Indices are of both hemispheres' areas over those of the hulls or envelopes, each in
+    its own: a hull around both would bridge the fissure between them and count it as
+    folding. Means are over the vertices of both, by area.
     """
     meshes = [side.mesh for side in sides]
     areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
@@ -218,25 +218,24 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
             remedy="Lower metrics.curvature_radius_mm.",
         )
 
-    def mean(values: NDArray) -> float:
-        return float(np.average(values, weights=weights))
-
+    mean = partial(np.average, weights=weights)
     depth = np.concatenate([side.maps["sulcal_depth_mm"] for side in sides])
     deep = np.quantile(depth, 0.95, weights=weights, method="inverted_cdf")
+    radius = float(mean(curvature_maps.radius_mm))
+    pial = sum(map(area, meshes))
     return {
-        "gyrification_index": gyrification_index(meshes, [side.hull for side in sides]),
-        "gyrification_index_envelope": gyrification_index(
-            meshes, [side.envelope for side in sides]
-        ),
-        "mean_shape_index": mean(curvature_maps.shape_index),
-        "mean_curvedness": mean(curvature_maps.curvedness),
-        "sulcal_area_share": mean(curvature_maps.shape_index < 0),
-        "curvature_radius": mean(curvature_maps.radius_mm),
-        "curvature_wavelength": RESOLVED_RADII * mean(curvature_maps.radius_mm),
-        "mean_sulcal_depth": mean(depth),
+        "gyrification_index": pial
+        / sum(float(side.hull.areas.sum()) for side in sides),
+        "gyrification_index_envelope": pial
+        / sum(float(side.envelope.areas.sum()) for side in sides),
+        "mean_shape_index": float(mean(curvature_maps.shape_index)),
+        "mean_curvedness": float(mean(curvature_maps.curvedness)),
+        "sulcal_area_share": float(mean(curvature_maps.shape_index < 0)),
+        "curvature_radius": radius,
+        "curvature_wavelength": RESOLVED_RADII * radius,
+        "mean_sulcal_depth": float(mean(depth)),
         "sulcal_depth_95": float(deep),
-        **curvature_integrals(curvature_maps, weights),
-        **mean_curvature_quantiles(curvature_maps, weights),
+        **curvature_metrics(curvature_maps, weights),
     }
 
 
@@ -270,7 +269,14 @@ def thickness_metrics(values: Floats, areas: Floats) -> Metrics:
     }
 
 
-def area_ratio(whole: Metrics, mean_curvature: float) -> Metrics:
+def _folding_and_thickness(
+    sides: Sequence[Folds], thickness: Sequence[Floats]
+) -> Metrics:
+    areas = np.concatenate([vertex_areas(side.mesh) for side in sides])
+    return folding_metrics(sides) | thickness_metrics(np.concatenate(thickness), areas)
+
+
+def _area_ratio(whole: Metrics, mean_curvature: float) -> Metrics:
     """Return the pial area over that of a complete surface, or nothing where cortex or
     thickness is not known.
 
@@ -411,15 +417,8 @@ def measure_brain(
         for name, mesh in meshes.items()
     }
 
-    def folding_and_thickness(names: Sequence[str]) -> Metrics:
-        areas = np.concatenate([vertex_areas(meshes[name]) for name in names])
-        values = np.concatenate([thickness[name] for name in names])
-        return folding_metrics([folds[name] for name in names]) | thickness_metrics(
-            values, areas
-        )
-
-    whole_metrics = size_metrics(whole, meshes.values()) | folding_and_thickness(
-        list(meshes)
+    whole_metrics = size_metrics(whole, meshes.values()) | _folding_and_thickness(
+        list(folds.values()), list(thickness.values())
     )
     volumes = label_volumes_ml or {}
     whole_metrics |= {
@@ -438,13 +437,13 @@ def measure_brain(
             weights=[area_cm2(mesh) for mesh in meshes.values()],
         )
     )
-    metrics = {"whole": whole_metrics | area_ratio(whole_metrics, mean_curvature)}
+    metrics = {"whole": whole_metrics | _area_ratio(whole_metrics, mean_curvature)}
     maps = {}
     for name, mesh in meshes.items():
         found = spectra[name]
         metrics[name] = (
             size_metrics(mesh)
-            | folding_and_thickness([name])
+            | _folding_and_thickness([folds[name]], [thickness[name]])
             | _spectrum_metrics(found, area(mesh))
         )
         maps[name] = dict(folds[name].maps)

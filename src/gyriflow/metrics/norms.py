@@ -3,7 +3,7 @@ scores of brains against them."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..geometry.triangles import Floats
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
 from ..settings.terms import OBSERVED, SIDES, SPREAD_UNKNOWN, Side, min_norm_subjects
-from .lms import WeeklyNorm, fit_norm, norm_from_plain
+from .lms import WeeklyNorm, fit_norm
 from .tables import BRAIN
 
 QUANTILES = {
@@ -105,22 +105,9 @@ class LabelledBrain:
     volumes: Mapping[int, float]
 
 
-def published_scores(
+def _published_scores(
     brain: LabelledBrain, norms: Mapping[str, PublishedNorm]
 ) -> pd.DataFrame:
-    """Return the scores of the volumes of a brain's structures against published norms.
-
-    With another label scheme than the norm's, a structure is the scheme's tissue that
-    is closest to it, such as the cortex. A structure without voxels, or without labels
-    in the scheme, is left out.
-
-    Columns subject, structure, week, value, unit, expected, sd, z = (value −
-    expected)/sd, centile (of the normal distribution, 0 to 100), brains (in the norm;
-    NaN if its source does not give their number), flag ("ok"; "other labels": the norm
-    was measured with another label scheme; "outside the norm's weeks"; "one hemisphere"
-    if the brain lacks a hemisphere of the norm). Expected, z and centile are NaN with
-    the last two flags.
-    """
     rows = []
     for name, norm in norms.items():
         is_same = norm.scheme == brain.scheme.name
@@ -180,9 +167,20 @@ def published_scores(
 def volume_tables(
     brains: Sequence[LabelledBrain], norms: Mapping[str, PublishedNorm]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return the volumes of all labels of brains, and their `published_scores`.
+    """Return the volumes of all labels of brains, and the scores of their structures'
+    volumes against published norms.
 
-    Columns subject, run ("observed"), week, label, tissue, volume_mL.
+    With another label scheme than the norm's, a structure is the scheme's tissue that
+    is closest to it, such as the cortex. A structure without voxels, or without labels
+    in the scheme, is left out.
+
+    Columns of volumes: subject, run ("observed"), week, label, tissue, volume_mL; of
+    scores: subject, structure, week, value, unit, expected, sd, z = (value −
+    expected)/sd, centile (of the normal distribution, 0 to 100), brains (in the norm;
+    NaN if its source does not give their number), flag ("ok"; "other labels": the norm
+    was measured with another label scheme; "outside the norm's weeks"; "one hemisphere"
+    if the brain lacks a hemisphere of the norm). Expected, z and centile are NaN with
+    the last two flags.
     """
     rows = [
         (
@@ -197,7 +195,7 @@ def volume_tables(
         for label, volume in brain.volumes.items()
     ]
     scores = pd.concat(
-        [published_scores(brain, norms) for brain in brains], ignore_index=True
+        [_published_scores(brain, norms) for brain in brains], ignore_index=True
     )
     return pd.DataFrame(
         rows,
@@ -239,18 +237,12 @@ class CohortNorms:
     @property
     def plain(self) -> dict[str, Any]:
         """The norms as plain values for JSON."""
-        keys = ("hemisphere", "metric", "unit")
-        rows = [
-            dict(
-                zip(
-                    keys,
-                    (*name, unit),
-                    strict=True,
-                )
-            )
-            | norm.plain
-            for name, (unit, norm) in self.norms.items()
-        ]
+        rows = []
+        for (hemisphere, metric), (unit, norm) in self.norms.items():
+            row = {"hemisphere": hemisphere, "metric": metric, "unit": unit}
+            for key, value in asdict(norm).items():
+                row[key] = np.asarray(value).tolist()
+            rows.append(row)
         subjects = max((norm.subjects for _, norm in self.norms.values()), default=0)
         method = "LMS (Cole and Green 1992); sex and site are ignored"
         facts = {
@@ -263,14 +255,14 @@ class CohortNorms:
 
 def cohort_from_plain(content: Mapping[str, Any]) -> CohortNorms:
     """Return the norms that `CohortNorms.plain` gives as plain values."""
-    rows = [dict(row) for row in content["norms"]]
-    norms = {
-        (row.pop("hemisphere"), row.pop("metric")): (
-            row.pop("unit"),
-            norm_from_plain(row),
-        )
-        for row in rows
-    }
+    norms = {}
+    for row in content["norms"]:
+        fields = dict(row)
+        name = fields.pop("hemisphere"), fields.pop("metric")
+        unit = fields.pop("unit")
+        for key in ("location", "scale", "covariance"):
+            fields[key] = np.array(fields[key], dtype=float)
+        norms[name] = unit, WeeklyNorm(**fields)
     return CohortNorms(norms, content["individuals"], content["made_with"])
 
 

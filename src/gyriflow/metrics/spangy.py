@@ -145,53 +145,46 @@ class Basis:
 
     @cached_property
     def _energy_of_places(self) -> sparse.csr_matrix:
+        """The (m, m) energy of maps on the copy, in mm²."""
         return sparse.csr_matrix(self.places.T @ self.energy @ self.places)
 
-    def coefficients(self, energy: Floats) -> Floats:
-        """Return the (k,) coefficients of the fit of a map f by the orthonormal
-        functions, from its (n,) products with `energy`."""
-        products = self._products(self.places.T @ energy[:, None])
-        return self._by_inverse_root(products)[:, 0]
 
-    def values(self, coefficients: Floats) -> Floats:
-        """Return (n, c) values on the surface of sums of the orthonormal functions,
-        from (k, c) coefficients."""
-        return self.places @ self._sums(self._by_inverse_root(coefficients))
+def _sums(basis: Basis, coefficients: Floats) -> Floats:
+    """Return the (m, c) sums of the functions with (k, c) coefficients, in the
+    precision of the functions: a copy in another would be as large."""
+    functions = basis.functions
+    return (functions @ coefficients.astype(functions.dtype)).astype(float)
 
-    def _sums(self, coefficients: Floats) -> Floats:
-        """Return the (m, c) sums of the functions with (k, c) coefficients, in the
-        precision of the functions: a copy in another would be as large."""
-        return (self.functions @ coefficients.astype(self.functions.dtype)).astype(
-            float
-        )
 
-    def _products(self, values: Floats) -> Floats:
-        """Return the (k, c) products of the functions with (m, c) values, in their
-        precision."""
-        return (self.functions.T @ values.astype(self.functions.dtype)).astype(float)
+def _products(basis: Basis, values: Floats) -> Floats:
+    """Return the (k, c) products of the functions with (m, c) values, in their
+    precision."""
+    functions = basis.functions
+    return (functions.T @ values.astype(functions.dtype)).astype(float)
 
-    def _by_inverse_root(self, vectors: Floats) -> Floats:
-        """Return S^(-1/2) V for (k, c) vectors V, by the binomial series of (1 − X) for
-        X = I − S.
 
-        It converges as the powers of X, whose norm is below 0.6: that is reached where
-        S is the lumped mass of modes that are orthonormal by the mean mass.
-        """
-        found = term = vectors
-        size = np.linalg.norm(vectors)
-        for number in range(1, MAX_TERMS + 1):
-            values = self._sums(term)
-            change = term - self._products(self._energy_of_places @ values)
-            term = (1.0 - 0.5 / number) * change
-            found = found + term
-            if np.linalg.norm(term) <= SERIES_TOL * size:
-                return found
-        raise SolverError(
-            "the modes are not orthonormal on the surface",
-            found=f"{np.linalg.norm(term) / size:.2g} after {MAX_TERMS} terms",
-            expected=f"at most {SERIES_TOL:g}",
-            remedy="Remesh the surface.",
-        )
+def _by_inverse_root(basis: Basis, vectors: Floats) -> Floats:
+    """Return S^(-1/2) V for (k, c) vectors V, by the binomial series of (1 − X) for X =
+    I − S.
+
+    It converges as the powers of X, whose norm is below 0.6: that is reached where S is
+    the lumped mass of modes that are orthonormal by the mean mass.
+    """
+    found = term = vectors
+    size = np.linalg.norm(vectors)
+    for number in range(1, MAX_TERMS + 1):
+        values = _sums(basis, term)
+        change = term - _products(basis, basis._energy_of_places @ values)
+        term = (1.0 - 0.5 / number) * change
+        found = found + term
+        if np.linalg.norm(term) <= SERIES_TOL * size:
+            return found
+    raise SolverError(
+        "the modes are not orthonormal on the surface",
+        found=f"{np.linalg.norm(term) / size:.2g} after {MAX_TERMS} terms",
+        expected=f"at most {SERIES_TOL:g}",
+        remedy="Remesh the surface.",
+    )
 
 
 def spectral_basis(
@@ -260,7 +253,8 @@ def spectrum(
     """
     band = basis.band
     energy = basis.energy @ proxy
-    coefficients = basis.coefficients(energy)
+    products = _products(basis, basis.places.T @ energy[:, None])
+    coefficients = _by_inverse_root(basis, products)[:, 0]
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(
         len(proxy),
@@ -270,7 +264,8 @@ def spectrum(
     whole = bands.loc[is_whole, "band"].to_numpy()
     if len(whole):
         is_in_band = band[:, None] == whole
-        at_vertices = basis.values(is_in_band * coefficients[:, None])
+        parts = _by_inverse_root(basis, is_in_band * coefficients[:, None])
+        at_vertices = basis.places @ _sums(basis, parts)
         largest = whole[at_vertices.argmax(axis=1)]
         smallest = whole[at_vertices.argmin(axis=1)]
         dominant = np.where(proxy > 0, largest, -smallest)
@@ -349,16 +344,17 @@ class _Profile:
     resolved: NDArray[np.bool_]
     is_open: bool
 
-    def cumulative(self, octaves: Floats, end: float) -> Floats:
-        """Return the share of the power of waves longer than 2^octaves mm, of those
-        longer than 2^end."""
-        edges = self.longest - np.arange(len(self.powers) + 1) / PARTS
-        sums = np.append(0.0, np.cumsum(self.powers))
-        ascending = edges[::-1]
-        sums_to_edges = sums[::-1]
-        power = np.interp(octaves, ascending, sums_to_edges)
-        whole = np.interp(end, ascending, sums_to_edges)
-        return power / whole
+
+def _cumulative(profile: _Profile, octaves: Floats, end: float) -> Floats:
+    """Return the share of the power of waves longer than 2^octaves mm, of those longer
+    than 2^end."""
+    edges = profile.longest - np.arange(len(profile.powers) + 1) / PARTS
+    sums = np.append(0.0, np.cumsum(profile.powers))
+    ascending = edges[::-1]
+    sums_to_edges = sums[::-1]
+    power = np.interp(octaves, ascending, sums_to_edges)
+    whole = np.interp(end, ascending, sums_to_edges)
+    return power / whole
 
 
 def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
@@ -440,7 +436,7 @@ def _distances(a: _Profile, b: _Profile) -> list[tuple[str, float, str, str]]:
             flag = OPEN_AND_CLOSED if a.is_open != b.is_open else "ok"
             end = longest - last
             octaves = np.linspace(end, longest, 4 * PARTS * last + 1)
-            difference = a.cumulative(octaves, end) - b.cumulative(octaves, end)
+            difference = _cumulative(a, octaves, end) - _cumulative(b, octaves, end)
             value = float(np.trapezoid(np.abs(difference), octaves))
         name = "spectral_distance_B4"
         if last > FOLD_BANDS[0]:

@@ -205,6 +205,8 @@ def test_the_fourth_ventricle_is_outside_and_the_third_is_not():
     middle = (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)
     below = z[np.isin(labels, CEREBRUM) & middle].min()
     out = outside_ventricles(made, ATLAS)
+    found = read_cerebrum(made, affine, ATLAS).report["outside"]
+    assert found["ventricles_mL"] == pytest.approx(out.sum() * 1.2**3 / 1000)
     assert out[added & (z < below - 2.0)].all()
     assert not out[z > below + 5.0].any()
 

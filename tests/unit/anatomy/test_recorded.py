@@ -31,7 +31,6 @@ from gyriflow.geometry.triangles import (
     merged,
     submesh,
     transformed,
-    vertex_areas,
     vertex_normals,
 )
 from gyriflow.io.yaml_files import SCHEMES
@@ -83,7 +82,6 @@ def test_numbers_of_label_volumes(recorded):
             "schemes": schemes,
             "counts": layout.count,
             "contacts": layout.contact,
-            "at surface": labels.require_cortex_outside(volume, ATLAS),
             "outside ventricles": labels.outside_ventricles(volume, ATLAS),
             "unlabelled": labels.unlabelled_ventricles(
                 np.where(np.isin(volume, ATLAS.ventricles), 0, volume), ATLAS, affine
@@ -268,21 +266,15 @@ def test_numbers_of_thickness(recorded):
     volume, affine = brain()
     mask, core, _, grid = field()
     plain = Pose()
-    found = thickness.thickness_from_labels(
-        thickness.read_cortex(volume, affine, ATLAS), surface(), plain
-    )
+    cortex = thickness.cortex_of(labels.read_cerebrum(volume, affine, ATLAS), ATLAS)
+    found = thickness.thickness_from_labels(cortex, surface(), plain)
     inside = shapes.inner(surface(), 1.5)
     x = surface().vertices[:, 0]
-    areas = vertex_areas(surface())
     recorded(
         {
             "of labels": found,
             "border": thickness.border(core, grid),
             "voxels": thickness.Cortex(mask, mask & ~core, grid).voxels_through,
-            "curvature": thickness.mean_curvature(surface(), x > np.median(x)),
-            "summary": thickness.summary(
-                found.values_mm, found.is_measured & (x < x.mean()), areas
-            ),
             "white": answer_of(
                 thickness.thickness_from_white,
                 surface(),

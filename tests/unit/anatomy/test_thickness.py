@@ -9,10 +9,8 @@ from gyriflow.anatomy.extraction import smooth_mask
 from gyriflow.anatomy.labels import read_cerebrum
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.anatomy.thickness import (
-    FISSURE_REACH_MM,
     Cortex,
     cortex_of,
-    cortical_thickness,
     thickness_from_labels,
     thickness_from_white,
 )
@@ -45,7 +43,7 @@ def test_a_layer_between_concentric_spheres_is_measured_to_a_hundredth_on_averag
 ):
     pial, depth, inside, affine = ball
     cortex = Cortex(inside, inside & (depth < thickness_mm), affine)
-    found = cortical_thickness(pial, cortex)
+    found = thickness_from_labels(cortex, pial, Pose())
     assert found.is_measured.mean() > 0.99
     error = found.values_mm[found.is_measured] - thickness_mm
     assert abs(error.mean()) < 0.02
@@ -59,7 +57,7 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_reported(ba
     pial, depth, inside, affine = ball
     x = affine[0, 3] + 0.8 * np.arange(inside.shape[0])
     cortex = inside & (depth < 2.4) & (x < 10)[:, None, None]
-    found = cortical_thickness(pial, Cortex(inside, cortex, affine))
+    found = thickness_from_labels(Cortex(inside, cortex, affine), pial, Pose())
     # a cap of a quarter of the sphere's area is bare
     assert found.report["measured_area_share"] == pytest.approx(0.75, abs=0.03)
     bare = pial.vertices[:, 0] > 12
@@ -122,15 +120,14 @@ def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
     # the voxels go on beyond the surface, as where a fissure was opened
     larger = np.ones_like(inside)
     larger[:3] = False
-    cortex = larger & (depth < 3.0)
-    with pytest.raises(InputError, check=Facts(cortex.sum())):
-        cortical_thickness(pial, Cortex(larger, cortex, affine))
+    cortex = Cortex(larger, larger & (depth < 3.0), affine)
+    with pytest.raises(InputError, check=Facts(cortex.mask.sum())):
+        thickness_from_labels(cortex, pial, Pose())
     # but for opened sulci, on both sides of the fissure
-    x = pial.vertices[:, 0] - 1.5
-    is_beyond = np.abs(x) > FISSURE_REACH_MM
-    found = cortical_thickness(pial, Cortex(larger, cortex, affine), is_beyond)
-    assert found.is_measured[np.abs(x) > 3.5].all()
-    assert not found.is_measured[np.abs(x) < 2.5].any()
+    found = thickness_from_labels(cortex, pial, Pose(), fissure_x_mm=1.5)
+    from_fissure = np.abs(pial.vertices[:, 0] - 1.5)
+    assert found.is_measured[from_fissure > 3.5].all()
+    assert not found.is_measured[from_fissure < 2.5].any()
 
 
 PIAL = sphere(10.0, 4, (40.0, 5.0, 0.0))

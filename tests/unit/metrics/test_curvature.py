@@ -20,7 +20,7 @@ from gyriflow.geometry.triangles import (
 from gyriflow.metrics.curvature import (
     Curvature,
     curvature,
-    curvature_integrals,
+    curvature_metrics,
     kept_curvature,
 )
 
@@ -119,6 +119,6 @@ def test_a_cylinder_folds_but_has_no_intrinsic_curvature() -> None:
         pair = np.sort([np.full(8, sign / 4.0), np.zeros(8)], axis=0)
         bend = Curvature(pair[1], pair[0], np.ones(8, bool), np.ones(8))
         areas = np.full(8, 2 * np.pi * 4.0 * 10.0 / 8)
-        found = curvature_integrals(bend, areas)
+        found = curvature_metrics(bend, areas)
         assert found["folding_index"] == pytest.approx(10.0 / 8.0)
         assert found["intrinsic_curvature_index"] == 0.0

@@ -29,7 +29,6 @@ from gyriflow.geometry.triangles import (
 from gyriflow.growth.carrying import maps_on_template
 from gyriflow.metrics.measure import (
     BrainMetrics,
-    area_ratio,
     measure_brain,
     measure_white,
     thickness_metrics,
@@ -104,14 +103,6 @@ def test_only_the_whole_has_volumes_of_tissues(apart: BrainMetrics) -> None:
         ["whole", "volume_tissue", 90.0],
         ["whole", "volume_cortex", 20.0],
     ]
-
-
-def test_the_pial_area_is_compared_with_that_of_a_sheet_of_the_cortex() -> None:
-    sizes = {"area": 300.0, "volume_cortex": 80.0}
-    assert area_ratio(sizes, 0.125) == {}
-    sizes["mean_thickness"] = 2.0
-    assert area_ratio(sizes, 0.0) == {"area_ratio": pytest.approx(0.75)}
-    assert area_ratio(sizes, 0.125) == {"area_ratio": pytest.approx(0.6)}
 
 
 def test_neither_the_fissure_nor_a_cut_is_a_sulcus(
