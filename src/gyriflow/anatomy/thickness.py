@@ -59,8 +59,8 @@ MIN_AREA_RATIO = 0.95
 HIDDEN = "a part of it is hidden in fused sulci: area and gyrification are lower bounds"
 # vertices of both borders at which the number of voxels through the cortex is measured
 N_SAMPLES = 8000
-# how often what this Gaussian has taken away is added again; a third time brings back
-# more of the terraces than of the folds
+# how often what the Gaussian of `smooth_mask` takes away is added again; a third time
+# brings back more of the terraces than of the folds
 N_TWICINGS = 2
 # offset of a surface by which its mean curvature is measured
 OFFSET_MM = 0.05
@@ -149,6 +149,8 @@ def _cortical_thickness(
     cortex: Cortex,
     beyond_fissure: Mask | None,
 ) -> Thickness:
+    """Return the thickness on a pial surface in the coordinates of the cortex; in sulci
+    at the vertices `beyond_fissure` (n,) only."""
     values = layer_thickness(pial, cortex._inner_border)
     points, affine = pial.vertices, cortex.affine
     size = voxel_size(affine)
