@@ -305,18 +305,6 @@ def test_a_volume_that_ends_at_the_cerebrum_does_not_cut_it():
             assert border_share(np.isin(cut, CEREBRUM)) > REPORTED_LOSS
 
 
-@pytest.mark.parametrize(("left", "right"), [(10, 0), (0, 11), (10, 10)])
-def test_numbers_that_occur_in_a_scheme_of_sides_by_accident_contradict_it(
-    feta, left, right
-):
-    labels, _ = feta
-    is_left = np.indices(labels.shape)[0] < np.argwhere(labels)[:, 0].mean()
-    shift = np.where(is_left, left, right)
-    layout = layout_of(labels + (labels > 0) * shift)
-    found = scheme_contradictions(layout, SCHEMES["multi-bounti-43"])
-    assert "left and right would be mixed" in " ".join(found)
-
-
 @pytest.mark.parametrize(
     ("missing", "is_told"),
     [((), False), ((4, 6, 8, 17), False), ((3,), True), ((6,), True)],

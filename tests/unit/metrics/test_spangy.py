@@ -77,9 +77,6 @@ def test_a_sphere_has_its_degrees_in_the_bands() -> None:
         # of 642 vertices, fewer than twice the modes up to B5
         ("B5", 3, 642 // 2),
         (300, 3, 300),
-        # λ = l(l + 1)/R², λ1 = 2/R²: below 2·4⁴/R² lie l = 0 to 22, each 2l + 1 times,
-        # the last by 1 %
-        pytest.param("B4", 5, 23**2, marks=pytest.mark.slow),
     ],
 )
 def test_how_many_modes_of_a_sphere_are_taken(
