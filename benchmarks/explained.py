@@ -59,7 +59,6 @@ from gyriflow.geometry.tetrahedra import (
 from gyriflow.geometry.triangles import (
     Floats,
     TriangleMesh,
-    area,
     area_cm2,
     convex_hull,
     signed_volume,
@@ -72,7 +71,7 @@ from gyriflow.io.frames import read_positions, read_weeks
 from gyriflow.io.registrations import read_correspondence, read_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.metrics.gyrification import pieces_without_cuts
+from gyriflow.metrics.gyrification import gyrification_index, pieces_without_cuts
 from gyriflow.settings.terms import SIDES
 from gyriflow.study.paths import FOLDING, MESH, PIAL, REGISTERED, TARGETS
 
@@ -154,8 +153,7 @@ def explained_rows(
         for name, (surface, halves) in sides.items():
             hulls = [pieces_without_cuts(convex_hull(half), half) for half in halves]
             row = {"week": week, "shape": name, "area_cm2": area_cm2(surface)}
-            hull_mm2 = sum(float(hull.areas.sum()) for hull in hulls)
-            row |= {"gyrification_index": sum(map(area, halves)) / hull_mm2}
+            row |= {"gyrification_index": gyrification_index(halves, hulls)}
             row |= {"distance_mm": distance_mm(surface, observed), "r_shape_index": 1.0}
             if surface is not observed:
                 row["r_shape_index"] = r_shape_index(surface, observed, folds)

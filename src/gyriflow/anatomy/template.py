@@ -58,7 +58,7 @@ class PointCloud:
     size_mm: float
 
     @cached_property
-    def tree(self) -> cKDTree:
+    def _tree(self) -> cKDTree:
         return cKDTree(_features(self.points, self.normals))
 
     def mirrored(self) -> "PointCloud":
@@ -212,7 +212,7 @@ def _descend(
     def planes(rotation: Floats, shift: Floats) -> Planes:
         moved = points @ rotation.T + shift
         facing = normals @ rotation.T
-        _, nearest = target.tree.query(_features(moved, facing))
+        _, nearest = target._tree.query(_features(moved, facing))
         target_normals = target.normals[nearest]
         plane = unit(target_normals + facing)
         distances = np.einsum(
@@ -227,11 +227,11 @@ def _descend(
     rotation, shift = alignment.follow_planes(
         rotation, np.zeros(3) if shift is None else shift, planes, rounds, _is_converged
     )
-    forward, _ = target.tree.query(
+    forward, _ = target._tree.query(
         _features(points @ rotation.T + shift, normals @ rotation.T)
     )
     target_points, facing = target.points[::every], target.normals[::every]
-    backward, _ = shape.tree.query(
+    backward, _ = shape._tree.query(
         _features((target_points - shift) @ rotation, facing @ rotation)
     )
     squares = [

@@ -13,6 +13,7 @@ from ..geometry.remeshing import from_meshlab, in_meshlab, pymeshlab
 from ..geometry.triangles import (
     Floats,
     TriangleMesh,
+    area,
     connected,
     corners,
     face_areas,
@@ -178,6 +179,16 @@ def _split_to_size(mesh: TriangleMesh, length_mm: float) -> TriangleMesh:
     pieces = np.concatenate(parts)
     faces = np.arange(3 * len(pieces)).reshape(-1, 3)
     return TriangleMesh(pieces.reshape(-1, 3), faces)
+
+
+def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> float:
+    """Return the area of surfaces over that of the hulls or envelopes around them, cuts
+    left out of both.
+
+    The index of a brain is that of its two hemispheres, each in its own hull: a hull
+    around both would bridge the fissure between them and count it as folding.
+    """
+    return sum(map(area, meshes)) / sum(float(pieces.areas.sum()) for pieces in around)
 
 
 def local_gyrification_index(mesh: TriangleMesh, around: Pieces) -> Floats:

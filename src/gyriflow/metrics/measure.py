@@ -45,6 +45,7 @@ from .gyrification import (
     Pieces,
     cap,
     envelope,
+    gyrification_index,
     local_gyrification_index,
     pieces_without_cuts,
     sulcal_depth,
@@ -130,21 +131,12 @@ def surface_spectra(
 ) -> pd.DataFrame:
     """Return the spectra of the hemispheres of a brain, as in
     `BrainMetrics.spectra`."""
-    meshes = {
-        name: mesh
-        for name, mesh in (("left", left), ("right", right))
-        if mesh is not None
-    }
-    maps = {
-        name: curvature(mesh, radius_mm=curvature_radius_mm)
-        for name, mesh in meshes.items()
-    }
-    return _band_table(
-        {
-            name: hemisphere_spectra(mesh, maps[name], spangy_modes, spangy_mass)
-            for name, mesh in meshes.items()
-        }
-    )
+    spectra = {}
+    for name, mesh in (("left", left), ("right", right)):
+        if mesh is not None:
+            fitted = curvature(mesh, radius_mm=curvature_radius_mm)
+            spectra[name] = hemisphere_spectra(mesh, fitted, spangy_modes, spangy_mass)
+    return _band_table(spectra)
 
 
 def _band_table(spectra: Mapping[str, Mapping[str, Spectrum]]) -> pd.DataFrame:
@@ -197,9 +189,8 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     """Return the metrics of folding of one hemisphere, or of both together; vertices
     near cuts are left out.
 
-    Indices are of both hemispheres' areas over those of the hulls or envelopes, each in
-    its own: a hull around both would bridge the fissure between them and count it as
-    folding. Means are over the vertices of both, by area.
+    Indices are of both hemispheres' areas, each in its own hull; means are over the
+    vertices of both, by area.
     """
     meshes = [side.mesh for side in sides]
     areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
@@ -222,12 +213,11 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     depth = np.concatenate([side.maps["sulcal_depth_mm"] for side in sides])
     deep = np.quantile(depth, 0.95, weights=weights, method="inverted_cdf")
     radius = float(mean(curvature_maps.radius_mm))
-    pial = sum(map(area, meshes))
     return {
-        "gyrification_index": pial
-        / sum(float(side.hull.areas.sum()) for side in sides),
-        "gyrification_index_envelope": pial
-        / sum(float(side.envelope.areas.sum()) for side in sides),
+        "gyrification_index": gyrification_index(meshes, [side.hull for side in sides]),
+        "gyrification_index_envelope": gyrification_index(
+            meshes, [side.envelope for side in sides]
+        ),
         "mean_shape_index": float(mean(curvature_maps.shape_index)),
         "mean_curvedness": float(mean(curvature_maps.curvedness)),
         "sulcal_area_share": float(mean(curvature_maps.shape_index < 0)),

@@ -303,41 +303,23 @@ def region_metrics(
                 expected=expected,
             )
         areas, total = vertex_areas(mesh), area(mesh)
-        reliable = np.asarray(
-            maps[side].get(
-                "reliable",
-                np.ones(len(label)),
-            ),
-            dtype=bool,
-        )
+        everywhere = np.ones(len(label))
+        reliable = np.asarray(maps[side].get("reliable", everywhere), dtype=bool)
         for number, name in names.items():
             inside = label == number
             covered = float(areas[inside].sum())
             rows.append((side, name, "area", covered * CM2_PER_MM2, "cm2"))
             rows.append((side, name, "area_share", covered / total, "1"))
             for key, vertex_values in maps[side].items():
-                if VERTEX_MAPS[key].is_averaged:
-                    values = np.asarray(vertex_values, dtype=float)
-                    used = inside & np.isfinite(values) & reliable
-                    mean = (
-                        float(
-                            np.average(
-                                values[used],
-                                weights=areas[used],
-                            )
-                        )
-                        if areas[used].any()
-                        else np.nan
-                    )
-                    rows.append(
-                        (
-                            side,
-                            name,
-                            VERTEX_MAPS[key].mean_name,
-                            mean,
-                            VERTEX_MAPS[key].unit,
-                        )
-                    )
+                record = VERTEX_MAPS[key]
+                if not record.is_averaged:
+                    continue
+                values = np.asarray(vertex_values, dtype=float)
+                used = inside & np.isfinite(values) & reliable
+                mean = np.nan
+                if areas[used].any():
+                    mean = float(np.average(values[used], weights=areas[used]))
+                rows.append((side, name, record.mean_name, mean, record.unit))
     return pd.DataFrame(
         rows, columns=["hemisphere", "region", "metric", "value", "unit"]
     )

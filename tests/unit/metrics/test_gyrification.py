@@ -17,13 +17,14 @@ from gyriflow.geometry.triangles import (
 from gyriflow.metrics.gyrification import (
     cap,
     envelope,
+    gyrification_index,
     pieces_without_cuts,
     sulcal_depth,
 )
 
 
 def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
-    return area(mesh) / pieces_without_cuts(around, mesh).areas.sum()
+    return gyrification_index([mesh], [pieces_without_cuts(around, mesh)])
 
 
 def dented(depth: float, width: float) -> TriangleMesh:

@@ -109,6 +109,7 @@ def test_numbers_of_curvature_and_gyrification(recorded, sides):
             "cap": capped,
             "depth": gyrification.sulcal_depth(mesh, gyrification.envelope(capped)),
             "area of pieces": around.areas.sum(),
+            "index of gyrification": gyrification.gyrification_index([mesh], [around]),
             "local": gyrification.local_gyrification_index(mesh, around),
         },
         rtol=1e-3,
