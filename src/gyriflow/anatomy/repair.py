@@ -555,7 +555,8 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
     # selected
     n_faces = len(mesh.faces)
     document.compute_selection_by_condition_per_face(condselect=f"fi >= {n_faces}")
-    length = remeshing.pymeshlab.PureValue(triangles.mean_length(mesh.vertices, rims))
+    mean_mm = triangles.edge_lengths(mesh.vertices, rims).mean()
+    length = remeshing.pymeshlab.PureValue(float(mean_mm))
     document.meshing_isotropic_explicit_remeshing(
         iterations=remeshing.REMESHING_ROUNDS,
         targetlen=length,

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t
 
-from ..geometry.alignment import rigid_fit
-from ..geometry.deformations import transform_points
+from ..geometry.alignment import align_points
 from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
 from ..quantities import Shown, metrics_shown
 
@@ -51,18 +50,18 @@ class ErrorInTests:
     is_beyond: bool
 
 
-def log_value(metric: str, value: Any) -> Any:
+def _log_value(metric: str, value: Any) -> Any:
     """Return the logarithm of a metric, whose differences are errors; for `FOLDING`
     that of the folding."""
     return np.log(value - 1 + SMOOTH if metric == FOLDING else value)
 
 
-def from_log(metric: str, value: Any) -> Any:
-    """Return the metric of a logarithm of `log_value`."""
+def _from_log(metric: str, value: Any) -> Any:
+    """Return the metric of a logarithm of `_log_value`."""
     return np.exp(value) + (1 - SMOOTH if metric == FOLDING else 0)
 
 
-def log_errors(tests: Sequence[Mapping[str, Any]], metric: str) -> pd.DataFrame:
+def _log_errors(tests: Sequence[Mapping[str, Any]], metric: str) -> pd.DataFrame:
     """Return the errors of runs in tests with the default protocol: columns start,
     week, horizon, error.
 
@@ -91,13 +90,13 @@ def log_errors(tests: Sequence[Mapping[str, Any]], metric: str) -> pd.DataFrame:
     )
 
 
-def error_in_tests(
+def _error_in_tests(
     errors: pd.DataFrame,
     week: float,
     horizon: float,
 ) -> ErrorInTests | None:
     """Return the tested error of a prediction of a week over a horizon, from
-    `log_errors`; None without tests.
+    `_log_errors`; None without tests.
 
     The tests that count are those of this week and of earlier ones, over this horizon
     and shorter ones, or over the shortest horizon that a week was tested with; weeks
@@ -134,7 +133,7 @@ def error_in_tests(
     )
 
 
-def error_words(metric: str, tested: ErrorInTests) -> str:
+def _error_words(metric: str, tested: ErrorInTests) -> str:
     """Describe a tested error, such as "largest error in 6 tests of 2 start brains: −10
     to +11 %"."""
     low = _percent(-tested.largest)
@@ -158,7 +157,7 @@ def _percent(error: float) -> str:
     return f"{100 * np.expm1(error):+.0f}".replace("-", "−")
 
 
-def atlas_advantage(
+def _atlas_advantage(
     tests: Sequence[Mapping[str, Any]], horizon: float
 ) -> tuple[float, float, float] | None:
     """Return by how much the atlas' own brain was nearer in tests than runs: mean r of
@@ -204,10 +203,10 @@ def prediction_facts(
     """
     horizon, errors = week - start_week, {}
     for metric in QUANTITIES:
-        found = error_in_tests(log_errors(tests, metric), week, horizon)
-        errors[metric] = "not tested" if found is None else error_words(metric, found)
+        found = _error_in_tests(_log_errors(tests, metric), week, horizon)
+        errors[metric] = "not tested" if found is None else _error_words(metric, found)
     advantage = ""
-    if better := atlas_advantage(tests, horizon):
+    if better := _atlas_advantage(tests, horizon):
         tested, run, atlas = better
         advantage = (
             f"In tests over {tested:g} weeks the atlas' own brain was more like the"
@@ -236,7 +235,7 @@ UNTESTED = ErrorInTests(
 """The intervals of a run without tests are those of its members."""
 
 
-def spread_of_members(values: Floats, level: float) -> float:
+def _spread_of_members(values: Floats, level: float) -> float:
     """Return half the width of the two-sided prediction interval for one further value
     of a normal sample (n,).
 
@@ -270,8 +269,8 @@ def interval_table(
 
     Columns week, metric, unit, run (its value), members (number of values; one that did
     not reach a week has none), mean, sd (NaN for one), tests, tested_starts,
-    largest_error, bias (fractions, of `error_in_tests`; NaN without tests), low, high,
-    observed_value (NaN without a brain) and contains_observed.
+    largest_error, bias (fractions; NaN without tests), low, high, observed_value (NaN
+    without a brain) and contains_observed.
     """
     keys, names = ["week", "metric"], metrics_shown(Shown.INTERVALS)
     own, varied, brains = (
@@ -281,15 +280,15 @@ def interval_table(
     rows = []
     start = own["week"].min()
     for metric, table in varied.groupby("metric"):
-        errors = log_errors(tests, str(metric))
+        errors = _log_errors(tests, str(metric))
         widest = 0.0
         for at, group in table.groupby("week")["value"]:
             week = float(str(at))
             tested = UNTESTED
             if week > start:
-                tested = error_in_tests(errors, week, week - start) or UNTESTED
-            logs = log_value(str(metric), group.to_numpy(dtype=float))
-            half = np.hypot(spread_of_members(logs, LEVEL), tested.largest)
+                tested = _error_in_tests(errors, week, week - start) or UNTESTED
+            logs = _log_value(str(metric), group.to_numpy(dtype=float))
+            half = np.hypot(_spread_of_members(logs, LEVEL), tested.largest)
             widest = max(widest, half) if np.isfinite(half) else half
             middle = logs.mean() - tested.bias
             rows.append(
@@ -305,8 +304,8 @@ def interval_table(
                         np.expm1(tested.largest) if tested.tests else np.nan
                     ),
                     "bias": np.expm1(tested.bias) if tested.tests else np.nan,
-                    "low": from_log(str(metric), middle - widest),
-                    "high": from_log(str(metric), middle + widest),
+                    "low": _from_log(str(metric), middle - widest),
+                    "high": _from_log(str(metric), middle + widest),
                 }
             )
     table = (
@@ -343,10 +342,7 @@ def ensemble_maps(
     """
     areas = vertex_areas(run)
     shapes = [member.vertices for member in members]
-    aligned = [
-        transform_points(shape, rigid_fit(shape, run.vertices, areas))
-        for shape in shapes
-    ]
+    aligned = [align_points(shape, run.vertices, areas) for shape in shapes]
     values, spread = np.stack(shape_indices), np.full(run.vertices.shape, np.nan)
     if len(members) > 1:
         spread = np.var(aligned, axis=0, ddof=1)

@@ -102,7 +102,7 @@ class ObservedBrain:
         return numbers, draw_units([int(numbers.max()) + 1])
 
     @cached_property
-    def baseline_correlations(self) -> dict[tuple[str, str], Floats]:
+    def _baseline_correlations(self) -> dict[tuple[str, str], Floats]:
         """The correlation of each baseline and map, and that in each bootstrap
         sample."""
         found = {}
@@ -159,7 +159,7 @@ def compare(
         row |= size_columns(predicted, observed.surface)
     if {"distance", "intervals"} & set(groups):
         aligned = align(predicted, observed.surface)
-        pair = pairwise_distances(aligned, observed.surface, observed.prepared.mesh)
+        pair = _pairwise_distances(aligned, observed.surface, observed.prepared.mesh)
         if "distance" in groups:
             row |= surface_distances(pair) | {
                 "cortex_dice": cortex_dice(aligned, observed.surface)
@@ -177,10 +177,10 @@ def compare(
         row["roughness_ratio"] = roughness_mm(prepared.mesh) / roughness_mm(
             observed.prepared.mesh
         )
-    return row | fold_columns(prepared, observed, samples, groups), samples
+    return row | _fold_columns(prepared, observed, samples, groups), samples
 
 
-def fold_columns(
+def _fold_columns(
     prepared: PreparedSurface,
     observed: ObservedBrain,
     samples: dict[str, Floats],
@@ -202,7 +202,7 @@ def fold_columns(
                 observed.prepared.areas,
             )
     if "intervals" in groups:
-        sampling, known = observed.resampling, observed.baseline_correlations
+        sampling, known = observed.resampling, observed._baseline_correlations
         row |= {
             "asymmetry_mm": sampling.asymmetry_mm,
             "is_symmetric": sampling.is_symmetric,
@@ -239,7 +239,7 @@ def size_columns(predicted: TriangleMesh, observed: TriangleMesh) -> dict[str, f
     return row
 
 
-def pairwise_distances(
+def _pairwise_distances(
     surface: TriangleMesh,
     observed: TriangleMesh,
     even: TriangleMesh | None = None,
@@ -255,7 +255,7 @@ def pairwise_distances(
 
 
 def surface_distances(pair: list[VertexDistances]) -> dict[str, float]:
-    """Summarise the distances of `pairwise_distances` in mm.
+    """Summarise the distances of `_pairwise_distances` in mm.
 
     distance_mm is the mean of the two area-weighted means, distance95_mm the larger of
     the two 95 % quantiles (a robust Hausdorff distance); distance_left_mm and
@@ -294,7 +294,7 @@ def aligned_distances(
 ) -> dict[str, float]:
     """Align a surface rigidly with the observed one, and return their
     `surface_distances`."""
-    return surface_distances(pairwise_distances(align(surface, observed), observed))
+    return surface_distances(_pairwise_distances(align(surface, observed), observed))
 
 
 def bootstrap_distances(

@@ -65,19 +65,15 @@ def thickness_difference(
     at the same vertices. `fitted` is the expected surface deformed to fit the observed
     one of the week.
     """
+    surface, simulated_mm = simulated_start
+    observed_mm = _thickness_on(fitted, observed)
+    start_mm = _thickness_on(surface, start)
+    return observed_mm - start_mm * expected_mm / simulated_mm
 
-    def values_on(
-        mesh: TriangleMesh,
-        surface: TriangleMesh,
-        values: Floats,
-    ) -> Floats:
-        return values_at(match_surface(mesh, surface), values)
 
-    surface, start_mm = simulated_start
-    return (
-        values_on(fitted, *observed)
-        - values_on(surface, *start) * expected_mm / start_mm
-    )
+def _thickness_on(mesh: TriangleMesh, known: SurfaceThickness) -> Floats:
+    surface, thickness_mm = known
+    return values_at(match_surface(mesh, surface), thickness_mm)
 
 
 def deviation_table(

@@ -59,11 +59,6 @@ class PreparedSurface:
         """The (n,) areas of the vertices in mm²."""
         return vertex_areas(self.mesh)
 
-    @property
-    def curvature_rms(self) -> float:
-        """The root mean square of mean curvature over the area, in 1/mm."""
-        return float(np.sqrt(np.average(self.mean_curvature**2, weights=self.areas)))
-
 
 def prepare_for_comparison(
     mesh: TriangleMesh,
@@ -109,13 +104,20 @@ def curvature_differences(
     the first Wasserstein distance between the distributions of mean curvature over the
     area.
     """
+    rms_ratio = _curvature_rms(surface) / _curvature_rms(observed)
     distance = wasserstein_distance(
         surface.mean_curvature, observed.mean_curvature, surface.areas, observed.areas
     )
     return {
-        "curvature_rms_ratio": surface.curvature_rms / observed.curvature_rms,
+        "curvature_rms_ratio": rms_ratio,
         "curvature_distance_per_mm": float(distance),
     }
+
+
+def _curvature_rms(surface: PreparedSurface) -> float:
+    """Return the root mean square of mean curvature over the area, in 1/mm."""
+    squares = surface.mean_curvature**2
+    return float(np.sqrt(np.average(squares, weights=surface.areas)))
 
 
 def cortex_dice(surface: TriangleMesh, observed: TriangleMesh) -> float:

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError, MeshError
 from ..geometry.jacobians import EDGES, lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
-from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
+from ..geometry.triangles import TriangleMesh, edge_lengths, edges, face_areas
 from ..settings.terms import BASE, CLAMPED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
@@ -67,13 +67,7 @@ def _edge_length_within(
     cortex = mesh.corners[depth <= thickness_mm]
     if not len(cortex):
         cortex = mesh.corners
-    lengths = [
-        mean_length(
-            mesh.vertices,
-            cortex[:, pair],
-        )
-        for pair in EDGES
-    ]
+    lengths = [edge_lengths(mesh.vertices, cortex[:, pair]).mean() for pair in EDGES]
     return float(np.mean(lengths))
 
 

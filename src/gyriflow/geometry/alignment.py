@@ -3,12 +3,14 @@ points."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import igl
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from .deformations import transform_points
 from .triangles import Floats, TriangleMesh, dots, face_normals, transformed
 
 _TURNS = Rotation.create_group("O").as_matrix()
@@ -89,6 +91,15 @@ def rigid_fit(
     return motion(turn.as_matrix(), shift)
 
 
+def align_points(
+    points: Floats,
+    onto: Floats,
+    weights: Floats,
+) -> Floats:
+    """Return (n, 3) points after their least-squares rigid motion onto others."""
+    return transform_points(points, rigid_fit(points, onto, weights))
+
+
 def without_rigid_motion(
     first: Floats,
     second: Floats,
@@ -96,11 +107,10 @@ def without_rigid_motion(
 ) -> Floats:
     """Return the (n, 3) displacement from `first` to `second` after the latter is
     rigidly aligned to the former."""
-    back = rigid_fit(second, first, weights)
-    return second @ back[:3, :3].T + back[:3, 3] - first
+    return align_points(second, first, weights) - first
 
 
-def step_towards_planes(planes: Planes) -> tuple[Floats, Floats]:
+def _step_towards_planes(planes: Planes) -> tuple[Floats, Floats]:
     """Return the rotation and shift that minimise the squared distances of points from
     planes.
 
@@ -137,7 +147,7 @@ def follow_planes(
     """
     for _ in range(rounds):
         planes = find_planes(rotation, shift)
-        turn, move = step_towards_planes(planes)
+        turn, move = _step_towards_planes(planes)
         # as (4, 4) matrices, since round-off decides between two equally close faces
         whole = motion(turn, move) @ motion(rotation, shift)
         rotation = whole[:3, :3]
@@ -150,17 +160,19 @@ def follow_planes(
 def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floats]]:
     """Return a function that finds the nearest points of a surface, and the normals
     there."""
-    normals = face_normals(mesh)
-    vertices = mesh.vertices
-    faces = mesh.faces
     tree = igl.AABB()
-    tree.init(vertices, faces)
+    tree.init(mesh.vertices, mesh.faces)
+    return partial(_nearest_plane, tree, mesh, face_normals(mesh))
 
-    def nearest(points: Floats) -> tuple[Floats, Floats]:
-        _, face, places = tree.squared_distance(vertices, faces, points)
-        return places, normals[face]
 
-    return nearest
+def _nearest_plane(
+    tree: igl.AABB,
+    mesh: TriangleMesh,
+    normals: Floats,
+    points: Floats,
+) -> tuple[Floats, Floats]:
+    _, face, places = tree.squared_distance(mesh.vertices, mesh.faces, points)
+    return places, normals[face]
 
 
 def _some_points(mesh: TriangleMesh) -> Floats:

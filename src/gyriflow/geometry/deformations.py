@@ -116,16 +116,3 @@ def carry(deformation: Deformation, points: Floats) -> Floats:
             deformation.displacement[..., axis], index, order=1, mode="nearest"
         )
     return transform_points(moved, deformation.matrix)
-
-
-def volume_changes(deformation: Deformation) -> Floats:
-    """Return the (i, j, k) local change of volume on the map's grid (central
-    differences); ≤ 0 where it folds."""
-    displacement = deformation.displacement.astype(np.float64)
-    slopes = np.gradient(displacement, axis=(0, 1, 2))
-    by_index = np.stack(list(slopes), axis=-1)
-    voxel = deformation.affine[:3, :3]
-    by_position = by_index @ np.linalg.inv(voxel)
-    of_displacement = np.linalg.det(np.eye(3) + by_position)
-    linear = deformation.matrix[:3, :3]
-    return of_displacement * np.linalg.det(linear)

@@ -268,11 +268,6 @@ def cofactors_of(maps: Floats) -> Floats:
     return found
 
 
-def edge_vectors(places: Floats, tets: Indices) -> Floats:
-    """Return the (m, 3, 3) edges of (m, 4) elements from their first corners."""
-    return np.take(places, tets[:, 1:], axis=0) - places[tets[:, :1]]
-
-
 def _has_root(
     a: float,
     b: float,

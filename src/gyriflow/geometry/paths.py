@@ -7,8 +7,7 @@ import numpy as np
 from scipy.interpolate import BPoly
 from scipy.spatial import cKDTree
 
-from .alignment import rigid_fit
-from .deformations import transform_points
+from .alignment import align_points
 from .diffusion import vertex_sizes
 from .jacobians import inverted_on_the_way, may_be_inverted
 from .tetrahedra import TetrahedralMesh, linear_pieces
@@ -55,21 +54,20 @@ def path_through(
     with steps of `step_gw`.
 
     Each shape is aligned rigidly to the one before; shapes at almost the same time are
-    merged (`merged_shapes`). `stops` are weeks of shapes that were not observed.
-    Velocities are `limited_velocities`; near elements that a step would invert the path
-    is straight from shape to shape, so that the velocity may jump at the weeks.
+    merged. `stops` are weeks of shapes that were not observed. Velocities are limited;
+    near elements that a step would invert the path is straight from shape to shape, so
+    that the velocity may jump at the weeks.
     """
     sizes = vertex_sizes(shapes[0], linear_pieces(mesh))
     aligned = [shapes[0]]
     for shape in shapes[1:]:
-        motion = rigid_fit(shape, aligned[-1], sizes)
-        aligned.append(transform_points(shape, motion))
-    at, places = merged_shapes(
+        aligned.append(align_points(shape, aligned[-1], sizes))
+    at, places = _merged_shapes(
         np.asarray(weeks, dtype=float),
         np.stack(aligned),
         stops,
     )
-    velocities = limited_velocities(at, places)
+    velocities = _limited_velocities(at, places)
     # by interval, since velocities may differ on the two sides of a week: control
     # points of Bernstein's polynomials
     lengths = np.diff(at)
@@ -134,7 +132,7 @@ def _inverted_by_steps(
     return suspects[found]
 
 
-def merged_shapes(
+def _merged_shapes(
     weeks: Floats,
     places: Floats,
     stops: Collection[float] = (),
@@ -178,7 +176,7 @@ def merged_shapes(
     return weeks[keep], merged[keep]
 
 
-def limited_velocities(weeks: Floats, places: Floats) -> Floats:
+def _limited_velocities(weeks: Floats, places: Floats) -> Floats:
     """Return the (k, n, 3) velocities at k weeks of points on their way through (k, n,
     3) places.
 

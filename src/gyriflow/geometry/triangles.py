@@ -177,7 +177,7 @@ def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
 def mean_edge_length(mesh: TriangleMesh) -> float:
     """Return the mean edge length in mm."""
     pairs, _ = edges(mesh)
-    return mean_length(mesh.vertices, pairs)
+    return float(edge_lengths(mesh.vertices, pairs).mean())
 
 
 def edge_lengths(vertices: Floats, pairs: Indices) -> Floats:
@@ -193,12 +193,6 @@ def edge_lengths(vertices: Floats, pairs: Indices) -> Floats:
 def rms_length(vectors: Floats) -> float:
     """Return the root mean square length of (n, 3) vectors."""
     return float(np.sqrt(3 * np.mean(vectors**2)))
-
-
-def mean_length(vertices: Floats, pairs: Indices) -> float:
-    """Return the mean length of edges given as (e, 2) vertex indices, in the vertices'
-    unit."""
-    return float(edge_lengths(vertices, pairs).mean())
 
 
 def is_closed(mesh: TriangleMesh) -> bool:

@@ -17,8 +17,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import isotonic_regression
 
-from ..geometry.alignment import rigid_fit
-from ..geometry.deformations import transform_points
+from ..geometry.alignment import align_points
 from ..geometry.diffusion import vertex_sizes
 from ..geometry.matching import barycentric, nearest_on
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
@@ -311,6 +310,5 @@ def positions_at(
     )
     first = second - 1
     part = (week - weeks[first]) / (weeks[second] - weeks[first])
-    motion = rigid_fit(atlas[second], atlas[first], sizes)
-    aligned = transform_points(atlas[second], motion)
+    aligned = align_points(atlas[second], atlas[first], sizes)
     return np.asarray((1 - part) * atlas[first] + part * aligned)

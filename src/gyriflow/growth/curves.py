@@ -78,7 +78,7 @@ def rate(curve: Curve, week: ArrayLike) -> Floats:
     return rates
 
 
-def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
+def _interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     """Return the bounds of the 95 % interval of a curve at weeks. Its width is constant
     beyond the ends."""
     at = np.asarray(week, dtype=float)
@@ -89,7 +89,7 @@ def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     return middle * below, middle * above
 
 
-def tabulated(
+def _tabulated(
     weeks: Sequence[float],
     values: Sequence[float],
     *,
@@ -99,12 +99,6 @@ def tabulated(
     """Return the curve through a given table, such as a norm; InputError if a value is
     invalid or decreases."""
     weeks_, values_ = _checked(weeks, values, name)
-    if len(np.unique(weeks_)) < len(weeks_):
-        raise InputError(
-            f"the {name} has a week twice",
-            found=weeks_.tolist(),
-            expected="one value for each week",
-        )
     shrinks = np.diff(values_) < 0
     if not may_shrink and shrinks.any():
         _refuse_shrinking(name, weeks_[1:][shrinks])
@@ -210,7 +204,7 @@ def errors(fits: Mapping[str, CurveFit]) -> pd.DataFrame:
     """
     tables = []
     for name, fit in fits.items():
-        low, high = interval(fit.curve, fit.weeks)
+        low, high = _interval(fit.curve, fit.weeks)
         middle = value(fit.curve, fit.weeks)
         columns = {
             "week": fit.weeks,
@@ -230,7 +224,7 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
     rate_per_week."""
     tables = []
     for name, curve in curves.items():
-        low, high = interval(curve, curve.weeks)
+        low, high = _interval(curve, curve.weeks)
         columns = {
             "week": curve.weeks,
             "value": curve.values,
@@ -398,7 +392,7 @@ def followed_sizes(
         if source == "measured":
             curve = _measured_curve(curves, series, quantity)
         else:
-            curve = tabulated(
+            curve = _tabulated(
                 [float(week) for week in source],
                 list(source.values()),
                 name=quantity,
@@ -430,7 +424,7 @@ def sizes_on_curves(
     for name in SIZES:
         if SIZES[0] in growth:
             sizes = growth[name]
-            found[name] = tabulated(
+            found[name] = _tabulated(
                 list(sizes),
                 list(sizes.values()),
                 may_shrink=True,

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from ..geometry.alignment import rigid_fit
-from ..geometry.deformations import Deformation, carry, transform_points
+from ..geometry.alignment import align_points
+from ..geometry.deformations import Deformation, carry
 from ..geometry.diffusion import (
     cell_sizes,
     diffuse,
@@ -72,9 +72,9 @@ class Persistence:
     lasting: float = LASTING
     match_error_mm: float = MATCH_ERROR_MM
 
-    @property
-    def reliability(self) -> float:
-        """The share of the mean square of the difference that is real, from 0 to 1."""
+    def _reliability(self) -> float:
+        """Return the share of the mean square of the difference that is real, from 0 to
+        1."""
         if not self.match_error_mm:
             return 1.0
         if self.difference_mm <= self.match_error_mm:
@@ -89,8 +89,9 @@ class Persistence:
         fading = np.exp(-weeks_ahead / LASTING_GW)
         persistence = self.lasting + (1 - self.lasting) * fading
         match_fading = np.exp(-weeks_ahead / MATCH_FADING_GW)
-        error = (1 - self.reliability) * match_fading
-        return float(persistence * (self.reliability + error))
+        reliability = self._reliability()
+        error = (1 - reliability) * match_fading
+        return float(persistence * (reliability + error))
 
 
 WHOLE = Persistence(difference_mm=np.inf, lasting=1.0)
@@ -198,13 +199,10 @@ def expected_positions(
         )
     pieces = linear_pieces(mesh)
     sizes = vertex_sizes(mesh.vertices, pieces)
-
-    def aligned(places: Floats, onto: Floats) -> Floats:
-        return transform_points(places, rigid_fit(places, onto, sizes))
-
-    start = aligned(
+    start = align_points(
         positions_at(start_week, atlas, atlas_weeks, sizes),
         mesh.vertices,
+        sizes,
     )
     difference = mesh.vertices - start
     smooth = diffuse(mesh.vertices, pieces, difference, smoothing_mm)
@@ -221,7 +219,7 @@ def expected_positions(
         smooth_share = persistence.weight(week - start_week)
         finer_share = smooth_share * float(np.exp((start_week - week) / fading_gw))
         remaining = smooth_share * smooth + finer_share * (difference - smooth)
-        positions.append(aligned(places, start) + scale * remaining)
+        positions.append(align_points(places, start, sizes) + scale * remaining)
         kept.append((week, smooth_share, finer_share, difference_mm))
     columns = ["week", "smooth_share", "finer_share", "difference_mm"]
     return Expectation(
@@ -295,8 +293,8 @@ def predict_shapes(
         body.move_to(shape)
         shapes += with_stops(shapes[-1], week, body)
         reached = shapes[-1].positions[used]
-        motion = rigid_fit(reached, shape[used], sizes[used])
-        misfits_mm[week] = rms_length(transform_points(reached, motion) - shape[used])
+        reached = align_points(reached, shape[used], sizes[used])
+        misfits_mm[week] = rms_length(reached - shape[used])
         log.info("GW %g: %.2f mm from the expected shape", week, misfits_mm[week])
     misfits_mm = {week: mm for week, mm in misfits_mm.items() if week <= end_week}
     if misfits_mm:

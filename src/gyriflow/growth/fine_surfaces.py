@@ -87,13 +87,11 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
     volume = signed_volume(boundary)
     scale = np.cbrt(volume / signed_volume(before))
     motion = rigid_fit(before.vertices, boundary.vertices, areas)
-
-    def aligned(points: Floats) -> Floats:
-        return transform_points(centre + scale * (points - centre), motion)
-
-    places = aligned(before.vertices)
+    places, surface = (
+        transform_points(centre + scale * (points - centre), motion)
+        for points in (before.vertices, observed.surface.vertices)
+    )
     displacements = boundary.vertices - places
-    surface = aligned(observed.surface.vertices)
     n_neighbours = min(N_NEIGHBOURS, len(places))
     distances, neighbours = cKDTree(places).query(surface, n_neighbours)
     n_allowed = crossing_faces(observed.surface)

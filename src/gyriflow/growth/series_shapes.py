@@ -111,7 +111,7 @@ def _pulls(
         forward = match_surface(moved, surface)
         backward = match_surface(surface, moved)
     else:
-        below = points_below(surface)
+        below = _points_below(surface)
         forward = match_layers(
             moved.vertices, vertex_normals(moved), inner, surface, below
         )
@@ -137,7 +137,7 @@ def _is_near(match: Match, reach_mm: float) -> Mask:
     return match.agrees & (match.distance_mm < reach_mm)
 
 
-def points_below(surface: TriangleMesh) -> Floats:
+def _points_below(surface: TriangleMesh) -> Floats:
     """Return the (n, 3) points `INNER_MM` below the vertices of a surface."""
     return surface.vertices - INNER_MM * vertex_normals(surface)
 
@@ -327,7 +327,7 @@ def follow_series(
             shape = places + extend(goals - places[used])
             fit_body(body, shape, target, used)
             if target is not None:
-                warn_of_misfit(body.boundary, target[0], week)
+                _warn_of_misfit(body.boundary, target[0], week)
             shapes += with_stops(before, week, body)
         if after_week:
             after_week(SeriesShapes.of(shapes))
@@ -377,7 +377,7 @@ def tissue_below(
     """Return the (n, 3) places, after a registration, of the tissue below the vertices
     of a boundary before it."""
     match = match_surface(boundary, observed)
-    return carry(pair, values_at(match, points_below(observed)))
+    return carry(pair, values_at(match, _points_below(observed)))
 
 
 def misfit_mm(boundary: TriangleMesh, surface: TriangleMesh) -> tuple[float, float]:
@@ -392,7 +392,7 @@ def misfit_mm(boundary: TriangleMesh, surface: TriangleMesh) -> tuple[float, flo
     return surface_distance(ways)
 
 
-def warn_of_misfit(
+def _warn_of_misfit(
     boundary: TriangleMesh,
     surface: TriangleMesh,
     week: float,

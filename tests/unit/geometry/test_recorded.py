@@ -126,7 +126,9 @@ def test_numbers_of_an_alignment(recorded, surface):
             "fit": onto,
             "angle": alignment.angle_deg(onto[:3, :3]),
             "left": alignment.without_rigid_motion(first, second, weights),
-            "step": alignment.step_towards_planes(planes),
+            "step": alignment.follow_planes(
+                np.eye(3), np.zeros(3), lambda *_: planes, 1, lambda *_: True
+            ),
         }
     )
 
@@ -168,7 +170,6 @@ def test_numbers_of_correspondences_and_poses(recorded, surface):
     recorded(
         {
             "carried": deformations.carry(pair, surface.vertices),
-            "determinants": deformations.volume_changes(pair),
             "index": deformations.voxel_index(surface.vertices, pair.affine),
             "moved": moved,
             "surfaces": deformations.between_moved(matched, FAR[0], FAR[1]),

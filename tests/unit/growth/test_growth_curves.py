@@ -15,13 +15,11 @@ from gyriflow.growth.curves import (
     fits_of_series,
     fitted,
     followed_sizes,
-    interval,
     rate,
     sizes_on_curves,
-    tabulated,
     value,
 )
-from gyriflow.growth.rates import growth_rates
+from gyriflow.growth.rates import rates_of_series
 from gyriflow.io.files import read_table, write_json, write_table
 from gyriflow.io.surfaces import write_surface
 from gyriflow.units import SECONDS_PER_GW
@@ -53,8 +51,11 @@ def test_a_week_without_weight_counts_neither_for_the_curve_nor_for_its_error():
     others = WEEKS != 25.0
     without = fitted(WEEKS[others], SCATTERED[others])
     assert fit.weights[4] == 0
-    found, expected = (interval(each.curve, WEEKS) for each in (fit, without))
-    assert np.array(found) == pytest.approx(np.array(expected), rel=0.005)
+    found, expected = (
+        errors({"volume": each})[["curve", "low", "high"]].to_numpy()
+        for each in (fit, without)
+    )
+    assert found[others] == pytest.approx(expected, rel=0.005)
 
 
 def test_the_first_week_is_kept_where_all_growth_refers_to_it(caplog):
@@ -112,8 +113,6 @@ def test_several_brains_of_a_week_and_two_weeks_alone():
 def test_shrinking_is_refused():
     with pytest.raises(InputError, check=Facts("ventricles", "21, 22", 30)):
         fitted(WEEKS, VOLUMES[::-1], name="ventricles")
-    with pytest.raises(InputError, check=Facts(23)):
-        tabulated([21, 22, 23], [1.0, 2.0, 1.5])
 
 
 @pytest.mark.parametrize(
@@ -128,12 +127,6 @@ def test_shrinking_is_refused():
 def test_what_is_no_curve_is_refused(weeks, values):
     with pytest.raises(InputError, check=Facts("volume")):
         fitted(weeks, values, name="volume")
-
-
-def test_a_table_in_any_order_is_written_as_it_was_given_without_an_error():
-    table = curve_table({"volume_ml": tabulated([22, 21, 25], [60.0, 50.0, 90.0])})
-    for column in ("value", "low", "high"):
-        assert table[column].tolist() == pytest.approx([50, 60, 90])
 
 
 # sizes that runs follow
@@ -155,7 +148,7 @@ def curves():
 
 
 def test_sizes_are_followed_every_quarter_of_a_week(curves):
-    growth = MEASURED | {"volume_ml": {21: 40.0, 25: 80.0}}
+    growth = MEASURED | {"volume_ml": {25: 80.0, 21: 40.0}}
     sizes = followed_sizes(growth, curves, "volume", [21.0, 22.0, 23.0], False)
     assert list(sizes["area_cm2"])[:3] == [21.0, 21.25, 21.5]
     assert max(sizes["area_cm2"]) >= 23.0
@@ -198,8 +191,9 @@ def test_a_given_table_shrinks_only_where_that_is_allowed():
 @pytest.mark.parametrize("weeks", [1.0, 4.0])
 def test_compound_rates_multiply_up_to_the_ratios(weeks):
     step_s = 600.0
-    table = growth_rates([21, 21 + weeks], [9000.0, 14_000.0], [45_000.0, 80_000.0])
-    row = table.iloc[0]
+    sizes = {"area_cm2": [90.0, 140.0], "volume_ml": [45.0, 80.0]}
+    brains = pd.DataFrame({"series": "s", "week": [21.0, 21.0 + weeks], **sizes})
+    row = rates_of_series(brains, ["s"]).iloc[0]
     steps = round(weeks * SECONDS_PER_GW / step_s)
     length = (1 + row["compound_rate_per_s"] * step_s) ** steps
     core_length = (1 + row["core_compound_rate_per_s"] * step_s) ** steps

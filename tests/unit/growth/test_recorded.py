@@ -80,7 +80,6 @@ def test_numbers_of_curves(recorded):
         WEEKS, areas["area_cm2"][:8], degrees_of_freedom=3.5, keeps_first=True
     )
     at = np.array([20.0, 21.7, 24.0, 29.0])
-    plain = curves.tabulated([21, 24, 30], [90.0, 150.0, 260.0])
     growth = {"model": "sizes", "area_cm2": "measured", "volume_ml": {21: 40, 27: 99}}
     weeks = [21.0, 22.0, 24.0]
     sizes = {"area_cm2": {21.0: 90.0, 23.0: 120.0, 24.0: 150.0}}
@@ -91,9 +90,8 @@ def test_numbers_of_curves(recorded):
             "errors": curves.errors(fits["surface"]),
             "table": table,
             "kept": kept,
-            "values": [curves.value(curve, at) for curve in (kept.curve, plain)],
-            "rates": [curves.rate(curve, at) for curve in (kept.curve, plain)],
-            "intervals": [curves.interval(curve, at) for curve in (kept.curve, plain)],
+            "values": [curves.value(kept.curve, at)],
+            "rates": [curves.rate(kept.curve, at)],
             "followed": curves.followed_sizes(growth, table, "surface", weeks, False),
             "sizes": curves.sizes_on_curves({"model": "rates"}, table, "volume", weeks),
             "parameters": params_content(
@@ -105,7 +103,6 @@ def test_numbers_of_curves(recorded):
                 [23.0, 24.0],
                 [23.0],
             ),
-            "shrinks": answer_of(curves.tabulated, [21, 24, 30], [90.0, 80.0, 99.0]),
         }
     )
 
