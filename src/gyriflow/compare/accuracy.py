@@ -50,14 +50,14 @@ class ErrorInTests:
     is_beyond: bool
 
 
-def _log_value(metric: str, value: Any) -> Any:
+def log_value(metric: str, value: Any) -> Any:
     """Return the logarithm of a metric, whose differences are errors; for `FOLDING`
     that of the folding."""
     return np.log(value - 1 + SMOOTH if metric == FOLDING else value)
 
 
 def _from_log(metric: str, value: Any) -> Any:
-    """Return the metric of a logarithm of `_log_value`."""
+    """Return the metric of a logarithm of `log_value`."""
     return np.exp(value) + (1 - SMOOTH if metric == FOLDING else 0)
 
 
@@ -287,7 +287,7 @@ def interval_table(
             tested = UNTESTED
             if week > start:
                 tested = _error_in_tests(errors, week, week - start) or UNTESTED
-            logs = _log_value(str(metric), group.to_numpy(dtype=float))
+            logs = log_value(str(metric), group.to_numpy(dtype=float))
             half = np.hypot(_spread_of_members(logs, LEVEL), tested.largest)
             widest = max(widest, half) if np.isfinite(half) else half
             middle = logs.mean() - tested.bias
