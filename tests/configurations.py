@@ -40,6 +40,14 @@ def resolved(brains=None, refused=(), **changes):
     return resolve(load(study(brains, **changes)), dict.fromkeys(refused, "refused"))
 
 
+def cases(names, table):
+    """Parametrise a test with a table: a case a line, its cells in YAML between |."""
+    rows = []
+    for line in table.strip().splitlines():
+        rows.append([yaml.safe_load(cell) for cell in line.split(" | ")])
+    return pytest.mark.parametrize(names, rows)
+
+
 def ids(brains):
     return [brain.id for brain in brains]
 

@@ -2,7 +2,8 @@
 is refused of them."""
 
 import pytest
-from configurations import LABELLED, keys, problems, study, touched
+import yaml
+from configurations import LABELLED, cases, keys, problems, study, touched
 from facts import Facts
 
 from gyriflow.io.yaml_files import SCHEMES
@@ -10,6 +11,7 @@ from gyriflow.study.brains import label_scheme
 from gyriflow.study.loading import load
 
 MINE = {"cerebrum": [1, 2], "cortex": [2], "known": {9: "outer CSF"}}
+FILES = "a.nii.gz t2w.nii.gz l.gii r.gii u.gii v.gii all.stl white.stl"
 
 
 def one(**brain):
@@ -18,163 +20,107 @@ def one(**brain):
 
 @pytest.fixture
 def folder(tmp_path):
-    return touched(
-        tmp_path,
-        "a.nii.gz",
-        "t2w.nii.gz",
-        "l.gii",
-        "r.gii",
-        "lw.gii",
-        "rw.gii",
-        "all.stl",
-        "white.stl",
-    )
+    return touched(tmp_path, *FILES.split())
 
 
 def test_files_are_found_beside_the_configuration(folder):
-    pair = {"left": "l.gii", "right": "r.gii"}
-    brains = [
-        {
-            "id": "a",
-            "week": 21,
-            "labels": "a.nii.gz",
-            "scheme": "binary",
-            "image": "t2w.nii.gz",
-        },
-        {"id": "b", "week": 21, "hemispheres": pair, "white": ["lw.gii", "rw.gii"]},
-        {"id": "c", "week": 22, "pial": "all.stl", "white": "white.stl"},
-        {"id": "d", "week": 22, "pial": "l.gii", "side": "left"},
-        {
-            "id": "e",
-            "week": 22,
-            "labels": "a.nii.gz",
-            "side": "right",
-            "scheme": "binary",
-        },
-        {"id": "f", "week": 22, "shape": {}},
-    ]
-    labels, both, whole, left, right, shape = load(study(brains), folder).brains
-    assert labels.files == [labels.labels] == [str(folder / "a.nii.gz")]
-    assert both.files == [str(folder / "l.gii"), str(folder / "r.gii")]
-    assert both.white_files == {
-        "left": str(folder / "lw.gii"),
-        "right": str(folder / "rw.gii"),
+    text = """
+    - {id: a, week: 21, labels: a.nii.gz, scheme: binary, image: t2w.nii.gz}
+    - {id: b, week: 21, hemispheres: {left: l.gii, right: r.gii}, white: [u.gii, v.gii]}
+    - {id: c, week: 22, pial: all.stl, white: white.stl}
+    - {id: d, week: 22, pial: l.gii, side: left}
+    - {id: e, week: 22, labels: a.nii.gz, side: right, scheme: binary}
+    - {id: f, week: 22, shape: {}}
+    """
+    brains = load(study(yaml.safe_load(text)), folder).brains
+    found = {}
+    for brain in brains:
+        white = [f"{part} {file}" for part, file in brain.white_files.items()]
+        files = " ".join([*brain.files, *white]).replace(f"{folder}/", "")
+        found[brain.id] = (brain.source, brain.sides, files)
+    both = ("left", "right")
+    assert found == {
+        "a": ("labels", both, "a.nii.gz"),
+        "b": ("hemispheres", both, "l.gii r.gii left u.gii right v.gii"),
+        "c": ("pial", both, "all.stl whole white.stl"),
+        "d": ("pial", ("left",), "l.gii"),
+        "e": ("labels", ("right",), "a.nii.gz"),
+        "f": ("shape", both, ""),
     }
-    assert whole.white_files == {"whole": str(folder / "white.stl")}
-    assert (left.sides, left.labels) == (("left",), None)
-    assert (right.sides, right.labels) == (("right",), str(folder / "a.nii.gz"))
-    assert (shape.source, shape.files, shape.shape.kind) == ("shape", [], "ellipsoid")
+    assert brains[-1].shape.kind == "ellipsoid"
 
 
-HEMISPHERE = {"labels": "a.nii.gz", "side": "left"}
-REGIONS = {"a": {"labels": "a.nii.gz", "names": {1: "frontal"}}}
-
-
-@pytest.mark.parametrize(
+@cases(
     ("brain", "key", "facts"),
-    [
-        (
-            {"labels": "a.nii.gz", "scheme": "binary", "pial": "all.stl"},
-            "",
-            ["labels", "pial", "shape"],
-        ),
-        ({}, "", ["labels", "hemispheres", "pial", "shape"]),
-        ({"labels": "a.nii.gz"}, ".scheme", []),
-        ({"labels": "a.nii.gz", "scheme": "d"}, ".scheme", ["d", "binary, crl"]),
-        ({"image": "t2w.nii.gz"}, ".image", ["labels"]),
-        ({"pial": "lost.stl"}, ".pial", ["lost.stl"]),
-        ({"hemispheres": {"left": "l.gii"}}, ".hemispheres.right", []),
-        (
-            {"hemispheres": {"left": "l.gii", "right": "r.gii"}, "white": "white.stl"},
-            ".white",
-            [],
-        ),
-        (HEMISPHERE, ".scheme", []),
-        (
-            {"hemispheres": {"left": "l.gii", "right": "r.gii"}, "side": "left"},
-            ".side",
-            ["hemispheres", "labels", "pial"],
-        ),
-        (
-            HEMISPHERE | {"scheme": "binary", "coordinates": "ras"},
-            ".coordinates",
-            ["pial"],
-        ),
-        (
-            {"pial": "l.gii", "side": "left", "scheme": "binary"},
-            ".scheme",
-            ["labels"],
-        ),
-        (
-            HEMISPHERE | {"side": "middle", "scheme": "binary"},
-            ".side",
-            ["left", "right"],
-        ),
-        ({"shape": {}, "coordinates": "lps"}, ".coordinates", ["shape", "pial"]),
-        ({"shape": {}, "population": "sheep"}, ".population", ["shape", "pial"]),
-        (
-            {"shape": {"semi_axes_mm": [40, 40, 200]}},
-            ".shape.semi_axes_mm[2]",
-            [200, 150],
-        ),
-        ({"shape": {"semi_axes_mm": [10, 21, 12]}}, ".shape.semi_axes_mm", [21, 2]),
-        ({"week": 50, "pial": "all.stl"}, ".week", [50, 45]),
-    ],
+    """
+    {labels: a.nii.gz, scheme: binary, pial: all.stl} | "" | [labels, pial, shape]
+    {} | "" | [labels, hemispheres, pial, shape]
+    {labels: a.nii.gz} | .scheme | []
+    {labels: a.nii.gz, scheme: d} | .scheme | [d, "binary, crl"]
+    {image: t2w.nii.gz} | .image | [labels]
+    {pial: lost.stl} | .pial | [lost.stl]
+    {hemispheres: {left: l.gii}} | .hemispheres.right | []
+    {hemispheres: {left: l.gii, right: r.gii}, white: white.stl} | .white | []
+    {hemispheres: {left: l.gii, right: r.gii}, side: left} | .side | [labels, pial]
+    {labels: a.nii.gz, side: left} | .scheme | []
+    {labels: a.nii.gz, scheme: binary, coordinates: ras} | .coordinates | [pial]
+    {pial: l.gii, side: left, scheme: binary} | .scheme | [labels]
+    {labels: a.nii.gz, side: middle, scheme: binary} | .side | [left, right]
+    {shape: {}, coordinates: lps} | .coordinates | [shape, pial]
+    {shape: {}, population: sheep} | .population | [shape, pial]
+    {shape: {semi_axes_mm: [40, 40, 200]}} | ".shape.semi_axes_mm[2]" | [200, 150]
+    {shape: {semi_axes_mm: [10, 21, 12]}} | .shape.semi_axes_mm | [21, 2]
+    {week: 50, pial: all.stl} | .week | [50, 45]
+    {week: 22+7, pial: all.stl} | .week | [22+7, 24+2]
+    {week: 50+1, pial: all.stl} | .week | [50+1, 15, 45]
+    """,
 )
 def test_what_is_wrong_with_a_brain_is_said(folder, brain, key, facts):
-
     assert problems(one(**brain), folder) == [Facts(f"brains[0]{key}:", *facts)]
 
 
-def test_ids_are_unique_and_no_folder_of_the_results():
-    brains = [{"id": name, "week": 22, **LABELLED} for name in ("a", "Study", "A", "a")]
-    assert problems(study(brains=brains)) == [
-        Facts("brains:", 2, "a"),
-        Facts("brains:", "Study"),
-        Facts("brains:", "a", "A"),
-    ]
+# names of folders: on some disks, those that differ in case, accents or dots are one
 
 
-@pytest.mark.parametrize(
-    ("first", "second"), [("a.", "a"), ("a..", "A"), ("sub-1", "sub-1.")]
+@cases(
+    ("names", "found"),
+    """
+    [a, Study, A, a] | [["brains:", 2, a], ["brains:", Study], ["brains:", a, A]]
+    [a., a] | [["brains:", a., a]]
+    [a.., A] | [["brains:", a.., A]]
+    [sub-1, sub-1.] | [["brains:", sub-1, sub-1.]]
+    [con] | [["brains:", con]]
+    [aux.1] | [["brains:", aux.1]]
+    [Lpt9] | [["brains:", Lpt9]]
+    [xcon, x.nul] | []
+    """,
 )
-def test_ids_that_are_one_folder_on_some_disks_are_refused(first, second):
-    brains = [{"id": name, "week": 22, **LABELLED} for name in (first, second)]
-    found = problems(study(brains=brains, start=first))
-    assert found == [Facts("brains:", first, second)]
+def test_each_brain_has_a_folder_on_every_disk(names, found):
+    brains = [{"id": name, "week": 22, **LABELLED} for name in names]
+    expected = [Facts(*facts) for facts in found]
+    assert problems(study(brains=brains, start="first")) == expected
 
 
-@pytest.mark.parametrize(
-    ("first", "second"), [("x", "x."), ("é", "e\u0301"), ("Straße", "STRASSE")]
+@cases(
+    ("section", "first", "second"),
+    """
+    runs | x | x.
+    runs | é | "e\\u0301"
+    runs | Straße | STRASSE
+    sweeps | w8 | W8
+    """,
 )
-def test_runs_that_are_one_folder_on_some_disks_are_refused(first, second):
-    runs = {first: {"end_week": 23}, second: {"end_week": 24}}
-    assert problems(study(runs=runs)) == [Facts(f"runs.{second}:", first)]
+def test_runs_and_sweeps_that_are_one_folder_are_refused(section, first, second):
+    entries = [{"end_week": 23}, {"end_week": 24}]
+    if section == "sweeps":
+        sweep = {"base": "reference", "compare_week": 22.5}
+        entries = [sweep | {"vary": {"thickness_mm": [n, n + 1]}} for n in (1, 3)]
+    raw = study(**{section: dict(zip((first, second), entries, strict=True))})
+    assert problems(raw) == [Facts(f"{section}.{second}:", first)]
 
 
-@pytest.mark.parametrize("name", ["con", "NUL", "aux.1", "Lpt9"])
-def test_names_of_devices_of_windows_are_refused(name):
-    brains = [{"id": name, "week": 22, **LABELLED}]
-    assert problems(study(brains=brains, start=name, runs={name: {}})) == [
-        Facts("brains:", name),
-        Facts(f"runs.{name}:", name),
-    ]
-    allowed = [{"id": f"x{name}", "week": 22, **LABELLED}]
-    assert problems(study(brains=allowed, start=f"x{name}")) == []
-
-
-@pytest.mark.parametrize("pair", [("s", "S"), ("w8", "W8")])
-def test_studies_that_differ_only_in_case_are_refused(pair):
-    sweep = {
-        "base": "reference",
-        "compare_week": 22.5,
-        "vary": {"thickness_mm": [1, 2]},
-    }
-    first, second = pair
-    text = problems(
-        study(sweeps={first: sweep, second: sweep | {"vary": {"thickness_mm": [3, 4]}}})
-    )
-    assert text == [Facts(f"sweeps.{second}:", first)]
+def test_names_of_devices_of_windows_are_refused_for_runs():
+    assert problems(study(runs={"NUL": {}})) == [Facts("runs.NUL:", "NUL")]
 
 
 def test_one_scan_of_a_subject_is_of_each_week():
@@ -184,35 +130,15 @@ def test_one_scan_of_a_subject_is_of_each_week():
     ]
 
 
-def test_a_week_that_an_atlas_lacks_is_refused_with_those_present(tmp_path):
-    touched(
-        tmp_path, "week21_labels.nii.gz", "week22.5_labels.nii.gz", "week21_t2w.nii.gz"
-    )
-    assert problems(one(labels="week30_labels.nii.gz", scheme="binary"), tmp_path) == [
-        Facts(
-            "brains[0].labels:",
-            tmp_path / "week30_labels.nii.gz",
-            "week21_labels.nii.gz, week22.5_labels.nii.gz",
-        )
-    ]
-
-
 # schemes
 
 
 def test_a_user_s_scheme_is_used_by_its_name(folder):
-    config = load(
-        one(labels="a.nii.gz", scheme="mine") | {"schemes": {"mine": MINE}}, folder
-    )
-    scheme = label_scheme(config, config.brains[0].scheme)
-    assert (scheme.name, scheme.cerebrum, scheme.cortex, scheme.known) == (
-        "mine",
-        (1, 2),
-        (2,),
-        {9: "outer CSF"},
-    )
-    plain = load(one(**LABELLED))
-    assert label_scheme(plain, plain.brains[0].scheme) == SCHEMES["spina-bifida-atlas"]
+    raw = one(labels="a.nii.gz", scheme="mine") | {"schemes": {"mine": MINE}}
+    scheme = label_scheme(load(raw, folder), "mine")
+    assert (scheme.name, scheme.cerebrum, scheme.cortex) == ("mine", (1, 2), (2,))
+    assert scheme.known == {9: "outer CSF"}
+    assert label_scheme(load(one(**LABELLED)), "crl") == SCHEMES["crl"]
 
 
 def test_all_mistakes_in_schemes_are_named_at_once():
@@ -222,16 +148,16 @@ def test_all_mistakes_in_schemes_are_named_at_once():
         "c": {"cerebrum": [0], "left": ["x"], "cortx": []},
         "e": {"cerebrum": []},
     }
+    wrong = {
+        "a": ["cerebrum", "cortex", "right"],
+        "b": ["cortex", "right"],
+        "c": ["cerebrum[0]", "left[0]", "cortx"],
+        "e": ["cerebrum"],
+    }
     assert keys(study(schemes=schemes)) == [
-        "schemes.a.cerebrum",
-        "schemes.a.cortex",
-        "schemes.a.right",
-        "schemes.b.cortex",
-        "schemes.b.right",
-        "schemes.c.cerebrum[0]",
-        "schemes.c.left[0]",
-        "schemes.c.cortx",
-        "schemes.e.cerebrum",
+        f"schemes.{name}.{key}"
+        for name, of_scheme in wrong.items()
+        for key in of_scheme
     ]
     assert keys(study(schemes={"feta-7": MINE})) == ["schemes.feta-7"]
 
@@ -239,74 +165,41 @@ def test_all_mistakes_in_schemes_are_named_at_once():
 # regions
 
 
-@pytest.mark.parametrize(
-    ("metrics", "facts"),
-    [
-        ({"regions": {"a": {}}}, Facts("regions.a.labels:")),
-        ({"regions": {"a": {"labels": "a.nii.gz"}}}, Facts("regions.a.names:")),
-        ({"regions": {"a": {"labels": "l.gii"}}}, Facts("regions.a.labels:")),
-        (
-            {"regions": {"a": {"labels": ["l.gii", "r.gii"]}}},
-            Facts("regions.a.surface:"),
-        ),
-        (
-            {"regions": {"a": REGIONS["a"] | {"surface": ["l.gii", "r.gii"]}}},
-            Facts("regions.a.surface:"),
-        ),
-        ({"regions": {"q": REGIONS["a"]}}, Facts("regions:", "q", "a")),
-        ({"norm_reference": ["x"]}, Facts("norm_reference:", "x", "a")),
-    ],
+@cases(
+    ("side", "metrics", "facts"),
+    """
+    null | {regions: {a: {}}} | ["regions.a.labels:"]
+    null | {regions: {a: {labels: a.nii.gz}}} | ["regions.a.names:"]
+    null | {regions: {a: {labels: l.gii}}} | ["regions.a.labels:"]
+    null | {regions: {a: {labels: [l.gii, r.gii]}}} | ["regions.a.surface:"]
+    null | {regions: {a: {labels: a.nii.gz, surface: l.gii}}} | ["regions.a.surface:"]
+    null | {regions: {q: {labels: a.nii.gz, names: {1: x}}}} | ["regions:", q, a]
+    left | {regions: {a: {labels: a.nii.gz, names: {1: x}}}} | ["regions:", a]
+    null | {norm_reference: [x]} | ["norm_reference:", x, a]
+    """,
 )
-def test_what_is_wrong_with_regions_and_references_is_said(folder, metrics, facts):
-    (line,) = problems(one(**LABELLED) | {"metrics": metrics}, folder)
-    assert line.removeprefix("metrics.") == facts
-
-
-def test_regions_need_both_hemispheres(folder):
-    raw = one(**HEMISPHERE, scheme="binary") | {"metrics": {"regions": REGIONS}}
-    assert problems(raw, folder) == [Facts("metrics.regions:", "a")]
+def test_what_is_wrong_with_regions_and_references_is_said(
+    folder, side, metrics, facts
+):
+    (line,) = problems(one(**LABELLED, side=side) | {"metrics": metrics}, folder)
+    assert line.removeprefix("metrics.") == Facts(*facts)
 
 
 # ages and covariates
 
 
-@pytest.mark.parametrize(
-    ("text", "week"),
-    [
-        ("22+3", 22.43),
-        ("22 wks 1 day", 22.14),
-        ("22 weeks and 6 days", 22.86),
-        ("22w2d", 22.29),
-        ("22.4", 22.4),
-    ],
-)
-def test_ages_may_be_written_in_weeks_and_days(text, week):
-    curve = {"weeks": {text: 1.5, "30+0": 2.0}}
-    settings = {
-        "brains": [{"id": "a", "week": text, **LABELLED}],
-        "folding": {"end_week": "24+3", "thickness_mm": curve},
-    }
-    config = load(settings | {"start": "a"})
-    assert (config.brains[0].week, config.folding.end_week) == (week, 24.43)
-    assert list(config.folding.thickness_mm.weeks) == pytest.approx([week, 30])
-
-
-@pytest.mark.parametrize(
-    ("text", "facts"),
-    [("22+7", ["24+2"]), ("2+3", ["24+2"]), ("50+1", [15, 45]), ("young", ["24+2"])],
-)
-def test_what_is_no_age_is_refused(text, facts):
-    assert problems(one(**LABELLED, week=text)) == [
-        Facts("brains[0].week:", text, *facts)
-    ]
+def test_ages_may_be_written_in_weeks_and_days():
+    curve = {"weeks": {"22w2d": 1.5, "30+0": 2.0}}
+    folding = {"end_week": "24+3", "thickness_mm": curve}
+    config = load(study([{"id": "a", "week": "22+3", **LABELLED}], folding=folding))
+    assert (config.brains[0].week, config.folding.end_week) == (22.43, 24.43)
+    assert list(config.folding.thickness_mm.weeks) == pytest.approx([22.29, 30])
 
 
 @pytest.mark.parametrize(
     "name",
     [
         "run",
-        "week",
-        "subject",
         "brain_of_input",
         "whole_area_cm2",
         "left_frontal_gyrification_index",

@@ -4,7 +4,7 @@ are individuals."""
 import pytest
 from configurations import (
     LABELLED,
-    both_kinds,
+    cases,
     growth_series,
     labelled,
     problems,
@@ -23,69 +23,60 @@ from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
 SURFACE = sphere(30.0, 2)
-RUN = {"start": "a", "folding": {"end_week": 23}}
+
+# surfaces with the same vertices
 
 
 @pytest.fixture
 def folder(tmp_path):
-    def write(name, mesh):
-        write_surface(tmp_path / name, mesh)
-        return name
-
-    write("a.gii", SURFACE)
     # other places, another order of the triangles and of their corners
-    write("b.gii", flipped(TriangleMesh(1.1 * SURFACE.vertices, SURFACE.faces[::-1])))
-    write("fine.gii", sphere(30.0, 3))
+    alike = flipped(TriangleMesh(1.1 * SURFACE.vertices, SURFACE.faces[::-1]))
     turned = SURFACE.faces.copy()
-    turned[0, 0] = next(
-        corner for corner in range(len(SURFACE.vertices)) if corner not in turned[0]
-    )
-    write("other.gii", TriangleMesh(SURFACE.vertices, turned))
+    turned[0, 0] = len(SURFACE.vertices) - 1
+    meshes = {
+        "a": SURFACE,
+        "b": alike,
+        "fine": sphere(30.0, 3),
+        "other": TriangleMesh(SURFACE.vertices, turned),
+    }
+    for name, mesh in meshes.items():
+        write_surface(tmp_path / f"{name}.gii", mesh)
     (tmp_path / "torn.gii").write_text("")
     return tmp_path
 
 
-def series(folder, *files, **changes):
-    brains = [
-        {
-            "id": name,
-            "week": 21 + number,
-            **({"pial": file} if isinstance(file, str) else file),
-        }
-        for number, (name, file) in enumerate(zip("abcdef", files, strict=False))
-    ]
-    return growth_series(load(RUN | {"brains": brains} | changes, folder))
+def surface(files):
+    """Return the source of a brain: one file, or hemispheres with + between them."""
+    left, *right = [f"{name}.gii" for name in files.split("+")]
+    return (
+        {"hemispheres": {"left": left, "right": right[0]}} if right else {"pial": left}
+    )
 
 
-def test_equal_triangles_in_any_order_are_matched(folder):
-    found = series(folder, "a.gii", "b.gii", "a.gii")
-    assert found.matched == {"surface": {"a", "b", "c"}}
-    assert found.unmatched == {}
-
-
-@pytest.mark.parametrize(
-    ("file", "facts"),
-    [
-        ("fine.gii", ["b", 642, 1280, "a", 162, 320]),
-        ("other.gii", ["b", "a"]),
-        ("torn.gii", ["torn.gii:"]),
-        (
-            {"hemispheres": {"left": "a.gii", "right": "b.gii"}},
-            ["b", "hemispheres", "a", "pial"],
-        ),
-    ],
+@cases(
+    ("files", "facts"),
+    """
+    a b a | null
+    a+fine b+fine | null
+    a fine b | [b, 642, 1280, a, 162, 320]
+    a other b | [b, a]
+    a torn b | ["torn.gii:"]
+    a a+b b | [b, hemispheres, a, pial]
+    a+fine fine+a | [b, 642, 162]
+    """,
 )
-def test_others_are_not_and_say_why(folder, file, facts):
-    found = series(folder, "a.gii", file, "b.gii")
-    assert found.matched == {}
-    assert found.unmatched["surface"] == Facts(*facts)
-
-
-def test_hemispheres_match_side_by_side(folder):
-    pair = {"hemispheres": {"left": "a.gii", "right": "fine.gii"}}
-    assert series(folder, pair, pair).matched == {"surface": {"a", "b"}}
-    swapped = {"hemispheres": {"left": "fine.gii", "right": "a.gii"}}
-    assert series(folder, pair, swapped).unmatched["surface"] == Facts("b", 642, 162)
+def test_surfaces_match_by_equal_triangles_or_it_is_said_why_not(folder, files, facts):
+    brains = [
+        {"id": name, "week": 21 + number, **surface(text)}
+        for number, (name, text) in enumerate(zip("abc", files.split(), strict=False))
+    ]
+    found = growth_series(load(study(brains), folder))
+    if facts is None:
+        assert found.matched == {"surface": {brain["id"] for brain in brains}}
+        assert found.unmatched == {}
+    else:
+        assert found.matched == {}
+        assert found.unmatched["surface"] == Facts(*facts)
 
 
 def test_an_atlas_is_believed_until_its_files_are_there(folder):
@@ -95,102 +86,74 @@ def test_an_atlas_is_believed_until_its_files_are_there(folder):
     assert list(found.matched.values()) == [{"dhcp-surface-21", "dhcp-surface-22"}]
     for week, file in ((21, "a.gii"), (22, "fine.gii")):
         for side in ("left", "right"):
-            (folder / f"fetal.week{week}.{side}.pial.surf.gii").write_bytes(
-                (folder / file).read_bytes()
-            )
-    config = {"atlas": named, "start": "first", "folding": {"end_week": 22}}
+            path = folder / f"fetal.week{week}.{side}.pial.surf.gii"
+            path.write_bytes((folder / file).read_bytes())
     found = growth_series(load(config, folder))
     assert found.matched == {}
     assert list(found.unmatched.values()) == [Facts("dhcp-surface-22", 642, 162)]
 
 
-@pytest.mark.parametrize(
-    ("growth", "brains"),
-    [
-        ({}, ["a", "b", "c"]),
-        ({"brains": ["c", "a"]}, ["a", "c"]),
-        ({"brains": None}, ["a", "b", "c"]),
-    ],
+# series of a study
+
+SOURCES = {
+    "v": LABELLED,
+    "s": {"pial": "pial.surf.gii"},
+    "l": {"pial": "pial.surf.gii", "side": "left"},
+    "r": {"pial": "pial.surf.gii", "side": "right"},
+}
+
+
+def sources(names):
+    """Return brains whose names are their source and week."""
+    return [
+        {"id": name, "week": int(name[1:3]), **SOURCES[name[0]]}
+        for name in names.split()
+    ]
+
+
+@cases(
+    ("names", "growth", "series"),
+    """
+    v21 v22 v22b | {} | {volume: [v21, v22, v22b]}
+    v21 v22 v22b | {brains: null} | {volume: [v21, v22, v22b]}
+    v21 v22 v22b | {brains: [v22b, v21]} | {volume: [v21, v22b]}
+    v21 v22 s21 s22 | {} | {surface: [s21, s22], volume: [v21, v22]}
+    v21 v22 s21 s22 | {brains: [v22, v21]} | {volume: [v21, v22]}
+    v21 v22 l21 l22 | {} | {volume: [v21, v22], "left hemisphere, surface": [l21, l22]}
+    r21 r22 | {} | {surface: [r21, r22]}
+    """,
 )
-def test_growth_is_of_all_brains_or_those_named(growth, brains):
-    assert series_ids(resolved(labelled(21, 22, 22), growth=growth)) == {
-        "volume": brains
-    }
-
-
-def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_followed(
-    tmp_path,
+def test_a_series_is_of_brains_of_one_kind_or_of_those_named(
+    tmp_path, names, growth, series
 ):
-    raw = both_kinds(tmp_path, (21, 22))
-    config = load(raw, tmp_path)
-    found = series_ids(resolve(config))
-    assert found == {"surface": ["s21", "s22"], "volume": ["v21", "v22"]}
-    series = (series_for(config, "s21"), series_for(config, "v21"))
-    assert series == ("surface", "volume")
-    named = load(raw | {"growth": {"series": "volume"}}, tmp_path)
-    assert series_for(named, "s21") == "volume"
-    chosen = resolve(load(raw | {"growth": {"brains": ["v22", "v21"]}}, tmp_path))
-    assert series_ids(chosen) == {"volume": ["v21", "v22"]}
+    raw = study(sources(names), start="first", growth=growth)
+    found = resolve(load(raw, touched(tmp_path, "pial.surf.gii")))
+    assert series_ids(found) == series
 
 
-def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_sides(
-    tmp_path,
+@cases(
+    ("start", "growth", "series"),
+    """
+    s21 | {} | surface
+    v21 | {} | volume
+    l21 | {} | left hemisphere, surface
+    s21 | {series: volume} | volume
+    """,
+)
+def test_a_run_follows_the_series_of_its_start_or_the_one_named(
+    tmp_path, start, growth, series
 ):
-    brains = [
-        {
-            "id": f"{side}{week}",
-            "week": week,
-            "pial": "lh.surf.gii",
-            "side": side,
-        }
-        for side in ("left", "right")
-        for week in (24, 25)
-    ]
-    brains += [{"id": f"p{week}", "week": week, **LABELLED} for week in (24, 25)]
-    config = load(
-        study(brains, start="left24", folding={"end_week": 26}),
-        touched(tmp_path, "lh.surf.gii"),
-    )
-    assert series_ids(resolve(config)) == {
-        "left hemisphere, surface": ["left24", "left25"],
-        "right hemisphere, surface": ["right24", "right25"],
-        "volume": ["p24", "p25"],
-    }
-    assert series_for(config, "left24") == "left hemisphere, surface"
+    raw = study(sources("s21 s22 v21 v22 l21 l22"), start=start, growth=growth)
+    config = load(raw, touched(tmp_path, "pial.surf.gii"))
+    assert series_for(config, start) == series
 
 
-def test_averages_are_no_individuals():
-    atlas = {"name": "spina-bifida", "series": "operated", "weeks": [25, 26]}
-    brains = [
-        {"id": f"s{week}", "week": week, "subject": f"s{week}", **LABELLED}
-        for week in (21, 23)
-    ]
-    brains += [{"id": f"n{week}", "week": week, **LABELLED} for week in (21, 21.4, 23)]
-    found = resolve(
-        load(
-            {
-                "brains": brains,
-                "atlas": atlas,
-                "metrics": {"norm_reference": ["spina-bifida"]},
-            }
-        )
-    )
-    assert found.norm_reference == [
-        "spina-bifida-operated-25",
-        "spina-bifida-operated-26",
-    ]
-    assert not found.are_individuals(found.norm_reference)
-    assert found.are_individuals(["s21", "s23"])
-    assert not found.are_individuals(["n21", "n23"])
-    assert found.are_individuals(["n21", "n21.4", "n23"])
-
-
-@pytest.mark.parametrize(
+@cases(
     ("first", "second"),
-    [
-        ({"subject": "a, b"}, {"subject": "a", "population": "b"}),
-        ({"subject": "control"}, {"population": "control"}),
-    ],
+    """
+    {subject: "a, b"} | {subject: a, population: b}
+    {subject: control} | {population: control}
+    """,
 )
 def test_two_series_of_one_name_are_refused(first, second):
     brains = [
@@ -202,53 +165,67 @@ def test_two_series_of_one_name_are_refused(first, second):
     assert problems(study(brains, start="x21")) == [Facts("growth.brains:", 2, name)]
 
 
-def test_charts_are_coloured_by_a_covariate_that_groups_subjects():
-    covariates = [
-        {"site": "x", "mother": str(number), "sex": "FM"[number % 2]}
-        for number in range(3)
-    ]
-    brains = [
-        {"id": f"b{n}", "week": 21, "covariates": values, **LABELLED}
-        for n, values in enumerate(covariates)
-    ]
-    found = resolve(load({"brains": brains})).brains
-    groups = {name: brain.group for name, brain in found.items()}
-    # all are of one site, and each has its own mother
-    assert groups == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
-
-
-MEASURED: dict = {"start": None, "folding": None}
-CROSS_SECTION, ONE_SUBJECT = [{}, {}, {}], [{"subject": "s"}] * 3
-COHORT = {"growth": {"brains": {"cohort": ["all"]}}}
-
-
-@pytest.mark.parametrize(
-    ("keys", "changes", "names"),
-    [
-        (CROSS_SECTION, MEASURED, []),
-        (CROSS_SECTION, {}, ["volume"]),
-        (ONE_SUBJECT, MEASURED, ["volume"]),
-        ([{"subject": name} for name in "xyz"], MEASURED | COHORT, []),
-        ([{"subject": name} for name in "xyz"], {"runs": {"r": {}}, **COHORT}, []),
-        (
-            [{"subject": name} for name in "xyz"],
-            {"runs": {"r": {"growth": "sizes"}}, **COHORT},
-            ["cohort"],
-        ),
-    ],
+@cases(
+    ("growth", "found"),
+    """
+    {brains: {one: [v21, x], two: [v21, v22]}} | [["brains.one:", x, "v21, v22, s21"]]
+    {brains: {one: [v21, s21], two: [v21, v22]}} | [["brains.one:", 1]]
+    {brains: []} | [["brains:", 0]]
+    {brains: [s21, v22]} | []
+    {series: volumes} | [["series:", volumes, "surface, volume"]]
+    {brains: {one: v21}} | [["brains.one:", v21]]
+    """,
 )
-def test_only_brains_whose_differences_are_growth_have_rates(keys, changes, names):
+def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
+    raw = study(sources("v21 v22 s21 s22"), start="v21", growth=growth)
+    lines = problems(raw, touched(tmp_path, "pial.surf.gii"))
+    assert lines == [Facts(f"growth.{facts[0]}", *facts[1:]) for facts in found]
+
+
+# differences between weeks that are growth
+
+
+def test_averages_are_no_individuals():
     brains = [
-        {**brain, **key} for brain, key in zip(labelled(21, 22, 23), keys, strict=True)
+        {"id": f"s{week}", "week": week, "subject": f"s{week}", **LABELLED}
+        for week in (21, 23)
     ]
+    brains += [{"id": f"n{week}", "week": week, **LABELLED} for week in (21, 21.4, 23)]
+    atlas = {"name": "spina-bifida", "series": "operated", "weeks": [25, 26]}
+    reference = {"norm_reference": ["spina-bifida"]}
+    found = resolve(load({"brains": brains, "atlas": atlas, "metrics": reference}))
+    averages = [f"spina-bifida-operated-{week}" for week in (25, 26)]
+    assert found.norm_reference == averages
+    assert not found.are_individuals(averages)
+    assert found.are_individuals(["s21", "s23"])
+    assert not found.are_individuals(["n21", "n23"])
+    assert found.are_individuals(["n21", "n21.4", "n23"])
+
+
+@cases(
+    ("subjects", "changes", "names"),
+    """
+    null | {start: null, folding: null} | []
+    null | {} | [volume]
+    sss | {start: null, folding: null} | [volume]
+    xyz | {start: null, folding: null, growth: {brains: {cohort: [all]}}} | []
+    xyz | {runs: {r: {}}, growth: {brains: {cohort: [all]}}} | []
+    xyz | {runs: {r: {growth: sizes}}, growth: {brains: {cohort: [all]}}} | [cohort]
+    """,
+)
+def test_only_brains_whose_differences_are_growth_have_rates(subjects, changes, names):
+    brains = labelled(21, 22, 23)
+    for brain, subject in zip(brains, subjects or (), strict=False):
+        brain["subject"] = subject
     found = resolved(brains, **changes)
     assert len(found.growth_brains) == 3
-    with_rates = [series.name for series in found.series.values() if series.has_rates]
-    assert with_rates == names
+    assert [
+        series.name for series in found.series.values() if series.has_rates
+    ] == names
 
 
-def test_an_atlas_has_rates_without_runs(folder):
+def test_an_atlas_has_rates_without_runs():
     named = {"name": "spina-bifida", "weeks": [21, 22]}
-    found = resolve(load(study(labelled(23, 24), atlas=named, **MEASURED), folder))
+    found = resolved(labelled(23, 24), atlas=named, start=None, folding=None)
     with_rates = [series.name for series in found.series.values() if series.has_rates]
     assert with_rates == ["spina bifida aperta, unoperated"]

@@ -2,13 +2,15 @@
 refused."""
 
 import re
+from itertools import product
 from pathlib import Path
 
 import pytest
-from configurations import LABELLED
+import yaml
+from configurations import LABELLED, cases
+from configurations import refusal as refusal_of
 from facts import Facts
 
-from gyriflow.errors import InputError
 from gyriflow.settings.runs import PRESETS, Run
 from gyriflow.study import paths, resolve
 from gyriflow.study.loading import load
@@ -16,78 +18,60 @@ from gyriflow.study.paths import STUDY, log_of
 from gyriflow.study.resolve import _equality_key
 
 ROOT = Path(__file__).parents[3]
-
-BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 25, **LABELLED}]
 RUNS = {"reference": {"preset": "fetalfoldsim"}, "short": {"end_week": 22}}
-THICKNESS = {
-    "base": "reference",
+BASE = {"base": "reference", "compare_week": 25}
+THICKNESS = BASE | {
     "vary": {"thickness_mm": [0.8, 1.5]},
     "fixed": {"shear_modulus_cortex_pa": 3000},
-    "compare_week": 25,
 }
-STIFFNESS = {
-    "base": "reference",
-    "vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]},
-    "compare_week": 25,
-}
-CALIBRATION = {
-    "base": "reference",
-    "parameters": {"thickness_mm": [1, 3]},
-    "score": {"size": 1},
-    "compare_week": 25,
-}
+STIFFNESS = BASE | {"vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]}}
+CALIBRATION = BASE | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}
 
 
-def config(**sections):
-    return load(
-        {
-            "brains": BRAINS,
-            "start": "first",
-            "folding": {"end_week": 26},
-            "runs": RUNS,
-            **sections,
-        }
-    )
+def brains(**weeks):
+    return [{"id": name, "week": week, **LABELLED} for name, week in weeks.items()]
+
+
+def study(**sections):
+    folding = {"end_week": 26}
+    usual = {"brains": brains(a=21, b=25), "start": "first", "folding": folding}
+    return usual | {"runs": RUNS} | sections
 
 
 def resolved(**sections):
-    return resolve(config(**sections))
-
-
-def members(study, name):
-    return [row.run for row in study.by_sweep[name]]
+    return resolve(load(study(**sections)))
 
 
 def refusal(**sections):
-    with pytest.raises(InputError) as error:
-        config(**sections)
-    return str(error.value)
+    return refusal_of(study(**sections))
 
 
-def test_a_study_of_a_run_with_two_start_brains_has_its_members_from_both():
-    vary = {"thickness_mm": [1, 2]}
+# the runs of sweeps
+
+
+def test_a_sweep_of_a_run_with_two_start_brains_has_its_members_from_both():
     runs = {"reference": {"preset": "fetalfoldsim", "start": ["a", "b"]}}
-    study = {"base": "reference", "vary": vary, "compare_week": 26}
-    brains = [*BRAINS, {"id": "c", "week": 26, **LABELLED}]
-    found = resolved(brains=brains, runs=runs, sweeps={"both": study})
-    starts = [(row.run, row.brain) for row in found.by_sweep["both"]]
-    assert sorted(starts) == [
-        ("both-1", "a"),
-        ("both-1", "b"),
-        ("both-2", "a"),
-        ("both-2", "b"),
-    ]
+    sweep = BASE | {"vary": {"thickness_mm": [1, 2]}, "compare_week": 26}
+    known = brains(a=21, b=25, c=26)
+    found = resolved(brains=known, runs=runs, sweeps={"both": sweep})
+    starts = {(row.run, row.brain) for row in found.by_sweep["both"]}
+    assert starts == set(product(("both-1", "both-2"), "ab"))
 
 
-def test_a_study_makes_a_run_of_each_combination():
+def test_a_sweep_makes_a_run_of_each_combination():
     vary = {"thickness_mm": [1, 2], "max_halvings": [2, 3]}
     found = resolved(sweeps={"both": THICKNESS | {"vary": vary}})
     runs = {}
     for row in found.by_sweep["both"]:
         runs[row.run] = found.simulations[row.run, row.brain].settings
-    assert list(runs) == ["both-1-2", "both-1-3", "both-2-2", "both-2-3"]
-    values = [(run.thickness_mm, run.max_halvings) for run in runs.values()]
-    assert values == [(1, 2), (1, 3), (2, 2), (2, 3)]
+    assert {
+        name: (run.thickness_mm, run.max_halvings) for name, run in runs.items()
+    } == {
+        "both-1-2": (1, 2),
+        "both-1-3": (1, 3),
+        "both-2-2": (2, 2),
+        "both-2-3": (2, 3),
+    }
     assert {run.shear_modulus_cortex_pa for run in runs.values()} == {3000}
     assert {run.end_week for run in runs.values()} == {25}
     # they are no runs that everything is made of
@@ -95,43 +79,31 @@ def test_a_study_makes_a_run_of_each_combination():
 
 
 def test_equal_runs_are_solved_once():
-    found = resolved(
-        sweeps={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS}
-    )
-    # 1500 Pa is the reference, 3000 Pa stands in the other study too
-    assert members(found, "stiffness") == [
-        "stiffness-300",
-        "reference",
-        "thickness-1.5",
-    ]
+    found = resolved(sweeps={"thickness": THICKNESS, "stiffness": STIFFNESS})
+    # 1500 Pa is the reference, 3000 Pa stands in the other sweep too
+    runs = [row.run for row in found.by_sweep["stiffness"]]
+    assert runs == ["stiffness-300", "reference", "thickness-1.5"]
     assert found.may_diverge == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
 
 
-VALUES = {
-    "step_s": [21600, 86400],
-    "thickness_mm": [1.2, 1.5],
-    "shear_modulus_cortex_pa": [1000, 1500],
-    "shear_modulus_core_pa": [300, 400],
-    "material": ["neo-hookean", "compressible-neo-hookean"],
-    "poisson_ratio": [0.4, 0.45],
-    "growth_rate_per_s": [1e-7, 2e-7],
-    "core_growth_rate_per_s": [0.0, 1e-8],
-    "growth": [
-        "rates",
-        {
-            "model": "sizes",
-            "area_cm2": {21: 90, 30: 200},
-            "volume_ml": {21: 40, 30: 150},
-        },
-    ],
-    "stress_memory_gw": [0.0, 1.0],
-    "support": ["ellipsoid", "free"],
-    "contact": ["planes", "none"],
-    "output_every_gw": [0.5, 1.0],
-    "newton_tolerance": [1e-4, 1e-5],
-    "max_halvings": [5, 6],
-    "start": ["a", "b"],
-}
+VALUES = yaml.safe_load("""
+step_s: [21600, 86400]
+thickness_mm: [1.2, 1.5]
+shear_modulus_cortex_pa: [1000, 1500]
+shear_modulus_core_pa: [300, 400]
+material: [neo-hookean, compressible-neo-hookean]
+poisson_ratio: [0.4, 0.45]
+growth_rate_per_s: [1.0e-7, 2.0e-7]
+core_growth_rate_per_s: [0.0, 1.0e-8]
+growth: [rates, {model: sizes, area_cm2: {21: 90, 30: 200}, volume_ml: {21: 40}}]
+stress_memory_gw: [0.0, 1.0]
+support: [ellipsoid, free]
+contact: [planes, none]
+output_every_gw: [0.5, 1.0]
+newton_tolerance: [1.0e-4, 1.0e-5]
+max_halvings: [5, 6]
+start: [a, b]
+""")
 """Two values of each key that changes the shapes of a run."""
 ALIKE = {"end_week", "preset", "fields", "ensemble", "ranks"}
 """Keys that change no shape of a week that both runs have."""
@@ -148,200 +120,146 @@ def test_runs_are_equal_only_where_no_key_that_changes_shapes_differs():
 
 
 def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
-    brains = [*BRAINS, {"id": "c", "week": 24.5, **LABELLED}]
+    known = brains(a=21, b=25, c=24.5)
     sweeps = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
-    simulations = resolved(brains=brains, sweeps=sweeps).simulations
+    simulations = resolved(brains=known, sweeps=sweeps).simulations
     assert simulations["thickness-1.5", "a"].settings.end_week == 25
     assert simulations["thickness-1.5", "a"].weeks == (21, 22, 23, 24, 24.5, 25)
     assert simulations["thickness-0.8", "a"].weeks[-1] == 24.5
     # the reference itself has no surface of that week, so that it cannot stand in
-    other = resolved(
-        brains=brains, sweeps={"stiffness": STIFFNESS | {"compare_week": 24.5}}
-    )
-    assert members(other, "stiffness")[1] == "stiffness-1500"
+    sweeps = {"stiffness": STIFFNESS | {"compare_week": 24.5}}
+    rows = resolved(brains=known, sweeps=sweeps).by_sweep["stiffness"]
+    assert rows[1].run == "stiffness-1500"
 
 
-def test_comparison_prefers_the_starts_population(tmp_path):
-    brains = []
-    for name, week, population in (
-        ("a", 21, "one"),
-        ("b", 25, "two"),
-        ("c", 25, "one"),
-    ):
-        (tmp_path / f"{name}.stl").touch()
-        brains.append(
-            {
-                "id": name,
-                "week": week,
-                "pial": str(tmp_path / f"{name}.stl"),
-                "population": population,
-            }
-        )
-    for known, asked, real in (
-        (brains, {}, "c"),
-        (brains[:2], {}, "b"),
-        (brains, {"compare_with": ["b"]}, "b"),
-    ):
-        found = resolved(brains=known, sweeps={"thickness": THICKNESS | asked})
-        assert found.by_sweep["thickness"][0].observed == (real,)
+@pytest.mark.parametrize(
+    ("names", "asked", "observed"),
+    [("abc", {}, "c"), ("ab", {}, "b"), ("abc", {"compare_with": ["b"]}, "b")],
+)
+def test_comparison_prefers_the_starts_population(names, asked, observed):
+    known = brains(**{name: 21 if name == "a" else 25 for name in names})
+    for brain in known:
+        brain["population"] = "two" if brain["id"] == "b" else "one"
+    found = resolved(brains=known, sweeps={"thickness": THICKNESS | asked})
+    assert found.by_sweep["thickness"][0].observed == (observed,)
 
 
 def test_the_run_of_a_single_value_may_differ_further():
-    study = THICKNESS | {
-        "fixed": {"shear_modulus_cortex_pa": 3000, "step_s": 86400},
-        "fixed_at": {1.5: {"step_s": 43200}},
-    }
-    found = resolved(sweeps={"s": study})
-    rows = []
+    steps = {"fixed": {"step_s": 86400}, "fixed_at": {0.8: {"step_s": 3600}}}
+    found = resolved(sweeps={"s": THICKNESS | steps})
+    step_of = {}
     for row in found.by_sweep["s"]:
-        settings = found.simulations[row.run, row.brain].settings
-        rows.append((row.run, settings.step_s, row.values))
-    assert rows == [
-        ("s-0.8", 86400, {"thickness_mm": 0.8}),
-        ("s-1.5", 43200, {"thickness_mm": 1.5}),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("change", "key", "facts"),
-    [
-        ({"vary": {"thicknes_mm": [1]}}, "vary.thicknes_mm", []),
-        ({"vary": {"thickness_mm": [-1]}}, "vary.thickness_mm", [0, -1]),
-        ({"vary": {"thickness_mm": [1, 1]}}, "vary.thickness_mm", [[1.0, 1.0]]),
-        ({"vary": {"preset": ["measured"]}}, "vary.preset", ["base"]),
-        ({"fixed": {"preset": "measured"}}, "fixed.preset", ["base"]),
-        ({"vary": {}}, "vary", ["folding"]),
-        ({"fixed": {"contact.gap": 2}}, "fixed.contact.gap", []),
-        ({"fixed_at": {1.2: {"step_s": 43200}}}, "fixed_at", [1.2]),
-        ({"fixed_at": {1.5: {"steps": 1}}}, "fixed_at.steps", []),
-        ({"base": "ref"}, "base", ["ref", "reference, short"]),
-        ({"compare_week": 24}, "compare_week", [24, 21, 25]),
-        ({"compare_with": ["a"]}, "compare_with", ["a", 21, 25]),
-    ],
-)
-def test_what_is_wrong_with_a_study_is_said(change, key, facts):
-    assert refusal(sweeps={"s": THICKNESS | change}) == Facts(
-        1, f"sweeps.s.{key}:", *facts
-    )
+        step_of[row.run] = found.simulations[row.run, row.brain].settings.step_s
+    assert step_of == {"s-0.8": 3600, "s-1.5": 86400}
 
 
 def test_values_that_agree_in_six_digits_are_runs_of_their_own():
-    study = THICKNESS | {"vary": {"thickness_mm": [1.0, 1.0000001, 1.0000002]}}
-    found = resolved(sweeps={"s": study}).by_sweep["s"]
-    assert [(row.run, row.values["thickness_mm"]) for row in found] == [
-        ("s-1", 1.0),
-        ("s-1.0000001", 1.0000001),
-        ("s-1.0000002", 1.0000002),
-    ]
+    values = [1.0, 1.0000001, 1.0000002]
+    sweep = THICKNESS | {"vary": {"thickness_mm": values}}
+    found = resolved(sweeps={"s": sweep}).by_sweep["s"]
+    assert [row.run for row in found] == ["s-1", "s-1.0000001", "s-1.0000002"]
+    assert [row.values["thickness_mm"] for row in found] == values
+
+
+# what is refused
+
+
+@cases(
+    ("change", "key", "facts"),
+    """
+    {vary: {thicknes_mm: [1]}} | vary.thicknes_mm | []
+    {vary: {thickness_mm: [-1]}} | vary.thickness_mm | [0, -1]
+    {vary: {thickness_mm: [1, 1]}} | vary.thickness_mm | [[1.0, 1.0]]
+    {vary: {preset: [measured]}} | vary.preset | [base]
+    {fixed: {preset: measured}} | fixed.preset | [base]
+    {vary: {}} | vary | [folding]
+    {fixed: {contact.gap: 2}} | fixed.contact.gap | []
+    {fixed_at: {1.2: {step_s: 43200}}} | fixed_at | [1.2]
+    {fixed_at: {1.5: {steps: 1}}} | fixed_at.steps | []
+    {base: ref} | base | [ref, "reference, short"]
+    {compare_week: 24} | compare_week | [24, 21, 25]
+    {compare_with: [a]} | compare_with | [a, 21, 25]
+    """,
+)
+def test_what_is_wrong_with_a_sweep_is_said(change, key, facts):
+    found = refusal(sweeps={"s": THICKNESS | change})
+    assert found == Facts(1, f"sweeps.s.{key}:", *facts)
+
+
+@cases(
+    ("change", "key", "facts"),
+    """
+    {parameters: {thickness_mm: [3, 1]}} | parameters.thickness_mm | [[3.0, 1.0]]
+    {parameters: {thickness_mm: [-1, 1]}} | parameters.thickness_mm | [0, -1]
+    {parameters: {poisson: [0, 0.4]}} | parameters.poisson | []
+    {parameters: {}} | parameters | [0, 1]
+    {rounds: [30, 11]} | rounds | [[30, 11], 3, 40]
+    {score: {}} | score | [shape_index, surface_distance]
+    {score: {beauty: 1}} | score.beauty | [beauty, shape_index, surface_distance]
+    {compare_week: 24} | compare_week | [24, 21, 25]
+    {base: ref} | base | [ref, "reference, short"]
+    """,
+)
+def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
+    found = refusal(calibrate=CALIBRATION | change)
+    assert found == Facts(1, f"calibrate.{key}:", *facts)
+
+
+POISSON = THICKNESS | {"vary": {"poisson_ratio": [0.3, 0.4]}}
+BOTH = THICKNESS | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}}
 
 
 @pytest.mark.parametrize(
-    ("changes", "key", "facts"),
+    ("changes", "facts"),
     [
         (
             {"sweeps": {"s": THICKNESS}, "runs": RUNS | {"S-0.8": {}}},
-            "sweeps.s",
-            ["s-0.8", "S-0.8", "runs"],
+            ["sweeps.s:", "s-0.8", "S-0.8", "runs"],
         ),
         (
-            {
-                "sweeps": {
-                    "s": (
-                        THICKNESS
-                        | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}}
-                    ),
-                    "s-1": THICKNESS | {"vary": {"poisson_ratio": [0.3, 0.4]}},
-                }
-            },
-            "sweeps.s-1",
-            ["s-1-0.3", "sweep s", "sweep s-1"],
+            {"sweeps": {"s": BOTH, "s-1": POISSON}},
+            ["sweeps.s-1:", "s-1-0.3", "sweep s", "sweep s-1"],
         ),
         (
             {"calibrate": CALIBRATION, "runs": RUNS | {"Calibration-01": {}}},
-            "runs.Calibration-01",
-            ["calibration-01"],
+            ["runs.Calibration-01:", "calibration-01"],
         ),
     ],
 )
-def test_runs_of_all_sections_have_folders_of_their_own(changes, key, facts):
-    assert refusal(**changes) == Facts(1, f"{key}:", *facts)
+def test_runs_of_all_sections_have_folders_of_their_own(changes, facts):
+    assert refusal(**changes) == Facts(1, *facts)
 
 
 def test_folders_of_results_are_no_names_of_sweeps():
-    sources = [
-        *ROOT.glob("workflow/rules/*.smk"),
-        *ROOT.glob("src/gyriflow/study/*.py"),
-    ]
-    paths = [
-        *(path.read_text() for path in sources),
-        log_of("rule", f"{STUDY}/metrics.png"),
-    ]
-    folders = {
-        name
-        for text in paths
-        for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)
-    }
+    rules = ROOT.glob("workflow/rules/*.smk")
+    modules = ROOT.glob("src/gyriflow/study/*.py")
+    texts = [path.read_text() for path in (*rules, *modules)]
+    texts.append(log_of("rule", f"{STUDY}/metrics.png"))
+    folders = set()
+    for text in texts:
+        folders |= set(re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text))
     assert folders > {"logs", "figures", "calibration", "registration"}
     for folder in folders:
-        assert refusal(sweeps={folder: THICKNESS}) == Facts(f"sweeps.{folder}:")
-        assert refusal(sweeps={folder.upper(): THICKNESS}) == Facts(
-            f"sweeps.{folder.upper()}:"
-        )
-    assert refusal(sweeps={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts(
-        "sweeps.s:", "s-0.8"
-    )
+        for name in (folder, folder.upper()):
+            assert refusal(sweeps={name: THICKNESS}) == Facts(f"sweeps.{name}:")
 
 
-@pytest.mark.parametrize(
-    ("change", "key", "facts"),
-    [
-        (
-            {"parameters": {"thickness_mm": [3, 1]}},
-            "parameters.thickness_mm",
-            [[3.0, 1.0]],
-        ),
-        ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm", [0, -1]),
-        ({"parameters": {"poisson": [0, 0.4]}}, "parameters.poisson", []),
-        ({"parameters": {}}, "parameters", [0, 1]),
-        ({"rounds": [30, 11]}, "rounds", [[30, 11], 3, 40]),
-        ({"score": {}}, "score", ["shape_index", "surface_distance"]),
-        (
-            {"score": {"beauty": 1}},
-            "score.beauty",
-            ["beauty", "shape_index", "surface_distance"],
-        ),
-        ({"compare_week": 24}, "compare_week", [24, 21, 25]),
-        ({"base": "ref"}, "base", ["ref", "reference, short"]),
-    ],
-)
-def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
-    assert refusal(calibrate=CALIBRATION | change) == Facts(
-        1, f"calibrate.{key}:", *facts
-    )
+# files
 
 
-@pytest.mark.parametrize(
+@cases(
     ("pattern", "log"),
-    [
-        (
-            "results/brains/{brain}/mesh/targets.{origin}.h5",
-            "results/brains/{brain}/logs/rule.{origin}.log",
-        ),
-        (
-            "results/study/{sweep}/members/{run}.csv",
-            "results/study/{sweep}/logs/rule.{run}.log",
-        ),
-        (
-            "results/study/matched/{earlier}/{later}.h5",
-            "results/study/logs/rule.{earlier},{later}.log",
-        ),
-        ("results/{where}/regions.csv", "results/{where}/logs/rule.log"),
-    ],
+    """
+    brains/{brain}/mesh/targets.{origin}.h5 | brains/{brain}/logs/rule.{origin}.log
+    study/{sweep}/members/{run}.csv | study/{sweep}/logs/rule.{run}.log
+    study/matched/{earlier}/{later}.h5 | study/logs/rule.{earlier},{later}.log
+    "{where}/regions.csv" | "{where}/logs/rule.log"
+    """,
 )
 def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(
     pattern, log
 ):
-    assert log_of("rule", pattern) == log
+    assert log_of("rule", f"results/{pattern}") == f"results/{log}"
 
 
 @pytest.mark.parametrize(
@@ -355,17 +273,8 @@ def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(
 def test_ids_with_the_marks_of_file_names_have_files_of_their_own(patterns):
     names = ("a", "a.b", "b", "b.c", "c", "a.coefficients", "b.smoothing-1.seed-2")
     files = []
-    for first in names:
-        for second in names:
-            values = {
-                "sweep": "s",
-                "run": first,
-                "brain": second,
-                "earlier": first,
-                "later": second,
-            }
-            files += [
-                pattern.format(**values, smoothing="1", seed="2")
-                for pattern in patterns
-            ]
+    for first, second in product(names, names):
+        values = {"run": first, "brain": second, "earlier": first, "later": second}
+        values |= {"sweep": "s", "smoothing": "1", "seed": "2"}
+        files += [pattern.format(**values) for pattern in patterns]
     assert len(set(files)) == len(files)
