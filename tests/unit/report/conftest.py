@@ -9,11 +9,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from gyriflow.report import panels
+
 SMALLEST_PT = 6.0
 """Least size of print in a figure."""
 TOUCH = 3.0
 """By how many dots texts may reach into each other or over the edge: boxes are a little
 larger than letters."""
+
+
+@pytest.fixture(autouse=True)
+def quick_pictures(monkeypatch):
+    """Draw surfaces with fewer pixels than print has."""
+    monkeypatch.setattr(panels, "PIXELS_PER_INCH", 100)
 
 
 @pytest.fixture(autouse=True)

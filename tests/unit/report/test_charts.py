@@ -1,7 +1,6 @@
 """Charts hold what the tables say: metrics, norms, growth and scores."""
 
 import os
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +9,13 @@ import pytest
 from facts import Facts
 from matplotlib.figure import Figure
 from pictures import contents
+from text_tables import frame
 
 from gyriflow.errors import InputError
-from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
-from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
+from gyriflow.metrics.atlas_curves import CURVES
+from gyriflow.metrics.norms import cohort_norms, norm_curves
 from gyriflow.report.growth import growth_figure
 from gyriflow.report.scores import calibration_figure, nearest_figure, validation_figure
-from gyriflow.report.tables import brain_table
 from gyriflow.report.weeks import (
     displacement_figure,
     influence_spectra,
@@ -27,36 +26,37 @@ from gyriflow.report.weeks import (
     regions_chart,
     spectra_figure,
 )
-from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
 
-COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
-REGIONS = pd.DataFrame(
-    [
-        (
-            subject,
-            run,
-            week,
-            side,
-            region,
-            metric,
-            factor * size + (1.0 if side == "left" else 0.0),
-            unit,
-        )
-        for subject, run, week, size in (
-            ("a", "observed", 21.0, 10.0),
-            ("b", "observed", 22.0, 12.0),
-            ("a", "r", 22.0, 11.0),
-        )
-        for side in ("left", "right")
-        for region, factor in (("front", 1), ("back", 2))
-        for metric, unit in (("area", "cm2"), ("mean_sulcal_depth", "mm"))
-    ],
-    columns=COLUMNS,
+REGIONS = frame(
+    """
+    subject run      week size
+    a       observed 21   10
+    b       observed 22   12
+    a       r        22   11
+    """
 )
-ASYMMETRY = pd.DataFrame(
-    [("a", "observed", 21.0, "area", region, 0.1) for region in ("front", "back")]
-    + [("a", "observed", 21.0, "area", "", 0.5)],
-    columns=["subject", "run", "week", "metric", "region", "asymmetry_index"],
+PARTS = frame(
+    """
+    hemisphere more region factor metric            unit
+    left       1    front  1      area              cm2
+    left       1    front  1      mean_sulcal_depth mm
+    left       1    back   2      area              cm2
+    left       1    back   2      mean_sulcal_depth mm
+    right      0    front  1      area              cm2
+    right      0    front  1      mean_sulcal_depth mm
+    right      0    back   2      area              cm2
+    right      0    back   2      mean_sulcal_depth mm
+    """
+)
+REGIONS = REGIONS.merge(PARTS, how="cross")
+REGIONS["value"] = REGIONS["factor"] * REGIONS["size"] + REGIONS["more"]
+ASYMMETRY = frame(
+    """
+    subject run      week metric region asymmetry_index
+    a       observed 21   area   front  0.1
+    a       observed 21   area   back   0.1
+    a       observed 21   area   -      0.5
+    """
 )
 WEEKS = np.arange(21.0, 31.0)
 REFERENCE = [f"s{i}" for i in range(len(WEEKS))]
@@ -66,39 +66,27 @@ NOISE = np.array([0.5, -0.5, 0.2, -0.1, -0.4, 0.3, 0.3, -0.5, 0.4, -0.2])
 def metric_rows(
     run: str, hemisphere: str, metric: str, values: dict[float, float], unit: str
 ) -> pd.DataFrame:
-    columns = {
-        "subject": "s",
-        "run": run,
-        "week": list(values),
-        "hemisphere": hemisphere,
-        "metric": metric,
-    }
-    return pd.DataFrame({**columns, "value": list(values.values()), "unit": unit})
+    table = pd.DataFrame({"week": list(values), "value": list(values.values())})
+    which = {"run": run, "hemisphere": hemisphere, "metric": metric}
+    return table.assign(subject="s", unit=unit, **which)
 
 
 def spectrum_rows(
     run: str, week: float, power: dict[int, float], *, complete: bool = True
 ) -> list[pd.DataFrame]:
-    of_all = {"subject": "s", "run": run, "week": week, "resolved": True}
-    of_all |= {"complete": complete, "denominator_complete": complete}
-    bands, powers = list(power), np.array(list(power.values()))
-    return [
-        pd.DataFrame(
-            {
-                **of_all,
-                "hemisphere": side,
-                "proxy": proxy,
-                "band": bands,
-                "relative_power": factor * share * powers,
-            }
-        )
-        for side, factor in (("left", 1.0), ("right", 0.5))
-        for proxy, share in (("mean_curvature", 1.0), ("shape_index", 0.8))
-    ]
+    bands = pd.DataFrame({"band": list(power), "power": list(power.values())})
+    bands = bands.assign(subject="s", run=run, week=week, resolved=True)
+    bands = bands.assign(complete=complete, denominator_complete=complete)
+    tables = []
+    for side, factor in (("left", 1.0), ("right", 0.5)):
+        for proxy, share in (("mean_curvature", 1.0), ("shape_index", 0.8)):
+            table = bands.assign(hemisphere=side, proxy=proxy)
+            table["relative_power"] = factor * share * table["power"]
+            tables.append(table)
+    return tables
 
 
 NO_ATLASES = pd.DataFrame(columns=CURVES)
-NO_DIFFERENCES = pd.DataFrame(columns=DIFFERENCES)
 
 
 def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
@@ -107,20 +95,18 @@ def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
     return influence_spectra([pd.concat(members)], real, values=values, week=28.0)
 
 
-@cache
 def metrics_with_norms() -> pd.DataFrame:
-    rows = [
-        (name, "observed", week, "whole", "area", 10 * week + noise, "cm2")
-        for name, week, noise in zip(REFERENCE, WEEKS, NOISE, strict=True)
-    ]
-    rows += [
-        ("case", "observed", 25.0, "whole", "area", 252.0, "cm2"),
-        ("s0", "r", 24.0, "whole", "area", 240.0, "cm2"),
-    ]
-    return pd.DataFrame(
-        rows,
-        columns=["subject", "run", "week", "hemisphere", "metric", "value", "unit"],
+    """Return metrics of brains of a norm, of one beside it, and of a run."""
+    brains = {"subject": REFERENCE, "week": WEEKS, "value": 10 * WEEKS + NOISE}
+    further = frame(
+        """
+        subject run      week value
+        case    observed 25   252
+        s0      r        24   240
+        """
     )
+    table = pd.concat([pd.DataFrame(brains).assign(run="observed"), further])
+    return table.assign(hemisphere="whole", metric="area", unit="cm2")
 
 
 def scans_of_subjects(groups=None):
@@ -131,12 +117,6 @@ def scans_of_subjects(groups=None):
         rows = metric_rows("observed", "whole", "area", {week: value}, "cm2")
         parts.append(rows.assign(subject=brain))
     return pd.concat(parts), {"a1": "sub-a", "a2": "sub-a", "b1": "sub-b"}
-
-
-def subjects_by_marker():
-    """Scans of a subject are joined, and subjects are told apart."""
-    metrics, subjects = scans_of_subjects()
-    return metrics_figure(metrics, NO_ATLASES, subjects=subjects)
 
 
 def subjects_by_marker_and_groups_by_colour():
@@ -196,10 +176,6 @@ def a_band_of_a_run_that_is_cut_off():
     return study_of(*cut_off("thin").values())
 
 
-def a_band_of_a_brain_that_is_cut_off():
-    return study_of(*cut_off("observed").values())
-
-
 def a_band_of_a_brain_that_is_cut_off_over_weeks():
     found = cut_off("observed")
     return spectra_figure(pd.concat([*found["thin"], *found["observed"]]), NO_ATLASES)
@@ -243,62 +219,55 @@ def a_norm_of_averages():
 
 
 def bands_between_centiles():
-    centiles = {
-        "expected": [100.0, 130.0, 200.0],
-        "q05": [90.0, 110.0, 160.0],
-        "q25": [95.0, 122.0, 185.0],
-        "q75": [106.0, 141.0, 220.0],
-        "q95": [118.0, 160.0, 270.0],
-    }
-    known = {"hemisphere": "whole", "metric": "area", "week": [22.0, 23.0, 25.5]}
-    curves = pd.DataFrame(known | centiles)
+    curves = frame(
+        """
+        week expected q05 q25 q75 q95
+        22   100      90  95  106 118
+        23   130      110 122 141 160
+        25.5 200      160 185 220 270
+        """,
+        hemisphere="whole",
+        metric="area",
+    )
     other = curves.assign(hemisphere="left", expected=1.0, q05=0.0, q95=2.0)
     brain = metric_rows("observed", "whole", "area", {24.0: 150.0}, "cm2")
-    return norms_figure(
-        brain, pd.concat([other, curves]), reference=["s"], brains=["s"]
-    )
+    own = {"reference": ["s"], "brains": ["s"]}
+    return norms_figure(brain, pd.concat([other, curves]), **own)
 
 
 def intervals_around_a_run():
     """A metric without intervals is not drawn."""
-    rows = pd.DataFrame(
-        {
-            "week": [22.0, 27.5, 24.0],
-            "unit": "1",
-            "observed_value": [np.nan, 18.5, 12.0],
-            "low": [9.0, 14.5, 11.0],
-            "high": [10.5, 19.0, 14.0],
-            "run": [10.0, 16.0, 12.5],
-        }
+    rows = frame(
+        """
+        week observed_value low  high run unit
+        22   -              9    10.5 10  1
+        27.5 18.5           14.5 19   16  1
+        24   12             11   14   12.5 1
+        """
     )
     parts = [rows.assign(metric="area"), rows.assign(metric="folding_index")]
     return intervals_figure(pd.concat(parts))
 
 
-AREAS = pd.DataFrame(
-    {
-        "series": "volume",
-        "week": [21.0, 23.0, 22.0],
-        "area_cm2": [100, 130, 115],
-        "volume_ml": [50, 70, 60],
-    }
+AREAS = frame(
+    """
+    series week area_cm2 volume_ml
+    volume 21   100      50
+    volume 23   130      70
+    volume 22   115      60
+    """
 )
-RATES = pd.DataFrame(
-    {
-        "series": "volume",
-        "from_week": [21.0, 22.0],
-        "to_week": [22.0, 23.0],
-        "rate_per_s": [1.2e-7, -0.3e-7],
-    }
+RATES = frame(
+    """
+    series from_week to_week rate_per_s
+    volume 21        22      1.2e-7
+    volume 22        23      -0.3e-7
+    """
 )
 
 
 def rates_of_growth():
     return growth_figure(AREAS, RATES, folding_rate_per_s=2e-7)
-
-
-def areas_without_rates():
-    return growth_figure(AREAS, RATES[:0])
 
 
 def rates_of_one_of_two_series():
@@ -319,45 +288,34 @@ def a_folding_rate_that_changes():
     return growth_figure(AREAS, RATES, folding_rate_per_s=curve)
 
 
-def norms_of_displacement(published):
-    """Return the displacement of all nodes per week, at the middle of each interval."""
-    norms = pd.DataFrame(
-        {
-            "run": "thin",
-            "subject": "s",
-            "from_week": [21.0, 21.0, 25.0],
-            "to_week": [22.0, 22.0, 27.0],
-            "nodes": ["all", "pial", "all"],
-            "max_mm": 3.0,
-            "mean_mm": [0.57, 0.8, 0.5],
-        }
-    )
-    return displacement_figure(norms, published=published)
-
-
-def displacement():
-    return norms_of_displacement(None)
-
-
 def displacement_beside_a_published_one():
+    """The displacement of all nodes per week, at the middle of each interval."""
+    norms = frame(
+        """
+        run  subject from_week to_week nodes max_mm mean_mm
+        thin s       21        22      all   3      0.57
+        thin s       21        22      pial  3      0.8
+        thin s       25        27      all   3      0.5
+        """
+    )
     row = {"source": "a paper", "max_mm": [2.5, 2.2], "mean_mm": [0.5, 0.4]}
     published = {"displacement": {"from_weeks": [21, 22], "rows": [row]}}
-    return norms_of_displacement(published)
+    return displacement_figure(norms, published=published)
 
 
 def parameters_of_a_calibration():
     """A diverged run has no score: it stands at the worst of the others."""
-    tried = {
-        "thickness_mm": [1.0, 2.0, 3.0, 2.2],
-        "growth_rate_per_s": [1e-7, 2e-7, 3e-7, 2.2e-7],
-        "round": [0, 0, 0, 1],
-        "score": [0.5, 0.2, np.nan, 0.1],
-    }
-    optimum = {"parameter": ["thickness_mm", "growth_rate_per_s"]}
-    optimum["value"] = [2.1, 2.1e-7]
-    return calibration_figure(
-        pd.DataFrame(tried), pd.DataFrame(optimum), score=["size"]
+    tried = frame(
+        """
+        thickness_mm growth_rate_per_s round score
+        1            1e-7              0     0.5
+        2            2e-7              0     0.2
+        3            3e-7              0     -
+        2.2          2.2e-7            1     0.1
+        """
     )
+    optimum = frame("parameter value\nthickness_mm 2.1\ngrowth_rate_per_s 2.1e-7")
+    return calibration_figure(tried, optimum, score=["size"])
 
 
 def gains(runs, start="a"):
@@ -420,29 +378,21 @@ def a_published_nearest_value():
     """It is a line in the panel of its measure and week."""
     names = ("area", "shape_index_relative_power_B4_weyl")
     rows = [distances({0.8: 2.0, 2.25: 1.0}, measure=name) for name in names]
-    found = {
-        "parameter": "thickness_mm",
-        "week": 28,
-        "measure": "shape_index_relative_power_B4",
-        "value": 1.3,
-    }
-    others = [
-        found | {"week": 29, "value": 1.4},
-        found | {"parameter": "step_s", "value": 1.5},
-    ]
-    published = {"nearest": [found, *others]}
+    found = {"parameter": "thickness_mm", "week": 28, "value": 1.3}
+    found["measure"] = "shape_index_relative_power_B4"
+    later = found | {"week": 29, "value": 1.4}
+    other = found | {"parameter": "step_s", "value": 1.5}
+    published = {"nearest": [found, later, other]}
     return nearest_figure(pd.concat(rows), **SWEEP, published=published)
 
 
 CHARTS = (
-    subjects_by_marker,
     subjects_by_marker_and_groups_by_colour,
     more_subjects_than_a_legend_holds,
     runs_as_lines_and_observed_brains_as_stars,
     atlases_near_the_weeks_of_the_brains,
     spectra_of_a_sweep,
     a_band_of_a_run_that_is_cut_off,
-    a_band_of_a_brain_that_is_cut_off,
     a_band_of_a_brain_that_is_cut_off_over_weeks,
     spectra_over_weeks,
     sums_of_areas_and_means_of_depths_of_regions,
@@ -451,11 +401,9 @@ CHARTS = (
     bands_between_centiles,
     intervals_around_a_run,
     rates_of_growth,
-    areas_without_rates,
     rates_of_one_of_two_series,
     rates_of_many_subjects,
     a_folding_rate_that_changes,
-    displacement,
     displacement_beside_a_published_one,
     parameters_of_a_calibration,
     gains_with_their_kind_and_interval,
@@ -480,66 +428,3 @@ def test_a_table_without_metrics_is_refused():
         metrics_figure(
             metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""), NO_ATLASES
         )
-
-
-def test_a_brain_has_its_numbers_with_where_they_stand():
-    metrics = metrics_with_norms()
-    own = metrics[metrics["subject"] == "case"]
-    cohort = cohort_norms(metrics, REFERENCE)
-    scores = measured_scores(metrics, REFERENCE, cohort)
-    row = brain_table(own, scores, NO_DIFFERENCES).loc["pial area (cm²)"]
-    assert (row["whole"], row["note"], row.iloc[-2]) == (
-        252.0,
-        "few brains",
-        "95 (95 to 95), +1.6",
-    )
-    averages = cohort_norms(metrics, REFERENCE, individuals=False)
-    scores = measured_scores(metrics, REFERENCE, averages)
-    row = brain_table(own, scores, NO_DIFFERENCES).loc["pial area (cm²)"]
-    assert row["norm"] == pytest.approx(250, abs=0.5)
-    assert row.iloc[-2] in ("+0.8 %", "+0.9 %", "+0.7 %")
-    assert row["note"] == SPREAD_UNKNOWN
-    scores = measured_scores(own, [], cohort_norms(own, []))
-    assert list(brain_table(own, scores, NO_DIFFERENCES)) == ["whole"]
-
-
-def test_a_brain_has_its_differences_from_atlases_beside_the_noise():
-    metrics = metrics_with_norms()
-    own = metrics[metrics["subject"] == "case"]
-    differences = pd.DataFrame(
-        {
-            "subject": ["case", "case", "case", "case", "s1"],
-            "run": ["observed", "observed", "observed", "predicted", "observed"],
-            "hemisphere": "whole",
-            "metric": "area",
-            "atlas": ["one", "two", "three", "one", "one"],
-            "difference": 1.0,
-            "relative_difference": [-0.031, 0.001, np.nan, 0.5, 0.5],
-            "times_noise": [-22.2, 1.9, 3.0, 9.0, 9.0],
-        }
-    )
-    scores = measured_scores(own, [], cohort_norms(own, []))
-    row = brain_table(own, scores, differences).loc["pial area (cm²)"]
-    row = row.rename(lambda head: head.partition(" (")[0])
-    # other errors are larger than such a multiple of this noise
-    assert row["difference from one"] == "−3.1 % (> 10 × noise)"
-    assert row["difference from two"] == "+0.1 % (within noise)"
-    assert row["difference from three"] == "+1 (3 × noise)"
-    # a metric that a warning is of has no multiple, and one of hemispheres both of them
-    power = {"metric": "spangy_B4_power", "value": 9.0, "unit": "1"}
-    sides = [own.iloc[:1].assign(hemisphere=side, **power) for side in SIDES]
-    by_side = differences[:2].assign(
-        subject="case", hemisphere=list(SIDES), metric="spangy_B4_power", atlas="one"
-    )
-    table = brain_table(
-        pd.concat([own, *sides]),
-        scores,
-        pd.concat([differences, by_side]),
-        {"area": "lower bound"},
-    )
-    table = table.rename(columns=lambda head: head.partition(" (")[0])
-    found = table["difference from one"]
-    assert found["pial area (cm²): lower bound, see the warning"] == (
-        "−3.1 % (lower bound)"
-    )
-    assert found["SpAnGy B4 power"] == Facts("left −3.1 %", "right +0.1 %")

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from facts import Facts
 from markupsafe import Markup, escape
+from text_tables import frame
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
@@ -23,7 +24,6 @@ from gyriflow.report.page import (
     page_figures,
     report_page,
     run_verdict,
-    scores_table,
     sections,
     study_page,
     verdict,
@@ -38,90 +38,57 @@ PARTS = {
     "three": "three.min.js",
     "controls": "OrbitControls.min.js",
     "viewer": "viewer.js",
+    "notice": "three.LICENSE.txt",
 }
-PARTS |= {"notice": "three.LICENSE.txt"}
-BRAINS = [
-    {
-        "id": name,
-        "week": week,
-        "population": "healthy",
-        "source": "labels",
-        "synthetic": False,
-        "licence": licence,
-    }
-    | {"covariates": covariates}
-    for name, week, licence, covariates in (
-        ("young", 21.0, "CC0 1.0", {"sex": "F"}),
-        ("old", 23.0, None, {}),
-    )
-]
+BRAIN = {"population": "healthy", "source": "labels", "synthetic": False}
+YOUNG = {"id": "young", "week": 21.0, "licence": "CC0 1.0", "covariates": {"sex": "F"}}
+OLD = {"id": "old", "week": 23.0, "licence": None, "covariates": {}}
+BRAINS = [BRAIN | YOUNG, BRAIN | OLD]
 PICTURES = {"young": ("data:image/webp;base64,AAAA", 1.5)}
-RUNS = pd.DataFrame(
-    {
-        "run": ["thin"],
-        "subject": ["young"],
-        "start_week": [21.0],
-        "preset": ["measured"],
-        "end_week": [23.0],
-        "weeks": ["[21.0, 22.0]"],
-        "min_J": [0.9],
-        "elements_through_cortex": [1.2],
-        "initial_penetration_mm": [0.0],
-        "growth.model": ["rates"],
-        "order": [1],
-        "least_elements_through_cortex": [1.1],
-        "unresolved_from_week": [21.5],
-    }
+RUNS = frame(
+    """
+    run  subject start_week preset   end_week min_J elements_through_cortex order
+    thin young   21         measured 23       0.9   1.2                     1
+    """,
+    weeks="[21.0, 22.0]",
+    initial_penetration_mm=0.0,
+    least_elements_through_cortex=1.1,
+    unresolved_from_week=21.5,
+    **{"growth.model": "rates"},
 )
-VALIDATION = pd.DataFrame(
-    {
-        "run": "thin",
-        "kind": "predicted",
-        "start": "young",
-        "start_week": 21.0,
-        "week": [22.0, 23.0],
-        "area_difference": [0.1, -0.0794],
-        "volume_difference": [0.0, 0.02],
-        "r_shape_index": [0.1, 0.566],
-        "r_start_shape_index": [0.1, 0.568],
-        "r_low_shape_index": [0.0, 0.51],
-        "r_high_shape_index": [0.2, 0.61],
-        "distance_mm": [0.1, 0.42],
-        "gain_shape_index": [0.0, -0.002],
-        "gain_low_shape_index": [0.0, -0.044],
-        "gain_high_shape_index": [0.0, 0.045],
-    }
+VALIDATION = frame(
+    """
+    week area_difference volume_difference distance_mm r_shape_index
+    22   0.1             0.0               0.1         0.1
+    23   -0.0794         0.02              0.42        0.566
+    """,
+    run="thin",
+    kind="predicted",
+    start="young",
+    start_week=21.0,
+    r_start_shape_index=[0.1, 0.568],
+    r_low_shape_index=[0.0, 0.51],
+    r_high_shape_index=[0.2, 0.61],
+    gain_shape_index=[0.0, -0.002],
+    gain_low_shape_index=[0.0, -0.044],
+    gain_high_shape_index=[0.0, 0.045],
 )
-
-
+WARNING = {"step": "s", "level": "warning"}
 NO_WARNINGS = pd.DataFrame({"subject": [], "run": [], "level": [], "message": []})
-OWN_WARNING = pd.DataFrame(
-    {
-        "subject": ["young"],
-        "run": np.nan,
-        "step": "s",
-        "level": "warning",
-        "message": "own",
-    }
+OWN_WARNING = frame("subject run message\nyoung - own", **WARNING)
+QUALITY = frame(
+    "subject\nyoung\nold",
+    verdict=["needs review", "refused"],
+    cause=[np.nan, "cropped"],
+    warnings=["a bridge was cut", np.nan],
 )
-QUALITY = pd.DataFrame(
-    {
-        "subject": ["young", "old"],
-        "verdict": ["needs review", "refused"],
-        "cause": [np.nan, "cropped"],
-        "warnings": ["a bridge was cut", np.nan],
-    }
-)
-METRICS = pd.DataFrame(
-    {
-        "subject": "young",
-        "run": "observed",
-        "week": 21.0,
-        "hemisphere": ["whole", "whole", "left"],
-        "metric": ["volume", "area", "area"],
-        "value": [46.2, 90.0, 44.0],
-        "unit": ["mL", "cm2", "cm2"],
-    }
+METRICS = frame(
+    """
+    subject run      week hemisphere metric value unit
+    young   observed 21   whole      volume 46.2  mL
+    young   observed 21   whole      area   90    cm2
+    young   observed 21   left       area   44    cm2
+    """
 )
 CENTILES = METRICS.iloc[:2].assign(
     expected=[40.0, 100.0],
@@ -134,6 +101,8 @@ CENTILES = METRICS.iloc[:2].assign(
 MEASURES = {"quality": QUALITY, "metrics": METRICS, "centiles": CENTILES}
 MEASURES["differences"] = pd.DataFrame(columns=DIFFERENCES)
 MEASURES["curves"] = pd.DataFrame(columns=CURVES)
+TABLES = MEASURES | {"runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
+MEASURED_ONLY = {"runs": None, "validation": None}
 FROM_ATLAS = METRICS[1:2].assign(
     atlas="crl", relative_difference=-0.1, difference=-10.0, times_noise=-40.0
 )
@@ -145,6 +114,11 @@ PROVENANCE = {
     "packages": {"numpy": "2.0", "absent": None},
     "files": [{"brain": "young", "what": "labels", "sha256": "12ab"}],
 }
+ORIGIN = {
+    "provenance": PROVENANCE,
+    "methods": "**Brains.** Two.",
+    "configuration": "start: young\n",
+}
 
 
 def shown(
@@ -155,31 +129,25 @@ def shown(
 ) -> list[dict]:
     """Return figures of rules, of which those that begin with "steps" are technical, in
     sections called as they."""
-    figures = [
-        {
-            "name": rule,
-            "section": rule,
-            "title": title,
-            "caption": caption,
-            "technical": rule.startswith("steps"),
-        }
-        | {"first": rule in ("weekly_figure", "predicted_figure")}
-        | {"path": f"{rule}{number}.png", "names": {"brain": "a"}}
-        for number, rule in enumerate(rules)
-    ]
+    usual = {"title": title, "caption": caption, "names": {"brain": "a"}}
+    figures = []
+    for number, rule in enumerate(rules):
+        figure = {"name": rule, "section": rule, "path": f"{rule}{number}.png"}
+        figure["technical"] = rule.startswith("steps")
+        figure["first"] = rule in ("weekly_figure", "predicted_figure")
+        figures.append(usual | figure)
     return page_figures(figures, {figure["path"]: content for figure in figures})
 
 
-TABLES = MEASURES | {"runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
-ORIGIN = {
-    "provenance": PROVENANCE,
-    "methods": "**Brains.** Two.",
-    "configuration": "start: young\n",
-}
+def written(content: dict, view: dict | None = None) -> str:
+    texts = {name: (PAGE / file).read_text() for name, file in PARTS.items()}
+    template = (PAGE / "page.html").read_text()
+    no_view = {"groups": [], "maps": []}
+    return report_page(template, texts, view or no_view, **ORIGIN, **content)
 
 
 def page(
-    figures: list[dict],
+    figures: list[dict] = (),
     view: dict | None = None,
     prediction: dict | None = None,
     **tables,
@@ -191,24 +159,28 @@ def page(
     )
 
 
-def elements(text: str, name: str) -> list[str]:
+def sheet(**tables) -> str:
+    """Return the first part of the page of a brain, with others than the usual
+    tables."""
+    all_tables = Tables(**TABLES | tables)
+    content = brain_page(BRAINS[0], all_tables, shown("quality"), norm="the norm")
+    return written(content).partition("<h2>quality")[0]
+
+
+def elements(text: str, name: str, word: str = "") -> list[str]:
     """Return the texts inside the elements of a page that have a name, without their
-    tags."""
-    return [
-        Markup(inside).striptags()
-        for inside in re.findall(rf"<{name}\b[^>]*>(.*?)</{name}>", text, re.DOTALL)
-    ]
+    tags: those with a word."""
+    inside = re.findall(rf"<{name}\b[^>]*>(.*?)</{name}>", text, re.DOTALL)
+    texts = [Markup(part).striptags() for part in inside]
+    return [text for text in texts if word in text]
 
 
-def written(content: dict, view: dict | None = None) -> str:
-    texts = {name: (PAGE / file).read_text() for name, file in PARTS.items()}
-    return report_page(
-        (PAGE / "page.html").read_text(),
-        texts,
-        view or {"groups": [], "maps": []},
-        **ORIGIN,
-        **content,
-    )
+def require_order(text: str, *parts: str) -> None:
+    places = [text.index(part) for part in parts]
+    assert places == sorted(places)
+
+
+# the page of a study
 
 
 def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
@@ -218,20 +190,13 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     ]
     text = page(figures, {"groups": [{"name": "</script><b>"}], "maps": []})
     outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', outside) == [
-        'href="brains/young.html"'
-    ]
+    links = re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', outside)
+    assert links == ['href="brains/young.html"']
     assert "</script><b>" not in text
     assert "<em>all</em>" in text
-    ids = (
-        f'<section id="{name}'
-        for name in ("surfaces-in-3d", "growth_figure", "brains", "provenance")
-    )
-    order = [
-        text.index(word)
-        for word in ("first &lt;page", "results/study/validation.csv", *ids)
-    ]
-    assert order == sorted(order)
+    names = ("surfaces-in-3d", "growth_figure", "brains", "provenance")
+    ids = [f'<section id="{name}' for name in names]
+    require_order(text, "first &lt;page", "results/study/validation.csv", *ids)
     assert Facts(2, 21, "23 GW", "healthy", "young", 1) in elements(text, "p")
     assert "12ab" in text
     assert Facts("2026-01-01 12:30 UTC", "0.1", "abc") in elements(text, "p")
@@ -254,11 +219,18 @@ def test_what_a_user_has_written_is_shown_as_text(monkeypatch):
     assert "<script" not in shown_text
 
 
+def test_messages_tell_files_without_their_folders(monkeypatch):
+    message = "/data/Smith John/x.nii.gz: cortex of 1 voxel, see https://a.b/c"
+    monkeypatch.setitem(QUALITY, "warnings", [message, ""])
+    text = page()
+    assert "x.nii.gz: cortex of 1 voxel, see https://a.b/c" in text
+    assert "Smith" not in text
+
+
 def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_through():
-    figures = [
-        {**item, "section": name}
-        for item, name in zip(shown("steps", "maps", "rates"), "AAB", strict=True)
-    ]
+    figures = shown("steps", "maps", "rates")
+    for figure, name in zip(figures, "AAB", strict=True):
+        figure["section"] = name
     found = [
         (name, [(item["number"], item["technical"]) for item in items])
         for name, items in sections(figures)
@@ -267,282 +239,130 @@ def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_thr
     assert "<details><summary>2. a</summary>" in page(figures)
 
 
-def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
-    none = pd.DataFrame({"level": [], "message": []})
-    told = verdict(RUNS, VALIDATION, none)
-    assert told == Facts("23 GW", "thin", "predicted", 0.57, "0.42 mm", 1.2, 2)
-    # the warning names its run
-    coarse = RUNS.assign(run="coarse")
-    assert verdict(coarse, VALIDATION, none) == Facts("thin", "coarse", 1.2, 2)
-    failed = pd.DataFrame(
-        {"level": ["warning", "error"], "message": ["holes closed", "a step died."]}
-    )
-    assert (
-        verdict(RUNS, VALIDATION, failed)
-        == Facts("23 GW", "a step died.")
-        != Facts("holes closed")
-    )
-    resolved = RUNS.assign(elements_through_cortex=8.5, unresolved_from_week=np.nan)
-    # a warning about one element is not the worst of several
-    doubts = pd.DataFrame({"level": "warning", "message": ["one element", "coarse"]})
-    assert verdict(RUNS, VALIDATION, doubts) == told
-    assert verdict(resolved, None, doubts) == Facts(2)
-    assert verdict(resolved, None, doubts) != Facts("one element")
-    assert verdict(resolved, None, doubts[:1]) == Facts("one element")
-    alone = verdict(resolved, None, none)
-    assert alone == Facts(NOT_COMPARED)
-    assert not re.search(r"\d", alone)
-    assert told in page(shown("growth_figure")).replace("&#39;", "'")
+def test_a_study_without_simulations_says_how_many_brains_have_which_verdict():
+    quality = pd.concat([QUALITY, QUALITY[:1].assign(subject="third")])
+    text = page(**MEASURED_ONLY, quality=quality)
+    assert elements(text, "strong")[0] == "3 brains: 2 need review, 1 refused."
 
 
-ATLASES = read_yaml(SHIPPED / "norms" / "atlases.yaml")["atlases"]
-ACCURACY = read_yaml(SHIPPED / "norms" / "predictions.yaml")
-
-
-def predicted(weeks: float) -> dict:
-    """Return what the report of a prediction is given, so many weeks ahead of 22 GW."""
-    atlas = {
-        "name": "crl",
-        "title": "An atlas",
-        "reference": "A. et al., doi 10.1/x",
-    }
-    atlas["licence"] = {
-        "name": "CRL licence",
-        "url": None,
-        "terms": "Research only.",
-        "accept": True,
-    }
-    return {
-        "run": "thin",
-        "brain": "young",
-        "start_week": 22.0,
-        "week": 22 + weeks,
-        "atlas_brain": "crl-30",
-        "atlas_week": 30,
-        "population": "well",
-        "atlas": atlas,
-        "accuracy": ACCURACY,
-        "tests": {
-            "errors": {"area": "largest error in 4 tests"},
-            "starts": ["crl 22 GW"],
-            "advantage": "",
-        },
-        "kept": pd.DataFrame(
-            {
-                "week": [23.0, 30.0, 34.0],
-                "smooth_share": [0.9, 0.6, 0.5],
-                "finer_share": [0.7, 0.1, 0.0],
-                "difference_mm": 0.71,
-            }
-        ),
-        "surfaces": ["results/a.surf.gii"],
-        "atlas_surface": "results/atlas.surf.gii",
-        "labels": "results/a_dseg.nii.gz",
-    }
-
-
-def test_the_report_of_a_prediction_says_what_it_is_how_accurate_and_in_which_files():
-    figures = shown("predicted_figure", "weekly_figure", caption="of *all*")
-    metrics = pd.concat(
-        [METRICS, METRICS[1:2].assign(run="thin", week=29.5, value=210.5)]
-    )
-    text = " ".join(
-        page(
-            figures, validation=None, prediction=predicted(7.5), metrics=metrics
-        ).split()
-    )
-    assert elements(text, "h1") == [Facts("young", "29.5 GW", "the atlas crl")]
-    assert Facts("young", "22 GW", "29.5 GW", 7.5, "An atlas") in elements(text, "p")
-    parts = (
-        "</h1>",
-        str(escape(accuracy_sentence(predicted(7.5)))),
-        "210.5",
-        "largest error in 4 tests",
-        "0.71 mm",
-        "crl 22 GW",
-        "norms/predictions.yaml",
-        "results/a.surf.gii",
-        "results/atlas.surf.gii",
-        "results/a_dseg.nii.gz",
-        "A. et al., doi 10.1/x.",
-        "CRL licence",
-        "Research only.",
-        '<section id="brains"',
-    )
-    order = [text.index(part) for part in parts]
-    assert order == sorted(order)
-    # no table of dashes, and the other figure in its section
-    assert "results/study/validation.csv" not in text
-    assert "<h2>weekly_figure" in text
-    assert "results/study/validation.csv" in page(figures, prediction=predicted(7.5))
-    # also beside an observed brain
-    better = predicted(7.5)
-    better["tests"] |= {"advantage": "The atlas was better."}
-    assert "<strong>The atlas was better. At 23 GW" in page(figures, prediction=better)
-
-
-def test_a_prediction_beyond_those_that_were_tried_says_so():
-    last = max(row["horizon"] for row in ACCURACY["rows"])
-    assert accuracy_sentence(predicted(last)).count(f"{last:g} weeks") == 1
-    rows = [
-        {"horizon": 2.0, "model": name, "distance_mm": 0.5, "r_shape_index": 0.8}
-        for name in ("run", "atlas", "scaled")
-    ]
-    worse = [rows[0] | {"r_shape_index": 0.7}, *rows[1:]]
-    told = [
-        accuracy_sentence(predicted(2.0) | {"accuracy": {"rows": accuracy}})
-        for accuracy in (rows, worse)
-    ]
-    assert ["shape index; it is stored with" in sentence for sentence in told] == [
-        False,
-        True,
-    ]
-    assert accuracy_sentence(predicted(last + 1)) == Facts(
-        f"{last:g} weeks", f"{last + 1:g} weeks"
-    )
-    # where the atlas' own brain was better, that comes first
-    brain = predicted(2.0)
-    assert accuracy_sentence(brain).startswith("This is a prediction")
-    brain["tests"] |= {"advantage": "The atlas was better."}
-    assert accuracy_sentence(brain).startswith(
-        "The atlas was better. This is a prediction"
-    )
-
-
-def test_shipped_accuracy_has_all_baselines_and_at_least_two_starts_at_each_horizon():
-    rows = pd.DataFrame(ACCURACY["rows"])
-    assert (rows.groupby("horizon")["start"].nunique() >= 2).all()
-    assert not rows.duplicated(["start", "start_week", "horizon", "model"]).any()
-    by_way = rows.pivot_table(
-        "distance_mm", ["start", "start_week", "horizon"], "model"
-    )
-    assert set(by_way) == {"run", "target", "atlas", "atlas_deformed", "scaled"}
-    assert by_way.notna().all(axis=None)
-    # a prediction that is worth less than no folding would not be shipped
-    assert (by_way["run"] < by_way["scaled"]).all()
-    assert rows["r_shape_index"].between(0, 1).all()
+def test_equal_warnings_are_one_row_with_each_brain_once():
+    text = "subject run\nyoung -\nold -\nyoung -"
+    warnings = frame(text, message="too small", **WARNING)
+    text = page(warnings=warnings)
+    assert text.count("too small") == 1
+    assert "young; old<" in text
 
 
 def test_paths_are_hidden():
-    named = {
-        "labels": "/data/Smith_John.nii.gz",
-        "brains": [{"id": "a", "pial": "C:\\x\\lh.pial", "image": "S.nii"}],
-    }
-    hidden = {
-        "labels": "(file)",
-        "brains": [{"id": "a", "pial": "(file)", "image": "(file)"}],
-    }
+    pial = {"id": "a", "pial": "C:\\x\\lh.pial", "image": "S.nii"}
+    named = {"labels": "/data/Smith_John.nii.gz", "brains": [pial]}
+    hidden = {"id": "a", "pial": "(file)", "image": "(file)"}
     plain = {"population": "spina bifida aperta", "week": 21.0}
-    assert hide_paths(named | plain) == hidden | plain
+    expected = {"labels": "(file)", "brains": [hidden]}
+    assert hide_paths(named | plain) == expected | plain
 
 
-def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
-    tables = Tables(**TABLES)
-    young, old = brain_rows(BRAINS, tables, linked=PICTURES)
+# brains
+
+
+def rows_of_brains(**tables):
+    return brain_rows(BRAINS, Tables(**TABLES | tables), linked=PICTURES)
+
+
+def test_a_brain_has_a_row_with_numbers_verdict_and_cause_or_warnings():
+    young, old = rows_of_brains()
     assert (young["verdict"], young["cause"]) == ("needs review", "a bridge was cut")
     assert (old["verdict"], old["cause"]) == ("refused", "cropped")
     assert young["facts"] == ["21 GW", "healthy", "sex: F", "CC0 1.0"]
     assert old["facts"][:3] == ["23 GW", "healthy", "labels"]
-    assert [row["numbers"]["volume, with ventricles (mL)"] for row in (young, old)] == [
-        ("46.2", ["88 (70 to 96), +1.2"]),
-        ("–", []),
-    ]
     # averages give no centile
-    assert young["numbers"]["pial area (cm²)"] == ("90", ["−10.0 %"])
-    # without a norm, atlases, and what a warning says of a metric
+    assert young["numbers"] == {
+        "volume, with ventricles (mL)": ("46.2", ["88 (70 to 96), +1.2"]),
+        "pial area (cm²)": ("90", ["−10.0 %"]),
+    }
+    assert old["numbers"] == {title: ("–", []) for title in young["numbers"]}
+
+
+def test_numbers_without_a_norm_have_their_warnings_and_differences_from_atlases():
     quality = QUALITY.assign(area_is_lower_bound=[True, np.nan])
-    unrated = {"quality": quality, "centiles": CENTILES.assign(centile=np.nan)}
-    unrated["centiles"]["expected"] = np.nan
-    unrated["differences"] = FROM_ATLAS
-    young, old = brain_rows(BRAINS, Tables(**TABLES | unrated), linked=PICTURES)
-    assert young["numbers"]["pial area (cm²)"] == ("90", ["lower bound", "−10.0 % CRL"])
-    assert young["numbers"]["volume, with ventricles (mL)"] == ("46.2", [])
-    text = page([], **unrated)
-    assert [words for words in elements(text, "p") if "CRL" in words] == [
-        Facts("CRL (Gholipour et al. 2017)")
-    ]
-    rows = re.findall(
-        "<tr>.*?</tr>", page([]).partition('<div class="wide brains">')[2], re.DOTALL
-    )[1:3]
-    assert [("<img " in row, "href" in row) for row in rows] == [
+    centiles = CENTILES.assign(centile=np.nan, expected=np.nan)
+    unrated = {"quality": quality, "centiles": centiles, "differences": FROM_ATLAS}
+    young, _ = rows_of_brains(**unrated)
+    assert young["numbers"] == {
+        "volume, with ventricles (mL)": ("46.2", []),
+        "pial area (cm²)": ("90", ["lower bound", "−10.0 % CRL"]),
+    }
+    cited = Facts("CRL (Gholipour et al. 2017)")
+    assert elements(page(**unrated), "p", "CRL") == [cited]
+
+
+def test_the_table_of_brains_has_pictures_and_links_of_those_with_pages():
+    table = page().partition('<div class="wide brains">')[2]
+    _, young, old, *_ = re.findall("<tr>.*?</tr>", table, re.DOTALL)
+    assert [("<img " in row, "href" in row) for row in (young, old)] == [
         (True, True),
         (False, False),
     ]
-    assert elements(rows[0], "td")[2:] == ["46.288 (70 to 96), +1.2", "90−10.0 %"]
+    assert elements(young, "td")[2:] == ["46.288 (70 to 96), +1.2", "90−10.0 %"]
     # the verdict is below the name, which is seen on narrow screens
-    _, described, *numbers = elements(rows[1], "td")
+    _, described, *numbers = elements(old, "td")
     assert described.startswith("old23 GW;")
     assert described.endswith("refusedcropped")
     assert numbers == ["–", "–"]
 
 
 def test_a_page_says_how_certain_its_centiles_are():
-    few = pd.concat(
-        [MEASURES["centiles"], MEASURES["centiles"].assign(flag="too few brains")]
-    )
-    # those of an atlas itself are not spoken of
-    for text in (page(shown("growth_figure")), page([], centiles=few)):
-        sentences = [sentence for sentence in elements(text, "p") if "norm" in sentence]
-        assert sentences == [Facts("90 %", "z"), Facts("the norm")]
+    # the few brains of an atlas itself are not spoken of
+    few = pd.concat([CENTILES, CENTILES.assign(flag="too few brains")])
     published = ("ten", "z", "dhcp-19", "results/study/published_centiles.csv")
-    for flag, facts in (("few brains", (30, 5, 95)), ("too few brains", published)):
-        text = page([], centiles=MEASURES["centiles"].assign(flag=flag))
-        assert [sentence for sentence in elements(text, "p") if "norm" in sentence] == [
-            Facts(*facts)
-        ]
+    for centiles, facts in (
+        (few, [("90 %", "z"), ("the norm",)]),
+        (CENTILES.assign(flag="few brains"), [(30, 5, 95)]),
+        (CENTILES.assign(flag="too few brains"), [published]),
+    ):
+        sentences = elements(page(centiles=centiles), "p", "norm")
+        assert sentences == [Facts(*words) for words in facts]
+
+
+# the page of a brain
 
 
 def test_a_brain_has_a_page_of_its_own():
-    warnings = pd.DataFrame(
-        {
-            "subject": ["young", "young", "old"],
-            "run": [np.nan, "thin", np.nan],
-            "step": "s",
-            "level": "warning",
-            "message": ["own", "of a run", "of another"],
-        }
-    )
-    own = {"warnings": warnings, "differences": FROM_ATLAS}
-    tables = Tables(**TABLES | own)
+    text = "subject run message\nyoung - own\nyoung thin of-a-run\nold - of-another"
+    tables = Tables(**TABLES | {"warnings": frame(text, **WARNING)})
     text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert 'href="../report.html"' in text
-    assert text.index("<th>left</th>") < text.index(">own<") < text.index("<h2>quality")
-    assert ("of a run" in text, "of another" in text) == (False, False)
-    # first both hemispheres, and where the brain stands
-    before, _, _ = text.partition("<h2>quality")
-    row = r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 % \(&gt; 10 ×"
-    assert re.search(row, before)
-    assert "medical device" in before
-    heads = [head for head in elements(before, "th") if "CRL" in head]
-    assert heads == [Facts("difference from CRL", "multiples of the noise")]
-    (compared,) = [words for words in elements(before, "p") if "Gholipour" in words]
-    assert compared == Facts("CRL", "2017")
-    tables = Tables(**TABLES)
-    text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
+    require_order(text, "<th>left</th>", ">own<", "<h2>quality")
+    assert ("of-a-run" in text, "of-another" in text) == (False, False)
     assert "no atlas to compare with" in text
 
 
-def sheet(**tables) -> str:
-    """Return the first part of the page of a brain, with others than the usual
-    tables."""
-    all_tables = Tables(**TABLES | tables)
-    text = written(brain_page(BRAINS[0], all_tables, [], norm="the norm"))
-    return text.partition('<section id="brains">')[0]
+def test_the_first_sheet_has_both_hemispheres_and_where_the_brain_stands():
+    text = sheet(differences=FROM_ATLAS)
+    row = r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 % \(&gt; 10 ×"
+    assert re.search(row, text)
+    assert "medical device" in text
+    noise = Facts("difference from CRL", "multiples of the noise")
+    assert elements(text, "th", "CRL") == [noise]
+    assert elements(text, "p", "Gholipour") == [Facts("CRL", "2017")]
+    made = Facts("labels", "12ab", "gyriflow 0.1", "2026-01-01")
+    assert elements(text, "p", "SHA-256") == [made]
+
+
+ATLASES = read_yaml(SHIPPED / "norms" / "atlases.yaml")["atlases"]
 
 
 def test_the_first_sheet_says_that_thickness_is_not_to_be_compared_with_atlases():
     thickness = METRICS[:1].assign(metric="mean_thickness", value=1.9, unit="mm")
-    values = {
-        atlas: pd.Series(
-            facts["values"]["whole"]["mean_thickness"], index=facts["weeks"]
-        )
-        for atlas, facts in ATLASES.items()
-    }
+    values = {}
+    for atlas, facts in ATLASES.items():
+        whole = facts["values"]["whole"]
+        values[atlas] = pd.Series(whole["mean_thickness"], index=facts["weeks"])
     ratio = (values["chinese"] / values["crl"]).dropna()
     smallest, largest = 100 * (1 - ratio.max()), 100 * (1 - ratio.min())
     text = sheet(differences=FROM_ATLAS, metrics=pd.concat([METRICS, thickness]))
-    (compared,) = [words for words in elements(text, "p") if "Thickness" in words]
-    assert compared == Facts(f"{smallest:.0f} to {largest:.0f} %")
+    differs = Facts(f"{smallest:.0f} to {largest:.0f} %")
+    assert elements(text, "p", "Thickness") == [differs]
     assert "Thickness" not in sheet(differences=FROM_ATLAS)
 
 
@@ -556,97 +376,92 @@ def test_the_first_sheet_says_by_how_much_parts_differ_from_the_volume():
     assert 1.0 < most < 3.0
     tissue = METRICS[:1].assign(metric="volume_tissue", value=40.0)
     text = sheet(differences=FROM_ATLAS, metrics=pd.concat([METRICS, tissue]))
-    (told,) = [words for words in elements(text, "p") if "in voxels" in words]
-    assert told == Facts("up to 3 %")
+    assert elements(text, "p", "in voxels") == [Facts("up to 3 %")]
     assert "in voxels" not in sheet(differences=FROM_ATLAS)
 
 
 @pytest.mark.parametrize(
-    ("weeks", "words"),
+    ("weeks", "volumes", "words"),
     [
-        ((20.0, 21.0, 22.0), "20 and 22 GW: volume −10.0 % and +30.0 %"),
-        ((21.0, 22.0, 23.0), "22 GW: volume +10.0 %"),
+        ((20, 21, 22), (9, 10, 13), "20 and 22 GW: volume −10.0 % and +30.0 %"),
+        ((21, 22, 23), (10, 11, 13), "22 GW: volume +10.0 %"),
     ],
 )
-def test_the_first_sheet_says_what_a_week_of_age_is_worth(weeks, words):
-    values = {
-        "volume": [9.0, 10.0, 13.0] if weeks[0] == 20 else [10.0, 11.0, 13.0],
-        "area": [80.0, 100.0, 125.0],
-        "gyrification_index": [1.0, 1.1, 1.21],
-        "mean_sulcal_depth": [2.0, 3.0, 4.0],
-        "mean_thickness": [1.0, 2.0, 3.0],
-    }
-    curves = pd.concat(
-        pd.DataFrame({"metric": name, "week": weeks, "value": numbers})
-        for name, numbers in values.items()
-    ).assign(atlas="crl", hemisphere="whole")
+def test_the_first_sheet_says_what_a_week_of_age_is_worth(weeks, volumes, words):
+    curves = frame(
+        """
+        volume area gyrification_index mean_sulcal_depth mean_thickness
+        0      80   1                  2                 1
+        0      100  1.1                3                 2
+        0      125  1.21               4                 3
+        """
+    )
+    curves = curves.assign(volume=volumes, week=weeks).melt("week", var_name="metric")
+    curves = curves.assign(atlas="crl", hemisphere="whole")
     text = sheet(differences=FROM_ATLAS, curves=curves)
-    (told,) = [line for line in elements(text, "p") if "week of age" in line]
+    (told,) = elements(text, "p", "week of age")
     assert told == Facts(f"CRL at {words}")
+    names = (", pial area", ", gyrification index", ", mean depth below the hull")
+    require_order(told, words, *names)
     assert "thickness" not in told
-    parts = told.partition("week of age")[2].split(", ")
-    assert [part.split(" −")[0].split(" +")[0] for part in parts[1:4]] == [
-        "pial area",
-        "gyrification index",
-        "mean depth below the hull",
-    ]
 
 
-def test_the_first_sheet_says_from_which_files_it_was_made_by_which_version_and_when():
-    text = sheet(differences=FROM_ATLAS)
-    (told,) = [line for line in elements(text, "p") if "SHA-256" in line]
-    assert told == Facts("labels", "12ab", "gyriflow 0.1", "2026-01-01")
+@pytest.mark.parametrize(
+    ("judged", "warnings", "facts"),
+    [
+        ("fine", NO_WARNINGS, ["fine: no automatic warning.", "bad-inputs.md"]),
+        ("fine", OWN_WARNING, ["fine (warnings below", "bad-inputs.md"]),
+        ("needs review", OWN_WARNING, ["needs review (warnings below"]),
+    ],
+)
+def test_a_verdict_of_fine_says_that_faults_may_give_no_warning(
+    judged, warnings, facts
+):
+    text = sheet(quality=QUALITY.assign(verdict=judged), warnings=warnings)
+    (found,) = elements(text, "p", "Quality of")
+    assert found == Facts(*facts)
+    assert ("bad-inputs.md" in found) == (judged == "fine")
 
 
-def test_a_verdict_of_fine_says_that_faults_may_give_no_warning():
-    sentences = []
-    for judged, warnings in (
-        ("fine", NO_WARNINGS),
-        ("fine", OWN_WARNING),
-        ("needs review", OWN_WARNING),
-    ):
-        tables = Tables(
-            **TABLES | {"quality": QUALITY.assign(verdict=judged), "warnings": warnings}
-        )
-        text = written(brain_page(BRAINS[0], tables, [], norm="the norm"))
-        (found,) = [words for words in elements(text, "p") if "Quality of" in words]
-        sentences.append(found)
-    fine, warned, doubtful = sentences
-    assert fine == Facts("fine: no automatic warning.", "docs/how-to/bad-inputs.md")
-    assert warned == Facts("fine (warnings below", "docs/how-to/bad-inputs.md")
-    assert doubtful == Facts("needs review (warnings below")
-    assert "bad-inputs.md" not in doubtful
+# runs
 
 
-def test_a_measured_study_begins_with_how_many_brains_have_which_verdict():
-    quality = pd.concat([QUALITY, QUALITY[:1].assign(subject="third")])
-    text = page([], runs=None, validation=None, quality=quality)
-    assert "3 brains: 2 need review, 1 refused." in text
+FINE = RUNS.assign(elements_through_cortex=8.5, unresolved_from_week=np.nan)
+NONE = frame("level message")
+FAILED = pd.DataFrame({"level": ["warning", "error"], "message": ["holes", "it died."]})
+TWO = pd.DataFrame({"level": "warning", "message": ["one element", "coarse"]})
+COMPARED = ("23 GW", "thin", "predicted", 0.57, "0.42 mm")
 
 
-def test_equal_warnings_are_one_row_with_each_brain_once():
-    names = ["young", "old", "young"]
-    warnings = pd.DataFrame({"subject": names, "run": np.nan, "step": "s"})
-    warnings = warnings.assign(level="warning", message="too small")
-    text = page([], warnings=warnings)
-    assert text.count("too small") == 1
-    assert "young; old<" in text
-
-
-def test_a_run_is_judged_and_scored_at_its_last_compared_week():
-    (row,) = scores_table(RUNS, VALIDATION).to_dict("records")
-    assert row["verdict"] == Facts("22 GW", 23, 1.2, 2)
-    assert row["observed brain"] == Facts("23 GW", "predicted")
-    assert row["area (%)"] == "−7.9"
-    assert (row["r"], row["gain"]) == ("0.57 (0.51 to 0.61)", "−0.00 (−0.04 to +0.04)")
-    assert row["distance (mm)"] == "0.42"
-    # of the same run from another brain of that week
-    other = VALIDATION.assign(start="old", distance_mm=9.0)
-    both = scores_table(RUNS, pd.concat([VALIDATION, other]))
-    assert both["distance (mm)"].tolist() == ["0.42"]
-    (alone,) = scores_table(RUNS).to_dict("records")
-    assert alone["gain"] == "–"
-    assert "GW" not in alone["observed brain"]
+@pytest.mark.parametrize(
+    ("runs", "validation", "warnings", "facts", "without"),
+    [
+        (RUNS, VALIDATION, NONE, [*COMPARED, 1.2, 2], "warnings"),
+        # the warning names its run
+        (
+            RUNS.assign(run="coarse"),
+            VALIDATION,
+            NONE,
+            ["thin", "coarse", 1.2],
+            "warnings",
+        ),
+        (RUNS, VALIDATION, FAILED, ["23 GW", "it died."], "holes"),
+        # a warning about one element is not the worst of several
+        (RUNS, VALIDATION, TWO, [*COMPARED, 1.2, 2], "one element"),
+        (FINE, None, TWO, [NOT_COMPARED, "2 warnings"], "one element"),
+        (FINE, None, TWO[:1], [NOT_COMPARED, "one element"], "warnings"),
+        (FINE, None, NONE, [NOT_COMPARED, "no warnings"], "Worst"),
+    ],
+)
+def test_the_verdict_tells_what_was_compared_and_the_worst_warning(
+    runs, validation, warnings, facts, without
+):
+    told = verdict(runs, validation, warnings)
+    assert told == Facts(*facts)
+    assert without not in told
+    tables = {"runs": runs, "validation": validation}
+    if warnings is NONE:
+        assert told in page(**tables).replace("&#39;", "'")
 
 
 @pytest.mark.parametrize(
@@ -666,17 +481,10 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
 )
 def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, facts):
     # to its end, with so many elements before its steps of half a week and in them
-    steps = pd.DataFrame(
-        {
-            "week": 21.5 + 0.5 * np.arange(len(through)),
-            "elements_through_cortex": through,
-        }
-    )
-    run = {
-        **RUNS.iloc[0].to_dict(),
-        "weeks": "[21.0, 23.0]",
-        "elements_through_cortex": through[0],
-    }
+    weeks = 21.5 + 0.5 * np.arange(len(through))
+    steps = pd.DataFrame({"week": weeks, "elements_through_cortex": through})
+    run = RUNS.iloc[0].to_dict() | {"elements_through_cortex": through[0]}
+    run |= {"weeks": "[21.0, 23.0]"}
     run |= resolution_over_steps(order, steps, has_layers=True)
     reached, *doubts = run_verdict(run).split("; ")
     assert (reached, doubts) == (Facts("23 GW"), [Facts(*doubt) for doubt in facts])
@@ -684,151 +492,182 @@ def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, fact
     assert run_verdict(run | {"initial_penetration_mm": 0.45}) == run_verdict(run)
     assert run_verdict(run | {"initial_penetration_mm": 0.55}) == Facts("0.55 mm")
     # layers do not enter growth towards shapes
-    run |= {"growth.model": "shapes"} | resolution_over_steps(
-        order, steps, has_layers=False
-    )
-    assert run_verdict(run) == reached
+    run |= resolution_over_steps(order, steps, has_layers=False)
+    assert run_verdict(run | {"growth.model": "shapes"}) == reached
     assert np.isnan([run["element_error_percent"], run["unresolved_from_week"]]).all()
 
 
-def test_the_methods_say_what_was_run():
-    packages = dict.fromkeys(
-        ("scikit-image", "fenics-dolfinx", "petsc4py", "snakemake"), "9.9"
-    )
-    software = {"gyriflow": "0.1", "packages": packages}
-    parameters = {
-        "start_week": 21.0,
-        "step_s": 43200.0,
-        "material": "neo-hookean",
-        "shear_modulus_cortex_pa": 1500.0,
-        "shear_modulus_core_pa": {"map": "core"},
-        "poisson_ratio": 0.45,
-        "thickness_mm": 1.5,
-        "growth": {"model": "rates"},
-        "growth_rate_per_s": 2e-7,
-        "core_growth_rate_per_s": 0.0,
-        "stress_memory_gw": 0.0,
-        "contact": "global",
+# predictions
+
+ACCURACY = read_yaml(SHIPPED / "norms" / "predictions.yaml")
+KEPT = """
+week smooth_share finer_share difference_mm
+23   0.9          0.7         0.71
+30   0.6          0.1         0.71
+34   0.5          0.0         0.71
+"""
+
+
+def predicted(weeks: float, advantage: str = "") -> dict:
+    """Return what the report of a prediction is given, so many weeks ahead of 22 GW."""
+    licence = {"name": "CRL licence", "url": None, "terms": "Research only."}
+    atlas = {"name": "crl", "title": "An atlas", "reference": "A. et al., doi 10.1/x"}
+    errors = {"area": "largest error in 4 tests"}
+    return {
+        "run": "thin",
+        "brain": "young",
+        "start_week": 22.0,
+        "week": 22 + weeks,
+        "atlas_brain": "crl-30",
+        "atlas_week": 30,
+        "population": "well",
+        "atlas": atlas | {"licence": licence | {"accept": True}},
+        "accuracy": ACCURACY,
+        "tests": {"errors": errors, "starts": ["crl 22 GW"], "advantage": advantage},
+        "kept": frame(KEPT),
+        "surfaces": ["results/a.surf.gii"],
+        "atlas_surface": "results/atlas.surf.gii",
+        "labels": "results/a_dseg.nii.gz",
     }
-    summary = {"weeks": [21.0, 24.5], "steps": 49, "tets": 1234}
-    led = parameters | {"growth": {"model": "shapes", "of": "self"}}
-    brains = [
-        {
-            "week": 21.0,
-            "population": "spina bifida",
-            "source": "labels",
-            "synthetic": False,
-        },
-        {"week": 24.5, "population": None, "source": "shape", "synthetic": True},
-    ]
-    runs = [
-        {
-            "run": "stiff",
-            "start": "young",
-            "growth_of": "",
-            "parameters": parameters,
-            "summary": summary,
-        },
-        {
-            "run": "led",
-            "start": "a",
-            "growth_of": "population cohort",
-            "parameters": led,
-            "summary": summary,
-        },
-        {
-            "run": "own",
-            "start": "a",
-            "growth_of": "own",
-            "parameters": led,
-            "summary": summary,
-        },
-    ]
-    template, metrics = (PAGE / "methods.rst").read_text(), {"curvature_radius_mm": 3.0}
-    surface = {"ids": ["young"], "cortex": "white", "by_cortex": True}
-    atlas = {"ids": ["old", "older"], "cortex": "measured", "by_cortex": False}
-    text = methods_text(
-        template,
-        brains=brains,
-        runs=runs,
-        software=software,
-        metrics=metrics,
-        atlases={},
-        filled=[surface, atlas],
-        surface={"edge_length_mm": 0.8, "open_sulci": False},
+
+
+FIGURES = shown("predicted_figure", "weekly_figure", caption="of *all*")
+
+
+def test_the_report_of_a_prediction_says_what_it_is_how_accurate_and_in_which_files():
+    then = METRICS[1:2].assign(run="thin", week=29.5, value=210.5)
+    tables = {"validation": None, "metrics": pd.concat([METRICS, then])}
+    text = " ".join(page(FIGURES, prediction=predicted(7.5), **tables).split())
+    assert elements(text, "h1") == [Facts("young", "29.5 GW", "the atlas crl")]
+    assert Facts("young", "22 GW", "29.5 GW", 7.5, "An atlas") in elements(text, "p")
+    require_order(
+        text,
+        "</h1>",
+        str(escape(accuracy_sentence(predicted(7.5)))),
+        "210.5",
+        "largest error in 4 tests",
+        "0.71 mm",
+        "crl 22 GW",
+        "norms/predictions.yaml",
+        "results/a.surf.gii",
+        "results/atlas.surf.gii",
+        "results/a_dseg.nii.gz",
+        "A. et al., doi 10.1/x.",
+        "CRL licence",
+        "Research only.",
+        '<section id="brains"',
+    )
+    # no table of dashes, and the other figure in its section
+    assert "results/study/validation.csv" not in text
+    assert "<h2>weekly_figure" in text
+
+
+def test_a_prediction_beside_an_observed_brain_has_scores_and_the_atlas_advantage():
+    text = page(prediction=predicted(7.5, advantage="The atlas was better."))
+    assert "results/study/validation.csv" in text
+    assert "<strong>The atlas was better. At 23 GW" in text
+
+
+def test_a_prediction_beyond_those_that_were_tried_says_so():
+    last = max(row["horizon"] for row in ACCURACY["rows"])
+    assert accuracy_sentence(predicted(last)).count(f"{last:g} weeks") == 1
+    beyond = accuracy_sentence(predicted(last + 1))
+    assert beyond == Facts(f"{last:g} weeks", f"{last + 1:g} weeks")
+
+
+@pytest.mark.parametrize(
+    ("r", "advantage", "begin", "is_simpler_better"),
+    [
+        (0.8, "", "This is a prediction", False),
+        (0.7, "", "This is a prediction", True),
+        # what was measured on the brain itself comes first
+        (0.7, "The atlas was better.", "The atlas was better. This is", False),
+    ],
+)
+def test_a_prediction_says_where_the_atlas_own_brain_was_better(
+    r, advantage, begin, is_simpler_better
+):
+    rows = frame("model r_shape_index\natlas 0.8\nscaled 0.8\nrun 0.8")
+    rows.loc[2, "r_shape_index"] = r
+    rows = rows.assign(horizon=2.0, distance_mm=0.5).to_dict("records")
+    told = accuracy_sentence(predicted(2.0, advantage) | {"accuracy": {"rows": rows}})
+    assert told.startswith(begin)
+    assert ("shape index; it is stored with" in told) == is_simpler_better
+
+
+def test_shipped_accuracy_has_all_baselines_and_at_least_two_starts_at_each_horizon():
+    rows = pd.DataFrame(ACCURACY["rows"])
+    assert (rows.groupby("horizon")["start"].nunique() >= 2).all()
+    test = ["start", "start_week", "horizon"]
+    assert not rows.duplicated([*test, "model"]).any()
+    by_model = rows.pivot_table("distance_mm", test, "model")
+    assert set(by_model) == {"run", "target", "atlas", "atlas_deformed", "scaled"}
+    assert by_model.notna().all(axis=None)
+    # a prediction that is worth less than no folding would not be shipped
+    assert (by_model["run"] < by_model["scaled"]).all()
+    assert rows["r_shape_index"].between(0, 1).all()
+
+
+# methods
+
+TEMPLATE = (PAGE / "methods.rst").read_text()
+SOFTWARE = {
+    "gyriflow": "0.1",
+    "packages": dict.fromkeys(
+        ("scikit-image", "fenics-dolfinx", "petsc4py", "snakemake"), "9.9"
+    ),
+}
+MEASURED_BRAIN = {"week": 21.0, "population": "spina bifida", "source": "labels"}
+MEASURED_BRAIN |= {"synthetic": False}
+
+
+def methods(**used) -> str:
+    usual = {"brains": [MEASURED_BRAIN], "runs": [], "atlases": {}, "filled": []}
+    usual |= {"metrics": {"curvature_radius_mm": 3.0}, "software": SOFTWARE}
+    usual |= {"surface": {"edge_length_mm": 0.8, "open_sulci": False}}
+    return methods_text(TEMPLATE, **usual | used)
+
+
+PARAMETERS = read_yaml(Path(__file__).with_name("parameters.yaml"))
+RUN_SUMMARY = {"weeks": [21.0, 24.5], "steps": 49, "tets": 1234}
+
+
+def run(name, growth_source, growth):
+    """Return what the methods get of a run from one start brain."""
+    parameters = PARAMETERS | {"growth": growth}
+    about = {"run": name, "start": "young", "growth_of": growth_source}
+    return about | {"parameters": parameters, "summary": RUN_SUMMARY}
+
+
+def test_the_methods_say_which_brains_and_runs_there_were(recorded):
+    shape = {"week": 24.5, "population": None, "source": "shape", "synthetic": True}
+    shapes = {"model": "shapes", "of": "self"}
+    text = methods(
+        brains=[MEASURED_BRAIN, shape],
+        runs=[
+            run("stiff", "", {"model": "rates"}),
+            run("led", "population cohort", shapes),
+            run("own", "own", shapes),
+        ],
+        filled=[
+            {"ids": ["young"], "cortex": "white", "by_cortex": True},
+            {"ids": ["old", "older"], "cortex": "measured", "by_cortex": False},
+        ],
         mesh={"order": 2, "mesher": "tetgen"},
     )
-    # closed sulci make areas after 26 GW lower bounds
-    assert text.split("\n\n")[0] == Facts(
-        2, 21, 24.5, "GW", 1, "spina bifida", "gyriflow 0.1", 26, "0.8 mm"
-    )
-    assert text == Facts(
-        "young, given as surfaces, was",
-        "white and pial",
-        "cerebrum and cortex",
-        "old, older",
-        "alone",
-    )
-    stiff, led, own = (line for line in text.splitlines() if line.startswith("- "))
-    assert stiff == Facts(
-        "*stiff*",
-        "young",
-        21,
-        "24.5 GW",
-        49,
-        "12 h",
-        1234,
-        "quadratic",
-        1500,
-        "Pa",
-        "2·10⁻⁷",
-        "[4]",
-    )
-    assert "{" not in stiff
-    assert led == Facts("*led*", "population cohort")
-    assert led != Facts("atlas")
-    assert not {"atlas", "population"} & set(own.split())
-    alone, opened = (
-        methods_text(
-            template,
-            brains=brains[:1],
-            runs=[],
-            software=software,
-            metrics=metrics,
-            atlases={"crl": "G. et al.: Curves", "own": "Own curves"} if opens else {},
-            filled=[],
-            surface={"edge_length_mm": 1, "open_sulci": opens},
-        )
-        for opens in (False, True)
-    )
-    assert "Simulation" not in opened
-    assert "Tallinen" not in opened
-    assert opened == Facts("Koenderink", "[1]")
-    assert opened != Facts(26)
-    assert alone == Facts(26)
-    assert alone != Facts("slits")
-    assert opened == Facts(
-        "slits", "CRL [4]", "own [5]", "4. G. et al.: Curves", "5. Own curves"
-    )
-    assert caption_html(opened).count("<li><p>") == 5
-    assert "atlas" not in alone
-    assert "filled" not in opened
+    recorded(dict(enumerate(text.splitlines())))
     assert caption_html(text).count("<li><p>") == 3 + 7
     assert "system-message" not in caption_html(text)
 
 
-def test_messages_tell_files_without_their_folders(monkeypatch):
-    monkeypatch.setitem(
-        QUALITY,
-        "warnings",
-        ["/data/Smith John/x.nii.gz: cortex of 1 voxel, see https://a.b/c", ""],
-    )
-    text = page(shown("growth_figure"))
-    assert "x.nii.gz: cortex of 1 voxel, see https://a.b/c" in text
-    assert "Smith" not in text
+def test_the_methods_of_measured_brains_are_without_those_of_simulations(recorded):
+    # closed sulci make areas after 26 GW lower bounds
+    recorded(dict(enumerate(methods().splitlines())))
 
 
-def test_a_page_without_simulations_says_how_many_brains_were_measured():
-    assert elements(page([], runs=None, validation=None), "strong")[0] == Facts(
-        2, 1, "refused"
-    )
+def test_the_methods_cite_what_sulci_and_atlases_are_from(recorded):
+    atlases = {"crl": "G. et al.: Curves", "own": "Own curves"}
+    surface = {"edge_length_mm": 1, "open_sulci": True}
+    text = methods(atlases=atlases, surface=surface)
+    recorded(dict(enumerate(text.splitlines())))
+    assert caption_html(text).count("<li><p>") == 5

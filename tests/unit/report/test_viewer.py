@@ -12,28 +12,10 @@ DECLARED = (
     r"(\w+)\s*=>",
 )
 NAME = r"[A-Za-z_$][\w$]*"
-KNOWN = {
-    "class",
-    "function",
-    "constructor",
-    "for",
-    "in",
-    "if",
-    "try",
-    "catch",
-    "return",
-    "continue",
-    "true",
-    "false",
-    "window",
-    "Float32Array",
-    "Set",
-    "setInterval",
-    "brain",
-    "paint",
-    "run",
-    "triangles",
-}
+KNOWN = """
+class function constructor for in if try catch return continue true false window
+Float32Array Set setInterval brain paint run triangles
+"""
 """Words of the language, of browsers, and methods of the view."""
 
 
@@ -46,7 +28,7 @@ def undeclared(script: str) -> set[str]:
         for names in re.findall(pattern, code):
             declared |= set(re.findall(NAME, names))
     used = re.findall(rf"(?<![.\w$])({NAME})(?!\s*:)(?![\w$])", code)
-    return set(used) - declared - KNOWN
+    return set(used) - declared - set(KNOWN.split())
 
 
 def inserted(template: str) -> list[str]:

@@ -9,32 +9,26 @@ from gyriflow.settings.terms import element_error, rounded_elements, run_names
 
 
 @pytest.mark.parametrize(
-    ("order", "elements", "percent"),
+    ("order", "elements", "percent", "facts"),
     [
-        (1, 1.0, 32.2),
-        (1, 2.0, 32.2),
-        (1, 4.0, 13.3),
+        (1, 1.0, 32.2, ["more than", "quadratic elements on as many nodes"]),
+        (1, 2.0, 32.2, ["up to", "quadratic elements on as many nodes"]),
+        # half as many quadratic elements have as many nodes
+        (1, 4.0, 13.3, ["up to 13 %", "on as many nodes: up to 1 %"]),
         # half-way between 4 and 8 by the logarithm
-        (1, math.sqrt(32.0), math.sqrt(13.3 * 4.5)),
-        (1, 20.0, 4.5),
-        (2, 0.5, 4.3),
-        (2, 2.0, 0.9),
+        (1, math.sqrt(32.0), math.sqrt(13.3 * 4.5), ["up to"]),
+        (1, 20.0, 4.5, ["up to"]),
+        (2, 0.5, 4.3, ["more than"]),
+        (2, 2.0, 0.9, ["up to"]),
     ],
 )
 def test_errors_of_elements_are_interpolated_by_their_logarithms(
-    order, elements, percent
+    order, elements, percent, facts
 ):
     error, text = element_error(order, elements)
     assert error == pytest.approx(percent)
-    assert text == Facts(f"{elements:.2g}", f"{percent:.0f} %")
-    is_few = elements < (2.0 if order == 1 else 0.8)
-    assert ("more than" in text) == is_few
-    # half as many quadratic elements have as many nodes
-    assert ("quadratic elements on as many nodes" in text) == (
-        order == 1 and percent > 10
-    )
-    if (order, elements) == (1, 4.0):
-        assert text == Facts("up to 1 %")
+    assert text == Facts(f"{elements:.2g}", f"{percent:.0f} %", *facts)
+    assert ("quadratic elements on" in text) == (order == 1 and percent > 10)
 
 
 def test_elements_have_two_digits_and_runs_of_several_brains_the_brain():

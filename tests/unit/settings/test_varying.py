@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from configurations import cases
 from facts import Facts
 
 from gyriflow.errors import InputError
@@ -22,77 +23,91 @@ def value(given):
     return parameters_from(RUN | {"thickness_mm": given}).thickness_mm
 
 
-def test_a_curve_is_linear_between_its_weeks_and_constant_beyond():
-    assert value_at(value("2e-3"), 33.0, {}) == 2e-3
-    curve = value({"weeks": {25: 3.0, "21": 1.0}})
-    assert [value_at(curve, week, {}) for week in (20.0, 21.0, 22.0, 25.0, 40.0)] == [
-        1.0,
-        1.0,
-        1.5,
-        3.0,
-        3.0,
-    ]
+@cases(
+    ("given", "weeks", "values"),
+    """
+    2.0e-3 | [33] | [2.0e-3]
+    {weeks: {25: 3.0, "21": 1.0}} | [20, 21, 22, 25, 40] | [1, 1, 1.5, 3, 3]
+    {weeks: {21: 1.0, 31: 2.0}, map: thickness_mm} | [26] | [[1.5, 3, 6]]
+    {map: thickness_mm} | [26] | [[1, 2, 4]]
+    """,
+)
+def test_a_curve_is_linear_and_constant_beyond_and_multiplied_with_a_map(
+    given, weeks, values
+):
+    for week, expected in zip(weeks, values, strict=True):
+        np.testing.assert_allclose(value_at(value(given), week, MAP), expected)
 
 
-def test_a_map_is_multiplied_with_the_curve():
-    both = value({"weeks": {21: 1.0, 31: 2.0}, "map": "thickness_mm"})
-    np.testing.assert_allclose(value_at(both, 26.0, MAP), [1.5, 3.0, 6.0])
-    assert value_range(both, MAP, 21.0, 40.0) == (1.0, 8.0)
-    assert value_range(both, MAP, 21.0, 26.0) == (1.0, 6.0)
-    np.testing.assert_allclose(
-        value_at(value({"map": "thickness_mm"}), 26.0, MAP), MAP["thickness_mm"]
-    )
+@cases(
+    ("given", "weeks", "ends"),
+    """
+    {weeks: {21: 1.0, 25: 5.0, 28: 0.5, 31: 2.0}} | [21, 31] | [0.5, 5]
+    {weeks: {21: 1.0, 25: 5.0, 28: 0.5, 31: 2.0}} | [22, 24] | [2, 4]
+    {weeks: {21: 1.0, 25: 5.0, 28: 0.5, 31: 2.0}} | [26, 30] | [0.5, 3.5]
+    {weeks: {21: 1.0, 25: 5.0, 28: 0.5, 31: 2.0}} | [22, 27] | [2, 5]
+    {weeks: {21: 1.0, 31: 2.0}, map: thickness_mm} | [21, 40] | [1, 8]
+    {weeks: {21: 1.0, 31: 2.0}, map: thickness_mm} | [21, 26] | [1, 6]
+    """,
+)
+def test_the_range_of_a_curve_has_its_ends_and_all_between(given, weeks, ends):
+    assert value_range(value(given), MAP, *weeks) == tuple(ends)
 
 
-def test_the_range_of_a_curve_has_its_ends_and_all_between():
-    curve = value({"weeks": {21: 1.0, 25: 5.0, 28: 0.5, 31: 2.0}})
-    assert value_range(curve, {}, 21.0, 31.0) == (0.5, 5.0)
-    assert value_range(curve, {}, 22.0, 24.0) == (2.0, 4.0)
-    assert value_range(curve, {}, 26.0, 30.0) == (0.5, 3.5)
-    assert value_range(curve, {}, 22.0, 27.0) == (2.0, 5.0)
-    assert mean_of_curve(curve) == pytest.approx(8.5 / 4)
-    both = value({"weeks": {21: 2.0, 31: 4.0}, "map": "thickness_mm"})
-    assert mean_of_curve(both) == 3.0
-    assert mean_of_curve(value({"map": "thickness_mm"})) == 1.0
+@cases(
+    ("given", "mean"),
+    """
+    {weeks: {21: 1.0, 25: 5.0, 28: 0.5, 31: 2.0}} | 2.125
+    {weeks: {21: 2.0, 31: 4.0}, map: thickness_mm} | 3
+    {map: thickness_mm} | 1
+    """,
+)
+def test_the_mean_of_a_curve_is_that_of_its_values(given, mean):
+    assert mean_of_curve(value(given)) == mean
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        "thick",
-        True,
-        {},
-        {"weeks": {}},
-        {"weeks": [1, 2]},
-        {"weeks": {21: 1, "21.0": 2, 31: 3}},
-        {"week": {21: 1}},
-        None,
-        "estimated",
-    ],
+@cases(
+    ("given",),
+    """
+    thick
+    true
+    {}
+    {weeks: {}}
+    {weeks: [1, 2]}
+    {weeks: {21: 1, "21.0": 2, 31: 3}}
+    {week: {21: 1}}
+    null
+    """,
 )
 def test_what_is_no_number_curve_or_map_is_refused(given):
     with pytest.raises(InputError, match="thickness_mm"):
         value(given)
 
 
-def test_values_are_checked_over_all_weeks_and_places():
+def test_values_of_a_curve_are_checked_over_all_weeks():
     with pytest.raises(InputError, check=Facts("growth_rate_per_s:", 0, -1e-7)):
         parameters_from(RUN | {"growth_rate_per_s": {"weeks": {21: 1e-7, 30: -1e-7}}})
-    rates = parameters_from(RUN | {"growth_rate_per_s": {"map": "rate"}})
-    with pytest.raises(InputError, check=Facts("growth_rate_per_s:", 0, -1e-8)):
-        require_maps(rates, {"rate": np.array([1e-7, -1e-8])}, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "maps", "n_nodes", "facts"),
+    [
+        ("growth_rate_per_s", [1e-7, -1e-8], 2, [":", 0, -1e-8]),
+        ("thickness_mm", [1.0, 0.0, 1.0], 3, [":", 0, "mm"]),
+        ("thickness_mm", [1.0, 2.0, 4.0], 4, [3, 4]),
+        ("thickness_mm", [1.0, np.nan, np.inf], 3, [2, 3]),
+        ("thickness_mm", None, 3, ["--maps"]),
+    ],
+)
+def test_a_map_that_is_missing_or_has_other_values_is_refused(
+    name, maps, n_nodes, facts
+):
+    mapped = parameters_from(RUN | {name: {"map": name}})
+    given = {} if maps is None else {name: np.array(maps)}
+    with pytest.raises(InputError, check=Facts(name, *facts)):
+        require_maps(mapped, given, n_nodes)
+
+
+def test_a_map_of_allowed_values_passes():
     mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
     require_maps(mapped, MAP, 3)
-    with pytest.raises(InputError, check=Facts("thickness_mm:", 0, "mm")):
-        require_maps(mapped, {"thickness_mm": np.array([1.0, 0.0, 1.0])}, 3)
-
-
-def test_a_missing_or_unfitting_map_is_refused():
-    mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
-    with pytest.raises(InputError, check=Facts("thickness_mm", "--maps")):
-        require_maps(mapped, {}, 3)
-    with pytest.raises(InputError, check=Facts("thickness_mm", 3, 4)):
-        require_maps(mapped, MAP, 4)
-    for bad in (np.nan, np.inf, -np.inf):
-        with pytest.raises(InputError, check=Facts("thickness_mm", 2, 3)):
-            require_maps(mapped, {"thickness_mm": np.array([1.0, bad, bad])}, 3)

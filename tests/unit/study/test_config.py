@@ -13,7 +13,7 @@ from facts import Facts
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings.atlas import Atlas
-from gyriflow.settings.folding import output_weeks, parameters_from, plain_settings
+from gyriflow.settings.folding import parameters_from, plain_settings
 from gyriflow.settings.root import Config
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.study.loading import load
@@ -184,18 +184,6 @@ def test_starts_that_cannot_be_are_all_named():
     assert problems(far) == [Facts("folding.end_week:", 22, 22.5, "b")]
 
 
-@pytest.mark.parametrize(
-    ("end", "every", "weeks"),
-    [
-        (23.5, 1, [21, 22, 23, 23.5]),
-        (21.3, 0.1, [21, 21.1, 21.2, 21.3]),
-        (22, 5, [21, 22]),
-    ],
-)
-def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
-    assert output_weeks(21, end, every) == pytest.approx(weeks)
-
-
 def test_parameters_of_a_run_are_what_the_folding_program_reads():
     folding = {"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}
     (one,) = resolved(folding=folding).run_simulations
@@ -214,6 +202,7 @@ def test_parameters_of_a_run_are_what_the_folding_program_reads():
 CONFIG = Path(__file__).parents[3] / "config"
 EXAMPLES = sorted([CONFIG / "config.yaml", *(CONFIG / "examples").glob("*.yaml")])
 SCHEMA = Config.model_json_schema()
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 
 
 def test_the_schema_of_all_keys_is_current():
@@ -242,4 +231,4 @@ def test_editors_find_the_schema_of_each_example_and_it_holds(path):
     named = first_line.removeprefix("# yaml-language-server: $schema=")
     assert (path.parent / named).resolve() == CONFIG / "schema.json"
     content = json.loads(json.dumps(read_yaml(path)))  # keys of JSON are texts
-    jsonschema.validate(content, SCHEMA)
+    VALIDATOR.validate(content)

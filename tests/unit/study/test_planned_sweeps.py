@@ -24,7 +24,6 @@ THICKNESS = BASE | {
     "vary": {"thickness_mm": [0.8, 1.5]},
     "fixed": {"shear_modulus_cortex_pa": 3000},
 }
-STIFFNESS = BASE | {"vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]}}
 CALIBRATION = BASE | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}
 
 
@@ -47,43 +46,6 @@ def refusal(**sections):
 
 
 # the runs of sweeps
-
-
-def test_a_sweep_of_a_run_with_two_start_brains_has_its_members_from_both():
-    runs = {"reference": {"preset": "fetalfoldsim", "start": ["a", "b"]}}
-    sweep = BASE | {"vary": {"thickness_mm": [1, 2]}, "compare_week": 26}
-    known = brains(a=21, b=25, c=26)
-    found = resolved(brains=known, runs=runs, sweeps={"both": sweep})
-    starts = {(row.run, row.brain) for row in found.by_sweep["both"]}
-    assert starts == set(product(("both-1", "both-2"), "ab"))
-
-
-def test_a_sweep_makes_a_run_of_each_combination():
-    vary = {"thickness_mm": [1, 2], "max_halvings": [2, 3]}
-    found = resolved(sweeps={"both": THICKNESS | {"vary": vary}})
-    runs = {}
-    for row in found.by_sweep["both"]:
-        runs[row.run] = found.simulations[row.run, row.brain].settings
-    assert {
-        name: (run.thickness_mm, run.max_halvings) for name, run in runs.items()
-    } == {
-        "both-1-2": (1, 2),
-        "both-1-3": (1, 3),
-        "both-2-2": (2, 2),
-        "both-2-3": (2, 3),
-    }
-    assert {run.shear_modulus_cortex_pa for run in runs.values()} == {3000}
-    assert {run.end_week for run in runs.values()} == {25}
-    # they are no runs that everything is made of
-    assert found.pairs == [("reference", "a"), ("short", "a")]
-
-
-def test_equal_runs_are_solved_once():
-    found = resolved(sweeps={"thickness": THICKNESS, "stiffness": STIFFNESS})
-    # 1500 Pa is the reference, 3000 Pa stands in the other sweep too
-    runs = [row.run for row in found.by_sweep["stiffness"]]
-    assert runs == ["stiffness-300", "reference", "thickness-1.5"]
-    assert found.may_diverge == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
 
 
 VALUES = yaml.safe_load("""
@@ -119,31 +81,6 @@ def test_runs_are_equal_only_where_no_key_that_changes_shapes_differs():
     assert _equality_key(Run(**run | alike)) == _equality_key(Run(**run))
 
 
-def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
-    known = brains(a=21, b=25, c=24.5)
-    sweeps = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
-    simulations = resolved(brains=known, sweeps=sweeps).simulations
-    assert simulations["thickness-1.5", "a"].settings.end_week == 25
-    assert simulations["thickness-1.5", "a"].weeks == (21, 22, 23, 24, 24.5, 25)
-    assert simulations["thickness-0.8", "a"].weeks[-1] == 24.5
-    # the reference itself has no surface of that week, so that it cannot stand in
-    sweeps = {"stiffness": STIFFNESS | {"compare_week": 24.5}}
-    rows = resolved(brains=known, sweeps=sweeps).by_sweep["stiffness"]
-    assert rows[1].run == "stiffness-1500"
-
-
-@pytest.mark.parametrize(
-    ("names", "asked", "observed"),
-    [("abc", {}, "c"), ("ab", {}, "b"), ("abc", {"compare_with": ["b"]}, "b")],
-)
-def test_comparison_prefers_the_starts_population(names, asked, observed):
-    known = brains(**{name: 21 if name == "a" else 25 for name in names})
-    for brain in known:
-        brain["population"] = "two" if brain["id"] == "b" else "one"
-    found = resolved(brains=known, sweeps={"thickness": THICKNESS | asked})
-    assert found.by_sweep["thickness"][0].observed == (observed,)
-
-
 def test_the_run_of_a_single_value_may_differ_further():
     steps = {"fixed": {"step_s": 86400}, "fixed_at": {0.8: {"step_s": 3600}}}
     found = resolved(sweeps={"s": THICKNESS | steps})
@@ -151,14 +88,6 @@ def test_the_run_of_a_single_value_may_differ_further():
     for row in found.by_sweep["s"]:
         step_of[row.run] = found.simulations[row.run, row.brain].settings.step_s
     assert step_of == {"s-0.8": 3600, "s-1.5": 86400}
-
-
-def test_values_that_agree_in_six_digits_are_runs_of_their_own():
-    values = [1.0, 1.0000001, 1.0000002]
-    sweep = THICKNESS | {"vary": {"thickness_mm": values}}
-    found = resolved(sweeps={"s": sweep}).by_sweep["s"]
-    assert [row.run for row in found] == ["s-1", "s-1.0000001", "s-1.0000002"]
-    assert [row.values["thickness_mm"] for row in found] == values
 
 
 # what is refused

@@ -132,33 +132,17 @@ def test_scans_of_other_subjects_are_grown_towards_only_if_they_are_named(labels
     assert message(cohort, start="a22", **growth, **late) == Facts("a22", "b", 22, 27)
 
 
-def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(of_two):
+def test_its_own_growth_lacks_brains_whatever_is_named(of_two):
     named = {"growth": {"series": "atlas"}, **MEASURED}
-    found = study(of_two(22, 23, 24), **named)
-    assert found.chains["own22", "self"].later == ("own23", "own24")
     assert message(of_two(22), **named) == Facts("atlas", 22, 24, "growth.brains")
     early = message(of_two(22, 23), **MEASURED)
     assert early == Facts("own22 (22 GW)", "own23 (23 GW)", 24, "growth.brains")
 
 
-LATER = {"base": "a", "compare_week": 26}
-
-
-@pytest.mark.parametrize(
-    "more",
-    [
-        {"sweeps": {"late": LATER | {"vary": {"thickness_mm": [1.0, 2.0]}}}},
-        {
-            "calibrate": LATER
-            | {"parameters": {"step_s": [9, 99]}, "score": {"size": 1}}
-        },
-    ],
-)
-def test_runs_of_sweeps_and_of_the_calibration_grow_until_their_own_end(of_two, more):
-    found = study(of_two(22, 24, 26), **MEASURED, **more)
-    assert found.chains["own22", "self"].weeks[1:] == (24, 26)
-    # the atlas ends at 25 GW
-    assert message(of_two(22, 24, 26), **EXPECTED, **more) == Facts("own22", 22, 26)
+def test_an_atlas_has_to_reach_the_end_of_sweeps(of_two):
+    sweep = {"base": "a", "compare_week": 26, "vary": {"thickness_mm": [1.0, 2.0]}}
+    found = message(of_two(22, 24, 26), **EXPECTED, sweeps={"late": sweep})
+    assert found == Facts("own22", 22, 26)
 
 
 # ensembles
@@ -256,22 +240,6 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
     # does not
     predictions = [(one.run, one.is_atlas_prediction) for one in found.predictions]
     assert predictions == [("a", True), ("paper", False)]
-    # of unknown population, it is compared with the brains that its growth comes from
-    (unknown,) = study(of_two(22, population=None), **EXPECTED).run_simulations
-    assert unknown.kind == "explained"
-
-
-@pytest.mark.parametrize("is_named", [True, False])
-def test_a_later_scan_of_the_subject_is_its_own_whatever_it_is_called(of_two, is_named):
-    scans = of_two(22)
-    for brain in scans:
-        if brain["id"] in ("own22", "b24"):
-            brain["subject"] = "s"
-    # which is of no other subject's series but by name
-    atlas = [brain["id"] for brain in scans[1:]]
-    growth = {"brains": {"with it": atlas}} if is_named else {}
-    (simulation,) = study(scans, growth=growth, **EXPECTED).run_simulations
-    assert simulation.is_atlas_prediction == (not is_named)
 
 
 def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):

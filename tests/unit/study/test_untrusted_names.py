@@ -21,7 +21,7 @@ from gyriflow.study.loading import load
 PRINTABLE = r"""a'b a"b a;b $(x) `x` -rf --all .hidden .. ../x a/b /etc/passwd a\b"""
 PRINTABLE += " a|b a&b a* a? ~root {brain}"
 NAMES = [*PRINTABLE.split(), "a b", "a\nb", "a\n", "a\0b", "a\u202eb", "", " "]
-NAMES.append("a" * 5000)
+NAMES.append("a" * 101)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -36,7 +36,7 @@ def test_names_that_a_shell_or_a_path_could_take_apart_are_refused(name):
     assert f"sweeps.{name}: " in found
 
 
-@pytest.mark.parametrize("name", ["a b", "../x", "a\nb", "a" * 5000])
+@pytest.mark.parametrize("name", ["a b", "../x", "a\nb", "a" * 101])
 def test_rows_of_a_table_have_such_names_neither(tmp_path, name):
     touched(tmp_path, "a.gii")
     table = f'participant_id\tweek\tpial\n"{name}"\t24\ta.gii\n'
