@@ -185,7 +185,7 @@ def common_growth_rate():
     rates = [
         simulation.settings.growth_rate_per_s
         for simulation in study.simulations.values()
-        if simulation.has_growth_rate
+        if simulation.settings.growth.model == "rates"
     ]
     if not rates or any(rate != rates[0] for rate in rates):
         return None

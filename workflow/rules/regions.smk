@@ -62,7 +62,7 @@ rule simulated_regions:
 
 
 # observed and simulated brains that are measured, by the place of their tables
-ALL_MEASURED = study.all_measured
+ALL_MEASURED = {row.place: row for row in SIMULATED.values()} | study.measured
 
 
 rule region_metrics:

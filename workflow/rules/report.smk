@@ -146,7 +146,7 @@ rule html_report:
         warnings=rules.study_records.output.warnings,
         runs=rules.run_tables.output.csv if study.run_simulations else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
-        atlas_brain=study.atlas_surface(study.prediction) if study.prediction else [],
+        atlas_brain=study.prediction_facts["atlas_surface"] if study.prediction else [],
         intervals=study.prediction.file(ENSEMBLE) if study.prediction and study.prediction.members else [],
         small=[f"{BRAIN}/figures/small.png".format(brain=brain) for brain in BRAINS],
         accuracy=PREDICTION_TESTS if study.prediction else [],

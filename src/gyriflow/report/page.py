@@ -111,7 +111,7 @@ def page_figures(
     return entries
 
 
-def sections(
+def _sections(
     figures: Sequence[Mapping[str, Any]],
 ) -> list[tuple[str, list[dict[str, Any]]]]:
     """Return the sections, each with its figures and tables, numbered consecutively,
@@ -205,7 +205,7 @@ def study_page(
             else html_table(_group_warnings(tables.warnings))
         ),
         "summary_figure": summary[0] if summary else None,
-        "sections": sections(others),
+        "sections": _sections(others),
     }
     # of the page of a single brain
     page |= {
@@ -377,16 +377,18 @@ def methods_text(template: str, **used: Any) -> str:
     model, where `number` formats numbers; `fused_after_gw`; and `atlas_label`.
     """
 
-    def growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
-        return GROWTH_MODELS[run["parameters"]["growth"]["model"]].sentence(run, number)
-
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(
-        growth_sentence=growth_sentence,
+        growth_sentence=_growth_sentence,
         fused_after_gw=FUSED_AFTER_GW,
         atlas_label=atlas_label,
         **used,
     )
+
+
+def _growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
+    model = run["parameters"]["growth"]["model"]
+    return GROWTH_MODELS[model].sentence(run, number)
 
 
 def caption_html(caption: str) -> Markup:
@@ -522,7 +524,7 @@ def scores_table(
         rows.append(
             {
                 "run": name,
-                "verdict": run_verdict(run),
+                "verdict": _run_verdict(run),
                 **_scores(scores),
             }
         )
@@ -628,7 +630,7 @@ def verdict(
     return f"{sentence} There were {len(texts)} warnings, listed under Brains."
 
 
-def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
+def _run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and the limitations of its folds."""
     # the table has the list as JSON
     reached = max(json.loads(run["weeks"]))
@@ -679,44 +681,44 @@ def _coarseness(run: Mapping[str, Any] | pd.Series, order: int) -> list[str]:
 
 def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
     """Return the scores as text, dashes for missing ones."""
-
-    def text(
-        name: str,
-        pattern: str,
-        factor: float = 1.0,
-    ) -> str:
-        value = validation.get(name, np.nan)
-        return (
-            "–" if pd.isna(value) else format(factor * value, pattern).replace("-", "−")
-        )
-
-    def spread(name: str, pattern: str) -> str:
-        ends = " to ".join(
-            text(
-                f"{name}_{end}_shape_index",
-                pattern,
-            )
-            for end in ("low", "high")
-        )
-        return (
-            f"{text(f'{name}_shape_index', pattern)} ({ends})"
-            if len(validation)
-            else "–"
-        )
-
+    observed = "none"
+    if len(validation):
+        observed = f"{week_label(validation['week'])}, {validation['kind']}"
     return {
-        "observed brain": (
-            f"{week_label(validation['week'])}, {validation['kind']}"
-            if len(validation)
-            else "none"
-        ),
-        "distance (mm)": text("distance_mm", ".2f"),
-        "r": spread("r", ".2f"),
-        "r of the scaled start": text("r_start_shape_index", ".2f"),
-        "gain": spread("gain", "+.2f"),
-        "area (%)": text("area_difference", "+.1f", 100),
-        "volume (%)": text("volume_difference", "+.1f", 100),
+        "observed brain": observed,
+        "distance (mm)": _score(validation, "distance_mm", ".2f"),
+        "r": _score_with_interval(validation, "r", ".2f"),
+        "r of the scaled start": _score(validation, "r_start_shape_index", ".2f"),
+        "gain": _score_with_interval(validation, "gain", "+.2f"),
+        "area (%)": _score(validation, "area_difference", "+.1f", 100),
+        "volume (%)": _score(validation, "volume_difference", "+.1f", 100),
     }
+
+
+def _score(
+    validation: Mapping[Any, Any],
+    name: str,
+    pattern: str,
+    factor: float = 1.0,
+) -> str:
+    value = validation.get(name, np.nan)
+    if pd.isna(value):
+        return "–"
+    return format(factor * value, pattern).replace("-", "−")
+
+
+def _score_with_interval(
+    validation: Mapping[Any, Any],
+    name: str,
+    pattern: str,
+) -> str:
+    if not len(validation):
+        return "–"
+    score, low, high = (
+        _score(validation, f"{name}_{part}shape_index", pattern)
+        for part in ("", "low_", "high_")
+    )
+    return f"{score} ({low} to {high})"
 
 
 def _group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
@@ -731,14 +733,15 @@ def _group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
     prefix = (rows["level"] + ": ").where(is_error, "")
     rows["message"] = prefix + rows["message"]
 
-    def joined(names: pd.Series) -> str:
-        return "; ".join(filter(None, names.unique()))
-
     groups = rows.groupby(
         ["step", "message"],
         sort=False,
     )["brain, run"]
-    return groups.agg(joined).reset_index()
+    return groups.agg(_joined).reset_index()
+
+
+def _joined(names: pd.Series) -> str:
+    return "; ".join(filter(None, names.unique()))
 
 
 def hide_paths(value: Any) -> Any:

@@ -8,6 +8,7 @@ from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
+import pyvista as pv
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
@@ -21,7 +22,6 @@ from .scene import (
     VIEWS,
     View,
     half_extents,
-    is_visible,
     picture_axes,
     render,
 )
@@ -54,6 +54,8 @@ _LETTER_IN = 0.055
 _LABEL_LETTERS = 26
 # maximum share of the width for the scale bar; the colour bar is right of it
 _SCALE_SHARE = 0.36
+SAME_PLACE_MM = 0.5
+"""Maximum distance of the first hit of a ray from a visible point."""
 _END_NAMES = {
     "A": "anterior",
     "P": "posterior",
@@ -155,11 +157,12 @@ def panel_grid(
     legend_columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
     legend_in = 0.15 * math.ceil(len(legend) / legend_columns) + 0.16
     foot_in = max(0.66 if colour_bar or legend else 0.46, legend_in)
-    total = _TOP_IN + _dots(foot_in) + sum(block.height_in for block in drawn)
+    total = _TOP_IN + _dots(foot_in) + sum(block.heights_in.sum() for block in drawn)
     figure = Figure(figsize=(width, total))
     top_in = total - _TOP_IN
     letters = iter(ascii_lowercase)
     for block in drawn:
+        block_in = block.heights_in.sum()
         # a letter for each row, or for each panel of a single row
         per_row = 1 if len(rows) > 1 else len(columns) if len(columns) > 1 else 0
         grid = GridSpec(
@@ -169,13 +172,13 @@ def panel_grid(
             left=left_in / width,
             right=(left_in + widths_in[block.columns].sum()) / width,
             top=top_in / total,
-            bottom=(top_in - block.height_in) / total,
+            bottom=(top_in - block_in) / total,
             width_ratios=widths_in[block.columns],
             height_ratios=block.heights_in,
             hspace=0,
             wspace=0,
         )
-        top_in -= block.height_in
+        top_in -= block_in
         for number, row in enumerate(block.rows):
             # pictures are between the headings or captions above and the captions below
             line = 2 * number + 1
@@ -238,10 +241,6 @@ class _Block:
     columns: slice
     rows: Sequence[Row]
     heights_in: Floats
-
-    @property
-    def height_in(self) -> float:
-        return float(self.heights_in.sum())
 
 
 def _write_letters(
@@ -458,7 +457,7 @@ def _draw_ring(
     to_right, to_top = picture_axes(panel.view)
     place = float((point - middle) @ to_right), float((point - middle) @ to_top)
     radius = 0.05 * np.ptp(axes.get_xlim()) / 2
-    line = "-" if is_visible(panel.mesh, point, panel.view) else ":"
+    line = "-" if _is_visible(panel.mesh, point, panel.view) else ":"
     # a white margin below the black ring
     for colour, thickness, style in (("white", 2.0, "-"), ("black", 1.0, line)):
         ring = Circle(
@@ -472,6 +471,26 @@ def _draw_ring(
             zorder=5,
         )
         axes.add_patch(ring)
+
+
+def _is_visible(
+    mesh: TriangleMesh,
+    point: Floats,
+    view: View,
+) -> bool:
+    """Return whether a point of the surface is visible in a view."""
+    far = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    body = pv.PolyData.from_regular_faces(
+        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
+    )
+    towards = np.array(view.towards)
+    right, up = picture_axes(view)
+    # slightly shifted: rays through vertices may pass between triangles
+    point = point + 0.013 * right + 0.007 * up
+    hits, _ = body.ray_trace(
+        origin=point + far * towards, end_point=point - 1e-3 * towards
+    )
+    return bool(len(hits) == 0 or ((hits - point) @ towards).max() < SAME_PLACE_MM)
 
 
 def _draw_colour_bar(

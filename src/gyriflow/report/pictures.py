@@ -41,8 +41,6 @@ from .style import (
     styled,
 )
 
-SurfaceMap = tuple[TriangleMesh, Floats]
-"""A surface in RAS+ mm and a value per vertex."""
 SurfaceMaps = tuple[TriangleMesh, Mapping[str, Floats]]
 """A surface in RAS+ mm and its maps per vertex by name."""
 Halves = Sequence[SurfaceMaps]
@@ -102,24 +100,15 @@ class GridBrain:
     directions: Floats | None = None
 
     @property
-    def is_mapped(self) -> bool:
-        return any(maps for _, maps in self.halves)
-
-    @property
     def surface(self) -> TriangleMesh:
         mesh, _ = whole_maps(self.halves, [])
         return mesh
-
-    def surface_map(self, quantity: str) -> SurfaceMap:
-        """Return its whole surface and a map; NaN on a hemisphere that lacks it."""
-        mesh, maps = whole_maps(self.halves, [quantity])
-        return mesh, maps[quantity]
 
 
 Grid = Sequence[GridBrain]
 
 
-def brain_grid(
+def _brain_grid(
     grid: Grid,
     quantity: str = "",
     *,
@@ -137,12 +126,12 @@ def brain_grid(
     `panel_grid`.
     """
     # each brain once, in however many views it is
-    mapped = {id(brain.halves): brain for brain in grid if brain.is_mapped}
+    mapped = {id(brain.halves): brain.halves for brain in grid if _has_maps(brain)}
     scale = None
     colour_bar = None
     if quantity and mapped:
-        values = [brain.surface_map(quantity)[1] for brain in mapped.values()]
-        every = np.concatenate(values)
+        values = [whole_maps(halves, [quantity])[1] for halves in mapped.values()]
+        every = np.concatenate([maps[quantity] for maps in values])
         scale = scale_of(quantity, every)
         if limit is not None:
             scale = colour_scale(
@@ -177,6 +166,10 @@ def brain_grid(
     )
 
 
+def _has_maps(brain: GridBrain) -> bool:
+    return any(maps for _, maps in brain.halves)
+
+
 def _panel(
     brain: GridBrain,
     quantity: str,
@@ -185,9 +178,9 @@ def _panel(
     """Return a brain in its view and colours, None if it has no surface."""
     if not brain.halves:
         return None
-    if scale is not None and brain.is_mapped:
-        mesh, values = brain.surface_map(quantity)
-        colours = paint(values, scale)
+    if scale is not None and _has_maps(brain):
+        mesh, maps = whole_maps(brain.halves, [quantity])
+        colours = paint(maps[quantity], scale)
         light: Mapping[str, Any] = MAP
     else:
         mesh = brain.surface
@@ -203,7 +196,7 @@ def _panel(
     )
 
 
-def in_views(grid: Grid, views: Sequence[str] = SIDE_VIEWS) -> list[GridBrain]:
+def _in_views(grid: Grid, views: Sequence[str] = SIDE_VIEWS) -> list[GridBrain]:
     """Return brains from several views, a column per week, interval or name.
 
     Weeks and intervals are sorted, names in their order. Each row has all views, or is
@@ -247,26 +240,26 @@ def in_views(grid: Grid, views: Sequence[str] = SIDE_VIEWS) -> list[GridBrain]:
 @styled
 def inputs_figure(grid: Grid) -> Figure:
     """Draw the first and the last brain of a study."""
-    return brain_grid(in_views(grid, OUTER_VIEWS))
+    return _brain_grid(_in_views(grid, OUTER_VIEWS))
 
 
 @styled
 def predicted_figure(grid: Grid) -> Figure:
     """Draw the start brain, the predicted one, and the atlas' own brain."""
-    return brain_grid(in_views(grid, OUTER_VIEWS))
+    return _brain_grid(_in_views(grid, OUTER_VIEWS))
 
 
 @styled
 def weekly_figure(grid: Grid) -> Figure:
     """Draw the brains of several runs (blue) above observed ones (beige) by week."""
-    return brain_grid(in_views(grid))
+    return _brain_grid(_in_views(grid))
 
 
 @styled
 def expected_figure(grid: Grid) -> Figure:
     """Draw expected brains above observed ones by week, and below the distance between
     them (map `distance_mm`)."""
-    return brain_grid(in_views(grid), "distance_mm")
+    return _brain_grid(_in_views(grid), "distance_mm")
 
 
 @styled
@@ -297,7 +290,7 @@ def displacement_maps(
             )
             grid.append(brain)
     title = "norm of the displacement (mm)"
-    return brain_grid(in_views(grid), "displacement_mm", title=title)
+    return _brain_grid(_in_views(grid), "displacement_mm", title=title)
 
 
 def _displacement_caption(norms: Floats, place: Floats) -> str:
@@ -369,25 +362,25 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
 @styled
 def shape_maps(grid: Grid) -> Figure:
     """Draw the shape index of simulated and observed brains by week."""
-    return brain_grid(in_views(grid), "shape_index")
+    return _brain_grid(_in_views(grid), "shape_index")
 
 
 @styled
 def brain_depth(halves: Halves, *, sides: Sequence[str]) -> Figure:
     """Draw the sulcal depth of a brain, at the scale and in the colours of all brains'
     pages; `sides` are those of its `halves`."""
-    grid = _brain_views(halves, sides)
-    return brain_grid(grid, "sulcal_depth_mm", limit=DEEP_MM, at_page_scale=True)
+    grid = _bra_in_views(halves, sides)
+    return _brain_grid(grid, "sulcal_depth_mm", limit=DEEP_MM, at_page_scale=True)
 
 
 @styled
 def brain_maps(halves: Halves, *, sides: Sequence[str]) -> Figure:
     """Draw the shape index of a brain at the scale of all brains' pages; `sides` are
     those of its `halves`."""
-    return brain_grid(_brain_views(halves, sides), "shape_index", at_page_scale=True)
+    return _brain_grid(_bra_in_views(halves, sides), "shape_index", at_page_scale=True)
 
 
-def _brain_views(halves: Halves, sides: Sequence[str]) -> list[GridBrain]:
+def _bra_in_views(halves: Halves, sides: Sequence[str]) -> list[GridBrain]:
     """Return a brain from outside, from above, and the inner face of each
     hemisphere."""
     grid = []
@@ -406,19 +399,19 @@ def _brain_views(halves: Halves, sides: Sequence[str]) -> list[GridBrain]:
 @styled
 def position_spread_figure(grid: Grid) -> Figure:
     """Draw the standard deviation of positions over an ensemble by week."""
-    return brain_grid(in_views(grid), "position_sd_mm")
+    return _brain_grid(_in_views(grid), "position_sd_mm")
 
 
 @styled
 def sulcus_probability_figure(grid: Grid) -> Figure:
     """Draw the share of an ensemble's members that have a sulcus, by week."""
-    return brain_grid(in_views(grid), "sulcus_probability")
+    return _brain_grid(_in_views(grid), "sulcus_probability")
 
 
 @styled
 def deviation_figure(grid: Grid, *, quantity: str) -> Figure:
     """Draw how observed brains deviate from expected ones in a quantity, by week."""
-    return brain_grid(in_views(grid, ROUND_VIEWS), quantity)
+    return _brain_grid(_in_views(grid, ROUND_VIEWS), quantity)
 
 
 @styled
@@ -452,7 +445,7 @@ def influence_figure(grid: Grid, *, values: Mapping[str, Mapping[str, Any]]) -> 
                         view=VIEWS[view],
                     )
                 )
-    return brain_grid(placed, "shape_index", absent=ABSENT)
+    return _brain_grid(placed, "shape_index", absent=ABSENT)
 
 
 # growth
@@ -463,7 +456,7 @@ def growth_found_figure(
     frames: Mapping[float, SurfaceMaps], growth: Mapping[str, Floats]
 ) -> Figure:
     """Draw the growth in area by which a run approached its target shapes."""
-    return growth_grid(frames, growth, "area_growth_percent_per_gw")
+    return _growth_grid(frames, growth, "area_growth_percent_per_gw")
 
 
 @styled
@@ -472,7 +465,7 @@ def growth_across_figure(
 ) -> Figure:
     """Draw the growth across the surface by which a run approached its target
     shapes."""
-    return growth_grid(frames, growth, "thickness_growth_percent_per_gw")
+    return _growth_grid(frames, growth, "thickness_growth_percent_per_gw")
 
 
 @styled
@@ -480,14 +473,13 @@ def growth_sd_figure(
     frames: Mapping[float, SurfaceMaps], growth: Mapping[str, Floats]
 ) -> Figure:
     """Draw the standard deviation of growth in area over the members of an ensemble."""
-    return growth_grid(frames, growth, "area_growth_percent_per_gw")
+    return _growth_grid(frames, growth, "area_growth_percent_per_gw")
 
 
-def growth_grid(
+def _growth_grid(
     frames: Mapping[float, SurfaceMaps],
     growth: Mapping[str, Floats],
     quantity: str,
-    views: Sequence[str] = OUTER_VIEWS,
 ) -> Figure:
     """Draw a quantity of growth on the surface at the end of each interval.
 
@@ -523,7 +515,7 @@ def growth_grid(
             "growth", interval, [(mesh, maps)], directions=directions.get(interval)
         )
         grid.append(brain)
-    return brain_grid(in_views(grid, views), quantity)
+    return _brain_grid(_in_views(grid, OUTER_VIEWS), quantity)
 
 
 @styled
@@ -590,16 +582,16 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
 @styled
 def brain_regions(grid: Grid) -> Figure:
     """Draw the regions of the cortex of a brain."""
-    return region_grid(grid)
+    return _region_grid(grid)
 
 
 @styled
 def regions_figure(grid: Grid) -> Figure:
     """Draw the regions of the cortex of observed and simulated brains."""
-    return region_grid(grid)
+    return _region_grid(grid)
 
 
-def region_grid(grid: Grid) -> Figure:
+def _region_grid(grid: Grid) -> Figure:
     """Draw brains coloured by region, a column per brain and a row per view, with the
     regions' names.
 
@@ -627,7 +619,7 @@ def region_grid(grid: Grid) -> Figure:
                     colours=_painted_regions(brain.halves, colours),
                 )
             )
-    return brain_grid(placed, legend=legend)
+    return _brain_grid(placed, legend=legend)
 
 
 def _painted_regions(
@@ -691,4 +683,4 @@ def zones_figure(
                     light=MAP,
                 )
             )
-    return brain_grid(grid, legend=legend)
+    return _brain_grid(grid, legend=legend)

@@ -107,8 +107,6 @@ PARTS = {
 }
 """Used parts of colour maps: their darkest ends could be mistaken for shade."""
 UNKNOWN_COLOUR = "#B8B8B8"
-SAME_PLACE_MM = 0.5
-"""Maximum distance of the first hit of a ray from a visible point."""
 TISSUE = {"ambient": 0.16, "diffuse": 0.84, "specular": 0.1}
 """Light on surfaces of one colour, whose shading shows the shape."""
 MAP = {"ambient": 0.58, "diffuse": 0.42, "specular": 0.0}
@@ -194,26 +192,6 @@ def paint(values: Floats, scale: ScalarMappable) -> Floats:
     colours = np.asarray(scale.to_rgba(values))[:, :3]
     colours[~np.isfinite(values)] = to_rgb(UNKNOWN_COLOUR)
     return colours
-
-
-def is_visible(
-    mesh: TriangleMesh,
-    point: Floats,
-    view: View,
-) -> bool:
-    """Return whether a point of the surface is visible in a view."""
-    far = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    body = pv.PolyData.from_regular_faces(
-        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
-    )
-    towards = np.array(view.towards)
-    right, up = picture_axes(view)
-    # slightly shifted: rays through vertices may pass between triangles
-    point = point + 0.013 * right + 0.007 * up
-    hits, _ = body.ray_trace(
-        origin=point + far * towards, end_point=point - 1e-3 * towards
-    )
-    return bool(len(hits) == 0 or ((hits - point) @ towards).max() < SAME_PLACE_MM)
 
 
 def render(

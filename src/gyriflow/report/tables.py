@@ -514,41 +514,22 @@ def predicted_table(
     ].assign(name=_named)
     scores = scores.assign(text=centile_text(scores)).set_index("name")
 
-    def of_brain(
-        table: pd.DataFrame,
-        column: str,
-        brain: str,
-        run: str,
-        when: str,
-    ) -> pd.Series:
-        at = table["week"] == prediction[when]
-        return table.loc[
-            at & (table["subject"] == prediction[brain]) & (table["run"] == run), column
-        ]
-
+    start, atlas_brain = prediction["brain"], prediction["atlas_brain"]
     brains = {
-        f"start, {week_label(prediction['start_week'])}": (
-            "brain",
-            OBSERVED,
-            "start_week",
-        ),
-        f"predicted, {week_label(prediction['week'])}": (
-            "brain",
-            prediction["run"],
-            "week",
-        ),
-        f"the atlas' own brain, {week_label(prediction['atlas_week'])}": (
-            "atlas_brain",
-            OBSERVED,
-            "atlas_week",
-        ),
+        "start": (start, OBSERVED, prediction["start_week"]),
+        "predicted": (start, prediction["run"], prediction["week"]),
+        "the atlas' own brain": (atlas_brain, OBSERVED, prediction["atlas_week"]),
     }
     columns: dict[str, pd.Series] = {}
-    for head, key in brains.items():
-        columns[head] = of_brain(rows, "value", *key)
-        if len(texts := of_brain(scores, "text", *key)):
+    values = {}
+    for name, (brain, run, week) in brains.items():
+        head = f"{name}, {week_label(week)}"
+        values[name] = _rows_of(rows, brain, run, week)["value"]
+        columns[head] = values[name]
+        texts = _rows_of(scores, brain, run, week)["text"]
+        if len(texts):
             columns[f"{head}: centile (90 % interval), z"] = texts
-        if intervals is not None and key[1] == prediction["run"]:
+        if intervals is not None and run == prediction["run"]:
             last = (
                 intervals[intervals["week"] == prediction["week"]]
                 .assign(name=_named)
@@ -558,16 +539,25 @@ def predicted_table(
             columns[INTERVAL_HEAD] = pd.Series(
                 [f"{a:.4g} to {b:.4g}" for a, b in ends], last.index
             )
-    predicted, atlas_brain = (columns[head] for head in list(brains)[1:])
-    columns["predicted less the atlas' (%)"] = (
-        100 * (predicted / atlas_brain - 1)
-    ).map(_signed)
+    predicted = values["predicted"]
+    differences = 100 * (predicted / values["the atlas' own brain"] - 1)
+    columns["predicted less the atlas' (%)"] = differences.map(_signed)
     errors = {
         metric_title(metric): text
         for metric, text in prediction["tests"]["errors"].items()
     }
     columns[ERROR_HEAD] = predicted.index.to_series().map(errors)
     return pd.DataFrame(columns).reindex(predicted.index).rename_axis("metric")
+
+
+def _rows_of(
+    table: pd.DataFrame,
+    brain: str,
+    run: str,
+    week: float,
+) -> pd.DataFrame:
+    is_brain = (table["subject"] == brain) & (table["week"] == week)
+    return table[is_brain & (table["run"] == run)]
 
 
 def kept_table(kept: pd.DataFrame, end_week: float) -> pd.DataFrame:

@@ -92,7 +92,7 @@ def surfaces_view(
             )
     groups: list[dict[str, Any]] = []
     for run, frames in simulated.items():
-        vertices_kept, faces = thin_out(frames[-1][1], vertices)
+        vertices_kept, faces = _thin_out(frames[-1][1], vertices)
         group = {
             "name": run,
             "kind": "simulated",
@@ -104,7 +104,7 @@ def surfaces_view(
     if observed_frames:
         drawn = []
         for frame in observed_frames:
-            vertices_kept, faces = thin_out(frame[1], vertices)
+            vertices_kept, faces = _thin_out(frame[1], vertices)
             own_faces = {"faces": _text(faces, "<u2")}
             drawn.append(_frame(frame, vertices_kept, box, scales) | own_faces)
         group = {
@@ -160,7 +160,7 @@ def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
     return list(frames)
 
 
-def thin_out(
+def _thin_out(
     mesh: TriangleMesh, vertices: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the indices of about so many vertices to keep, and the (m, 3) triangles

@@ -82,7 +82,7 @@ class Layer:
     value: str | tuple[str, str] = "value"
 
 
-def weeks_chart(
+def _weeks_chart(
     titles: Mapping[str, str],
     layers: Sequence[Layer],
     weeks: Sequence[float] | pd.Series,
@@ -315,7 +315,7 @@ def metrics_figure(
     panels = {("whole", name): name for name in titles}
     lines, names = _atlas_lines(atlases, panels, whole["week"])
     layers = [*lines, *_run_lines(rows, colours), *marks]
-    figure, _ = weeks_chart(titles, layers, whole["week"])
+    figure, _ = _weeks_chart(titles, layers, whole["week"])
     named = [*(subjects if markers else ()), *shades]
     has_stars = not observed["subject"].isin(named).all()
     run_legend(
@@ -349,7 +349,7 @@ def intervals_figure(ensemble: pd.DataFrame) -> Figure:
             "observed_value",
         ),
     ]
-    figure, _ = weeks_chart(
+    figure, _ = _weeks_chart(
         titles,
         layers,
         rows["week"],
@@ -437,7 +437,7 @@ def norms_figure(
             shades=shades,
         ),
     ]
-    figure, _ = weeks_chart(
+    figure, _ = _weeks_chart(
         titles,
         layers,
         rows["week"],
@@ -529,7 +529,7 @@ def regions_chart(
                     },
                 )
             )
-    figure, panels = weeks_chart(
+    figure, panels = _weeks_chart(
         titles,
         layers,
         rows["week"],
@@ -639,7 +639,7 @@ def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
         "sharex": True,
         "sharey": "col",
     }
-    figure, panels = weeks_chart(
+    figure, panels = _weeks_chart(
         dict(zip(titles, titles, strict=True)), layers, rows["week"], **layout
     )
     for axes in panels.values():
@@ -728,7 +728,7 @@ def displacement_figure(
         )
         for run, style in styles.items()
     ]
-    figure, panels = weeks_chart(
+    figure, panels = _weeks_chart(
         titles, layers, [*rows["from_week"], *rows["to_week"]], per_row=2
     )
     for axes in panels.values():
@@ -884,7 +884,7 @@ def spectra_figure(
         "sharex": True,
         "sharey": "col",
     }
-    figure, panels = weeks_chart(titles, layers, rows["week"], **layout)
+    figure, panels = _weeks_chart(titles, layers, rows["week"], **layout)
     for cell, (side, band) in cells.items():
         axes = panels[cell]
         if not rows.loc[rows["panel"] == cell, "value"].notna().any():

@@ -44,20 +44,11 @@ def variations(members: int) -> list[Variation]:
     """Return the variation of each member of an ensemble, by a Latin hypercube: one
     sample per stratum."""
     random = np.random.default_rng(0)
-
-    def quantiles() -> NDArray[np.float64]:
-        strata = random.permutation(members)
-        return (strata + random.uniform(size=members)) / members
-
-    def between(low: float, high: float) -> NDArray[np.float64]:
-        log_low, log_high = np.log((low, high))
-        return np.exp(log_low + quantiles() * (log_high - log_low))
-
-    age_shift_gw = [AGE_SD_GW * NormalDist().inv_cdf(age) for age in quantiles()]
-    smoothing = between(*SMOOTHING_RANGE)
-    difference_mm = between(*DIFFERENCE_RANGE_MM)
-    fading_gw = between(*FADING_RANGE_GW)
-    lasting = quantiles()
+    ages, *shares, lasting = (_quantiles(random, members) for _ in range(5))
+    age_shift_gw = [AGE_SD_GW * NormalDist().inv_cdf(age) for age in ages]
+    smoothing = _between(*SMOOTHING_RANGE, shares[0])
+    difference_mm = _between(*DIFFERENCE_RANGE_MM, shares[1])
+    fading_gw = _between(*FADING_RANGE_GW, shares[2])
     return [
         Variation(
             number=number,
@@ -70,3 +61,18 @@ def variations(members: int) -> list[Variation]:
         )
         for number in range(members)
     ]
+
+
+def _quantiles(random: np.random.Generator, members: int) -> NDArray[np.float64]:
+    strata = random.permutation(members)
+    return (strata + random.uniform(size=members)) / members
+
+
+def _between(
+    low: float,
+    high: float,
+    share: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the values at shares of the logarithmic way between two."""
+    log_low, log_high = np.log((low, high))
+    return np.exp(log_low + share * (log_high - log_low))

@@ -167,7 +167,9 @@ def plain_settings(settings: FoldingSettings) -> dict[str, Any]:
         mode="json",
         exclude={"ranks", "start", "ensemble"},
     )
-    plain["growth"] = settings.growth.own_keys()
+    model = settings.growth.definition
+    own_keys = {"model", *model.keys, *model.resolved}
+    plain["growth"] = settings.growth.model_dump(mode="json", include=own_keys)
     mapped = mapped_parameters(settings)
     for name in VARYING:
         value = getattr(settings, name)
@@ -319,12 +321,12 @@ def params_content(
         **settings,
     }
     if target_weeks:
-        content["targets"] = {week: target_map(week) for week in target_weeks}
+        content["targets"] = {week: _target_map(week) for week in target_weeks}
         content["stops"] = list(stops)
     return content | {"growth": growth}
 
 
-def target_map(week: float) -> str:
+def _target_map(week: float) -> str:
     """Return what the names of the maps of positions that a mesh is to have at a week
     begin with."""
     return f"target_{week:05.2f}"
@@ -338,7 +340,7 @@ def target_maps(
     maps = {}
     for week, places in zip(weeks, positions, strict=True):
         for axis, values in zip(AXES, places.T, strict=True):
-            maps[f"{target_map(week)}_{axis}"] = values
+            maps[f"{_target_map(week)}_{axis}"] = values
     return maps
 
 

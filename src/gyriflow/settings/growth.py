@@ -162,17 +162,6 @@ class Growth(Settings):
             self.volume_ml,
         )
 
-    def own_keys(self) -> dict[str, Any]:
-        """Return the model and the keys that it uses, in the form of a file."""
-        return self.model_dump(
-            mode="json",
-            include={
-                "model",
-                *self.definition.keys,
-                *self.definition.resolved,
-            },
-        )
-
     def unused_keys(self, used: Collection[str]) -> Problems:
         """Yield a problem for each key that differs from its default but is not among
         those used."""

@@ -110,10 +110,6 @@ class TableAge:
     column: AgeColumn
     text: str
 
-    @property
-    def is_missing(self) -> bool:
-        return is_missing(self.text)
-
     def __str__(self) -> str:
         return f"{self.column.name} {self.text or 'n/a'} ({self.place})"
 

@@ -43,7 +43,7 @@ class UsedAtlas:
     atlas: Atlas
 
     @property
-    def series(self) -> list[str]:
+    def _series(self) -> list[str]:
         """The names of the series that are used."""
         series = self.settings.series
         if series is None:
@@ -60,7 +60,7 @@ class UsedAtlas:
     def files(self) -> list[AtlasFile]:
         """The files that the study uses, by series and week."""
         files: list[AtlasFile] = []
-        for name in self.series:
+        for name in self._series:
             if name in self.atlas.series:
                 files += self._files_of(name)
         return files
@@ -74,7 +74,7 @@ class UsedAtlas:
         series = self.atlas.series[name]
         weeks = set(series.weeks)
         if self.settings.weeks is not None:
-            weeks = self.known_weeks(name).intersection(self.settings.weeks)
+            weeks = self._known_weeks(name).intersection(self.settings.weeks)
         keys = series.files if self.settings.images else series.needed
         root = (self.atlas.url or "").rstrip("/")
         for week in sorted(weeks):
@@ -97,7 +97,7 @@ class UsedAtlas:
                     copies=tuple(copies),
                 )
 
-    def known_weeks(self, name: str) -> set[float]:
+    def _known_weeks(self, name: str) -> set[float]:
         """Return the weeks of a series that are published, or whose required files are
         in the folder."""
         series = self.atlas.series[name]
@@ -179,7 +179,7 @@ def atlas_problems(used: UsedAtlas) -> Problems:
     atlas = used.atlas
     settings = used.settings
     licence = atlas.licence
-    unknown = [name for name in used.series if name not in atlas.series]
+    unknown = [name for name in used._series if name not in atlas.series]
     if unknown:
         yield KeyProblem(
             f"found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}",
@@ -195,14 +195,14 @@ def atlas_problems(used: UsedAtlas) -> Problems:
             f" {licence.terms}",
             ("accept_licence",),
         )
-    available = set.union(*map(used.known_weeks, used.series))
-    unknown_weeks = set(settings.weeks or ()) - available
-    if unknown_weeks:
+    available = set.union(*map(used._known_weeks, used._series))
+    un_known_weeks = set(settings.weeks or ()) - available
+    if un_known_weeks:
         source = atlas.name
         if settings.series is not None:
-            source += f" ({', '.join(used.series)})"
+            source += f" ({', '.join(used._series)})"
         yield KeyProblem(
-            f"{source} has no files of {_listed(unknown_weeks)} GW; it has"
+            f"{source} has no files of {_listed(un_known_weeks)} GW; it has"
             f" {_listed(available)} GW. Weeks are not rounded: write one of these",
             ("weeks",),
         )

@@ -75,10 +75,6 @@ class TableRow:
     values: Mapping[str, str]
     ages: Sequence[TableAge]
 
-    @property
-    def subject(self) -> str:
-        return self.name.removeprefix("sub-")
-
 
 @dataclass(frozen=True)
 class Table:
@@ -263,7 +259,8 @@ class ScanTables:
         self.cells: list[TableAge] = []
         for table in self.tables:
             for row in table.rows:
-                self.rows.setdefault(row.subject, []).append(row)
+                subject = row.name.removeprefix("sub-")
+                self.rows.setdefault(subject, []).append(row)
                 self.cells += row.ages
         kinds = {cell.column.kind for cell in self.cells}
         self.kind = "scan" if "scan" in kinds else "gestational"
@@ -347,7 +344,7 @@ class ScanTables:
             cause = f"no row of its session; found {found}; expected {session}"
             age = ScanAge(None, cause=cause)
         if age is None and shared:
-            cells = [cell for cell in shared if not cell.is_missing]
+            cells = [cell for cell in shared if not is_missing(cell.text)]
             cause = (
                 f"one age is given for several sessions; found {(cells or shared)[0]};"
                 f" expected a row with session_id {session}"
@@ -360,10 +357,10 @@ class ScanTables:
     def _age(self, ages: Sequence[TableAge]) -> ScanAge | None:
         """Return the age that the cells of a scan give, or None if it has no cells."""
         used = [age for age in ages if age.column.kind == self.kind]
-        present = [age for age in used if not age.is_missing]
+        present = [age for age in used if not is_missing(age.text)]
         others = []
         for age in ages:
-            if age.column.kind != self.kind and not age.is_missing:
+            if age.column.kind != self.kind and not is_missing(age.text):
                 others.append(age)
         doubtful = others
         if self.kind == "scan" and used:
@@ -400,7 +397,7 @@ class ScanTables:
     @cached_property
     def _other_ages(self) -> list[TableAge]:
         """The ages in columns that are not named as of gestational ages."""
-        return [cell for cell in self._cells_of("other") if not cell.is_missing]
+        return [cell for cell in self._cells_of("other") if not is_missing(cell.text)]
 
 
 def _is_in(file: Path | None, folder: Path) -> bool:

@@ -210,11 +210,6 @@ class Simulation:
         return self.settings.growth.shapes
 
     @property
-    def has_growth_rate(self) -> bool:
-        """True if its cortex grows at the rate of the settings, changed by no law."""
-        return self.settings.growth.model == "rates"
-
-    @property
     def has_growth_maps(self) -> bool:
         """True if maps of the growth that it found can be written."""
         return self.shapes is not None and "growth" in self.settings.fields

@@ -95,7 +95,7 @@ class Series:
         brains = self.brains[name]
         return brains[0].subject is not None and not several_subjects(brains)
 
-    def are_matched(self, *brains: Brain) -> bool:
+    def _are_matched(self, *brains: Brain) -> bool:
         """Return whether brains have surfaces with the same vertices."""
         ids = {brain.id for brain in brains}
         return any(ids <= matched for matched in self.matched.values())
@@ -112,7 +112,7 @@ class Series:
         `variation` is the factor of a registration's smoothing, and the seed of its
         perturbed labels.
         """
-        is_matched = self.are_matched(earlier, later)
+        is_matched = self._are_matched(earlier, later)
         pattern = VARIED_REGISTRATION
         if is_matched:
             pattern = MATCHED
@@ -372,7 +372,7 @@ def _own_chain(
     by_week = {start.week: start}
     for brain in members:
         lack_labels = start.labels is None or brain.labels is None
-        if lack_labels and not series.are_matched(start, brain):
+        if lack_labels and not series._are_matched(start, brain):
             continue
         if start.week < brain.week <= last:
             by_week.setdefault(brain.week, brain)

@@ -286,12 +286,6 @@ class Study:
         return {row.place: row for row in rows}
 
     @cached_property
-    def all_measured(self) -> dict[str, MeasuredBrain]:
-        """All measured brains by place, including those of further simulations."""
-        rows = {row.place: row for row in self.simulated.values()}
-        return rows | self.measured
-
-    @cached_property
     def used_atlases(self) -> list[UsedAtlas]:
         """The atlases of the study, with the files that exist now."""
         return used_atlases(self.config)
@@ -493,18 +487,9 @@ class Study:
             "population": atlas_brain.population_name,
             "atlas": used and used.atlas.model_dump(include=atlas_keys),
             "surfaces": [*self.measured_parts(last).values()],
-            "atlas_surface": self.atlas_surface(simulation),
+            "atlas_surface": simulation.file(paths.ATLAS_BRAIN, week=last.week),
             "labels": labels,
         }
-
-    @staticmethod
-    def atlas_surface(prediction: Simulation) -> str:
-        """Return the file with the atlas' own brain in the last week of a
-        prediction."""
-        return prediction.file(
-            paths.ATLAS_BRAIN,
-            week=prediction.weeks[-1],
-        )
 
 
 # the tables on disk

@@ -23,8 +23,7 @@ from gyriflow.report.page import (
     methods_text,
     page_figures,
     report_page,
-    run_verdict,
-    sections,
+    scores_table,
     study_page,
     verdict,
 )
@@ -231,9 +230,11 @@ def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_thr
     figures = shown("steps", "maps", "rates")
     for figure, name in zip(figures, "AAB", strict=True):
         figure["section"] = name
+    about = {"norm": "the norm", "pictures": PICTURES}
+    content = study_page(BRAINS, Tables(**TABLES), figures, **about)
     found = [
         (name, [(item["number"], item["technical"]) for item in items])
-        for name, items in sections(figures)
+        for name, items in content["sections"]
     ]
     assert found == [("A", [(1, False), (2, True)]), ("B", [(3, False)])]
     assert "<details><summary>2. a</summary>" in page(figures)
@@ -462,6 +463,11 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning(
     tables = {"runs": runs, "validation": validation}
     if warnings is NONE:
         assert told in page(**tables).replace("&#39;", "'")
+
+
+def run_verdict(run):
+    (row,) = scores_table(pd.DataFrame([run])).to_dict("records")
+    return row["verdict"]
 
 
 @pytest.mark.parametrize(

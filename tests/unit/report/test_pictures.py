@@ -16,14 +16,13 @@ from gyriflow.report.panels import LINES_MM, direction_lines
 from gyriflow.report.pictures import (
     GridBrain,
     brain_depth,
-    brain_grid,
     brain_maps,
+    brain_regions,
     displacement_maps,
     expected_figure,
-    growth_grid,
-    in_views,
+    growth_across_figure,
+    growth_found_figure,
     influence_figure,
-    region_grid,
     scale_of,
     shape_maps,
     weekly_figure,
@@ -131,10 +130,11 @@ def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before()
     weeks = np.arange(21.0, 31.0)
     long = [plain("long", week, BRAIN, simulated=True) for week in weeks]
     brains = [*long, plain("observed brain", 21.0, BRAIN)]
-    figure = brain_grid(in_views(brains, ("left",)))
+    figure = weekly_figure(brains)
+    # of two blocks with two views
     written = [text.get_text() for text in figure.findobj(Text)]
-    assert sum("long" in text for text in written) == 2
-    assert sum("observed brain" in text for text in written) == 1
+    assert sum("long" in text for text in written) == 4
+    assert sum("observed brain" in text for text in written) == 2
 
 
 def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps_and_one_scale():
@@ -244,9 +244,9 @@ def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed
 def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
     ridge = mapped("simulated", 28.0, BRAIN, "shape_index", 0.7)
     sulcus = mapped("observed brain", 28.0, BRAIN, "shape_index", -0.7)
-    figure = brain_grid(in_views([ridge, sulcus], ("left",)), "shape_index")
+    figure = shape_maps([ridge, sulcus])
     assert colour_bar(figure, "shape index").get_xlim() == (-1.0, 1.0)
-    gyri, sulci = tones(figure)
+    gyri, _, sulci, _ = tones(figure)
     assert gyri[0] > gyri[2]
     assert sulci[2] > sulci[0]
 
@@ -308,28 +308,32 @@ def test_lines_on_a_map_run_along_directions_where_these_are_seen():
         direction = name_in_interval(f"growth_direction_{axis}", 21.0, 22.0)
         growth[direction] = right[:, number]
     frames = {21.0: (SMOOTH, {}), 22.0: (SMOOTH, {})}
-    figure = growth_grid(frames, growth, name, views=("right", "left"))
-    dark = [(picture(figure, number) < 60).all(axis=-1).sum() for number in (0, 1)]
-    assert dark[0] > 100
-    assert dark[1] == 0
+    figure = growth_found_figure(frames, growth)
+    # from the left, and from above with the right on the right
+    dark = [(picture(figure, number) < 60).all(axis=-1) for number in (0, 1)]
+    middle = dark[1].shape[1] // 2
+    assert not dark[0].any()
+    assert not dark[1][:, :middle].any()
+    assert dark[1][:, middle:].sum() > 50
 
 
 @pytest.mark.parametrize(
-    ("quantity", "label", "factor", "ends"),
+    ("draw", "quantity", "label", "factor", "ends"),
     [
-        ("area_growth_percent_per_gw", "growth of area", 1.0, (0.0, 8.0)),
-        ("thickness_growth_percent_per_gw", "across", -0.5, (-4.0, 4.0)),
+        (growth_found_figure, "area", "growth of area", 1.0, (0.0, 8.0)),
+        (growth_across_figure, "thickness", "across", -0.5, (-4.0, 4.0)),
     ],
 )
 def test_growth_of_an_interval_is_on_the_surface_at_its_end(
-    quantity, label, factor, ends
+    draw, quantity, label, factor, ends
 ):
     heights = {21.0: 20, 22.5: 24, 25.0: 30}
     frames = {week: (box((20, 30, tall)), {}) for week, tall in heights.items()}
     maps = {}
     for interval, value in (((21.0, 22.5), 2.0), ((22.5, 25.0), 8.0)):
-        maps[name_in_interval(quantity, *interval)] = np.full(8, factor * value)
-    figure = growth_grid(frames, maps, quantity, views=("left", "top"))
+        name = name_in_interval(f"{quantity}_growth_percent_per_gw", *interval)
+        maps[name] = np.full(8, factor * value)
+    figure = draw(frames, maps)
     assert {"21–22.5 GW\nleft view", "22.5–25 GW\nleft view"} <= words(figure)
     assert colour_bar(figure, label).get_xlim() == pytest.approx(ends)
     first, second = picture(figure, 0), picture(figure, 1)
@@ -346,7 +350,7 @@ def test_regions_are_seen_in_their_colours_where_they_are():
     y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
     regions = np.where(z < -12, 0, np.where(y > 0, 1, 2))
     names = {1: "front", 2: "back"}
-    figure = region_grid([GridBrain("", "p", [(mesh, (regions, names))])])
+    figure = brain_regions([GridBrain("", "p", [(mesh, (regions, names))])])
     hues = {}
     for patch in figure.legends[0].legend_handles:
         hue = np.array(patch.get_facecolor()[:3])

@@ -5,13 +5,13 @@ from base64 import b64decode
 
 import numpy as np
 import pytest
-import pyvista as pv
 from facts import Facts
 from shapes import sphere
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.report.view3d import surfaces_view, thin_out
+from gyriflow.geometry.triangles import TriangleMesh, volume_ml
+from gyriflow.report import view3d
+from gyriflow.report.view3d import surfaces_view
 
 BALL = sphere(20.0)
 
@@ -38,16 +38,14 @@ def growing(values: np.ndarray | None = None) -> list:
     ]
 
 
-def test_thinning_keeps_vertices_and_the_shape():
-    mesh = BALL
-    kept, faces = thin_out(mesh, 400)
-    assert len(kept) == pytest.approx(400, rel=0.1)
-    assert faces.max() == len(kept) - 1
-    coarse = pv.PolyData.from_regular_faces(mesh.vertices[kept], faces)
-    assert coarse.volume == pytest.approx(
-        pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces).volume, rel=0.03
-    )
-    assert len(thin_out(mesh, 10**6)[0]) == len(mesh.vertices)
+def test_thinning_keeps_the_shape(monkeypatch):
+    monkeypatch.setattr(view3d, "MAX_VERTICES", 600)
+    data = surfaces_view({"thin": growing()}, [], observed_name="observed brain")
+    (group,) = data["groups"]
+    places = positions(data, group["frames"][0])
+    assert len(places) == pytest.approx(600, rel=0.1)
+    coarse = TriangleMesh(places, shorts(group["faces"]).reshape(-1, 3).astype(int))
+    assert volume_ml(coarse) == pytest.approx(volume_ml(BALL), rel=0.03)
 
 
 def test_a_run_has_one_triangulation_and_its_positions_each_week():
