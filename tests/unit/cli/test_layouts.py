@@ -11,12 +11,13 @@ from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 
 
-def both(pattern):
+def both(*patterns):
     """Return the paths of both sides, L and R or lh and rh for @."""
-    return [
-        pattern.replace("@", side)
-        for side in (("lh", "rh") if "/@." in pattern else ("L", "R"))
-    ]
+    paths = []
+    for pattern in patterns:
+        sides = ("lh", "rh") if "/@." in pattern else ("L", "R")
+        paths += [pattern.replace("@", side) for side in sides]
+    return paths
 
 
 def brains(folder, **options):
@@ -28,205 +29,137 @@ def brains(folder, **options):
     }
 
 
-NIBABIES = "derivatives/nibabies/sub-01/ses-1/anat/sub-01_ses-1"
-DHCP = "derivatives/dhcp/sub-CC00856XX15/ses-3530/anat/sub-CC00856XX15_ses-3530"
-HCP = "100307/{}/100307.@.{}"
-
-FETPYPE = (
-    "derivatives/nesvor_bounti/sub-01/ses-01/anat"
-    "/sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"
-)
 TABLE = "participants.tsv"
 KEEP_ONE = Facts("2 files", "keep one")
+FETA = "sub-026/anat/sub-026_rec-mial_dseg.nii.gz"
+DHCP = "derivatives/dhcp/sub-CC00856XX15/ses-3530/anat/sub-CC00856XX15_ses-3530"
+DHCP_SESSIONS = "sub-CC00856XX15/sub-CC00856XX15_sessions.tsv"
+FETPYPE = "derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_dseg.nii.gz"
+NIBABIES = "derivatives/nibabies/sub-01/ses-1/anat/sub-01_ses-1"
+HCP = "100307/T1w/Native/100307.@.{}.native.surf.gii"
+DATA_SETS = {
+    "FeTA": (
+        {
+            "labels": [FETA],
+            "text": {TABLE: "participant_id\tGestational age\nsub-026\t23.3"},
+        },
+        {"sub-026": (23.3, FETA, "")},
+    ),
+    # several kinds of one scan are asked for, with ages at the scan of sessions
+    "dHCP": (
+        {
+            "labels": [f"{DHCP}_desc-drawem9_dseg.nii.gz"],
+            "surfaces": both(f"{DHCP}_hemi-@_pial.surf.gii"),
+            "tables": {
+                TABLE: ["participant_id sex birth_age", "CC00856XX15 F 39.1"],
+                DHCP_SESSIONS: ["session_id scan_age", "3530 29.71"],
+            },
+        },
+        {
+            "sub-CC00856XX15_ses-3530": (
+                29.71,
+                ", ".join(both(f"{DHCP}_hemi-@_pial.surf.gii")),
+                KEEP_ONE,
+            ),
+            "sub-CC00856XX15_ses-3530-2": (
+                29.71,
+                f"{DHCP}_desc-drawem9_dseg.nii.gz",
+                KEEP_ONE,
+            ),
+        },
+    ),
+    "fetpype": (
+        {
+            "labels": [FETPYPE],
+            "tables": {TABLE: ["participant_id session_id ga", "sub-01 ses-01 24+3"]},
+        },
+        {"sub-01_ses-01": (24.43, FETPYPE, "")},
+    ),
+    # a template's space and meshes beside the subject's own
+    "NiBabies": (
+        {
+            "labels": [f"{NIBABIES}_space-MNIInfant_cohort-1_dseg.nii.gz"],
+            "surfaces": both(
+                f"{NIBABIES}_hemi-@_pial.surf.gii",
+                f"{NIBABIES}_hemi-@_white.surf.gii",
+                f"{NIBABIES}_hemi-@_space-fsLR_den-32k_pial.surf.gii",
+            ),
+            "text": {f"{NIBABIES}_label-GM_probseg.nii.gz": "no labels"},
+            "tables": {TABLE: ["participant_id pma", "sub-01 41.2"]},
+        },
+        {
+            "sub-01_ses-1": (
+                41.2,
+                ", ".join(both(f"{NIBABIES}_hemi-@_pial.surf.gii")),
+                "",
+            )
+        },
+    ),
+    # with its template
+    "FreeSurfer": (
+        {
+            "surfaces": both(
+                "subjects/sub-01/surf/@.pial",
+                "subjects/sub-01/surf/@.pial.T1",
+                "subjects/sub-01/surf/@.white",
+                "subjects/sub-01/surf/@.sphere",
+                "subjects/sub-02/surf/@.pial.T1",
+                "subjects/fsaverage/surf/@.pial",
+            ),
+            "labels": [f"subjects/sub-01/mri/{name}aseg.mgz" for name in ("", "aparc")],
+            "tables": {
+                f"subjects/{TABLE}": ["participant_id week", "sub-01 36", "sub-02 37"]
+            },
+        },
+        {
+            "sub-01": (36.0, ", ".join(both("subjects/sub-01/surf/@.pial")), ""),
+            "sub-02": (37.0, ", ".join(both("subjects/sub-02/surf/@.pial.T1")), ""),
+        },
+    ),
+    # without sub-
+    "Infant FreeSurfer": (
+        {
+            "surfaces": both("case7/surf/@.pial", "case8/surf/@.pial"),
+            "labels": ["case7/mri/aseg.mgz"],
+            "tables": {TABLE: ["participant_id week", "case7 36", "case8 37"]},
+        },
+        {
+            "case7": (36.0, ", ".join(both("case7/surf/@.pial")), ""),
+            "case8": (37.0, ", ".join(both("case8/surf/@.pial")), ""),
+        },
+    ),
+    "HCP": (
+        {
+            "surfaces": both(
+                HCP.format("pial"),
+                HCP.format("white"),
+                "100307/T1w/fsaverage_LR32k/100307.@.pial.32k_fs_LR.surf.gii",
+                "100307/MNINonLinear/Native/100307.@.pial.native.surf.gii",
+            ),
+            "tables": {TABLE: ["participant_id week", "100307 36"]},
+        },
+        {"100307": (36.0, ", ".join(both(HCP.format("pial"))), "")},
+    ),
+    # a clone with and without contents
+    "git-annex": (
+        {
+            "lost": ["sub-01_week24_dseg.nii.gz", *both("sub-02_week25/surf/@.pial")],
+            "labels": ["sub-03_week26_dseg.nii.gz"],
+        },
+        {
+            "sub-01": (
+                24.0,
+                "sub-01_week24_dseg.nii.gz",
+                Facts("sub-01_week24_dseg.nii.gz"),
+            ),
+            "sub-02": (25.0, Facts("lh.pial"), Facts("lh.pial")),
+            "sub-03": (26.0, "sub-03_week26_dseg.nii.gz", ""),
+        },
+    ),
+}
 
 
-@pytest.mark.parametrize(
-    ("contents", "expected"),
-    [
-        # FeTA 2.x
-        (
-            {
-                "labels": [
-                    f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz" for n in (26, 27)
-                ],
-                "text": {
-                    TABLE: (
-                        "participant_id\tPathology\tGestational age\n"
-                        "sub-026\tNeurotypical\t23.3\nsub-027\tPathological\t26.9"
-                    )
-                },
-            },
-            {
-                f"sub-0{n}": (week, f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz", "")
-                for n, week in ((26, 23.3), (27, 26.9))
-            },
-        ),
-        # dHCP: several kinds of one scan are asked for, with ages at the scan of
-        # sessions
-        (
-            {
-                "labels": [f"{DHCP}_desc-drawem9_dseg.nii.gz"],
-                "surfaces": both(f"{DHCP}_hemi-@_pial.surf.gii"),
-                "tables": {
-                    TABLE: ["participant_id sex birth_age", "CC00856XX15 F 39.1"],
-                    "sub-CC00856XX15/sub-CC00856XX15_sessions.tsv": [
-                        "session_id scan_age",
-                        "3530 29.71",
-                    ],
-                },
-            },
-            {
-                "sub-CC00856XX15_ses-3530": (
-                    29.71,
-                    ", ".join(both(f"{DHCP}_hemi-@_pial.surf.gii")),
-                    KEEP_ONE,
-                ),
-                "sub-CC00856XX15_ses-3530-2": (
-                    29.71,
-                    f"{DHCP}_desc-drawem9_dseg.nii.gz",
-                    KEEP_ONE,
-                ),
-            },
-        ),
-        # fetpype's derivatives
-        (
-            {
-                "labels": [FETPYPE],
-                "tables": {
-                    TABLE: ["participant_id session_id ga", "sub-01 ses-01 24+3"]
-                },
-            },
-            {
-                "sub-01_ses-01": (
-                    24.43,
-                    Facts("sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"),
-                    "",
-                )
-            },
-        ),
-        # NiBabies: a template's space and meshes beside the subject's own
-        (
-            {
-                "labels": [f"{NIBABIES}_space-MNIInfant_cohort-1_dseg.nii.gz"],
-                "surfaces": [
-                    *both(f"{NIBABIES}_hemi-@_pial.surf.gii"),
-                    *both(f"{NIBABIES}_hemi-@_white.surf.gii"),
-                    *both(f"{NIBABIES}_hemi-@_space-fsLR_den-32k_pial.surf.gii"),
-                ],
-                "text": {f"{NIBABIES}_label-GM_probseg.nii.gz": "no labels"},
-                "tables": {TABLE: ["participant_id pma", "sub-01 41.2"]},
-            },
-            {
-                "sub-01_ses-1": (
-                    41.2,
-                    ", ".join(both(f"{NIBABIES}_hemi-@_pial.surf.gii")),
-                    "",
-                )
-            },
-        ),
-        # FreeSurfer, with its template
-        (
-            {
-                "surfaces": (
-                    [
-                        path
-                        for layer in ("pial", "pial.T1", "white", "sphere")
-                        for path in both(f"subjects/sub-01/surf/@.{layer}")
-                    ]
-                    + both("subjects/sub-02/surf/@.pial.T1")
-                    + both("subjects/fsaverage/surf/@.pial")
-                ),
-                "labels": [
-                    "subjects/sub-01/mri/aseg.mgz",
-                    "subjects/sub-01/mri/aparc+aseg.mgz",
-                ],
-                "tables": {
-                    f"subjects/{TABLE}": [
-                        "participant_id week",
-                        "sub-01 36",
-                        "sub-02 37",
-                    ]
-                },
-            },
-            {
-                "sub-01": (
-                    36.0,
-                    "subjects/sub-01/surf/lh.pial, subjects/sub-01/surf/rh.pial",
-                    "",
-                ),
-                "sub-02": (
-                    37.0,
-                    "subjects/sub-02/surf/lh.pial.T1, subjects/sub-02/surf/rh.pial.T1",
-                    "",
-                ),
-            },
-        ),
-        # Infant FreeSurfer, without sub-
-        (
-            {
-                "surfaces": [*both("case7/surf/@.pial"), *both("case8/surf/@.pial")],
-                "labels": ["case7/mri/aseg.mgz"],
-                "tables": {TABLE: ["participant_id week", "case7 36", "case8 37"]},
-            },
-            {
-                f"case{n}": (
-                    29.0 + n,
-                    f"case{n}/surf/lh.pial, case{n}/surf/rh.pial",
-                    "",
-                )
-                for n in (7, 8)
-            },
-        ),
-        # HCP
-        (
-            {
-                "surfaces": [
-                    *both(HCP.format("T1w/Native", "pial.native.surf.gii")),
-                    *both(HCP.format("T1w/Native", "white.native.surf.gii")),
-                    *both(HCP.format("T1w/fsaverage_LR32k", "pial.32k_fs_LR.surf.gii")),
-                    *both(HCP.format("MNINonLinear/Native", "pial.native.surf.gii")),
-                ],
-                "tables": {TABLE: ["participant_id week", "100307 36"]},
-            },
-            {
-                "100307": (
-                    36.0,
-                    ", ".join(both(HCP.format("T1w/Native", "pial.native.surf.gii"))),
-                    "",
-                )
-            },
-        ),
-        # a clone of git-annex with and without contents
-        (
-            {
-                "lost": [
-                    "sub-01_week24_dseg.nii.gz",
-                    *both("sub-02_week25/surf/@.pial"),
-                ],
-                "labels": ["sub-03_week26_dseg.nii.gz"],
-            },
-            {
-                "sub-01": (
-                    24.0,
-                    "sub-01_week24_dseg.nii.gz",
-                    Facts("sub-01_week24_dseg.nii.gz"),
-                ),
-                "sub-02": (25.0, Facts("lh.pial"), Facts("lh.pial")),
-                "sub-03": (26.0, "sub-03_week26_dseg.nii.gz", ""),
-            },
-        ),
-    ],
-    ids=[
-        "FeTA",
-        "dHCP",
-        "fetpype",
-        "NiBabies",
-        "FreeSurfer",
-        "Infant FreeSurfer",
-        "HCP",
-        "git-annex",
-    ],
-)
+@pytest.mark.parametrize(("contents", "expected"), DATA_SETS.values(), ids=DATA_SETS)
 def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
     assert brains(make_tree(tmp_path, **contents)) == expected
 
@@ -235,69 +168,58 @@ WEEK = "sub-01_week24"
 
 
 @pytest.mark.parametrize(
-    ("contents", "cause"),
+    ("kind", "files", "facts"),
     [
+        ("labels", [f"{WEEK}_space-MNI152NLin6Asym_dseg.nii.gz"], ["MNI152NLin6Asym"]),
+        ("labels", [f"{WEEK}_space-dhcpSym_dseg.nii.gz"], ["dhcpSym"]),
+        ("labels", [f"{WEEK}_space-T2w_dseg.nii.gz"], []),
+        ("labels", [f"tpl-x/{WEEK}_dseg.nii.gz"], ["tpl-x"]),
+        ("labels", [f"sub-02/{WEEK}_dseg.nii.gz"], ["sub-01", "sub-02"]),
+        ("labels", ["week24/sub-mü_dseg.nii.gz"], ["sub-mü"]),
+        ("torn", [f"{WEEK}_dseg.nii.gz"], [f"{WEEK}_dseg.nii.gz"]),
+        ("surfaces", both(f"{WEEK}/@.white"), ["white", "pial"]),
+        ("surfaces", [f"{WEEK}/lh.pial"], []),
+        ("surfaces", [f"{WEEK}/lh.pial", f"{WEEK}/rh.sphere"], ["right", "rh.sphere"]),
+        ("surfaces", [f"{WEEK}/lh.pial", f"{WEEK}/label/rh.a.annot"], ["rh.a.annot"]),
+        ("surfaces", [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white"], ["lh.white"]),
+        ("surfaces", both(f"{WEEK}_hemi-@_space-fsLR_den-32k_pial.surf.gii"), []),
+        # the second is a link to nowhere
+        ("lost", [f"{WEEK}/lh.pial", f"{WEEK}/rh.pial"], ["rh.pial"]),
         (
-            {"labels": [f"{WEEK}_space-MNI152NLin6Asym_dseg.nii.gz"]},
-            Facts("MNI152NLin6Asym"),
+            "lost",
+            [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white", f"{WEEK}/rh.white"],
+            ["rh.white"],
         ),
-        ({"labels": [f"{WEEK}_space-dhcpSym_dseg.nii.gz"]}, Facts("dhcpSym")),
-        ({"labels": [f"{WEEK}_space-T2w_dseg.nii.gz"]}, ""),
-        ({"labels": [f"tpl-x/{WEEK}_dseg.nii.gz"]}, Facts("tpl-x")),
-        ({"labels": [f"sub-02/{WEEK}_dseg.nii.gz"]}, Facts("sub-01", "sub-02")),
-        ({"text": {f"{WEEK}_dseg.nii.gz": "no labels"}}, Facts(f"{WEEK}_dseg.nii.gz")),
-        ({"surfaces": both(f"{WEEK}/@.white")}, Facts("white", "pial")),
-        ({"surfaces": both(f"{WEEK}/@.pial")}, ""),
-        ({"surfaces": [f"{WEEK}/lh.pial"]}, ""),
-        (
-            {"surfaces": [f"{WEEK}/lh.pial", f"{WEEK}/rh.sphere"]},
-            Facts("right", "rh.sphere"),
-        ),
-        (
-            {"surfaces": [f"{WEEK}/lh.pial"], "lost": [f"{WEEK}/rh.pial"]},
-            Facts("rh.pial"),
-        ),
-        (
-            {"surfaces": [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white"]},
-            Facts("white", "lh.white"),
-        ),
-        (
-            {
-                "surfaces": [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white"],
-                "lost": [f"{WEEK}/rh.white"],
-            },
-            Facts("rh.white"),
-        ),
-        ({"surfaces": [f"{WEEK}/lh.pial"], "text": {f"{WEEK}/rh.pial": ""}}, ""),
-        ({"surfaces": both(f"{WEEK}_hemi-@_space-fsLR_den-32k_pial.surf.gii")}, ""),
     ],
 )
-def test_files_that_cannot_be_used_are_named(tmp_path, contents, cause):
-    ((_, _, found),) = brains(make_tree(tmp_path, **contents)).values()
-    assert found == cause
+def test_files_that_cannot_be_used_are_named(tmp_path, kind, files, facts):
+    contents = {kind: files}
+    if kind == "torn":
+        contents = {"text": {files[0]: "no labels"}}
+    elif kind == "lost":
+        contents = {"surfaces": files[:-1], "lost": files[-1:]}
+    ((_, _, cause),) = brains(make_tree(tmp_path, **contents)).values()
+    assert cause == (Facts(*facts) if facts else "")
 
 
 @pytest.mark.parametrize(
-    ("labels", "surfaces", "cause"),
+    ("files", "surfaces", "cause"),
     [
         # of one data set
         (["anat/sub-01_dseg.nii.gz"], "surf/sub-01_hemi-@_pial.surf.gii", KEEP_ONE),
-        (
-            ["volumes/sub-01_dseg.nii.gz"],
-            "meshes/sub-01_hemi-@_pial.surf.gii",
-            KEEP_ONE,
-        ),
-        (["anat/sub-01_dseg.nii.gz", "seg/sub-01_desc-x_dseg.nii.gz"], None, KEEP_ONE),
+        (["a/sub-01_dseg.nii.gz"], "b/sub-01_hemi-@_pial.surf.gii", KEEP_ONE),
+        (["anat/sub-01_dseg.nii.gz", "seg/sub-01_desc-x_dseg.nii.gz"], "", KEEP_ONE),
+        # of two
         (
             ["siteA/anat/sub-01_dseg.nii.gz", "siteB/anat/sub-01_dseg.nii.gz"],
-            None,
+            "",
             Facts("siteA", "siteB"),
         ),
     ],
 )
-def test_folders_of_kinds_of_data_are_not_data_sets(tmp_path, labels, surfaces, cause):
-    make_tree(tmp_path, labels=labels, surfaces=both(surfaces) if surfaces else [])
-    assert all(found == cause for _, _, found in brains(tmp_path).values())
+def test_folders_of_kinds_of_data_are_not_data_sets(tmp_path, files, surfaces, cause):
+    make_tree(tmp_path, labels=files, surfaces=both(surfaces) if surfaces else [])
+    assert [found for _, _, found in brains(tmp_path).values()] == [cause] * 2
 
 
 def test_a_resampled_surface_is_used_with_a_warning(tmp_path):
@@ -308,70 +230,41 @@ def test_a_resampled_surface_is_used_with_a_warning(tmp_path):
 
 def test_closed_surfaces_of_whole_brains_are_recognised(tmp_path):
     brain = cerebrum_surface(*phantom(24.0, 2.0))
-    write_surface(tmp_path / "24.stl", brain)
-    write_surface(tmp_path / "week25.ply", brain)
-    write_surface(tmp_path / "skull.stl", brain)
+    for name in ("24.stl", "week25.ply", "skull.stl"):
+        write_surface(tmp_path / name, brain)
     write_surface(tmp_path / "nut.stl", type(brain)(0.1 * brain.vertices, brain.faces))
     assert brains(tmp_path) == {
         "week25": (25.0, "week25.ply", ""),
         "24": ("CHOOSE", "24.stl", Facts("week")),
     }
-
     assert recognise(tmp_path).unused == {"nut.stl": Facts("mL", 15, 700)}
 
 
 @pytest.mark.parametrize(
-    "contents",
+    "files",
     [
         # sides in other folders, in another order of parts, as single letters
-        {"surfaces": ["sub-01/lh/lh.pial", "sub-01/rh/rh.pial"]},
-        {
-            "surfaces": [
-                "sub-01_run-1_hemi-L_pial.surf.gii",
-                "sub-01_hemi-R_run-1_pial.surf.gii",
-            ]
-        },
-        {"surfaces": ["sub-01_L.stl", "sub-01_R.stl"]},
-        # a torn file beside a good one, and a mesh of something else
-        {
-            "labels": ["sub-01_dseg.nii.gz"],
-            "text": {"sub-01_desc-x_dseg.nii.gz": "torn", "sub-01_placenta.stl": "x"},
-        },
+        ["sub-01/lh/lh.pial", "sub-01/rh/rh.pial"],
+        ["sub-01_run-1_hemi-L_pial.surf.gii", "sub-01_hemi-R_run-1_pial.surf.gii"],
+        ["sub-01_L.stl", "sub-01_R.stl"],
     ],
 )
-def test_what_belongs_to_a_scan_is_found_and_nothing_else(tmp_path, contents):
-    first, *others = recognise(make_tree(tmp_path, **contents)).brains
-    assert (first.entry["id"], first.problem, len(others)) == (
-        "sub-01",
-        "",
-        "text" in contents,
+def test_both_sides_of_a_scan_are_found_wherever_they_are(tmp_path, files):
+    (brain,) = recognise(make_tree(tmp_path, surfaces=files)).brains
+    assert (brain.entry["id"], brain.problem) == ("sub-01", "")
+    assert brain.entry["hemispheres"] == dict(
+        zip(("left", "right"), files, strict=True)
     )
+
+
+def test_a_torn_file_beside_a_good_one_and_other_meshes_are_not_chosen_between(
+    tmp_path,
+):
+    torn = {"sub-01_desc-x_dseg.nii.gz": "torn", "sub-01_placenta.stl": "x"}
+    make_tree(tmp_path, labels=["sub-01_dseg.nii.gz"], text=torn)
+    first, _ = recognise(tmp_path).brains
+    assert (first.entry["id"], first.problem) == ("sub-01", "")
     assert not [note for note in first.notes if "keep one" in note]
-    assert len(first.entry.get("hemispheres", ())) in (0, 2)
-
-
-@pytest.mark.parametrize(
-    ("contents", "facts"),
-    [
-        (
-            {"labels": ["siteA/sub-01_dseg.nii.gz", "siteB/sub-01_dseg.nii.gz"]},
-            [1, "siteA", "siteB"],
-        ),
-        ({"labels": ["sub-mü_dseg.nii.gz"]}, ["sub-mü"]),
-        (
-            {
-                "surfaces": ["sub-01/surf/lh.pial"],
-                "text": {"sub-01/label/rh.aparc.annot": ""},
-            },
-            ["rh.aparc.annot"],
-        ),
-    ],
-)
-def test_what_is_not_of_one_scan_is_refused(tmp_path, contents, facts):
-    assert all(
-        brain.problem == Facts(*facts[-2:])
-        for brain in recognise(make_tree(tmp_path, **contents)).brains
-    )
 
 
 def test_links_to_folders_that_are_not_there_are_scans_that_cannot_be_read(tmp_path):
@@ -381,12 +274,10 @@ def test_links_to_folders_that_are_not_there_are_scans_that_cannot_be_read(tmp_p
 
 
 def test_only_results_of_gyriflow_are_passed_over(tmp_path):
+    own = "own/results/brains/a/week25_dseg.nii.gz"
     make_tree(
         tmp_path,
-        labels=[
-            "results/week24_dseg.nii.gz",
-            "own/results/brains/a/week25_dseg.nii.gz",
-        ],
+        labels=["results/week24_dseg.nii.gz", own],
         text={"own/results/study/study.json": "{}"},
     )
     assert list(brains(tmp_path)) == ["week24"]
@@ -394,31 +285,25 @@ def test_only_results_of_gyriflow_are_passed_over(tmp_path):
         recognise(tmp_path / "own")
 
 
-def test_labels_of_other_participants_are_not_read(tmp_path, monkeypatch):
-    make_tree(
-        tmp_path,
-        labels=["sub-01_week24_dseg.nii.gz"],
-        text={"sub-02_week25_dseg.nii.gz": "torn"},
-    )
+def test_labels_of_other_participants_are_not_read(tmp_path):
+    torn = {"sub-02_week25_dseg.nii.gz": "torn"}
+    make_tree(tmp_path, labels=["sub-01_week24_dseg.nii.gz"], text=torn)
     assert list(brains(tmp_path, participants=["01"])) == ["sub-01"]
     ((_, _, cause),) = brains(tmp_path, participants=["02"]).values()
     assert cause == Facts("sub-02_week25_dseg.nii.gz")
 
 
 def test_scans_and_tables_in_formats_that_are_not_read_are_named(tmp_path):
-    make_tree(
-        tmp_path,
-        labels=["case1_week24_seg.nii.gz", "case2_week25_seg.nii.gz"],
-        text={
-            "case3_week26.seg.nrrd": "NRRD0005",
-            "case4_week27_label.mha": "NDims = 3",
-            # exported, too
-            "case1_week24_seg.seg.nrrd": "NRRD0005",
-            "image.nrrd": "NRRD0005",
-            "participants.xlsx": "PK",
-        },
-    )
-    found = recognise(tmp_path)
+    foreign = {
+        "case3_week26.seg.nrrd": "NRRD0005",
+        "case4_week27_label.mha": "NDims = 3",
+        # exported, too
+        "case1_week24_seg.seg.nrrd": "NRRD0005",
+        "image.nrrd": "NRRD0005",
+        "participants.xlsx": "PK",
+    }
+    labels = ["case1_week24_seg.nii.gz", "case2_week25_seg.nii.gz"]
+    found = recognise(make_tree(tmp_path, labels=labels, text=foreign))
     assert [brain.entry["week"] for brain in found.brains] == [24, 25]
     assert found.unused == {
         "case3_week26.seg.nrrd": Facts("NIfTI"),

@@ -12,9 +12,7 @@ from gyriflow.errors import InputError
 from gyriflow.study.ages import AT_SCAN
 
 LONE = "sub-01/lh.pial"
-FIRST, SECOND = (f"sub-01/ses-{session}/lh.pial" for session in (1, 2))
-BOTH = [FIRST, SECOND]
-TWO = {"sub-01_ses-1": 22.0, "sub-01_ses-2": 28.0}
+FIRST, SECOND = BOTH = [f"sub-01/ses-{session}/lh.pial" for session in (1, 2)]
 TABLE = "participants.tsv"
 SESSIONS = "sub-01/sub-01_sessions.tsv"
 SIDECAR = "participants.json"
@@ -35,6 +33,13 @@ def tree(folder, files, tables, sidecar=None):
     rows = {path: text.split(" | ") for path, text in tables.items()}
     described = {SIDECAR: sidecar} if sidecar else {}
     return make_tree(folder, surfaces=files, tables=rows, json=described)
+
+
+def age_of_row(folder, columns, cells, sidecar=None):
+    """Return the age of a scan that has a row in a table of participants."""
+    table = f"participant_id {columns} | sub-01 {cells}"
+    (found,) = ages(tree(folder, [LONE], {TABLE: table}, sidecar)).values()
+    return found
 
 
 @pytest.mark.parametrize("column", [*sorted(AT_SCAN), "PMA", "AgeAtScan"])
@@ -67,34 +72,24 @@ def test_an_age_at_the_scan_comes_before_others_which_are_said(tmp_path, column)
 def test_ages_have_their_unit_from_the_name_or_the_sidecar(
     tmp_path, column, text, units, week
 ):
-    rows = f"participant_id {column} | sub-01 {text}"
     sidecar = {column: {"Units": units}} if units else None
-    assert ages(tree(tmp_path, [LONE], {TABLE: rows}, sidecar)) == {"sub-01": week}
+    assert age_of_row(tmp_path, column, text, sidecar) == week
 
 
 @pytest.mark.parametrize(
-    "description",
+    ("key", "text"),
     [
-        "gestational age at birth",
-        "GA (months)",
-        "corrected age",
-        "weeks since conception",
-        "chronological age",
-        "of the mother",
+        ("Description", "gestational age at birth"),
+        ("Description", "GA (months)"),
+        ("Description", "corrected age"),
+        ("Description", "weeks since conception"),
+        ("Description", "chronological age"),
+        ("AgeReference", "of the mother"),
     ],
 )
-@pytest.mark.parametrize("key", ["Description", "AgeReference"])
-def test_a_column_that_is_described_as_another_age_is_refused(
-    tmp_path, description, key
-):
-    tree(
-        tmp_path,
-        [LONE],
-        {TABLE: "participant_id scan_age | sub-01 24"},
-        {"scan_age": {key: description}},
-    )
-    facts = Facts("scan_age", description, SIDECAR, f"{TABLE} row 2")
-    assert ages(tmp_path) == {"sub-01": facts}
+def test_a_column_that_is_described_as_another_age_is_refused(tmp_path, key, text):
+    found = age_of_row(tmp_path, "scan_age", "24", {"scan_age": {key: text}})
+    assert found == Facts("scan_age", text, SIDECAR, f"{TABLE} row 2")
 
 
 @pytest.mark.parametrize(
@@ -102,13 +97,11 @@ def test_a_column_that_is_described_as_another_age_is_refused(
     [
         # not named as a gestational age at the scan
         ("age", "24", ["age 24"]),
-        ("age age_unit", "170 days", ["age 170"]),
         ("age_months", "6", ["age_months 6"]),
         ("postnatal_age_weeks", "24", ["postnatal_age_weeks 24"]),
         # beside one that may be at birth
         ("ga age", "33.1 29.4", ["ga 33.1", "age 29.4"]),
         ("ga age_at_fetal_mri", "33.1 29.4", ["age_at_fetal_mri", "scan_age"]),
-        ("ga pna", "33.1 4", ["ga 33.1", "pna 4"]),
         ("ga age_since_birth", "33.1 4", ["ga 33.1", "age_since_birth 4"]),
         ("week age_reference", "24 DOB", ["week 24", "age_reference DOB"]),
         ("scan_age age_type", "24 postnatal", ["scan_age 24", "age_type postnatal"]),
@@ -121,181 +114,128 @@ def test_a_column_that_is_described_as_another_age_is_refused(
     ],
 )
 def test_other_ages_are_refused_by_cell(tmp_path, columns, cells, found):
-    tree(tmp_path, [LONE], {TABLE: f"participant_id {columns} | sub-01 {cells}"})
-    assert ages(tmp_path) == {"sub-01": Facts(*found, f"{TABLE} row 2")}
+    assert age_of_row(tmp_path, columns, cells) == Facts(*found, f"{TABLE} row 2")
 
 
 def test_an_age_of_the_mother_or_at_birth_is_not_one_of_the_scan(tmp_path):
-    columns = "participant_id maternal_age ga_at_birth birth_age ga GA"
-    tree(tmp_path, [LONE], {TABLE: f"{columns} | sub-01 31 39.1 39.1 24 24"})
-    assert ages(tmp_path) == {"sub-01": 24.0}
+    columns = "maternal_age ga_at_birth birth_age ga GA"
+    assert age_of_row(tmp_path, columns, "31 39.1 39.1 24 24") == 24.0
+
+
+@pytest.mark.parametrize(
+    ("table", "age"),
+    [
+        ("timepoint ga | sub-01 2 24", 24.0),
+        ("visit ga | sub-01 1 22 | sub-01 2 28", ["row 2", "row 3", "session_id"]),
+        # whole ids only
+        ("ga | SUB-01 22", ["SUB-01"]),
+        ("ga | 1 22", ["01", "1 (participants.tsv row 2)"]),
+        # given twice
+        ("ga | sub-01 22 | sub-01 28", [22, "row 2", 28, "row 3", "session_id"]),
+        ("sex ga | sub-01 F 22 | sub-01 M 22", ["sex", "F", "M"]),
+    ],
+)
+def test_an_age_is_that_of_exactly_this_subject(tmp_path, table, age):
+    found = ages(tree(tmp_path, [LONE], {TABLE: f"participant_id {table}"}))
+    assert found == {"sub-01": Facts(*age) if isinstance(age, list) else age}
+
+
+@pytest.mark.parametrize(
+    ("participants", "sessions", "age"),
+    [
+        (None, "session_id ga | 2 24", ["2 (sub-01_sessions.tsv row 2)"]),
+        ("sub-01 24", "session_id sex | 1 F | 2 F", ["row 2", "session_id 1"]),
+        (None, "participant_id session_id ga | sub-02 1 22", ["sub-02", "sub-01"]),
+        # given twice
+        (
+            "sub-01 33",
+            "session_id ga | 1 22",
+            ["ga 33", TABLE, "ga 22", "sub-01_sessions.tsv"],
+        ),
+        # a data set that has ages at scans has others at birth
+        ("sub-01 33", "session_id scan_age | 1 29.4", 29.4),
+    ],
+)
+def test_an_age_is_that_of_exactly_this_session(tmp_path, participants, sessions, age):
+    tables = {SESSIONS: sessions}
+    if participants:
+        tables[TABLE] = f"participant_id ga | {participants}"
+    found = ages(tree(tmp_path, [FIRST], tables))
+    assert found == {"sub-01_ses-1": Facts(*age) if isinstance(age, list) else age}
+
+
+@pytest.mark.parametrize("column", ["session_id", "session", "ses", "Visit"])
+@pytest.mark.parametrize("name", [TABLE, "sessions.tsv"])
+def test_a_table_may_have_a_row_for_each_session(tmp_path, name, column):
+    table = f"participant_id {column} ga | sub-01 1 22 | 01 ses-2 28"
+    found = ages(tree(tmp_path, BOTH, {name: table}))
+    assert found == {"sub-01_ses-1": 22.0, "sub-01_ses-2": 28.0}
+
+
+SCANS = "sub-01/ses-1/sub-01_ses-1_scans.tsv"
 
 
 @pytest.mark.parametrize(
     ("files", "tables", "expected"),
     [
-        # a row for each session, under several names of the column
-        *(
-            (
-                BOTH,
-                {TABLE: f"participant_id {column} ga | sub-01 1 22 | 01 ses-2 28"},
-                TWO,
-            )
-            for column in ("session_id", "session", "ses", "Visit")
-        ),
-        (
-            BOTH,
-            {"sessions.tsv": "participant_id session_id ga | 01 1 22 | 01 2 28"},
-            TWO,
-        ),
-        (
-            [LONE],
-            {TABLE: "participant_id visit ga | sub-01 1 22 | sub-01 2 28"},
-            {"sub-01": Facts("row 2", "row 3", "session_id")},
-        ),
-        ([LONE], {TABLE: "participant_id timepoint ga | sub-01 2 24"}, {"sub-01": 24}),
-        (
-            [FIRST],
-            {SESSIONS: "session_id ga | 2 24"},
-            {"sub-01_ses-1": Facts("2 (sub-01_sessions.tsv row 2)")},
-        ),
         # one age of a subject with two sessions is of neither
-        (
-            BOTH,
-            {TABLE: "participant_id ga | sub-01 22"},
-            dict.fromkeys(TWO, Facts("ga 22", f"{TABLE} row 2", "session_id")),
-        ),
-        (
-            [FIRST],
-            {
-                TABLE: "participant_id ga | sub-01 24",
-                SESSIONS: "session_id sex | 1 F | 2 F",
-            },
-            {"sub-01_ses-1": Facts("ga 24", "row 2", "session_id 1")},
-        ),
-        # whole ids only
-        ([LONE], {TABLE: "participant_id ga | SUB-01 22"}, {"sub-01": Facts("SUB-01")}),
-        (
-            [LONE],
-            {TABLE: "participant_id ga | 1 22"},
-            {"sub-01": Facts("01", "1 (participants.tsv row 2)")},
-        ),
-        (
-            ["case01.lh.pial"],
-            {TABLE: "participant_id ga | case1 22"},
-            {"case01": Facts("case1", "row 2")},
-        ),
+        (BOTH, {TABLE: "ga | sub-01 22"}, [["ga 22", f"{TABLE} row 2", "session_id"]]),
+        # ids without sub-
+        (["case01.lh.pial"], {TABLE: "ga | case1 22"}, [["case1", "row 2"]]),
         (
             ["a/case7.lh.pial", "a/case7_b.lh.pial", "a/x/case8.lh.pial"],
-            {TABLE: "participant_id ga | case7 22 | case7_b 23 | a 24 | x 25"},
-            {"case7": 22.0, "case7_b": 23.0, "case8": Facts("a, x")},
+            {TABLE: "ga | case7 22 | case7_b 23 | a 24 | x 25"},
+            [22.0, 23.0, ["a, x"]],
         ),
-        (
-            ["sub-01-A/lh.pial"],
-            {TABLE: "participant_id ga | sub-01 22 | sub-01-A 28"},
-            {"sub-01-A": 28.0},
-        ),
-        (
-            [FIRST],
-            {SESSIONS: "participant_id session_id ga | sub-02 1 22"},
-            {"sub-01_ses-1": Facts("sub-02", "sub-01")},
-        ),
-        # given twice
-        (
-            [LONE],
-            {TABLE: "participant_id ga | sub-01 22 | sub-01 28"},
-            {"sub-01": Facts(22, "row 2", 28, "row 3", "session_id")},
-        ),
-        (
-            [LONE],
-            {TABLE: "participant_id sex ga | sub-01 F 22 | sub-01 M 22"},
-            {"sub-01": Facts("sex", "F", "M")},
-        ),
-        (
-            [FIRST],
-            {
-                TABLE: "participant_id ga | sub-01 33",
-                SESSIONS: "session_id ga | 1 22",
-            },
-            {"sub-01_ses-1": Facts("ga 33", TABLE, "ga 22", "sub-01_sessions.tsv")},
-        ),
+        (["sub-01-A/lh.pial"], {TABLE: "ga | sub-01 22 | sub-01-A 28"}, [28.0]),
         # tables of one data set, wherever they lie
         (
             ["derivatives/seg/" + FIRST],
-            {
-                TABLE: "participant_id sex | sub-01 F",
-                "rawdata/" + SESSIONS: "session_id ga | 1 22",
-            },
-            {"sub-01_ses-1": 22.0},
+            {TABLE: "sex | sub-01 F", "rawdata/" + SESSIONS: "session_id ga | 1 22"},
+            [22.0],
         ),
         (
             [FIRST],
-            {
-                TABLE: "participant_id ga | sub-01 33",
-                "sub-01/ses-1/sub-01_ses-1_scans.tsv": (
-                    "filename scan_age | a.nii.gz 24 | b.nii.gz 24"
-                ),
-            },
-            {"sub-01_ses-1": 24.0},
+            {TABLE: "ga | sub-01 33", SCANS: "filename scan_age | a 24 | b 24"},
+            [24.0],
         ),
-        # a data set that has ages at scans has others at birth
+        # ages of other scans say what those of a column are
         (
             ["sub-01/lh.pial", "sub-02/lh.pial"],
-            {TABLE: "participant_id ga scan_age | sub-01 33.1 29.4 | sub-02 35 n/a"},
-            {"sub-01": 29.4, "sub-02": Facts("scan_age", "n/a", "row 3")},
+            {TABLE: "ga scan_age | sub-01 33.1 29.4 | sub-02 35 n/a"},
+            [29.4, ["scan_age", "n/a", "row 3"]],
         ),
         (
             [FIRST, "sub-02/lh.pial"],
-            {
-                TABLE: "participant_id ga | sub-01 33.1 | sub-02 39",
-                SESSIONS: "session_id scan_age | 1 29.4",
-            },
-            {"sub-01_ses-1": 29.4, "sub-02": Facts("ga 39", "row 3", "scan_age")},
+            {TABLE: "ga | sub-01 33 | sub-02 39", SESSIONS: "session_id pma | 1 29.4"},
+            [29.4, ["ga 39", "row 3", "scan_age"]],
         ),
         (
             ["sub-01/lh.pial", "sub-02/lh.pial"],
-            {TABLE: "participant_id ga pna | sub-01 33.1 4 | sub-02 35 n/a"},
-            {
-                "sub-01": Facts("ga 33.1", "pna 4"),
-                "sub-02": Facts("ga 35", "row 3", "pna 4", "row 2"),
-            },
+            {TABLE: "ga pna | sub-01 33.1 4 | sub-02 35 n/a"},
+            [["ga 33.1", "pna 4"], ["ga 35", "row 3", "pna 4", "row 2"]],
         ),
         # the name of the file beside a table
-        (
-            ["sub-01_GA-26.lh.pial"],
-            {TABLE: "participant_id ga | sub-01 26.4"},
-            {"sub-01": 26.4},
-        ),
-        (
-            ["sub-01_GA-26.lh.pial"],
-            {TABLE: "participant_id ga | sub-01 28"},
-            {"sub-01": Facts(28, "26", TABLE)},
-        ),
-        (
-            ["sub-01_ses-1_GA24.lh.pial", "sub-01_ses-2_GA26.lh.pial"],
-            {TABLE: "participant_id ga | sub-01 n/a"},
-            dict.fromkeys(TWO, Facts("ga", "n/a", f"{TABLE} row 2")),
-        ),
-        (
-            ["sub-01_GA-26.lh.pial"],
-            {TABLE: "participant_id age | sub-01 n/a"},
-            {"sub-01": Facts("age", "n/a", f"{TABLE} row 2")},
-        ),
-        # a table of another data set is not of this file
-        (
-            ["a/case7_week24.lh.pial"],
-            {"b/participants.tsv": "participant_id ga | case7 28"},
-            {"case7_week24": 24.0},
-        ),
+        (["sub-01_GA-26.lh.pial"], {TABLE: "ga | sub-01 26.4"}, [26.4]),
+        (["sub-01_GA-26.lh.pial"], {TABLE: "ga | sub-01 28"}, [[28, "26", TABLE]]),
+        (["sub-01_GA-26.lh.pial"], {TABLE: "age | sub-01 n/a"}, [["age", "n/a"]]),
         (
             ["sub-01_GA-26.lh.pial", "sub-02/lh.pial"],
-            {TABLE: "participant_id sex | sub-01 F | sub-02 F"},
-            {"sub-01": 26.0, "sub-02": Facts(TABLE, "sex", "scan_age")},
+            {TABLE: "sex | sub-01 F | sub-02 F"},
+            [26.0, [TABLE, "sex", "scan_age"]],
         ),
+        # a table of another data set is not of this file
+        (["a/case7_week24.lh.pial"], {f"b/{TABLE}": "ga | case7 28"}, [24.0]),
     ],
 )
-def test_an_age_is_that_of_exactly_this_scan(tmp_path, files, tables, expected):
-    assert ages(tree(tmp_path, files, tables)) == expected
+def test_an_age_is_that_of_exactly_this_file(tmp_path, files, tables, expected):
+    for path in tables:
+        if path.endswith(TABLE):
+            tables = tables | {path: f"participant_id {tables[path]}"}
+    found = ages(tree(tmp_path, files, tables))
+    in_order = [found[name] for name in sorted(found)]
+    weeks = [Facts(*age) if isinstance(age, list) else age for age in expected]
+    assert in_order == (weeks * 2 if files is BOTH else weeks)
 
 
 @pytest.mark.parametrize(
@@ -348,16 +288,14 @@ def test_tables_whose_content_is_not_here_are_not_passed_over(tmp_path):
 @pytest.mark.parametrize("place", ["table", "names"])
 def test_decimals_that_may_be_days_are_asked_for_once(tmp_path, place):
     texts = ("24.3", "25.1", "26.6")
+    names = [f"week{text}" for text in texts]
     if place == "table":
         names = ["sub-00", "sub-01", "sub-02"]
         rows = [f"{name} {text}" for name, text in zip(names, texts, strict=True)]
         make_tree(tmp_path, tables={TABLE: ["participant_id ga", *rows]})
-    else:
-        names = [f"week{text}" for text in texts]
     make_tree(tmp_path, surfaces=[f"{name}_hemi-L_pial.surf.gii" for name in names])
-    with pytest.raises(
-        InputError, check=Facts("24.3", "--decimal-weeks", "--weeks-days")
-    ):
+    facts = Facts("24.3", "--decimal-weeks", "--weeks-days")
+    with pytest.raises(InputError, check=facts):
         ages(tmp_path)
     assert list(ages(tmp_path, notation="decimal").values()) == [24.3, 25.1, 26.6]
     assert list(ages(tmp_path, notation="days").values()) == [24.43, 25.14, 26.86]
@@ -368,12 +306,6 @@ def test_halves_and_tenths_above_6_are_decimals(tmp_path, texts):
     names = [f"week{text}_hemi-L_pial.surf.gii" for text in texts]
     make_tree(tmp_path, surfaces=names)
     assert list(ages(tmp_path).values()) == [float(text) for text in texts]
-
-
-def test_a_participant_that_is_not_there_is_refused(tmp_path):
-    make_tree(tmp_path, surfaces=[LONE])
-    with pytest.raises(InputError, check=Facts("sub-1", "sub-01")):
-        recognise(tmp_path, participants=["1"])
 
 
 def test_a_scan_without_an_age_is_told_with_a_name_that_gives_one(tmp_path):

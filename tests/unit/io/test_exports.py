@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from dataclasses import replace
 
 import nibabel as nib
 import numpy as np
@@ -34,467 +33,323 @@ from gyriflow.io.volumes import (
 from gyriflow.io.yaml_files import SCHEMES
 
 VALIDATOR = shutil.which("bids-validator-deno")
-TABLES = {
-    "metrics_wide": pd.DataFrame(
-        {"subject": ["case_1"], "area": [3.5], "depth": [np.nan]}
-    )
-}
+COLUMNS = {"area": ("pial area", "cm2")}
 POSE = np.array([[0.0, -1, 0, 5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 """A quarter turn and 5 mm."""
 
 
+SIDES = {"left": -1, "right": 1}
+
+
 @pytest.fixture
 def brain(tmp_path):
-    ends = {
-        "surfaces": "pial.surf.gii",
-        "maps": "shape.gii",
-        "regions": "regions.label.gii",
-    }
-    paths = {
-        kind: {side: str(tmp_path / f"{side}.{end}") for side in ("left", "right")}
-        for kind, end in ends.items()
-    }
-    for side, sign in (("left", -1), ("right", 1)):
+    """A brain whose pial surfaces were posed by `POSE`, with maps and regions."""
+    surfaces, maps, regions = {}, {}, {}
+    for side, sign in SIDES.items():
         mesh = hemisphere(sign)
         number = np.arange(len(mesh.vertices))
-        write_surface(paths["surfaces"][side], mesh)
-        write_vertex_maps(
-            paths["maps"][side],
-            {"sulcal_depth_mm": number / 7, "thickness_mm": number / 9},
-        )
-        write_vertex_labels(paths["regions"][side], number % 2, {1: "frontal"})
+        values = {"sulcal_depth_mm": number / 7, "thickness_mm": number / 9}
+        surfaces[side] = str(tmp_path / f"{side}.pial.surf.gii")
+        maps[side] = str(tmp_path / f"{side}.shape.gii")
+        regions[side] = str(tmp_path / f"{side}.regions.label.gii")
+        write_surface(surfaces[side], transformed(mesh, POSE))
+        write_vertex_maps(maps[side], values)
+        write_vertex_labels(regions[side], number % 2, {1: "frontal"})
     write_json(tmp_path / "surface.json", {"pose": Pose(POSE).plain()})
     return ExportedBrain(
-        "case_1",
-        "observed",
-        22.43,
-        "case_1",
-        **paths,
+        brain="case_1",
+        run="observed",
+        week=22.43,
+        subject="case_1",
+        surfaces=surfaces,
+        maps=maps,
+        regions=regions,
         report=str(tmp_path / "surface.json"),
         covariates={},
     )
 
 
-def test_bids_derivatives(tmp_path, brain):
-    folder = tmp_path / "bids"
-    simulated = brain._replace(run="run-a", week=24.0)
-    export_bids(
-        folder,
-        [brain, simulated],
-        TABLES,
-        "1.2.3",
-        {"area": ("pial area, both hemispheres", "cm2")},
-    )
+@pytest.fixture
+def scans(brain):
+    """Two sessions of a subject and one of another."""
+    rows = [
+        ("sub-01_ses-1", 21.0, {"sex": "F", "tesla": "1.5"}),
+        ("sub-01_ses-2", 24.43, {"sex": "F", "tesla": "3"}),
+        ("sub-02_ses-1", 22.0, {"sex": "M", "tesla": "3"}),
+    ]
+    return [
+        brain._replace(brain=name, subject=name[:6], week=week, covariates=covariates)
+        for name, week, covariates in rows
+    ]
+
+
+def exported(folder, brains, **tables):
+    """Export brains with tables of one row each, and return the folder of the first
+    subject's files."""
+    rows = {name: pd.DataFrame([row]) for name, row in tables.items()}
+    export_bids(folder, brains, rows, "1.2.3", COLUMNS)
+    return next(folder.glob("sub-*"), folder) / "anat"
+
+
+def test_a_study_is_a_bids_derivative(tmp_path, brain):
+    folder, simulated = tmp_path / "bids", brain._replace(run="run-a", week=24.0)
+    row = {"subject": "case_1", "area": 3.5, "depth": np.nan}
+    place = exported(folder, [brain, simulated], metrics_wide=row)
     described = read_json(folder / "dataset_description.json")
     assert described["DatasetType"] == "derivative"
     assert described["GeneratedBy"][0]["Version"] == "1.2.3"
-    place = folder / "sub-case1" / "anat"
     names = {path.name for path in place.iterdir()}
     assert "sub-case1_hemi-L_pial.surf.gii" in names
     assert "sub-case1_hemi-R_desc-runagw2400_thickness.shape.gii" in names
     assert len(names) == 2 * 2 * (1 + 2 + 1)
     # in the world of the volumes
-    turned = hemisphere(1).vertices @ POSE[:3, :3].T + POSE[:3, 3]
-    write_surface(brain.surfaces["right"], replace(hemisphere(1), vertices=turned))
-    export_bids(
-        folder,
-        [brain],
-        TABLES,
-        "1.2.3",
-        {"area": ("pial area, both hemispheres", "cm2")},
-    )
-    np.testing.assert_allclose(
-        read_surface(place / "sub-case1_hemi-R_pial.surf.gii").vertices,
-        hemisphere(1).vertices,
-        atol=1e-5,
-    )
-    depth = read_vertex_maps(place / "sub-case1_hemi-L_sulc.shape.gii")
-    assert list(depth) == ["sulc"]
-    np.testing.assert_allclose(depth["sulc"][:3], [0, -1 / 7, -2 / 7], rtol=1e-6)
+    right = read_surface(place / "sub-case1_hemi-R_pial.surf.gii")
+    np.testing.assert_allclose(right.vertices, hemisphere(1).vertices, atol=1e-5)
+    (depth,) = read_vertex_maps(place / "sub-case1_hemi-L_sulc.shape.gii").items()
+    assert depth[0] == "sulc"
+    np.testing.assert_allclose(depth[1][:3], [0, -1 / 7, -2 / 7], rtol=1e-6)
+    labels = place / "sub-case1_hemi-L_desc-regions_dseg.label.gii"
+    assert read_vertex_labels(labels)[1] == {1: "frontal"}
     wide = read_json(folder / "metrics_wide.json")
-    assert wide["area"] == {
-        "Description": "pial area, both hemispheres",
-        "Units": "cm^2",
-    }
+    assert wide["area"] == {"Description": "pial area", "Units": "cm^2"}
     assert set(wide) == {"brain", "run", "week", "area", "depth"}
-    assert read_json(folder / "sulc.json")["Units"] == "mm"
-    # what has no value, and how much of it
-    assert read_json(folder / "thickness.json")["Description"] == Facts(
-        "NaN", "thickness_measured_share"
-    )
-    write_vertex_maps(brain.maps["left"], {"unheard_of": depth["sulc"]})
-    with pytest.raises(KeyError, match="unheard_of"):
-        export_bids(folder, [brain], TABLES, "1.2.3", {})
-    _, regions = read_vertex_labels(
-        place / "sub-case1_hemi-L_desc-regions_dseg.label.gii"
-    )
-    assert regions == {1: "frontal"}
-    wide = (folder / "metrics_wide.tsv").read_text()
-    assert wide.splitlines() == [
+    assert (folder / "metrics_wide.tsv").read_text().splitlines() == [
         "participant_id\tsession_id\tbrain\tarea\tdepth",
         "sub-case1\tn/a\tcase_1\t3.5\tn/a",
     ]
-    assert (folder / "descriptions.tsv").read_text().splitlines()[1] == Facts(
-        "desc-runagw2400\t", "run-a", 24
-    )
+    # what has no value, and how much of it
+    thickness = read_json(folder / "thickness.json")["Description"]
+    assert thickness == Facts("NaN", "thickness_measured_share")
+    _, description = (folder / "descriptions.tsv").read_text().splitlines()
+    assert description == Facts("desc-runagw2400\t", "run-a", 24)
+
+
+def test_a_map_without_a_name_in_bids_ends_the_export(tmp_path, brain):
+    write_vertex_maps(brain.maps["left"], {"unheard_of": np.zeros(5)})
+    with pytest.raises(KeyError, match="unheard_of"):
+        exported(tmp_path / "bids", [brain])
 
 
 # as the HCP and smriprep's inverted maps have them: larger on gyri, thickness positive,
 # lengths in mm
 OTHER_TOOLS = {
-    "curv": (1, "1/mm"),
-    "sulc": (1, "mm"),
-    "thickness": (1, "mm"),
-    "shapeIndex": (1, "arbitrary"),
+    "curv": (1, "1/mm", "gyri"),
+    "sulc": (1, "mm", "gyri"),
+    "thickness": (1, "mm", ""),
+    "shapeIndex": (1, "arbitrary", "gyri"),
 }
 
 
 def test_maps_under_names_of_other_tools_have_their_signs_and_units(tmp_path, brain):
     on_gyri = np.where(np.arange(len(hemisphere(-1).vertices)) % 3 == 0, 1.0, -1.0)
-    ours = {
+    own_maps = {
         "mean_curvature": 0.3 * on_gyri,
         "sulcal_depth_mm": 4 - 4 * on_gyri,
         "thickness_mm": 2 + 0.5 * on_gyri,
+        "shape_index": 0.5 * on_gyri,
     }
     for path in brain.maps.values():
-        write_vertex_maps(path, ours | {"shape_index": 0.5 * on_gyri})
-    white = brain._replace(white=brain.surfaces, white_maps=brain.maps)
-    export_bids(tmp_path / "bids", [white], {}, "1", {})
-    for name, (sign, unit) in OTHER_TOOLS.items():
+        write_vertex_maps(path, own_maps)
+    place = exported(tmp_path / "bids", [brain])
+    for name, (sign, unit, word) in OTHER_TOOLS.items():
         described = read_json(tmp_path / "bids" / f"{name}.json")
         assert described["Units"] == unit
+        assert word in described["Description"]
         for side, structure in (("L", "CortexLeft"), ("R", "CortexRight")):
-            path = (
-                tmp_path
-                / "bids"
-                / "sub-case1"
-                / "anat"
-                / f"sub-case1_hemi-{side}_{name}.shape.gii"
-            )
+            path = place / f"sub-case1_hemi-{side}_{name}.shape.gii"
             (values,) = read_vertex_maps(path).values()
             assert (np.sign(values - values.mean()) == sign * on_gyri).all()
             assert nib.load(path).meta["AnatomicalStructurePrimary"] == structure
-        assert name == "thickness" or any(
-            word in described["Description"] for word in ("gyri", "sulci")
-        )
+
+
+def test_white_surfaces_are_exported_with_the_pial_ones_in_the_same_world(
+    tmp_path, brain
+):
+    small = transformed(hemisphere(-1), np.diag([0.5, 0.5, 0.5, 1]))
+    white = {"left": str(tmp_path / "white.surf.gii")}
+    write_surface(white["left"], transformed(small, POSE))
+    maps = {"left": brain.maps["left"]}
+    place = exported(tmp_path / "bids", [brain._replace(white=white, white_maps=maps)])
+    found = read_surface(place / "sub-case1_hemi-L_white.surf.gii")
+    np.testing.assert_allclose(found.vertices, small.vertices, atol=1e-5)
+    depth = read_vertex_maps(place / "sub-case1_hemi-L_desc-white_sulc.shape.gii")
+    assert list(depth) == ["sulc"]
+    assert "desc-white" in (tmp_path / "bids" / "descriptions.tsv").read_text()
     for layer, secondary in (("pial", "Pial"), ("white", "GrayWhite")):
-        points, _ = nib.load(
-            tmp_path / "bids/sub-case1/anat" / f"sub-case1_hemi-L_{layer}.surf.gii"
-        ).darrays
+        points, _ = nib.load(place / f"sub-case1_hemi-L_{layer}.surf.gii").darrays
         assert points.meta["AnatomicalStructureSecondary"] == secondary
 
 
-def scans_of_two(brain):
-    scans = (
-        ("1", "1", 21.0, "F", "1.5"),
-        ("1", "2", 24.43, "F", "3"),
-        ("2", "1", 22.0, "M", "3"),
-    )
-    return [
-        brain._replace(
-            brain=f"sub-0{subject}_ses-{session}",
-            subject=f"sub-0{subject}",
-            week=week,
-            covariates=more,
-        )
-        for subject, session, week, sex, tesla in scans
-        for more in [{"sex": sex, "tesla": tesla}]
-    ]
-
-
-def test_subjects_and_sessions_keep_their_names(tmp_path, brain):
+def test_subjects_and_sessions_keep_their_names(tmp_path, scans):
     folder = tmp_path / "bids"
-    export_bids(folder, scans_of_two(brain), {}, "1", {})
-    assert (
-        folder / "sub-01" / "ses-2" / "anat" / "sub-01_ses-2_hemi-L_sulc.shape.gii"
-    ).exists()
-    assert (
-        folder / "participants.tsv"
-    ).read_text() == "participant_id\tsex\nsub-01\tF\nsub-02\tM\n"
-    assert (folder / "sub-01" / "sub-01_sessions.tsv").read_text().splitlines() == [
+    exported(folder, scans)
+    place = folder / "sub-01" / "ses-2" / "anat"
+    assert (place / "sub-01_ses-2_hemi-L_sulc.shape.gii").exists()
+    participants = (folder / "participants.tsv").read_text()
+    assert participants == "participant_id\tsex\nsub-01\tF\nsub-02\tM\n"
+    sessions = folder / "sub-01" / "sub-01_sessions.tsv"
+    assert sessions.read_text().splitlines() == [
         "session_id\tgestational_age\tbrain\ttesla",
         "ses-1\t21\tsub-01_ses-1\t1.5",
         "ses-2\t24.43\tsub-01_ses-2\t3",
     ]
     # scans of a subject that have no names of sessions have their weeks'
-    unnamed = [
-        one._replace(brain=f"scan{number}")
-        for number, one in enumerate(scans_of_two(brain))
-    ]
-    export_bids(folder, unnamed, {}, "1", {})
+    named = zip("abc", scans, strict=True)
+    exported(folder, [scan._replace(brain=name) for name, scan in named])
     assert (folder / "sub-01" / "ses-2443w" / "anat").is_dir()
 
 
-def test_brains_of_one_bids_name_are_refused(tmp_path, brain):
-    again = brain._replace(brain="scan-2")
-    with pytest.raises(
-        InputError, check=Facts("sub-case1_ses-2243w", "case_1", "scan-2")
-    ):
-        export_bids(tmp_path / "bids", [brain, again], {}, "1", {})
-
-
 @pytest.mark.parametrize(
-    ("first", "second", "label"),
+    ("changes", "facts"),
     [
-        ("1-12", "11-2", "sub-112"),
-        ("case_1", "case-1", "sub-case1"),
-        ("sub-01", "01", "sub-01"),
-        ("müller", "möller", "sub-mller"),
+        # of one week
+        ([{"brain": "a"}, {"brain": "b"}], ["sub-case1_ses-2243w", "a", "b"]),
+        # of several weeks
+        ([{"subject": "1-12"}, {"subject": "11-2", "week": 23}], ["1-12", "11-2"]),
+        ([{"subject": "sub-01"}, {"subject": "01", "week": 23}], ["sub-01", "01"]),
+        ([{"subject": "müller"}, {"subject": "möller", "week": 23}], ["sub-mller"]),
         # a disk that ignores case has one folder for both
-        ("sub-a", "sub-A", "sub-a"),
+        ([{"subject": "sub-a"}, {"subject": "sub-A", "week": 23}], ["sub-a", "sub-A"]),
+        ([{}, {"run": "b-1"}, {"run": "b.1", "week": 25}], ["b1", "b-1", "b.1"]),
+        # without letters and digits
+        ([{}, {"subject": "--", "week": 23}], ["subject", "--"]),
+        ([{}, {"run": "--"}], ["run", "--"]),
     ],
 )
-def test_subjects_of_one_bids_label_are_refused_at_any_weeks(
-    tmp_path, brain, first, second, label
+def test_brains_without_a_label_of_their_own_in_bids_are_refused(
+    tmp_path, brain, changes, facts
 ):
-    scans = [
-        brain._replace(brain="a", subject=first, week=22.0),
-        brain._replace(brain="b", subject=second, week=23.0),
-        brain._replace(brain="c", subject=first, week=24.0),
-    ]
-    with pytest.raises(InputError, check=Facts(label, first, second)):
-        export_bids(tmp_path / "bids", scans, {}, "1", {})
+    brains = [brain._replace(**change) for change in changes]
+    with pytest.raises(InputError, check=Facts(*facts)):
+        exported(tmp_path / "bids", brains)
     assert not (tmp_path / "bids").exists()
-
-
-def test_runs_of_one_bids_label_are_refused_at_any_brains_and_weeks(tmp_path, brain):
-    other = brain._replace(brain="case_2", subject="case_2")
-    folded = [
-        brain._replace(run="stiff-1", week=24.0),
-        other._replace(run="stiff.1", week=25.0),
-    ]
-    with pytest.raises(InputError, check=Facts("stiff1", "stiff-1", "stiff.1")):
-        export_bids(tmp_path / "bids", [brain, other, *folded], {}, "1", {})
 
 
 def test_covariates_named_as_columns_of_the_export_stand_beside_these(tmp_path, brain):
     # a table often has the age at birth beside that at the scan
     covariates = {"gestational_age": "39.1", "brain": "left", "session_id": "b"}
-    wide = pd.DataFrame(
-        {
-            "subject": ["case_1"],
-            "week": [22.43],
-            **{key: [text] for key, text in covariates.items()},
-        }
-    )
-    export_bids(
-        tmp_path,
-        [brain._replace(covariates=covariates)],
-        {"metrics_wide": wide},
-        "1",
-        {},
-    )
-    (row,) = pd.read_csv(tmp_path / "participants.tsv", sep="\t", dtype=str).to_dict(
-        "records"
-    )
-    assert row == {
-        "participant_id": "sub-case1",
-        "gestational_age": "22.43",
-        "brain": "case_1",
-    } | {f"{key}_of_input": text for key, text in covariates.items()}
-    (row,) = pd.read_csv(tmp_path / "metrics_wide.tsv", sep="\t").to_dict("records")
-    assert (row["brain"], row["brain_of_input"], row["gestational_age_of_input"]) == (
-        "case_1",
-        "left",
-        39.1,
-    )
+    row = {"subject": "case_1", "week": 22.43} | covariates
+    exported(tmp_path, [brain._replace(covariates=covariates)], metrics_wide=row)
+    renamed = {f"{key}_of_input": text for key, text in covariates.items()}
+    people = pd.read_csv(tmp_path / "participants.tsv", sep="\t", dtype=str)
+    own = {"gestational_age": "22.43", "brain": "case_1"}
+    assert people.to_dict("records") == [
+        {"participant_id": "sub-case1"} | own | renamed
+    ]
+    wide = pd.read_csv(tmp_path / "metrics_wide.tsv", sep="\t", dtype=str)
+    (found,) = wide.to_dict("records")
+    assert found == found | renamed | {"brain": "case_1"}
 
 
-@pytest.mark.parametrize("kind", ["subject", "run"])
-def test_a_name_without_letters_and_digits_has_no_label(tmp_path, brain, kind):
-    with pytest.raises(InputError, check=Facts(kind, "--")):
-        export_bids(
-            tmp_path / "bids",
-            [brain._replace(**{kind: "--"}, week=23.0), brain],
-            {},
-            "1",
-            {},
-        )
+WIDE = {"subject": "sub-01_ses-1", "run": "observed", "week": 21.0, "area": 3.5}
 
 
-def test_subjects_are_handed_over_beside_others(tmp_path, brain):
-    exported, folder, source = (
-        tmp_path / name for name in ("exported", "out", "source")
-    )
-    export_bids(
-        exported,
-        scans_of_two(brain),
-        TABLES_OF_TWO,
-        "1",
-        {"area": ("pial area", "cm2")},
-    )
-    page = tmp_path / "brains" / "sub-01_ses-1" / "figures" / "quality.png"
-    page.parent.mkdir(parents=True)
-    page.touch()
-    (folder / "sub-07").mkdir(parents=True)
-    (folder / "sub-01" / "anat").mkdir(parents=True)
-    (folder / "sub-01" / "anat" / "of_another_program.nii").touch()
-    source.mkdir()
-    publish_derivatives(exported, folder, source, ["sub-01_ses-1"], whole=False)
-    assert {path.name for path in folder.iterdir()} >= {
-        "sub-07",
-        "sub-01",
-        "sub-02",
-        ".bidsignore",
-    }
-    assert (folder / "sub-01" / "anat" / "of_another_program.nii").exists()
+def touched(path):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch()
+    return path
+
+
+def names_in(folder):
+    return {path.name for path in folder.rglob("*") if path.is_file()}
+
+
+def test_derivatives_are_published_beside_files_of_others(tmp_path, scans):
+    made, folder, source = (tmp_path / name for name in ("made", "out", "source"))
+    exported(made, scans, metrics_wide=WIDE)
+    touched(tmp_path / "brains" / "sub-01_ses-1" / "figures" / "quality.png")
+    other = touched(folder / "sub-01" / "anat" / "of_another_program.nii")
+    publish_derivatives(made, folder, source, ["sub-01_ses-1"], whole=False)
+    assert {".bidsignore", "sub-02_sessions.tsv", other.name} <= names_in(folder)
     assert (folder / "sub-01" / "figures" / "sub-01_ses-1_quality.png").exists()
     assert not (folder / "participants.tsv").exists()
     write_json(source / "dataset_description.json", {"DatasetDOI": "10.1/x"})
-    (exported.parent / "report" / "brains").mkdir(parents=True)
     for name in ("sub-01_ses-1", "crl-22"):
-        (exported.parent / "report" / "brains" / f"{name}.html").touch()
+        touched(tmp_path / "report" / "brains" / f"{name}.html")
     # a session that is no more, of which a user has kept a note
-    for path in (exported / "sub-01" / "ses-2").rglob("*.gii"):
+    for path in (made / "sub-01" / "ses-2").rglob("*.gii"):
         path.unlink()
-    (folder / "sub-01" / "ses-2" / "note.txt").touch()
+    touched(folder / "sub-01" / "ses-2" / "note.txt")
     # again and again: the note does not become one of the files that may be removed
     for _ in range(2):
-        publish_derivatives(exported, folder, source, ["sub-01_ses-1"], whole=True)
-    left = [
-        path.name for path in (folder / "sub-01" / "ses-2").rglob("*") if path.is_file()
-    ]
-    assert left == ["note.txt"]
+        publish_derivatives(made, folder, source, ["sub-01_ses-1"], whole=True)
+    assert names_in(folder / "sub-01" / "ses-2") == {"note.txt"}
     assert (folder / "participants.tsv").exists()
     # the report leads to brains of an atlas, too
-    assert {path.name for path in (folder / "brains").iterdir()} == {
-        "sub-01_ses-1.html",
-        "crl-22.html",
-    }
-    assert read_json(folder / "dataset_description.json")["SourceDatasets"] == [
-        {"URL": "doi:10.1/x"}
-    ]
+    assert names_in(folder / "brains") == {"sub-01_ses-1.html", "crl-22.html"}
+    described = read_json(folder / "dataset_description.json")
+    assert described["SourceDatasets"] == [{"URL": "doi:10.1/x"}]
 
 
-def test_a_data_set_of_another_program_is_left(tmp_path, brain):
-    exported, folder = tmp_path / "exported", tmp_path / "out"
-    export_bids(exported, scans_of_two(brain), TABLES_OF_TWO, "1", {})
-    write_json(
-        folder / "dataset_description.json", {"GeneratedBy": [{"Name": "fMRIPrep"}]}
-    )
-    with pytest.raises(
-        InputError, check=Facts(folder / "dataset_description.json", "OUT")
-    ):
-        publish_derivatives(exported, folder, tmp_path, [], whole=True)
-    assert [path.name for path in folder.iterdir()] == ["dataset_description.json"]
-
-
-TABLES_OF_TWO = {
-    "metrics_wide": pd.DataFrame(
-        {
-            "subject": ["sub-01_ses-1"],
-            "run": ["observed"],
-            "week": [21.0],
-            "area": [3.5],
-        }
-    ),
-}
+def test_a_data_set_of_another_program_is_left(tmp_path, scans):
+    made, description = tmp_path / "made", tmp_path / "out/dataset_description.json"
+    exported(made, scans)
+    write_json(description, {"GeneratedBy": [{"Name": "fMRIPrep"}]})
+    with pytest.raises(InputError, check=Facts(description, "OUT")):
+        publish_derivatives(made, description.parent, tmp_path, [], whole=True)
+    assert names_in(description.parent) == {description.name}
 
 
 def labels_of(folder):
     """Return a volume of labels, and the sphere and its thickness that those of a
     simulated brain are made of."""
-    files = {
-        "labels": "labels.nii.gz",
-        "surface": "whole.surf.gii",
-        "thickness": "thickness.shape.gii",
-    }
-    files = {kind: str(folder / name) for kind, name in files.items()}
-    write_label_volume(
-        files["labels"],
-        LabelVolume(np.ones((40, 40, 20), np.int32), scaling((1, 1, 2), -20)),
+    volume, surface, thickness = (
+        str(folder / name) for name in ("l.nii.gz", "whole.surf.gii", "t.shape.gii")
     )
+    labels = np.ones((40, 40, 20), np.int32)
+    write_label_volume(volume, LabelVolume(labels, scaling((1, 1, 2), -20)))
     ball = sphere(10.0)
-    write_surface(files["surface"], transformed(ball, POSE))
-    write_vertex_maps(
-        files["thickness"], {"thickness_mm": np.full(len(ball.vertices), 3.0)}
-    )
-    return files | {"labels": LabelSource(files["labels"], "auto", SCHEMES["binary"])}
-
-
-def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
-    """Both were posed by a quarter turn and a shift."""
-    small = transformed(hemisphere(-1), np.diag([0.5, 0.5, 0.5, 1]))
-    write_surface(tmp_path / "white.surf.gii", transformed(small, POSE))
-    files = {
-        "white": {"left": str(tmp_path / "white.surf.gii")},
-        "white_maps": {"left": brain.maps["left"]},
-    }
-    export_bids(tmp_path / "bids", [brain._replace(**files)], {}, "1", {})
-    place = tmp_path / "bids" / "sub-case1" / "anat"
-    found = read_surface(place / "sub-case1_hemi-L_white.surf.gii")
-    np.testing.assert_allclose(found.vertices, small.vertices, atol=1e-5)
-    assert list(
-        read_vertex_maps(place / "sub-case1_hemi-L_desc-white_sulc.shape.gii")
-    ) == ["sulc"]
-    assert "desc-white" in (tmp_path / "bids" / "descriptions.tsv").read_text()
-
-
-def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, brain):
-    folder, path = tmp_path / "bids", str(tmp_path / "left.template.shape.gii")
-    write_vertex_maps(path, {"sulcal_depth_mm": np.arange(5.0)})
-    scans = [
-        one._replace(template="sub-01_ses-1", template_maps={"left": path})
-        for one in scans_of_two(brain)
-    ]
-    export_bids(folder, [*scans, scans[1]._replace(run="a", week=25.0)], {}, "1", {})
-    place = (
-        folder
-        / "sub-01"
-        / "ses-2"
-        / "anat"
-        / "sub-01_ses-2_hemi-L_space-sub01ses1_den-5_sulc.shape.gii"
-    )
-    assert read_vertex_maps(place)["sulc"] == pytest.approx(-np.arange(5))
-    assert place.with_name(place.name.replace("_sulc", "_desc-agw2500_sulc")).exists()
-    assert read_json(folder / "space-sub01ses1_sulc.json") == {
-        "Description": read_json(folder / "sulc.json")["Description"],
-        "Units": "mm",
-        "SpatialReference": {
-            side: f"bids::sub-01/ses-1/anat/sub-01_ses-1_hemi-{side}_pial.surf.gii"
-            for side in ("L", "R")
-        },
-    }
+    write_surface(surface, transformed(ball, POSE))
+    write_vertex_maps(thickness, {"thickness_mm": np.full(len(ball.vertices), 3.0)})
+    source = LabelSource(volume, "auto", SCHEMES["binary"])
+    return {"labels": source, "surface": surface, "thickness": thickness}
 
 
 def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain):
-    folder, volume = tmp_path / "bids", labels_of(tmp_path)
-    export_bids(
-        folder, [brain, brain._replace(run="a", week=24.0, volume=volume)], {}, "1", {}
-    )
-    found = read_label_volume(
-        folder / "sub-case1" / "anat" / "sub-case1_desc-agw2400_dseg.nii.gz"
-    )
+    volume = labels_of(tmp_path)
+    simulated = brain._replace(run="a", week=24.0, volume=volume)
+    place = exported(tmp_path / "bids", [brain, simulated])
+    found = read_label_volume(place / "sub-case1_desc-agw2400_dseg.nii.gz")
     start = volume["labels"].read()
     np.testing.assert_array_equal(found.affine, start.affine)
     assert found.labels.shape == start.labels.shape
-    assert found.labels[20, 20, 10] == 1
-    assert found.labels[28, 20, 10] == 2
+    assert (found.labels[20, 20, 10], found.labels[28, 20, 10]) == (1, 2)
+    inner, outer = (4 / 3 * np.pi * radius**3 for radius in (7, 10))
     volumes = np.bincount(found.labels.ravel())[1:] * 2
-    assert volumes == pytest.approx(
-        [4 / 3 * np.pi * 7**3, 4 / 3 * np.pi * (10**3 - 7**3)], rel=0.05
-    )
+    assert volumes == pytest.approx([inner, outer - inner], rel=0.05)
+
+
+def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, scans):
+    folder, path = tmp_path / "bids", str(tmp_path / "left.template.shape.gii")
+    write_vertex_maps(path, {"sulcal_depth_mm": np.arange(5.0)})
+    more = {"template": "sub-01_ses-1", "template_maps": {"left": path}}
+    brains = [scan._replace(**more) for scan in scans]
+    exported(folder, [*brains, brains[1]._replace(run="a", week=25.0)])
+    stem = "sub-01/ses-2/anat/sub-01_ses-2_hemi-L_space-sub01ses1_den-5"
+    depth = read_vertex_maps(folder / f"{stem}_sulc.shape.gii")["sulc"]
+    assert depth == pytest.approx(-np.arange(5))
+    assert (folder / f"{stem}_desc-agw2500_sulc.shape.gii").exists()
+    description = read_json(folder / "space-sub01ses1_sulc.json")
+    assert description == read_json(folder / "sulc.json") | {
+        "SpatialReference": {
+            side: f"bids::sub-01/ses-1/anat/sub-01_ses-1_hemi-{side}_pial.surf.gii"
+            for side in ("L", "R")
+        }
+    }
 
 
 @pytest.mark.skipif(
     not VALIDATOR,
     reason="no bids-validator-deno on PATH: pip install bids-validator-deno",
 )
-def test_the_bids_validator_finds_no_error(tmp_path, brain):
+def test_the_bids_validator_finds_no_error(tmp_path, brain, scans):
     folder = tmp_path / "bids"
-    more = {
-        "white": brain.surfaces,
-        "white_maps": brain.maps,
-        "template": "sub-01_ses-1",
-        "template_maps": brain.maps,
-    }
-    scans = [one._replace(**more) for one in scans_of_two(brain)]
-    simulated = scans[0]._replace(
-        white={}, white_maps={}, run="run-a", week=23.5, volume=labels_of(tmp_path)
-    )
-    export_bids(
-        folder, [*scans, simulated], TABLES_OF_TWO, "1", {"area": ("pial area", "cm2")}
-    )
+    white = {"white": brain.surfaces, "white_maps": brain.maps}
+    template = {"template": "sub-01_ses-1", "template_maps": brain.maps}
+    simulated = {"run": "run-a", "week": 23.5, "volume": labels_of(tmp_path)}
+    brains = [scan._replace(**white, **template) for scan in scans]
+    brains.append(scans[0]._replace(**template, **simulated))
+    exported(folder, brains, metrics_wide=WIDE)
     done = ran(VALIDATOR, folder, "--format", "json")
     found = json.loads(done.stdout)["issues"]["issues"]
     assert [issue for issue in found if issue["severity"] == "error"] == []

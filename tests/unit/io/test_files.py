@@ -33,7 +33,7 @@ from gyriflow.settings.base import folder_of, located
 from gyriflow.study.loading import load
 
 
-def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
+def test_a_file_appears_only_when_the_block_ends_well(tmp_path):
     path = tmp_path / "new" / "a.surf.gii"
     with atomic_write(path) as temporary:
         temporary.write_text("whole")
@@ -62,55 +62,22 @@ def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
 
 def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
     path = tmp_path / "a.csv"
-    with (
-        pytest.raises(
-            StorageError, check=Facts(path, "No space left on device")
-        ) as caught,
-        atomic_write(path),
-    ):
+    facts = Facts(path, "No space left on device")
+    with pytest.raises(StorageError, check=facts) as caught, atomic_write(path):
         raise OSError(errno.ENOSPC, "No space left on device")
     assert caught.value.exit_code == 5
 
 
 def test_json_unwraps_numpy_and_has_no_nan(tmp_path):
     path = tmp_path / "a.json"
-    write_json(
-        path,
-        {
-            "n": np.int64(3),
-            "x": [np.float32(0.5), np.nan, np.inf],
-            "m": np.eye(2),
-            "ok": np.True_,
-        },
-    )
+    numbers = {"n": np.int64(3), "x": [np.float32(0.5), np.nan, np.inf]}
+    write_json(path, numbers | {"m": np.eye(2), "ok": np.True_})
     assert read_json(path) == {
         "n": 3,
         "x": [0.5, None, None],
         "m": [[1.0, 0.0], [0.0, 1.0]],
         "ok": True,
     }
-    assert "NaN" not in path.read_text()
-
-
-@pytest.mark.parametrize(
-    "rows",
-    [
-        ("s1\t24\ta", "s2\t25\tb"),
-        # tabs at the end of the rows that the heading does not have
-        ("s1\t24\ta\t", "s2\t25\tb\t"),
-        ("s1\t24\ta\t\t", "s2\t25\tb\t\t"),
-        ("s1\t24\ta\t", "s2\t25\tb"),
-        # names of the rows without a heading, as R writes them
-        ("1\ts1\t24\ta", "2\ts2\t25\tb"),
-    ],
-)
-def test_cells_stay_below_their_heading(tmp_path, rows):
-    path = tmp_path / "participants.tsv"
-    path.write_text("\n".join(("id\tage\tfile", *rows)) + "\n")
-    assert read_text_table(path) == [
-        {"id": "s1", "age": "24", "file": "a"},
-        {"id": "s2", "age": "25", "file": "b"},
-    ]
 
 
 ROWS = [{"id": "s1", "age": "24,5"}, {"id": "s2", "age": "25"}]
@@ -119,14 +86,18 @@ ROWS = [{"id": "s1", "age": "24,5"}, {"id": "s2", "age": "25"}]
 @pytest.mark.parametrize(
     "content",
     [
-        b"sep=;\nid;age\ns1;24,5\ns2;25\n",
+        # tabs at the end of the rows that the heading does not have
+        b"id\tage\ns1\t24,5\t\ns2\t25\t\n",
+        # names of the rows without a heading, as R writes them
+        b"id\tage\n1\ts1\t24,5\n2\ts2\t25\n",
+        # as Excel saves tables
         b"sep=;\r\nid;age\r\ns1;24,5\r\ns2;25\r\n",
         "id\tage\ns1\t24,5\ns2\t25\n".encode("utf-16"),
         b"\xfe\xff" + "id\tage\r\ns1\t24,5\r\ns2\t25\r\n".encode("utf-16-be"),
         b'id,age\ns1,"24,5"\ns2,25\n',
     ],
 )
-def test_tables_as_excel_saves_them_are_read(tmp_path, content):
+def test_cells_of_tables_of_other_programs_stay_below_their_heading(tmp_path, content):
     (tmp_path / "participants.csv").write_bytes(content)
     assert read_text_table(tmp_path / "participants.csv") == ROWS
 
@@ -138,49 +109,19 @@ def test_a_workbook_of_excel_is_named_with_what_to_do(tmp_path, start):
         read_text_table(tmp_path / "participants.tsv")
 
 
-NAMES = (
-    "021",
-    "7",
-    "1e5",
-    "NA",
-    "None",
-    "true",
-    "1.0",
-    "2024-01-01",
-    "-",
-    "nan",
-    "1_000",
-    "a",
-)
+NAMES = ["021", "7", "1e5", "NA", "None", "true", "1.0", "2024-01-01", "-", "nan"]
+TEXTS = ("subject", "run", "region", "observed", "start", "series", "page")
 
 
-def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
-    for column in (
-        "subject",
-        "run",
-        "region",
-        "observed",
-        "start",
-        "series",
-        "page",
-        "population",
-    ):
-        table = pd.DataFrame(
-            {column: NAMES, "week": np.arange(12) / 4, "explained": [True, False] * 6}
-        )
-        write_table(tmp_path / "a.csv", table.assign(value=np.nan, unit=""))
-        back = read_table(tmp_path / "a.csv")
-        assert tuple(back[column]) == NAMES
-        assert back["explained"].tolist() == [True, False] * 6
-        assert back["week"].tolist() == table["week"].tolist()
-        assert back[["value", "unit"]].isna().all(axis=None)
-        # all of one kind, too
-        for name in NAMES:
-            write_table(
-                tmp_path / "a.csv",
-                pd.DataFrame({column: [name] * 2, "week": [21.0, 22.5]}),
-            )
-            assert read_table(tmp_path / "a.csv")[column].tolist() == [name] * 2
+@pytest.mark.parametrize("names", [NAMES, *([name] * 2 for name in NAMES)])
+def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path, names):
+    table = dict.fromkeys(TEXTS, names)
+    table["week"] = [21.25 + number for number in range(len(names))]
+    table["explained"] = [week % 2 > 1 for week in table["week"]]
+    write_table(tmp_path / "a.csv", pd.DataFrame(table).assign(value=np.nan, unit=""))
+    back = read_table(tmp_path / "a.csv")
+    assert back[[*table]].to_dict("list") == table
+    assert back[["value", "unit"]].isna().all(axis=None)
 
 
 def test_folders_that_may_not_be_read_are_among_the_files(tmp_path, monkeypatch):
@@ -199,62 +140,73 @@ def test_folders_that_may_not_be_read_are_among_the_files(tmp_path, monkeypatch)
     assert files_below(tmp_path / "lost") == []
 
 
-@pytest.mark.parametrize("key", ["021", "true", "no", "~", "0x1F", "1_000"])
-def test_keys_that_yaml_reads_as_something_else_are_refused(tmp_path, key):
-    (tmp_path / "a.yaml").write_text(f"runs:\n  {key}: {{}}\n")
-    with pytest.raises(InputError, check=Facts(tmp_path / "a.yaml", "line 2", key)):
-        read_keys(tmp_path / "a.yaml")
-    (tmp_path / "a.yaml").write_text(
-        f'runs:\n  "{key}": {{}}\n  1: {{}}\n  21.50: {{}}\n'
-    )
-    assert list(read_keys(tmp_path / "a.yaml")["runs"]) == [key, 1, 21.5]
-
-
 @pytest.mark.parametrize(
-    ("first", "second"), [("1", "1.0"), ("21", "21.0"), ("21.5", "21.50")]
-)
-def test_keys_that_are_one_number_are_not_merged(tmp_path, first, second):
-    path = tmp_path / "a.yaml"
-    path.write_text(f"runs:\n  {first}: {{}}\n  {second}: {{end_week: 24}}\n")
-    with pytest.raises(InputError, check=Facts(path, "line 3", first, second)):
-        read_keys(path)
-    path.write_text(f'runs:\n  "{first}": {{}}\n  "{second}": {{}}\n')
-    assert list(read_keys(path)["runs"]) == [first, second]
-
-
-@pytest.mark.parametrize(
-    ("text", "number"),
-    [("023", 19), ("-017", -15), ("23:4", 1384), ("12:00:00", 43200), ("1:30.5", 90.5)],
-)
-def test_numbers_are_not_read_otherwise_than_written(tmp_path, text, number):
-    path = tmp_path / "a.yaml"
-    path.write_text(f"brains:\n  - week: {text}\n")
-    with pytest.raises(InputError, check=Facts(path, "line 2", text, number)):
-        read_keys(path)
-    path.write_text(f"a: '{text}'\nb: [0, 0.5, -3, 1_000, 23.0, 1.0e+3]\n")
-    assert read_keys(path) == {"a": text, "b": [0, 0.5, -3, 1000, 23.0, 1000.0]}
-
-
-@pytest.mark.parametrize(
-    ("text", "name"),
+    ("text", "facts"),
     [
-        ("a:\n\t- b: 1\n", "TAB"),
-        ("start:\u00a0a\nb: 1\n", "NO-BREAK SPACE"),
-        ("a: 1\n\u200bb:2\nc: 3\n", "ZERO WIDTH SPACE"),
+        # keys that are other values to YAML
+        ("a:\n  021: {}\n", ["line 2", "021"]),
+        ("a:\n  0x1F: {}\n", ["line 2", "0x1F"]),
+        ("a:\n  true: {}\n", ["line 2", "true"]),
+        ("a:\n  ~: {}\n", ["line 2", "~"]),
+        # keys that are one
+        ("a:\n  21.5: {}\n  21.50: {}\n", ["line 3", "21.5", "21.50"]),
+        ("a:\n  b: {}\n  c: {}\n  b: {}\n", ["line 4", "b", "line 2"]),
+        # numbers that are other ones to YAML
+        ("a:\n- b: -017\n", ["line 2", "-017", -15]),
+        ("a:\n- b: 23:4\n", ["line 2", "23:4", 1384]),
+        ("a:\n- b: 1:30.5\n", ["line 2", "1:30.5", 90.5]),
+        # what cannot be seen
+        ("a:\n\t- b: 1\n", ["TAB"]),
+        ("start:\u00a0a\nb: 1\n", ["NO-BREAK SPACE"]),
+        ("a: 1\n\u200bb:2\nc: 3\n", ["ZERO WIDTH SPACE"]),
+        # no keys
+        ("a: [1\nb: 2\n", ["YAML", 2]),
+        ("# a comment\n", ["`week: 21`"]),
+        ("- a\n", ["list", "`week: 21`"]),
     ],
 )
-def test_spaces_that_yaml_does_not_take_for_spaces_are_named(tmp_path, text, name):
+def test_what_yaml_reads_otherwise_than_written_is_refused(tmp_path, text, facts):
     path = tmp_path / "a.yaml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, check=Facts(path, name)):
+    with pytest.raises(InputError, check=Facts(path, *facts)):
         read_keys(path)
 
 
-def test_a_configuration_of_another_encoding_says_so(tmp_path):
+def test_values_and_quoted_keys_are_read_as_written(tmp_path):
     path = tmp_path / "a.yaml"
+    path.write_text(
+        'runs: {"021": {}, "true": {}, 1: {}, "1.0": {}, 21.50: {}}\n'
+        "a: '023'\nb: [0, 0.5, -3, 1_000, 23.0, 1.0e+3]\n"
+    )
+    found = read_keys(path)
+    assert list(found["runs"]) == ["021", "true", 1, "1.0", 21.5]
+    assert (found["a"], found["b"]) == ("023", [0, 0.5, -3, 1000, 23.0, 1000.0])
+
+
+def test_a_configuration_that_is_missing_or_of_another_encoding_says_so(tmp_path):
+    path = tmp_path / "a.yaml"
+    with pytest.raises(InputError, check=Facts(path, "No such file")):
+        read_keys(path)
     path.write_bytes("# Müller\nstart: a\n".encode("latin-1"))
     with pytest.raises(InputError, check=Facts(path, "UTF-8", "0xfc")):
         read_keys(path)
+
+
+@pytest.mark.parametrize("opening", ["[", "a: [", "{a: ", "- "])
+def test_values_that_are_nested_deeply_are_refused(tmp_path, opening):
+    """libyaml would end the process."""
+    path = tmp_path / "study.yaml"
+    path.write_text("a: [[1, {b: [2]}]]")
+    assert read_yaml(path) == {"a": [[1, {"b": [2]}]]}
+    path.write_text(opening * 100_000)
+    with pytest.raises(InputError, check=Facts(path)):
+        read_yaml(path)
+
+
+def test_yaml_that_is_written_is_read(tmp_path):
+    content = {"b": 1.5, "a": [1, "ν"], "c": {"d": None, "e": True}}
+    write_yaml(tmp_path / "new" / "x.yaml", content)
+    assert read_yaml(tmp_path / "new" / "x.yaml") == content
 
 
 def test_contents_are_read_again_only_where_size_or_times_changed(
@@ -309,39 +261,36 @@ ABSENT = {
     "/annex/objects/K\n": "datalad get",
     "version https://git-lfs.github.com/spec/v1\n": "lfs",
 }
+READERS = {
+    "a.nii.gz": read_label_volume,
+    "a.img": lambda path: read_label_volume(path.with_suffix(".hdr")),
+    "a.surf.gii": read_surface,
+    "lh.pial": read_surface,
+    "a.tsv": read_text_table,
+    "a.json": read_json,
+    "a.yaml": read_yaml,
+}
 
 
-@pytest.mark.parametrize(
-    ("content", "command"), ABSENT.items(), ids=["link", "pointer", "LFS"]
-)
-@pytest.mark.parametrize(
-    ("name", "read"),
-    [
-        ("a.nii.gz", read_label_volume),
-        ("a.img", lambda path: read_label_volume(path.with_suffix(".hdr"))),
-        ("a.surf.gii", read_surface),
-        ("lh.pial", read_surface),
-        ("a.tsv", read_text_table),
-        ("a.json", read_json),
-        ("a.yaml", read_yaml),
-    ],
-)
+@pytest.mark.parametrize("content", ABSENT, ids=["link", "pointer", "LFS"])
+@pytest.mark.parametrize("name", READERS)
 def test_content_that_is_not_here_is_named_with_the_command_that_gets_it(
-    tmp_path, name, read, content, command
+    tmp_path, name, content
 ):
-    nib.save(
-        nib.Nifti1Pair(np.zeros((9, 9, 9), np.uint8), np.eye(4)), tmp_path / "a.img"
-    )
+    nib.save(nib.Nifti1Pair(np.zeros((9, 9, 9), "u1"), np.eye(4)), tmp_path / "a.img")
     path = tmp_path / name
     path.unlink(missing_ok=True)
     path.symlink_to(content) if content is LINK else path.write_text(content)
-    with pytest.raises(InputError, check=Facts(f"{path}:", command)):
-        read(path)
-    if content is LINK:
-        assert path in files_below(tmp_path)
-        assert refusal(
-            {"brains": [{"id": "a", "week": 21, "pial": str(path)}]}
-        ) == Facts(f"datalad get {path}")
+    with pytest.raises(InputError, check=Facts(f"{path}:", ABSENT[content])):
+        READERS[name](path)
+
+
+def test_a_link_without_its_content_is_among_the_files_and_no_brain(tmp_path):
+    path = tmp_path / "a.surf.gii"
+    path.symlink_to(LINK)
+    assert files_below(tmp_path) == [path]
+    brain = {"id": "a", "week": 21, "pial": str(path)}
+    assert refusal({"brains": [brain]}) == Facts(f"datalad get {path}")
 
 
 def test_a_link_to_a_key_is_read_as_its_own_name_says(tmp_path):
@@ -355,37 +304,3 @@ def test_a_link_to_a_key_is_read_as_its_own_name_says(tmp_path):
     assert len(read_surface(located(tmp_path, "a.surf.gii")).faces) == 80
     # a configuration too has its brains beside it, not in the store
     assert folder_of(link) == tmp_path
-
-
-def test_what_is_written_is_read(tmp_path):
-    content = {"b": 1.5, "a": [1, "ν"], "c": {"d": None, "e": True}}
-    write_yaml(tmp_path / "new" / "x.yaml", content)
-    assert read_yaml(tmp_path / "new" / "x.yaml") == content
-
-
-@pytest.mark.parametrize(
-    ("text", "facts"),
-    [
-        ("runs:\n  thick: {}\n  thin: {}\n  thick: {}\n", [4, "thick", 2]),
-        ("a: [1\nb: 2\n", ["YAML", 2]),
-        (None, ["No such file"]),
-        ("# a comment\n", ["`week: 21`"]),
-        ("- a\n", ["list", "`week: 21`"]),
-    ],
-)
-def test_what_is_no_configuration_is_refused(tmp_path, text, facts):
-    if text is not None:
-        (tmp_path / "x.yaml").write_text(text)
-    with pytest.raises(InputError, check=Facts(tmp_path / "x.yaml", *facts)):
-        read_keys(tmp_path / "x.yaml")
-
-
-@pytest.mark.parametrize("opening", ["[", "a: [", "{a: ", "- "])
-def test_values_that_are_nested_deeply_are_refused(tmp_path, opening):
-    """libyaml would end the process."""
-    path = tmp_path / "study.yaml"
-    path.write_text("a: [[1, {b: [2]}]]")
-    assert read_yaml(path) == {"a": [[1, {"b": [2]}]]}
-    path.write_text(opening * 100_000)
-    with pytest.raises(InputError, check=Facts(path)):
-        read_yaml(path)

@@ -54,119 +54,83 @@ def written(form, folder, stem, suffix):
     WRITERS[form.name](folder / f"{stem}{suffix.removesuffix('.gz')}")
     if suffix.endswith(".gz"):
         for path in folder.glob(f"{stem}.*"):
-            path.with_name(f"{path.name}.gz").write_bytes(
-                gzip.compress(path.read_bytes())
-            )
+            packed = gzip.compress(path.read_bytes())
+            path.with_name(f"{path.name}.gz").write_bytes(packed)
             path.unlink()
     return folder / f"{stem}{suffix}"
 
 
+def recognised(folder, names):
+    """Return whether a folder has one brain, of files with these names."""
+    (found,) = recognise(folder).brains
+    return all(repr(name) in repr(found.entry) for name in names)
+
+
 @pytest.mark.parametrize(
     ("form", "suffix"),
-    [(form, suffix) for form in FORMATS for suffix in form.all_suffixes],
-    ids=lambda value: str(value),
+    [
+        (form, suffix)
+        for form in FORMATS
+        for suffix in form.suffixes
+        if form.content == "surface"
+    ],
+    ids=lambda value: getattr(value, "name", value),
 )
-def test_a_format_is_read_recognised_and_hidden(tmp_path, form, suffix):
+def test_a_format_of_surfaces_is_read_recognised_and_hidden(tmp_path, form, suffix):
     # FreeSurfer's ending is the layer
-    pial = "" if suffix in (".pial", ".white") else ".pial"
-    stems = (
-        ["case_week22_dseg"] if form.content == "volume" else [f"lh{pial}", f"rh{pial}"]
-    )
-    paths = [written(form, tmp_path, stem, suffix) for stem in stems]
+    pial = "" if form.name == "FreeSurfer" else ".pial"
+    paths = [written(form, tmp_path, f"{side}{pial}", suffix) for side in ("lh", "rh")]
+    surface = read_surface(paths[0])
+    assert is_closed(surface)
+    assert signed_volume(surface) == pytest.approx(signed_volume(BALL), rel=1e-5)
+    places = np.sort(surface.vertices, axis=0)
+    assert places == pytest.approx(np.sort(BALL.vertices, axis=0), abs=1e-4)
+    assert not is_volume(paths[0])
+    assert hide_paths({"file": paths[0].name}) == {"file": "(file)"}
     if suffix == ".white":
         for side in ("lh", "rh"):
             written(form, tmp_path, side, ".pial")
-    for path in paths:
-        if form.content == "surface":
-            surface = read_surface(path)
-            assert is_closed(surface)
-            assert signed_volume(surface) == pytest.approx(
-                signed_volume(BALL), rel=1e-5
-            )
-            assert np.sort(surface.vertices, axis=0) == pytest.approx(
-                np.sort(BALL.vertices, axis=0), abs=1e-4
-            )
-        else:
-            assert (read_label_volume(path).labels == LABELS).all()
-        assert is_volume(path) == (form.content == "volume")
-        assert hide_paths({"file": path.name}) == {"file": "(file)"}
-    (found,) = recognise(tmp_path).brains
-    # a pair is named by its header
-    assert all(
-        repr(path.name.replace(".img", ".hdr")) in repr(found.entry) for path in paths
-    )
-
-
-def write_mni(path, ball=BALL, coloured_by=2, corners=3):
-    """Write a surface as programs of the MNI do, coloured as a whole (0), by faces (1)
-    or by vertices (2)."""
-    colours = {0: 1, 1: len(ball.faces), 2: len(ball.vertices)}[coloured_by]
-    ends = corners * np.arange(1, len(ball.faces) + 1)
-    parts = [
-        f"P 0.3 0.3 0.4 10 1 {len(ball.vertices)}",
-        "\n".join(" ".join(map(str, point)) for point in ball.vertices),
-        "0 0 1\n" * len(ball.vertices),
-        f"{len(ball.faces)}\n{coloured_by} " + "0 1 1 1\n" * colours,
-        " ".join(map(str, ends)),
-        " ".join(map(str, ball.faces.ravel())),
-    ]
-    path.write_text("\n".join(parts))
-
-
-@pytest.mark.parametrize("coloured_by", [0, 1, 2])
-def test_an_obj_file_of_the_mni_is_read(tmp_path, coloured_by):
-    path = tmp_path / "sub-1_gray_surface_left_81920.obj"
-    write_mni(path, coloured_by=coloured_by)
-    found = read_surface(path)
-    assert found.vertices == pytest.approx(BALL.vertices)
-    assert (found.faces == BALL.faces).all()
-
-
-def test_other_obj_files_of_the_mni_are_named(tmp_path):
-    path = tmp_path / "a.obj"
-    write_mni(path, corners=4)
-    with pytest.raises(InputError, check=Facts(path, "triangles")):
-        read_surface(path)
-    write_mni(path)
-    path.write_bytes(path.read_bytes()[:-500])
-    with pytest.raises(InputError, check=Facts(path)):
-        read_surface(path)
-    path.write_bytes(
-        b"p" + np.array([0.3, 0.3, 0.4, 10.0], ">f4").tobytes() + b"\0" * 100
-    )
-    with pytest.raises(InputError, check=Facts(path, "binary", "MNI")):
-        read_surface(path)
-    path.write_text("# nothing\n")
-    with pytest.raises(InputError, check=Facts(path)):
-        read_surface(path)
+    assert recognised(tmp_path, [path.name for path in paths])
 
 
 @pytest.mark.parametrize(
-    "ending", ["dlabel", "dscalar", "dtseries", "pconn", "dpconn", "plabel"]
+    ("form", "suffix"),
+    [
+        (form, suffix)
+        for form in FORMATS
+        for suffix in form.all_suffixes
+        if form.content == "volume"
+    ],
+    ids=lambda value: getattr(value, "name", value),
 )
-def test_cifti_files_are_not_volumes(tmp_path, ending):
-    assert not is_volume(f"a.{ending}.nii")
-    assert is_volume(f"a.{ending}.nii.gz")
-    assert is_volume("a.label.nii")
-    save_volume(nib.Nifti1Image)(tmp_path / "sub-1_week24_dseg.nii.gz")
-    (tmp_path / f"sub-1_week24_seg.{ending}.nii").touch()
-    (brain,) = recognise(tmp_path).brains
-    assert brain.entry["labels"] == "sub-1_week24_dseg.nii.gz"
-    (tmp_path / "sub-1_week24_dseg.nii.gz").unlink()
-    with pytest.raises(
-        InputError, check=Facts(f"sub-1_week24_seg.{ending}.nii", "CIFTI")
-    ):
-        recognise(tmp_path)
+def test_a_format_of_volumes_is_read_recognised_and_hidden(tmp_path, form, suffix):
+    path = written(form, tmp_path, "case_week22_dseg", suffix)
+    assert (read_label_volume(path).labels == LABELS).all()
+    assert is_volume(path)
+    assert hide_paths({"file": path.name}) == {"file": "(file)"}
+    # a pair is named by its header
+    assert recognised(tmp_path, [path.name.replace(".img", ".hdr")])
 
 
 def test_each_format_has_a_reader_and_each_reader_a_format():
-    readers = {"surface": SURFACE_READERS, "volume": VOLUME_READERS}
-    for content, by_name in readers.items():
-        assert list(by_name) == [
-            form.name for form in FORMATS if form.content == content
-        ]
+    names = {"surface": [], "volume": []}
+    for form in FORMATS:
+        names[form.content].append(form.name)
+    assert names == {"surface": [*SURFACE_READERS], "volume": [*VOLUME_READERS]}
     suffixes = [suffix for form in FORMATS for suffix in form.all_suffixes]
     assert len(suffixes) == len(set(suffixes))
+
+
+@pytest.mark.parametrize("ending", ["dlabel", "dtseries", "pconn"])
+def test_cifti_files_are_not_volumes(tmp_path, ending):
+    assert not is_volume(f"a.{ending}.nii")
+    assert is_volume(f"a.{ending}.nii.gz")
+    name = f"sub-1_week24_seg.{ending}.nii"
+    (tmp_path / name).touch()
+    with pytest.raises(InputError, check=Facts(name, "CIFTI")):
+        recognise(tmp_path)
+    save_volume(nib.Nifti1Image)(tmp_path / "sub-1_week24_dseg.nii.gz")
+    assert recognised(tmp_path, ["sub-1_week24_dseg.nii.gz"])
 
 
 @pytest.mark.parametrize("suffix", [".nii.gz", ".HDR", ".mgz"])
@@ -177,27 +141,49 @@ def test_a_single_hemisphere_with_a_scheme_may_be_any_volume(suffix):
         BrainConfig(**one)
 
 
-CORNERS = {
-    "positive": lambda corner, number: f"{corner + 1}",
-    "from the end": lambda corner, number: f"{corner - len(BALL.vertices)}",
-    "textured": lambda corner, number: f"{corner + 1}/{number % 2 + 1}",
-    "with normals": lambda corner, number: f"{corner + 1}//{number + 1}",
-    "with both": lambda corner, number: f"{corner + 1}/{number % 2 + 1}/{number + 1}",
-}
+def mni_text(coloured_by=2, corners=3):
+    """Return a surface as programs of the MNI write it, coloured as a whole (0), by
+    faces (1) or by vertices (2)."""
+    colours = {0: 1, 1: len(BALL.faces), 2: len(BALL.vertices)}[coloured_by]
+    ends = corners * np.arange(1, len(BALL.faces) + 1)
+    parts = [
+        f"P 0.3 0.3 0.4 10 1 {len(BALL.vertices)}",
+        "\n".join(" ".join(map(str, point)) for point in BALL.vertices),
+        "0 0 1\n" * len(BALL.vertices),
+        f"{len(BALL.faces)}\n{coloured_by} " + "0 1 1 1\n" * colours,
+        " ".join(map(str, ends)),
+        " ".join(map(str, BALL.faces.ravel())),
+    ]
+    return "\n".join(parts)
 
 
-@pytest.mark.parametrize("corners", CORNERS)
-def test_an_obj_file_keeps_its_vertices_however_it_names_corners(tmp_path, corners):
+def wavefront_text(corner):
+    """Return a surface as a Wavefront file in which a function of a vertex and its face
+    writes the corners."""
     lines = ["mtllib none.mtl", "vt 0 0", "vt 1 1"]
     lines += ["v " + " ".join(map(str, point)) for point in BALL.vertices]
     lines += ["vn 0 0 1"] * len(BALL.faces)
     for number, face in enumerate(BALL.faces):
-        lines.append(f"usemtl colour{number % 3}")
-        words = [CORNERS[corners](int(corner), number) for corner in face]
-        lines.append("f " + " ".join(words))
-    path = tmp_path / "a.obj"
-    path.write_text("\n".join(lines))
-    found = read_surface(path)
+        words = [corner(int(vertex), number) for vertex in face]
+        lines += [f"usemtl colour{number % 3}", "f " + " ".join(words)]
+    return "\n".join(lines)
+
+
+OBJ_TEXTS = {
+    "MNI, one colour": mni_text(0),
+    "MNI, a colour of each face": mni_text(1),
+    "MNI, a colour of each vertex": mni_text(2),
+    "from the end": wavefront_text(lambda vertex, _: f"{vertex - len(BALL.vertices)}"),
+    "with texture and normals": wavefront_text(
+        lambda vertex, face: f"{vertex + 1}/{face % 2 + 1}/{face + 1}"
+    ),
+}
+
+
+@pytest.mark.parametrize("text", OBJ_TEXTS.values(), ids=OBJ_TEXTS)
+def test_an_obj_file_keeps_its_vertices_and_faces(tmp_path, text):
+    (tmp_path / "a.obj").write_text(text)
+    found = read_surface(tmp_path / "a.obj")
     assert found.vertices == pytest.approx(BALL.vertices)
     assert (found.faces == BALL.faces).all()
 
@@ -230,21 +216,48 @@ def test_a_truncated_surface_of_text_is_not_one_with_fewer_faces(tmp_path, name)
         read_surface(path)
 
 
-VTK_CELLS = {
-    "POLYGONS 1 5\n4 0 1 3 2": ["1 faces"],
-    "TRIANGLE_STRIPS 1 5\n4 0 1 2 3": ["1 strips"],
-    "LINES 1 3\n2 0 1\nPOLYGONS 2 8\n3 0 1 2\n3 1 3 2": ["1 lines"],
-}
+VTK_HEAD = (
+    "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n"
+    "0 0 0\n9 0 0\n0 9 0\n9 9 0\n"
+)
+TRANSPOSED = nib.gifti.GiftiImage(
+    darrays=[
+        nib.gifti.GiftiDataArray(
+            BALL.vertices.T.astype(np.float32), intent="NIFTI_INTENT_POINTSET"
+        ),
+        nib.gifti.GiftiDataArray(
+            BALL.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE"
+        ),
+    ]
+)
 
 
-@pytest.mark.parametrize("cells", VTK_CELLS)
-def test_cells_of_a_vtk_file_that_are_no_triangles_are_named(tmp_path, cells):
-    path = tmp_path / "a.vtk"
-    path.write_text(
-        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n"
-        f"0 0 0\n9 0 0\n0 9 0\n9 9 0\n{cells}\n"
-    )
-    with pytest.raises(InputError, check=Facts(path, "Triangulate", *VTK_CELLS[cells])):
+@pytest.mark.parametrize(
+    ("name", "content", "facts"),
+    [
+        ("a.obj", mni_text(corners=4), ["triangles"]),
+        ("a.obj", mni_text()[:-500], []),
+        ("a.obj", b"p\x3e\x99\x99\x9a" + b"\0" * 100, ["binary", "MNI"]),
+        ("a.obj", "# nothing\n", []),
+        ("a.vtk", f"{VTK_HEAD}POLYGONS 1 5\n4 0 1 3 2", ["1 faces", "Triangulate"]),
+        ("a.vtk", f"{VTK_HEAD}TRIANGLE_STRIPS 1 5\n4 0 1 2 3", ["1 strips"]),
+        (
+            "a.vtk",
+            f"{VTK_HEAD}LINES 1 3\n2 0 1\nPOLYGONS 2 8\n3 0 1 2\n3 1 3 2",
+            ["1 lines"],
+        ),
+        (
+            "lh.pial.asc",
+            "#!ascii version of lh.pial\n3 1\n",
+            ["as text", "mris_convert"],
+        ),
+        ("a.gii", TRANSPOSED.to_bytes(), ["(3, 162)", "(n, 3)"]),
+    ],
+)
+def test_what_is_no_surface_of_triangles_is_named(tmp_path, name, content, facts):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InputError, check=Facts(path, *facts)):
         read_surface(path)
 
 
@@ -257,31 +270,7 @@ def test_what_is_no_file_with_content_is_named_in_each_format(tmp_path, suffix):
     empty.touch()
     folder.mkdir()
     link.symlink_to(link)
-    with pytest.raises(InputError, check=Facts(empty, "is empty")):
-        read_surface(empty)
-    with pytest.raises(InputError, check=Facts(folder, "folder")) as caught:
-        read_surface(folder)
-    assert "truncated" not in str(caught.value)
-    with pytest.raises(InputError, check=Facts(link, "back to it")):
-        read_surface(link)
-
-
-def test_a_surface_of_freesurfer_as_text_is_named(tmp_path):
-    path = tmp_path / "lh.pial.asc"
-    path.write_text("#!ascii version of lh.pial\n3 1\n0 0 0 0\n")
-    with pytest.raises(InputError, check=Facts(path, "as text", "mris_convert")):
-        read_surface(path)
-
-
-def test_the_shape_of_transposed_points_is_named(tmp_path):
-    points = nib.gifti.GiftiDataArray(
-        BALL.vertices.T.astype(np.float32), intent="NIFTI_INTENT_POINTSET"
-    )
-    faces = nib.gifti.GiftiDataArray(
-        BALL.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE"
-    )
-    path = tmp_path / "a.surf.gii"
-    nib.save(nib.gifti.GiftiImage(darrays=[points, faces]), path)
-    shape = f"(3, {len(BALL.vertices)})"
-    with pytest.raises(InputError, check=Facts(path, shape, "(n, 3)")):
-        read_surface(path)
+    for path, fact in ((empty, "is empty"), (folder, "folder"), (link, "back to it")):
+        with pytest.raises(InputError, check=Facts(path, fact)) as caught:
+            read_surface(path)
+        assert ("truncated" in str(caught.value)) == (path == empty)

