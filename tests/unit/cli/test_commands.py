@@ -11,6 +11,7 @@ import pytest
 import yaml
 from atlas_brains import atlas_brain, atlas_halves
 from click.testing import CliRunner
+from configurations import touched
 from facts import Facts
 from scan_trees import make_tree
 from shapes import sphere
@@ -29,6 +30,13 @@ from gyriflow.settings.runs import GrowthSettings
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
+
+
+def refused(*arguments):
+    """Return what a command says that ends with the code of a mistake in its input."""
+    done = CliRunner().invoke(main, list(map(str, arguments)))
+    assert done.exit_code == 2, done.output
+    return done.output
 
 
 @pytest.fixture
@@ -58,11 +66,9 @@ def test_a_run_on_this_machine_gets_its_cores(handed_on):
 def test_any_file_may_be_the_configuration_but_results_are_targets(
     handed_on, tmp_path, name
 ):
-    result = tmp_path / "results" / "study" / "metrics.csv"
-    result.parent.mkdir(parents=True)
-    for path in (result, tmp_path / name):
-        path.touch()
-    assert handed_on("results/study/metrics.csv")[-1] == "results/study/metrics.csv"
+    result = "results/study/metrics.csv"
+    touched(tmp_path, name, result)
+    assert handed_on(result)[-1] == result
     assert handed_on(name, "--until", "mesh", config=name)[-2:] == ["--until", "mesh"]
 
 
@@ -70,25 +76,20 @@ def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
     assert "--cores" not in handed_on("--profile", "profiles/slurm")
     assert "--cores" not in handed_on("--executor=slurm")
     # but a limit that is asked for is one
-    assert handed_on("--cores", "200", "--profile", "profiles/slurm")[:2] == [
-        "--cores",
-        "200",
-    ]
+    given = ["--cores", "200"]
+    assert handed_on(*given, "--profile", "profiles/slurm")[:2] == given
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize("given", [["no.yaml"], []])
 def test_a_missing_configuration_is_reported_in_one_line_where_it_is_named(
-    monkeypatch, tmp_path, command
+    monkeypatch, tmp_path, command, given
 ):
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(main, [command, "no.yaml"])
-    assert (done.exit_code, done.output.count("\n")) == (2, 1)
-    assert done.output == Facts(f"{tmp_path / 'no.yaml'}:", "gyriflow init")
-    done = CliRunner().invoke(main, [command])
-    assert (done.exit_code, done.output) == (
-        2,
-        Facts(f"{tmp_path / 'gyriflow.yaml'}:", "gyriflow init"),
-    )
+    (name,) = given or ["gyriflow.yaml"]
+    output = refused(command, *given)
+    assert output == Facts(f"{tmp_path / name}:", "gyriflow init")
+    assert output.count("\n") == 1
 
 
 def test_a_mistake_in_an_argument_is_one_line():
@@ -138,40 +139,47 @@ def test_a_data_set_may_lie_in_a_folder_that_is_called_as_a_command(
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / folder).mkdir()
-    done = CliRunner().invoke(main, [folder, "out", "participant"])
-    assert (done.exit_code, done.output) == (2, Facts(f"{folder}:", 0, ".nii.gz"))
+    facts = Facts(f"{folder}:", 0, ".nii.gz")
+    assert refused(folder, "out", "participant") == facts
     # the command by its own name
-    assert (
-        CliRunner().invoke(main, ["bids", folder, "out", "group"]).output == done.output
-    )
+    assert refused("bids", folder, "out", "group") == facts
 
 
+def test_a_current_folder_that_was_deleted_is_named(tmp_path, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert refused("check") == Facts("the current folder no longer exists")
+
+
+ATLAS = SHIPPED / "atlases" / "spina-bifida"
 FOUND = "fetal_SB_atlas_GA22_notoperated"
 """The id of the brain that is predicted, by the folder of its labels."""
-LABELS = str(SHIPPED / "atlases" / "spina-bifida" / FOUND / "parcellation.nii.gz")
+LABELS = str(ATLAS / FOUND / "parcellation.nii.gz")
+
+
+def configured(folder):
+    """Return the configuration in a folder, as it is written and as a study."""
+    section = yaml.safe_load((folder / "gyriflow.yaml").read_text())
+    return section, resolve(load(section))
 
 
 @pytest.fixture
 def predicted(monkeypatch, tmp_path):
     """Return what `gyriflow predict` says, of the shipped brain of 22 GW by default,
     and note the run's arguments."""
-    monkeypatch.setattr(
-        launch,
-        "main",
-        lambda asked: (tmp_path / "asked.txt").write_text(" ".join(asked)) and 0,
-    )
 
-    def said(*given, files=(LABELS,)):
-        arguments = [
-            "predict",
-            *files,
-            "--directory",
-            str(tmp_path),
-            "--cores",
-            "3",
-            *given,
-        ]
-        return CliRunner().invoke(main, arguments)
+    def note(asked):
+        (tmp_path / "asked.txt").write_text(" ".join(asked))
+        return 0
+
+    monkeypatch.setattr(launch, "main", note)
+
+    def said(*given, files=(LABELS,), code=0):
+        place = ["--directory", str(tmp_path), "--cores", "3"]
+        done = CliRunner().invoke(main, ["predict", *files, *place, *given])
+        assert done.exit_code == code, done.output
+        return done.output
 
     return said
 
@@ -179,69 +187,41 @@ def predicted(monkeypatch, tmp_path):
 def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(
     predicted, tmp_path
 ):
-    done = predicted("--week", "22.4", "--until", "24.5")
-    assert done.exit_code == 0
-    assert done.output == Facts("spina bifida aperta")
-    config = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
-    assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
-    study = resolve(config)
-    assert [
-        (simulation.brain, simulation.shapes) for simulation in study.run_simulations
-    ] == [(FOUND, "atlas")]
-    assert list(study.chains[FOUND, "atlas"].later) == [
-        brain.id for brain in config.brains[1:]
-    ]
-    asked = (tmp_path / "asked.txt").read_text()
-    assert (
-        asked
-        == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path}"
-        " all export"
-    )
-    # the same call goes on, another one replaces nothing
-    assert predicted("--week", "22.4", "--until", "24.5").exit_code == 0
-    other = predicted("--week", "22.4", "--until", "24")
-    assert (other.exit_code, other.output) == (
-        2,
-        Facts(tmp_path / "gyriflow.yaml", "--force"),
-    )
-    assert predicted("--week", "22.4", "--until", "24", "--force").exit_code == 0
-    assert (
-        load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
-        .runs["predicted"]
-        .end_week
-        == 24
-    )
-    assert (
-        predicted(
-            "--week", "22.4", "--until", "24", "--force", "--ensemble", "5"
-        ).exit_code
-        == 0
-    )
-    run = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs[
-        "predicted"
-    ]
-    assert run.ensemble == 5
+    path, asked = tmp_path / "gyriflow.yaml", ("--week", "22.4", "--until", "24.5")
+    assert predicted(*asked) == Facts("spina bifida aperta")
+    _, study = configured(tmp_path)
+    brains = study.config.brains
+    assert [brain.week for brain in brains] == [22.4, 22, 23, 24, 25]
+    (simulation,) = study.run_simulations
+    assert (simulation.brain, simulation.shapes) == (FOUND, "atlas")
+    later = [brain.id for brain in brains[1:]]
+    assert list(study.chains[FOUND, "atlas"].later) == later
+    call = f"--configfile {path} --cores 3 --directory {tmp_path} all export"
+    assert (tmp_path / "asked.txt").read_text() == call
+    # with the mesh with which benchmarks/horizon.py measured the errors of predictions
+    mesh = study.config.mesh
+    tested = read_keys(SHIPPED / "norms" / "predictions.yaml")["mesh"]
+    assert mesh.mesher == "tetgen"
+    for key in ("order", "surface_edge_mm"):
+        assert getattr(mesh, key) == tested[key]
 
 
-def test_a_prediction_has_the_mesh_that_its_errors_were_measured_with(
+def test_the_same_prediction_goes_on_and_another_one_replaces_nothing(
     predicted, tmp_path
 ):
-    assert predicted("--week", "22.4", "--until", "24").exit_code == 0
-    mesh = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).mesh
-    tested = read_keys(SHIPPED / "norms" / "predictions.yaml")["mesh"]
-    assert (mesh.order, mesh.surface_edge_mm) == (
-        tested["order"],
-        tested["surface_edge_mm"],
-    )
-    # the mesher of benchmarks/horizon.py, with which they were measured
-    assert mesh.mesher == "tetgen"
+    for _ in range(2):
+        predicted("--week", "22.4", "--until", "24.5")
+    other = ("--week", "22.4", "--until", "24")
+    assert predicted(*other, code=2) == Facts(tmp_path / "gyriflow.yaml", "--force")
+    predicted(*other, "--force", "--ensemble", "5")
+    run = configured(tmp_path)[1].config.runs["predicted"]
+    assert (run.end_week, run.ensemble) == (24, 5)
 
 
 def test_quadratic_elements_are_warned_of_on_the_way_to_deep_folds(predicted, tmp_path):
-    asked = ("--week", "25", "--until", "34", "--atlas", "spina-bifida")
-    assert predicted(*asked).exit_code == 0
-    section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
-    assert list(deep_curved_folds(resolve(load(section)))) == []
+    predicted("--week", "25", "--until", "34", "--atlas", "spina-bifida")
+    section, study = configured(tmp_path)
+    assert list(deep_curved_folds(study)) == []
     section["mesh"] = {"order": 2}
     (line,) = deep_curved_folds(resolve(load(section)))
     assert line == Facts("run predicted", "mesh.order: 1")
@@ -252,30 +232,15 @@ def test_quadratic_elements_are_warned_of_on_the_way_to_deep_folds(predicted, tm
 def test_a_quick_prediction_is_coarse_and_finds_files_from_the_working_directory(
     monkeypatch, predicted, tmp_path
 ):
-    atlas = SHIPPED / "atlases" / "spina-bifida"
-    monkeypatch.chdir(atlas.parent)
-    asked = (
-        "--week",
-        "22",
-        "--until",
-        "24",
-        "--quick",
-        "--atlas",
-        f"{atlas.name}/atlas.yaml",
-        "--folder",
-        atlas.name,
-    )
-    assert predicted(*asked).exit_code == 0
+    monkeypatch.chdir(ATLAS.parent)
+    place = ("--atlas", f"{ATLAS.name}/atlas.yaml", "--folder", ATLAS.name)
+    predicted("--week", "22", "--until", "24", "--quick", *place)
     monkeypatch.chdir(tmp_path)
-    section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
-    assert (section["atlas"]["name"], section["atlas"]["folder"]) == (
-        str(atlas / "atlas.yaml"),
-        str(atlas),
-    )
-    study = resolve(load(section))
-    assert all(
-        Path(file).is_file() for brain in study.brains.values() for file in brain.files
-    )
+    section, study = configured(tmp_path)
+    named = section["atlas"]["name"], section["atlas"]["folder"]
+    assert named == (str(ATLAS / "atlas.yaml"), str(ATLAS))
+    for brain in study.brains.values():
+        assert all(Path(file).is_file() for file in brain.files)
     # growth towards shapes is not by layers
     assert list(coarse_cortices(study)) == []
     assert study.run_simulations[0].settings.step_s == 7 * 86400
@@ -285,45 +250,33 @@ def test_a_quick_prediction_is_coarse_and_finds_files_from_the_working_directory
 
 
 @pytest.mark.parametrize(
-    ("end", "weeks"), [("30", [25, 28, 31]), ("32", [25, 28, 31, 34])]
+    ("end", "option", "weeks"),
+    [
+        ("30", "--quick", [25, 28, 31]),
+        ("32", "--quick", [25, 28, 31, 34]),
+        ("30", "--force", range(25, 35)),
+    ],
 )
 def test_a_quick_prediction_uses_every_third_week_up_to_its_end(
-    predicted, tmp_path, end, weeks
+    predicted, tmp_path, end, option, weeks
 ):
     asked = ("--week", "25", "--until", end, "--atlas", "spina-bifida")
-    assert predicted(*asked, "--quick").exit_code == 0
-    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[
-        0
-    ].weeks == tuple(weeks)
-    assert predicted(*asked, "--force").exit_code == 0
-    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[
-        0
-    ].weeks == tuple(range(25, 35))
+    predicted(*asked, option)
+    assert configured(tmp_path)[1].config.atlas[0].weeks == tuple(weeks)
 
 
 def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path):
-    seen = []
+    planned = []
     monkeypatch.setattr(
-        checking, "plan", lambda config, *_, **__: seen.append(config.is_file()) or []
+        checking, "plan", lambda path, *_, **__: planned.append(path.is_file()) or []
     )
-    before = set(tmp_path.rglob("*"))
-    dry = (
-        "--week",
-        "22",
-        "--until",
-        "24",
-        "--directory",
-        str(tmp_path / "new"),
-        "--dry-run",
-    )
-    assert predicted(*dry).exit_code == 0
-    assert (seen, set(tmp_path.rglob("*"))) == ([True], before)
+    asked, before = ("--week", "22", "--until", "24", "-n"), set(tmp_path.rglob("*"))
+    predicted(*asked, "--directory", str(tmp_path / "new"))
+    assert (planned, set(tmp_path.rglob("*"))) == ([True], before)
     # what it would not replace, it says then
-    (tmp_path / "gyriflow.yaml").write_text("start: mine")
-    assert predicted("--week", "22", "--until", "24", "-n").output == Facts(
-        tmp_path / "gyriflow.yaml", "--force"
-    )
-    assert (tmp_path / "gyriflow.yaml").read_text() == "start: mine"
+    path = touched(tmp_path, "gyriflow.yaml") / "gyriflow.yaml"
+    assert predicted(*asked, code=2) == Facts(path, "--force")
+    assert path.read_text() == ""
 
 
 @pytest.fixture
@@ -332,34 +285,17 @@ def data_set(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     # set in this process, and removed after the test
     monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
-    make_tree(
-        tmp_path / "data",
-        labels=[f"sub-0{number}/anat/sub-0{number}_dseg.nii.gz" for number in (1, 2)],
-        tables={
-            "participants.tsv": [
-                "participant_id scan_age",
-                "sub-01 24.1",
-                "sub-02 25.3",
-            ]
-        },
-    )
+    rows = ["participant_id scan_age", "sub-01 24.1", "sub-02 25.3"]
+    names = [f"sub-0{number}/anat/sub-0{number}_dseg.nii.gz" for number in (1, 2)]
+    make_tree(tmp_path / "data", labels=names, tables={"participants.tsv": rows})
     return tmp_path
 
 
 @pytest.mark.parametrize(
     ("arguments", "directory", "option"),
     [
-        (
-            ("data", "out", "participant", "--participant-label", "02"),
-            "out/work",
-            "--work-dir",
-        ),
-        (("measure", "data", "-d", "study"), "study", "--directory"),
-        (
-            ("predict", LABELS, "--week", "22", "--until", "24", "-d", "study"),
-            "study",
-            "--directory",
-        ),
+        (["data", "out", "participant"], "out/work", "--work-dir"),
+        (["measure", "data", "-d", "study"], "study", "--directory"),
     ],
 )
 def test_beside_a_live_run_a_command_writes_nothing_and_names_its_option(
@@ -374,36 +310,56 @@ def test_beside_a_live_run_a_command_writes_nothing_and_names_its_option(
         assert before == {path: path.stat().st_mtime_ns for path in data_set.rglob("*")}
 
 
-def test_a_dry_call_for_a_bids_data_set_leaves_the_configuration_of_a_run(
-    monkeypatch, data_set
-):
-    seen = []
-    monkeypatch.setattr(
-        checking, "plan", lambda config, *_, **__: seen.append(read_keys(config)) or []
-    )
-    before = set(data_set.rglob("*"))
-    dry = ("data", "out", "participant", "--participant-label", "02", "-n")
-    assert CliRunner().invoke(main, dry).exit_code == 0
-    assert [brain["id"] for brain in seen[0]["brains"]] == ["sub-02"]
-    assert set(data_set.rglob("*")) == before
-
-
 @pytest.mark.parametrize(
-    ("fold", "is_told"), [((), True), (("--no-fold",), False), (("--fold",), False)]
+    ("fold", "is_named"), [((), True), (("--no-fold",), False), (("--fold",), False)]
 )
-def test_settings_that_only_matter_to_fold_are_named_if_nothing_is_asked_to_fold(
-    monkeypatch, data_set, fold, is_told
+def test_a_dry_call_for_a_bids_data_set_names_settings_that_only_matter_to_fold(
+    monkeypatch, data_set, fold, is_named
 ):
-    monkeypatch.setattr(checking, "plan", lambda *_, **__: [])
+    planned = []
+    monkeypatch.setattr(
+        checking, "plan", lambda path, *_, **__: planned.append(read_keys(path)) or []
+    )
     settings = "start: all\nfolding: {end_week: 30}\nmetrics: {spangy_modes: B4}\n"
     (data_set / "my.yaml").write_text(settings)
-    dry = ("data", "out", "participant", "--settings", "my.yaml", "-n", *fold)
-    done = CliRunner().invoke(main, dry)
+    before = set(data_set.rglob("*"))
+    options = ("--settings", "my.yaml", "--participant-label", "02", "-n", *fold)
+    done = CliRunner().invoke(main, ["data", "out", "participant", *options])
     assert done.exit_code == 0
-    told = [line for line in done.stderr.splitlines() if "--settings" in line]
-    assert told == [Facts("--fold", "start, folding")] * is_told
+    assert [brain["id"] for brain in planned[0]["brains"]] == ["sub-02"]
+    assert set(data_set.rglob("*")) == before
     # a section that measuring uses is not among them
-    assert not any("metrics" in line for line in told)
+    named = [line for line in done.stderr.splitlines() if "--settings" in line]
+    assert named == [Facts("--fold", "start, folding")] * is_named
+    assert "metrics" not in done.stderr
+
+
+def test_check_takes_a_folder_as_measure_does_and_writes_nothing(tmp_path, monkeypatch):
+    numbers = range(2, 8)
+    rows = ["participant_id ga", "sub-1 24.1", *(f"sub-{n} n/a" for n in numbers)]
+    names = [f"sub-{n}_dseg.nii.gz" for n in (1, *numbers)]
+    make_tree(tmp_path, labels=names, tables={"participants.tsv": rows})
+    planned = []
+    monkeypatch.setattr(
+        checking, "plan", lambda path, *_, **__: planned.append(read_keys(path)) or []
+    )
+    # set in this process, and removed after the test
+    monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
+    before = set(tmp_path.rglob("*"))
+    options = ("--scheme", "spina-bifida-atlas", "-d", tmp_path / "new")
+    output = refused("check", tmp_path, *options)
+    assert set(tmp_path.rglob("*")) == before
+    assert [brain["id"] for brain in planned[0]["brains"]] == ["sub-1"]
+    assert output == Facts(f"{tmp_path}: 1 brain, measured only", "6 problems")
+    # where the age is from
+    assert output == Facts("participants.tsv row 2")
+    # six scans with one fault: three lines and a number
+    assert (output.count("n/a"), output) == (3, Facts("3 more"))
+    # the options are those of measure
+    (tmp_path / "gyriflow.yaml").write_text("brains: []")
+    for command in ("check", "measure"):
+        output = refused(command, tmp_path, "--files", "*x*")
+        assert output == Facts("--files", "init FOLDER")
 
 
 @pytest.mark.parametrize(
@@ -421,200 +377,106 @@ def test_settings_that_only_matter_to_fold_are_named_if_nothing_is_asked_to_fold
 def test_a_prediction_that_no_atlas_allows_is_refused(
     predicted, tmp_path, until, more, facts
 ):
-    done = predicted("--week", "22.4", "--until", until, *more)
-    assert (done.exit_code, done.output) == (2, Facts(*facts))
+    asked = ("--week", "22.4", "--until", until, *more)
+    assert predicted(*asked, code=2) == Facts(*facts)
     assert not (tmp_path / "gyriflow.yaml").exists()
 
 
-def test_check_takes_a_folder_as_measure_does_and_writes_nothing(tmp_path, monkeypatch):
-    rows = [
-        "participant_id gestational_age",
-        "sub-01 24.1",
-        *(f"sub-{number:02} n/a" for number in range(2, 8)),
-    ]
-    names = [f"sub-{number:02}_dseg.nii.gz" for number in range(1, 8)]
-    make_tree(tmp_path, labels=names, tables={"participants.tsv": rows})
-    planned = []
-
-    def plan(config, *_, **__):
-        planned.append(yaml.safe_load(config.read_text()))
-        return []
-
-    monkeypatch.setattr(checking, "plan", plan)
-    # set in this process, and removed after the test
-    monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
-    before = set(tmp_path.rglob("*"))
-    options = ("--scheme", "spina-bifida-atlas", "-d", str(tmp_path / "new"))
-    done = CliRunner().invoke(main, ["check", str(tmp_path), *options])
-    assert (done.exit_code, set(tmp_path.rglob("*"))) == (2, before)
-    assert [brain["id"] for brain in planned[0]["brains"]] == ["sub-01"]
-    assert done.output == Facts(f"{tmp_path}: 1 brain, measured only", "6 problems")
-    # where the age is from
-    assert done.output == Facts("participants.tsv row 2")
-    # six scans with one fault: three lines and a number
-    assert done.output.count("n/a") == 3
-    assert done.output == Facts("3 more")
-    # the options are those of measure
-    (tmp_path / "gyriflow.yaml").write_text("brains: []")
-    for command in ("check", "measure"):
-        done = CliRunner().invoke(main, [command, str(tmp_path), "--files", "*x*"])
-        assert (done.exit_code, done.output) == (2, Facts("--files", "init FOLDER"))
-
-
-def test_a_current_folder_that_was_deleted_is_named(tmp_path, monkeypatch):
-    (tmp_path / "gone").mkdir()
-    monkeypatch.chdir(tmp_path / "gone")
-    (tmp_path / "gone").rmdir()
-    done = CliRunner().invoke(main, ["check"])
-    assert (done.exit_code, done.output) == (
-        2,
-        Facts("the current folder no longer exists"),
-    )
-
-
-def test_a_file_that_is_not_there_is_answered_with_what_is(predicted_from):
-    done = predicted_from("brain.nii", "--week", "23.4")
-    assert (done.exit_code, done.output) == (
-        2,
-        Facts("brain.nii", "there is brain.stl"),
-    )
-    # of another kind than expected, and there
-    done = predicted_from("brain.stl", "--week", "23.4", "--folder", "half.stl")
-    assert (done.exit_code, "there is" in done.output) == (2, False)
+LH, RH, LH_WHITE, RH_WHITE = (
+    f"{side}.{layer}.surf.gii" for layer in ("pial", "white") for side in ("lh", "rh")
+)
 
 
 @pytest.fixture(scope="module")
 def surfaces(tmp_path_factory):
     """Surface files of the shipped brain of 24 GW and of a ball, by name."""
     folder, (left, right) = tmp_path_factory.mktemp("surfaces"), atlas_halves()
-    meshes = {
-        "brain": atlas_brain(),
-        "half": left,
-        "ball": sphere(5.0),
-        "lh": left,
-        "rh": right,
-    }
-    names = {
-        name: f"{name}.pial.surf.gii" if name in ("lh", "rh") else f"{name}.stl"
-        for name in meshes
-    }
-    for name, mesh in meshes.items():
-        write_surface(folder / names[name], mesh)
-    write_surface(folder / "lh.white.surf.gii", left)
-    write_surface(folder / "rh.white.surf.gii", right)
-    (folder / "notes.txt").write_text("none")
-    return folder
+    for name, mesh in {
+        "brain.stl": atlas_brain(),
+        "half.stl": left,
+        "ball.stl": sphere(5.0),
+        LH: left,
+        RH: right,
+        LH_WHITE: left,
+        RH_WHITE: right,
+    }.items():
+        write_surface(folder / name, mesh)
+    return touched(folder, "notes.txt")
 
 
 @pytest.fixture
 def predicted_from(monkeypatch, predicted, surfaces):
-    """Return the outcome of `gyriflow predict` for files of that folder, in which it
+    """Return what `gyriflow predict` says of files of that folder, in which it
     stands."""
     monkeypatch.chdir(surfaces)
-    return lambda *given: predicted("--until", "24.8", files=given)
+    asked = ("--week", "23.4", "--until", "24.8")
+    return lambda *given, code=0: predicted(*asked, files=given, code=code)
+
+
+def whites(*names):
+    """Return the options for white surfaces."""
+    return [word for name in names for word in ("--white", name)]
 
 
 @pytest.mark.parametrize(
     ("files", "source"),
     [
         (["brain.stl"], {"pial": "brain.stl"}),
+        ([RH, LH], {"hemispheres": {"left": LH, "right": RH}}),
         (
-            ["rh.pial.surf.gii", "lh.pial.surf.gii"],
-            {"hemispheres": {"left": "lh.pial.surf.gii", "right": "rh.pial.surf.gii"}},
-        ),
-        (
-            [
-                "lh.pial.surf.gii",
-                "rh.pial.surf.gii",
-                "--white",
-                "lh.white.surf.gii",
-                "--white",
-                "rh.white.surf.gii",
-            ],
-            {
-                "hemispheres": {
-                    "left": "lh.pial.surf.gii",
-                    "right": "rh.pial.surf.gii",
-                },
-                "white": ["lh.white.surf.gii", "rh.white.surf.gii"],
-            },
+            [LH, RH, *whites(LH_WHITE, RH_WHITE)],
+            {"hemispheres": {"left": LH, "right": RH}, "white": [LH_WHITE, RH_WHITE]},
         ),
     ],
 )
 def test_a_brain_is_predicted_from_its_surfaces(
     predicted_from, surfaces, tmp_path, files, source
 ):
-    done = predicted_from(*files, "--week", "23.4")
-    assert (done.exit_code, done.output) == (0, Facts("23.4", "24.8 GW"))
-    section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
+    assert predicted_from(*files) == Facts("23.4", "24.8 GW")
+    section, study = configured(tmp_path)
     (entry,) = section["brains"]
-    found = {
-        key: entry[key] for key in entry if key in ("pial", "hemispheres", "white")
-    }
-    plain = yaml.safe_dump(found).replace(f"{surfaces}/", "")
-    assert yaml.safe_load(plain) == source
-    study = resolve(load(section))
+    keys = {"pial", "hemispheres", "white"} & set(entry)
+    found = yaml.safe_dump({key: entry[key] for key in keys})
+    assert yaml.safe_load(found.replace(f"{surfaces}/", "")) == source
     (simulation,) = study.run_simulations
-    chain = study.chains[simulation.brain, "atlas"]
-    assert chain.weeks[1:] == (23, 24, 25)
+    assert study.chains[simulation.brain, "atlas"].weeks[1:] == (23, 24, 25)
     assert [group["ids"] for group in study.filled] == [[entry["id"]]]
 
 
 @pytest.mark.parametrize(
-    ("given", "facts"),
+    ("files", "facts"),
     [
-        (["brain.stl"], ["--week"]),
-        (["lh.pial.surf.gii", "--week", "23"], ["lh.pial.surf.gii", "LEFT", "RIGHT"]),
-        (["half.stl", "--week", "23"], ["half.stl", "0.5", "LEFT", "RIGHT"]),
-        (["ball.stl", "--week", "23"], ["ball.stl", "0.522 mL"]),
-        (
-            ["lh.pial.surf.gii", "lh.pial.surf.gii", "--week", "23"],
-            ["lh.pial.surf.gii, lh.pial.surf.gii"],
-        ),
-        (
-            ["lh.pial.surf.gii", "rh.pial.surf.gii", "brain.stl", "--week", "23"],
-            ["brain.stl"],
-        ),
-        (
-            ["lh.white.surf.gii", "rh.white.surf.gii", "--week", "23"],
-            ["lh.white.surf.gii", "--white"],
-        ),
-        (
-            [
-                "brain.stl",
-                "--white",
-                "brain.stl",
-                "--white",
-                "half.stl",
-                "--week",
-                "23",
-            ],
-            ["--white", 2, 1],
-        ),
-        (
-            ["brain.stl", "--white", "lh.pial.surf.gii", "--week", "23"],
-            ["lh.pial.surf.gii", "white"],
-        ),
-        (["notes.txt", "--week", "23"], ["notes.txt", ".nii.gz", ".stl"]),
-        (["brain.stl", "--scheme", "feta-7", "--week", "23"], ["--scheme", "feta-7"]),
-        (["brain.stl", "--image", "brain.stl", "--week", "23"], ["--image"]),
+        ([LH], [LH, "LEFT", "RIGHT"]),
+        (["half.stl"], ["half.stl", "0.5", "LEFT", "RIGHT"]),
+        (["ball.stl"], ["ball.stl", "0.522 mL"]),
+        ([LH, LH], [f"{LH}, {LH}"]),
+        ([LH, RH, "brain.stl"], ["brain.stl"]),
+        ([LH_WHITE, RH_WHITE], [LH_WHITE, "--white"]),
+        (["brain.stl", *whites("brain.stl", "half.stl")], ["--white", 2, 1]),
+        (["brain.stl", *whites(LH)], [LH, "white"]),
+        (["notes.txt"], ["notes.txt", ".nii.gz", ".stl"]),
+        (["brain.stl", "--scheme", "feta-7"], ["--scheme", "feta-7"]),
+        (["brain.stl", "--image", "brain.stl"], ["--image"]),
+        # labels are alone
+        ([LABELS, "brain.stl"], ["parcellation.nii.gz", "brain.stl"]),
+        ([LABELS, *whites("brain.stl")], ["parcellation.nii.gz", "brain.stl"]),
+        (["brain.nii"], ["brain.nii", "there is brain.stl"]),
     ],
 )
 def test_files_that_are_not_one_brain_to_predict_are_refused(
-    predicted_from, tmp_path, given, facts
+    predicted_from, tmp_path, files, facts
 ):
-    done = predicted_from(*given)
-    assert (done.exit_code, done.output) == (2, Facts(*facts))
+    assert predicted_from(*files, code=2) == Facts(*facts)
     assert not (tmp_path / "gyriflow.yaml").exists()
 
 
-def test_labels_are_predicted_alone(predicted_from):
-    for more in (["brain.stl"], ["--white", "brain.stl"]):
-        done = predicted_from(LABELS, *more, "--week", "23")
-        assert (done.exit_code, done.output) == (
-            2,
-            Facts("parcellation.nii.gz", "brain.stl"),
-        )
+def test_a_file_of_another_kind_than_expected_is_not_said_to_be_missing(predicted_from):
+    output = predicted_from("brain.stl", "--folder", "half.stl", code=2)
+    assert "there is" not in output
+
+
+def test_a_prediction_needs_a_week(predicted):
+    assert predicted("--until", "24.8", code=2) == Facts("--week")
 
 
 @pytest.mark.parametrize("home", ["", "/proc/nobody", "file"])

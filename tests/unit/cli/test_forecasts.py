@@ -189,7 +189,7 @@ def test_a_study_takes_its_work_on_all_cores_or_its_longest_chain(
     forecast, jobs, cores, hours
 ):
     (line,) = [line for line in forecast(jobs, cores) if line.startswith("time")]
-    assert line == Facts(f"about {hours} h", cores)
+    assert line == Facts(f"about {hours}.0 h", cores)
 
 
 def test_the_work_and_the_largest_memory_of_a_study_are_those_of_its_foldings(forecast):
@@ -207,7 +207,7 @@ def test_the_work_and_the_largest_memory_of_a_study_are_those_of_its_foldings(fo
 
 def test_a_path_of_an_atlas_is_kept_or_made_for_some_time(forecast):
     found = forecast([MAKE_PATH, TARGETS])
-    assert Facts("path of x22", "has to be made", "4 h") in found
+    assert Facts("path of x22", "has to be made", "4.0 h") in found
     found = forecast([KEPT_PATH, TARGETS])
     assert Facts("path of x22", "kept") in found
 

@@ -2,6 +2,7 @@
 files that cannot be used."""
 
 import pytest
+import yaml
 from facts import Facts
 from scan_trees import make_tree
 from shapes import cerebrum_surface, phantom
@@ -11,159 +12,132 @@ from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 
 
-def both(*patterns):
-    """Return the paths of both sides, L and R or lh and rh for @."""
-    paths = []
-    for pattern in patterns:
-        sides = ("lh", "rh") if "/@." in pattern else ("L", "R")
-        paths += [pattern.replace("@", side) for side in sides]
-    return paths
+def both(pattern):
+    """Return the paths of both sides, such as {lh,rh}.pial, or a path as it is."""
+    before, is_pair, rest = pattern.partition("{")
+    sides, _, after = rest.partition("}")
+    return [before + side + after for side in sides.split(",")] if is_pair else [before]
 
 
 def brains(folder, **options):
-    """Return week, files and causes of each scan by id."""
-    found = recognise(folder, **options).brains
-    return {
-        brain.entry["id"]: (brain.entry["week"], brain.files, " ".join(brain.causes))
-        for brain in found
-    }
+    """Return week, files, white ones last, and causes of each scan by id."""
+    found = {}
+    for brain in recognise(folder, **options).brains:
+        files = brain.files.split(", ") + brain.entry.get("white", [])
+        week, causes = brain.entry["week"], " ".join(brain.causes)
+        found[brain.entry["id"]] = week, files, causes
+    return found
 
 
-TABLE = "participants.tsv"
-KEEP_ONE = Facts("2 files", "keep one")
-FETA = "sub-026/anat/sub-026_rec-mial_dseg.nii.gz"
-DHCP = "derivatives/dhcp/sub-CC00856XX15/ses-3530/anat/sub-CC00856XX15_ses-3530"
-DHCP_SESSIONS = "sub-CC00856XX15/sub-CC00856XX15_sessions.tsv"
-FETPYPE = "derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_dseg.nii.gz"
-NIBABIES = "derivatives/nibabies/sub-01/ses-1/anat/sub-01_ses-1"
-HCP = "100307/T1w/Native/100307.@.{}.native.surf.gii"
-DATA_SETS = {
-    "FeTA": (
-        {
-            "labels": [FETA],
-            "text": {TABLE: "participant_id\tGestational age\nsub-026\t23.3"},
-        },
-        {"sub-026": (23.3, FETA, "")},
-    ),
-    # several kinds of one scan are asked for, with ages at the scan of sessions
-    "dHCP": (
-        {
-            "labels": [f"{DHCP}_desc-drawem9_dseg.nii.gz"],
-            "surfaces": both(f"{DHCP}_hemi-@_pial.surf.gii"),
-            "tables": {
-                TABLE: ["participant_id sex birth_age", "CC00856XX15 F 39.1"],
-                DHCP_SESSIONS: ["session_id scan_age", "3530 29.71"],
-            },
-        },
-        {
-            "sub-CC00856XX15_ses-3530": (
-                29.71,
-                ", ".join(both(f"{DHCP}_hemi-@_pial.surf.gii")),
-                KEEP_ONE,
-            ),
-            "sub-CC00856XX15_ses-3530-2": (
-                29.71,
-                f"{DHCP}_desc-drawem9_dseg.nii.gz",
-                KEEP_ONE,
-            ),
-        },
-    ),
-    "fetpype": (
-        {
-            "labels": [FETPYPE],
-            "tables": {TABLE: ["participant_id session_id ga", "sub-01 ses-01 24+3"]},
-        },
-        {"sub-01_ses-01": (24.43, FETPYPE, "")},
-    ),
-    # a template's space and meshes beside the subject's own
-    "NiBabies": (
-        {
-            "labels": [f"{NIBABIES}_space-MNIInfant_cohort-1_dseg.nii.gz"],
-            "surfaces": both(
-                f"{NIBABIES}_hemi-@_pial.surf.gii",
-                f"{NIBABIES}_hemi-@_white.surf.gii",
-                f"{NIBABIES}_hemi-@_space-fsLR_den-32k_pial.surf.gii",
-            ),
-            "text": {f"{NIBABIES}_label-GM_probseg.nii.gz": "no labels"},
-            "tables": {TABLE: ["participant_id pma", "sub-01 41.2"]},
-        },
-        {
-            "sub-01_ses-1": (
-                41.2,
-                ", ".join(both(f"{NIBABIES}_hemi-@_pial.surf.gii")),
-                "",
-            )
-        },
-    ),
-    # with its template
-    "FreeSurfer": (
-        {
-            "surfaces": both(
-                "subjects/sub-01/surf/@.pial",
-                "subjects/sub-01/surf/@.pial.T1",
-                "subjects/sub-01/surf/@.white",
-                "subjects/sub-01/surf/@.sphere",
-                "subjects/sub-02/surf/@.pial.T1",
-                "subjects/fsaverage/surf/@.pial",
-            ),
-            "labels": [f"subjects/sub-01/mri/{name}aseg.mgz" for name in ("", "aparc")],
-            "tables": {
-                f"subjects/{TABLE}": ["participant_id week", "sub-01 36", "sub-02 37"]
-            },
-        },
-        {
-            "sub-01": (36.0, ", ".join(both("subjects/sub-01/surf/@.pial")), ""),
-            "sub-02": (37.0, ", ".join(both("subjects/sub-02/surf/@.pial.T1")), ""),
-        },
-    ),
-    # without sub-
-    "Infant FreeSurfer": (
-        {
-            "surfaces": both("case7/surf/@.pial", "case8/surf/@.pial"),
-            "labels": ["case7/mri/aseg.mgz"],
-            "tables": {TABLE: ["participant_id week", "case7 36", "case8 37"]},
-        },
-        {
-            "case7": (36.0, ", ".join(both("case7/surf/@.pial")), ""),
-            "case8": (37.0, ", ".join(both("case8/surf/@.pial")), ""),
-        },
-    ),
-    "HCP": (
-        {
-            "surfaces": both(
-                HCP.format("pial"),
-                HCP.format("white"),
-                "100307/T1w/fsaverage_LR32k/100307.@.pial.32k_fs_LR.surf.gii",
-                "100307/MNINonLinear/Native/100307.@.pial.native.surf.gii",
-            ),
-            "tables": {TABLE: ["participant_id week", "100307 36"]},
-        },
-        {"100307": (36.0, ", ".join(both(HCP.format("pial"))), "")},
-    ),
-    # a clone with and without contents
-    "git-annex": (
-        {
-            "lost": ["sub-01_week24_dseg.nii.gz", *both("sub-02_week25/surf/@.pial")],
-            "labels": ["sub-03_week26_dseg.nii.gz"],
-        },
-        {
-            "sub-01": (
-                24.0,
-                "sub-01_week24_dseg.nii.gz",
-                Facts("sub-01_week24_dseg.nii.gz"),
-            ),
-            "sub-02": (25.0, Facts("lh.pial"), Facts("lh.pial")),
-            "sub-03": (26.0, "sub-03_week26_dseg.nii.gz", ""),
-        },
-    ),
-}
+DATA_SETS = yaml.safe_load(
+    """
+FeTA:
+  files: [sub-026/anat/sub-026_rec-mial_dseg.nii.gz]
+  tables: {participants.tsv: participant_id Gestational-age | sub-026 23.3}
+  found: {sub-026: 23.3 sub-026/anat/sub-026_rec-mial_dseg.nii.gz}
+# several kinds of one scan are asked for, with ages at the scan of sessions
+dHCP:
+  files:
+  - derivatives/dhcp/sub-C6/ses-30/anat/sub-C6_ses-30_desc-drawem9_dseg.nii.gz
+  - derivatives/dhcp/sub-C6/ses-30/anat/sub-C6_ses-30_hemi-{L,R}_pial.surf.gii
+  tables:
+    participants.tsv: participant_id sex birth_age | C6 F 39.1
+    sub-C6/sub-C6_sessions.tsv: session_id scan_age | 30 29.71
+  found:
+    sub-C6_ses-30:
+      29.71 derivatives/dhcp/sub-C6/ses-30/anat/sub-C6_ses-30_hemi-{L,R}_pial.surf.gii
+    sub-C6_ses-30-2:
+      29.71 derivatives/dhcp/sub-C6/ses-30/anat/sub-C6_ses-30_desc-drawem9_dseg.nii.gz
+  note: keep one
+fetpype:
+  files: [derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_dseg.nii.gz]
+  tables: {participants.tsv: participant_id session_id ga | sub-01 ses-01 24+3}
+  found:
+    sub-01_ses-01:
+      24.43 derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_dseg.nii.gz
+# a template's space and meshes beside the subject's own
+NiBabies:
+  files:
+  - sub-01/anat/sub-01_space-MNIInfant_cohort-1_dseg.nii.gz
+  - sub-01/anat/sub-01_hemi-{L,R}_pial.surf.gii
+  - sub-01/anat/sub-01_hemi-{L,R}_white.surf.gii
+  - sub-01/anat/sub-01_hemi-{L,R}_space-fsLR_den-32k_pial.surf.gii
+  - sub-01/anat/sub-01_label-GM_probseg.nii.gz
+  tables: {participants.tsv: participant_id pma | sub-01 41.2}
+  found:
+    sub-01:
+      41.2 sub-01/anat/sub-01_hemi-{L,R}_pial.surf.gii
+      sub-01/anat/sub-01_hemi-{L,R}_white.surf.gii
+# with its template
+FreeSurfer:
+  files:
+  - subjects/sub-01/surf/{lh,rh}.pial
+  - subjects/sub-01/surf/{lh,rh}.pial.T1
+  - subjects/sub-01/surf/{lh,rh}.white
+  - subjects/sub-01/surf/{lh,rh}.sphere
+  - subjects/sub-02/surf/{lh,rh}.pial.T1
+  - subjects/fsaverage/surf/{lh,rh}.pial
+  - subjects/sub-01/mri/aseg.mgz
+  - subjects/sub-01/mri/aparc+aseg.mgz
+  tables: {subjects/participants.tsv: participant_id week | sub-01 36 | sub-02 37}
+  found:
+    sub-01: 36 subjects/sub-01/surf/{lh,rh}.pial subjects/sub-01/surf/{lh,rh}.white
+    sub-02: 37 subjects/sub-02/surf/{lh,rh}.pial.T1
+# without sub-
+Infant FreeSurfer:
+  files: ["case7/surf/{lh,rh}.pial", "case8/surf/{lh,rh}.pial", case7/mri/aseg.mgz]
+  tables: {participants.tsv: participant_id week | case7 36 | case8 37}
+  found: {case7: "36 case7/surf/{lh,rh}.pial", case8: "37 case8/surf/{lh,rh}.pial"}
+HCP:
+  files:
+  - 1003/T1w/Native/1003.{L,R}.pial.native.surf.gii
+  - 1003/T1w/Native/1003.{L,R}.white.native.surf.gii
+  - 1003/T1w/fsaverage_LR32k/1003.{L,R}.pial.32k_fs_LR.surf.gii
+  - 1003/MNINonLinear/Native/1003.{L,R}.pial.native.surf.gii
+  tables: {participants.tsv: participant_id week | 1003 36}
+  found:
+    "1003":
+      36 1003/T1w/Native/1003.{L,R}.pial.native.surf.gii
+      1003/T1w/Native/1003.{L,R}.white.native.surf.gii
+dHCP's atlas:
+  files:
+  - week22.{left,right}.pial.surf.gii
+  - week22.{left,right}.wm.surf.gii
+  - week22.{left,right}.sphere.surf.gii
+  found:
+    week22: 22 week22.{left,right}.pial.surf.gii week22.{left,right}.wm.surf.gii
+"""
+)
 
 
-@pytest.mark.parametrize(("contents", "expected"), DATA_SETS.values(), ids=DATA_SETS)
-def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
+@pytest.mark.parametrize("case", DATA_SETS.values(), ids=DATA_SETS)
+def test_a_data_set_is_read_as_it_is(tmp_path, case):
+    contents = {"labels": [], "surfaces": [], "tables": {}}
+    for pattern in case["files"]:
+        is_volume = pattern.endswith((".nii.gz", ".mgz"))
+        contents["labels" if is_volume else "surfaces"] += both(pattern)
+    for path, rows in case.get("tables", {}).items():
+        contents["tables"][path] = rows.split(" | ")
+    expected = {}
+    for name, text in case["found"].items():
+        week, *patterns = text.split()
+        files = [file for pattern in patterns for file in both(pattern)]
+        note = Facts(case["note"]) if "note" in case else ""
+        expected[name] = float(week), files, note
     assert brains(make_tree(tmp_path, **contents)) == expected
 
 
+def test_a_clone_of_git_annex_has_scans_with_and_without_contents(tmp_path):
+    lost = ["sub-01_week24_dseg.nii.gz", *both("sub-02_week25/surf/{lh,rh}.pial")]
+    make_tree(tmp_path, lost=lost, labels=["sub-03_week26_dseg.nii.gz"])
+    assert brains(tmp_path) == {
+        "sub-01": (24.0, lost[:1], Facts(lost[0])),
+        "sub-02": (25.0, lost[1:], Facts("lh.pial")),
+        "sub-03": (26.0, ["sub-03_week26_dseg.nii.gz"], ""),
+    }
+
+
+KEEP_ONE = Facts("2 files", "keep one")
 WEEK = "sub-01_week24"
 
 
@@ -177,17 +151,26 @@ WEEK = "sub-01_week24"
         ("labels", [f"sub-02/{WEEK}_dseg.nii.gz"], ["sub-01", "sub-02"]),
         ("labels", ["week24/sub-mü_dseg.nii.gz"], ["sub-mü"]),
         ("torn", [f"{WEEK}_dseg.nii.gz"], [f"{WEEK}_dseg.nii.gz"]),
-        ("surfaces", both(f"{WEEK}/@.white"), ["white", "pial"]),
+        ("surfaces", both(f"{WEEK}/{{lh,rh}}.white"), ["white", "pial"]),
         ("surfaces", [f"{WEEK}/lh.pial"], []),
         ("surfaces", [f"{WEEK}/lh.pial", f"{WEEK}/rh.sphere"], ["right", "rh.sphere"]),
         ("surfaces", [f"{WEEK}/lh.pial", f"{WEEK}/label/rh.a.annot"], ["rh.a.annot"]),
-        ("surfaces", [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white"], ["lh.white"]),
-        ("surfaces", both(f"{WEEK}_hemi-@_space-fsLR_den-32k_pial.surf.gii"), []),
+        (
+            "surfaces",
+            [*both(f"{WEEK}/{{lh,rh}}.pial"), f"{WEEK}/lh.white"],
+            ["lh.white"],
+        ),
+        (
+            "surfaces",
+            [f"{WEEK}/left/lh.pial", f"{WEEK}/right/lh.pial"],
+            ["left/lh.pial", "right/lh.pial"],
+        ),
+        ("surfaces", both(f"{WEEK}_hemi-{{L,R}}_space-fsLR_den-32k_pial.surf.gii"), []),
         # the second is a link to nowhere
         ("lost", [f"{WEEK}/lh.pial", f"{WEEK}/rh.pial"], ["rh.pial"]),
         (
             "lost",
-            [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white", f"{WEEK}/rh.white"],
+            [*both(f"{WEEK}/{{lh,rh}}.pial"), f"{WEEK}/lh.white", f"{WEEK}/rh.white"],
             ["rh.white"],
         ),
     ],
@@ -206,8 +189,8 @@ def test_files_that_cannot_be_used_are_named(tmp_path, kind, files, facts):
     ("files", "surfaces", "cause"),
     [
         # of one data set
-        (["anat/sub-01_dseg.nii.gz"], "surf/sub-01_hemi-@_pial.surf.gii", KEEP_ONE),
-        (["a/sub-01_dseg.nii.gz"], "b/sub-01_hemi-@_pial.surf.gii", KEEP_ONE),
+        (["anat/sub-01_dseg.nii.gz"], "surf/sub-01_hemi-{L,R}_pial.surf.gii", KEEP_ONE),
+        (["a/sub-01_dseg.nii.gz"], "b/sub-01_hemi-{L,R}_pial.surf.gii", KEEP_ONE),
         (["anat/sub-01_dseg.nii.gz", "seg/sub-01_desc-x_dseg.nii.gz"], "", KEEP_ONE),
         # of two
         (
@@ -222,20 +205,14 @@ def test_folders_of_kinds_of_data_are_not_data_sets(tmp_path, files, surfaces, c
     assert [found for _, _, found in brains(tmp_path).values()] == [cause] * 2
 
 
-def test_a_resampled_surface_is_used_with_a_warning(tmp_path):
-    make_tree(tmp_path, surfaces=both("sub-01_hemi-@_space-fsLR_den-32k_pial.surf.gii"))
-    (brain,) = recognise(tmp_path).brains
-    assert (len(brain.warnings), brain.problem) == (1, "")
-
-
 def test_closed_surfaces_of_whole_brains_are_recognised(tmp_path):
     brain = cerebrum_surface(*phantom(24.0, 2.0))
     for name in ("24.stl", "week25.ply", "skull.stl"):
         write_surface(tmp_path / name, brain)
     write_surface(tmp_path / "nut.stl", type(brain)(0.1 * brain.vertices, brain.faces))
     assert brains(tmp_path) == {
-        "week25": (25.0, "week25.ply", ""),
-        "24": ("CHOOSE", "24.stl", Facts("week")),
+        "week25": (25.0, ["week25.ply"], ""),
+        "24": ("CHOOSE", ["24.stl"], Facts("week")),
     }
     assert recognise(tmp_path).unused == {"nut.stl": Facts("mL", 15, 700)}
 
@@ -270,7 +247,7 @@ def test_a_torn_file_beside_a_good_one_and_other_meshes_are_not_chosen_between(
 def test_links_to_folders_that_are_not_there_are_scans_that_cannot_be_read(tmp_path):
     make_tree(tmp_path, labels=["sub-01_week24_dseg.nii.gz"])
     (tmp_path / "sub-02").symlink_to("nowhere")
-    assert brains(tmp_path)["sub-02"] == ("CHOOSE", "sub-02", Facts("link"))
+    assert brains(tmp_path)["sub-02"] == ("CHOOSE", ["sub-02"], Facts("link"))
 
 
 def test_only_results_of_gyriflow_are_passed_over(tmp_path):
@@ -283,14 +260,6 @@ def test_only_results_of_gyriflow_are_passed_over(tmp_path):
     assert list(brains(tmp_path)) == ["week24"]
     with pytest.raises(InputError, check=Facts(tmp_path / "own")):
         recognise(tmp_path / "own")
-
-
-def test_labels_of_other_participants_are_not_read(tmp_path):
-    torn = {"sub-02_week25_dseg.nii.gz": "torn"}
-    make_tree(tmp_path, labels=["sub-01_week24_dseg.nii.gz"], text=torn)
-    assert list(brains(tmp_path, participants=["01"])) == ["sub-01"]
-    ((_, _, cause),) = brains(tmp_path, participants=["02"]).values()
-    assert cause == Facts("sub-02_week25_dseg.nii.gz")
 
 
 def test_scans_and_tables_in_formats_that_are_not_read_are_named(tmp_path):

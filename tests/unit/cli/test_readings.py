@@ -16,9 +16,6 @@ from gyriflow.io import kept_results
 from gyriflow.io.kept_results import keep_result, kept_result, remove_old_results
 from gyriflow.shipped import SHIPPED
 
-LABELS = SHIPPED.joinpath(
-    "atlases", "spina-bifida", "fetal_SB_atlas_GA21_notoperated", "parcellation.nii.gz"
-)
 calls = []
 
 
@@ -38,11 +35,11 @@ def scans(tmp_path, monkeypatch):
     """Two scans, the second with an empty file after another."""
     calls.clear()
     monkeypatch.setattr(module, "code_hash", lambda *_: "code of this version")
-    texts = {"a": "one two", "b": "three", "c": ""}
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text)
+    files = [tmp_path / name for name in "abc"]
+    for file, text in zip(files, ("one two", "three", ""), strict=True):
+        file.write_text(text)
     return [
-        ScanFiles([str(tmp_path / name) for name in names]) for names in ("a", "bc")
+        ScanFiles([str(file) for file in group]) for group in (files[:1], files[1:])
     ]
 
 
@@ -57,31 +54,28 @@ def test_what_was_found_is_kept_with_warnings_and_errors(scans, own_cache):
     assert (own_cache / "readings").stat().st_mode & 0o077 == 0
 
 
-def test_files_are_read_again_whose_content_name_or_settings_are_others(
-    scans, tmp_path
+def test_files_are_read_again_whose_content_name_settings_or_code_are_others(
+    scans, tmp_path, monkeypatch
 ):
-    readings(words_in, scans)
+    def values(name="a", *settings):
+        return readings(words_in, [ScanFiles([str(tmp_path / name)], settings)])[
+            0
+        ].values
+
+    assert values() == ["one", "two"]
     (tmp_path / "a").write_text("one four")
-    assert readings(words_in, scans)[0].values == ["one", "four"]
-    assert len(calls) == 3
-    (limited,) = readings(words_in, [ScanFiles(scans[0].files, (1,))])
-    assert limited.values == ["one"]
+    assert values() == ["one", "four"]
+    assert values("a", 1) == ["one"]
     (tmp_path / "a").rename(tmp_path / "d")
-    readings(words_in, [ScanFiles([str(tmp_path / "d")])])
+    assert values("d") == ["one", "four"]
+    monkeypatch.setattr(module, "code_hash", lambda *_: "code of another version")
+    values("d")
     assert len(calls) == 5
     # what is not there yet is not kept
-    missing = [ScanFiles([str(tmp_path / "e")])]
     for _ in range(2):
         with pytest.raises(FileNotFoundError):
-            readings(words_in, missing)
+            values("e")
     assert len(calls) == 7
-
-
-def test_other_code_reads_again(scans, monkeypatch):
-    readings(words_in, scans)
-    monkeypatch.setattr(module, "code_hash", lambda *_: "code of another version")
-    readings(words_in, scans)
-    assert len(calls) == 4
 
 
 @pytest.mark.parametrize(
@@ -97,7 +91,7 @@ def test_a_damaged_result_is_made_again(scans, own_cache, content):
 
 
 def test_nothing_is_kept_where_the_folder_cannot_be_written(scans, own_cache):
-    own_cache.parent.joinpath("gyriflow").write_text("a file")
+    own_cache.write_text("a file")
     assert readings(words_in, scans) == readings(words_in, scans)
     assert len(calls) == 4
 
@@ -117,13 +111,15 @@ def test_the_results_used_last_are_kept(own_cache, monkeypatch):
 def test_many_scans_are_read_by_several_processes_as_by_one(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "available_cores", lambda: 2)
     monkeypatch.setattr(module, "MIN_IN_POOL", 3)
-    (tmp_path / "b.nii.gz").write_bytes(b"torn")
-    scans = [ScanFiles([str(path)]) for path in (LABELS, tmp_path / "b.nii.gz")]
-    whole, torn = readings(fits_of_file, scans)
+    folder = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated"
+    scans = []
+    for name in "abcd":
+        path = tmp_path / f"{name}.nii.gz"
+        path.symlink_to(folder / "parcellation.nii.gz")
+        scans.append(ScanFiles([str(path)]))
+    (tmp_path / "torn.nii.gz").write_bytes(b"torn")
+    torn = ScanFiles([str(tmp_path / "torn.nii.gz")])
+    whole, refused = readings(fits_of_file, [scans[0], torn])
     assert whole.values[0]["spina-bifida-atlas"] == ""
-    assert torn.error.startswith(str(tmp_path))
-    others = []
-    for name in "cde":
-        (tmp_path / f"{name}.nii.gz").symlink_to(LABELS)
-        others.append(ScanFiles([str(tmp_path / f"{name}.nii.gz")]))
-    assert readings(fits_of_file, others) == [whole] * 3
+    assert refused.error.startswith(str(tmp_path))
+    assert readings(fits_of_file, scans[1:]) == [whole] * 3

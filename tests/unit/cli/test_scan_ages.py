@@ -256,6 +256,9 @@ def test_an_age_is_that_of_exactly_this_file(tmp_path, files, tables, expected):
         ("week24_0.5mm", 24.0),
         ("week24_1_5T", 24.0),
         ("GA24/week26", Facts("24", "26")),
+        ("sub-21", Facts("week24.3")),
+        ("image24", Facts("week24.3")),
+        ("AGA23", Facts("week24.3")),
     ],
 )
 def test_names_give_ages_or_are_refused_as_ambiguous(tmp_path, name, age):
