@@ -94,7 +94,7 @@ def check_study(
     from .inputs import check_other_files, input_facts
 
     with _read_study(path, directory) as study, collected_warnings() as logged:
-        problems = list(input_problems(study.config))
+        problems = list(_input_problems(study.config))
         further = list(check_other_files(study))
         facts = list(input_facts(study))
         n_downloads = len(study.downloads)
@@ -118,9 +118,9 @@ def check_study(
     yield from grouped(refusals)
     for line in facts:
         yield f"  {line}", 0
-    for line in (*coarse_cortices(study), *deep_curved_folds(study)):
+    for line in (*_coarse_cortices(study), *_deep_curved_folds(study)):
         yield f"  warning: {line}", 0
-    for line in export_problems(study):
+    for line in _export_problems(study):
         yield f"  warning: no export: {line}", 0
     if n_downloads:
         files = "files are" if n_downloads > 1 else "file is"
@@ -254,7 +254,7 @@ def _contents(study: Study) -> str:
     return ", ".join(parts)
 
 
-def coarse_cortices(study: Study) -> Iterator[str]:
+def _coarse_cortices(study: Study) -> Iterator[str]:
     """Yield a warning, with its runs, for each number of elements through the cortex
     that is too small or inexact."""
     mesh = study.config.mesh
@@ -285,7 +285,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         yield f"{', '.join(names)}: {text}"
 
 
-def deep_curved_folds(study: Study) -> Iterator[str]:
+def _deep_curved_folds(study: Study) -> Iterator[str]:
     """Yield a warning for each simulation in which quadratic elements grow towards
     shapes with deep folds, on the way to which they fold over."""
     if study.config.mesh.order == 1:
@@ -299,7 +299,7 @@ def deep_curved_folds(study: Study) -> Iterator[str]:
             )
 
 
-def export_problems(study: Study) -> Iterator[str]:
+def _export_problems(study: Study) -> Iterator[str]:
     """Yield why a study cannot be exported under the labels that BIDS would give its
     subjects and runs."""
     subjects = [brain.subject_name for brain in study.brains.values()]
@@ -309,7 +309,7 @@ def export_problems(study: Study) -> Iterator[str]:
         yield str(error)
 
 
-def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
+def _input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
     """Yield each problem or warning about a brain's input files: the brain's id, the
     text, and if it is a problem.
 
@@ -387,14 +387,7 @@ def _needs(
     directory: Path,
     cores: int,
 ) -> Iterator[tuple[str, bool]]:
-    seconds = [
-        job_seconds(
-            study,
-            job.rule,
-            job.wildcards,
-        )
-        for job in jobs
-    ]
+    seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
     made_by: dict[str, int] = {}
     for number, job in enumerate(jobs):
         made_by |= dict.fromkeys(job.outputs, number)
@@ -412,13 +405,8 @@ def _needs(
     foldings = [job for job in jobs if job.rule in FOLDINGS]
     needs = []
     for job in foldings:
-        key = (job.wildcards["run"], job.wildcards["brain"])
-        needs.append(
-            simulation_needs(
-                study.simulations[key],
-                study.config.mesh,
-            )
-        )
+        simulation = study.simulations[job.wildcards["run"], job.wildcards["brain"]]
+        needs.append(simulation_needs(simulation, study.config.mesh))
     for line in _path_lines(jobs, seconds, study, directory):
         yield line, False
     work_s = sum(seconds)
@@ -445,11 +433,7 @@ def _needs(
     folder = directory.absolute()
     while not folder.is_dir():
         folder = folder.parent
-    yield _fits(
-        "disk",
-        disk_mib,
-        shutil.disk_usage(folder).free / 2**20,
-    )
+    yield _fits("disk", disk_mib, shutil.disk_usage(folder).free / 2**20)
 
 
 def _path_lines(

@@ -20,7 +20,7 @@ from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED, shipped_atlases
 
 if TYPE_CHECKING:
-    from .recognition import FoundScans
+    from .recognition import FoundBrain, FoundScans
 
 LEVELS = ("participant", "group")
 BIDS_LEVELS = [[level] for level in LEVELS]
@@ -196,16 +196,16 @@ def _command_name() -> str:
     return f"{os.path.relpath(run)} gyriflow"
 
 
-def version(
+def _print_version(
     context: click.Context,
     parameter: click.Parameter,
     value: bool,
 ) -> None:
     """Print the version and end."""
     if value and not context.resilient_parsing:
-        from ..version import version as own
+        from ..version import version
 
-        click.echo(f"gyriflow {own()}")
+        click.echo(f"gyriflow {version()}")
         context.exit()
 
 
@@ -219,7 +219,7 @@ def version(
     is_flag=True,
     expose_value=False,
     is_eager=True,
-    callback=version,
+    callback=_print_version,
     help="Show the version.",
 )
 def main() -> None:
@@ -293,7 +293,7 @@ def _recognise(
     files: str | None,
     **selection: Any,
 ) -> "FoundScans":
-    from .recognition import recognise, scheme_reasons
+    from .recognition import recognise
 
     notation: Any = {
         None: None,
@@ -301,23 +301,46 @@ def _recognise(
         False: "days",
     }[decimal_weeks]
     found = recognise(folder, files or "*", notation=notation, **selection)
-    for line in scheme_reasons(found.brains):
+    for line in _scheme_lines(found.brains):
         click.echo(line)
     return found
 
 
+def _scheme_lines(brains: Sequence["FoundBrain"]) -> Iterator[str]:
+    """Yield the number of volumes of each chosen scheme, then contradictions to it, and
+    the schemes that do not fit."""
+    from .recognition import UNSET
+
+    by_scheme: dict[str, list[FoundBrain]] = {}
+    for brain in brains:
+        by_scheme.setdefault(brain.entry.get("scheme", UNSET), []).append(brain)
+    by_scheme.pop(UNSET, None)
+    for name, with_scheme in by_scheme.items():
+        number = len(with_scheme)
+        yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
+        causes: dict[str, str] = {}
+        for brain in with_scheme:
+            for scheme, cause in (brain.fits or {}).items():
+                if cause:
+                    causes[scheme] = cause
+        if name in causes:
+            yield f"  but {causes.pop(name)}"
+        if causes:
+            yield f"  label schemes that do not fit: {', '.join(causes)}"
+
+
 def _show_scans(
     found: "FoundScans",
-    verdicts: dict[str, tuple[str, str]] | None = None,
+    directory: Path | None = None,
     *,
     may_fill_in: bool = False,
 ) -> int:
-    """Print the table of scans and the unused files; return the exit code, 0 if values
-    `may_fill_in` only."""
+    """Print the table of scans, with the verdicts on those measured in a directory, and
+    the unused files; return the exit code, 0 if values `may_fill_in` only."""
     from .scans import found_rows, scan_lines
 
     _show_unused(found)
-    for line in scan_lines(found_rows(found, verdicts or {})):
+    for line in scan_lines(found_rows(found, directory)):
         click.echo(line)
     causes = (
         brain.problem or brain.contradiction or (brain.notes and not may_fill_in)
@@ -741,12 +764,10 @@ def bids(
     from ..io.made_files import require_own_data_set
     from .init import (
         BIDS_OPTIONS,
-        folding_sections,
         store_options,
         with_earlier_options,
         write_bids,
     )
-    from .scans import measured_verdicts
 
     require_own_data_set(out)
     work = work or out / "work"
@@ -760,7 +781,7 @@ def bids(
     )
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     with _place_to_write(work, dry_run, "--work-dir") as place:
-        brains, folded = write_bids(
+        brains, folded, unused = write_bids(
             found,
             data,
             place / CONFIG,
@@ -775,11 +796,8 @@ def bids(
             click.echo(f"{len(folded)} of them to fold: {', '.join(folded)}")
         elif selection["fold"]:
             click.echo(NOTHING_TO_FOLD, err=True)
-        elif selection["fold"] is None and selection["settings"]:
-            unused = folding_sections(Path(selection["settings"]))
-            if unused:
-                keys = ", ".join(unused)
-                click.echo(f"{NOT_FOLDED} {keys}", err=True)
+        elif selection["fold"] is None and unused:
+            click.echo(f"{NOT_FOLDED} {', '.join(unused)}", err=True)
         if not dry_run:
             click.echo(f"configuration: {config}")
         code = _run(
@@ -793,7 +811,7 @@ def bids(
         if not dry_run and (exported / "dataset_description.json").is_file():
             publish_derivatives(exported, out, data, brains, whole=level == "group")
             click.echo(f"derivatives: {out}")
-    refused = _show_scans(found, {} if dry_run else measured_verdicts(work))
+    refused = _show_scans(found, None if dry_run else work)
     sys.exit(code or refused)
 
 

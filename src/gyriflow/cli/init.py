@@ -289,10 +289,10 @@ def write_bids(
     *,
     settings: str | None = None,
     fold: bool | None = None,
-) -> tuple[list[str], list[str]]:
+) -> tuple[list[str], list[str], list[str]]:
     """Write a configuration for the scans of a BIDS data set that can be used; return
-    their ids, and those of the folded ones. The one at `shown_path` has to be of an
-    earlier call.
+    their ids, those of the folded ones, and the unused sections of the settings. The
+    one at `shown_path` has to be of an earlier call.
 
     `settings` is a configuration without brains. The scans are measured. With `fold`
     those that `start` of the settings names are also folded, or else the first of
@@ -330,6 +330,7 @@ def write_bids(
         "brains": [_absolute(brain.entry, folder) for brain in brains]
     }
     series = _series(brains)
+    unused = []
     if fold and (series or "start" in further):
         runs: dict[str, Any] = {"reference": {}}
         if series and all(_have_shapes(scans, folder) for scans in series):
@@ -341,7 +342,9 @@ def write_bids(
         text["folding"] = end | (further.get("folding") or {})
     else:
         for key, value in further.items():
-            if key not in FOLDING_SECTIONS:
+            if key in FOLDING_SECTIONS:
+                unused.append(key)
+            else:
                 text[key] = value
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
     is_own = shown_path.with_name(BIDS_OPTIONS).exists() or (
@@ -356,12 +359,7 @@ def write_bids(
         )
     write_text(path, BIDS_HEAD + yaml.safe_dump(text, sort_keys=False))
     names = [brain.entry["id"] for brain in brains]
-    return names, _folded(text, names)
-
-
-def folding_sections(settings: Path) -> list[str]:
-    """Return the sections of a configuration that only matter to fold."""
-    return [key for key in read_keys(settings) if key in FOLDING_SECTIONS]
+    return names, _folded(text, names), unused
 
 
 def _folded(config: Mapping[str, Any], names: Sequence[str]) -> list[str]:

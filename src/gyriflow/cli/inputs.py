@@ -41,12 +41,11 @@ from ..geometry.triangles import (
 )
 from ..io.downloads import require_checksums
 from ..io.surfaces import (
-    load_gifti,
     read_hemispheres,
     read_surface,
     read_surface_maps,
+    read_vertex_arrays,
     read_vertex_labels,
-    structure_of,
     surface_space_structure,
 )
 from ..io.volumes import read_header, read_label_volume, read_volume_map
@@ -66,7 +65,7 @@ HULL_SHARE = 0.8
 open."""
 
 
-def describe(path: str) -> str:
+def _describe(path: str) -> str:
     """Return what a file holds: size, unit, side and numbers of vertices or voxels;
     InputError as its reader's."""
     if is_volume(path):
@@ -79,16 +78,13 @@ def describe(path: str) -> str:
             text += f", given in {header.unit}"
         return f"{text}, {header.space} space"
     if path.lower().endswith((".shape.gii", ".func.gii", ".label.gii")):
-        image = load_gifti(path)
-        counts = []
+        arrays, structure = read_vertex_arrays(path)
+        counts = ", ".join(str(len(values)) for values in arrays)
         spans = []
-        for array in image.darrays:
-            values = np.asarray(array.data)
-            counts.append(str(len(values)))
+        for values in arrays:
             if values.size:
                 spans.append(f"{values.min():.4g} to {values.max():.4g}")
-        side = _side(structure_of(image, path))
-        return f"{', '.join(counts)} values, {', '.join(spans)}{side}"
+        return f"{counts} values, {', '.join(spans)}{_side(structure)}"
     mesh, space, structure = surface_space_structure(path)
     kind = "closed" if is_closed(mesh) else "open"
     size = _sizes(np.ptp(mesh.vertices, axis=0))
@@ -132,7 +128,7 @@ def input_facts(study: Study) -> Iterator[str]:
         if Path(path).is_file():
             with suppress(GyriflowError):
                 named = ", ".join(dict.fromkeys(names))
-                yield f"{named}: {Path(path).name}: {describe(path)}"
+                yield f"{named}: {Path(path).name}: {_describe(path)}"
 
 
 def doubts_about_files(

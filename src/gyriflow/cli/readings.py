@@ -2,6 +2,7 @@
 cache folder: reading a scan takes a second, at each call."""
 
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -16,9 +17,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from ..code_hash import code_hash
-from ..errors import GyriflowError
-from ..io.files import contents
-from ..io.kept_results import keep_result, kept_result, remove_old_results
+from ..errors import GyriflowError, InputError, StorageError
+from ..io.files import contents, read_json, write_json
 from ..io.origins import joined_contents, origin_key
 from ..running.machine import available_cores
 from ..settings.schemes import SCHEME_FILES
@@ -27,6 +27,8 @@ from ..version import version
 MIN_IN_POOL = 16
 """From so many scans on they are read by several processes, each of which takes two
 seconds to start."""
+MAX_KEPT = 20_000
+"""How many results are kept, the latest used."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,9 @@ def readings(
         results[number] = result
         key = keys[number]
         if key is not None:
-            keep_result(key, asdict(result))
+            _keep(key, result)
     if missing:
-        remove_old_results()
+        _remove_old_results()
     return [result for result in results if result is not None]
 
 
@@ -105,11 +107,44 @@ def _plain(value: Any) -> Any:
 
 
 def _kept(key: str | None) -> Reading | None:
-    kept = {} if key is None else kept_result(key)
+    """Return the result that was kept under a key; None if there is none, or if it is
+    damaged."""
+    if key is None:
+        return None
     # another program may have changed the file
-    with suppress(TypeError):
-        return Reading(**kept) if kept else None
+    with suppress(InputError, OSError, KeyError, TypeError, RuntimeError):
+        path = _kept_path(key)
+        result = Reading(**read_json(path)["result"])
+        # the latest used ones are kept
+        os.utime(path)
+        return result
     return None
+
+
+def _keep(key: str, result: Reading) -> None:
+    """Keep a result under a key, unless the folder cannot be written. Two processes may
+    keep the same."""
+    with suppress(StorageError, OSError, RuntimeError):
+        path = _kept_path(key)
+        # results may contain names of subjects
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_json(path, {"result": asdict(result)})
+
+
+def _remove_old_results() -> None:
+    """Remove the results that were not used for longest, down to `MAX_KEPT`."""
+    with suppress(OSError, RuntimeError):
+        paths = list(_kept_path("").parent.iterdir())
+        if len(paths) > MAX_KEPT:
+            paths.sort(key=lambda path: path.stat().st_mtime_ns)
+            for path in paths[:-MAX_KEPT]:
+                path.unlink(missing_ok=True)
+
+
+def _kept_path(key: str) -> Path:
+    base = os.environ.get("XDG_CACHE_HOME")
+    cache = Path(base or Path.home() / ".cache")
+    return cache / "gyriflow" / "readings" / f"{key}.json"
 
 
 def _on_all_cores(

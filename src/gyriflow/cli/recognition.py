@@ -142,10 +142,10 @@ class FoundBrain:
         source = self.entry.get("labels") or self.entry.get("pial")
         return str(source or ", ".join(self.entry["hemispheres"].values()))
 
-    @property
-    def is_whole_surface(self) -> bool:
-        """True if it is one surface of both hemispheres."""
-        return "pial" in self.entry and "side" not in self.entry
+
+def _is_whole_surface(brain: FoundBrain) -> bool:
+    """Return whether a scan is one surface of both hemispheres."""
+    return "pial" in brain.entry and "side" not in brain.entry
 
 
 @dataclass
@@ -371,7 +371,7 @@ def _brains_of_scan(
     for brain in preferred:
         if (
             brain.is_unreadable
-            and brain.is_whole_surface
+            and _is_whole_surface(brain)
             and not LAYER_NAME.search(brain.file.name)
         ):
             unused[brain.files] = brain.problem
@@ -682,7 +682,7 @@ def _read_files(brains: Sequence[FoundBrain], folder: Path) -> None:
     for brain in brains:
         if brain.problem:
             continue
-        if "labels" in brain.entry or brain.is_whole_surface:
+        if "labels" in brain.entry or _is_whole_surface(brain):
             whole.append(brain)
             continue
         names = [*brain.files.split(", "), *brain.entry.get("white", ())]
@@ -1053,24 +1053,3 @@ def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> 
                 f"scheme: scans of {brain.entry['subject']} fit"
                 f" {' and '.join(sorted(schemes))}"
             )
-
-
-def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
-    """Yield the number of volumes of each chosen scheme, then contradictions to it, and
-    the schemes that do not fit."""
-    by_scheme: dict[str, list[FoundBrain]] = defaultdict(list)
-    for brain in brains:
-        by_scheme[brain.entry.get("scheme", UNSET)].append(brain)
-    by_scheme.pop(UNSET, None)
-    for name, with_scheme in by_scheme.items():
-        number = len(with_scheme)
-        yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
-        causes: dict[str, str] = {}
-        for brain in with_scheme:
-            for scheme, cause in (brain.fits or {}).items():
-                if cause:
-                    causes[scheme] = cause
-        if name in causes:
-            yield f"  but {causes.pop(name)}"
-        if causes:
-            yield f"  label schemes that do not fit: {', '.join(causes)}"

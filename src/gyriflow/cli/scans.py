@@ -1,7 +1,7 @@
 """The table of scans with which `init`, `check` and the BIDS app end."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -69,9 +69,11 @@ def scan_lines(scans: Iterable[ScanRow]) -> Iterator[str]:
         yield total
 
 
-def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
+def _measured_verdicts(directory: Path | None) -> dict[str, tuple[str, str]]:
     """Return verdict and cause of each brain of a study from its quality table, by id;
     empty if there is none."""
+    if directory is None:
+        return {}
     path = directory / "results" / "study" / "quality.csv"
     if not path.is_file():
         return {}
@@ -82,11 +84,10 @@ def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
     return verdicts
 
 
-def found_rows(
-    found: FoundScans, verdicts: Mapping[str, tuple[str, str]]
-) -> Iterator[ScanRow]:
-    """Yield the rows of recognised scans; `verdicts` has verdict and cause of those
-    that were run, by id."""
+def found_rows(found: FoundScans, directory: Path | None = None) -> Iterator[ScanRow]:
+    """Yield the rows of recognised scans, with the verdicts on those that were measured
+    in a working directory."""
+    verdicts = _measured_verdicts(directory)
     for brain in found.brains:
         scan = brain.entry["id"]
         week = brain.entry["week"]

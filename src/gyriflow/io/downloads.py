@@ -4,7 +4,9 @@ import gzip
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError, StorageError
 from .files import AnyPath, sha256_of
@@ -50,20 +52,6 @@ def fetch(
 
     path = Path(path)
     pooch.get_logger().setLevel("WARNING")
-    # without compression on the way, which would be undone in files that are compressed
-    # themselves
-    by_http = pooch.HTTPDownloader(
-        timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"}
-    )
-
-    def download(
-        url: str,
-        output_file: str,
-        caller: pooch.Pooch,
-    ) -> None:
-        by_http(url, output_file, caller)
-        _check(Path(output_file), path.name, sha256)
-
     with _refused(path, url):
         if path.exists():
             _check(path, path.name, sha256)
@@ -79,11 +67,29 @@ def fetch(
             "",
             retry_if_failed=TRIES - 1,
             **files,
-        ).fetch(path.name, downloader=download)
+        ).fetch(path.name, downloader=partial(_download, path.name, sha256))
     report(
         f"{path}: SHA-256 {sha256_of(path)}"
         + ("" if sha256 else " as downloaded; no checksum is known")
     )
+
+
+def _download(
+    name: str,
+    sha256: str | None,
+    url: str,
+    output_file: str,
+    caller: Any,
+) -> None:
+    import pooch
+
+    # without compression on the way, which would be undone in files that are compressed
+    # themselves
+    by_http = pooch.HTTPDownloader(
+        timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"}
+    )
+    by_http(url, output_file, caller)
+    _check(Path(output_file), name, sha256)
 
 
 def _check(

@@ -476,14 +476,12 @@ def fingerprints(
 def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
     """Return the files of a folder and those in it, in order, without hidden ones and
     folders of some names."""
-
-    def is_included(path: Path) -> bool:
-        return not any(
-            part.startswith(".") or part in left_out
-            for part in path.relative_to(folder).parts
-        )
-
-    return [path for path in files_below(folder) if is_included(path)]
+    files = []
+    for path in files_below(folder):
+        parts = path.relative_to(folder).parts
+        if not any(part.startswith(".") or part in left_out for part in parts):
+            files.append(path)
+    return files
 
 
 def files_below(folder: AnyPath) -> list[Path]:
@@ -491,12 +489,9 @@ def files_below(folder: AnyPath) -> list[Path]:
     folders stand for theirs."""
     entered: set[str] = set()
     found: list[Path] = []
-
-    def add_unreadable(error: OSError) -> None:
-        found.extend([Path(error.filename)] * isinstance(error, PermissionError))
-
+    errors: list[OSError] = []
     for place, folders, names in os.walk(
-        folder, onerror=add_unreadable, followlinks=True
+        folder, onerror=errors.append, followlinks=True
     ):
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
@@ -512,4 +507,7 @@ def files_below(folder: AnyPath) -> list[Path]:
         files = [here / name for name in names if real not in entered]
         found += [file for file in files if file.is_file() or not file.exists()]
         entered.add(real)
+    for error in errors:
+        if isinstance(error, PermissionError):
+            found.append(Path(error.filename))
     return sorted(found)

@@ -25,8 +25,7 @@ POSITIONS = "positions"
 CELL_FIELDS = "cell_fields"
 
 
-def group_name(week: float) -> str:
-    """Return the name of the group of a week."""
+def _group_name(week: float) -> str:
     return f"week_{week_tag(week)}"
 
 
@@ -44,7 +43,7 @@ def write_frame(
     9). `attributes` are numbers that hold for the whole frame.
     """
     with new_hdf5(path) as file:
-        frame = file.create_group(group_name(week))
+        frame = file.create_group(_group_name(week))
         frame.attrs.update(attributes or {})
         for name, values in vertex_fields.items():
             frame[name] = values if name == POSITIONS else _single(values)
@@ -139,13 +138,13 @@ def read_field(
     """Return a field at a week: at the vertices (n, …) or, such as strain, of the
     elements (c, …); InputError, which names what there is, where there is none."""
     with _reading(path) as file:
-        if group_name(week) not in file:
+        if _group_name(week) not in file:
             raise InputError(
                 f"has no week {week}",
                 path=path,
                 found=f"weeks {_weeks(file)}",
             )
-        fields = {**file[group_name(week)]}
+        fields = {**file[_group_name(week)]}
         fields |= fields.pop(CELL_FIELDS, {})
         if field not in fields:
             raise InputError(
@@ -168,7 +167,7 @@ def read_pial_frames(
         for week in _weeks(file):
             values = {
                 name: data[:]
-                for name, data in file[group_name(week)].items()
+                for name, data in file[_group_name(week)].items()
                 if name != CELL_FIELDS
             }
             if not frames:

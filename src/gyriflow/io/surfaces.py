@@ -143,24 +143,20 @@ def _require_side(
 ) -> None:
     """Raise InputError if a file's structure is the other hemisphere than `side`,
     "left" or "right"."""
-    expected = next(
-        (name for key, name in STRUCTURES.items() if key == side),
-        None,
+    named = SIDES_BY_STRUCTURE.get(structure or "")
+    if side not in STRUCTURES or named in (None, side):
+        return
+    remedy = (
+        f"Give it as the {named} one. If you know that it is the {side} one, correct"
+        " the file's own side (AnatomicalStructurePrimary, or its name)."
     )
-    if expected and structure in STRUCTURES.values() and structure != expected:
-        other = next(key for key, name in STRUCTURES.items() if name == structure)
-        remedy = (
-            f"Give it as the {other} one. If you know that it is the {side} one,"
-            " correct the file's own side "
-        )
-        remedy += "(AnatomicalStructurePrimary, or its name)."
-        raise InputError(
-            "is the other hemisphere",
-            path=path,
-            found=structure,
-            expected=expected,
-            remedy=remedy,
-        )
+    raise InputError(
+        "is the other hemisphere",
+        path=path,
+        found=structure,
+        expected=STRUCTURES[side],
+        remedy=remedy,
+    )
 
 
 def read_hemispheres(
@@ -289,24 +285,20 @@ def _named(structure: Structure | None, layer: Layer | None = None) -> dict[str,
 
 def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
     """Return the named per-vertex values of a GIFTI shape file."""
-    arrays = enumerate(load_gifti(path).darrays)
+    arrays = enumerate(_load_gifti(path).darrays)
     return {
         array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float)
         for n, array in arrays
     }
 
 
-def read_surface_map(
+def _surface_map(
     path: AnyPath,
     surface_path: AnyPath,
-    side: str | None = None,
+    side: str | None,
 ) -> tuple[TriangleMesh, Floats]:
-    """Return a surface and the values of a GIFTI shape or func file at its vertices.
-
-    InputError for invalid files, more than one array, another number of values than of
-    vertices, NaN and infinite values, STL surfaces, which do not number vertices, and
-    other hemispheres than the surface's or `side`.
-    """
+    """Return a surface and the values of a map at its vertices, of a `side` if it is
+    known."""
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
         problem = "cannot have a map, since STL files do not number their vertices"
@@ -316,7 +308,7 @@ def read_surface_map(
         )
         raise InputError(problem, path=surface_path, expected=expected)
     surface, _, structure = surface_space_structure(surface_path)
-    image = load_gifti(path)
+    image = _load_gifti(path)
     arrays = image.darrays
     if (
         len(arrays) != 1
@@ -336,9 +328,8 @@ def read_surface_map(
             expected=expected,
         )
     _require_side(surface_path, structure, side)
-    _require_side(
-        path, structure_of(image, path), side or SIDES_BY_STRUCTURE.get(structure or "")
-    )
+    surface_side = side or SIDES_BY_STRUCTURE.get(structure or "")
+    _require_side(path, _structure_of(image, path), surface_side)
     values = np.asarray(
         arrays[0].data,
         dtype=float,
@@ -358,19 +349,30 @@ def read_surface_map(
 def read_surface_maps(
     paths: Sequence[AnyPath], surface_paths: Sequence[AnyPath]
 ) -> tuple[TriangleMesh, Floats]:
-    """Return surfaces, two are left and right, as one and their maps, each read as by
-    `read_surface_map`."""
+    """Return surfaces, two are left and right, as one and the values of GIFTI shape or
+    func files at their vertices.
+
+    InputError for invalid files, more than one array in a file, another number of
+    values than of vertices, NaN and infinite values, STL surfaces, which do not number
+    vertices, and other hemispheres than the surface's.
+    """
     sides = SIDES if len(paths) == 2 else (None,)
     pieces = [
-        read_surface_map(*files)
-        for files in zip(paths, surface_paths, sides, strict=True)
+        _surface_map(*files) for files in zip(paths, surface_paths, sides, strict=True)
     ]
     return merged(*(surface for surface, _ in pieces)), np.concatenate(
         [values for _, values in pieces]
     )
 
 
-def load_gifti(path: AnyPath) -> GiftiImage:
+def read_vertex_arrays(path: AnyPath) -> tuple[list[NDArray], str | None]:
+    """Return the arrays of values at vertices of any GIFTI file, and the structure that
+    it names, or None."""
+    image = _load_gifti(path)
+    return [array.data for array in image.darrays], _structure_of(image, path)
+
+
+def _load_gifti(path: AnyPath) -> GiftiImage:
     """Return the image of a GIFTI file; InputError where it is missing, truncated or of
     another kind."""
     with reading(path, "GIFTI", "a whole .gii file"):
@@ -385,7 +387,7 @@ def load_gifti(path: AnyPath) -> GiftiImage:
     return image
 
 
-def structure_of(image: GiftiImage, path: AnyPath) -> str | None:
+def _structure_of(image: GiftiImage, path: AnyPath) -> str | None:
     """Return the structure that a GIFTI file names, in its arrays, as a whole or in its
     name, or None."""
     named = (
@@ -396,7 +398,7 @@ def structure_of(image: GiftiImage, path: AnyPath) -> str | None:
 
 
 def _read_gifti_surface(path: Path) -> RawSurface:
-    image = load_gifti(path)
+    image = _load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
     if (
@@ -419,7 +421,7 @@ def _read_gifti_surface(path: Path) -> RawSurface:
     # other shapes are refused by the caller
     if vertices.shape[1:] == (3,):
         vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    return vertices, np.asarray(triangles[0].data), space, structure_of(image, path)
+    return vertices, np.asarray(triangles[0].data), space, _structure_of(image, path)
 
 
 def _read_with_trimesh(path: Path) -> RawSurface:
@@ -596,8 +598,8 @@ def read_vertex_labels(
     InputError for other files, non-integer values, and the other hemisphere than
     `side`.
     """
-    image = load_gifti(path)
-    _require_side(path, structure_of(image, path), side)
+    image = _load_gifti(path)
+    _require_side(path, _structure_of(image, path), side)
     arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
         shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"

@@ -7,7 +7,7 @@ elements with fields and tags, and `facets`, the pial triangles. dolfinx reads t
 each tag, since dolfinx before 0.10 reads a grid's first only.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -138,54 +138,32 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
     """Write `path` (.xdmf) and its .h5 file."""
     data = Path(path).with_suffix(".h5")
     cells = {"tets": regions.mesh.tets, "facets": regions.facets}
-    tags = {"tets": regions.cell_tags, "facets": regions.facet_tags}
+    tags: dict[str, dict[str, Stored]] = {"tets": {}, "facets": {}}
+    fields = {}
     with new_hdf5(data) as file:
         file["vertices"] = regions.mesh.vertices
-        for kind, values in cells.items():
-            file[kind] = values
-            for name, tag in tags[kind].items():
-                file[f"{kind}_tags/{name}"] = np.asarray(tag, dtype=np.int32)
+        for kind, by_name in (
+            ("tets", regions.cell_tags),
+            ("facets", regions.facet_tags),
+        ):
+            file[kind] = cells[kind]
+            for name, tag in by_name.items():
+                values, place = np.asarray(tag, dtype=np.int32), f"{kind}_tags/{name}"
+                file[place] = values
+                tags[kind][name] = values, f"{data.name}:/{place}"
         for name, field in regions.fields.items():
             file[f"fields/{name}"] = field
-
-    def part(
-        name: str,
-        kind: str,
-        names: Iterable[str],
-        fields: Mapping[str, NDArray],
-    ) -> str:
-        cell_data = {
-            tag: (
-                np.asarray(tags[kind][tag], np.int32),
-                f"{data.name}:/{kind}_tags/{tag}",
-            )
-            for tag in names
-        }
-        vertex_data = {
-            field: (values, f"{data.name}:/fields/{field}")
-            for field, values in fields.items()
-        }
-        points = regions.mesh.vertices, f"{data.name}:/vertices"
-        return xdmf_grid(
-            name, (cells[kind], f"{data.name}:/{kind}"), points, vertex_data, cell_data
-        )
-
-    blocks = part(
-        "mesh",
-        "tets",
-        tags["tets"],
-        regions.fields,
-    ) + part("facets", "facets", tags["facets"], {})
-    single = [part(name, "tets", [name], {}) for name in tags["tets"]]
-    single += [
-        part(
-            f"facet_{name}" if name in tags["tets"] else name,
-            "facets",
-            [name],
-            {},
-        )
-        for name in tags["facets"]
-    ]
+            fields[name] = field, f"{data.name}:/fields/{name}"
+    points = regions.mesh.vertices, f"{data.name}:/vertices"
+    tets, facets = ((cells[kind], f"{data.name}:/{kind}") for kind in cells)
+    blocks = xdmf_grid("mesh", tets, points, fields, tags["tets"])
+    blocks += xdmf_grid("facets", facets, points, {}, tags["facets"])
+    single = []
+    for name, stored in tags["tets"].items():
+        single.append(xdmf_grid(name, tets, points, {}, {name: stored}))
+    for name, stored in tags["facets"].items():
+        own_name = f"facet_{name}" if name in tags["tets"] else name
+        single.append(xdmf_grid(own_name, facets, points, {}, {name: stored}))
     write_text(path, document(blocks, "".join(single)))
 
 

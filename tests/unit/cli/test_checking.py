@@ -10,19 +10,12 @@ import numpy as np
 import pytest
 import yaml
 from atlas_brains import atlas_halves
-from configurations import labelled, resolved
+from configurations import labelled
 from facts import Facts
 from shapes import hemisphere, inner, moved
 
 from gyriflow.cli import check as checking
-from gyriflow.cli.check import (
-    check_study,
-    coarse_cortices,
-    export_problems,
-    input_problems,
-    plan,
-    work_of,
-)
+from gyriflow.cli.check import check_study, plan, work_of
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import MIRROR
 from gyriflow.geometry.triangles import transformed
@@ -30,7 +23,6 @@ from gyriflow.io.surfaces import write_surface, write_vertex_labels, write_verte
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.settings.terms import ELEMENTS_NEEDED, element_error, is_too_coarse
 from gyriflow.shipped import SHIPPED
-from gyriflow.study.loading import load
 
 SIDES = {"left": -1, "right": 1}
 N_VERTICES = len(hemisphere(1).vertices)
@@ -47,20 +39,42 @@ def write_hemispheres(folder, change=lambda mesh: mesh):
         write_surface(path, change(hemisphere(sign)), structure)
 
 
-def doubts(folder, *, are_refusals, week=23, **keys):
-    """Return the warnings, or the refusals, about the files of a brain."""
-    brain = {"id": "a", "week": week} | keys
-    folding = {"end_week": week + 3}
-    config = load({"brains": [brain], "start": "a", "folding": folding}, folder)
-    found = input_problems(config)
-    return [text for _, text, is_refused in found if is_refused == are_refusals]
+@pytest.fixture
+def check(tmp_path, monkeypatch):
+    """Return the lines of check on a configuration of some brains, the first of which
+    is folded, and those that are problems."""
+    monkeypatch.setattr(checking, "work_of", lambda *_: iter(()))
+
+    def lines(*brains, **keys):
+        first = brains[0]
+        config = {"start": first["id"], "folding": {"end_week": first["week"] + 2}}
+        config |= {"brains": list(brains)} | keys
+        (tmp_path / "study.yaml").write_text(yaml.safe_dump(config))
+        found = list(check_study(tmp_path / "study.yaml", tmp_path, 1))
+        return [line for line, _ in found], [line for line, bad in found if bad]
+
+    return lines
 
 
-def refusals(folder, **keys):
-    return doubts(folder, are_refusals=True, **keys)
+@pytest.fixture
+def refusals(check):
+    """Return the problems of the files of a brain."""
+    return lambda **keys: check({"id": "a", "week": 23} | keys)[1]
 
 
-def test_the_labels_of_one_hemisphere_are_read_as_labels(tmp_path):
+def warnings(lines):
+    return [line for line in lines if "warning:" in line]
+
+
+PAIR = {
+    "id": "sub-1",
+    "week": 23,
+    "hemispheres": {"left": "left.surf.gii", "right": "right.surf.gii"},
+    "coordinates": "ras",
+}
+
+
+def test_the_labels_of_one_hemisphere_are_read_as_labels(tmp_path, refusals):
     # a block of white matter with cortex on one side only
     labels = np.zeros((20, 20, 20))
     labels[4:16, 4:16, 4:16] = 1
@@ -70,27 +84,26 @@ def test_the_labels_of_one_hemisphere_are_read_as_labels(tmp_path):
     write_labels(tmp_path / "unknown.nii.gz", labels, np.eye(4))
     scheme = "spina-bifida-atlas"
     # its wall towards the side that is not there may have no cortex
-    assert refusals(tmp_path, labels="l.nii.gz", side="left", scheme=scheme) == []
-    found = refusals(tmp_path, labels="l.nii.gz", scheme=scheme)
+    assert refusals(labels="l.nii.gz", side="left", scheme=scheme) == []
+    found = refusals(labels="l.nii.gz", scheme=scheme)
     assert found[0] == Facts(scheme, "cortex", "32 %", "50 %")
-    found = refusals(tmp_path, labels="unknown.nii.gz", side="left", scheme=scheme)
+    found = refusals(labels="unknown.nii.gz", side="left", scheme=scheme)
     assert found == [Facts(scheme, "99 among 1, 5, 99")]
 
 
-def test_the_surface_of_one_hemisphere_is_of_its_side(tmp_path):
+def test_the_surface_of_one_hemisphere_is_of_its_side(tmp_path, refusals):
     write_hemispheres(tmp_path)
-    assert refusals(tmp_path, pial="right.surf.gii", side="right") == []
-    found = refusals(tmp_path, pial="right.surf.gii", side="left")
+    assert refusals(pial="right.surf.gii", side="right") == []
+    found = refusals(pial="right.surf.gii", side="left")
     assert found == [Facts(tmp_path / "right.surf.gii", "CortexRight", "CortexLeft")]
 
 
-def test_white_surfaces_outside_their_pial_ones_are_refused(tmp_path):
+def test_white_surfaces_outside_their_pial_ones_are_refused(tmp_path, refusals):
     write_hemispheres(tmp_path)
     for name, sign in (("white0", -1), ("white1", 1)):
         white = inner(hemisphere(sign), 1.5)
         write_surface(tmp_path / f"{name}.ply", white)
         write_surface(tmp_path / f"shifted_{name}.ply", moved(white, 6.0))
-    pair = {side: f"{side}.surf.gii" for side in SIDES}
     for whites, facts in (
         (["white0", "white1"], None),
         (["white1", "white0"], ["100 %", "swapped"]),
@@ -98,47 +111,34 @@ def test_white_surfaces_outside_their_pial_ones_are_refused(tmp_path):
         (["shifted_white0", "shifted_white1"], ["coordinates"]),
     ):
         files = [f"{name}.ply" for name in whites]
-        found = refusals(tmp_path, hemispheres=pair, coordinates="ras", white=files)
+        found = refusals(**PAIR, white=files)
         assert found == ([Facts("white surface (left)", *facts)] if facts else [])
 
 
 @pytest.mark.parametrize(
     ("mm", "facts"), [(1.0, [Facts("%", 38)]), (1.7, [])], ids=["small", "usual"]
 )
-def test_a_size_that_is_not_that_of_the_week_is_doubted(tmp_path, mm, facts):
+def test_a_size_that_is_not_that_of_the_week_is_doubted(tmp_path, check, mm, facts):
     write_labels(tmp_path / "l.nii.gz", np.ones((45, 45, 40)), mm * np.eye(4))
-    keys = {"week": 38, "labels": "l.nii.gz", "scheme": "binary"}
-    assert doubts(tmp_path, are_refusals=False, **keys) == facts
-    assert refusals(tmp_path, **keys) == []
+    brain = {"id": "a", "week": 38, "labels": "l.nii.gz", "scheme": "binary"}
+    lines, bad = check(brain)
+    assert bad == []
+    assert [line for line in warnings(lines) if "brain a" in line] == facts
 
 
-def test_labels_that_lie_as_those_of_another_scheme_are_refused(tmp_path):
+def test_labels_that_lie_as_those_of_another_scheme_are_refused(tmp_path, refusals):
     folder = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA28_operated"
     volume = read_label_volume(folder / "parcellation.nii.gz")
     coarse = volume.affine @ np.diag([2, 2, 2, 1])
     write_labels(tmp_path / "l.nii.gz", volume.labels[::2, ::2, ::2], coarse)
-    found = refusals(tmp_path, week=28, labels="l.nii.gz", scheme="dhcp-19")
+    found = refusals(week=28, labels="l.nii.gz", scheme="dhcp-19")
     assert found[0] == Facts("l.nii.gz", "spina-bifida-atlas", "dhcp-19", "%")
 
 
-def checked(folder, monkeypatch, *, brain=(), **keys):
-    """Return the lines of check on a configuration of a pair of hemispheres of 23 GW,
-    and those that are problems."""
-    monkeypatch.setattr(checking, "work_of", lambda *_: iter(()))
-    if not (folder / "left.surf.gii").exists():
-        write_hemispheres(folder)
-    pair = {side: f"{side}.surf.gii" for side in SIDES}
-    pial = {"hemispheres": pair, "coordinates": "ras"}
-    brains = [{"id": "sub-1", "week": 23} | pial | dict(brain)]
-    config = {"brains": brains, "start": "sub-1", "folding": {"end_week": 25}} | keys
-    (folder / "study.yaml").write_text(yaml.safe_dump(config))
-    lines = list(check_study(folder / "study.yaml", folder, 1))
-    return [line for line, _ in lines], [line for line, bad in lines if bad]
-
-
 def test_every_file_is_reported_with_its_size_side_and_number_of_vertices(
-    tmp_path, monkeypatch
+    tmp_path, check
 ):
+    write_hemispheres(tmp_path)
     for side, thickness in (("left", 2.5), ("right", 1.5)):
         maps = {"t": np.full(N_VERTICES, thickness)}
         path = tmp_path / f"{side}.shape.gii"
@@ -150,12 +150,8 @@ def test_every_file_is_reported_with_its_size_side_and_number_of_vertices(
         "surface": ["left.surf.gii", "right.surf.gii"],
     }
     regions = {"sub-1": {"labels": "regions.nii.gz", "names": {1: "a"}}}
-    lines, bad = checked(
-        tmp_path,
-        monkeypatch,
-        folding={"end_week": 25, "thickness_mm": mapped},
-        metrics={"regions": regions},
-    )
+    folding = {"end_week": 25, "thickness_mm": mapped}
+    lines, bad = check(PAIR, folding=folding, metrics={"regions": regions})
     assert bad == []
     assert Facts("left.surf.gii", N_VERTICES, "mm", "left", "scanner_anat") in lines
     assert Facts("left.shape.gii", N_VERTICES, 2.5, "left") in lines
@@ -178,15 +174,15 @@ def with_space(path, data, to, matrix):
     ids=["a template's space", "a warning of the reader"],
 )
 def test_a_doubt_about_a_surface_is_that_of_its_brain_and_comes_once(
-    tmp_path, monkeypatch, caplog, data, scale, facts
+    tmp_path, check, caplog, data, scale, facts
 ):
     write_hemispheres(tmp_path)
     matrix = np.diag([scale, scale, scale, 1.0])
     for side in SIDES:
         with_space(tmp_path / f"{side}.surf.gii", data, "talairach", matrix)
-    lines, bad = checked(tmp_path, monkeypatch)
+    lines, bad = check(PAIR)
     assert bad == []
-    found = [line for line in lines if "warning:" in line and "surf.gii" in line]
+    found = [line for line in warnings(lines) if "surf.gii" in line]
     assert found == [
         Facts("warning: brain sub-1:", tmp_path / f"{side}.surf.gii", *facts)
         for side in SIDES
@@ -199,22 +195,22 @@ def test_a_doubt_about_a_surface_is_that_of_its_brain_and_comes_once(
     ("metres", "facts"),
     [(1e-3, [0.0025, "metres"]), (1e3, [2500, "micrometres"]), (0.0, ["thickness"])],
 )
-def test_a_thickness_map_in_another_unit_is_refused(
-    tmp_path, monkeypatch, metres, facts
-):
+def test_a_thickness_map_in_another_unit_is_refused(tmp_path, check, metres, facts):
+    write_hemispheres(tmp_path)
     path = tmp_path / "thick.shape.gii"
     write_vertex_maps(path, {"t": np.full(N_VERTICES, 2.5 * metres)})
     mapped = {"map": path.name, "surface": "left.surf.gii"}
     folding = {"end_week": 25, "thickness_mm": mapped}
-    _, bad = checked(tmp_path, monkeypatch, folding=folding)
+    _, bad = check(PAIR, folding=folding)
     assert bad == [Facts("thickness_mm", path, *facts)]
     # a map that a curve multiplies
     if metres:
         mapped["weeks"] = {22: 0.5 / metres, 24: 1.5 / metres}
-        assert checked(tmp_path, monkeypatch, folding=folding)[1] == []
+        assert check(PAIR, folding=folding)[1] == []
 
 
-def test_files_of_regions_and_white_surfaces_are_opened(tmp_path, monkeypatch):
+def test_files_of_regions_and_white_surfaces_are_opened(tmp_path, check):
+    write_hemispheres(tmp_path)
     for side, number in (("left", N_VERTICES), ("right", N_VERTICES - 1)):
         path = tmp_path / f"{side}.label.gii"
         labels = np.ones(number, int)
@@ -226,20 +222,20 @@ def test_files_of_regions_and_white_surfaces_are_opened(tmp_path, monkeypatch):
     ):
         files = [f"{side}.label.gii" for side in labels]
         regions = {"sub-1": {"labels": files, "surface": surfaces}}
-        _, bad = checked(tmp_path, monkeypatch, metrics={"regions": regions})
+        _, bad = check(PAIR, metrics={"regions": regions})
         right = tmp_path / "right.label.gii"
         assert bad == [Facts("regions of sub-1", right, *facts)]
     (tmp_path / "white.surf.gii").write_text("torn")
     white = {"white": ["white.surf.gii", "white.surf.gii"]}
-    _, bad = checked(tmp_path, monkeypatch, brain=white)
+    _, bad = check(PAIR | white)
     assert bad == [Facts("brain sub-1", tmp_path / "white.surf.gii")]
 
 
 @pytest.mark.parametrize(("scale", "fact"), [(1e-3, "metres"), (10.0, 23)])
-def test_surfaces_in_other_units_are_refused(tmp_path, monkeypatch, scale, fact):
+def test_surfaces_in_other_units_are_refused(tmp_path, check, scale, fact):
     matrix = np.diag([scale, scale, scale, 1.0])
     write_hemispheres(tmp_path, lambda mesh: transformed(mesh, matrix))
-    assert checked(tmp_path, monkeypatch)[1] == [Facts("brain sub-1", fact)]
+    assert check(PAIR)[1] == [Facts("brain sub-1", fact)]
 
 
 @pytest.mark.parametrize(
@@ -249,35 +245,32 @@ def test_surfaces_in_other_units_are_refused(tmp_path, monkeypatch, scale, fact)
         ("auto", ["exchanged", "mirrored", "RAS", "LAS"]),
     ],
 )
-def test_mirrored_hemispheres_are_refused(tmp_path, monkeypatch, coordinates, facts):
+def test_mirrored_hemispheres_are_refused(tmp_path, check, coordinates, facts):
     for side, half in zip(SIDES, atlas_halves(), strict=True):
         write_surface(tmp_path / f"{side}.surf.gii", transformed(half, MIRROR))
-    brain = {"week": 24, "coordinates": coordinates}
-    _, bad = checked(tmp_path, monkeypatch, brain=brain)
+    _, bad = check(PAIR | {"week": 24, "coordinates": coordinates})
     assert bad == [Facts("brain sub-1", *facts)]
 
 
-def test_subjects_that_would_be_one_in_the_export_are_reported():
-    scans = labelled(21, 22)
-    assert list(export_problems(resolved(scans))) == []
-    scans[0]["subject"], scans[1]["subject"] = "1-12", "11-2"
-    assert list(export_problems(resolved(scans))) == [Facts("sub-112", "1-12", "11-2")]
+def test_subjects_that_would_be_one_in_the_export_are_reported(check):
+    first, second = labelled(21, 22)
+    assert not [line for line in check(first, second)[0] if "no export" in line]
+    lines, _ = check(first | {"subject": "1-12"}, second | {"subject": "11-2"})
+    assert Facts("warning: no export", "sub-112", "1-12", "11-2") in lines
 
 
-def test_files_named_as_of_another_subject_or_space_are_reported(tmp_path, monkeypatch):
+def test_files_named_as_of_another_subject_or_space_are_reported(tmp_path, check):
+    write_hemispheres(tmp_path)
     name = "sub-2_space-MNI152_hemi-L_pial.surf.gii"
     write_surface(tmp_path / name, hemisphere(-1))
     pair = {"hemispheres": {"left": name, "right": "right.surf.gii"}}
-    lines, bad = checked(tmp_path, monkeypatch, brain=pair)
+    lines, bad = check(PAIR | pair)
     assert bad == []
-    found = [line for line in lines if "warning: brain" in line and name in line]
+    found = [line for line in warnings(lines) if name in line]
     assert found == [Facts(name, "sub-2"), Facts(name, "MNI152")]
 
 
-def test_a_header_without_a_unit_is_reported_and_is_no_warning(
-    tmp_path, monkeypatch, caplog
-):
-    monkeypatch.setattr(checking, "work_of", lambda *_: iter(()))
+def test_a_header_without_a_unit_is_reported_and_is_no_warning(tmp_path, check, caplog):
     units = {"a": "unknown", "b": "mm"}
     for name, unit in units.items():
         image = nib.Nifti1Image(np.ones((45, 45, 40), np.uint8), 1.7 * np.eye(4))
@@ -287,23 +280,14 @@ def test_a_header_without_a_unit_is_reported_and_is_no_warning(
         {"id": name, "week": 38, "labels": f"{name}.nii", "scheme": "binary"}
         for name in units
     ]
-    (tmp_path / "gyriflow.yaml").write_text(yaml.safe_dump({"brains": brains}))
-    lines = [line for line, _ in check_study(tmp_path / "gyriflow.yaml", tmp_path, 1)]
+    lines, _ = check(*brains)
     assert [line for line in lines if "no unit given" in line] == [Facts("a.nii")]
     assert caplog.records == []
 
 
-def coarse(surface_edge_mm, order, **folding):
-    return list(
-        coarse_cortices(
-            resolved(
-                labelled(22, 23, 24),
-                start="b",
-                mesh={"surface_edge_mm": surface_edge_mm, "order": order},
-                folding={"end_week": 24} | folding,
-            )
-        )
-    )
+def advice(lines):
+    """Return the warnings on the mesh."""
+    return [line for line in warnings(lines) if "mesh." in line]
 
 
 @pytest.mark.parametrize(
@@ -319,15 +303,33 @@ def coarse(surface_edge_mm, order, **folding):
     ],
 )
 def test_a_mesh_too_coarse_for_the_cortex_is_reported(
-    edge_mm, order, thickness_mm, facts
+    check, edge_mm, order, thickness_mm, facts
 ):
-    found = coarse(edge_mm, order, thickness_mm=thickness_mm)
-    assert found == ([Facts(*facts)] if facts else [])
+    mesh = {"surface_edge_mm": edge_mm, "order": order}
+    folding = {"end_week": 24, "thickness_mm": thickness_mm}
+    lines, _ = check(*labelled(23), mesh=mesh, folding=folding)
+    assert advice(lines) == ([Facts(*facts)] if facts else [])
 
 
 @pytest.mark.parametrize(("growth", "n"), [("rates", 1), ("sizes", 1), ("shapes", 0)])
-def test_growth_without_layers_needs_no_elements_through_the_cortex(growth, n):
-    assert len(coarse(1.2, 1, growth=growth)) == n
+def test_growth_without_layers_needs_no_elements_through_the_cortex(check, growth, n):
+    mesh = {"surface_edge_mm": 1.2, "order": 1}
+    folding = {"end_week": 24, "growth": growth}
+    lines, _ = check(*labelled(22, 23, 24), mesh=mesh, folding=folding)
+    assert len(advice(lines)) == n
+
+
+@pytest.mark.parametrize(
+    ("order", "end_week", "is_warned_of"),
+    [(2, 34, True), (2, 30, False), (1, 34, False)],
+)
+def test_quadratic_elements_are_warned_of_on_the_way_to_deep_folds(
+    check, order, end_week, is_warned_of
+):
+    folding = {"end_week": end_week, "growth": "shapes"}
+    lines, _ = check(*labelled(25, 30, 34), mesh={"order": order}, folding=folding)
+    facts = Facts("run reference from a", "mesh.order: 1")
+    assert advice(lines) == ([facts] if is_warned_of else [])
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -17,7 +17,6 @@ from scan_trees import make_tree
 from shapes import sphere
 
 from gyriflow.cli import check as checking
-from gyriflow.cli.check import coarse_cortices, deep_curved_folds
 from gyriflow.cli.commands import main
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
@@ -218,17 +217,6 @@ def test_the_same_prediction_goes_on_and_another_one_replaces_nothing(
     assert (run.end_week, run.ensemble) == (24, 5)
 
 
-def test_quadratic_elements_are_warned_of_on_the_way_to_deep_folds(predicted, tmp_path):
-    predicted("--week", "25", "--until", "34", "--atlas", "spina-bifida")
-    section, study = configured(tmp_path)
-    assert list(deep_curved_folds(study)) == []
-    section["mesh"] = {"order": 2}
-    (line,) = deep_curved_folds(resolve(load(section)))
-    assert line == Facts("run predicted", "mesh.order: 1")
-    section["folding"]["end_week"] = 30
-    assert list(deep_curved_folds(resolve(load(section)))) == []
-
-
 def test_a_quick_prediction_is_coarse_and_finds_files_from_the_working_directory(
     monkeypatch, predicted, tmp_path
 ):
@@ -241,8 +229,6 @@ def test_a_quick_prediction_is_coarse_and_finds_files_from_the_working_directory
     assert named == (str(ATLAS / "atlas.yaml"), str(ATLAS))
     for brain in study.brains.values():
         assert all(Path(file).is_file() for file in brain.files)
-    # growth towards shapes is not by layers
-    assert list(coarse_cortices(study)) == []
     assert study.run_simulations[0].settings.step_s == 7 * 86400
     assert study.config.mesh.order == 1
     # a path of the atlas has a quarter as many nodes on the surface

@@ -38,7 +38,8 @@ STUDY = {
     "growth": {"brains": {"x": [brain["id"] for brain in ATLAS]}},
     "runs": {
         "expected": {},
-        "rates": {"preset": "fetalfoldsim", "growth": "rates", "step_s": 3600},
+        # so large that it sets the limits of its job
+        "rates": {"growth": "rates", "step_s": 600, "end_week": 40, "ranks": 4},
         "measured": {"preset": "measured", "start": "x22", "end_week": 30},
     },
 }

@@ -12,8 +12,6 @@ from gyriflow.cli import readings as module
 from gyriflow.cli.readings import Reading, ScanFiles, readings
 from gyriflow.cli.recognition import fits_of_file
 from gyriflow.errors import InputError
-from gyriflow.io import kept_results
-from gyriflow.io.kept_results import keep_result, kept_result, remove_old_results
 from gyriflow.shipped import SHIPPED
 
 calls = []
@@ -96,15 +94,19 @@ def test_nothing_is_kept_where_the_folder_cannot_be_written(scans, own_cache):
     assert len(calls) == 4
 
 
-def test_the_results_used_last_are_kept(own_cache, monkeypatch):
-    monkeypatch.setattr(kept_results, "MAX_KEPT", 2)
-    for number, key in enumerate("abc"):
-        keep_result(key, key)
-        path = own_cache / "readings" / f"{key}.json"
-        os.utime(path, (1e9 + number, 1e9 + number))
-    assert kept_result("a") == "a"
-    remove_old_results()
-    assert [kept_result(key) for key in "abc"] == ["a", None, "c"]
+def test_the_results_used_last_are_kept(scans, own_cache, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "MAX_KEPT", 2)
+    first, second, third = (ScanFiles([str(tmp_path / name)]) for name in "abc")
+    readings(words_in, [first, second])
+    for path in (own_cache / "readings").iterdir():
+        os.utime(path, (1e9, 1e9))
+    readings(words_in, [first])
+    readings(words_in, [third])
+    assert len(calls) == 3
+    readings(words_in, [first, third])
+    assert len(calls) == 3
+    readings(words_in, [second])
+    assert len(calls) == 4
 
 
 @pytest.mark.slow

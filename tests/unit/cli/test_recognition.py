@@ -16,13 +16,7 @@ from shapes import sphere
 
 from gyriflow.cli.commands import main
 from gyriflow.cli.init import write_configuration
-from gyriflow.cli.recognition import (
-    UNSET,
-    FoundBrain,
-    recognise,
-    scheme_fits,
-    scheme_reasons,
-)
+from gyriflow.cli.recognition import UNSET, recognise, scheme_fits
 from gyriflow.errors import InputError
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
@@ -159,18 +153,6 @@ def test_a_folder_may_hold_two_data_sets_but_a_subject_is_of_one(tmp_path):
     ) == [(UNSET, [note]), (UNSET, [note]), ("spina-bifida-atlas", [])]
 
 
-def test_the_chosen_scheme_has_its_contradiction_and_others_their_names_only():
-    fits = {"a": "", "b": "cortex is missing", "c": "too little cortex"}
-    brain = FoundBrain(Path("a.nii"), {"scheme": "a"}, fits=fits)
-    head, others = scheme_reasons([brain, brain])
-    assert (head, others) == (Facts("a", 2), Facts("b, c"))
-    assert "cortex" not in others
-    brain = FoundBrain(Path("x.nii"), {"scheme": "b"}, fits=fits)
-    head, contradiction, others = scheme_reasons([brain])
-    assert (head, contradiction) == (Facts("b", 1), Facts("cortex is missing"))
-    assert others.endswith(": c")
-
-
 @pytest.mark.parametrize(
     ("first", "second", "id"),
     [
@@ -217,9 +199,12 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
     assert list(config.runs) == ["reference", "measured"]
     with pytest.raises(InputError, check=Facts("gyriflow.yaml", "--force")):
         write_configuration(recognise(tmp_path), tmp_path, tmp_path / "gyriflow.yaml")
-    output = called("init", tmp_path, "--force", "--scheme", "feta-7")
-    assert Facts("feta-7", 2) in output.splitlines()
-    assert {brain.scheme for brain in configured(tmp_path).brains} == {"feta-7"}
+    output = called("init", tmp_path, "--force", "--scheme", "drawem-9")
+    # the contradiction to the chosen scheme, the names of others only
+    head, against, others = output.splitlines()[:3]
+    assert (head, against) == (Facts("scheme drawem-9", 2), Facts("but"))
+    assert others.endswith(": crl, dhcp-19, freesurfer, multi-bounti-43")
+    assert {brain.scheme for brain in configured(tmp_path).brains} == {"drawem-9"}
 
 
 def test_a_configuration_that_is_replaced_is_kept(tmp_path):

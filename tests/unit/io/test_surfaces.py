@@ -17,7 +17,6 @@ from gyriflow.geometry.triangles import transformed
 from gyriflow.io.surfaces import (
     read_hemispheres,
     read_surface,
-    read_surface_map,
     read_surface_maps,
     read_vertex_labels,
     read_vertex_maps,
@@ -169,12 +168,12 @@ def test_maps_and_labels_of_the_other_hemisphere_are_refused(tmp_path):
     unnamed, labels = tmp_path / "unnamed.ply", tmp_path / "l.label.gii"
     write_surface(unnamed, BALL)
     write_vertex_labels(labels, np.ones(162, int), {1: "frontal"}, "CortexLeft")
-    read_surface_map(maps["left"], surfaces["left"])
-    read_surface_map(maps["right"], unnamed)
+    read_surface_maps([maps["left"]], [surfaces["left"]])
+    read_surface_maps([maps["right"]], [unnamed])
     read_vertex_labels(labels, "left")
     for read, *arguments in (
-        (read_surface_map, maps["right"], surfaces["left"]),
-        (read_surface_map, maps["right"], unnamed, "left"),
+        (read_surface_maps, [maps["right"]], [surfaces["left"]]),
+        (read_surface_maps, [maps["right"]] * 2, [unnamed] * 2),
         # two are left and right
         (read_surface_maps, [*maps.values()][::-1], [*surfaces.values()][::-1]),
         (read_vertex_labels, labels, "right"),
@@ -302,7 +301,7 @@ def test_what_is_no_map_of_a_surface_is_refused(tmp_path, counts, surface, facts
         ]
         nib.save(GiftiImage(darrays=arrays), tmp_path / "a.gii")
     with pytest.raises(InputError, check=Facts(*facts)):
-        read_surface_map(tmp_path / "a.gii", tmp_path / surface)
+        read_surface_maps([tmp_path / "a.gii"], [tmp_path / surface])
 
 
 @pytest.mark.parametrize(
