@@ -16,14 +16,12 @@ from contact_bodies import (
     stress_at,
     two_blocks,
 )
-from scipy.optimize import brentq
-from shapes import box_mesh, ellipsoid_mesh
+from shapes import box_mesh
 
 from gyriflow.errors import MeshError
-from gyriflow.folding.contact import SelfContact, contact_distance_mm
+from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
-from gyriflow.geometry.triangles import TriangleMesh, edge_lengths, edges
 from gyriflow.units import M_PER_MM, MM_PER_M
 
 
@@ -60,23 +58,6 @@ def test_forces_fit_the_energy_and_stiffness_the_forces():
     )
 
 
-def test_forces_have_no_sum_and_no_moment():
-    mesh = two_blocks()
-    problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
-    u = approach(problem.domain)
-    forces = contact.forces(u)
-    places = (problem.domain.positions + gathered(problem.domain, u))[
-        np.unique(boundary_faces(mesh)[0])
-    ]
-    size = np.abs(forces).sum()
-    assert size > 0
-    assert np.abs(forces.sum(axis=0)).max() <= 1e-12 * size
-    assert (
-        np.abs(np.cross(places, forces).sum(axis=0)).max()
-        <= 1e-12 * size * np.abs(places).max()
-    )
-
-
 @pytest.mark.parametrize(
     "upper", [pytest.param((5, 5, 3), marks=pytest.mark.one_rank), (4, 3, 3)]
 )
@@ -84,6 +65,7 @@ def test_pressed_blocks_have_the_analytic_pressure_and_their_gap_follows_the_dis
     upper,
 ):
     growth, gaps = 0.2, []
+    assert stress_at(1 + growth, growth) == pytest.approx(0.0, abs=1e-9)
     mesh = two_blocks(upper=upper)
     zones = in_a_tube(mesh)
     for distance in (0.2, 0.1, 0.05):
@@ -113,29 +95,15 @@ def test_pressed_blocks_have_the_analytic_pressure_and_their_gap_follows_the_dis
     assert pressure == pytest.approx(
         -stress_at(1 + GAP_MM / 2 / HEIGHT_MM, growth), rel=0.05
     )
-    assert brentq(
-        lambda stretch: stress_at(stretch, growth), 0.9, 1.4
-    ) == pytest.approx(1 + growth)
-
-
-def two_balls():
-    ball = ellipsoid_mesh(2, (4.0, 4.0, 4.0))
-    vertices = np.concatenate(
-        [ball.vertices - [4.1, 0.0, 0.0], ball.vertices + [4.1, 0.0, 0.0]]
-    )
-    return TetrahedralMesh(
-        vertices, np.concatenate([ball.tets, ball.tets + len(ball.vertices)])
-    )
 
 
 def test_a_surface_that_crosses_itself_is_refused():
-    mesh = two_balls()
-    mesh = TetrahedralMesh(
-        mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets
-    )
-    facets, _ = boundary_faces(mesh)
+    mesh = two_blocks()
+    is_upper = mesh.vertices[:, 2] > 0
+    shift = is_upper[:, None] * [0.7, 0.4, -3 * GAP_MM]
+    crossing = TetrahedralMesh(mesh.vertices + shift, mesh.tets)
     with pytest.raises(MeshError, match=r"mesh\.surface_edge_mm"):
-        SelfContact(Domain(COMM, mesh), facets, 1000.0, 0.2)
+        SelfContact(Domain(COMM, crossing), boundary_faces(mesh)[0], 1000.0, 0.2)
 
 
 def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
@@ -157,25 +125,6 @@ def test_a_compressed_surface_does_not_repel_itself(order):
     facets, _ = boundary_faces(mesh)
     contact = SelfContact(Domain(COMM, mesh), facets, 1000.0)
     assert contact.pair_count(np.zeros((len(contact.domain.vertex_of_node), 3))) == 0
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_short_edges_here_and_there_do_not_lower_the_contact_distance(order):
-    """Their ends are nearer to each other than the distance, as neighbours."""
-    mesh = box_mesh((10, 10, 2), (10.0, 10.0, 2.0))
-    x, y, z = mesh.vertices.T
-    moved = mesh.vertices.copy()
-    for i in (-4.0, -1.0, 2.0):
-        for j in (-4.0, -1.0, 2.0):
-            on_top = (y == j) & (z == 1.0)
-            moved[on_top & (x == i + 1.0), 0] = i + 0.02
-    mesh = TetrahedralMesh(moved, mesh.tets)
-    mesh = mesh if order == 1 else quadratic(mesh)
-    facets, _ = boundary_faces(mesh)
-    contact = SelfContact(Domain(COMM, mesh), facets, 1000.0)
-    start = contact.surface.reference_mm()
-    lengths = edge_lengths(start, edges(TriangleMesh(start, contact.surface.faces))[0])
-    assert contact.distance_mm == contact_distance_mm(lengths) > 0.021
 
 
 def test_no_pair_is_missed_where_the_distance_has_grown():

@@ -11,47 +11,20 @@ from boxes import (
     EvenGrowth,
     curved_box,
     distorted_box,
-    gathered,
-    problem_on,
     set_layers,
-    solved,
     zones_of,
 )
-from scipy.optimize import minimize_scalar
 from shapes import box_mesh
-from verification_cases.boxes import box_zones
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.layers import PialSearch, cortical_weight
 from gyriflow.folding.problem import NonlinearProblem
-from gyriflow.folding.simulation import Folding, elements_through
+from gyriflow.folding.simulation import Folding
 from gyriflow.folding.stretches import packed, unpacked
-from gyriflow.geometry.tetrahedra import signed_volumes, volumes_between
 from gyriflow.mechanics.materials import MATERIALS
 from gyriflow.settings.folding import parameters_from
 from gyriflow.units import M_PER_MM, SECONDS_PER_GW
-
-
-@pytest.mark.parametrize(
-    "mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"]
-)
-def test_tangential_growth_stretches_across_the_normal_only(mesh):
-    oblique = np.array([1.0, 2.0, 2.0]) / 3
-    problem = problem_on(
-        mesh,
-        zones_of(mesh),
-        dg=0.2,
-        dr=-0.05,
-        normals=lambda c: np.tile(oblique, (len(c), 1)),
-    )
-    along = np.outer(oblique, oblique)
-    growth = 1.2 * (np.eye(3) - along) + 0.95 * along
-    x = problem.domain.local(problem.domain.positions)
-    assert problem.energy(x @ (growth - np.eye(3)).T) == pytest.approx(0.0, abs=1e-16)
-    u = x * [0.2, 0.0, 0.0]
-    assert problem.volume_ratios(u) == pytest.approx(1.2)
-    assert 0 < problem.smallest_volume_ratio(u) <= 1.2 * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("material", MATERIALS)
@@ -75,24 +48,6 @@ def test_a_run_has_the_material_that_it_names(material):
         ),
     }
     assert problem.energy(u) == pytest.approx(densities[material] * 288e-9, rel=1e-12)
-
-
-def test_gathering_and_placing_keep_every_vertex_in_its_place():
-    mesh = distorted_box()
-    domain = Domain(COMM, mesh)
-    np.testing.assert_allclose(
-        domain.gather(domain.local(domain.positions)[: domain.n_owned]),
-        mesh.vertices * 1e-3,
-    )
-    moved = domain.positions * 1.5 + [0.1, 0.2, 0.3]
-    domain.place(moved)
-    volumes = volumes_between(domain.local(moved), domain.cells)
-    total = COMM.allreduce(float(volumes.sum()))
-    assert total == pytest.approx(1.5**3 * signed_volumes(mesh).sum() * 1e-9, rel=1e-12)
-    used = domain.mesh.geometry.x[domain.mesh.geometry.dofmap].mean(axis=1)
-    np.testing.assert_allclose(
-        used, moved[domain.vertex_of_node[domain.cells]].mean(axis=1), rtol=1e-12
-    )
 
 
 RUN = {
@@ -122,28 +77,6 @@ def stretched_problem(zones, mesh):
     up, V = np.tile([0.0, 0.0, 1.0], (cells, 1)), np.tile(STRETCH, (cells, 1, 1, 1))
     set_layers(problem, 1000.0 * uniform, 0.0 * uniform, 0.0 * uniform, up, V)
     return problem
-
-
-def test_a_free_body_springs_back_from_the_stretch_it_kept():
-    mesh = distorted_box()
-    problem = stretched_problem(replace(zones_of(mesh), free=True), mesh)
-    x = problem.domain.local(problem.domain.positions)
-    assert problem.energy(x @ (np.linalg.inv(STRETCH) - np.eye(3)).T) == pytest.approx(
-        0.0, abs=1e-16
-    )
-    u = solved(problem, newton_tolerance=1e-10, krylov_tolerance=1e-8).displacement
-    assert problem.energy(u) == pytest.approx(0.0, abs=1e-14)
-    found = gathered(problem.domain, u)
-    # the rotation is free to choose, so compare distances
-    pairs = np.random.default_rng(1).integers(0, len(found), (200, 2))
-    now, exact = (
-        np.linalg.norm(np.diff(points[pairs], axis=1), axis=2)
-        for points in (
-            problem.domain.positions + found,
-            problem.domain.positions @ np.linalg.inv(STRETCH).T,
-        )
-    )
-    np.testing.assert_allclose(now, exact, rtol=1e-6, atol=1e-12)
 
 
 def test_the_energy_of_a_kept_stretch_is_counted_per_volume_without_stress():
@@ -217,79 +150,6 @@ def test_thickness_and_stiffness_of_a_step_are_those_of_its_middle(mesh, monkeyp
     cortex_pa, core_pa = 300.0 + 700.0 * part, 200.0 + 700.0 * part
     expected_pa = tissue.at_points(cortex_pa * weight + core_pa * (1 - weight))
     np.testing.assert_allclose(moduli_pa, [expected_pa])
-
-
-def stretch_up(growth):
-    """Return the stretch λ of tissue held at its sides that grows evenly."""
-    bulk_to_shear = 2 * 1.45 / (3 * 0.1)
-
-    def elastic(up):
-        return np.array([1.0, 1.0, up]) / (1 + growth)
-
-    def energy(up):
-        J = elastic(up).prod()
-        return (
-            0.5 * ((elastic(up) ** 2).sum() * J ** (-2 / 3) - 3)
-            + bulk_to_shear / 2 * (J - 1) ** 2
-        )
-
-    return minimize_scalar(energy, (1.0, 1.1), tol=1e-12).x
-
-
-@pytest.mark.parametrize(
-    "mesh", [box_mesh((3, 3, 3), (6.0, 6.0, 6.0)), curved_box((2, 2, 2))], ids=ORDERS
-)
-def test_tissue_held_at_its_sides_forgets_a_part_of_the_volume_it_grew_by(mesh):
-    parameters = parameters_from(
-        RUN
-        | {
-            "contact": "none",
-            "support": "free",
-        }
-    )
-    zones = box_zones(mesh, parameters)
-    folding, state = folding_of(mesh, zones, **EVEN)
-    folding.model = EvenGrowth(folding.parameters, None, 0.02).growth
-    for _ in range(4):
-        state = folding.step(state, 43200.0)
-    height = stretch_up(0.02) ** 4
-    found = np.ptp(state.positions[:, 2]) / np.ptp(folding.start[:, 2])
-    assert found == pytest.approx(height, rel=1e-6)
-    assert np.log(height) / (12 * np.log(1.02)) < 0.9
-
-
-def test_the_table_of_steps_has_elements_through_the_cortex_in_the_middle_of_a_step():
-    mesh = distorted_box((8, 6, 6))
-    thickness = {"weeks": {21.0: 1.0, 22.0: 3.0}}
-    zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
-    folding, start = folding_of(mesh, zones, thickness_mm=thickness)
-    day_s = SECONDS_PER_GW / 7
-    start = replace(start, time_s=2 * day_s)
-    (row,) = folding.step(start, day_s).rows
-    tissue, _ = folding.begin(start, day_s)
-    thickness_m = (1.0 + 2.0 * 2.5 / 7) * M_PER_MM
-    expected = elements_through(folding.domain, tissue.depth, thickness_m)
-    assert row["elements_through_cortex"] == pytest.approx(expected)
-
-
-def test_displacements_of_the_pial_surface_are_those_of_its_vertices_alone():
-    mesh = distorted_box()
-    zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
-    folding, _ = folding_of(mesh, zones)
-    # vertices of the surface move by 1 or 2 mm, those inside and below by 5
-    displacement = np.tile([0.0, 3.0, 4.0], (len(mesh.vertices), 1))
-    is_pial = np.isin(np.arange(len(mesh.vertices)), zones.cortex_facets)
-    assert 0 < is_pial.sum() < len(is_pial)
-    displacement[is_pial] = [1.0, 0.0, 0.0]
-    displacement[np.flatnonzero(is_pial)[0]] = [0.0, 0.0, 2.0]
-    solution = folding.solver.solve(folding.problem.rest())
-    row = folding._solution_row(solution, displacement * M_PER_MM)
-    n_pial, n_other = is_pial.sum(), (~is_pial).sum()
-    assert row["max_u_mm"] == pytest.approx(5.0)
-    assert row["max_u_pial_mm"] == pytest.approx(2.0)
-    assert row["mean_u_pial_mm"] == pytest.approx((n_pial + 1) / n_pial)
-    expected = (n_pial + 1 + 5 * n_other) / (n_pial + n_other)
-    assert row["mean_u_mm"] == pytest.approx(expected)
 
 
 def test_an_elastic_state_stays_where_it_is_in_equilibrium():

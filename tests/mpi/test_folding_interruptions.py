@@ -16,8 +16,6 @@ from gyriflow.folding.checkpoint import read_checkpoint, run_key
 from gyriflow.folding.run import run
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
-from gyriflow.geometry.triangles import is_closed
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
@@ -61,10 +59,6 @@ def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(
             rtol=1e-4,
             atol=1e-4 * values.max(),
         )
-    surface, _ = boundary_surface(
-        TetrahedralMesh(read_positions(one, 21.5), read_tets(one))
-    )
-    assert is_closed(surface)
 
 
 @pytest.fixture(scope="module")
@@ -90,14 +84,13 @@ def killed_after(step, arguments):
     return "".join(printed)
 
 
-@pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 1)])
-def test_a_killed_run_resumes_and_ends_like_an_uninterrupted_one(
-    mesh, long_run, tmp_path, first, then
+def test_a_killed_run_resumes_on_fewer_ranks_and_ends_like_an_uninterrupted_one(
+    mesh, long_run, tmp_path
 ):
     out = tmp_path / "out"
-    printed = killed_after(3, command(mesh, out, first, **TIGHT, step_s=MANY_STEPS))
+    printed = killed_after(3, command(mesh, out, 2, **TIGHT, step_s=MANY_STEPS))
     assert not (out / "frames.h5").exists(), printed
-    again = fold(mesh, out, then, **TIGHT, step_s=MANY_STEPS)
+    again = fold(mesh, out, 1, **TIGHT, step_s=MANY_STEPS)
     assert again.returncode == 0, again.stderr
     resumed = read_json(out / "summary.json")["resumed_after_step"]
     assert resumed >= 3

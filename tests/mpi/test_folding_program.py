@@ -18,9 +18,8 @@ from shapes import ellipsoid_mesh
 
 from gyriflow.errors import StorageError
 from gyriflow.folding.__main__ import require_space
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from gyriflow.io.files import read_json
-from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
+from gyriflow.io.frames import read_field, read_positions, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
 from gyriflow.messages import read_events, read_messages
 from gyriflow.settings.folding import parameters_from
@@ -61,23 +60,7 @@ def test_a_run_leaves_every_file_and_nothing_else(tight_run):
     for week in (21.25, 21.5):
         assert np.abs(steps["week"] - week).min() < 1e-12
     assert (steps["min_J"] > 0).all()
-    moved = read_positions(frames, 21.5) - read_positions(frames, 21.0)
-    np.testing.assert_allclose(
-        moved, read_field(frames, 21.5, "displacement_mm"), atol=1e-12
-    )
-    summary = read_json(tight_run / "summary.json")
-    assert summary["steps"] == len(steps)
-    ratios = [
-        np.quantile(
-            radius_ratios(
-                TetrahedralMesh(read_positions(frames, week), read_tets(frames))
-            ),
-            0.01,
-        )
-        for week in summary["weeks"]
-    ]
-    assert summary["radius_ratio_01"] == pytest.approx(ratios)
-    assert len(set(ratios)) == 3
+    assert read_json(tight_run / "summary.json")["steps"] == len(steps)
 
 
 def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(
@@ -142,16 +125,14 @@ def test_memory_and_a_shortened_step_are_reported_before_the_solve(default_run):
     assert Facts("step_s", 43200, 21, 21.25) in before.splitlines()
 
 
-def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
-    done = fold(mesh, tmp_path / "out", 2, growth_rate_per_s=0.0)
-    assert done.returncode == 0
-    frames = tmp_path / "out" / "frames.h5"
-    assert (read_field(frames, 21.5, "displacement_mm") == 0).all()
-
-
-def test_warnings_and_progress_are_printed_and_written_as_data(mesh, tmp_path):
+def test_warnings_and_progress_of_a_run_without_growth_are_printed_and_written(
+    mesh, tmp_path
+):
     # linear elements lock
     done = fold(mesh, tmp_path / "out", 2, growth_rate_per_s=0.0, poisson_ratio=0.48)
+    # without growth nothing moves at all
+    frames = tmp_path / "out" / "frames.h5"
+    assert (read_field(frames, 21.5, "displacement_mm") == 0).all()
     messages = read_messages(tmp_path / "out.log")
     assert {message.level for message in messages} == {"warning"}
     assert "poisson_ratio is 0.48" in messages[0].text
@@ -163,22 +144,6 @@ def test_warnings_and_progress_are_printed_and_written_as_data(mesh, tmp_path):
     last, used = progress[-2:]
     assert last["week"] == pytest.approx(last["end_week"])
     assert used["event"] == "usage"
-
-
-def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_path):
-    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "program": IMPATIENT}
-    done = fold(
-        mesh, tmp_path / "out", end_week=21.4, output_weeks=[21.0, 21.4], **hard
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    # which step fails first depends on round-off
-    assert re.search(
-        r"step of (86400|69120) s failed .*: trying (43200|34560) s", done.stdout
-    )
-    steps = pd.read_csv(tmp_path / "out" / "steps.csv")
-    assert steps["dt_s"].min() <= 34560
-    assert steps["week"].iloc[-1] == pytest.approx(21.4)
-    assert (steps["min_J"] > 0).all()
 
 
 def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
@@ -205,20 +170,13 @@ def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_p
     brain = read_tetrahedral_mesh(mesh)
     y = brain.vertices[:, 1]
     write_maps(tmp_path / "maps.h5", {"thickness_mm": np.where(y > 0, 4.0, 2.0)})
+    settings = TIGHT | {"thickness_mm": {"map": "thickness_mm"}}
+    settings["fields"] = ["cortex_weight"]
     ends = []
     for ranks in (1, 2):
         out = tmp_path / f"out{ranks}"
-        settings = {
-            "thickness_mm": {"map": "thickness_mm"},
-            **TIGHT,
-            "fields": ["cortex_weight"],
-        }
-        call = [
-            *command(mesh, out, ranks, **settings),
-            "--maps",
-            str(tmp_path / "maps.h5"),
-        ]
-        done = ran(*call)
+        program = command(mesh, out, ranks, **settings)
+        done = ran(*program, "--maps", str(tmp_path / "maps.h5"))
         assert done.returncode == 0, done.stdout + done.stderr
         ends.append(read_positions(out / "frames.h5", 21.5))
     assert (
@@ -227,13 +185,6 @@ def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_p
     weight = read_field(tmp_path / "out1" / "frames.h5", 21.0, "cortex_weight")
     inside = np.abs(weight - 0.5) < 0.499
     assert weight[inside & (y > 0)].mean() > weight[inside & (y < 0)].mean()
-
-    write_maps(tmp_path / "short.h5", {"thickness_mm": np.ones(7)})
-    call[-1] = str(tmp_path / "short.h5")
-    done = ran(*call)
-    assert done.returncode == 2
-    assert done.stderr == Facts("thickness_mm", 7, len(y))
-    assert done.stderr.count("thickness_mm") == 1
 
 
 def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):

@@ -42,50 +42,50 @@ def test_ranks_on_different_processors_share_code_that_all_can_execute(
     assert len(set(folders.values())) == 3
 
 
-def test_c_code_gets_arrays_of_its_type_and_size_only():
+NUMBERS = np.arange(6.0).reshape(2, 3)
+FIXED = np.arange(6.0)
+FIXED.setflags(write=False)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "size", "is_written", "facts"),
+    [
+        (NUMBERS.astype(np.float32), 6, False, ["float64", "float32"]),
+        (NUMBERS.astype(">f8"), 6, False, ["float64", ">f8"]),
+        (NUMBERS, 7, False, [7, "(2, 3)"]),
+        (NUMBERS.T, 6, False, ["contiguous"]),
+        (FIXED, 6, True, ["read-only"]),
+    ],
+)
+def test_c_code_gets_arrays_of_its_type_and_size_only(numbers, size, is_written, facts):
     interface = cffi.FFI()
-    numbers = np.arange(6.0).reshape(2, 3)
-    assert (
-        interface.cast("double *", pointer(interface, numbers, np.float64, 6))[4] == 4.0
-    )
-    for wrong in (
-        numbers.astype(np.float32),
-        numbers.astype(np.int64),
-        numbers.astype(">f8"),
-    ):
-        with pytest.raises(TypeError, check=Facts("float64", str(wrong.dtype))):
-            pointer(interface, wrong, np.float64, 6)
-    with pytest.raises(ValueError, check=Facts(7, "(2, 3)")):
-        pointer(interface, numbers, np.float64, 7)
-    with pytest.raises(ValueError, match="contiguous"):
-        pointer(interface, numbers.T, np.float64, 6)
-    fixed = numbers.copy()
-    fixed.setflags(write=False)
-    pointer(interface, fixed, np.float64, 6)
-    with pytest.raises(ValueError, match="read-only"):
-        pointer(interface, fixed, np.float64, 6, is_written=True)
+    for whole in (NUMBERS, FIXED):
+        found = pointer(interface, whole, np.float64, 6)
+        assert interface.cast("double *", found)[4] == 4.0
+    with pytest.raises((TypeError, ValueError), check=Facts(*facts)):
+        pointer(interface, numbers, np.float64, size, is_written=is_written)
 
 
 def test_products_refuse_arrays_that_c_code_would_misread():
     blocks, x, y = np.ones((4, 3, 3), np.float32), np.ones(12), np.zeros(12)
     multiply_blocks(blocks, x, y)
     assert y == pytest.approx(3.0)
-    for wrong in (
-        (blocks.astype(float), x, y),
-        (blocks, x.astype(np.float32), y),
-        (blocks, x, y.astype(int)),
-    ):
-        with pytest.raises(TypeError):
-            multiply_blocks(*wrong)
-    for short in ((blocks, x[:9], y), (blocks, x, y[:9])):
-        with pytest.raises(ValueError, check=Facts(12, "(9,)")):
-            multiply_blocks(*short)
-
     motions = PartMotions(np.array([0, 0, 1, 1]), np.ones((4, 3), np.float32))
     assert motions.restrict(x, 2)[:3] == pytest.approx(2.0)
-    with pytest.raises(TypeError):
-        motions.restrict(x.astype(np.float32), 2)
-    with pytest.raises(ValueError, check=Facts(12, "(9,)")):
-        motions.add(np.zeros(12), y[:9])
-    with pytest.raises(TypeError):
-        PartMotions(np.array([0, 0, 1, 1]), np.ones((4, 3))).restrict(x, 2)
+    double = PartMotions(np.array([0, 0, 1, 1]), np.ones((4, 3)))
+    for misread in (
+        lambda: multiply_blocks(blocks.astype(float), x, y),
+        lambda: multiply_blocks(blocks, x.astype(np.float32), y),
+        lambda: multiply_blocks(blocks, x, y.astype(int)),
+        lambda: motions.restrict(x.astype(np.float32), 2),
+        lambda: double.restrict(x, 2),
+    ):
+        with pytest.raises(TypeError):
+            misread()
+    for short in (
+        lambda: multiply_blocks(blocks, x[:9], y),
+        lambda: multiply_blocks(blocks, x, y[:9]),
+        lambda: motions.add(np.zeros(12), y[:9]),
+    ):
+        with pytest.raises(ValueError, check=Facts(12, "(9,)")):
+            short()

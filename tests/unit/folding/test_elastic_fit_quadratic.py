@@ -14,7 +14,6 @@ from gyriflow.geometry.alignment import rigid_fit
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.jacobians import EDGES, inverted_on_the_way, lower_bounds
-from gyriflow.geometry.paths import path_through
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_surface,
@@ -194,26 +193,6 @@ def test_states_whose_curved_elements_fold_over_are_no_stops(caplog):
     # nothing is left to pass: it is said, and the shape stays valid
     assert "inverted" in caplog.text
     assert (lower_bounds(body.positions_mm, mesh.tets) > 0).all()
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_path_reports_the_elements_that_it_inverts_between_two_shapes(order):
-    mesh = bar(order)
-    shapes = [mesh.vertices, twisted(mesh, 1.2 * np.pi), twisted(mesh, 3.6 * np.pi)]
-    path = path_through([21.0, 22.0, 23.0], shapes, mesh, step_gw=1.0)
-    expected = inverted_along(mesh, shapes)
-    assert expected[0] == 0 < expected[1]
-    # alignment takes the weights of the start, not those of the shape before
-    assert [len(faults) for faults in path.inverted] == pytest.approx(expected, abs=2)
-    # the bar's middle turns by half a turn against its ends, which are most of it
-    at = np.abs(mesh.vertices[mesh.corners[path.inverted[1]]].mean(axis=1)[:, 0])
-    assert at.max() < 6.0
-    # in two steps with a shape between, nothing is inverted
-    middle = twisted(mesh, 2.4 * np.pi)
-    whole = path_through(
-        [21.0, 22.0, 22.5, 23.0], [*shapes[:2], middle, shapes[2]], mesh, step_gw=0.25
-    )
-    assert [len(faults) for faults in whole.inverted] == [0, 0, 0]
 
 
 @pytest.mark.parametrize("breaks_another", [False, True])

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ellipsoid import GAP_MM, RUN, brain_mesh
-from shapes import box_mesh, ellipsoid_mesh
+from shapes import box_mesh
 
 from gyriflow.folding.growth import GrowthByRates, StepStart
 from gyriflow.folding.layers import PialSearch, cortical_weight
@@ -25,16 +25,6 @@ def search_of(mesh):
     return PialSearch(mesh.vertices, boundary_faces(mesh)[0])
 
 
-def test_weight_is_half_at_the_cortical_thickness_and_falls_from_one_to_zero():
-    weight = cortical_weight(np.array([0.0, 1.5, 3.0, 1e6]), 1.5)
-    np.testing.assert_allclose(
-        weight,
-        [1 / (1 + np.exp(-10)), 0.5, 1 / (1 + np.exp(10)), 0.0],
-        rtol=1e-12,
-        atol=1e-300,
-    )
-
-
 def test_the_layers_of_a_week_have_its_thickness_stiffness_and_growth():
     mesh = brain_mesh(8)
     by_week = {
@@ -47,20 +37,13 @@ def test_the_layers_of_a_week_have_its_thickness_stiffness_and_growth():
     zones = zones_of_run(mesh, p, GAP_MM)
     growth = GrowthByRates(p, StepStart(mesh.vertices, 0.0, p.step_s))
     names = ["distance", "cortex_weight", "shear_modulus", "growth"]
-    for week, part in ((21.0, 0.0), (22.5, 0.75), (23.0, 1.0)):
-        fields = layer_fields(mesh.vertices, zones, growth, {}, week, names)
-        weight = cortical_weight(fields["distance_to_pial_mm"], 2.0 + part)
-        np.testing.assert_allclose(fields["cortex_weight"], weight, rtol=1e-12)
-        core_pa, cortex_pa = 200.0 + 200.0 * part, 300.0 + 600.0 * part
-        np.testing.assert_allclose(
-            fields["shear_modulus_pa"], core_pa + (cortex_pa - core_pa) * weight
-        )
-        rate = (1 + 2 * part) * 1e-7
-        np.testing.assert_allclose(
-            fields["tangential_growth_per_step"],
-            rate * p.step_s * weight * zones.growing,
-            atol=1e-15,
-        )
+    fields = layer_fields(mesh.vertices, zones, growth, {}, 22.5, names)
+    weight = cortical_weight(fields["distance_to_pial_mm"], 2.75)
+    np.testing.assert_allclose(fields["cortex_weight"], weight, rtol=1e-12)
+    np.testing.assert_allclose(fields["shear_modulus_pa"], 350.0 + 400.0 * weight)
+    expected = 2.5e-7 * p.step_s * weight * zones.growing
+    found = fields["tangential_growth_per_step"]
+    np.testing.assert_allclose(found, expected, atol=1e-15)
 
 
 def test_rates_that_change_with_the_weeks_are_those_of_the_middle_of_a_step():
@@ -92,15 +75,6 @@ def test_distance_is_to_the_triangles_not_to_the_vertices_within_reach():
     assert search.distance(points[:1], reach=1.0)[0] == pytest.approx(5 * np.sqrt(3))
 
 
-def test_normals_on_a_ball_point_outwards_and_have_length_one():
-    mesh = ellipsoid_mesh(8, (10.0, 10.0, 10.0))
-    search = search_of(mesh)
-    points = 9.0 * search.surface.vertices / 10.0
-    normals = search.nearest_normals(points)
-    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, rtol=1e-12)
-    assert np.einsum("ij,ij->i", normals, points / 9.0).min() > 0.97
-
-
 @pytest.mark.parametrize(("order", "degree"), [(1, 1), (2, 3)])
 def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights(
     order, degree
@@ -118,17 +92,6 @@ def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights
             assert points.weights @ (points.barycentric**powers).prod(
                 axis=1
             ) == pytest.approx(exact, rel=1e-12)
-
-
-def test_the_rules_of_both_orders_prefer_no_corner():
-    for order in (1, 2):
-        points = IntegrationPoints.for_order(order)
-        known = {
-            tuple(row)
-            for row in np.column_stack([points.barycentric, points.weights]).round(9)
-        }
-        for change in itertools.permutations(range(4)):
-            assert {(*[key[i] for i in change], key[4]) for key in known} == known
 
 
 def test_smooth_values_are_quadratic_and_bounded_ones_stay_between_the_nodes():

@@ -1,27 +1,22 @@
 """Growth of a step towards shapes: what the path gives, and what feedback makes up
 for."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import box_mesh, ellipsoid_mesh
+from shapes import ellipsoid_mesh
 from verification_cases.growth_maps import WavyBox, errors_of_map
 
 from gyriflow.errors import InputError
-from gyriflow.folding.growth import GrowthInputs, Size, StepStart
+from gyriflow.folding.growth import GrowthInputs, StepStart
 from gyriflow.folding.targets import (
-    FEEDBACK_FROM_MM,
     FEEDBACK_GW,
-    FEEDBACK_SMOOTHING_MM,
-    MAX_SHRINKAGE_PER_DAY,
     TargetGrowth,
     growth_on_path,
     missed_targets,
     path_of_run,
-    shapes_of_run,
     shrinkage_note,
 )
 from gyriflow.folding.tissue import Elements
@@ -30,7 +25,6 @@ from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.paths import path_through
-from gyriflow.geometry.tetrahedra import grid
 from gyriflow.settings.folding import parameters_from
 
 DAY_S, DAY_GW = 86_400.0, 1 / 7
@@ -93,92 +87,12 @@ def test_feedback_makes_up_for_a_misfit_with_its_time_constant(steps):
     assert remaining_share(misfits[0], misfits[-1]) == pytest.approx(expected, abs=0.01)
 
 
-def test_feedback_is_of_the_smooth_part_of_a_misfit():
-    mesh = box_mesh((10, 10, 10), (10.0, 10.0, 10.0))
-    inside = (np.abs(mesh.vertices - mesh.vertices.mean(axis=0)) < 4.5).all(axis=1)
-    assert inside.sum() == 9**3
-    # the shortest wave of a mesh with edges of 1 mm, 2 mm
-    rough = (
-        0.1
-        * np.where(inside, (-1.0) ** np.rint(mesh.vertices).sum(axis=1), 0.0)[:, None]
-        * [1.0, 0.0, 0.0]
-    )
-    before, after = misfits_after_steps(mesh, rough, 1)
-    fed_back = 1 - remaining_share(before, after)
-    # a step of diffusion keeps 1 / (1 + σ² k² / 2) of a wave, here of k² = 12/h² (the
-    # largest eigenvalue of the grid)
-    kept = 1 / (1 + FEEDBACK_SMOOTHING_MM**2 * 12 / 2)
-    assert fed_back == pytest.approx(
-        kept * (1 - np.exp(-DAY_GW / FEEDBACK_GW)), rel=0.3
-    )
-
-
-def test_misfits_of_the_solver_are_not_made_up_for():
-    direction = np.sin(BODY.vertices[:, [1, 2, 0]] / 8)
-    before, after = misfits_after_steps(BODY, 0.5 * FEEDBACK_FROM_MM * direction, 1)
-    assert remaining_share(before, after) == pytest.approx(1.0, abs=1e-3)
-
-
 def test_a_map_of_growth_has_the_error_of_its_elements():
     coarse, fine = (errors_of_map(WavyBox(30.0, 30.0, nodes)) for nodes in (8, 16))
     for name in ("tensor", "area"):
         assert fine[name] < 0.6 * coarse[name]
         assert fine[name] < 2.5 / fine["per_wave"]
     assert coarse["slope"] < fine["slope"] < 1.01
-
-
-UNEVEN = grid(
-    [
-        np.array([-8, -7, -6, -5, 0, 5, 10.0]),
-        np.linspace(-6, 6, 5),
-        np.linspace(-5, 5, 5),
-    ]
-)
-"""A box whose elements on the right are five times as long as those on the left."""
-
-
-def test_a_misfit_and_the_motion_before_it_are_means_over_volume():
-    # half a millimetre on the left, where most vertices are
-    p = parameters_from(RUN)
-    inputs = GrowthInputs(UNEVEN, zones_of_run(UNEVEN, p), {})
-    path = path_through([21.0, 23.0], [UNEVEN.vertices, UNEVEN.vertices], UNEVEN)
-    off = UNEVEN.vertices + np.where(
-        UNEVEN.vertices[:, :1] < -4.5, [0.0, 0.0, 0.5], 0.0
-    )
-    found = growth_on_path(p, inputs, path, StepStart(off, 0.0, DAY_S)).misfit_mm
-    sizes, even = vertex_sizes(off, UNEVEN.tets), np.ones(len(off))
-
-    def misfit(aligned_by, weights):
-        left = without_rigid_motion(off, UNEVEN.vertices, aligned_by)
-        return np.sqrt(np.average((left**2).sum(axis=1), weights=weights))
-
-    assert found == pytest.approx(misfit(sizes, sizes), rel=0.01)
-    assert abs(found / misfit(even, sizes) - 1) > 0.03
-    assert abs(found / misfit(sizes, even) - 1) > 0.03
-
-
-def test_a_path_ends_with_its_last_shape_though_the_step_goes_on():
-    p = parameters_from(RUN)
-    inputs = GrowthInputs(BODY, zones_of_run(BODY, p), {})
-    path = path_through([21.0, 23.0], [BODY.vertices, 1.1 * BODY.vertices], BODY)
-    time_s = 13.5 * DAY_S
-    growth = growth_on_path(
-        p, inputs, path, StepStart(path(21.0 + 13.5 * DAY_GW), time_s, DAY_S)
-    )
-    assert growth.goal_mm == pytest.approx(1.1 * BODY.vertices, abs=1e-3)
-
-
-def test_elements_that_shrink_by_more_than_a_share_of_their_volume_a_day_are_counted():
-    p = parameters_from(RUN | {"step_s": 2 * DAY_S})
-    inputs = GrowthInputs(UNEVEN, zones_of_run(UNEVEN, p), {})
-    # a layer that shrinks to its half in two days
-    later = UNEVEN.vertices.copy()
-    later[UNEVEN.vertices[:, 0] > -7.5, 0] -= 0.5
-    path = path_through([21.0, 21.0 + 2 * DAY_GW], [UNEVEN.vertices, later], UNEVEN)
-    start = StepStart(UNEVEN.vertices, 0.0, 2 * DAY_S)
-    layer = UNEVEN.vertices[UNEVEN.tets, 0].max(axis=1) < -6.5
-    assert 2 * MAX_SHRINKAGE_PER_DAY < 0.5
-    assert growth_on_path(p, inputs, path, start).shrinking == layer.sum()
 
 
 def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goal():
@@ -206,14 +120,6 @@ def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goa
     for found, stretch in zip(inverse, (1.5, np.exp(0.7), 1.0), strict=True):
         assert found == pytest.approx(np.diag([1 / stretch, 1.0, 1.0]))
     assert (growth.held, counted) == ([2], [2])
-    row = replace(growth, misfit_mm=0.3, shrinking=5).row(Size(200.0, 3000.0))
-    assert row == {
-        "area_cm2": 2.0,
-        "volume_ml": 3.0,
-        "to_path_mm": 0.3,
-        "held_elements": 2,
-        "shrinking_elements": 5,
-    }
     fixed = np.arange(36).reshape(12, 3) % 5 == 0
     guess = growth.guess(fixed)
     assert (guess[fixed] == 0).all()
@@ -239,14 +145,13 @@ def test_a_run_off_its_path_tells_how_far_and_how_many_elements_were_held_in_any
 
 
 def test_shapes_of_a_run_are_those_after_its_start_and_reach_to_its_end():
-    shape = dict(
-        zip(("target_x", "target_y", "target_z"), (1.1 * BODY.vertices).T, strict=True)
-    )
+    x, y, z = 1.1 * BODY.vertices.T
+    shape = {"target_x": x, "target_y": y, "target_z": z}
     p = parameters_from(RUN | {"targets": {21.0: "earlier", 23.0: "target"}})
-    weeks, shapes = shapes_of_run(p, shape, BODY.vertices)
-    assert weeks == [21.0, 23.0]
-    assert shapes[1] == pytest.approx(1.1 * BODY.vertices)
+    inputs = GrowthInputs(BODY, zones_of_run(BODY, p), shape)
+    path = path_of_run(p, inputs)
+    assert list(path.weeks) == [21.0, 23.0]
+    assert path(23.0) == pytest.approx(1.1 * BODY.vertices, abs=1e-6)
     short = parameters_from(RUN | {"targets": {22.9: "target"}})
-    inputs = GrowthInputs(BODY, zones_of_run(BODY, short), shape)
     with pytest.raises(InputError, check=Facts("22.9 GW", "23 GW")):
         path_of_run(short, inputs)

@@ -3,7 +3,7 @@ symmetry."""
 
 import numpy as np
 import pytest
-from ellipsoid import CENTRE_MM, GAP_MM, RUN, brain_mesh
+from ellipsoid import CENTRE_MM, RUN, brain_mesh
 from facts import Facts
 from shapes import box_mesh
 from verification_cases.boxes import box_zones
@@ -11,19 +11,14 @@ from verification_cases.boxes import box_zones
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding import zones as zones_module
 from gyriflow.folding.checks import refuse_impossible, zone_report
-from gyriflow.folding.zones import brain_box, cell_tags, inside_ellipsoid, zones_of_run
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from gyriflow.geometry.triangles import TriangleMesh, area, face_areas
+from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import (
-    BRIDGE,
+    BETWEEN_PLANES,
     CLAMPED,
-    CORE,
-    CORTEX,
-    LEFT,
     LEFT_CONTACT,
     MEDIAL_WALL,
-    RIGHT,
     RIGHT_CONTACT,
 )
 
@@ -46,17 +41,6 @@ def brain():
     return brain_mesh(12)
 
 
-def test_the_ellipsoid_is_where_the_model_puts_it():
-    box = np.array([[-10.0, -20.0, -30.0], [10.0, 20.0, 30.0]]) + CENTRE_MM
-    centre = CENTRE_MM + np.array([0.0, 0.05 * 40, -0.15 * 60])
-    tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])
-    points = np.concatenate(
-        [box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)]
-    )
-    inside = inside_ellipsoid(points, *brain_box(points))
-    assert inside.tolist() == [False, False, True, True, True, False, False, False]
-
-
 def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
     zones = find_zones(brain)
     x = brain.vertices[zones.facets, 0] - MIDDLE_MM
@@ -70,15 +54,19 @@ def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
     )
 
 
-def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
+def test_nothing_in_the_model_s_ellipsoid_grows_and_its_facets_are_clamped(brain):
     zones = find_zones(brain)
-    clamped = zones.vertices_of(CLAMPED)
-    assert len(clamped)
-    inside = inside_ellipsoid(brain.vertices, *brain_box(brain.vertices))
-    assert inside[clamped].all()
-    # nothing inside grows, at the surface or below it
-    assert inside.sum() > 2 * len(clamped)
+    low, high = brain.vertices.min(axis=0), brain.vertices.max(axis=0)
+    middle, extent = (low + high) / 2, high - low
+    centre = middle + [0.0, 0.05, -0.15] * extent
+    semi_axes = [0.35, 0.40, 0.50] * extent
+    inside = (((brain.vertices - centre) / semi_axes) ** 2).sum(axis=1) <= 1
     assert (zones.growing[inside] == 0).all()
+    is_clamped = inside[zones.facets].all(axis=1) & (zones.facet_zone != LEFT_CONTACT)
+    is_clamped &= zones.facet_zone != RIGHT_CONTACT
+    is_clamped &= zones.facet_zone != BETWEEN_PLANES
+    np.testing.assert_array_equal(zones.facet_zone == CLAMPED, is_clamped)
+    assert inside.sum() > 2 * is_clamped.sum() > 0
 
 
 @pytest.mark.usefixtures("tiny_ellipsoid")
@@ -96,13 +84,13 @@ def test_tissue_that_bridges_the_planes_does_not_grow():
 def test_the_planes_follow_the_fissure(gap):
     """Walls of separate hemispheres have contact and grow at any distance; the planes
     stay within the paper's."""
-    boxes = [box_mesh((4, 3, 3), (8.0, 6.0, 6.0)) for _ in range(2)]
-    x = [
-        mesh.vertices + CENTRE_MM + [shift, 0.0, 0.0]
-        for mesh, shift in zip(boxes, (-4 - gap / 2, 4 + gap / 2), strict=True)
-    ]
-    tets = [boxes[0].tets, boxes[1].tets + len(x[0])]
-    pair = TetrahedralMesh(np.concatenate(x), np.concatenate(tets))
+    half = box_mesh((4, 3, 3), (8.0, 6.0, 6.0))
+    shift = np.array([4 + gap / 2, 0.0, 0.0])
+    vertices = CENTRE_MM + np.concatenate(
+        [half.vertices - shift, half.vertices + shift]
+    )
+    tets = np.concatenate([half.tets, half.tets + len(half.vertices)])
+    pair = TetrahedralMesh(vertices, tets)
     zones = find_zones(pair)
     planes = min(gap / 2, 0.625)
     expected = [MIDDLE_MM - planes, MIDDLE_MM + planes]
@@ -122,47 +110,6 @@ def test_tissue_between_the_planes_does_not_grow_with_planes(brain):
     assert (zones.growing[(left < x) & (x < right)] == 0).all()
 
 
-def test_the_report_adds_up(brain):
-    zones = find_zones(brain)
-    report = zone_report(brain, zones, 3.0)
-    assert sum(zone["facets"] for zone in report["zones"].values()) == len(zones.facets)
-    surface = TriangleMesh(brain.vertices, zones.facets)
-    areas = [zone["area_mm2"] for zone in report["zones"].values()]
-    assert sum(areas) == pytest.approx(area(surface))
-    assert report["zones"]["clamped"]["facets"] == (zones.facet_zone == CLAMPED).sum()
-    assert report["initial_penetration_mm"] == 0
-    assert report["clamped_share"]["left"] == pytest.approx(
-        report["clamped_share"]["right"], rel=0.05
-    )
-
-
-def test_the_clamped_share_is_that_of_the_area_on_each_side_of_the_fissure(brain):
-    # 6 mm beside the middle, so that the sides differ
-    zones = find_zones(brain, fissure_x_mm=MIDDLE_MM + 6.0)
-    shares = zone_report(brain, zones, 3.0)["clamped_share"]
-    triangles = brain.vertices[zones.facets]
-    areas = face_areas(TriangleMesh(brain.vertices, zones.facets))
-    is_clamped = zones.facet_zone == CLAMPED
-    on_left = triangles[:, :, 0].mean(axis=1) < MIDDLE_MM + 6.0
-    for side, mask in (("left", on_left), ("right", ~on_left)):
-        expected = areas[mask & is_clamped].sum() / areas[mask].sum()
-        assert shares[side] == pytest.approx(expected)
-    assert abs(shares["left"] - shares["right"]) > 0.02
-
-
-def test_elements_through_the_cortex_are_counted_by_the_edges_in_it():
-    box = box_mesh((8, 8, 8), (8.0, 8.0, 8.0))
-    vertices = box.vertices + CENTRE_MM
-    # the inner half is made of longer elements
-    depth = np.abs(box.vertices).max(axis=1)
-    vertices += box.vertices * np.where(depth < 2.5, 0.3, 0.0)[:, None]
-    mesh = TetrahedralMesh(vertices, box.tets)
-    zones = find_zones(mesh, contact="none", support="free")
-    edge = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
-    found = zone_report(mesh, zones, 0.8)["elements_through_cortex"]
-    assert found == pytest.approx(0.8 / edge)
-
-
 def test_few_walls_lie_between_the_planes(brain):
     zones = zone_report(brain, find_zones(brain, 20.0), 8.0)["zones"]
     assert zones["between planes"]["area_mm2"] <= 0.01 * sum(
@@ -172,10 +119,7 @@ def test_few_walls_lie_between_the_planes(brain):
 
 def test_the_sides_of_a_box_slide_in_their_planes():
     box = box_mesh((4, 3, 2), (8.0, 6.0, 4.0))
-    values = {
-        "contact": "none",
-        "support": "free",
-    }
+    values = {"contact": "none", "support": "free"}
     zones = box_zones(box, parameters_from(RUN | values))
     x, y, z = box.vertices.T
     low = z == -2.0
@@ -213,8 +157,6 @@ def half(side):
     """Return the half of an ellipsoid on one side of its middle, flat there."""
     mesh = brain_mesh(12)
     sign = -1.0 if side == "left" else 1.0
-    # pressed flat: the other half becomes a sheet, so only elements of one side are
-    # kept
     x = mesh.vertices[mesh.tets, 0] - MIDDLE_MM
     kept = (sign * x).min(axis=1) > -1e-9
     used, tets = np.unique(mesh.tets[kept], return_inverse=True)
@@ -235,11 +177,8 @@ def test_the_medial_wall_of_a_single_hemisphere_slides_in_its_plane(side):
     assert zones.penetration_mm(mesh.vertices) == 0.0
     assert not zones.vertices_of(RIGHT_CONTACT if side == "left" else LEFT_CONTACT).size
     # without cortex, but part of the area that is measured
-    assert (
-        not np.isin(zones.facets[zones.facet_zone == MEDIAL_WALL], zones.cortex_facets)
-        .all(axis=1)
-        .all()
-    )
+    n_wall = (zones.facet_zone == MEDIAL_WALL).sum()
+    assert len(zones.cortex_facets) == len(zones.facets) - n_wall
     assert len(zones.measured_facets) == len(zones.facets)
     refuse_impossible(mesh, zones)
 
@@ -259,28 +198,3 @@ def test_a_sliding_wall_alone_leaves_no_rigid_motion():
     assert np.linalg.matrix_rank(fixed) == 6
     assert zones.fixed[:, 1:].sum() == 3
     refuse_impossible(mesh, zones)
-
-
-def test_elements_are_left_right_or_between_the_planes():
-    mesh = brain_mesh(12)
-    tags = cell_tags(
-        mesh,
-        find_zones(mesh, GAP_MM),
-        (mesh.vertices[:, 1] > CENTRE_MM[1]).astype(float),
-    )
-    growing = find_zones(mesh, GAP_MM).growing[mesh.tets]
-    assert set(tags["growing"][(growing > 0).any(axis=1)]) == {1}
-    assert set(tags["growing"][(growing == 0).all(axis=1)]) == {0}
-    y = mesh.vertices[mesh.tets, 1] - CENTRE_MM[1]
-    assert set(tags["layer"][y.min(axis=1) > 0]) == {CORTEX}
-    assert set(tags["layer"][y.max(axis=1) <= 0]) == {CORE}
-    x = mesh.vertices[mesh.tets, 0].mean(axis=1) - MIDDLE_MM
-    # the planes stand a quarter of the gap to both sides
-    np.testing.assert_array_equal(tags["hemisphere"] == LEFT, x <= -2.0)
-    np.testing.assert_array_equal(tags["hemisphere"] == RIGHT, x >= 2.0)
-    assert (np.abs(x[tags["hemisphere"] == BRIDGE]) < 2.0).all()
-    # the numbers that docs/outputs.md has
-    assert (LEFT, RIGHT, BRIDGE, CORTEX, CORE) == (1, 2, 3, 1, 2)
-    volumes = signed_volumes(mesh)
-    left, right = (volumes[tags["hemisphere"] == side].sum() for side in (LEFT, RIGHT))
-    assert left == pytest.approx(right)
