@@ -66,7 +66,7 @@ def test_an_element_that_inverts_between_its_points_is_detected():
         moved = np.zeros_like(mesh.vertices)
         moved[middle] = part * (mesh.vertices[b] - mesh.vertices[a])
         u = problem.domain.local(moved * M_PER_MM)
-        bounds.append(problem.smallest_volume_ratio(u))
+        bounds.append(problem.domain.smallest_volume_ratio(u))
         inside = np.linalg.det(problem.evaluate("deformation", u))
         assert problem.domain.min_over_ranks(inside) > 0
     assert bounds[0] > 0 >= bounds[1]

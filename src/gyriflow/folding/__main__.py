@@ -35,7 +35,7 @@ from .zones import zones_of_run
 log = logging.getLogger(__name__)
 
 
-def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+def _parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Parse the command line."""
     parser = argparse.ArgumentParser(
         prog="python -m gyriflow.folding", description=__doc__
@@ -122,7 +122,7 @@ def require_space(
         )
 
 
-def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
+def _fold(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Read and check the inputs, print a summary of them, and run the simulation."""
     parameters = parameters_from(read_yaml(arguments.params))
     mesh = comm.bcast(
@@ -194,7 +194,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
 
 
 def _guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
-    """Run `main` with the folder locked, and end every rank with the exit code of the
+    """Run `_fold` with the folder locked, and end every rank with the exit code of the
     first error."""
     try:
         if comm.rank == 0:
@@ -206,9 +206,9 @@ def _guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
                     format="warning: %(message)s",
                     handlers=[printer, MessageHandler(arguments.log)],
                 )
-                main(comm, arguments)
+                _fold(comm, arguments)
         else:
-            main(comm, arguments)
+            _fold(comm, arguments)
     except Exception as error:
         message = error_message(error)
         if message.exit_code == 1:
@@ -228,4 +228,4 @@ def _guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
 
 
 if __name__ == "__main__":
-    _guarded(MPI.COMM_WORLD, parse())
+    _guarded(MPI.COMM_WORLD, _parse())

@@ -1,4 +1,4 @@
-"""Compilation of forms and C code. Each kind of processor has a cache, where one
+"""Compilation of forms and C code. Each kind of _processor has a cache, where one
 process compiles at a time."""
 
 import hashlib
@@ -31,7 +31,7 @@ NATIVE = "-march=native"
 COMPILER_ARGUMENTS = ["-O3", NATIVE, *REORDERED_SUMS]
 
 
-def processor() -> str:
+def _processor() -> str:
     """Return a text that differs between processors for which -march=native gives
     different code."""
     cpuinfo = Path("/proc/cpuinfo")
@@ -52,7 +52,7 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     Ranks on different processors share code without `NATIVE`.
     """
     set_compiler()
-    processors = set(comm.allgather(processor()))
+    processors = set(comm.allgather(_processor()))
     arguments = list(COMPILER_ARGUMENTS)
     if len(processors) == 1:
         kind = hashlib.sha256(processors.pop().encode()).hexdigest()[:8]

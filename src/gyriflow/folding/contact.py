@@ -77,10 +77,9 @@ class SelfContact:
     Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the
     start of the step. `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is
     the barrier's initial stiffness. The contact distance is the given `distance_mm`, or
-    else by the edge lengths at each step's start (`contact_distance_mm`), but below the
-    small gap at the start of the run, neighbours aside: a body that does not grow must
-    not move, except where neighbours on thin triangles or a few vertices are nearer to
-    each other. `stiffens` is for runs with stress memory. MeshError where the surface
+    else by the edge lengths at each step's start, but below the small gap at the start
+    of the run, neighbours aside: a body that does not grow must not move, except where
+    neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory. MeshError where the surface
     crosses itself at the start.
 
     Attributes: contact distance d̂, `distance_mm`, and stiffness κ of the barrier,
@@ -167,7 +166,7 @@ class SelfContact:
         self._rest = self.surface.reference_mm()
         lengths = edge_lengths(self._rest, self._edges)
         # from rank 0, as above
-        by_edges = self.domain.comm.bcast(contact_distance_mm(lengths), root=0)
+        by_edges = self.domain.comm.bcast(_contact_distance_mm(lengths), root=0)
         self.distance_mm = self._given_mm or min(by_edges, self._max_mm)
         self._search = ContactSearch(
             self.surface.faces,
@@ -248,7 +247,8 @@ class SelfContact:
 
     def add_forces(self, u: Floats, out: Floats) -> None:
         """Add the forces in N to the owned components (3 · n_owned,) of a vector."""
-        self.surface.add_to(out, self.forces(u))
+        surface = self.surface
+        out.reshape(-1, 3)[surface.local] += self.forces(u)[surface.rows]
 
     def stiffness(self, u: Floats, *, convex: bool = False) -> PETSc.Mat | None:
         """Return the second derivative in N/m, None without any pair; `convex` makes
@@ -313,7 +313,7 @@ class SelfContact:
         return values
 
 
-def contact_distance_mm(lengths: Floats) -> float:
+def _contact_distance_mm(lengths: Floats) -> float:
     """Return the contact distance d̂ in mm for a surface whose edges have (e,) lengths
     in mm."""
     by_mean = DISTANCE_PER_MEAN_EDGE * float(lengths.mean())

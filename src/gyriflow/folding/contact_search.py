@@ -48,19 +48,6 @@ class SearchRange:
     last: Floats
     reach: float
 
-    def covers(self, distance_mm: float, *positions: Floats) -> bool:
-        """Return whether the search has found all pairs within a distance at other
-        positions."""
-        margin = self.reach - distance_mm / 2
-        if np.isinf(margin):
-            return True
-        low = np.minimum(self.first, self.last) - margin
-        high = np.maximum(self.first, self.last) + margin
-        for places in positions:
-            if (places < low).any() or (places > high).any():
-                return False
-        return True
-
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:
@@ -191,7 +178,7 @@ class ContactSearch:
     def part_at(self, *positions: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh]:
         """Return a part of the surface with all pairs of the rank, at each of the given
         (s, 3) positions in mm."""
-        if self._part is None or not self._part[1].covers(self._distance, *positions):
+        if self._part is None or not self._covers(self._part[1], *positions):
             self._part = self._new_part(*positions)
             # candidates refer to vertex numbers of the old part
             self._mesh = None
@@ -223,11 +210,23 @@ class ContactSearch:
         )
         return part, covered
 
+    def _covers(self, searched: SearchRange, *positions: Floats) -> bool:
+        """Return whether a search has found all pairs at other positions."""
+        margin = searched.reach - self._distance / 2
+        if np.isinf(margin):
+            return True
+        low = np.minimum(searched.first, searched.last) - margin
+        high = np.maximum(searched.first, searched.last) + margin
+        for places in positions:
+            if (places < low).any() or (places > high).any():
+                return False
+        return True
+
     def _candidates_at(self, *positions: Floats) -> ipctk.Candidates | None:
         if self._candidates is None:
             return None
         candidates, covered = self._candidates
-        return candidates if covered.covers(self._distance, *positions) else None
+        return candidates if self._covers(covered, *positions) else None
 
     def _search(
         self, first: Floats, last: Floats

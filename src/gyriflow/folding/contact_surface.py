@@ -127,7 +127,8 @@ class ContactSurface:
     Attributes: the mesh vertices on the surface, `nodes` (n,); the triangles, `faces`
     (f, 3), by the numbers of the surface's own s vertices; and `weights` (s, n), which
     interpolate from the nodes to these s vertices. The first n of the s vertices are
-    the nodes themselves.
+    the nodes themselves. `local` are the owned nodes (o,) on the surface, `rows` their
+    places (o,) among `nodes`.
     """
 
     def __init__(self, domain: Domain, facets: Ints) -> None:
@@ -138,8 +139,8 @@ class ContactSurface:
         if domain.order == 2:
             self.weights, faces = finer_surface(faces)
         self.faces = faces
-        self._local, self._rows = domain.owned_rows(self.nodes)
-        self._rows_by_rank = domain.comm.allgather(self._rows)
+        self.local, self.rows = domain.owned_rows(self.nodes)
+        self._rows_by_rank = domain.comm.allgather(self.rows)
         self._gathered_rows = np.concatenate(self._rows_by_rank)
         self._columns = domain.node_of_vertex[self.nodes]
         self._part: SurfacePart | None = None
@@ -155,7 +156,7 @@ class ContactSurface:
         m."""
         nodal = gather(
             self.domain.comm,
-            u[self._local],
+            u[self.local],
             self._gathered_rows,
         )
         return np.asarray(self.weights @ nodal * MM_PER_M)
@@ -165,11 +166,6 @@ class ContactSurface:
         to the nodes."""
         self._interpolate(part)
         return self.domain.sum_over_ranks(self._part_weights.T @ values)
-
-    def add_to(self, out: Floats, nodal: Floats) -> None:
-        """Add (n, 3) values at the nodes to the owned components (3 · n_owned,) of a
-        vector."""
-        out.reshape(-1, 3)[self._local] += nodal[self._rows]
 
     def matrix_sum(
         self, part: SurfacePart, matrix: sparse.csc_matrix | None
@@ -188,7 +184,7 @@ class ContactSurface:
         # each rank receives the rows that it owns from all others
         own = rows_for[comm.rank]
         rows_for[comm.rank] = None
-        rows = sparse.csr_matrix((3 * len(self._rows), 3 * len(self.nodes)))
+        rows = sparse.csr_matrix((3 * len(self.rows), 3 * len(self.nodes)))
         for block in (own, *comm.alltoall(rows_for)):
             if block is not None:
                 rows = rows + block
@@ -196,7 +192,7 @@ class ContactSurface:
             (self.domain.n_owned, 3),
             dtype=PETSc.IntType,
         )
-        counts[self._local] = np.diff(rows.indptr).reshape(-1, 3)
+        counts[self.local] = np.diff(rows.indptr).reshape(-1, 3)
         # owned rows are in the order of the nodes
         start = np.concatenate([[0], np.cumsum(counts)]).astype(PETSc.IntType)
         node, component = np.divmod(rows.indices, 3)

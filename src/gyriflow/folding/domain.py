@@ -107,8 +107,8 @@ class Domain:
     the connected `part` of the mesh (n,), and the global node `node_of_vertex` (n,).
     For the local nodes, the first `n_owned` owned and the others ghosts: the vertex
     `vertex_of_node` (k,). For the local elements: their nodes in the file's order,
-    `cells` (c, 4) or (c, 10), their index in the file `tet_of_cell` (c,), and their
-    `volumes` (c,) in m³.
+    `cells` (c, 4) or (c, 10), those at the `corners` (c, 4), their index in the file
+    `tet_of_cell` (c,), and their `volumes` (c,) in m³.
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
@@ -135,6 +135,7 @@ class Domain:
         )
         nodes_of_cells = self.space.dofmap.list
         self.cells = np.ascontiguousarray(nodes_of_cells[:, FROM_DOLFINX[self.order]])
+        self.corners = self.cells[:, : NODES_OF_ORDER[1]]
         index_map = self.space.dofmap.index_map
         self.n_owned = index_map.size_local
         n_nodes = self.n_owned + index_map.num_ghosts
@@ -209,11 +210,6 @@ class Domain:
         self.mesh.geometry.x[self._geometry_node] = nodes
         self._measure(nodes)
 
-    @property
-    def corners(self) -> NDArray[np.int32]:
-        """Local nodes (c, 4) at the corners of the local elements."""
-        return self.cells[:, : NODES_OF_ORDER[1]]
-
     def _measure(self, node_positions: Floats) -> None:
         self.volumes = volumes_between(node_positions, self.cells)
         if self.order == 2:
@@ -222,29 +218,31 @@ class Domain:
             )
             self._upper_bounds = coefficients(node_positions, self.cells).max(axis=1)
 
-    def volume_ratios(self, node_positions: Floats) -> Floats:
-        """Return det F after a move of the local nodes to (k, 3) positions in m.
+    def volume_ratios(self, u: Floats) -> Floats:
+        """Return det F after displacements (k, 3) of the local nodes in m.
 
         It has one value in a linear element, (c, 1), and one at each node of a
         quadratic one, (c, 10).
         """
+        node_positions = self.local(self.positions) + u
         if self.order == 1:
             ratios = volumes_between(node_positions, self.cells) / self.volumes
             return ratios[:, None]
         after = jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
         return after / self._determinants_at_nodes
 
-    def smallest_volume_ratio(self, node_positions: Floats) -> float:
-        """Return a lower bound of det F after a move, over the elements of all ranks.
+    def smallest_volume_ratio(self, u: Floats) -> float:
+        """Return a lower bound of det F after displacements, over the elements of all
+        ranks.
 
         It is positive only if no element is inverted anywhere. In linear elements it is
         the smallest det F. In quadratic ones, where det F varies, it is the ratio of a
-        lower bound of the Jacobian determinant after the move to an upper bound of that
+        lower bound of the Jacobian determinant after them to an upper bound of that
         before.
         """
         if self.order == 1:
-            return self.min_over_ranks(self.volume_ratios(node_positions))
-        after = lower_bounds(node_positions, self.cells)
+            return self.min_over_ranks(self.volume_ratios(u))
+        after = lower_bounds(self.local(self.positions) + u, self.cells)
         return self.min_over_ranks(after / self._upper_bounds)
 
     def min_over_ranks(self, local_values: Floats) -> float:

@@ -438,7 +438,7 @@ class ElasticFit:
             faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
                 return before + displacement, faults
-            near = nearness(before, faults, length)[:, None]
+            near = _nearness(before, faults, length)[:, None]
             integrals = sizes[:, None] * displacement
             smooth = smooth_integrals(before, self._pieces, integrals, length)
             displacement = displacement + near * (smooth - displacement)
@@ -617,7 +617,7 @@ class ElasticFit:
         for length_mm in (0.0, *HOLDING_MM):
             trial = places
             if len(held):
-                near = nearness(places, held, length_mm)[:, None]
+                near = _nearness(places, held, length_mm)[:, None]
                 trial = places + near * (start - places)
             trial = straighten_sides(trial, self._tets)
             is_fault = self._faults_at(trial)
@@ -794,11 +794,11 @@ class ElasticFit:
             1.0,
         )
         taken_back = weight[:, None, None] * excess[flat]
-        stretches[near[flat], 0] = exponential(taken_back, MAX_OPENING)
+        stretches[near[flat], 0] = _exponential(taken_back, MAX_OPENING)
         return stretches
 
 
-def nearness(
+def _nearness(
     places: Floats,
     faults: Floats,
     length_mm: float,
@@ -810,7 +810,7 @@ def nearness(
     return np.asarray(np.exp(-((distance / reach_mm) ** 2)))
 
 
-def exponential(logs: Floats, limit: float) -> Floats:
+def _exponential(logs: Floats, limit: float) -> Floats:
     """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the
     limit count as this."""
     values, axes = np.linalg.eigh(logs)

@@ -238,7 +238,7 @@ class LinearSolver:
         self._cg.setTolerances(rtol=reduction)
         # a tangent after an indefinite one may still be indefinite
         first = max(self._level - 1, 0)
-        if convexify and not self._problem.convex:
+        if convexify and self._problem.contributions:
             # surfaces pressed together tend to slide sideways, which makes the tangent
             # indefinite; with semidefinite contact it rarely is, but it is not exact
             if first == 0:

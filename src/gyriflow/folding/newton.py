@@ -213,7 +213,7 @@ class NewtonSolver:
         problem = self.problem
         for guess in map(problem.without_rigid_motion, guesses):
             u = problem.max_step(at_rest.displacement, guess) * guess
-            if problem.smallest_volume_ratio(u) > 0:
+            if problem.domain.smallest_volume_ratio(u) > 0:
                 residual = problem.residual(u)
                 if residual.norm < 0.5 * at_rest.norm:  # false for NaN
                     return residual
@@ -243,7 +243,7 @@ class NewtonSolver:
         slope = direction.slope
         before = iterate.energy
         is_convex = direction.convex
-        if not problem.convex:
+        if problem.contributions:
             # the energy is compared wherever its change is above round-off
             before = problem.energy(start) if before is None else before
             is_convex = is_convex and abs(slope) <= MIN_RESOLVED * abs(before)
@@ -252,9 +252,9 @@ class NewtonSolver:
         for halvings in range(self.settings.max_backtracks):
             length = longest / 2**halvings
             u = start + length * direction.values
-            has_volume = problem.smallest_volume_ratio(u) > 0  # False for NaN
+            has_volume = problem.domain.smallest_volume_ratio(u) > 0  # False for NaN
             if not has_volume:
-                self.inverted = problem.volume_ratios(u)
+                self.inverted = problem.domain.volume_ratios(u)
                 continue
             trial = problem.residual(u)
             is_finite = np.isfinite(trial.norm)
@@ -287,7 +287,7 @@ class NewtonSolver:
         last = self.last or problem.residual(problem.rest())
         ratios = self.inverted
         if ratios is None:
-            ratios = problem.volume_ratios(last.displacement)
+            ratios = domain.volume_ratios(last.displacement)
         nodes_mm = domain.local(domain.positions) * MM_PER_M
         centres_mm = nodes_mm[domain.corners].mean(axis=1)
         ratio, tet, centre = domain.locate_minimum(

@@ -61,7 +61,8 @@ class NonlinearProblem:
 
     With `has_planes`, planes at the fissure press back by `PLANE_PENALTY_PA_PER_M`.
 
-    Attributes: further `contributions` to the energy, whether the body is `free` of
+    Attributes: further `contributions` to the energy (without any, it is convex except
+    for large rotations), whether the body is `free` of
     supports, and the q integration `points` of each element.
     """
 
@@ -333,12 +334,6 @@ class NonlinearProblem:
         semidefinite."""
         tangent.parts = self._stiffness_parts(u, convex=True)
 
-    @property
-    def convex(self) -> bool:
-        """True if the energy is convex except for large rotations, that is without
-        contributions."""
-        return not self.contributions
-
     def _stiffness_parts(self, u: Floats, *, convex: bool) -> list[PETSc.Mat]:
         parts = []
         for contribution in self.contributions:
@@ -353,19 +348,6 @@ class NonlinearProblem:
         contributions allow to add to u."""
         steps = [part.max_step(u, direction) for part in self.contributions]
         return min(steps, default=1.0)
-
-    def volume_ratios(self, u: Floats) -> Floats:
-        """Return det F of the local elements: (c, 1), or (c, 10) at the nodes of
-        quadratic ones."""
-        return self.domain.volume_ratios(self._moved(u))
-
-    def smallest_volume_ratio(self, u: Floats) -> float:
-        """Return a lower bound of det F: positive only where no element is inverted
-        anywhere."""
-        return self.domain.smallest_volume_ratio(self._moved(u))
-
-    def _moved(self, u: Floats) -> Floats:
-        return np.asarray(self.domain.local(self.domain.positions) + u)
 
 
 def _set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:

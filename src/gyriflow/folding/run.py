@@ -93,7 +93,7 @@ def run(
     join_frames(
         out / FRAMES,
         mesh.tets,
-        [frame_path(folder, week) for week in weeks],
+        [_frame_path(folder, week) for week in weeks],
     )
     seconds = time.monotonic() - began
     summary = {
@@ -101,7 +101,7 @@ def run(
         "dofs": 3 * len(mesh.vertices),
         "pial_faces": len(zones.facets),
         "ranks": comm.size,
-        **steps_summary(state.rows),
+        **_steps_summary(state.rows),
         "seconds": seconds,
         "cpu_seconds": processor,
         "peak_memory_MiB": memory,
@@ -223,7 +223,7 @@ def _save_frame(
             logs,
         )
         write_frame(
-            frame_path(folder, week),
+            _frame_path(folder, week),
             week,
             fields | at_vertices,
             at_elements,
@@ -258,7 +258,7 @@ def report_step(
     )
 
 
-def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
+def _steps_summary(rows: Sequence[dict]) -> dict[str, float]:
     """Return totals over the step table."""
     seconds = [row["seconds"] for row in rows]
     return {
@@ -311,7 +311,7 @@ def load_state(
         if seconds <= state.time_s * (1 + 1e-12):
             passed[week] = seconds
     problem = ""
-    if not all(frame_path(folder, week).exists() for week in passed):
+    if not all(_frame_path(folder, week).exists() for week in passed):
         problem = "lacks frames of some output weeks"
     elif parameters.targets:
         since = state.time_s - state.growth_s
@@ -331,7 +331,7 @@ def load_state(
     return replace(state, rows=tuple(rows)), message
 
 
-def frame_path(folder: Path, week: float) -> Path:
+def _frame_path(folder: Path, week: float) -> Path:
     """Return the file of a single frame, which exists until the run has ended."""
     return folder / f"frame-{week_tag(week)}.h5"
 

@@ -155,11 +155,11 @@ class Folding:
             self.grown(state, growth),
         )
         if self._inner_sides is not None:
-            after = replace(after, positions=self.straighten(after.positions))
+            after = replace(after, positions=self._straightened(after.positions))
         row["seconds"] = time.monotonic() - began
         return after
 
-    def straighten(self, positions: Floats) -> Floats:
+    def _straightened(self, positions: Floats) -> Floats:
         """Return (n, 3) positions in m with straighter inner sides of elements that are
         about to fold over.
 
@@ -197,7 +197,7 @@ class Folding:
             step_gw = step_s / SECONDS_PER_GW
             stretch = relaxed(before, step_gw, p.stress_memory_gw)
         growth = self.model(start)
-        modulus = modulus_of_tissue(p, tissue, week)
+        modulus = _modulus_of_tissue(p, tissue, week)
         inverse = growth.inverse(tissue)
         self.problem.set_step(
             tissue.at_points(modulus),
@@ -231,14 +231,14 @@ class Folding:
         week = growth.start.week(p, 0.5)
         thickness_mm = value_at(p.thickness_mm, week, self.maps)
         thickness = float(np.mean(thickness_mm)) * M_PER_MM
-        return elements_through(self.domain, tissue.depth, thickness)
+        return _elements_through(self.domain, tissue.layers.depth, thickness)
 
     def _solution_row(
         self, solution: Solution, displacement: Floats
     ) -> dict[str, float]:
         u = solution.displacement
         length = np.linalg.norm(displacement, axis=1) * MM_PER_M
-        ratios = self.problem.volume_ratios(u)
+        ratios = self.domain.volume_ratios(u)
         return {
             "newton": solution.newton,
             "krylov": solution.krylov,
@@ -306,9 +306,9 @@ def advance(
             state = replace(state, step_s=half, successes=0)
             continue
         if folding.domain.comm.rank == 0:
-            warnings = [unconverged_warning(after.rows[-1])]
+            warnings = [_unconverged_warning(after.rows[-1])]
             if p.growth.definition.has_layers:
-                warnings.append(resolution_warning(after.rows, folding.domain.order))
+                warnings.append(_resolution_warning(after.rows, folding.domain.order))
             for warning in filter(None, warnings):
                 log.warning(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
@@ -320,7 +320,7 @@ def advance(
         return after
 
 
-def modulus_of_tissue(
+def _modulus_of_tissue(
     p: FoldingParameters,
     tissue: Tissue,
     week: float,
@@ -332,7 +332,7 @@ def modulus_of_tissue(
     return shear_modulus(p, weight, tissue.maps, week)
 
 
-def elements_through(
+def _elements_through(
     domain: Domain,
     distance: Floats,
     thickness: float,
@@ -357,7 +357,7 @@ def elements_through(
     return float(thickness * count / total)
 
 
-def resolution_warning(rows: Sequence[dict], order: int) -> str:
+def _resolution_warning(rows: Sequence[dict], order: int) -> str:
     """Return a warning at the first step with too few elements through the cortex, else
     an empty text."""
     coarse = [is_too_coarse(order, row["elements_through_cortex"]) for row in rows[-2:]]
@@ -374,7 +374,7 @@ def resolution_warning(rows: Sequence[dict], order: int) -> str:
     )
 
 
-def unconverged_warning(row: dict) -> str:
+def _unconverged_warning(row: dict) -> str:
     """Return a warning if a step ended above the tolerance, else an empty text."""
     if row["converged"]:
         return ""

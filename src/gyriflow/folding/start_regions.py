@@ -8,7 +8,7 @@ from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Mask, TriangleMesh
 from ..io.tetmeshes import Regions
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.terms import REGION_FIELDS
+from ..settings.terms import LEFT, REGION_FIELDS, RIGHT
 from ..settings.varying import Maps
 from .checks import refuse_impossible
 from .growth import GrowthInputs, StepStart
@@ -16,7 +16,7 @@ from .growth_models import growth_model
 from .output import layer_fields, log_growth_at_vertices
 from .points import IntegrationPoints
 from .tissue import Elements
-from .zones import cell_tags, facet_tags, zones_of_run
+from .zones import cell_tags, zones_of_run
 
 
 def start_regions(
@@ -64,5 +64,11 @@ def start_regions(
             len(zones.facets),
             parameters.side == "left",
         )
-    tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
-    return Regions(mesh, zones.facets, fields, *tags)
+    of_cells = cell_tags(mesh, zones, fields["cortex_weight"])
+    # the fissure may be curved, so that no plane separates the hemispheres
+    side = np.where(on_left, LEFT, RIGHT)
+    of_facets = {
+        "zone": zones.facet_zone.astype(np.int32),
+        "hemisphere": side.astype(np.int32),
+    }
+    return Regions(mesh, zones.facets, fields, of_cells, of_facets)

@@ -69,10 +69,10 @@ def steered_growth(
 ) -> SteeredStep:
     """Return the growth by sizes of a step of a run with a size `at_start`."""
     week = start.week(p, 1.0)
-    area_cm2 = blended(
+    area_cm2 = _blended(
         p.growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, p.start_week, week
     )
-    volume_ml = blended(
+    volume_ml = _blended(
         p.growth.volume_ml, at_start.volume_mm3 * ML_PER_MM3, p.start_week, week
     )
     target = Size(area_cm2 / CM2_PER_MM2, volume_ml / ML_PER_MM3)
@@ -151,29 +151,19 @@ def free_growth(
     distance = search.distance(positions_mm, WEIGHT_REACH * np.max(thickness))
     weight = cortical_weight(distance, thickness)
     volumes = volumes_between(positions_mm, inputs.pieces)
-
-    def volume_rate(tangential: float, core: float) -> float:
+    volume_rates = []
+    for tangential, core in ((1.0, 0.0), (0.0, 1.0)):
         rates = {"growth_rate_per_s": tangential, "core_growth_rate_per_s": core}
         by_rates = p.model_copy(update=rates)
-        dg, dr = increments(
-            by_rates,
-            weight,
-            zones.growing,
-            {},
-            week,
-            1.0,
-        )
+        dg, dr = increments(by_rates, weight, zones.growing, {}, week, 1.0)
         of_volume = 2 * dg + dr
         of_pieces = of_volume[inputs.pieces].mean(axis=1)
-        return float(np.average(of_pieces, weights=volumes))
-
+        volume_rates.append(np.average(of_pieces, weights=volumes))
     faces = zones.measured_facets
     areas = face_areas(TriangleMesh(positions_mm, faces))
     growing = zones.growing[faces].mean(axis=1)
     cortex_area = 2 * float(growing @ areas / areas.sum())
-    cortex_volume = volume_rate(1.0, 0.0)
-    core_volume = volume_rate(0.0, 1.0)
-    return np.array([[cortex_area, 0.0], [cortex_volume, core_volume]])
+    return np.array([[cortex_area, 0.0], volume_rates])
 
 
 def missed_curves(row: dict[str, Any]) -> str:
@@ -197,7 +187,7 @@ def missed_curves(row: dict[str, Any]) -> str:
     return text
 
 
-def blended(
+def _blended(
     curve: Any,
     at_start: float,
     start_week: float,

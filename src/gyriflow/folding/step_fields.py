@@ -28,24 +28,14 @@ def step_fields(
     week. Growth towards shapes leaves no stress and elastic strain but next to
     contact, where they depend on the mesh: there are none.
     """
-    p = folding.parameters
-
-    def as_rates(fields: dict[str, Floats]) -> dict[str, Floats]:
-        if p.stress_memory_gw > 0:
-            return fields
-        steps_per_gw = SECONDS_PER_GW / folding.solved.step_s
-        return {
-            f"{name}_per_gw": values * steps_per_gw for name, values in fields.items()
-        }
-
     at_vertices: dict[str, Floats] = {}
     if folding.contact is not None and "contact_pressure" in names:
         pressure_pa = folding.contact.pressure(folding.solved.displacement)
-        at_vertices = as_rates({"contact_pressure_pa": pressure_pa})
-    is_elastic = p.growth.definition.measured != "shapes"
+        at_vertices = _as_rates(folding, {"contact_pressure_pa": pressure_pa})
+    is_elastic = folding.parameters.growth.definition.measured != "shapes"
     fields: dict[str, Floats] = {}
     if is_elastic:
-        fields |= as_rates(_elastic_fields(folding, names))
+        fields |= _as_rates(folding, _elastic_fields(folding, names))
     fields |= _total_fields(folding, names)
     if not fields:
         return at_vertices, {}
@@ -56,6 +46,14 @@ def step_fields(
         means.append(by_element @ points.weights)
     gathered = folding.domain.gather_cells(np.stack(means, axis=1))
     return at_vertices, dict(zip(fields, gathered.T, strict=True))
+
+
+def _as_rates(folding: Folding, fields: dict[str, Floats]) -> dict[str, Floats]:
+    """Return fields per week, without stress memory."""
+    if folding.parameters.stress_memory_gw > 0:
+        return fields
+    steps_per_gw = SECONDS_PER_GW / folding.solved.step_s
+    return {f"{name}_per_gw": values * steps_per_gw for name, values in fields.items()}
 
 
 def _elastic_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]:

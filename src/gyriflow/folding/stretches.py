@@ -68,7 +68,7 @@ def deformation_gradients(
     return found
 
 
-def inverse_stretch(
+def _inverse_stretch(
     F: Floats,
     power: Floats | float = 1.0,
     limit: float = np.inf,
@@ -92,7 +92,7 @@ def inverse_growth(
     limit: float,
 ) -> tuple[Floats, Mask]:
     """Return the inverse (..., 3, 3) of growth by U^power of F = R·U as in
-    `inverse_stretch`, and where U is limited.
+    `_inverse_stretch`, and where U is limited.
 
     Where growth is the whole of U, and surely below the limit, it is F⁻¹ = U⁻¹·Rᵀ,
     which costs less: an isotropic material does not depend on the rotation.
@@ -107,7 +107,7 @@ def inverse_growth(
     inverse[is_whole] = np.linalg.inv(F[is_whole])
     is_limited = np.zeros(is_whole.shape, dtype=bool)
     others = ~is_whole
-    inverse[others], is_limited[others] = inverse_stretch(
+    inverse[others], is_limited[others] = _inverse_stretch(
         F[others], power[others], limit
     )
     return inverse, is_limited

@@ -123,7 +123,7 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
             found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
             remedy="End the run earlier, or add brains of later weeks.",
         )
-    weeks, shapes = shapes_of_run(p, inputs.maps, inputs.mesh.vertices)
+    weeks, shapes = _shapes_of_run(p, inputs.maps, inputs.mesh.vertices)
     return path_through(
         weeks,
         shapes,
@@ -133,7 +133,7 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
     )
 
 
-def shapes_of_run(
+def _shapes_of_run(
     p: FoldingParameters,
     maps: Maps,
     positions_mm: Floats,

@@ -41,7 +41,7 @@ class Layers:
     weight: Floats
 
 
-def layers_of(
+def _layers_of(
     elements: Elements,
     positions: Floats,
     facets: Ints,
@@ -118,7 +118,7 @@ class Tissue:
             maps = {name: values[cells] @ linear for name, values in maps.items()}
         thickness_mm = value_at(p.thickness_mm, week, maps)
         find_layers = partial(
-            layers_of, elements, positions, zones.cortex_facets, thickness_mm, reach
+            _layers_of, elements, positions, zones.cortex_facets, thickness_mm, reach
         )
         return cls(
             elements,
@@ -161,18 +161,6 @@ class Tissue:
         return self.find_layers()
 
     @property
-    def pial(self) -> PialSearch:
-        return self.layers.pial
-
-    @property
-    def depth(self) -> Floats:
-        return self.layers.depth
-
-    @property
-    def nearest(self) -> NDArray:
-        return self.layers.nearest
-
-    @property
     def weight(self) -> Floats:
         return self.layers.weight
 
@@ -204,12 +192,12 @@ class Tissue:
         points = self.elements.points
         if points.order == 2:
             mask = needed.any(axis=1)
-            at_nodes = self.nearest[cells[mask]]
-            return mask, interpolated_normals(at_nodes, points)
+            at_nodes = self.layers.nearest[cells[mask]]
+            return mask, _interpolated_normals(at_nodes, points)
         mask = needed[cells].any(axis=1)
         nodes = cells[mask]
         centres = self.nodes[nodes].mean(axis=1)
-        normals = self.pial.normals_from(centres, self.nearest[nodes])
+        normals = self.layers.pial.normals_from(centres, self.layers.nearest[nodes])
         return mask, np.repeat(
             normals[:, None],
             len(points.weights),
@@ -217,7 +205,7 @@ class Tissue:
         )
 
 
-def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
+def _interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
     """Return the (c, q, 3) unit normals at the points of elements from those (c, k, 3)
     at their nodes.
 

@@ -117,7 +117,7 @@ class Zones:
         return fixed
 
 
-def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floats]:
+def _brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floats]:
     """Return the smallest and largest coordinates (3,) of a brain.
 
     The single hemisphere `side` is completed by its mirror image at its innermost
@@ -165,7 +165,7 @@ def _wall_anchors(vertices: Floats, wall: Ints) -> tuple[Ints, Mask]:
     return anchors, np.array([fixed_at_centre, fixed_farthest])
 
 
-def inside_ellipsoid(
+def _inside_ellipsoid(
     vertices: NDArray,
     low: Floats,
     high: Floats,
@@ -207,30 +207,25 @@ def zones_of_run(
     right_plane = fissure_x_mm + distance
     if p.side is not None:
         left_plane = right_plane = float(x.max() if p.side == "left" else x.min())
-    low, high = brain_box(mesh.vertices, p.side)
+    low, high = _brain_box(mesh.vertices, p.side)
     reach = (high - low)[0] / 8
     facet_x = x[facets]
-    is_static = inside_ellipsoid(mesh.vertices, low, high)
+    is_static = _inside_ellipsoid(mesh.vertices, low, high)
     zone = np.full(len(facets), terms.FREE)
 
-    def set_zone(number: int, is_inside: Mask) -> None:
-        """Set the zone of elements' faces that are inside with all vertices (f, 3)."""
-        zone[
-            on_whole_faces(
-                is_inside.all(axis=1),
-                mesh.order,
-            )
-        ] = number
-
+    # the vertices (f, 3) of the facets in each zone; of several zones the last counts
+    in_zones: dict[int, Mask] = {}
     if p.support == "ellipsoid":
-        set_zone(terms.CLAMPED, is_static[facets])
+        in_zones[terms.CLAMPED] = is_static[facets]
     if p.contact != "none":
         is_left = (facet_x > fissure_x_mm - reach) & (facet_x <= left_plane)
         is_right = (facet_x < fissure_x_mm + reach) & (facet_x >= right_plane)
         is_between = (facet_x > left_plane) & (facet_x < right_plane)
-        set_zone(terms.BETWEEN_PLANES, is_between)
-        set_zone(terms.LEFT_CONTACT, is_left)
-        set_zone(terms.RIGHT_CONTACT, is_right)
+        in_zones[terms.BETWEEN_PLANES] = is_between
+        in_zones[terms.LEFT_CONTACT] = is_left
+        in_zones[terms.RIGHT_CONTACT] = is_right
+    for number, is_inside in in_zones.items():
+        zone[on_whole_faces(is_inside.all(axis=1), mesh.order)] = number
     anchors = None
     if p.side is not None:
         zone[_medial_wall_facets(mesh, facets, p.side)] = terms.MEDIAL_WALL
@@ -344,17 +339,4 @@ def cell_tags(
         "hemisphere": hemisphere,
         "growing": is_growing.astype(np.int32),
         "layer": layer.astype(np.int32),
-    }
-
-
-def facet_tags(zones: Zones, on_left: Mask) -> Tags:
-    """Return the (f,) tags of `zones.facets`: `zone`, and `hemisphere`, LEFT for the
-    mask `on_left`, else RIGHT.
-
-    The fissure may be curved, so that no plane separates the hemispheres.
-    """
-    side = np.where(on_left, terms.LEFT, terms.RIGHT)
-    return {
-        "zone": zones.facet_zone.astype(np.int32),
-        "hemisphere": side.astype(np.int32),
     }

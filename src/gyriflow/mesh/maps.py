@@ -181,12 +181,10 @@ def move_to_mesh(
     Surfaces of the input are moved like the brain, by its (4, 4) pose; those that
     gyriflow made have been already.
     """
-
-    def mean_distance(candidate: TriangleMesh) -> float:
-        distance, _, _ = nearest_on(points, _solid(candidate))
-        return float(distance.mean())
-
-    return min(transformed(surface, pose), surface, key=mean_distance)
+    posed = transformed(surface, pose)
+    to_posed, _, _ = nearest_on(points, _solid(posed))
+    to_surface, _, _ = nearest_on(points, _solid(surface))
+    return posed if to_posed.mean() <= to_surface.mean() else surface
 
 
 def _solid(surface: TriangleMesh) -> TriangleMesh:

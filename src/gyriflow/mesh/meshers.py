@@ -94,17 +94,7 @@ def _run(
 ) -> Ended:
     lines: list[str] = []
     reading, printing = os.pipe()
-
-    def listen() -> None:
-        # lines go to the log as they come, so that one can see how far the mesher is
-        with os.fdopen(reading, errors="replace") as stream:
-            for line in stream:
-                text = line.rstrip()
-                if text:
-                    lines.append(text)
-                    log.info("%s: %s", name, text)
-
-    listener = Thread(target=listen)
+    listener = Thread(target=_log_lines, args=(reading, name, lines))
     search_path = os.pathsep.join(filter(None, sys.path))
     with subprocess.Popen(
         [sys.executable, "-m", __name__, name],
@@ -126,6 +116,17 @@ def _run(
             process.kill()
     listener.join()
     return Ended(code, output, lines)
+
+
+def _log_lines(reading: int, name: str, lines: list[str]) -> None:
+    """Log and collect what a mesher prints as it comes, so that one can see how far it
+    is."""
+    with os.fdopen(reading, errors="replace") as stream:
+        for line in stream:
+            text = line.rstrip()
+            if text:
+                lines.append(text)
+                log.info("%s: %s", name, text)
 
 
 def _pytetwild(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ the middles of edges.
 
 import logging
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -44,29 +45,12 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
     Where an element would become unsound, or the surface cross itself, moves are halved
     and then given up.
     """
-    before = tetrahedra.radius_ratios(mesh)
-
-    def spoilt(placed: TetrahedralMesh) -> Mask:
-        return np.asarray(
-            (tetrahedra.signed_volumes(placed) <= 0)
-            | (tetrahedra.radius_ratios(placed) < WORSE * before)
-        )
-
-    straight = tetrahedra.quadratic(
-        _move(
-            mesh,
-            *_project(mesh, surface),
-            spoilt,
-        )[0]
-    )
+    are_spoilt = partial(_are_spoilt, tetrahedra.radius_ratios(mesh))
+    moved, _ = _move(mesh, *_project(mesh, surface), are_spoilt)
+    straight = tetrahedra.quadratic(moved)
     target, way = _project(straight, surface)
     middles = way & (np.arange(len(way)) >= len(mesh.vertices))
-
-    def unsound(placed: TetrahedralMesh) -> Mask:
-        values = coefficients(placed.vertices, placed.tets)
-        return np.asarray(values.min(axis=1) < SOUND * values.mean(axis=1))
-
-    result, left = _move(straight, target, middles, unsound)
+    result, left = _move(straight, target, middles, _are_unsound)
     log.info(
         "quadratic elements: %d of %d nodes on middles of outer edges on the surface,"
         " least ratio of Jacobians %.2f",
@@ -79,6 +63,19 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
         jacobian_ratios(result).min(),
     )
     return result
+
+
+def _are_spoilt(ratios_before: Floats, placed: TetrahedralMesh) -> Mask:
+    """Return whether linear elements are inverted or have lost most of their radius
+    ratio."""
+    is_inverted = tetrahedra.signed_volumes(placed) <= 0
+    is_worse = tetrahedra.radius_ratios(placed) < WORSE * ratios_before
+    return np.asarray(is_inverted | is_worse)
+
+
+def _are_unsound(placed: TetrahedralMesh) -> Mask:
+    values = coefficients(placed.vertices, placed.tets)
+    return np.asarray(values.min(axis=1) < SOUND * values.mean(axis=1))
 
 
 def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask]:

@@ -51,7 +51,7 @@ class GapWalls:
     area: Floats
 
 
-def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
+def _fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
     """Return how far two surfaces are from each other, in mm.
 
     Within `hausdorff99` lies 99 % of either's area; `hausdorff` is the largest
@@ -65,7 +65,7 @@ def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
     }
 
 
-def gap_walls(mesh: TriangleMesh) -> GapWalls:
+def _gap_walls(mesh: TriangleMesh) -> GapWalls:
     """Return the walls of narrow gaps of a closed surface: rays from centroids meet
     parallel walls within 3 mm."""
     normals = triangles.face_normals(mesh)
@@ -89,7 +89,7 @@ def gap_walls(mesh: TriangleMesh) -> GapWalls:
     )
 
 
-def gap_summary(walls: GapWalls) -> dict[str, float | None]:
+def _gap_summary(walls: GapWalls) -> dict[str, float | None]:
     """Return the area of gaps' walls, and below which widths in mm 1 % and half of it
     lies (None without a gap).
 
@@ -112,7 +112,7 @@ def gap_summary(walls: GapWalls) -> dict[str, float | None]:
     }
 
 
-def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
+def _gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
     """Return the share of the walls' area before which another surface leaves the gap
     open; None without a gap.
 
@@ -185,7 +185,7 @@ def jacobian_ratios(mesh: TetrahedralMesh) -> Floats:
     )
 
 
-def dihedral_angles(mesh: TetrahedralMesh) -> Floats:
+def _dihedral_angles(mesh: TetrahedralMesh) -> Floats:
     """Return the (m, 6) angles in degrees between the faces at each edge, taken as flat
     between corners."""
     corner = mesh.vertices[mesh.corners]
@@ -208,14 +208,14 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     ready for JSON.
 
     `surface` is the one that was filled; distance, change of volume and gaps are
-    relative to it (see `fidelity`). Quadratic elements are measured on the triangles
+    relative to it (see `_fidelity`). Quadratic elements are measured on the triangles
     between nodes. `gap_kept` is None without gaps.
     """
     ratios = tetrahedra.radius_ratios(mesh)
-    angles = dihedral_angles(mesh)
+    angles = _dihedral_angles(mesh)
     volumes = tetrahedra.signed_volumes(mesh)
     boundary, _ = tetrahedra.boundary_surface(mesh)
-    walls = gap_walls(surface)
+    walls = _gap_walls(surface)
     return {
         "order": mesh.order,
         "tets": len(mesh.tets),
@@ -225,12 +225,12 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "pial_area_mm2": triangles.area(boundary),
         "smallest_pial_face_mm2": float(triangles.face_areas(boundary).min()),
         "crossing_faces": crossing_faces(boundary),
-        "surface_distance_mm": fidelity(boundary, surface),
+        "surface_distance_mm": _fidelity(boundary, surface),
         "gap_mm": {
-            "input": gap_summary(walls),
-            "mesh": gap_summary(gap_walls(boundary)),
+            "input": _gap_summary(walls),
+            "mesh": _gap_summary(_gap_walls(boundary)),
         },
-        "gap_kept": gap_kept(walls, boundary),
+        "gap_kept": _gap_kept(walls, boundary),
         "volume_mm3": float(volumes.sum()),
         "volume_change": float(volumes.sum() / triangles.signed_volume(surface) - 1),
         "min_radius_ratio": float(ratios.min()),

@@ -116,7 +116,7 @@ def tetrahedralise(
     core = max(order * core_edge_mm, edge)
     arrays: dict[str, Any]
     if mesher == "tetgen":
-        even = even_surface(surface, edge)
+        even = _even_surface(surface, edge)
         arrays = {
             "vertices": even.vertices,
             "faces": even.faces,
@@ -142,7 +142,7 @@ def tetrahedralise(
     return curve_edges(mesh, surface) if order == 2 else mesh
 
 
-def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
+def _even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
     """Remesh a surface with even triangles, fit to bound a mesh as it is; MeshError
     where it cuts itself."""
     even = remesh(surface, edge_mm)

@@ -21,9 +21,9 @@ from gyriflow.folding.checkpoint import (
     run_key,
     write_checkpoint,
 )
-from gyriflow.folding.run import delete_old_checkpoints, frame_path, load_state
+from gyriflow.folding.run import delete_old_checkpoints, load_state
 from gyriflow.settings.folding import parameters_from
-from gyriflow.units import SECONDS_PER_GW
+from gyriflow.units import SECONDS_PER_GW, week_tag
 
 VALUES = {
     "start_week": 21.0,
@@ -148,7 +148,7 @@ def test_a_run_is_resumed_with_the_frames_it_has_and_the_steps_before_its_end(tm
     run = parameters_from(values)
     for week in weeks[:2]:
         assert load_state(tmp_path, "key", run)[0] is None
-        frame_path(tmp_path, week).touch()
+        (tmp_path / f"frame-{week_tag(week)}.h5").touch()
     resumed, message = load_state(tmp_path, "key", run)
     assert message == Facts(3)
     assert [row["week"] for row in resumed.rows] == [21.5, 22.0, 22.5]
@@ -161,7 +161,7 @@ def test_a_run_is_resumed_with_the_frames_it_has_and_the_steps_before_its_end(tm
     towards = {"growth": {"model": "shapes", **sizes}, "targets": {23.0: "target"}}
     assert load_state(tmp_path, "key", parameters_from(values | towards))[0]
     others = {"output_weeks": [21.0, 22.25, 23.0]}
-    frame_path(tmp_path, 22.25).touch()
+    (tmp_path / f"frame-{week_tag(22.25)}.h5").touch()
     other = parameters_from(values | towards | others)
     found, message = load_state(tmp_path, "key", other)
     assert found is None

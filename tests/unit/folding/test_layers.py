@@ -14,7 +14,7 @@ from gyriflow.folding.growth import GrowthByRates, StepStart
 from gyriflow.folding.layers import PialSearch, cortical_weight
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.points import IntegrationPoints
-from gyriflow.folding.tissue import interpolated_normals
+from gyriflow.folding.tissue import Elements, Layers, Tissue
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.jacobians import NODES
 from gyriflow.geometry.tetrahedra import boundary_faces
@@ -107,16 +107,27 @@ def test_smooth_values_are_quadratic_and_bounded_ones_stay_between_the_nodes():
     )
 
 
+def normals_at_points(normals, points):
+    """Return the normals (q, 3) at the points of an element from those (10, 3) at its
+    nodes."""
+    nodes = np.arange(10)
+    elements = Elements(nodes[None], nodes, points)
+    layers = Layers(pial=None, depth=None, nearest=normals, weight=None)
+    tissue = Tissue(elements, NODES, np.ones(10), {}, lambda: layers)
+    _, found = tissue.normals(np.ones((1, len(points.weights)), dtype=bool))
+    return found[0]
+
+
 def test_normals_of_opposed_walls_do_not_cancel():
     points = IntegrationPoints.for_order(2)
-    normals = np.tile([0.0, 0.6, 0.8], (1, 10, 1))
-    normals[0, ::3] *= -1
-    found = interpolated_normals(normals, points)
+    normals = np.tile([0.0, 0.6, 0.8], (10, 1))
+    normals[::3] *= -1
+    found = normals_at_points(normals, points)
     np.testing.assert_allclose(np.abs(found @ [0.0, 0.6, 0.8]), 1.0)
     # and turn with the surface between the nodes
     angle = 0.3 * NODES[:, 1]
     turning = np.stack([np.sin(angle), np.zeros(10), np.cos(angle)], axis=1)
-    found = interpolated_normals(turning[None], points)[0]
+    found = normals_at_points(turning, points)
     np.testing.assert_allclose(
         np.arctan2(found[:, 0], found[:, 2]), 0.3 * points.barycentric[:, 1], atol=2e-3
     )

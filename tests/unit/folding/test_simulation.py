@@ -21,8 +21,6 @@ from gyriflow.folding.run import (
 from gyriflow.folding.simulation import (
     STEPS_BEFORE_DOUBLING,
     advance,
-    resolution_warning,
-    unconverged_warning,
 )
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.settings.folding import parameters_from
@@ -51,23 +49,35 @@ def test_a_step_that_does_not_divide_the_time_between_outputs_is_reported(
 
 
 class Stepper:
-    """A folding whose steps fail where they are too long for the time."""
+    """A folding whose steps fail where they are too long for the time; the cortex is as
+    many elements thick as in `through`, step by step."""
 
-    def __init__(self, longest, through=2.5, **changes):
+    def __init__(
+        self,
+        longest=lambda time_s: 1e9,
+        through=(2.5,),
+        order=1,
+        converged=True,
+        **changes,
+    ):
         self.parameters = parameters_from(
             RUN | {"output_weeks": [21.0, 22.0]} | changes
         )
-        self.domain = SimpleNamespace(comm=MPI.COMM_SELF, order=1)
-        self.longest, self.solver, self.through = longest, None, through
+        self.domain = SimpleNamespace(comm=MPI.COMM_SELF, order=order)
+        self.longest, self.solver = longest, None
+        self.through, self.converged = through, converged
 
     def step(self, state, step_s):
         if step_s > self.longest(state.time_s):
             raise NotConvergedError("too long")
+        number = len(state.rows)
         row = {
+            "step": number + 1,
             "dt_s": step_s,
-            "converged": True,
-            "elements_through_cortex": self.through,
-            "week": 21.0,
+            "residual": 3e-6,
+            "converged": self.converged,
+            "elements_through_cortex": self.through[number % len(self.through)],
+            "week": 21.0 + number,
         }
         return state.after(np.zeros((1, 3)), step_s, row)
 
@@ -93,7 +103,7 @@ def test_a_failing_step_is_halved_and_grows_back():
 
 
 def test_the_last_step_to_an_output_week_takes_what_is_left():
-    lengths = steps_to(Stepper(lambda time_s: 1e9), 100_000.0)
+    lengths = steps_to(Stepper(), 100_000.0)
     assert lengths == pytest.approx([43_200.0, 43_200.0, 13_600.0])
 
 
@@ -113,61 +123,46 @@ def test_a_short_remainder_is_halved_as_often_as_a_whole_step():
     )
 
 
-def rows(*through):
-    return [
-        {"week": 21.0 + i, "elements_through_cortex": value}
-        for i, value in enumerate(through)
-    ]
-
-
-def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
-    assert resolution_warning(rows(2.3, 2.1), 1) == ""
-    assert resolution_warning(rows(2.3, 2.1, 1.9), 1) == Facts("GW 23.00", 2)
-    assert resolution_warning(rows(2.3, 1.9, 1.8), 1) == ""
-    assert resolution_warning(rows(1.5), 1) == Facts(2)
-    assert resolution_warning(rows(1.5), 2) == ""
-    assert resolution_warning(rows(0.81), 2) == ""  # the default mesh at its start
-    assert resolution_warning(rows(1.2, 0.79), 2) == Facts("GW 22.00", 0.8)
-    # counts are judged as they are shown, with two digits
-    assert (
-        resolution_warning(rows(2.3, 1.96), 1)
-        == resolution_warning(rows(0.796), 2)
-        == ""
-    )
-    # no element lies in the cortex at all
-    assert resolution_warning(rows(np.nan), 1) == Facts(2)
-
-
 @pytest.mark.parametrize(
-    ("growth", "warnings"), [("rates", 1), ("sizes", 1), ("shapes", 0)]
+    ("order", "through", "facts"),
+    [
+        (1, [2.3, 2.1], None),
+        (1, [2.3, 2.1, 1.9, 1.8], ("GW 23.00", 2)),
+        (1, [1.5], ("start", 2)),
+        (2, [1.5], None),
+        # the default mesh at its start
+        (2, [0.81], None),
+        (2, [1.2, 0.79], ("GW 22.00", 0.8)),
+        # counts are judged as they are shown, with two digits
+        (1, [2.3, 1.96], None),
+        (2, [0.796], None),
+        # no element lies in the cortex at all
+        (1, [np.nan], (2,)),
+    ],
 )
-def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(
-    growth, warnings, caplog
+def test_a_cortex_that_outgrows_its_elements_gives_one_warning(
+    order, through, facts, caplog
 ):
+    steps_to(Stepper(through=through, order=order), 43_200.0 * len(through))
+    assert caplog.messages == ([Facts(*facts)] if facts else [])
+
+
+def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(caplog):
     sizes = {"area_cm2": {21: 90, 22: 99}, "volume_ml": {21: 40, 22: 46}}
-    settings = {"rates": {}, "sizes": sizes, "shapes": sizes | {"of": "self"}}[growth]
-    targets = {"targets": {22.0: "target_22"}} if growth == "shapes" else {}
-    steps_to(
-        Stepper(
-            lambda time_s: 1e9,
-            through=1.0,
-            growth={"model": growth} | settings,
-            **targets,
-        ),
-        604_800.0,
-    )
-    assert caplog.text.count("elements lie through the cortex") == warnings
+    growth = {"model": "shapes", "of": "self"} | sizes
+    targets = {22.0: "target_22"}
+    steps_to(Stepper(through=[1.0], growth=growth, targets=targets), 86_400.0)
+    assert caplog.messages == []
+
+
+def test_a_step_above_its_tolerance_gives_a_warning(caplog):
+    steps_to(Stepper(converged=False), 43_200.0)
+    assert caplog.messages == [Facts(1, "3.0e-06")]
 
 
 def test_nearly_incompressible_tissue_gives_a_warning():
     assert stiffness_warning(0.45) == stiffness_warning(0.46) == ""
     assert stiffness_warning(0.48) == Facts(0.48)
-
-
-def test_a_step_above_its_tolerance_gives_a_warning():
-    row = {"step": 7, "residual": 3e-6, "converged": True}
-    assert unconverged_warning(row) == ""
-    assert unconverged_warning(row | {"converged": False}) == Facts(7, "3.0e-06")
 
 
 @pytest.mark.parametrize(("n_flat", "is_warning"), [(0, False), (2, False), (3, True)])
