@@ -1,4 +1,4 @@
-"""Compilation of forms and C code. Each kind of _processor has a cache, where one
+"""Compilation of forms and C code. Each kind of processor has a cache, where one
 process compiles at a time."""
 
 import hashlib

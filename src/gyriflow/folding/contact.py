@@ -79,8 +79,9 @@ class SelfContact:
     the barrier's initial stiffness. The contact distance is the given `distance_mm`, or
     else by the edge lengths at each step's start, but below the small gap at the start
     of the run, neighbours aside: a body that does not grow must not move, except where
-    neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory. MeshError where the surface
-    crosses itself at the start.
+    neighbours on thin triangles or a few vertices are nearer to each other. `stiffens`
+    is for runs with stress memory. MeshError where the surface crosses itself at the
+    start.
 
     Attributes: contact distance d̂, `distance_mm`, and stiffness κ of the barrier,
     `stiffness_pa`, in the current step.

@@ -91,10 +91,10 @@ def inverse_growth(
     power: Floats,
     limit: float,
 ) -> tuple[Floats, Mask]:
-    """Return the inverse (..., 3, 3) of growth by U^power of F = R·U as in
-    `_inverse_stretch`, and where U is limited.
+    """Return the inverse (..., 3, 3) of growth by U^power of F = R·U, with one power for
+    each, and where U is limited.
 
-    Where growth is the whole of U, and surely below the limit, it is F⁻¹ = U⁻¹·Rᵀ,
+    Principal values of ln U beyond the `limit` count as this. Where growth is the whole of U, and surely below the limit, it is F⁻¹ = U⁻¹·Rᵀ,
     which costs less: an isotropic material does not depend on the rotation.
     """
     squared = F.swapaxes(-1, -2) @ F

@@ -208,7 +208,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     ready for JSON.
 
     `surface` is the one that was filled; distance, change of volume and gaps are
-    relative to it (see `_fidelity`). Quadratic elements are measured on the triangles
+    relative to it. Quadratic elements are measured on the triangles
     between nodes. `gap_kept` is None without gaps.
     """
     ratios = tetrahedra.radius_ratios(mesh)
