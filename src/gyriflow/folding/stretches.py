@@ -68,34 +68,17 @@ def deformation_gradients(
     return found
 
 
-def _inverse_stretch(
-    F: Floats,
-    power: Floats | float = 1.0,
-    limit: float = np.inf,
-) -> tuple[Floats, Mask]:
-    """Return U^−power (..., 3, 3) of F = R·U, with one power for all or one for each,
-    and where U is limited.
-
-    Principal values of ln U beyond the `limit` count as this.
-    """
-    logs, axes = _principal_logs(F.swapaxes(-1, -2) @ F)
-    is_limited = np.abs(logs).max(axis=-1) > limit
-    limited = np.clip(logs, -limit, limit)
-    powers = np.asarray(power)[..., None]
-    inverses = np.exp(-powers * limited)
-    return from_principal(inverses, axes), is_limited
-
-
 def inverse_growth(
     F: Floats,
     power: Floats,
     limit: float,
 ) -> tuple[Floats, Mask]:
-    """Return the inverse (..., 3, 3) of growth by U^power of F = R·U, with one power for
-    each, and where U is limited.
+    """Return the inverse (..., 3, 3) of growth by U^power of F = R·U, with one power
+    for each, and where U is limited.
 
-    Principal values of ln U beyond the `limit` count as this. Where growth is the whole of U, and surely below the limit, it is F⁻¹ = U⁻¹·Rᵀ,
-    which costs less: an isotropic material does not depend on the rotation.
+    Principal values of ln U beyond the `limit` count as this. Where growth is the whole
+    of U, and surely below the limit, it is F⁻¹ = U⁻¹·Rᵀ, which costs less: an isotropic
+    material does not depend on the rotation.
     """
     squared = F.swapaxes(-1, -2) @ F
     strains = np.linalg.norm(
@@ -105,11 +88,13 @@ def inverse_growth(
     is_whole = (np.abs(power - 1) < ROUND_OFF) & (strains < 1 - np.exp(-2 * limit))
     inverse = np.empty_like(F)
     inverse[is_whole] = np.linalg.inv(F[is_whole])
-    is_limited = np.zeros(is_whole.shape, dtype=bool)
     others = ~is_whole
-    inverse[others], is_limited[others] = _inverse_stretch(
-        F[others], power[others], limit
-    )
+    logs, axes = _principal_logs(squared[others])
+    limited = np.clip(logs, -limit, limit)
+    powers = power[others][:, None]
+    inverse[others] = from_principal(np.exp(-powers * limited), axes)
+    is_limited = np.zeros(is_whole.shape, dtype=bool)
+    is_limited[others] = np.abs(logs).max(axis=-1) > limit
     return inverse, is_limited
 
 
