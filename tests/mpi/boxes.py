@@ -91,7 +91,7 @@ class EvenGrowth(StepGrowth):
         )
 
 
-def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, comm=COMM):
+def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, comm=COMM):
     """Return a problem with layers that are uniform, or nodal functions of the position
     in m."""
     domain = Domain(comm, mesh)
@@ -101,13 +101,8 @@ def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, comm=COMM):
     def nodal(value):
         return value(x) if callable(value) else np.full(len(x), value)
 
-    centres = x[domain.cells].mean(axis=1)
-    normal = (
-        np.tile([0.0, 0.0, 1.0], (len(centres), 1))
-        if normals is None
-        else normals(centres)
-    )
-    set_layers(problem, nodal(mu), nodal(dg), nodal(dr), normal)
+    up = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
+    set_layers(problem, nodal(mu), nodal(dg), nodal(dr), up)
     return problem
 
 

@@ -18,6 +18,13 @@ from gyriflow.units import M_PER_MM
 
 HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2
 MU, NU = 1000.0, MATERIAL.poisson_ratio
+RUN = {
+    "start_week": 21.0,
+    "end_week": 30.0,
+    "output_weeks": [21.0, 30.0],
+    "fissure_x_mm": 0.0,
+    "support": "free",
+}
 
 
 def two_blocks(cells=(5, 5, 3), upper=(5, 5, 3), gap=GAP_MM):
@@ -98,19 +105,8 @@ def closing_sulcus(kind, comm=COMM, support="box", **changes):
     """Return what folds a block with a groove that closes in some steps, and the state
     at the start."""
     mesh = slab_with_a_sulcus()
-    p = parameters_from(
-        {
-            "start_week": 21.0,
-            "end_week": 30.0,
-            "output_weeks": [21.0, 30.0],
-            "fissure_x_mm": 0.0,
-            "thickness_mm": 2.0,
-            "growth_rate_per_s": 1e-6,
-            "support": "free",
-            "contact": kind,
-        }
-        | changes
-    )
+    growth = {"thickness_mm": 2.0, "growth_rate_per_s": 1e-6, "contact": kind}
+    p = parameters_from(RUN | growth | changes)
     zones = zones_of_run(mesh, p) if support == "free" else box_zones(mesh, p)
     return Folding(comm, mesh, zones, p), State.at_start(
         mesh.vertices * M_PER_MM, p.step_s

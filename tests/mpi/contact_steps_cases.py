@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from boxes import COMM
 from contact_bodies import (
+    RUN,
     SIDE_MM,
     after_steps,
     closing_sulcus,
@@ -62,13 +63,7 @@ def free_blocks(gap, **changes):
         (-0.5, 0.5),
         free=True,
     )
-    values = {
-        "start_week": 21.0,
-        "end_week": 30.0,
-        "output_weeks": [21.0, 30.0],
-        "fissure_x_mm": 0.0,
-    }
-    p = parameters_from(values | {"support": "free"} | changes)
+    p = parameters_from(RUN | changes)
     return Folding(COMM, mesh, zones, p), State.at_start(
         mesh.vertices * M_PER_MM, p.step_s
     )

@@ -7,7 +7,6 @@ from boxes import (
     COMM,
     at_the_bottom,
     box_with_a_bowed_side,
-    curved_box,
     gathered,
     problem_on,
     solved,
@@ -28,7 +27,6 @@ from verification_cases.boxes import slab_parameters
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import SelfContact
-from gyriflow.folding.domain import Domain
 from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.straightening import straightness
 from gyriflow.geometry.tetrahedra import (
@@ -36,23 +34,6 @@ from gyriflow.geometry.tetrahedra import (
     quadratic,
 )
 from gyriflow.units import M_PER_MM, MM_PER_M
-
-
-def test_volumes_and_facets_are_those_of_the_curved_elements():
-    mesh = curved_box()
-    zones = zones_of(
-        mesh,
-        at_the_bottom,
-        left=lambda c: c[:, 0] < -3.99,
-        right=lambda c: c[:, 0] > 3.99,
-    )
-    domain = Domain(COMM, mesh)
-    assert COMM.allreduce(domain.volumes.sum()) == pytest.approx(288e-9, rel=1e-12)
-    tags = domain.local_facets(zones.facets, zones.facet_zone)
-    counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
-    np.testing.assert_array_equal(
-        4 * counts, np.bincount(zones.facet_zone, minlength=5)
-    )
 
 
 def test_an_element_that_inverts_between_its_points_is_detected():

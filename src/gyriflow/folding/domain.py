@@ -19,13 +19,11 @@ from ..geometry.jacobians import NODES as NODE_COORDINATES
 from ..geometry.jacobians import coefficients, jacobians, lower_bounds, shape_slopes
 from ..geometry.tetrahedra import (
     NODES_OF_ORDER,
-    PIECES_OF_ORDER,
     TetrahedralMesh,
     connected_parts,
     volumes_between,
-    whole_faces,
 )
-from ..geometry.triangles import Floats, Indices, Ints
+from ..geometry.triangles import Floats, Ints
 from ..units import M_PER_MM
 
 # Scotch reads these when it first partitions a mesh; without them runs are not
@@ -276,36 +274,3 @@ class Domain:
             self.comm.allgather(smallest),
             key=lambda entry: entry[:2],
         )
-
-    def local_facets(self, facets: Ints, tags: Ints) -> dolfinx.mesh.MeshTags:
-        """Return the tags (f,) of boundary facets (f, 3), vertex indices of the file,
-        on the local facets.
-
-        The four triangles of a quadratic element's face have one tag. ValueError where
-        the facets are not the boundary.
-        """
-        topology = self.mesh.topology
-        topology.create_entities(2)
-        topology.create_connectivity(2, 3)
-        local = dolfinx.mesh.exterior_facet_indices(topology)
-        # the corners are the first three nodes
-        nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local)
-        corners = nodes.reshape(len(local), -1)[:, :3]
-        local_faces = self.mesh.geometry.input_global_indices[corners]
-        keys = self._face_numbers(whole_faces(facets, self.order))
-        local_keys = self._face_numbers(local_faces)
-        order = np.argsort(keys)
-        place = np.searchsorted(keys, local_keys, sorter=order)
-        index = order[place.clip(max=len(order) - 1)]
-        if (keys[index] != local_keys).any():
-            raise ValueError("the facets are not the boundary of the mesh")
-        face_tags = tags[:: PIECES_OF_ORDER[self.order]]
-        local_tags = face_tags[index].astype(np.int32)
-        return dolfinx.mesh.meshtags(self.mesh, 2, local, local_tags)
-
-    def _face_numbers(self, faces: Indices) -> Ints:
-        """Return one number (f,) for each face, whatever the order of its vertices."""
-        count = len(self.positions)
-        low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
-        in_plane = low * count + middle
-        return in_plane * count + high

@@ -12,7 +12,8 @@ import ufl
 from dolfinx.la import InsertMode, MatrixCSR
 from petsc4py import PETSc
 
-from ..geometry.triangles import Floats, Ints
+from ..geometry.tetrahedra import PIECES_OF_ORDER, whole_faces
+from ..geometry.triangles import Floats, Indices, Ints
 from ..mechanics.materials import Material
 from ..settings.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
@@ -152,7 +153,7 @@ class NonlinearProblem:
         right = dolfinx.fem.Constant(mesh, right_mm * M_PER_MM)
         ds = ufl.ds(
             domain=mesh,
-            subdomain_data=self.domain.local_facets(zones.facets, zones.facet_zone),
+            subdomain_data=_facet_tags(self.domain, zones),
             metadata={"quadrature_degree": FACET_DEGREE[self.domain.order]},
         )
         x = ufl.SpatialCoordinate(mesh)[0] + self._u[0]
@@ -348,6 +349,36 @@ class NonlinearProblem:
         contributions allow to add to u."""
         steps = [part.max_step(u, direction) for part in self.contributions]
         return min(steps, default=1.0)
+
+
+def _facet_tags(domain: Domain, zones: Zones) -> dolfinx.mesh.MeshTags:
+    """Return the zones of the local boundary facets.
+
+    The four triangles of a quadratic element's face have one zone.
+    """
+    topology = domain.mesh.topology
+    topology.create_entities(2)
+    topology.create_connectivity(2, 3)
+    local = dolfinx.mesh.exterior_facet_indices(topology)
+    # the corners are the first three nodes
+    nodes = dolfinx.mesh.entities_to_geometry(domain.mesh, 2, local)
+    corners = nodes.reshape(len(local), -1)[:, :3]
+    count = len(domain.positions)
+    keys = _face_numbers(whole_faces(zones.facets, domain.order), count)
+    local_faces = domain.mesh.geometry.input_global_indices[corners]
+    local_keys = _face_numbers(local_faces, count)
+    order = np.argsort(keys)
+    index = order[np.searchsorted(keys, local_keys, sorter=order)]
+    face_zone = zones.facet_zone[:: PIECES_OF_ORDER[domain.order]]
+    tags = face_zone[index].astype(np.int32)
+    return dolfinx.mesh.meshtags(domain.mesh, 2, local, tags)
+
+
+def _face_numbers(faces: Indices, count: int) -> Ints:
+    """Return one number (f,) for each face, whatever the order of its vertices, of
+    which there are `count`."""
+    low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
+    return (low * count + middle) * count + high
 
 
 def _set_at_points(field: dolfinx.fem.Function, values: Floats) -> None:

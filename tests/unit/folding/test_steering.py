@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from ellipsoid import GAP_MM, RUN, SEMI_AXES, brain_mesh
+from ellipsoid import GAP_MM, RUN, brain_mesh
 from facts import Facts
 from shapes import box_mesh
 
@@ -86,24 +86,6 @@ def test_growth_reaches_as_deep_as_the_cortex_is_thick_at_its_thickest():
         )
         found.append(free_growth(p, mesh.vertices, inputs, 21)[1, 0])
     assert found[1] == pytest.approx(found[0], rel=0.005)
-
-
-def test_free_growth_of_a_body_is_known():
-    mesh, thickness = brain_mesh(16), 4.0
-    # the cortex thickens by the week
-    by_week = {"thickness_mm": {"weeks": {21: 2.0, 22: thickness}}}
-    p = parameters_from(RUN | GROWING | by_week)
-    inputs = GrowthInputs(mesh, zones_of_run(mesh, p, GAP_MM), {})
-    made = free_growth(p, mesh.vertices, inputs, 22)
-    # all of it grows by one rate: three directions of the core, two of the cortex
-    layer = 3 - made[1].sum()
-    assert made[1, 0] == pytest.approx(2 * layer)
-    # the cortex is two layers of elements thick: so much of the body is found within
-    # 0.02 %
-    assert layer == pytest.approx(
-        1 - np.prod(1 - thickness / np.array(SEMI_AXES)), rel=0.01
-    )
-    assert made[0] == pytest.approx([2.0, 0.0])
 
 
 @pytest.mark.parametrize(
