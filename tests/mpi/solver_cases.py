@@ -138,6 +138,8 @@ def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monke
 @pytest.mark.parametrize(("rise", "is_accepted"), [(1e-14, True), (1e-9, False)])
 def test_an_energy_may_rise_by_round_off_alone(rise, is_accepted, monkeypatch):
     problem = growing_problem()
+    # as if each energy were a little above the one before
+    at_rest = problem.energy(problem.rest())
     # energies are compared where there are contributions, such as this one of nothing
     nothing = SimpleNamespace(
         add_forces=lambda u, out: None,
@@ -145,8 +147,6 @@ def test_an_energy_may_rise_by_round_off_alone(rise, is_accepted, monkeypatch):
         max_step=lambda u, direction: 1.0,
     )
     problem.contributions.append(nothing)
-    # as if each energy were a little above the one before
-    at_rest = problem.energy(problem.rest())
     number = itertools.count()
     monkeypatch.setattr(
         problem, "energy", lambda u: at_rest * (1 + rise) ** next(number)
