@@ -119,10 +119,9 @@ def test_too_little_shared_memory_is_named(mesh, tmp_path):
     assert read_messages(log)[0].text in log.read_text()
 
 
-def test_memory_and_a_shortened_step_are_reported_before_the_solve(default_run):
+def test_the_memory_is_reported_before_the_solve(default_run):
     before, _, _ = default_run[1].partition("step    1")
     assert Facts(3072, 2187, 2, "556 MiB") in before.splitlines()
-    assert Facts("step_s", 43200, 21, 21.25) in before.splitlines()
 
 
 def test_warnings_and_progress_of_a_run_without_growth_are_printed_and_written(

@@ -67,10 +67,9 @@ def run(
     loaded = load_state(folder, key, parameters) if comm.rank == 0 else None
     state, message = comm.bcast(loaded, root=0)
     if comm.rank == 0:
-        notes = [message, *delete_old_checkpoints(out, folder)]
-        notes.append(shortened_step_note(parameters))
-        for note in filter(None, notes):
-            print_line(note)
+        for note in (message, *delete_old_checkpoints(out, folder)):
+            if note:
+                print_line(note)
     if state is None:
         state = State.at_start(folding.start, parameters.step_s)
         state = _save_frame(folding, state, parameters.output_weeks[0], folder)
@@ -355,20 +354,6 @@ def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
         f"{path} belongs to another mesh or other parameters: kept but not used"
         for path in folders[:2]
     ]
-
-
-def shortened_step_note(parameters: FoldingParameters) -> str:
-    """Return a note if the time step does not divide the time between two outputs, else
-    an empty text."""
-    step = parameters.step_s
-    for first, second in pairwise(parameters.output_weeks):
-        remainder = math.remainder((second - first) * SECONDS_PER_GW, step)
-        if abs(remainder) > 1e-6 * step:
-            return (
-                f"step_s {step:g} does not divide the time from GW {first:g} to"
-                f" {second:g}: the last step there is shortened"
-            )
-    return ""
 
 
 def _peak_memory_mib() -> float:

@@ -16,7 +16,6 @@ from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.folding.run import (
     quality_note,
     report_step,
-    shortened_step_note,
 )
 from gyriflow.folding.simulation import (
     STEPS_BEFORE_DOUBLING,
@@ -27,25 +26,6 @@ from gyriflow.settings.folding import parameters_from
 from gyriflow.units import SECONDS_PER_GW
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
-
-
-@pytest.mark.parametrize(
-    ("step_s", "weeks", "shortened"),
-    [
-        (43200.0, [21.0, 22.0], []),
-        (302400.0, [21.0, 21.5, 22.0], []),
-        (43200.0, [21.0, 21.25, 22.0], [21, 21.25]),
-        (43200.0, [21.0, 21.5, 21.75, 22.0], [21.5, 21.75]),
-        (500000.0, [21.0, 22.0], [21, 22]),
-    ],
-)
-def test_a_step_that_does_not_divide_the_time_between_outputs_is_reported(
-    step_s, weeks, shortened
-):
-    note = shortened_step_note(
-        parameters_from(RUN | {"step_s": step_s, "output_weeks": weeks})
-    )
-    assert note == (Facts("step_s", step_s, *shortened) if shortened else "")
 
 
 class Stepper:
