@@ -7,9 +7,8 @@ from processes import ran
 
 MAKE_BODIES = """
 from contact_steps_cases import vertices_pulled_near
-for gap_mm in (0.5, 0.24, 0.03):
-    for count in (1, 2):
-        vertices_pulled_near(gap_mm, count)
+for gap_mm in (0.5, 0.03):
+    vertices_pulled_near(gap_mm, 2)
 """
 OVERWRITE_FREED_MEMORY = {
     "GLIBC_TUNABLES": "glibc.malloc.tcache_count=0",
