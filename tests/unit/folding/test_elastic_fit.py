@@ -24,6 +24,7 @@ from gyriflow.geometry.tetrahedra import (
 from gyriflow.geometry.triangles import TriangleMesh, rms_length
 
 BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
+SMALL = ellipsoid_mesh(8, (7.0, 8.4, 6.3))
 PIECES = linear_pieces(BODY)
 USED = boundary_surface(BODY)[1]
 
@@ -132,15 +133,19 @@ def test_what_cannot_be_drawn_is_held_and_the_rest_is_drawn():
     assert misfit.mean() < 0.6 * before.mean()
 
 
-def flattened():
-    """Return places at which a vertex inside has gone most of the way to the opposite
-    face of one of its elements."""
-    inside = np.setdiff1d(np.arange(len(BODY.vertices)), USED)
-    distance = np.linalg.norm(BODY.vertices[inside] - [8.0, 8.0, 5.0], axis=1)
-    vertex = inside[np.argmin(distance)]
-    tet = BODY.tets[(BODY.tets == vertex).any(axis=1)][0]
-    places = BODY.vertices.copy()
-    places[vertex] += 0.9 * (places[tet[tet != vertex]].mean(axis=0) - places[vertex])
+def inside_vertex(mesh, place):
+    """Return the vertex inside a mesh that is nearest to a place."""
+    inside = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_surface(mesh)[1])
+    return inside[np.argmin(np.linalg.norm(mesh.vertices[inside] - place, axis=1))]
+
+
+def flattened(mesh=BODY, share=0.9, place=(8.0, 8.0, 5.0)):
+    """Return places at which a vertex inside has gone a share of the way to the
+    opposite face of an element."""
+    vertex = inside_vertex(mesh, place)
+    tet = mesh.tets[(mesh.tets == vertex).any(axis=1)][0]
+    places = mesh.vertices.copy()
+    places[vertex] += share * (places[tet[tet != vertex]].mean(axis=0) - places[vertex])
     return places
 
 
@@ -353,3 +358,28 @@ def test_a_shape_is_refused_if_the_body_stays_more_than_three_millimetres_from_i
     else:
         assert body.follow(shape) == pytest.approx(BODY.vertices, abs=1e-6)
         assert caplog.messages == []
+
+
+@pytest.mark.parametrize(
+    ("share", "is_changed"), [(0.7, False), (0.85, True), (1.1, True)]
+)
+def test_a_displacement_is_smoothed_only_around_elements_that_lose_most_of_their_volume(
+    share, is_changed
+):
+    body, shift, place = ElasticFit(SMALL), np.array([0.3, -0.2, 0.1]), [2.8, 2.8, 1.75]
+    wanted = flattened(SMALL, share, place) + shift
+    found, faults = body._untangled(SMALL.vertices, wanted, UNTANGLING_MM)
+    assert len(faults) == 0
+    moved = np.linalg.norm(found - wanted, axis=1)
+    assert (moved.max() > 0.1) == is_changed
+    volumes = volumes_between(found, SMALL.tets) / volumes_between(
+        SMALL.vertices, SMALL.tets
+    )
+    assert volumes.min() > 0.2
+    # a motion of all is kept, and what is far from the fault stays as it is wanted
+    distance = np.linalg.norm(
+        SMALL.vertices - SMALL.vertices[inside_vertex(SMALL, place)], axis=1
+    )
+    assert moved[distance > 6.0].max() < 0.001
+    others = distance > 0.0
+    assert np.linalg.norm(found - SMALL.vertices - shift, axis=1)[others].max() < 0.5

@@ -267,9 +267,8 @@ def test_numbers_of_the_steps_of_an_elastic_fit(recorded, monkeypatch):
     element = mesh.tets[(mesh.tets == inside[5]).any(axis=1)][0]
     others = element[element != inside[5]]
     way = mesh.vertices[others].mean(axis=0) - mesh.vertices[inside[5]]
-    flat, less_flat = mesh.vertices.copy(), mesh.vertices.copy()
+    flat = mesh.vertices.copy()
     flat[inside[5]] += 0.9 * way
-    less_flat[inside[5]] += 0.7 * way
     outer = mesh.tets[~np.isin(mesh.tets, inside).any(axis=1)][0]
     pressed = flat.copy()
     pressed[outer[0]] += 0.95 * (flat[outer[1:]].mean(axis=0) - flat[outer[0]])
@@ -300,10 +299,7 @@ def test_numbers_of_the_steps_of_an_elastic_fit(recorded, monkeypatch):
             "flattening": body._flattening()[:, 0],
             "opened": body._opened(pressed),
             "distance": body._distance(mesh.vertices, target(mesh)),
-            "untangled": [
-                body._untangled(mesh.vertices, places, (1.0, 2.0))[0]
-                for places in (flat, less_flat)
-            ],
+            "untangled": body._untangled(mesh.vertices, flat, (1.0, 2.0))[0],
         },
         rtol=1e-3,
     )
