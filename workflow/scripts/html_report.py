@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import yaml
+
 from gyriflow.compare.accuracy import prediction_facts
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
-from gyriflow.io.yaml_files import read_yaml, yaml_text
+from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.page import (
     Tables,
     brain_page,
@@ -76,7 +78,9 @@ with step(snakemake.log[0]):
         "provenance": read_json(files.provenance),
         "methods": read_text(files.methods),
     }
-    origin["configuration"] = yaml_text(hide_paths(params.config))
+    origin["configuration"] = yaml.safe_dump(
+        hide_paths(params.config), sort_keys=False, allow_unicode=True
+    )
     brains = {brain["id"]: brain for brain in params.brains}
     for path, (name, figures) in zip(
         output.brains, params.brain_figures.items(), strict=True

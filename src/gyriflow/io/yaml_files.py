@@ -184,14 +184,9 @@ def read_keys(path: AnyPath) -> dict[str, Any]:
     return content
 
 
-def yaml_text(content: Any) -> str:
-    """Return content as YAML."""
-    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-
-
 def write_yaml(path: AnyPath, content: Any) -> None:
     """Write plain dictionaries, lists and numbers, keys in their order."""
-    write_text(path, yaml_text(content))
+    write_text(path, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
 
 
 class Schemes(Mapping[str, LabelScheme]):

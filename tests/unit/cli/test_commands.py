@@ -461,10 +461,6 @@ def test_a_file_of_another_kind_than_expected_is_not_said_to_be_missing(predicte
     assert "there is" not in output
 
 
-def test_a_prediction_needs_a_week(predicted):
-    assert predicted("--until", "24.8", code=2) == Facts("--week")
-
-
 @pytest.mark.parametrize("home", ["", "/proc/nobody", "file"])
 def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(
     monkeypatch, tmp_path, home

@@ -27,7 +27,7 @@ from gyriflow.io.files import (
 from gyriflow.io.origins import joined_contents
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.io.yaml_files import read_keys, read_yaml, write_yaml
+from gyriflow.io.yaml_files import read_keys, read_yaml
 from gyriflow.running.provenance import input_contents, recorded_inputs
 from gyriflow.settings.base import folder_of, located
 from gyriflow.study.loading import load
@@ -201,12 +201,6 @@ def test_values_that_are_nested_deeply_are_refused(tmp_path, opening):
     path.write_text(opening * 100_000)
     with pytest.raises(InputError, check=Facts(path)):
         read_yaml(path)
-
-
-def test_yaml_that_is_written_is_read(tmp_path):
-    content = {"b": 1.5, "a": [1, "ν"], "c": {"d": None, "e": True}}
-    write_yaml(tmp_path / "new" / "x.yaml", content)
-    assert read_yaml(tmp_path / "new" / "x.yaml") == content
 
 
 def test_contents_are_read_again_only_where_size_or_times_changed(

@@ -16,8 +16,8 @@ from gyriflow.cli.recognition import recognise
 from gyriflow.errors import InputError
 from gyriflow.formats import FORMATS, is_volume
 from gyriflow.geometry.triangles import is_closed, signed_volume
-from gyriflow.io.surfaces import SURFACE_READERS, read_surface, write_surface
-from gyriflow.io.volumes import VOLUME_READERS, read_label_volume
+from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.volumes import read_label_volume
 from gyriflow.report.page import hide_paths
 from gyriflow.settings.brains import BrainConfig
 
@@ -110,15 +110,6 @@ def test_a_format_of_volumes_is_read_recognised_and_hidden(tmp_path, form, suffi
     assert hide_paths({"file": path.name}) == {"file": "(file)"}
     # a pair is named by its header
     assert recognised(tmp_path, [path.name.replace(".img", ".hdr")])
-
-
-def test_each_format_has_a_reader_and_each_reader_a_format():
-    names = {"surface": [], "volume": []}
-    for form in FORMATS:
-        names[form.content].append(form.name)
-    assert names == {"surface": [*SURFACE_READERS], "volume": [*VOLUME_READERS]}
-    suffixes = [suffix for form in FORMATS for suffix in form.all_suffixes]
-    assert len(suffixes) == len(set(suffixes))
 
 
 @pytest.mark.parametrize("ending", ["dlabel", "dtseries", "pconn"])

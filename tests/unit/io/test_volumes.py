@@ -106,6 +106,9 @@ def test_a_volume_is_the_same_in_any_format_and_unit(tmp_path, name, unit, per_m
     volume = read_label_volume(tmp_path / name)
     assert np.array_equal(volume.labels, LABELS)
     assert volume.affine == pytest.approx(AFFINE, rel=1e-5)
+    header = read_header(tmp_path / name)
+    assert (header.shape, header.unit, header.space) == ((4, 5, 6), unit, "scanner")
+    assert header.voxel_mm == pytest.approx([0.8, 0.9, 1.0], rel=1e-5)
 
 
 def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path):
@@ -348,11 +351,3 @@ def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path, affine):
 def test_a_volume_without_labels_has_no_border(tmp_path):
     path = saved(tmp_path / "a.nii.gz", np.zeros((3, 4, 5), dtype=np.int16))
     assert read_label_volume(path, cropped=True).labels.shape == (3, 4, 5)
-
-
-def test_a_header_has_numbers_sizes_and_unit_of_voxels_and_their_space(tmp_path):
-    path = saved(tmp_path / "a.nii.gz", affine=scaling(1e-3) @ AFFINE, unit="meter")
-    shape, sizes, unit, space = read_header(path)
-    assert shape == (4, 5, 6)
-    assert sizes == pytest.approx([0.8, 0.9, 1.0], rel=1e-5)
-    assert (unit, space) == ("meter", "scanner")
