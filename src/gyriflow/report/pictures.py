@@ -243,10 +243,8 @@ def inputs_figure(grid: Grid) -> Figure:
     return _brain_grid(_in_views(grid, OUTER_VIEWS))
 
 
-@styled
-def predicted_figure(grid: Grid) -> Figure:
-    """Draw the start brain, the predicted one, and the atlas' own brain."""
-    return _brain_grid(_in_views(grid, OUTER_VIEWS))
+predicted_figure = inputs_figure
+"""The start brain, the predicted one, and the atlas' own brain."""
 
 
 @styled
@@ -459,6 +457,10 @@ def growth_found_figure(
     return _growth_grid(frames, growth, "area_growth_percent_per_gw")
 
 
+growth_sd_figure = growth_found_figure
+"""The standard deviation of growth in area over the members of an ensemble."""
+
+
 @styled
 def growth_across_figure(
     frames: Mapping[float, SurfaceMaps], growth: Mapping[str, Floats]
@@ -466,14 +468,6 @@ def growth_across_figure(
     """Draw the growth across the surface by which a run approached its target
     shapes."""
     return _growth_grid(frames, growth, "thickness_growth_percent_per_gw")
-
-
-@styled
-def growth_sd_figure(
-    frames: Mapping[float, SurfaceMaps], growth: Mapping[str, Floats]
-) -> Figure:
-    """Draw the standard deviation of growth in area over the members of an ensemble."""
-    return _growth_grid(frames, growth, "area_growth_percent_per_gw")
 
 
 def _growth_grid(
@@ -581,17 +575,6 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
 
 @styled
 def brain_regions(grid: Grid) -> Figure:
-    """Draw the regions of the cortex of a brain."""
-    return _region_grid(grid)
-
-
-@styled
-def regions_figure(grid: Grid) -> Figure:
-    """Draw the regions of the cortex of observed and simulated brains."""
-    return _region_grid(grid)
-
-
-def _region_grid(grid: Grid) -> Figure:
     """Draw brains coloured by region, a column per brain and a row per view, with the
     regions' names.
 
@@ -620,6 +603,10 @@ def _region_grid(grid: Grid) -> Figure:
                 )
             )
     return _brain_grid(placed, legend=legend)
+
+
+regions_figure = brain_regions
+"""The regions of observed and simulated brains, beside each other."""
 
 
 def _painted_regions(
