@@ -3,10 +3,18 @@ brain a file is of."""
 
 import pytest
 from configurations import LABELLED, labelled
+from shapes import hemisphere
+
+from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.io.surfaces import write_surface
 
 from .conftest import Workflow
 
-RUN = "results/runs/reference/b21/metrics"
+LABELS = LABELLED["labels"]
+RUN = "results/runs/reference/b21"
+SWEPT = "results/runs/thick-2/b21"
+SOFT = "results/runs/soft/b21"
+FOUND = "results/study/validation/b21/week-24.00/"
 
 
 def population(name, *weeks):
@@ -19,6 +27,10 @@ def population(name, *weeks):
 
 def surface(brain, part=""):
     return f"results/brains/{brain}/surface/{part}pial.surf.gii"
+
+
+def weekly(folder, *weeks, file="pial.surf.gii"):
+    return [f"{folder}/surfaces/week-{week}.00/{file}" for week in weeks]
 
 
 @pytest.fixture(scope="module")
@@ -43,99 +55,111 @@ def planned(checkout_copy, tmp_path_factory):
 def jobs(planned):
     """Brains of four weeks, the first folded, beside a sweep; the third has regions, to
     the second maps are brought."""
-    brains = population("b", 21, 22, 23, 24)
-    regions = {"b23": {"labels": "regions.nii.gz", "names": {1: "frontal"}}}
     sweep = {
         "base": "reference",
         "vary": {"thickness_mm": [1.0, 2.0]},
         "compare_week": 23,
     }
-    soft = {"map": brains[0]["labels"], "weeks": {21: 1.0, 24: 0.5}}
-    runs = {"reference": {"thickness_mm": 1.0}, "soft": {"shear_modulus_core_pa": soft}}
+    soft = {"map": LABELS, "weeks": {21: 1.0, 24: 0.5}}
     study = {
-        "brains": brains,
+        "brains": population("b", 21, 22, 23, 24),
         "start": "b21",
         "folding": {"end_week": 24},
         "sweeps": {"thick": sweep},
+        "metrics": {
+            "regions": {"b23": {"labels": "regions.nii.gz", "names": {1: "frontal"}}},
+            "template": "b22",
+        },
+        "runs": {
+            "reference": {"thickness_mm": 1.0},
+            "soft": {"shear_modulus_core_pa": soft},
+        },
     }
-    study |= {"metrics": {"regions": regions, "template": "b22"}, "runs": runs}
     return planned(study, "all", "export", "sweeps")
 
 
-def test_a_run_is_validated_by_the_real_brains_of_its_weeks(jobs):
-    files = jobs[f"{RUN}/validation.csv"]
-    weeks = (22, 23, 24)
-    assert [surface(f"b{week}") for week in weeks] == [
-        file for file in files if "/brains/" in file
-    ]
-    simulated = [
-        f"results/runs/reference/b21/surfaces/week-{week}.00/pial.surf.gii"
-        for week in weeks
-    ]
-    assert simulated == [file for file in files if "/surfaces/" in file]
-    ready = "results/study/validation/b21/week-{}.00/{}.{}.gii".format
-    kinds = [
-        (name, kind)
-        for name in ("observed", "start", "adjacent")
-        for kind in ("surf", "shape")
-    ]
-    assert {ready(week, *kind) for week in weeks for kind in kinds} <= set(files)
-    # the adjacent brain is the latest real one before
-    assert jobs[ready(24, "observed", "surf")] == [
-        surface("b24"),
-        surface("b23"),
-        surface("b21"),
-    ]
-
-
-def test_regions_are_carried_from_the_brain_that_has_them(jobs):
-    files = jobs["results/brains/b22/metrics/left.regions.label.gii"]
-    assert "results/brains/b23/metrics/left.regions.label.gii" in files
-    assert surface("b23", "left.") in files
-    assert "results/study/registration/b23/b22.h5" in files
-
-
-def test_maps_of_simulated_brains_are_brought_to_the_template_from_their_start(jobs):
-    files = jobs[f"{RUN}/week-24.00/left.template.shape.gii"]
-    # they keep the vertices of the start
-    assert "results/runs/reference/b21/surfaces/week-21.00/left.pial.surf.gii" in files
-    assert surface("b22", "left.") in files
-    assert "results/study/registration/b22/b21.h5" in files
-    own = jobs["results/brains/b22/metrics/left.template.shape.gii"]
-    assert [file for file in own if file.endswith(".h5")] == []
-
-
-def test_maps_of_parameters_are_made_of_the_files_of_the_user(jobs):
-    volume, *made = jobs["results/runs/soft/b21/params.yaml"]
-    assert volume == LABELLED["labels"]
-    assert all(path.startswith("results/brains/b21/") for path in made)
-    assert LABELLED["labels"] not in jobs["results/runs/reference/b21/params.yaml"]
-    assert (
-        "results/runs/soft/b21/folding/maps.h5"
-        in jobs["results/runs/soft/b21/folding/steps.csv"]
-    )
-    assert (
-        "results/runs/reference/b21/folding/maps.h5"
-        not in jobs["results/runs/reference/b21/folding/steps.csv"]
-    )
-
-
-def test_members_of_a_study_are_gathered_with_the_run_that_equals_one(jobs):
-    files = jobs["results/study/thick/members.csv"]
-    summaries = [
-        f"results/runs/{run}/b21/folding/summary.json"
-        for run in ("reference", "thick-2")
-    ]
-    assert [file for file in files if file.endswith("summary.json")] == summaries
-    # what has been solved already is compared at the week of the study
-    compared = jobs["results/study/thick/members/reference/b21/comparison.csv"]
-    tables = [file for file in compared if file.endswith("metrics.csv")]
-    assert tables == [
-        f"{RUN}/week-23.00/metrics.csv",
-        "results/brains/b23/metrics/metrics.csv",
-    ]
-    assert surface("b23") in compared
-    assert "results/runs/reference/b21/surfaces/week-23.00/pial.surf.gii" in compared
+@pytest.mark.parametrize(
+    ("output", "part", "expected"),
+    [
+        # a run is validated by the observed brains of its weeks
+        (
+            f"{RUN}/metrics/validation.csv",
+            "/brains/",
+            [surface("b22"), surface("b23"), surface("b24")],
+        ),
+        (f"{RUN}/metrics/validation.csv", "/surfaces/", weekly(RUN, 22, 23, 24)),
+        (
+            f"{RUN}/metrics/validation.csv",
+            FOUND,
+            [
+                f"{FOUND}{name}.{kind}.gii"
+                for kind in ("surf", "shape")
+                for name in ("observed", "start", "adjacent")
+            ],
+        ),
+        # whose adjacent one is the latest before
+        (
+            f"{FOUND}observed.surf.gii",
+            "pial",
+            [surface("b24"), surface("b23"), surface("b21")],
+        ),
+        # regions are carried from the brain that has them
+        (
+            "results/brains/b22/metrics/left.regions.label.gii",
+            "left.",
+            [
+                "results/brains/b23/metrics/left.regions.label.gii",
+                surface("b23", "left."),
+                surface("b22", "left."),
+            ],
+        ),
+        (
+            "results/brains/b22/metrics/left.regions.label.gii",
+            ".h5",
+            ["results/study/registration/b23/b22.h5"],
+        ),
+        # maps of simulated brains are brought to the template from their start, whose
+        # vertices they keep
+        (
+            f"{RUN}/metrics/week-24.00/left.template.shape.gii",
+            "surf.gii",
+            [*weekly(RUN, 21, file="left.pial.surf.gii"), surface("b22", "left.")],
+        ),
+        (
+            f"{RUN}/metrics/week-24.00/left.template.shape.gii",
+            ".h5",
+            ["results/study/registration/b22/b21.h5"],
+        ),
+        ("results/brains/b22/metrics/left.template.shape.gii", ".h5", []),
+        # maps of parameters are made of the files of the user
+        (f"{SOFT}/params.yaml", LABELS, [LABELS]),
+        (f"{RUN}/params.yaml", LABELS, []),
+        (f"{SOFT}/folding/steps.csv", "maps.h5", [f"{SOFT}/folding/maps.h5"]),
+        (f"{RUN}/folding/steps.csv", "maps.h5", []),
+        # members of a sweep are gathered with the run that equals one
+        (
+            "results/study/thick/members.csv",
+            "summary.json",
+            [f"{run}/folding/summary.json" for run in (RUN, SWEPT)],
+        ),
+        # which is compared at the week of the sweep
+        (
+            "results/study/thick/members/reference/b21/comparison.csv",
+            "metrics.csv",
+            [
+                f"{RUN}/metrics/week-23.00/metrics.csv",
+                "results/brains/b23/metrics/metrics.csv",
+            ],
+        ),
+        (
+            "results/study/thick/members/reference/b21/comparison.csv",
+            "/pial.surf.gii",
+            [surface("b23"), *weekly(RUN, 23)],
+        ),
+    ],
+)
+def test_a_rule_reads_the_files_of_the_right_brains(jobs, output, part, expected):
+    assert sorted(f for f in jobs[output] if part in f) == sorted(expected)
 
 
 def test_what_deviates_is_compared_with_what_was_expected_at_its_week(planned):
@@ -148,24 +172,31 @@ def test_what_deviates_is_compared_with_what_was_expected_at_its_week(planned):
         "folding": {"end_week": 24},
         "runs": {"a": {"preset": "expected"}},
     }
-    table = "results/runs/a/own22/metrics/week-24.00/deviation.csv"
+    run = "results/runs/a/own22"
+    table = f"{run}/metrics/week-24.00/deviation.csv"
     jobs = planned(study, "results/study/deviation.csv")
-    joined = [
-        file
-        for file in jobs["results/study/deviation.csv"]
-        if file.endswith("deviation.csv")
-    ]
+    joined = [f for f in jobs["results/study/deviation.csv"] if "deviation" in f]
     assert joined == [table.replace("24", "23"), table]
-    weekly = "results/runs/a/own22/surfaces/week-{}.00".format
     maps = "results/brains/{}/surface/measured_thickness.shape.gii".format
-    whole = [
-        surface("own22"),
-        *(f"{weekly(week)}/pial.surf.gii" for week in (22, 24)),
-        surface("own24"),
-    ]
-    thickness = [
+    assert jobs[table][:8] == [
+        *(surface("own22"), *weekly(run, 22, 24), surface("own24")),
         maps("own22"),
-        *(f"{weekly(week)}/thickness.shape.gii" for week in (22, 24)),
+        *weekly(run, 22, 24, file="thickness.shape.gii"),
         maps("own24"),
     ]
-    assert jobs[table][:8] == [*whole, *thickness]
+
+
+def test_matched_vertices_take_the_place_of_registration(workflow):
+    brains = []
+    for week in (21, 22, 23):
+        mesh = hemisphere(-1)
+        file = f"left-{week}.surf.gii"
+        grown = TriangleMesh(mesh.vertices * 1.04 ** (week - 21), mesh.faces)
+        write_surface(workflow.directory / file, grown)
+        brains.append({"id": f"b{week}", "week": week, "pial": file, "side": "left"})
+    folding = {"end_week": 23, "preset": "measured"}
+    study = {"brains": brains, "start": "b21", "folding": folding}
+    name = workflow.write("study.yaml", study)
+    jobs = workflow.jobs("all", "validate", "--configfile", name)
+    counts = [jobs[rule] for rule in ("match_surfaces", "targets", "register")]
+    assert counts == [2, 1, 0]

@@ -84,6 +84,11 @@ case "$*" in
 esac
 """
 OLD_GLIBC = "#!/bin/sh\necho glibc 2.34\n"
+ARM = '#!/bin/sh\n[ "$1" = -m ] && echo aarch64 || echo Linux\n'
+NOTE_AND_FAIL = '#!/bin/sh\necho "$*" >> "$RECORD"\nexit 1\n'
+FAIL = "#!/bin/sh\nexit 1\n"
+USER, SUPERUSER = "#!/bin/sh\necho 1000\n", "#!/bin/sh\necho 0\n"
+MADE = "from the environment: {}\n".format
 
 
 def write_program(folder, name, text):
@@ -93,45 +98,43 @@ def write_program(folder, name, text):
 
 
 @pytest.fixture
-def outside(tmp_path):
+def programs(tmp_path):
+    """Return a function that puts programs in front of all others."""
+
+    def put(**texts):
+        for name, text in texts.items():
+            write_program(tmp_path / "programs", name.replace("_", "-"), text)
+
+    return put
+
+
+@pytest.fixture
+def outside(programs, tmp_path):
     """Return the variables of a shell outside of any environment, with a stand-in for
     Python 3.13 first on PATH."""
-    programs = tmp_path / "programs"
-    for name in ("python3", "python3.12", "python3.14"):
-        write_program(programs, name, SHIM)
-    write_program(programs, "python3.13", PYTHON)
-    env = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in {"VIRTUAL_ENV", "CONDA_PREFIX"}
-    }
+    shims = dict.fromkeys(("python3", "python3.12", "python3.14"), SHIM)
+    programs(**shims, **{"python3.13": PYTHON})
+    active = {"VIRTUAL_ENV", "CONDA_PREFIX"}
+    env = {name: value for name, value in os.environ.items() if name not in active}
     files = {
         "GYRIFLOW_CACHE": str(tmp_path / "cache"),
         "RECORD": str(tmp_path / "record"),
-    }
-    return env | files | {"PATH": f"{programs}:{env['PATH']}"}
-
-
-@pytest.fixture
-def with_conda(outside, tmp_path):
-    """Return such variables for a machine that is too old for the wheels and has
-    conda."""
-    write_program(tmp_path / "programs", "getconf", OLD_GLIBC)
-    write_program(tmp_path / "programs", "conda", CONDA)
-    return outside
-
-
-@pytest.fixture
-def root_on_debian(outside, tmp_path):
-    """Return such variables for root on a Debian machine."""
-    programs = tmp_path / "programs"
-    write_program(programs, "id", "#!/bin/sh\necho 0\n")
-    write_program(programs, "dpkg", "#!/bin/sh\n")
-    write_program(programs, "apt-get", APT_GET)
-    return outside | {
-        "PATH": f"{programs}:/usr/bin:/bin",
         "PYENV_ROOT": str(tmp_path / "pyenv"),
     }
+    return env | files | {"PATH": f"{tmp_path / 'programs'}:{env['PATH']}"}
+
+
+@pytest.fixture
+def bare(outside, tmp_path):
+    """Return such variables for a machine with no programs but those of the system."""
+    return outside | {"PATH": f"{tmp_path / 'programs'}:/usr/bin:/bin"}
+
+
+@pytest.fixture
+def root_on_debian(bare, programs):
+    """Return such variables for root on a Debian machine."""
+    programs(id=SUPERUSER, dpkg="#!/bin/sh\n", apt_get=APT_GET)
+    return bare
 
 
 OWN = f"9{os.getpid()}.25"
@@ -182,20 +185,15 @@ def running(word):
 
 
 def test_arguments_and_exit_code_are_handed_on():
-    assert (
-        run("printf", "%s|", "a b", "", "*", "$HOME", "'").stdout == "a b||*|$HOME|'|"
-    )
+    given = "a b", "", "*", "$HOME", "'"
+    assert run("printf", "%s|", *given).stdout == "a b||*|$HOME|'|"
     assert run("bash", "-c", "exit 7").returncode == 7
     assert run("no-such-command").returncode == 127
 
 
 def test_blas_is_an_optimised_one():
-    loaded = run(
-        "python",
-        "-c",
-        "import gyriflow.folding, petsc4py.PETSc;"
-        " print(open('/proc/self/maps').read())",
-    ).stdout
+    program = "import gyriflow.folding, petsc4py.PETSc; print(open('{}').read())"
+    loaded = run("python", "-c", program.format("/proc/self/maps")).stdout
     assert "openblas" in loaded or "mkl" in loaded
 
 
@@ -208,7 +206,10 @@ class Vec:
 OPEN_MPI = "raise ImportError('libpetsc.so: undefined symbol: ompi_mpi_comm_world')"
 
 
-def write_solver(folder, petsc, dolfinx="0.11.0"):
+REAL = PETSC.format(scalar="float")
+
+
+def write_solver(folder, petsc=REAL, dolfinx="0.11.0"):
     """Write packages that stand in for dolfinx, mpi4py and petsc4py."""
     modules = {
         "dolfinx": f"__version__ = {dolfinx!r}",
@@ -235,23 +236,17 @@ def write_metadata(folder):
 def active(outside, tmp_path):
     """Return variables of an active venv with stand-ins for the solver."""
     folder = tmp_path / "active"
-    subprocess.run(
-        [sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=60
-    )
-    for python in (folder / "bin").glob("python3*"):
-        # ./run would make its own environment by it
+    venv = [sys.executable, "-m", "venv", "--without-pip", folder]
+    subprocess.run(venv, check=True, timeout=60)
+    # ./run would make its own environment by the former
+    for python in [*(folder / "bin").glob("python3*"), folder / "bin" / "python"]:
         python.unlink()
-    (folder / "bin" / "python").unlink()
     (folder / "bin" / "python").symlink_to(sys._base_executable)
-    write_program(
-        folder / "bin", "tool", "#!/bin/sh\necho from the active environment\n"
-    )
-    write_solver(packages_of(folder), PETSC.format(scalar="float"))
+    write_program(folder / "bin", "tool", "#!/bin/sh\necho from the active one\n")
+    write_solver(packages_of(folder))
     write_metadata(packages_of(folder))
-    return outside | {
-        "VIRTUAL_ENV": str(folder),
-        "PATH": f"{folder / 'bin'}:{outside['PATH']}",
-    }
+    path = f"{folder / 'bin'}:{outside['PATH']}"
+    return outside | {"VIRTUAL_ENV": str(folder), "PATH": path}
 
 
 def packages_of(folder):
@@ -267,44 +262,41 @@ def test_an_active_environment_with_the_solver_is_taken_whatever_variables_name_
         "PETSC_DIR": "/nowhere",
         "PETSC_ARCH": "linux-gnu",
         "PYTHONPATH": str(tmp_path / "foreign"),
+        "CONDA_PREFIX": "/behind/it/on/PATH",
     }
-    assert run("tool", env=active | other).stdout == "from the active environment\n"
+    assert run("tool", env=active | other).stdout == "from the active one\n"
+
+
+def lose_nibabel(packages):
+    (nibabel,) = packages.glob("nibabel-*")
+    shutil.rmtree(nibabel)
 
 
 @pytest.mark.parametrize(
-    ("petsc", "dolfinx"),
+    "change",
     [
-        (PETSC.format(scalar="complex"), "0.11.0"),
-        (OPEN_MPI, "0.11.0"),
-        (PETSC.format(scalar="float"), "0.10.0"),
+        lambda packages: write_solver(packages, PETSC.format(scalar="complex")),
+        lambda packages: write_solver(packages, OPEN_MPI),
+        lambda packages: write_solver(packages, dolfinx="0.10.0"),
+        lose_nibabel,
     ],
+    ids=["complex numbers", "another MPI", "an old solver", "a package missing"],
 )
-def test_an_active_environment_with_another_solver_is_not_taken(
-    active, tmp_path, petsc, dolfinx
+def test_an_active_environment_that_cannot_run_gyriflow_is_not_taken(
+    active, tmp_path, change
 ):
-    write_solver(packages_of(tmp_path / "active"), petsc, dolfinx)
+    change(packages_of(tmp_path / "active"))
     (tmp_path / "active" / "bin" / "tool").unlink()
-    assert run("tool", "1", env=active).stdout == "from the environment: 1\n"
-
-
-def test_an_active_environment_without_a_package_of_measuring_is_not_taken(
-    active, tmp_path
-):
-    (nibabel,) = packages_of(tmp_path / "active").glob("nibabel-*")
-    shutil.rmtree(nibabel)
-    (tmp_path / "active" / "bin" / "tool").unlink()
-    assert run("tool", "1", env=active).stdout == "from the environment: 1\n"
+    assert run("tool", "1", env=active).stdout == MADE(1)
 
 
 def test_with_conda_and_a_venv_active_the_first_python_on_path_decides(
     active, tmp_path
 ):
-    conda = tmp_path / "conda"
-    write_program(conda / "bin", "python", "#!/bin/sh\nexit 1\n")
-    both = active | {"CONDA_PREFIX": str(conda)}
-    assert run("tool", env=both).stdout == "from the active environment\n"
-    conda_first = both | {"PATH": f"{conda / 'bin'}:{both['PATH']}"}
-    assert run("tool", "1", env=conda_first).stdout == "from the environment: 1\n"
+    write_program(tmp_path / "conda" / "bin", "python", FAIL)
+    path = f"{tmp_path / 'conda' / 'bin'}:{active['PATH']}"
+    conda_first = {"CONDA_PREFIX": str(tmp_path / "conda"), "PATH": path}
+    assert run("tool", "1", env=active | conda_first).stdout == MADE(1)
 
 
 def test_ranks_under_mpiexec_are_of_one_run():
@@ -320,36 +312,29 @@ def test_ranks_under_mpiexec_are_of_one_run():
 def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp_path):
     first = run("tool", "1", env=outside)
     second = run("bash", "-c", "tool 2; exit 5", env=outside)
-    assert (first.stdout, first.returncode) == ("from the environment: 1\n", 0)
-    assert (second.stdout, second.returncode) == ("from the environment: 2\n", 5)
+    assert (first.stdout, first.returncode) == (MADE(1), 0)
+    assert (second.stdout, second.returncode) == (MADE(2), 5)
     (venv,) = (tmp_path / "cache").glob("venv-*/venv")
     assert first.stderr == Facts(venv.parent)
     assert second.stderr == ""
     calls = (tmp_path / "record").read_text().splitlines()
     assert f"-I -m venv {venv}" in calls
     (installation,) = [line for line in calls if "pip install" in line]
+    locks = [f"-r {ROOT}/envs/requirements{part}.txt" for part in ("", "-dev")]
     assert "--require-hashes" in installation
-    assert installation.endswith(
-        f"-r {ROOT}/envs/requirements.txt -r {ROOT}/envs/requirements-dev.txt"
-    )
+    assert installation.endswith(" ".join(locks))
 
 
-def test_a_python_of_pyenv_is_found_behind_shims(outside, tmp_path):
-    (tmp_path / "programs" / "python3.13").unlink()
-    write_program(tmp_path / "programs", "python3.13", SHIM)
+def test_a_python_of_pyenv_is_found_behind_shims(outside, programs, tmp_path):
+    programs(**{"python3.13": SHIM})
     write_program(tmp_path / "pyenv" / "versions" / "3.14.2" / "bin", "python3", PYTHON)
-    env = outside | {"PYENV_ROOT": str(tmp_path / "pyenv")}
-    assert run("tool", "1", env=env).stdout == "from the environment: 1\n"
+    assert run("tool", "1", env=outside).stdout == MADE(1)
 
 
-def test_a_python_with_wheels_goes_before_3_14(outside, tmp_path):
-    for name in ("python3", "python3.14"):
-        write_program(
-            tmp_path / "programs",
-            name,
-            PYTHON.replace("from the environment", "from 3.14"),
-        )
-    assert run("tool", "1", env=outside).stdout == "from the environment: 1\n"
+def test_a_python_with_wheels_goes_before_3_14(outside, programs):
+    newer = PYTHON.replace("from the environment", "from 3.14")
+    programs(**dict.fromkeys(("python3", "python3.14"), newer))
+    assert run("tool", "1", env=outside).stdout == MADE(1)
 
 
 def test_a_venv_whose_python_is_gone_is_made_again(outside, tmp_path):
@@ -357,34 +342,46 @@ def test_a_venv_whose_python_is_gone_is_made_again(outside, tmp_path):
     (python,) = (tmp_path / "cache").glob("venv-*/venv/bin/python")
     python.unlink()
     python.symlink_to(tmp_path / "python of a pyenv version that was removed")
-    assert run("tool", "2", env=outside).stdout == "from the environment: 2\n"
+    assert run("tool", "2", env=outside).stdout == MADE(2)
     assert os.access(python, os.X_OK)
 
 
 def test_the_set_up_uses_neither_the_users_python_home_nor_the_working_directory(
-    outside, tmp_path
+    outside, programs, tmp_path
 ):
-    write_program(tmp_path / "programs", "id", "#!/bin/sh\necho 1000\n")
+    programs(id=USER)
     env = outside | {"PYTHONHOME": str(tmp_path)}
-    assert run("tool", "1", env=env).stdout == "from the environment: 1\n"
+    assert run("tool", "1", env=env).stdout == MADE(1)
     for arguments in (tmp_path / "record").read_text().splitlines():
         assert arguments.startswith(("-I ", "-P "))
 
 
-def test_debians_package_for_venv_is_named(outside, tmp_path):
-    (tmp_path / "record.no-ensurepip").touch()
-    write_program(tmp_path / "programs", "id", "#!/bin/sh\necho 1000\n")
-    path = f"{tmp_path / 'programs'}:/usr/bin:/bin"
-    env = {"PATH": path, "PYENV_ROOT": str(tmp_path / "pyenv")}
-    done = run("tool", env=outside | env)
+NO_PYTHON = {"python3.13": SHIM, "python3": FAIL, "python3.11": FAIL, "id": USER}
+
+
+@pytest.mark.parametrize(
+    ("texts", "record", "facts"),
+    [
+        ({"uname": ARM}, "record", ["3.12", "2.35", "envs/gyriflow.yaml"]),
+        (NO_PYTHON, "record", ["3.12", "envs/gyriflow.yaml"]),
+        ({"id": USER}, "record.no-ensurepip", ["apt-get install python3.13-venv"]),
+    ],
+    ids=["no wheels", "an old Python", "Debian's venv missing"],
+)
+def test_without_any_way_it_says_what_is_needed(
+    bare, programs, tmp_path, texts, record, facts
+):
+    (tmp_path / record).touch()
+    programs(**texts)
+    done = run("tool", env=bare)
     assert done.returncode == 2
-    assert done.stderr == Facts("apt-get install python3.13-venv")
+    assert done.stderr == Facts(*facts)
     assert not (tmp_path / "cache").exists()
 
 
 def test_debians_package_for_venv_is_installed_as_root(root_on_debian, tmp_path):
     (tmp_path / "record.no-ensurepip").touch()
-    assert run("tool", "1", env=root_on_debian).stdout == "from the environment: 1\n"
+    assert run("tool", "1", env=root_on_debian).stdout == MADE(1)
     installation = "apt-get install -y --no-install-recommends python3.13-venv"
     assert installation in (tmp_path / "record").read_text().splitlines()
 
@@ -401,72 +398,39 @@ def test_ctrl_c_lets_an_installation_of_debian_packages_end(root_on_debian, tmp_
     assert record.read_text().splitlines()[-1] == "installed"
 
 
-def test_the_tree_comes_from_the_mirror_of_debian_itself(root_on_debian, tmp_path):
-    programs = tmp_path / "programs"
-    write_program(programs, "python3.13", SHIM)
-    write_program(programs, "unshare", '#!/bin/sh\necho "$*" >> "$RECORD"\nexit 1\n')
-    write_program(programs, "mmdebstrap", "#!/bin/sh\n")
+def test_the_tree_comes_from_the_mirror_of_debian_itself(
+    root_on_debian, programs, tmp_path
+):
+    programs(**{"python3.13": SHIM}, unshare=NOTE_AND_FAIL, mmdebstrap="#!/bin/sh\n")
     done = run("tool", env=root_on_debian)
     assert done.stderr == Facts("create_tree")
     assert (tmp_path / "record").read_text().splitlines()[-1].endswith(" mirror")
 
 
-def test_without_any_way_it_says_what_is_needed(outside, tmp_path):
-    write_program(
-        tmp_path / "programs",
-        "uname",
-        '#!/bin/sh\n[ "$1" = -m ] && echo aarch64 || echo Linux\n',
-    )
-    done = run("tool", env=outside | {"PATH": f"{tmp_path / 'programs'}:/usr/bin:/bin"})
-    assert done.returncode == 2
-    assert done.stderr == Facts("3.12", "2.35", "envs/gyriflow.yaml")
-
-
-def test_with_python_3_11_alone_it_says_what_is_needed(outside, tmp_path):
-    programs = tmp_path / "programs"
-    write_program(programs, "python3.13", SHIM)
-    for name in ("python3", "python3.11"):
-        write_program(programs, name, "#!/bin/sh\nexit 1\n")
-    write_program(programs, "id", "#!/bin/sh\necho 1000\n")
-    env = {"PATH": f"{programs}:/usr/bin:/bin", "PYENV_ROOT": str(tmp_path / "pyenv")}
-    done = run("tool", env=outside | env)
-    assert done.returncode == 2
-    assert done.stderr == Facts("3.12", "envs/gyriflow.yaml")
-    assert not (tmp_path / "cache").exists()
-
-
-def test_a_full_disk_is_named_before_anything_is_loaded(outside, tmp_path):
-    on_small_disk = (
-        f"mount -t tmpfs -o size=1m tmpfs '{tmp_path / 'cache'}' && '{RUN}' tool"
-    )
-    (tmp_path / "cache").mkdir()
-    done = ran(
-        "unshare", "--map-root-user", "--mount", "sh", "-c", on_small_disk, env=outside
-    )
-    if "unshare" in done.stderr:
-        pytest.skip("this machine allows no mounts")
-    assert done.returncode == 2
-    assert done.stderr == Facts(tmp_path / "cache", "1 MB", "3000", "GYRIFLOW_CACHE")
-    assert "pip install" not in (tmp_path / "record").read_text()
-
-
-def test_an_environment_of_somebody_else_that_is_not_ready_is_named(outside, tmp_path):
+@pytest.mark.parametrize(
+    ("setup", "facts"),
+    [
+        ("mount -t tmpfs -o size=1m tmpfs {0} && {1}", ["1 MB", "3000"]),
+        # left unfinished, then read-only for root too
+        (
+            "mount -t tmpfs tmpfs {0} && ! {1} && mount -o remount,ro {0} && {1}",
+            ["cannot be written"],
+        ),
+    ],
+)
+def test_a_cache_on_a_full_or_foreign_disk_is_named_before_anything_is_loaded(
+    outside, tmp_path, setup, facts
+):
     cache = tmp_path / "cache"
     cache.mkdir()
-    assert run("tool", env=outside).returncode == 0
-    (environment,) = (path for path in cache.glob("venv-*") if path.is_dir())
-    shutil.rmtree(cache)
-    # read-only for root too
-    setup = (
-        f"mount -t tmpfs tmpfs '{cache}' && mkdir '{environment}'"
-        f" && mount -o remount,ro '{cache}' && '{RUN}' tool"
-    )
-    cache.mkdir()
-    done = ran("unshare", "--map-root-user", "--mount", "sh", "-c", setup, env=outside)
+    (tmp_path / "record.fails").touch()
+    command = setup.format(cache, f"{RUN} tool")
+    unshared = "unshare", "--map-root-user", "--mount", "sh", "-c", command
+    done = ran(*unshared, env=outside)
     if "unshare" in done.stderr:
         pytest.skip("this machine allows no mounts")
     assert done.returncode == 2
-    assert done.stderr == Facts(environment, "cannot be written", "GYRIFLOW_CACHE")
+    assert done.stderr.splitlines()[-1] == Facts(cache, "GYRIFLOW_CACHE", *facts)
 
 
 @pytest.mark.parametrize(
@@ -477,70 +441,56 @@ def test_an_environment_of_somebody_else_that_is_not_ready_is_named(outside, tmp
     ],
 )
 def test_conda_environment_is_made_once_and_activated(
-    with_conda, tmp_path, name, create, hook
+    outside, programs, tmp_path, name, create, hook
 ):
-    (tmp_path / "programs" / "conda").rename(tmp_path / "programs" / name)
-    tag = hashlib.sha256((ROOT / "envs" / "gyriflow.yaml").read_bytes()).hexdigest()[
-        :12
-    ]
+    # a machine that is too old for the wheels
+    programs(getconf=OLD_GLIBC, **{name: CONDA})
+    recipe = ROOT / "envs" / "gyriflow.yaml"
+    tag = hashlib.sha256(recipe.read_bytes()).hexdigest()[:12]
     prefix = tmp_path / "cache" / f"conda-{tag}" / "conda"
-    first = run("tool", "1", env=with_conda)
-    second = run("bash", "-c", "tool 2; exit 5", env=with_conda)
-    assert (first.stdout, first.returncode) == ("from the environment: 1\n", 0)
-    assert (second.stdout, second.returncode) == ("from the environment: 2\n", 5)
+    first = run("tool", "1", env=outside)
+    second = run("bash", "-c", "tool 2; exit 5", env=outside)
+    assert (first.stdout, first.returncode) == (MADE(1), 0)
+    assert (second.stdout, second.returncode) == (MADE(2), 5)
     assert first.stderr == Facts(prefix.parent)
     assert second.stderr == ""
-
-    made = f"{create} -p {prefix} -f {ROOT}/envs/gyriflow.yaml"
+    made = f"{create} -p {prefix} -f {recipe}"
     assert (tmp_path / "record").read_text().splitlines() == [made, hook, hook]
 
 
 def test_bytecode_is_kept_which_every_process_would_make_again(outside):
-    done = run(
-        "printenv",
-        "PYTHONDONTWRITEBYTECODE",
-        env=outside | {"PYTHONDONTWRITEBYTECODE": "1"},
-    )
+    name = "PYTHONDONTWRITEBYTECODE"
+    done = run("printenv", name, env=outside | {name: "1"})
     assert (done.stdout, done.returncode) == ("", 1)
 
 
 def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(
-    outside, tmp_path
+    outside, programs, tmp_path
 ):
-    write_program(
-        tmp_path / "programs",
-        "getent",
-        f"#!/bin/sh\necho me:x:0:0::{tmp_path}/home:/bin/sh\n",
-    )
-    env = {
-        name: value
-        for name, value in outside.items()
-        if name not in ("GYRIFLOW_CACHE", "XDG_CACHE_HOME")
-    }
-    assert (
-        run("tool", "1", env=env | {"HOME": ""}).stdout == "from the environment: 1\n"
-    )
+    programs(getent=f"#!/bin/sh\necho me:x:0:0::{tmp_path}/home:/bin/sh\n")
+    folders = {"GYRIFLOW_CACHE": "", "XDG_CACHE_HOME": "", "HOME": ""}
+    assert run("tool", "1", env=outside | folders).stdout == MADE(1)
     assert list((tmp_path / "home" / ".cache" / "gyriflow").glob("venv-*/ready"))
+
+
+def in_folder(folder, command, env):
+    """Run ./run in a folder, after or before a command."""
+    return ran("bash", "-c", f"cd '{folder}' && {command}'{RUN}' true", env=env)
 
 
 def test_no_module_of_the_working_directory_is_imported(outside, tmp_path):
     (tmp_path / "dolfinx.py").write_text("open('foreign.ran', 'w')")
-    command = ["bash", "-c", f"cd '{tmp_path}' && '{RUN}' true"]
-    assert ran(*command, env=outside | {"VIRTUAL_ENV": "x"}).returncode == 0
+    env = outside | {"VIRTUAL_ENV": "x"}
+    assert in_folder(tmp_path, "", env).returncode == 0
     assert not (tmp_path / "foreign.ran").exists()
 
 
-def test_signals_reach_the_command(outside):
-    process = start(
-        "bash",
-        "-c",
-        "trap 'echo stopped; exit 9' TERM; echo up; while :; do sleep 0.1; done",
-        env=outside,
-    )
-    assert process.stdout.readline() == "up\n"
-    process.send_signal(signal.SIGTERM)
-    assert process.stdout.read() == "stopped\n"
-    assert process.wait(20) == 9
+def test_a_current_folder_that_was_deleted_is_named(outside, tmp_path):
+    (tmp_path / "gone").mkdir()
+    done = in_folder(tmp_path / "gone", "rmdir ../gone && ", outside)
+    assert done.returncode == 2
+    last = done.stderr.splitlines()[-1]
+    assert last == Facts("gyriflow:", "the current folder no longer exists")
 
 
 def test_no_process_stays_between_run_and_the_command(outside):
@@ -552,20 +502,6 @@ def test_no_process_stays_between_run_and_the_command(outside):
     assert process.wait(20) == -signal.SIGTERM
 
 
-def test_a_current_folder_that_was_deleted_is_named(outside, tmp_path):
-    (tmp_path / "gone").mkdir()
-    done = ran(
-        "bash",
-        "-c",
-        f"cd '{tmp_path}/gone' && rmdir ../gone && '{RUN}' true",
-        env=outside,
-    )
-    assert done.returncode == 2
-    assert done.stderr.splitlines()[-1] == Facts(
-        "gyriflow:", "the current folder no longer exists"
-    )
-
-
 def test_failing_set_up_shows_why_and_is_tried_again(outside, tmp_path):
     fails = tmp_path / "record.fails"
     fails.touch()
@@ -574,37 +510,27 @@ def test_failing_set_up_shows_why_and_is_tried_again(outside, tmp_path):
     assert done.stderr == Facts("create_venv", "ConnectionError: no such thing")
     assert done.stdout == ""
     fails.unlink()
-    assert run("tool", "now", env=outside).stdout == "from the environment: now\n"
+    assert run("tool", "now", env=outside).stdout == MADE("now")
 
 
 def test_two_at_once_make_one_environment(outside, tmp_path):
-    held = tmp_path / "record.wait"
+    held, record = tmp_path / "record.wait", tmp_path / "record"
     held.touch()
     first = start("tool", "first", env=outside)
-    record = tmp_path / "record"
     assert wait_until(lambda: record.exists() and "pip install" in record.read_text())
     second = start("tool", "second", env=outside)
     waiting = second.stderr.readline()
     held.unlink()
-    results = [process.communicate(timeout=30) for process in (first, second)]
-    assert [out for out, _ in results] == [
-        "from the environment: first\n",
-        "from the environment: second\n",
-    ]
+    printed = [process.communicate(timeout=30)[0] for process in (first, second)]
+    assert printed == [MADE("first"), MADE("second")]
     assert waiting == Facts("gyriflow:", "./run")
-    assert (
-        sum(
-            "pip install" in line
-            for line in (tmp_path / "record").read_text().splitlines()
-        )
-        == 1
-    )
+    assert record.read_text().count("pip install") == 1
 
 
-def test_an_environment_is_made_without_locks(outside, tmp_path):
-    write_program(tmp_path / "programs", "flock", "#!/bin/sh\nexit 71\n")
+def test_an_environment_is_made_without_locks(outside, programs, tmp_path):
+    programs(flock="#!/bin/sh\nexit 71\n")
     done = run("tool", "1", env=outside)
-    assert done.stdout == "from the environment: 1\n"
+    assert done.stdout == MADE(1)
     assert done.stderr == Facts(f"{tmp_path / 'cache'} has no locks")
 
 
@@ -626,4 +552,4 @@ def test_interrupted_set_up_leaves_nothing_running_and_is_redone(
     # waits for that
     for orphan in running(OWN):
         os.kill(orphan, signal.SIGTERM)
-    assert run("tool", "again", env=outside).stdout == "from the environment: again\n"
+    assert run("tool", "again", env=outside).stdout == MADE("again")

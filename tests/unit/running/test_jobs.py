@@ -11,77 +11,72 @@ from gyriflow.messages import Message, reported_messages, write_message
 from gyriflow.step import USAGE_COLUMNS, Usage, read_usage, record_usage
 
 
+def write_log(name, *used):
+    """Have a step in the working directory leave a warning of two lines, and what it
+    has used."""
+    log = Path("results", f"{name}.log")
+    log.parent.mkdir(parents=True, exist_ok=True)
+    write_message(log, Message("warning", f"{name}\nmore of it"))
+    if used:
+        record_usage(log, Usage(*used))
+    return log
+
+
 def test_messages_are_gathered_by_brain_and_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for place in (
-        "brains/a/logs/pial",
-        "brains/old/logs/pial",
-        "brains/a/metrics/logs/measure",
-        "runs/r/a/logs/simulate",
-        "runs/r/a/metrics/week-22.00/logs/measure",
-        "runs/old/a/logs/simulate",
-        "study/logs/poses",
-        "study/logs/atlas_file/x/week21.nii.gz",
-        # of the report before this one
-        "report/logs/html_report",
-    ):
-        log = Path("results", f"{place}.log")
-        log.parent.mkdir(parents=True, exist_ok=True)
-        for _ in range(2):
-            write_message(log, Message("warning", f"{place}\nmore of it"))
-    found = [
-        [message.brain, message.run, message.step, message.level, message.first_line]
+    # each with its place and step in the table; others are of no brain or run of it,
+    # or of the report before this one
+    expected = {
+        "study/logs/poses": ("", "", "poses"),
+        "study/logs/atlas_file/x/week21.nii.gz": ("", "", "week21.nii.gz"),
+        "brains/a/metrics/logs/measure": ("a", "", "measure"),
+        "brains/a/logs/pial": ("a", "", "pial"),
+        "runs/r/a/metrics/week-22.00/logs/measure": ("a", "r", "measure"),
+        "runs/r/a/logs/simulate": ("a", "r", "simulate"),
+    }
+    others = ("brains/old/logs/pial", "runs/old/a/logs/simulate")
+    for name in (*others, "report/logs/html_report", *reversed(expected)):
+        write_log(name)
+    found = {
+        message.first_line: (message.brain, message.run, message.step)
         for message in reported_messages(tmp_path, ["a"], [["r", "a"]])
-    ]
-    assert found == [
-        ["", "", "poses", "warning", "study/logs/poses"],
-        ["", "", "week21.nii.gz", "warning", "study/logs/atlas_file/x/week21.nii.gz"],
-        ["a", "", "measure", "warning", "brains/a/metrics/logs/measure"],
-        ["a", "", "pial", "warning", "brains/a/logs/pial"],
-        ["a", "r", "measure", "warning", "runs/r/a/metrics/week-22.00/logs/measure"],
-        ["a", "r", "simulate", "warning", "runs/r/a/logs/simulate"],
-    ]
+    }
+    assert list(found.items()) == list(expected.items())
     assert reported_messages(tmp_path / "empty", ["a"], []) == []
 
 
-def record(folder, name, *used):
-    """Have a step record what it has used, after a warning."""
-    log = folder / "results" / f"{name}.log"
-    log.parent.mkdir(parents=True, exist_ok=True)
-    write_message(log, Message("warning", "a warning"))
-    if used:
-        record_usage(log, Usage(*used))
-
-
-def test_steps_that_have_ended_are_found_with_their_rules_brains_and_runs(tmp_path):
-    record(tmp_path, "brains/a/logs/pial", 10.5, 9.75, 200.25)
-    record(tmp_path, "brains/a/logs/targets.self", 11, 10, 210)
-    record(tmp_path, "runs/two/a/logs/simulate", 100, 190, 1000)
-    record(tmp_path, "runs/two/a/logs/measure_simulated.week-22.00", 3, 2, 1)
-    record(tmp_path, "study/logs/atlas_file/x/week21.nii.gz", 1, 1, 1)
-    # it has failed
-    record(tmp_path, "study/logs/run_tables")
+def test_steps_that_have_ended_are_found_with_their_rules_brains_and_runs(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    expected = {
+        "brains/a/logs/pial": ("pial", "", "a", 10.5, 9.75, 200.25),
+        "brains/a/logs/targets.self": ("targets", "", "a", 11.0, 10.0, 210.0),
+        "runs/two/a/logs/measure.week-22.00": ("measure", "two", "a", 3.0, 2.0, 1.0),
+        "runs/two/a/logs/simulate": ("simulate", "two", "a", 100.0, 190.0, 1000.0),
+        "study/logs/atlas_file/x/week21.nii.gz": ("atlas_file", "", "", 1.0, 1.0, 1.0),
+    }
+    for name, (*_, wall_s, cpu_s, memory_mib) in expected.items():
+        write_log(name, wall_s, cpu_s, memory_mib)
+    # it has failed; of it a full disk left half a line
+    write_log("study/logs/run_tables")
+    torn = write_log("brains/b/logs/pial", 10.5, 9.75, 200.25).with_suffix(".jsonl")
+    torn.write_text(torn.read_text()[:-5])
     names = ("rule", "run", "brain", *USAGE_COLUMNS)
-    assert [[job[name] for name in names] for job in read_usage(tmp_path)] == [
-        ["pial", "", "a", 10.5, 9.75, 200.25],
-        ["targets", "", "a", 11.0, 10.0, 210.0],
-        ["measure_simulated", "two", "a", 3.0, 2.0, 1.0],
-        ["simulate", "two", "a", 100.0, 190.0, 1000.0],
-        ["atlas_file", "", "", 1.0, 1.0, 1.0],
-    ]
+    found = [tuple(job[name] for name in names) for job in read_usage(tmp_path)]
+    assert found == list(expected.values())
 
 
-def test_half_a_line_that_a_full_disk_left_is_no_record(tmp_path):
-    record(tmp_path, "brains/a/logs/pial", 10.5, 9.75, 200.25)
-    path = tmp_path / "results" / "brains" / "a" / "logs" / "pial.jsonl"
-    path.write_text(path.read_text()[:-5])
-    assert read_usage(tmp_path) == []
+def forget():
+    for remembered in (sources._digest, sources._files_of, sources.imported_modules):
+        remembered.cache_clear()
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """A small package of two rooms and a plain module, with a program beside it."""
     root = tmp_path / "src" / "gyriflow"
+    several = "from .. import (\n    surface,  # one\n    units as u,\n)\n"
     contents = {
         "__init__.py": "",
         "units.py": "ML = 1",
@@ -90,54 +85,48 @@ def package(tmp_path, monkeypatch):
         "surface/labels.py": "def read():\n    from .repair import ML",
         "mesh/__init__.py": "import numpy",
         "mesh/quality.py": "import gyriflow.units",
-        "mesh/fill.py": (
-            "from .. import (\n    surface,  # one\n    units as u,\n)\n"
-            "import gyriflow.unused as o"
-        ),
+        "mesh/fill.py": f"{several}import gyriflow.unused as o",
         "unused.py": "",
     }
     for name, text in contents.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
     monkeypatch.setattr(sources, "PACKAGE", root)
-    sources._files_of.cache_clear()
+    forget()
     yield root
-    sources._files_of.cache_clear()
+    forget()
 
 
-def test_modules_behind_a_program_are_followed_through_others(package, tmp_path):
+@pytest.mark.parametrize(
+    ("module", "names"),
+    [
+        ("surface.labels", ["surface/__init__", "surface/labels", "surface/repair"]),
+        ("mesh.fill", ["mesh/__init__", "mesh/fill", "surface/__init__", "unused"]),
+    ],
+)
+def test_modules_behind_a_program_are_followed_through_others(
+    package, tmp_path, module, names
+):
     program = tmp_path / "measure.py"
-    program.write_text("from gyriflow.surface.labels import read")
-    names = {path.relative_to(package).as_posix() for path in modules_behind(program)}
-    assert names == {
-        "__init__.py",
-        "surface/__init__.py",
-        "surface/labels.py",
-        "surface/repair.py",
-        "units.py",
-    }
+    program.write_text(f"import gyriflow.{module}")
+    found = {path.relative_to(package).as_posix() for path in modules_behind(program)}
+    assert found == {"__init__.py", "units.py", *(f"{name}.py" for name in names)}
 
 
-def test_a_change_of_a_module_changes_the_hash(package, tmp_path):
+@pytest.mark.parametrize(
+    ("file", "is_used"),
+    [
+        ("mesh/quality.py", True),
+        ("mesh/quality.c", True),
+        ("unused.py", False),
+        ("unused.c", False),
+    ],
+)
+def test_a_change_of_a_module_changes_the_hash(package, tmp_path, file, is_used):
     program = tmp_path / "judge.py"
     program.write_text("from gyriflow.mesh import quality")
-    hashes = {code_hash(program)}
-    for name in ("unused.py", "mesh/quality.py", "unused.c", "mesh/quality.c"):
-        with (package / name).open("a") as file:
-            file.write("\n// another line")
-        for remembered in (
-            sources._digest,
-            sources._files_of,
-            sources.imported_modules,
-        ):
-            remembered.cache_clear()
-        hashes.add(code_hash(program))
-        assert (
-            len(hashes)
-            == {
-                "unused.py": 1,
-                "mesh/quality.py": 2,
-                "unused.c": 2,
-                "mesh/quality.c": 3,
-            }[name]
-        )
+    before = code_hash(program)
+    with (package / file).open("a") as opened:
+        opened.write("\n// another line")
+    forget()
+    assert (code_hash(program) != before) == is_used
