@@ -3,16 +3,11 @@
 import inspect
 import re
 from importlib import import_module
-from pathlib import Path
 
 import pytest
-import yaml
 from facts import Facts
-from matplotlib.figure import Figure
 from planned_figures import planned_figures
-from scripts import run_script
 
-from gyriflow.io.files import write_json
 from gyriflow.report.page import caption_html
 from gyriflow.shipped import SHIPPED
 
@@ -274,26 +269,3 @@ def test_a_prediction_is_drawn_between_its_start_and_the_atlas(figures):
         (brain["column"], brain["surfaces"], brain["simulated"])
         for brain in predicted.params["grid"]
     ] == [(Facts(week, "GW"), [path], week == 23.9) for week, path in surfaces.items()]
-
-
-def test_the_script_gives_each_function_its_files_and_settings(monkeypatch, tmp_path):
-    given = []
-
-    def drawn(quality, frames, small=None, *, gates):
-        given.append((quality, frames, small, gates))
-        return Figure()
-
-    module = import_module("gyriflow.report.tables")
-    monkeypatch.setattr(module, "mesh_quality", drawn)
-    write_json(tmp_path / "quality.json", {"tets": 7})
-    (tmp_path / "published.yaml").write_text(yaml.safe_dump({"nearest": []}))
-    (tmp_path / "table.csv").write_text("week\n21.0\n")
-    run_script(
-        "figures.py",
-        tmp_path,
-        {"quality": ["quality.json"], "frames": [], "published": "published.yaml"},
-        {"mesh_quality": ["a.png", "a.pdf"]},
-        {"modules": ["tables"], "gates": {}, "more": 1},
-    )
-    assert given == [([{"tets": 7}], [], None, {})]
-    assert Path(tmp_path / "a.png").is_file()

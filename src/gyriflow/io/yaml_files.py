@@ -116,7 +116,7 @@ def read_yaml(path: AnyPath) -> Any:
         if not _has_valid_depth(text):
             problem = "is nested too deeply"
             raise InputError(problem, path=path, expected="a configuration")
-        content = yaml.load(text, Loader=_StrictLoader)
+        content = yaml.load(text, Loader=_StrictLoader)  # noqa: S506
         size = _size(content, {})
     except OSError as error:
         raise InputError("cannot be read", path=path, found=error) from error

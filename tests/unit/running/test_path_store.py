@@ -1,6 +1,7 @@
 """The names of kept paths: another one for everything that a path is made from, the
 same for everything else."""
 
+import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -34,6 +35,7 @@ SURFACES = {
     "scheme": None,
 }
 START = {"id": "start", "week": 21, "population": "b", "scheme": "spina-bifida-atlas"}
+SHAPES = WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key")
 SCHEME = {"cerebrum": [1, 2, 5], "cortex": [5], "white_matter": [1]}
 
 
@@ -93,31 +95,29 @@ def test_a_path_is_kept_next_to_its_atlas_until_its_key_or_its_file_is_another(
     store = folder / stored_name(path.brain, "key")
     assert path_store.kept_path(study, path, "key") is None
     folder.mkdir()
-    shapes = WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key")
-    write_weekly_shapes(store, shapes)
+    write_weekly_shapes(store, SHAPES)
     assert path_store.kept_path(study, path, "key") == store
     assert path_store.kept_path(study, path, None) is None
     # another path under this name, and a damaged file
-    write_weekly_shapes(store, replace(shapes, made_from="other"))
+    write_weekly_shapes(store, replace(SHAPES, made_from="other"))
     assert path_store.kept_path(study, path, "key") is None
     store.write_bytes(b"torn")
     assert path_store.kept_path(study, path, "key") is None
 
 
-def test_a_study_has_the_path_that_was_made_from_the_same(paths, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("key", "expected"), [("key", True), ("other", False), (None, False)]
+)
+def test_a_study_has_the_path_that_was_made_from_the_same(
+    paths, tmp_path, monkeypatch, key, expected
+):
     _, path = paths()
     monkeypatch.chdir(tmp_path)
     file = tmp_path / ATLAS_PATH.format(brain=path.brain)
-    assert not path_store.has_path(path, "key")
+    assert not path_store.has_path(path, key)
     file.parent.mkdir(parents=True)
-    write_weekly_shapes(
-        file, WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key")
-    )
-    assert [path_store.has_path(path, key) for key in ("key", "other", None)] == [
-        True,
-        False,
-        False,
-    ]
+    write_weekly_shapes(file, SHAPES)
+    assert path_store.has_path(path, key) == expected
 
 
 def test_a_path_has_another_key_where_anything_differs_that_it_is_made_from(keys):
@@ -185,26 +185,22 @@ def test_a_path_has_another_key_after_a_change_of_its_rules_and_scripts(
     before = keys()
     copy = tmp_path / "copy" / "workflow"
     for name in ("rules", "scripts"):
-        (copy / name).mkdir(parents=True)
-        for file in (path_store.SHIPPED / "workflow" / name).iterdir():
-            (copy / name / file.name).write_bytes(file.read_bytes())
+        shutil.copytree(path_store.SHIPPED / "workflow" / name, copy / name)
     monkeypatch.setattr(path_store, "SHIPPED", tmp_path / "copy")
     assert keys() == before
     (copy / changed).write_text((copy / changed).read_text() + "# changed\n")
     assert keys() != before
 
 
-def test_a_path_has_another_key_after_a_change_of_the_code_behind_its_scripts(
+def test_a_path_has_another_key_after_a_change_of_the_code_behind_a_script(
     keys, monkeypatch
 ):
     before = keys()
-    # of one script
-    changed = {"register.py": "code changed"}
-    monkeypatch.setattr(
-        path_store,
-        "code_hash",
-        lambda script: changed.get(script.name) or code_hash(script),
-    )
+
+    def changed(script):
+        return "code 2" if script.name == "register.py" else code_hash(script)
+
+    monkeypatch.setattr(path_store, "code_hash", changed)
     assert keys() != before
 
 

@@ -4,6 +4,7 @@ import json
 import logging
 import os
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from facts import Facts
@@ -74,41 +75,57 @@ def reasons(events, targets=("all",), forced=()):
     return {events.jobs[key].rule: why for key, why in made.reasons.items()}
 
 
-def test_what_matches_its_manifest_is_kept(study):
-    assert reasons(plan()) == {}
+def edit(name, text):
+    Path("results", name).write_text(text)
 
 
-def test_what_depends_on_an_outdated_result_runs_again_and_nothing_else(study):
+def remove(*names):
+    for name in names:
+        Path("results", name).unlink()
+
+
+def record(rule):
+    """Write the manifest of a job anew."""
+    write_manifest(plan().jobs[f"results/{rule}"], Contents({}, {}))
+
+
+BEHIND_THE_SURFACE = {"surface", "mesh", "metrics", "run"}
+
+
+@pytest.mark.parametrize(
+    ("change", "edge_mm", "rules"),
+    [
+        (lambda: None, 1.0, set()),
+        (lambda: None, 2.0, BEHIND_THE_SURFACE),
+        (lambda: edit("mesh", "edited"), 1.0, {"mesh", "run"}),
+        # a removed result is made again only where something needs it
+        (lambda: remove("surface"), 1.0, set()),
+        # and may be another one then
+        (lambda: remove("surface", "metrics"), 1.0, BEHIND_THE_SURFACE),
+        (lambda: remove("mesh"), 2.0, BEHIND_THE_SURFACE),
+        # its step has failed after that of the surface
+        (
+            lambda: (remove("mesh"), edit("surface", "of an edge"), record("surface")),
+            1.0,
+            {"mesh", "metrics", "run"},
+        ),
+        # it is unknown what it was
+        (lambda: remove("mesh", "manifest/mesh.json"), 1.0, {"mesh", "run"}),
+    ],
+)
+def test_what_does_not_match_its_manifest_runs_again_with_what_depends_on_it(
+    study, change, edge_mm, rules
+):
+    change()
+    assert set(reasons(plan({"edge_mm": edge_mm}))) == rules
+
+
+def test_a_reason_names_what_has_changed_or_is_missing(study):
     again = reasons(plan({"edge_mm": 2.0}))
-    assert set(again) == {"surface", "mesh", "metrics", "run"}
-    assert "edge_mm" in again["surface"]
+    assert again["surface"] == Facts("edge_mm")
     assert again["run"] == f"{BY_ANOTHER_JOB}: mesh"
-    (study / "results" / "mesh").write_text("edited")
-    assert set(reasons(plan())) == {"mesh", "run"}
-
-
-def test_a_removed_result_is_made_again_where_something_needs_it(study):
-    (study / "results" / "surface").unlink()
-    assert reasons(plan()) == {}
-    (study / "results" / "metrics").unlink()
-    again = reasons(plan())
-    # the surface is needed for the metrics, and may be another one then
-    assert set(again) == {"surface", "metrics", "mesh", "run"}
-    assert again["metrics"] == f"{MISSING}: results/metrics"
-
-
-def test_a_removed_result_that_would_be_another_is_made_again(study):
-    (study / "results" / "mesh").unlink()
-    assert set(reasons(plan({"edge_mm": 2.0}))) == {"surface", "mesh", "metrics", "run"}
-    # its step has failed after that of the surface
-    (study / "results" / "surface").write_text("of another edge")
-    write_manifest(plan().jobs["results/surface"], Contents({}, {}))
-    assert set(reasons(plan())) == {"mesh", "metrics", "run"}
-    # it is unknown what it was
-    (study / "results" / "surface").write_text("surface")
-    write_manifest(plan().jobs["results/surface"], Contents({}, {}))
-    (study / "results" / "manifest" / "mesh.json").unlink()
-    assert set(reasons(plan())) == {"mesh", "run"}
+    remove("metrics")
+    assert reasons(plan())["metrics"] == f"{MISSING}: results/metrics"
 
 
 def test_what_depends_on_a_forced_job_runs_again(study):
@@ -139,21 +156,21 @@ def test_a_rule_without_results_asks_for_all_results_of_the_jobs_that_it_names(s
     job = replace(
         events.jobs["results/metrics"], outputs=["results/metrics", "results/maps"]
     )
-    (study / "results" / "maps").write_text("maps")
+    edit("maps", "maps")
     events.jobs[job.key] = job
     write_manifest(job, Contents({}, {}))
     assert reasons(events) == {}
-    (study / "results" / "maps").unlink()
+    remove("maps")
     assert reasons(events) == {"metrics": f"{MISSING}: results/maps"}
     # Snakemake is asked for the other one, which it does not see
     assert made_plan(events, ["all"], []).outdated == ["results/metrics"]
     assert reasons(events, targets=["results/metrics"]) == reasons(events)
 
 
-def test_an_asked_for_file_is_made(study):
-    (study / "results" / "surface").unlink()
-    assert "surface" in reasons(plan(), targets=["results/surface"])
-    assert "surface" in reasons(plan(), targets=["surface"])
+@pytest.mark.parametrize("target", ["results/surface", "surface"])
+def test_an_asked_for_file_is_made(study, target):
+    remove("surface")
+    assert "surface" in reasons(plan(), targets=[target])
 
 
 def test_outdated_results_are_hidden_during_a_run_and_not_lost(study):
@@ -163,7 +180,7 @@ def test_outdated_results_are_hidden_during_a_run_and_not_lost(study):
     hide_results(study, made.outdated)
     assert not any((study / name).exists() for name in names)
     # one was made again, the job of another failed, the others have not begun
-    (study / "results" / "surface").write_text("new")
+    edit("surface", "new")
     restore_results(study, ["results/metrics"])
     left = {path.name: path.read_text() for path in study.glob("results/*[!t]")}
     assert left == {"surface": "new", "mesh": "mesh", "run": "run", "other": "other"}
