@@ -11,6 +11,7 @@ import threading
 from types import SimpleNamespace
 
 import pytest
+from configurations import touched
 from facts import Facts
 from mpi4py import MPI
 from processes import ran
@@ -27,7 +28,6 @@ from gyriflow.running.launch import (
     main,
     set_user_name,
     stop_jobs,
-    what_runs,
 )
 from gyriflow.shipped import SHIPPED
 
@@ -36,22 +36,17 @@ from .conftest import SMALL_STUDY, launching
 
 def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(workflow):
     # the working directory has a cohort of its own
-    for folder in ("my study", "elsewhere"):
-        (workflow.directory / folder).mkdir()
-        (workflow.directory / folder / "labels.nii.gz").touch()
-        table = (
-            f"participant_id\tweek\tlabels\nof-{folder}\t24\tlabels.nii.gz\n".replace(
-                " ", "-"
-            )
-        )
-        (workflow.directory / folder / "participants.tsv").write_text(table)
+    for name in ("mine", "elsewhere"):
+        folder = touched(workflow.directory / name, "labels.nii.gz")
+        table = f"participant_id\tweek\tlabels\n{name}\t24\tlabels.nii.gz\n"
+        (folder / "participants.tsv").write_text(table)
     table = {"file": "participants.tsv", "columns": {"scheme": "binary"}}
     study = {"participants": table, "start": "all", "folding": {"end_week": 26}}
-    name = workflow.write("my study/study.yaml", study)
+    name = workflow.write("mine/study.yaml", study)
     plan = workflow.plan("surface", "--configfile", name, "--directory", "elsewhere")
     (job,) = [job for job in plan.jobs if job.rule.startswith("pial")]
-    assert job.wildcards["brain"] == "of-my-study"
-    assert str(workflow.directory / "my study" / "labels.nii.gz") in job.files
+    assert job.wildcards["brain"] == "mine"
+    assert str(workflow.directory / "mine" / "labels.nii.gz") in job.files
 
 
 def test_a_user_whom_the_system_does_not_know_has_a_name(monkeypatch):
@@ -60,9 +55,6 @@ def test_a_user_whom_the_system_does_not_know_has_a_name(monkeypatch):
     monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
     set_user_name()
     assert getpass.getuser() == f"user-{os.getuid()}"
-
-
-def test_a_user_whom_the_system_knows_keeps_the_name(monkeypatch):
     monkeypatch.setenv("LOGNAME", "ana")
     set_user_name()
     assert getpass.getuser() == "ana"
@@ -180,30 +172,26 @@ def test_a_working_directory_that_cannot_be_written_ends_in_5(tmp_path):
     assert str(refused.value) == Facts(f"{below}:", "Not a directory")
 
 
-@pytest.mark.parametrize("place", ["Snakefile", "workflow/Snakefile"])
-def test_the_first_line_says_what_runs_where_a_folder_has_its_own_workflow(
-    tmp_path, monkeypatch, place
+@pytest.mark.parametrize("own", ["Snakefile", "workflow/Snakefile"])
+def test_the_first_line_says_what_runs_without_a_configuration_that_is_named(
+    workflow, capsys, own
 ):
-    monkeypatch.chdir(tmp_path)
     demo = SHIPPED / "config" / "config.yaml"
-    assert what_runs(tmp_path) == Facts("--configfile", "demo", demo)
-    (tmp_path / place).parent.mkdir(exist_ok=True)
-    (tmp_path / place).touch()
-    assert what_runs(tmp_path) == Facts("demo", demo, tmp_path / place)
-    own = tmp_path / "config" / "config.yaml"
-    own.parent.mkdir()
-    own.touch()
-    assert what_runs(tmp_path) == Facts(own, tmp_path / place)
-    assert what_runs(tmp_path) != Facts("demo")
 
+    def first_line(*arguments):
+        assert workflow.jobs("surface", *arguments)
+        return capsys.readouterr().err.partition("\n")[0]
 
-def test_what_runs_is_said_first_without_a_configuration(workflow, capsys):
-    (workflow.directory / "Snakefile").touch()
-    assert workflow.jobs("surface")
-    assert capsys.readouterr().err.splitlines()[0] == Facts("gyriflow:", "demo")
-    name = workflow.write("study.yaml", SMALL_STUDY)
-    assert workflow.jobs("surface", "--configfile", name)
-    assert "demo" not in capsys.readouterr().err
+    touched(workflow.directory, own)
+    said = first_line()
+    assert said == Facts("gyriflow:", "demo", demo, workflow.directory / own)
+    (workflow.directory / "config").mkdir()
+    name = workflow.write("config/config.yaml", SMALL_STUDY)
+    (workflow.directory / "config" / "phantom-21.nii.gz").touch()
+    said = first_line()
+    assert said == Facts(workflow.directory / name, workflow.directory / own)
+    assert said != Facts("demo")
+    assert "gyriflow" not in first_line("--configfile", name)
 
 
 def test_results_that_are_a_link_to_nowhere_are_named(workflow, capfd):

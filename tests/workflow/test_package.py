@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 from facts import Facts
 from processes import ran
 
@@ -21,16 +22,8 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    built = ran(
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--no-deps",
-        "--wheel-dir",
-        folder,
-        CHECKOUT,
-    )
+    pip = sys.executable, "-m", "pip", "wheel", "--no-deps"
+    built = ran(*pip, "--wheel-dir", folder, CHECKOUT)
     assert built.returncode == 0, built.stdout + built.stderr
     (found,) = folder.glob("gyriflow-*.whl")
     return found
@@ -48,47 +41,29 @@ def installed(wheel, folder, without=""):
 
     Imports of the packages `without` fail.
     """
-    subprocess.run(
-        [sys.executable, "-m", "venv", "--system-site-packages", folder],
-        check=True,
-        timeout=120,
-    )
+    venv = [sys.executable, "-m", "venv", "--system-site-packages", folder]
+    subprocess.run(venv, check=True, timeout=120)
     python = folder / "bin" / "python"
     found = "import sysconfig; print(sysconfig.get_path('purelib'))"
     site = ran(python, "-c", found).stdout.strip()
     (Path(site) / "environment.pth").write_text(sysconfig.get_path("purelib") + "\n")
     blocked = f"import sys; sys.modules.update(dict.fromkeys({without!r}.split()))"
     (Path(site) / "blocked.pth").write_text(blocked + "\n")
-    plain = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in ("PYTHONPATH", "VIRTUAL_ENV")
-    }
-    install = [
-        python,
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-index",
-        wheel,
-    ]
-    subprocess.run(install, env=plain, check=True, timeout=120)
-    return folder / "bin" / "gyriflow", plain | {"PATH": "/usr/bin:/bin"}
+    names = set(os.environ) - {"PYTHONPATH", "VIRTUAL_ENV"}
+    plain = {name: os.environ[name] for name in names} | {"PATH": "/usr/bin:/bin"}
+    install = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
+    subprocess.run([*install, wheel], env=plain, check=True, timeout=120)
+    return folder / "bin" / "gyriflow", plain
 
 
 def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     folders = ("workflow", "atlases", "schemes", "norms", "config", "profiles", "envs")
-    tracked = ran(
-        "git", "-C", CHECKOUT, "ls-files", "Snakefile", *folders
-    ).stdout.split()
+    git = "git", "-C", CHECKOUT, "ls-files"
+    tracked = ran(*git, "Snakefile", *folders).stdout.split()
     assert len(tracked) > 100
     assert {f"gyriflow/shipped/{name}" for name in tracked} <= names
-    sources = ran(
-        "git", "-C", CHECKOUT, "ls-files", "src/*.py", "src/*.c"
-    ).stdout.split()
+    sources = ran(*git, "src/*.py", "src/*.c").stdout.split()
     assert "src/gyriflow/folding/products.c" in sources
     assert {name.removeprefix("src/") for name in sources} <= names
     assert "snakemake_logger_plugin_gyriflow/__init__.py" in names
@@ -128,13 +103,8 @@ def test_a_brain_is_measured_without_the_solver(without_solver, tmp_path):
     python = command.with_name("python")
     blocked = ran(python, "-c", "import mpi4py", cwd=tmp_path, env=environment)
     assert blocked.returncode == 1
-    outcome = ran(
-        python,
-        "-P",
-        CHECKOUT / "tests" / "measure_installed.py",
-        cwd=tmp_path,
-        env=environment,
-    )
+    program = CHECKOUT / "tests" / "measure_installed.py"
+    outcome = ran(python, "-P", program, cwd=tmp_path, env=environment)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     assert outcome.stdout.splitlines()[-1] == "measured"
 
@@ -143,10 +113,11 @@ def test_simulating_without_the_solver_names_the_extra_before_the_first_job(
     without_solver, tmp_path
 ):
     command, environment = without_solver
-    demo = re.search(
-        r"(\S+/config\.yaml)", ran(command, "run", cwd=tmp_path, env=environment).stderr
-    )[1]
-    outcome = ran(command, "run", demo, "--cores", "1", cwd=tmp_path, env=environment)
+    shape = {"id": "a", "week": 21, "shape": {}}
+    study = {"brains": [shape], "start": "a", "folding": {"end_week": 22}}
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(study))
+    call = "run", "study.yaml", "--cores", "1"
+    outcome = ran(command, *call, cwd=tmp_path, env=environment)
     assert outcome.returncode == 2
     assert outcome.stderr == Facts("dolfinx", "gyriflow[fold]")
     assert not list(tmp_path.glob("results/brains/*/surface"))

@@ -9,10 +9,17 @@ from shapes import save_labels
 
 from gyriflow.io.registrations import read_weekly_shapes
 
-from .conftest import COARSE
+from .conftest import COARSE, labelled
 
 WEEKS = (22, 23)
 TARGETS = "results/brains/mine/mesh/targets.atlas.h5"
+MINE = {
+    "id": "mine",
+    "week": 22,
+    "labels": "mine.nii.gz",
+    "scheme": "spina-bifida-atlas",
+    "population": "b",
+}
 PATH = "results/brains/far-22/path/shapes.h5"
 
 
@@ -43,15 +50,8 @@ def study(workflow, url):
         labels,
         affine * [[1.05], [0.96], [1.0], [1.0]],
     )
-    mine = {
-        "id": "mine",
-        "week": 22,
-        "labels": "mine.nii.gz",
-        "scheme": "spina-bifida-atlas",
-        "population": "b",
-    }
     config = {
-        "brains": [mine],
+        "brains": [MINE],
         "atlas": {"name": "atlas.yaml", "folder": "atlas"},
         "start": "mine",
         "surface": {"edge_length_mm": 2.0},
@@ -68,11 +68,8 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(
 ):
     call = (TARGETS, "--cores", "2", "--configfile", study(workflow, server.url))
     planned = workflow.jobs(*call)
-    assert (planned["atlas_file"], planned["atlas_path"], planned["register"]) == (
-        2,
-        1,
-        2,
-    )
+    counts = [planned[rule] for rule in ("atlas_file", "atlas_path", "register")]
+    assert counts == [2, 1, 2]
     first = workflow.run(*call, timeout_s=900)
     assert first.returncode == 0, first.stderr
     folder = workflow.directory / "atlas" / "paths"
@@ -106,10 +103,8 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(
     (workflow.directory / PATH).unlink()
     whole = kept.read_bytes()
     middle = len(whole) // 2
-    for damaged in (
-        whole[:middle],
-        whole[:middle] + bytes(100) + whole[middle + 100 :],
-    ):
+    changed = whole[:middle] + bytes(100) + whole[middle + 100 :]
+    for damaged in (whole[:middle], changed):
         kept.write_bytes(damaged)
         assert workflow.jobs(*call)["atlas_path"] == 1
 
@@ -121,18 +116,12 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(
 def test_a_prediction_by_a_shipped_atlas_without_checksums_is_planned(
     workflow, atlas, files
 ):
-    mine = {
-        "id": "mine",
-        "week": 22,
-        "labels": "phantom-22.nii.gz",
-        "scheme": "spina-bifida-atlas",
-        "population": "b",
+    config = {
+        "brains": [MINE | labelled(22)],
+        "atlas": {"name": atlas, "weeks": [*range(22, 37)], "accept_licence": True},
+        "start": "mine",
+        "folding": {"preset": "expected", "end_week": 30},
     }
-    settings = {"name": atlas, "weeks": [*range(22, 37)], "accept_licence": True}
-    folding = {"preset": "expected", "end_week": 30}
-    name = workflow.write(
-        "study.yaml",
-        {"brains": [mine], "atlas": settings, "start": "mine", "folding": folding},
-    )
+    name = workflow.write("study.yaml", config)
     planned = workflow.jobs(TARGETS, "--configfile", name)
     assert (planned["atlas_file"], planned["atlas_path"]) == (files, 1)

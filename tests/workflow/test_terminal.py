@@ -57,21 +57,13 @@ def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(
         "surface": {"edge_length_mm": 3.0},
         "folding": {"end_week": 22},
     }
-    arguments = (
-        "--cores",
-        "1",
-        "surface",
-        "--configfile",
-        workflow.write("study.yaml", config),
-    )
+    name = workflow.write("study.yaml", config)
+    arguments = ("--cores", "1", "surface", "--configfile", name)
     code, said = on_a_terminal(workflow, *arguments)
     assert code == 0, said
     assert "pial_with_thickness a\r\x1b[2K" in said
-    (log,) = set(
-        re.findall(
-            rf"{re.escape(str(workflow.directory))}/\.snakemake/log/[\w.-]+\.log", said
-        )
-    )
+    folder = re.escape(str(workflow.directory))
+    (log,) = set(re.findall(rf"{folder}/\.snakemake/log/[\w.-]+\.log", said))
     assert "rule pial_with_thickness:" in Path(log).read_text()
     state = read_json(workflow.directory / STATE)
     assert state["done"] == state["total"] == 2
@@ -83,8 +75,7 @@ def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(
     # Snakemake's own messages are a word away
     as_before = workflow.run(*arguments, "--verbose")
     assert "Nothing to be done" in as_before.stdout + as_before.stderr
-    assert (
-        workflow.directory / "results/brains/a/surface/pial.surf.gii"
-    ).stat().st_size > 0
+    pial = workflow.directory / "results/brains/a/surface/pial.surf.gii"
+    assert pial.stat().st_size > 0
     assert not list(tmp_path.rglob("pwned*"))
     assert not (checkout_copy / "pwned").exists()
