@@ -24,7 +24,6 @@ from gyriflow.io.yaml_files import read_keys
 from gyriflow.messages import read_events
 from gyriflow.running.cost import job_seconds
 from gyriflow.settings.base import folder_of
-from gyriflow.step import usage_in
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
 from gyriflow.study.study import Study
@@ -66,9 +65,9 @@ def finished_steps(study: Study) -> Iterator[Step]:
                 if study.chains[wildcards["brain"], names].path
                 else rule
             )
-        used = usage_in(read_events(path))
-        if used:
-            yield Step(rule, wildcards, used["cpu_s"])
+        for row in read_events(path):
+            if row.get("event") == "usage":
+                yield Step(rule, wildcards, row["cpu_s"])
 
 
 def pair_in(names: str, study: Study) -> dict[str, str]:

@@ -27,10 +27,6 @@ class FileFormat:
     suffixes: tuple[str, ...]
     data_suffixes: tuple[str, ...] = ()
 
-    @property
-    def all_suffixes(self) -> tuple[str, ...]:
-        return (*self.suffixes, *self.data_suffixes)
-
 
 FORMATS = (
     FileFormat("GIFTI", "surface", (".gii", ".gii.gz")),
@@ -55,7 +51,9 @@ SURFACE_SUFFIXES = tuple(
 VOLUME_SUFFIXES = tuple(
     suffix for form in FORMATS if form.content == "volume" for suffix in form.suffixes
 )
-ALL_SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.all_suffixes)
+ALL_SUFFIXES = tuple(
+    suffix for form in FORMATS for suffix in form.suffixes + form.data_suffixes
+)
 READ_COMPRESSED = tuple(suffix for suffix in ALL_SUFFIXES if suffix.endswith(".gz"))
 FOREIGN_VOLUME_SUFFIXES = (".nrrd", ".nhdr", ".mha", ".mhd", ".mnc", ".gipl")
 """Ends of names of volumes in formats that are not read."""
@@ -79,14 +77,11 @@ def format_of(path: str | PathLike[str], content: Content) -> FileFormat | None:
     name = str(path).lower()
     if CIFTI_NAME.search(name):
         return None
-    return next(
-        (
-            form
-            for form in FORMATS
-            if form.content == content and name.endswith(form.all_suffixes)
-        ),
-        None,
-    )
+    for form in FORMATS:
+        suffixes = form.suffixes + form.data_suffixes
+        if form.content == content and name.endswith(suffixes):
+            return form
+    return None
 
 
 def is_volume(path: str | PathLike[str]) -> bool:

@@ -33,25 +33,22 @@ class Kinds:
             f"… and {len(alike) - N_SHOWN} more like: {alike[0]}" for alike in hidden
         ]
 
-    def lines(self) -> list[tuple[str, int]]:
-        """Return the lines that stand for all messages, those of a kind together, and
-        for how many each stands."""
-        lines = []
-        for alike in self._messages.values():
-            lines += [(message, 1) for message in alike[:N_SHOWN]]
-            if len(alike) > N_SHOWN:
-                count = len(alike) - N_SHOWN
-                lines.append((f"… and {count} more like these", count))
-        return lines
-
 
 def grouped(messages: Iterable[tuple[str, str]]) -> list[tuple[str, int]]:
-    """Return the lines that stand for messages, each with the name of its scan or "",
-    and for how many each stands."""
-    kinds = Kinds()
+    """Return the lines that stand for messages, those of a kind together, and for how
+    many each stands. A message has the name of its scan or ""."""
+    kinds: dict[str, list[str]] = {}
     for name, message in messages:
-        kinds.add(name, message)
-    return kinds.lines()
+        alike = kinds.setdefault(_kind_of(name, message), [])
+        if message not in alike:
+            alike.append(message)
+    lines = []
+    for alike in kinds.values():
+        lines += [(message, 1) for message in alike[:N_SHOWN]]
+        count = len(alike) - N_SHOWN
+        if count > 0:
+            lines.append((f"… and {count} more like these", count))
+    return lines
 
 
 def _kind_of(name: str, message: str) -> str:

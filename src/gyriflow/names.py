@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from .errors import InputError
 
 DEVICE = re.compile(r"(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?", re.IGNORECASE)
+"""Names that Windows takes for devices, so that its disks have no folders of them."""
 
 
 def merged_names(
@@ -26,12 +27,6 @@ def folder_name(name: str) -> str:
     """Return a name as disks see it that ignore case, dots and spaces at its end, and
     which of several forms of a letter with accents it has."""
     return unicodedata.normalize("NFC", name).casefold().rstrip(". ")
-
-
-def is_device(name: str) -> bool:
-    """Return whether Windows takes a name for a device, so that its disks have no
-    folder of that name."""
-    return DEVICE.fullmatch(name) is not None
 
 
 def column_part(name: str) -> str:

@@ -101,13 +101,9 @@ def strength(
     unit = np.trace(normal) / np.trace(penalty)
     data_shares = _data_shares(normal, unit * penalty)
 
-    def freedom_at(exponent: float) -> float:
-        penalty_shares = 10**exponent * (1 - data_shares)
-        return float((data_shares / (data_shares + penalty_shares)).sum())
-
     weakest, strongest = STRENGTHS
-    highest = freedom_at(weakest)
-    lowest = freedom_at(strongest)
+    highest = _freedom(data_shares, weakest)
+    lowest = _freedom(data_shares, strongest)
     if freedom > highest + FREEDOM_TOL or freedom < lowest - FREEDOM_TOL:
         log.warning(
             "%s: has %.3g degrees of freedom instead of %.3g: there are too few weeks,"
@@ -123,8 +119,16 @@ def strength(
     elif freedom >= highest - FREEDOM_TOL:
         exponent = weakest
     else:
-        exponent = brentq(lambda x: freedom_at(x) - freedom, weakest, strongest)
+        exponent = brentq(
+            lambda x: _freedom(data_shares, x) - freedom, weakest, strongest
+        )
     return float(unit * 10**exponent)
+
+
+def _freedom(data_shares: Floats, exponent: float) -> float:
+    """Return the degrees of freedom with a strength of the penalty."""
+    penalty_shares = 10**exponent * (1 - data_shares)
+    return float((data_shares / (data_shares + penalty_shares)).sum())
 
 
 def _data_shares(normal: Floats, penalty: Floats) -> Floats:

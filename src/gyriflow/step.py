@@ -9,7 +9,7 @@ import logging
 import re
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -97,32 +97,18 @@ def record_usage(log: str | Path, used: Usage) -> None:
         write_event(log, row)
 
 
-def usage_in(rows: Iterable[Mapping[str, Any]]) -> dict[str, float] | None:
-    """Return time and memory among the lines that a step has written; None if it has
-    not ended."""
-    for row in rows:
-        if row.get("event") == "usage":
-            return {name: float(row[name]) for name in USAGE_COLUMNS}
-    return None
-
-
 def read_usage(directory: Path) -> list[dict[str, Any]]:
     """Return the rule, brain, run and `USAGE_COLUMNS` of the steps of a working
     directory that have ended; brain and run are "" if not applicable."""
     rows = []
     for path in sorted((directory / "results").rglob("logs/**/*.jsonl")):
-        used = usage_in(read_events(path))
-        if used:
-            log = path.relative_to(directory)
-            # wildcards follow the rule, after a dot
-            rule = re.sub(r".*/logs/(\w+).*", r"\1", log.as_posix())
-            rows.append(
-                {
-                    **place_of(log),
-                    "rule": rule,
-                    **used,
-                }
-            )
+        log = path.relative_to(directory)
+        # wildcards follow the rule, after a dot
+        rule = re.sub(r".*/logs/(\w+).*", r"\1", log.as_posix())
+        for row in read_events(path):
+            if row.get("event") == "usage":
+                used = {name: float(row[name]) for name in USAGE_COLUMNS}
+                rows.append(place_of(log) | {"rule": rule} | used)
     return rows
 
 

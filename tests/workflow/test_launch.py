@@ -6,6 +6,7 @@ import getpass
 import os
 import pwd
 import re
+import signal
 import sys
 import threading
 from types import SimpleNamespace
@@ -15,20 +16,15 @@ from configurations import touched
 from facts import Facts
 from mpi4py import MPI
 from processes import ran
+from snakemake import cli
 
 from gyriflow.errors import InputError, StorageError
 from gyriflow.folding.__main__ import locked as locked_simulation
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
 from gyriflow.running import launch
-from gyriflow.running.launch import (
-    end_scheduler_timers,
-    hold_lock,
-    locked,
-    main,
-    set_user_name,
-    stop_jobs,
-)
+from gyriflow.running.launch import hold_lock, locked, main, set_user_name
+from gyriflow.running.planning import Events
 from gyriflow.shipped import SHIPPED
 
 from .conftest import SMALL_STUDY, launching
@@ -60,18 +56,21 @@ def test_a_user_whom_the_system_does_not_know_has_a_name(monkeypatch):
     assert getpass.getuser() == "ana"
 
 
-def test_timers_of_the_scheduler_end_and_that_which_stops_jobs_stays():
-    scheduler = threading.Timer(60, print)
-    stopping = threading.Timer(60, stop_jobs)
-    for timer in (scheduler, stopping):
-        timer.start()
-    try:
-        end_scheduler_timers()
-        scheduler.join(20)
-        assert not scheduler.is_alive()
-        assert stopping.is_alive()
-    finally:
-        stopping.cancel()
+def test_a_signal_stops_jobs_and_timers_of_the_scheduler_end(tmp_path, monkeypatch):
+    scheduler, stopped = threading.Timer(60, print), threading.Event()
+
+    def schedule(_):
+        scheduler.start()
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(launch, "received_signals", [])
+    monkeypatch.setattr(launch, "stop_jobs", stopped.set)
+    monkeypatch.setattr(cli, "main", schedule)
+    with launching(tmp_path):
+        assert launch.call_snakemake([], Events()) == 128 + signal.SIGTERM
+    scheduler.join(20)
+    assert not scheduler.is_alive()
+    assert stopped.wait(20)
 
 
 def stale(directory):

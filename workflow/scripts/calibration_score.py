@@ -16,7 +16,7 @@ from gyriflow.step import step
 files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
 
 
-def pairs_with(observed, simulated):
+def _pairs_with(observed, simulated):
     """Yield, for each simulated brain, what there is of it and of each of its observed
     brains."""
     for brain, count in zip(simulated, params.compared, strict=True):
@@ -46,11 +46,11 @@ with step(snakemake.log[0]):
         surface_spectra(left, right, **params.settings) for _, left, right in simulated
     )
     score = run_score(
-        pairs_with(brains, [whole for whole, _, _ in simulated]),
+        _pairs_with(brains, [whole for whole, _, _ in simulated]),
         params.weights,
         causes,
         radius_mm=radius_mm,
-        spectra=pairs_with(map(read_table, files.spectra), simulated_spectra),
+        spectra=_pairs_with(map(read_table, files.spectra), simulated_spectra),
     )
     row = {
         "run": run,

@@ -13,7 +13,7 @@ from gyriflow.step import step
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 
 
-def parts(paths):
+def _parts(paths):
     """Read the surfaces of a brain by part."""
     return dict(
         zip(
@@ -31,12 +31,12 @@ with step(snakemake.log[0]):
             read_tables, (files.metrics, files.spectra, files.coefficients)
         )
         observed = map(
-            parts,
+            _parts,
             batched(files.measured, len(params.parts)),
         )
         observed = dict(zip(params.observed, observed, strict=True))
         populations = {names.brain: params.population, **params.observed}
-        simulated = parts(files.simulated)
+        simulated = _parts(files.simulated)
         table = member_comparison(
             names.run, names.brain, populations, metrics, spectra, simulated, observed
         )

@@ -58,13 +58,13 @@ def _read_elements(frames):
     return mesh.tets, fields
 
 
-def read_ages(path):
+def _read_ages(path):
     """Return the ages by size of an atlas' brains."""
     return read_weekly_shapes(path).ages
 
 
 READERS = {
-    "ages": read_ages,
+    "ages": _read_ages,
     "boundary": _read_boundary,
     "elements": _read_elements,
     "frames": read_pial_frames,
@@ -76,7 +76,7 @@ READERS = {
 """Functions that read inputs by name; others are tables."""
 
 
-def read(name, paths):
+def _read(name, paths):
     """Return the content of an input, a list if it has several files."""
     reader = READERS.get(name, read_table)
     if isinstance(paths, str):
@@ -84,7 +84,7 @@ def read(name, paths):
     return [reader(path) for path in paths]
 
 
-def read_brain(placed):
+def _read_brain(placed):
     """Return a brain of a grid with its surfaces, and their maps or regions.
 
     `placed` are its files and its place in the grid; it may have no maps.
@@ -111,9 +111,9 @@ with step(snakemake.log[0]):
     found = dict(params.items())
     for name, paths in files.items():
         if name == "grid":
-            found[name] = [read_brain(placed) for placed in params.grid]
+            found[name] = [_read_brain(placed) for placed in params.grid]
         else:
-            found[name] = read(name, paths)
+            found[name] = _read(name, paths)
     for name, written in output.items():
         arguments = signature(functions[name]).parameters
         given = {key: value for key, value in found.items() if key in arguments}

@@ -62,7 +62,7 @@ def _with_content(figures):
     )
 
 
-def read_weeks(weeks):
+def _read_weeks(weeks):
     """Return the hemispheres of a brain with their maps by week."""
     return [
         (week, [(read_surface(mesh), read_vertex_maps(maps)) for mesh, maps in halves])
@@ -120,9 +120,10 @@ with step(snakemake.log[0]):
         _with_content(params.figures),
         **about,
     )
-    runs, observed = params.surfaces["runs"], params.surfaces["observed"]
-    runs = {run: read_weeks(weeks) for run, weeks in runs.items()}
-    view = surfaces_view(runs, read_weeks(observed), observed_name=params.observed_name)
+    surfaces = params.surfaces
+    runs = {run: _read_weeks(weeks) for run, weeks in surfaces["runs"].items()}
+    observed = _read_weeks(surfaces["observed"])
+    view = surfaces_view(runs, observed, observed_name=params.observed_name)
     write_json(output.view, view)
     write_text(
         output.report,

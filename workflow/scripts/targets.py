@@ -58,7 +58,7 @@ with step(snakemake.log[0]):
     unfinished = unfinished_series(snakemake.output[0], made_from, settings)
     state = unfinished.read()
 
-    def keep(shapes: SeriesShapes) -> None:
+    def _keep(shapes: SeriesShapes) -> None:
         # a fit does not end for a checkpoint that cannot be written
         with suppress(StorageError):
             unfinished.write(shapes.weeks, shapes.positions, shapes.stops)
@@ -71,7 +71,7 @@ with step(snakemake.log[0]):
         ElasticFit(mesh),
         has_slits=has_slits,
         earlier=SeriesShapes(*state) if state else None,
-        after_week=keep,
+        after_week=_keep,
     )
     sizes = sizes_of(mesh, found.positions)
     key = ""

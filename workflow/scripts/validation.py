@@ -20,7 +20,7 @@ from gyriflow.step import step
 files, params, output = snakemake.input, snakemake.params, snakemake.output
 
 
-def prepared(name, number):
+def _prepared(name, number):
     """Read a surface that was prepared for comparison in a week."""
     return PreparedSurface(
         read_surface(files[name][number]),
@@ -67,10 +67,10 @@ with step(snakemake.log[0]):
         }
     observed = {}
     for number, week in enumerate(params.weeks):
-        baselines = {name: prepared(name, number) for name in ("start", "adjacent")}
+        baselines = {name: _prepared(name, number) for name in ("start", "adjacent")}
         surface = read_surface(files.whole[number])
         observed[week] = ObservedBrain(
-            params.observed[number], surface, prepared("observed", number), baselines
+            params.observed[number], surface, _prepared("observed", number), baselines
         )
     labels = {name: params[name] for name in ("run", "kind", "start_week")} | {
         "start": snakemake.wildcards.brain

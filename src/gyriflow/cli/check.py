@@ -6,7 +6,7 @@ import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import chdir, contextmanager
+from contextlib import chdir, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from ..grouping import grouped
+from ..io.files import read_json
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
 from ..running.cost import (
@@ -30,7 +31,6 @@ from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
 from ..running.manifest import CHANGED_CODE
 from ..running.planning import BY_ANOTHER_JOB, MISSING, Plan
-from ..running.provenance import recorded_version
 from ..running.status import format_duration
 from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
@@ -186,13 +186,23 @@ def work_of(
 def _why(reason: str, directory: Path) -> str:
     """Return the reason to run a job, without the files of a general one."""
     if reason == CHANGED_CODE:
-        made_by, this = recorded_version(directory), version()
+        made_by, this = _recorded_version(directory), version()
         if made_by not in (None, this):
             return f"{reason} (gyriflow {made_by}, now {this})"
     for words in (MISSING, BY_ANOTHER_JOB):
         if reason.startswith(words):
             return words
     return reason
+
+
+def _recorded_version(directory: Path) -> str | None:
+    """Return the version of gyriflow that made the report in a working directory, or
+    None if there is none."""
+    with suppress(InputError, KeyError):
+        return str(
+            read_json(directory / "results" / "report" / "provenance.json")["gyriflow"]
+        )
+    return None
 
 
 def plan(

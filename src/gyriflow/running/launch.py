@@ -42,7 +42,7 @@ from ..io.yaml_files import read_keys
 from ..messages import Message, study_messages
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
-from .manifest import Job, write_manifest
+from .manifest import Job
 from .planning import (
     Events,
     Plan,
@@ -51,7 +51,6 @@ from .planning import (
     link_results,
     listing,
     made_plan,
-    no_plan,
     restore_results,
     view_of,
 )
@@ -239,7 +238,7 @@ def _check_configfiles(files: Sequence[Path], directory: Path) -> None:
             raise InputError(f"configuration {error}", remedy=remedy) from error
 
 
-def what_runs(directory: Path) -> str:
+def _what_runs(directory: Path) -> str:
     """Return which configuration runs if a call names none, and which workflow in the
     current folder does not."""
     demo, own = SHIPPED / "config" / "config.yaml", directory / "config" / "config.yaml"
@@ -475,7 +474,7 @@ def call_snakemake(
     def is_shown(record: logging.LogRecord) -> bool:
         if getattr(record, "event", None) == "run_info":
             # Snakemake's own handler, set by now, waits for running jobs to end
-            signal.signal(signal.SIGTERM, interrupt)
+            signal.signal(signal.SIGTERM, _interrupt)
         events.take(record)
         is_message = record.levelno >= logging.INFO
         names = NO_RULE.findall(record.getMessage()) if is_message else []
@@ -483,21 +482,12 @@ def call_snakemake(
         is_wanted = getattr(record, "event", None) not in unwanted
         return record.levelno >= level and is_wanted and not names
 
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        received_signals.append(number)
-        # a closed terminal sends several
-        if len(received_signals) == 1:
-            # while Snakemake waits for its jobs
-            threading.Timer(INTERRUPT_S, stop_jobs).start()
-        if len(received_signals) == 1 or number == signal.SIGINT:
-            raise KeyboardInterrupt
-
     numbers = [signal.SIGINT, signal.SIGTERM]
     # `nohup` has SIGHUP ignored; Windows has none
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         numbers.append(signal.SIGHUP)
     for number in numbers:
-        signal.signal(number, interrupt)
+        signal.signal(number, _interrupt)
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(is_shown)
     try:
@@ -511,7 +501,7 @@ def call_snakemake(
         code = 1
     finally:
         logger.removeFilter(is_shown)
-        end_scheduler_timers()
+        _end_scheduler_timers()
     for name in unknown_targets:
         rules = [
             path.read_text(encoding="utf-8")
@@ -528,7 +518,17 @@ def call_snakemake(
     return 128 + received_signals[0] if code and received_signals else code
 
 
-def end_scheduler_timers() -> None:
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    received_signals.append(number)
+    # a closed terminal sends several
+    if len(received_signals) == 1:
+        # while Snakemake waits for its jobs
+        threading.Timer(INTERRUPT_S, stop_jobs).start()
+    if len(received_signals) == 1 or number == signal.SIGINT:
+        raise KeyboardInterrupt
+
+
+def _end_scheduler_timers() -> None:
     """End the timers of Snakemake's scheduler, for which Python would wait at its
     end."""
     for thread in threading.enumerate():
@@ -551,39 +551,28 @@ class Call:
     take_plan: Callable[[Plan], None] | None = None
     is_shown: bool = True
 
-    def has_any(self, names: Sequence[str]) -> bool:
-        """Return whether any of some options is given."""
-        return any(getattr(self.options, name, None) for name in names)
-
     @property
     def runs(self) -> bool:
         """Whether it may run jobs."""
         return self.place == self.directory
 
-    @property
-    def is_planned(self) -> bool:
-        """Whether it runs jobs or shows those that would run."""
-        is_plain = self.options.dryrun or self.runs
-        return is_plain and not self.has_any(MANAGING_OPTIONS)
 
-    @property
-    def quiet(self) -> list[str]:
-        """The words after `--quiet`."""
-        return [item.name.lower() for item in self.options.quiet or []]
+def _has_any(options: Namespace, names: Sequence[str]) -> bool:
+    """Return whether any of some options is given."""
+    return any(getattr(options, name, None) for name in names)
 
-    def forced(self, jobs: Iterable[Job]) -> list[str]:
-        """Return the rules and files of planned jobs that run again in any case."""
-        if self.options.forceall:
-            return [job.rule for job in jobs]
-        wanted = session.targets if self.options.force else []
-        return [*(self.options.forcerun or []), *wanted]
 
-    def without_force(self) -> "Call":
-        """Return the call without arguments that force jobs to run: the plan has them,
-        and Snakemake would leave out some behind a checkpoint."""
-        arguments = [word for word in self.arguments if word not in FORCE_OPTIONS]
-        # the last of several counts
-        return replace(self, arguments=[*arguments, "--forcerun"])
+def _quiet_words(options: Namespace) -> list[str]:
+    """Return the words after `--quiet`."""
+    return [item.name.lower() for item in options.quiet or []]
+
+
+def _forced(options: Namespace, jobs: Iterable[Job]) -> list[str]:
+    """Return the rules and files of planned jobs that run again in any case."""
+    if options.forceall:
+        return [job.rule for job in jobs]
+    wanted = session.targets if options.force else []
+    return [*(options.forcerun or []), *wanted]
 
 
 def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
@@ -597,10 +586,14 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     if call.runs:
         # of a run that was killed
         restore_results(call.directory)
-    if not call.is_planned:
-        code, _ = run_jobs(call, no_plan())
+    is_plain = call.options.dryrun or call.runs
+    if not is_plain or _has_any(call.options, MANAGING_OPTIONS):
+        code, _ = run_jobs(call, Plan())
         return code
-    call = call.without_force()
+    # the plan has the forced jobs, and Snakemake would leave out some behind a
+    # checkpoint; the last of several options counts
+    words = [word for word in call.arguments if word not in FORCE_OPTIONS]
+    call = replace(call, arguments=[*words, "--forcerun"])
     events = Events()
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
@@ -609,7 +602,9 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     if code:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
-        forced = call.forced(events.jobs.values()) if left is None else left
+        forced = left
+        if forced is None:
+            forced = _forced(call.options, events.jobs.values())
         plan = made_plan(events, session.targets, forced)
         if call.runs:
             keep_contents(plan)
@@ -621,8 +616,8 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         if left is None:
             _say_nothing_runs(call, events.nothing)
         return 0
-    if not (call.runs or call.has_any(SNAKEMAKE_LISTS)):
-        print(listing(plan, call.quiet), end="")
+    if not (call.runs or _has_any(call.options, SNAKEMAKE_LISTS)):
+        print(listing(plan, _quiet_words(call.options)), end="")
         return 0
     if call.runs:
         hide_results(call.directory, plan.outdated)
@@ -644,7 +639,7 @@ def _say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
     messages are asked for."""
     if call.options.dryrun:
         print(record.getMessage())
-    elif call.has_any(VERBOSE_OPTIONS):
+    elif _has_any(call.options, VERBOSE_OPTIONS):
         print(record.getMessage(), file=sys.stderr)
     else:
         print("gyriflow: everything is up to date", file=sys.stderr)
@@ -659,38 +654,29 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
     if not call.runs:
         return call_snakemake(arguments, Events(plan.reasons), level), set()
 
-    def finish(job: Job) -> None:
-        # a result without a manifest is made again
-        with suppress(StorageError):
-            write_manifest(job, plan.found)
-
     unwanted: Collection[str] = ()
-    if "progress" in call.quiet:
+    quiet = _quiet_words(call.options)
+    if "progress" in quiet:
         # Snakemake would not name the jobs that have finished
-        others = [word for word in call.quiet if word != "progress"]
+        others = [word for word in quiet if word != "progress"]
         arguments += ["--quiet", *(others or ["host"])]
         level, unwanted = logging.INFO, ("job_finished", "progress")
     output: AbstractContextManager[None] = nullcontext()
-    if not call.has_any(READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS):
+    if not _has_any(
+        call.options, READ_ONLY_OPTIONS + VERBOSE_OPTIONS + MANAGING_OPTIONS
+    ):
         name = f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         details = call.directory.resolve() / ".snakemake" / "log" / name
         logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
         arguments = [*logger, *arguments]
         output = output_to(details)
-    events = Events(plan.reasons, finish)
+    events = Events(plan.reasons, plan.found)
     try:
         with output:
             code = call_snakemake(arguments, events, level, unwanted)
     finally:
         restore_results(call.directory, events.started)
     return code, events.ended
-
-
-def _is_dry(options: Namespace) -> bool:
-    """Return whether a call runs nothing and takes no lock."""
-    return any(
-        getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS
-    )
 
 
 def main(
@@ -716,9 +702,9 @@ def main(
     directory = options.directory or Path()
     is_second_pass = REFUSED_FILE_VAR in os.environ
     if not (options.configfile or options.snakefile or is_second_pass):
-        print(f"gyriflow: {what_runs(directory)}", file=sys.stderr)
+        print(f"gyriflow: {_what_runs(directory)}", file=sys.stderr)
     _check_configfiles(options.configfile or [], directory)
-    with nullcontext() if _is_dry(options) else locked(directory):
+    with nullcontext() if _has_any(options, READ_ONLY_OPTIONS) else locked(directory):
         return _run_workflow(arguments, options, take_plan, is_shown=is_shown)
 
 
@@ -732,7 +718,7 @@ def _run_workflow(
     """Run Snakemake as `main` does, in a working directory that is locked unless
     nothing is run."""
     directory = options.directory or Path()
-    dry_run = _is_dry(options)
+    dry_run = _has_any(options, READ_ONLY_OPTIONS)
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)

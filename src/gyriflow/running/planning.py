@@ -9,7 +9,7 @@ import logging
 import os
 import shutil
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import chain
@@ -29,6 +29,7 @@ from .manifest import (
     difference,
     manifest_of,
     read_manifest,
+    write_manifest,
 )
 from .provenance import recorded_inputs
 
@@ -71,16 +72,18 @@ class Events:
     """Jobs that Snakemake plans and finishes, from the events of its log.
 
     `reasons` replace Snakemake's own reasons to run a job, by the first of its results.
-    `finished` is called with each job that has finished. `jobs` are the planned ones by
-    key, `ended` the keys of those that have finished. `nothing` is the record that
-    nothing has to be done.
+    `found` are the contents of files before a run, with which the manifest of each job
+    that finishes is written. `jobs` are the planned ones by key, `ended` the keys of
+    those that have finished, `started` the results of those that have begun. `nothing`
+    is the record that nothing has to be done.
     """
 
     reasons: Mapping[str, str] = field(default_factory=dict)
-    finished: Callable[[Job], None] | None = None
+    found: Contents | None = None
     jobs: dict[str, Job] = field(default_factory=dict)
     nothing: logging.LogRecord | None = None
     ended: set[str] = field(default_factory=set)
+    started: set[str] = field(default_factory=set)
     _selected: dict[int, Any] = field(default_factory=dict)
     _keys: dict[int, str] = field(default_factory=dict)
 
@@ -93,6 +96,8 @@ class Events:
             case "job_info" if event["output"]:
                 key = event["output"][0].removesuffix(UPDATED)
                 self._keys[event["jobid"]] = key
+                if key in self.jobs:
+                    self.started.update(self.jobs[key].outputs)
                 if key in self.reasons:
                     record.reason = self.reasons[key]
             case "job_finished":
@@ -100,19 +105,12 @@ class Events:
                 key = self._keys.get(event["job_id"])
                 if key is not None:
                     self.ended.add(key)
-                if self.finished and key in self.jobs:
-                    self.finished(self.jobs[key])
+                if self.found and key in self.jobs:
+                    # a result without a manifest is made again
+                    with suppress(StorageError):
+                        write_manifest(self.jobs[key], self.found)
             case None if record.getMessage().startswith("Nothing to be done"):
                 self.nothing = record
-
-    @property
-    def started(self) -> set[str]:
-        """The results of the jobs that have started."""
-        files: set[str] = set()
-        for key in self._keys.values():
-            if key in self.jobs:
-                files.update(self.jobs[key].outputs)
-        return files
 
     def _add(self, selected: Any) -> None:
         # a job is selected for each of its results
@@ -133,11 +131,11 @@ class Plan:
     jobs by their key.
     """
 
-    jobs: Collection[Job]
-    manifests: Mapping[str, Mapping[str, Any]]
-    found: Contents
-    reasons: Mapping[str, str]
-    outdated: list[str]
+    jobs: Collection[Job] = ()
+    manifests: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    found: Contents = field(default_factory=lambda: Contents({}, {}))
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    outdated: Collection[str] = ()
 
     @property
     def reasoned_jobs(self) -> list[tuple[Job, str]]:
@@ -145,17 +143,6 @@ class Plan:
         return [
             (job, self.reasons[job.key]) for job in self.jobs if job.key in self.reasons
         ]
-
-
-def no_plan() -> Plan:
-    """Return the plan of a call that does not plan."""
-    return Plan(
-        [],
-        {},
-        Contents({}, {}),
-        {},
-        [],
-    )
 
 
 def made_plan(

@@ -68,16 +68,6 @@ def software() -> dict[str, Any]:
     }
 
 
-def recorded_version(directory: Path) -> str | None:
-    """Return the version of gyriflow that made the report in a working directory, or
-    None if there is none."""
-    with suppress(InputError, KeyError):
-        return str(
-            read_json(directory / "results" / "report" / "provenance.json")["gyriflow"]
-        )
-    return None
-
-
 def check_results_belong_to(
     directory: Path,
     files: Sequence[Path],
@@ -159,18 +149,15 @@ def recorded_inputs(directory: Path) -> dict[str, Any]:
 def texts_in(value: Any) -> list[str]:
     """Return all strings in nested mappings and lists, such as the file names in a
     brain's entry."""
-    items = (
-        value.values()
-        if isinstance(value, dict)
-        else value
-        if isinstance(value, list | tuple)
-        else []
-    )
-    return (
-        [value]
-        if isinstance(value, str)
-        else [text for item in items for text in texts_in(item)]
-    )
+    if isinstance(value, str):
+        return [value]
+    if isinstance(value, dict):
+        value = list(value.values())
+    texts: list[str] = []
+    if isinstance(value, list | tuple):
+        for item in value:
+            texts += texts_in(item)
+    return texts
 
 
 def input_contents(

@@ -48,16 +48,16 @@ def require_for(programs: Mapping[str, Path]) -> None:
     missing: dict[str, str] = {}
     compiles = False
     for name, program in programs.items():
-        needed = packages_behind(program)
+        needed = _packages_behind(program)
         compiles |= "dolfinx" in needed
         for package in needed:
-            if not is_installed(package):
+            if not _is_installed(package):
                 missing.setdefault(package, name)
     if missing:
         package, rule = next(iter(missing.items()))
         extras = sorted({EXTRAS[name] for name in missing})
         remedy = f'Install what is missing: pip install "gyriflow[{",".join(extras)}]"'
-        if "dolfinx" in missing and not has_dolfinx_wheels():
+        if "dolfinx" in missing and not _has_dolfinx_wheels():
             remedy = f"PyPI has no dolfinx with PETSc for this system: {_elsewhere()}"
         names = ", ".join(missing)
         problem = (
@@ -97,7 +97,7 @@ def _elsewhere() -> str:
     return f"use conda, {CONDA}, without its lines for Linux (docs/environment.md)"
 
 
-def packages_behind(program: Path) -> list[str]:
+def _packages_behind(program: Path) -> list[str]:
     """Return the packages of the extras that a program or the modules behind it
     import."""
     imported: set[str] = set()
@@ -107,14 +107,14 @@ def packages_behind(program: Path) -> list[str]:
     return [name for name in EXTRAS if name in imported]
 
 
-def is_installed(package: str) -> bool:
+def _is_installed(package: str) -> bool:
     """Return whether a package is installed; `importlib.util.find_spec` would import
     MPI for dolfinx."""
     is_blocked = package in sys.modules and sys.modules[package] is None
     return not is_blocked and PathFinder.find_spec(package) is not None
 
 
-def has_dolfinx_wheels() -> bool:
+def _has_dolfinx_wheels() -> bool:
     """Return whether PyPI has dolfinx with PETSc for this system: Linux x86_64 with
     glibc 2.34 or later."""
     if sys.platform != "linux" or platform.machine() != "x86_64":

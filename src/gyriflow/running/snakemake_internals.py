@@ -25,18 +25,19 @@ def shorten_usage_errors() -> None:
     its whole usage, and say which package an executor needs."""
     from snakemake.common.argparse import ArgumentParser
 
-    def end(_: Any, message: str) -> None:
-        text = f"{message}. See `./run snakemake --help`."
-        if executor := UNKNOWN_EXECUTOR.search(message):
-            package = f"snakemake-executor-plugin-{executor[1]}"
-            text = (
-                f"the executor {executor[1]} needs the package {package}, which this"
-                " environment has not. Install it as in docs/how-to/cluster.md"
-            )
-        print(f"gyriflow: {text}", file=sys.stderr)
-        sys.exit(InputError.exit_code)
+    ArgumentParser.error = _end_with_one_line
 
-    ArgumentParser.error = end
+
+def _end_with_one_line(_: Any, message: str) -> None:
+    text = f"{message}. See `./run snakemake --help`."
+    if executor := UNKNOWN_EXECUTOR.search(message):
+        package = f"snakemake-executor-plugin-{executor[1]}"
+        text = (
+            f"the executor {executor[1]} needs the package {package}, which this"
+            " environment has not. Install it as in docs/how-to/cluster.md"
+        )
+    print(f"gyriflow: {text}", file=sys.stderr)
+    sys.exit(InputError.exit_code)
 
 
 def max_jobs(arguments: Sequence[str]) -> int | None:

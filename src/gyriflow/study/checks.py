@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
-from ..names import column_part, folder_name, is_device, merged_names
+from ..names import DEVICE, column_part, folder_name, merged_names
 from ..quantities import METRICS
 from ..settings.base import Key, KeyProblem, Problems, did_you_mean, problems_in
 from ..settings.folding import VARYING, value_problems
@@ -114,7 +114,7 @@ def _names(config: Config) -> Problems:
     named += [(name, ("runs", name)) for name in config.runs]
     named += [(name, ("sweeps", name)) for name in config.sweeps]
     for name, key in named:
-        if is_device(name):
+        if DEVICE.fullmatch(name):
             yield KeyProblem(
                 f"found {name}, a device on Windows, whose disks have no folder of this"
                 " name; choose another",

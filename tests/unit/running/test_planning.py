@@ -16,12 +16,12 @@ from gyriflow.running.planning import (
     FORCED,
     MISSING,
     Events,
+    Plan,
     hide_results,
     keep_contents,
     link_results,
     listing,
     made_plan,
-    no_plan,
     restore_results,
     view_of,
 )
@@ -248,7 +248,7 @@ def test_a_run_that_leaves_planned_jobs_is_planned_again(
         return code, ended
 
     def plan_rest(*_):
-        return replace(no_plan(), reasons=dict.fromkeys(waiting, "missing"))
+        return Plan(reasons=dict.fromkeys(waiting, "missing"))
 
     monkeypatch.setattr(launch, "call_snakemake", lambda *_: 0)
     monkeypatch.setattr(launch, "made_plan", plan_rest)
