@@ -98,7 +98,7 @@ def test_a_format_of_surfaces_is_read_recognised_and_hidden(tmp_path, form, suff
     [
         (form, suffix)
         for form in FORMATS
-        for suffix in form.all_suffixes
+        for suffix in form.suffixes + form.data_suffixes
         if form.content == "volume"
     ],
     ids=lambda value: getattr(value, "name", value),
