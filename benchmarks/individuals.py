@@ -1,75 +1,58 @@
 """Find how large an individual difference must be for a prediction to be better than
-the atlas' brain of that week.
+the atlas' brain of that week, with synthetic individuals.
 
-    ./run python benchmarks/individuals.py FOLDER --accept-licence \\
-        --atlas crl CRL --atlas chinese CHINESE
+    ./run python benchmarks/individuals.py PAIRS.csv \\
+        [--individuals KIND-SIZE-SEED ...] [--weeks 26 30] [--match-error 0.3]
 
-CRL and CHINESE are the folders of atlases' files. The individuals are synthetic: an
-atlas' labels, deformed by random smooth maps. At the start, `shape` has waves of 40 to
-60 mm and `sulci` of 15 to 25 mm; their size is the root mean square displacement (mm)
-in the start brain's cerebrum. Maps follow the brain's centre and its lengths along
-three axes over the weeks, so the individual difference is `kept`; or it is `fading` as
-e^(−weeks/8), and another one of the same size replaces it.
+PAIRS.csv is the table of benchmarks/persistence.py. Each of its start brains gives a
+mesh, placed in an atlas, and the path of this atlas. An individual is the atlas,
+deformed by a random smooth map: `shape` has waves of 40 to 60 mm and `sulci` of 15 to
+25 mm, and the size is the root mean square displacement (mm) at the start. The map
+follows the centre of the brain and its lengths along three axes over the weeks, so the
+individual difference is `kept`; or it is `fading` as e^(-weeks/8), and another one of
+the same size replaces it. The deformed mesh is the start brain; the deformed surfaces
+of the atlas are its later scans. The match to the atlas has an error: a random map with
+waves of 15 to 25 mm and a root mean square of `--match-error` mm.
 
-The start brains are predicted with the growth of their atlas, without the synthetic
-later brains, and rigidly aligned with these. Models are the `atlas`' own brain of the
-week scaled to the predicted volume, the predicted shape before a body follows it, with
-the weight of `growth.expected.Persistence` (`predicted`), with all of the smooth
-difference (`whole`) and with all of it (`all`), and the atlas' surface moved to the
-predicted shape (`delivered`), which is what a study measures. The map of an individual
-depends on its kind and seed only.
-
-The last line is one JSON object: `rows` with `grown_by`, `persistence`, `individual`,
-`horizon` (GW), `model`, `distance_mm`, `r_shape_index`; of `delivered` also the
-differences of area, volume, folding (gyrification index) and mean sulcal depth, as
-fractions of the later brain's, which are the errors of its metrics. A table shows the
-largest and the root mean square of these.
+Models are those of benchmarks/persistence.py without the scaled start: the atlas' own
+brain, the predicted shape with all of the smooth difference (`whole`) and the surface
+that is delivered. Of `delivered` there are also the differences of area, volume,
+folding (gyrification index) and mean sulcal depth, as fractions of the later brain's,
+which are the errors of its metrics; tables show their largest and their root mean
+square. The last line is one JSON object with `rows`.
 """
 
 import argparse
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
-from itertools import pairwise, product
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import dolfinx_solver  # noqa: F401
 import numpy as np
 import pandas as pd
-from common import print_rows, r_shape_index, run_workflow
-from scipy.ndimage import map_coordinates
+import petsc4py
+from common import print_rows
+from persistence import Start, models_of, read_start, scores_of
 
 from gyriflow.anatomy.fissure import cut_sides, nearer_left
 from gyriflow.compare.accuracy import FOLDING, QUANTITIES, log_value
-from gyriflow.compare.comparison import aligned_distances
-from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
-from gyriflow.geometry.deformations import between_moved, transform_points
-from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import Floats, TriangleMesh
-from gyriflow.growth.expected import expected_positions
-from gyriflow.growth.fine_surfaces import ObservedSurface, moved_surface
-from gyriflow.growth.series_shapes import follow_series
-from gyriflow.io.registrations import read_correspondence
-from gyriflow.io.surfaces import read_pose, read_surface
-from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
-from gyriflow.io.yaml_files import SCHEMES, read_keys
+from gyriflow.compare.shapes import prepare_for_comparison
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
+from gyriflow.geometry.triangles import Floats, Mask, TriangleMesh
+from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.measure import folding_metrics, measure_folds, size_metrics
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM, SIDES
-from gyriflow.shipped import ATLASES
-from gyriflow.study.paths import MESH, PIAL, REGISTERED
+from gyriflow.study.paths import PIAL
 
 WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
-MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
-KEPT_GW = {"kept": np.inf, "fading": 8.0}
-MESH_SETTINGS = {
-    "order": 1,
-    "mesher": "tetgen",
-    "surface_edge_mm": 1.3,
-    "core_edge_mm": 3,
-}
-# a coarse mesh of a detailed surface has flat elements
-MESH_SETTINGS |= {"max_surface_distance_mm": 0.5}
+N_WAVES, FLOW_STEPS = 40, 8
+FADING_GW = {"kept": np.inf, "fading": 8.0}
+REPLACED = 1000
+"""Added to the seed of a map: that of the map which replaces it."""
+MATCH_SEED = 77
+MODELS = ("whole", "atlas", "delivered")
 INDIVIDUALS = [
     "shape-1-1",
     "sulci-1-2",
@@ -83,120 +66,95 @@ INDIVIDUALS = [
 def velocity(kind: str, seed: int, points: Floats) -> Floats:
     """Return a random smooth field at (n, 3) points in mm, (n, 3)."""
     random = np.random.default_rng([seed, list(WAVES_MM).index(kind)])
-    waves = random.normal(size=(3, MODES))
-    waves *= (
-        2
-        * np.pi
-        / random.uniform(*WAVES_MM[kind], MODES)
-        / np.linalg.norm(waves, axis=0)
-    )
-    return np.asarray(
-        np.cos(points @ waves + random.uniform(0, 2 * np.pi, MODES))
-        @ random.normal(size=(MODES, 3))
-    )
+    directions = random.normal(size=(3, N_WAVES))
+    directions /= np.linalg.norm(directions, axis=0)
+    lengths = random.uniform(*WAVES_MM[kind], N_WAVES)
+    phases = random.uniform(0, 2 * np.pi, N_WAVES)
+    heights = random.normal(size=(N_WAVES, 3))
+    waves = np.cos(points @ (2 * np.pi * directions / lengths) + phases)
+    return np.asarray(waves @ heights)
 
 
-def cerebrum_of(volume: LabelVolume, scheme: str) -> tuple[Floats, Floats, Floats]:
-    """Return the cerebrum's centre, its standard deviations along the axes, and its (n,
-    3) centred voxels, in mm."""
-    points = transform_points(
-        np.argwhere(np.isin(volume.labels, SCHEMES[scheme].cerebrum)), volume.affine
-    )
-    return points.mean(axis=0), points.std(axis=0), points - points.mean(axis=0)
+@dataclass(frozen=True, eq=False)
+class Individual:
+    """A random map KIND-SIZE-SEED of the atlas that a start brain is placed in."""
 
+    name: str
+    atlas: Start
 
-def deformed(
-    volume: LabelVolume, start: LabelVolume, scheme: str, name: str, share: float
-) -> LabelVolume:
-    """Return the labels of an individual KIND-SIZE-SEED with a share of its individual
-    difference at the start."""
-    kind, size, seed = name.split("-")
-    (centre, lengths, _) = cerebrum_of(volume, scheme)
-    (_, start_lengths, cerebrum) = cerebrum_of(start, scheme)
-    parts = []
-    for part, number in ((share, int(seed)), (np.sqrt(1 - share**2), int(seed) + 1000)):
-        rms = np.sqrt((velocity(kind, number, cerebrum[::20]) ** 2).sum(axis=1).mean())
-        parts.append((part * float(size) / rms / FLOW_STEPS, number))
-    labels, affine = np.pad(volume.labels, PAD), volume.affine.copy()
-    affine[:3, 3] -= affine[:3, :3].sum(axis=1) * PAD
-    grid = np.stack(
-        np.meshgrid(
-            *(np.arange(0, n + COARSE, COARSE) for n in labels.shape), indexing="ij"
+    @cached_property
+    def week(self) -> float:
+        """The stated week of the atlas' brain next to the start brain."""
+        weeks = np.asarray(self.atlas.path.shapes.weeks)
+        nearest = np.argmin(np.abs(weeks - self.atlas.week))
+        return float(weeks[nearest])
+
+    def body(self, week: float) -> Floats:
+        """Return the start's mesh (n, 3) in mm in the atlas of a stated week."""
+        return self.atlas.carried[self.atlas.path.shapes.weeks.index(week)]
+
+    def moved(self, points: Floats, week: float, share: float) -> Floats:
+        """Return (n, 3) points in mm of the atlas at a stated week in the individual,
+        which still has a share of its difference at the start."""
+        kind, size_mm, seed = self.name.split("-")
+        first, shape = self.body(self.week), self.body(week)
+        centred = first[::20] - first.mean(axis=0)
+        replacing = np.sqrt(1 - share**2)
+        steps = []
+        for part, number in ((share, int(seed)), (replacing, int(seed) + REPLACED)):
+            unit_mm = root_mean_square(velocity(kind, number, centred))
+            steps.append((part * float(size_mm) / unit_mm / FLOW_STEPS, number))
+        ratio = shape.std(axis=0) / first.std(axis=0)
+        centre = shape.mean(axis=0)
+        moved = (points - centre) / ratio
+        # a flow is one-to-one at any size
+        for _ in range(FLOW_STEPS):
+            step = np.zeros_like(moved)
+            for factor, number in steps:
+                step += factor * velocity(kind, number, moved)
+            moved = moved + step
+        return moved * ratio + centre
+
+    def surfaces(self, week: float, share: float = 1.0) -> list[TriangleMesh]:
+        """Return the surfaces of the individual at a stated week: whole, left,
+        right."""
+        surfaces = []
+        for surface in surfaces_of(self.atlas, week):
+            places = self.moved(surface.vertices, week, share)
+            surfaces.append(TriangleMesh(places, surface.faces))
+        return surfaces
+
+    def start(self, match_error_mm: float) -> Start:
+        """Return the individual as a start brain, placed in the atlas with an error."""
+        body = self.body(self.week)
+        error = velocity("sulci", MATCH_SEED, body - body.mean(axis=0))
+        matched = body + match_error_mm / root_mean_square(error) * error
+        deformed = self.moved(body, self.week, share=1.0)
+        return replace(
+            self.atlas,
+            name=self.name,
+            week=self.week,
+            mesh=TetrahedralMesh(deformed, self.atlas.mesh.tets),
+            carried=self.atlas.path.carry(matched, self.week),
+            surface=self.surfaces(self.week)[0],
         )
-    )
-    points = began = (
-        (transform_points(grid.reshape(3, -1).T, affine) - centre)
-        * start_lengths
-        / lengths
-    )
-    # a flow is one-to-one at any size
-    for _ in range(FLOW_STEPS):
-        points = points + sum(
-            factor * velocity(kind, number, points)
-            for factor, number in parts
-            if factor
-        )
-    moved = (points - began) * lengths / start_lengths @ np.linalg.inv(affine[:3, :3]).T
-    index = np.indices(labels.shape, dtype=np.float64)
-    index += [
-        map_coordinates(axis.reshape(grid.shape[1:]), index / COARSE, order=1)
-        for axis in moved.T
-    ]
-    largest, result = np.zeros(labels.shape, np.float32), np.zeros_like(labels)
-    for label in np.unique(labels):
-        weight = map_coordinates((labels == label).astype(np.float32), index, order=1)
-        result[weight > largest], largest = label, np.maximum(largest, weight)
-    return LabelVolume(result, affine)
 
 
-def targets_of(
-    folder: Path, brain: str, atlas: dict[float, str]
-) -> dict[float, dict[str, TriangleMesh]]:
-    """Return the predicted surfaces of a start brain along the brains of an atlas, by
-    week and model."""
-    chain = [brain, *atlas.values()]
-    mesh = read_tetrahedral_mesh(folder / MESH["mesh"].format(brain=brain))
-    poses = [
-        read_pose(folder / PIAL["report"].format(brain=name)).world for name in chain
-    ]
-    registered = [
-        folder / REGISTERED.format(earlier=earlier, later=later)
-        for earlier, later in pairwise(chain)
-    ]
-    pairs = [
-        between_moved(read_correspondence(file), *pair)
-        for file, pair in zip(registered, pairwise(poses), strict=True)
-    ]
-    surfaces = [
-        read_surface(folder / PIAL["whole"].format(brain=name)) for name in chain[1:]
-    ]
-    weeks, start = sorted(atlas), min(atlas)
-    carried = follow_series(
-        mesh, [start, *weeks], pairs, surfaces, has_slits=True
-    ).positions[1:]
-    options: dict[str, dict[str, Any]] = {
-        "predicted": {},
-        "whole": {"keep_all": True},
-        "all": {"keep_all": True, "smoothing_mm": 0.0},
-    }
-    boundary, used = boundary_surface(mesh)
-    result: dict[float, dict[str, TriangleMesh]] = {week: {} for week in weeks[1:]}
-    for model, option in options.items():
-        found = expected_positions(mesh, start, carried, weeks, weeks[1:], **option)
-        for week, positions in zip(weeks[1:], found.positions[1:], strict=True):
-            result[week][model] = TriangleMesh(positions[used], boundary.faces)
-    for number, week in enumerate(weeks[1:], 1):
-        observed = ObservedSurface(surfaces[number], carried[number][used])
-        shape = result[week]["predicted"]
-        result[week]["delivered"] = moved_surface(observed, shape)
-    return result
+def root_mean_square(vectors: Floats) -> float:
+    """Return the root mean square length of (n, 3) vectors."""
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
-def metrics_of(
-    whole: TriangleMesh, left: TriangleMesh, right: TriangleMesh
-) -> dict[str, float]:
-    """Return the metrics of a brain's size and folding."""
-    sides = (left, right)
+def surfaces_of(start: Start, week: float) -> list[TriangleMesh]:
+    """Return the surfaces of the atlas' brain of a stated week: whole, left, right."""
+    brain = f"{start.first.rsplit('-', 1)[0]}-{week:g}"
+    files = [PIAL[part].format(brain=brain) for part in ("whole", *SIDES)]
+    return [read_surface(start.study / file) for file in files]
+
+
+def metrics_of(surfaces: list[TriangleMesh]) -> dict[str, float]:
+    """Return the metrics of size and folding of a brain: whole, left, right."""
+    whole, *sides = surfaces
     folds = [measure_folds(side, CURVATURE_RADIUS_MM) for side in sides]
     return size_metrics(whole, sides) | folding_metrics(folds)
 
@@ -214,183 +172,81 @@ def differences(
     return result
 
 
-def surfaces_of(
-    folder: Path, brain: str
-) -> tuple[TriangleMesh, TriangleMesh, TriangleMesh]:
-    """Return the whole surface of a brain and those of its left and right side."""
-    whole, left, right = (
-        read_surface(folder / PIAL[part].format(brain=brain))
-        for part in ("whole", *SIDES)
-    )
-    return whole, left, right
-
-
-def scores_of(
-    folder: Path, name: str, atlas: str, weeks: Sequence[int]
-) -> list[dict[str, Any]]:
-    """Return the distances and correlations of all models of an individual, with both
-    persistences, and the differences of the delivered surface's metrics."""
-    start, rows = weeks[0], []
-    brain = f"{name}-kept-{start}"
-    targets = targets_of(
-        folder,
-        brain,
-        {float(week): f"{atlas}-{week}" for week in range(start, weeks[-1] + 1)},
-    )
-    delivered_metrics = {}
-    for week in weeks[1:]:
-        delivered = targets[week]["delivered"]
-        whole, left, right = surfaces_of(folder, f"{atlas}-{week}")
-        if delivered is targets[week]["predicted"]:
-            # the mesh's own surface, where an observed one would cross itself
-            _, left, right = surfaces_of(folder, brain)
-            mesh = read_tetrahedral_mesh(folder / MESH["mesh"].format(brain=brain))
-            whole, _ = boundary_surface(mesh)
-        sides = cut_sides(delivered, nearer_left(whole, left, right))
-        delivered_metrics[week] = metrics_of(delivered, *sides)
-    for persistence, week in product(KEPT_GW, weeks[1:]):
-        parts = surfaces_of(folder, f"{name}-{persistence}-{week}")
-        observed, observed_metrics = parts[0], metrics_of(*parts)
-        atlas_brain, _, _ = surfaces_of(folder, f"{atlas}-{week}")
-        models = targets[week] | {
-            "atlas": scale_to_volume(atlas_brain, targets[week]["predicted"])
+def rows_of(
+    individual: Individual, weeks: list[float], match_error_mm: float
+) -> Iterator[dict[str, Any]]:
+    """Yield the scores of an individual, whose difference is kept or fading."""
+    start = individual.start(match_error_mm)
+    for week, models in zip(weeks, models_of(start, weeks), strict=True):
+        labels: dict[str, Any] = {
+            "grown_by": start.first,
+            "individual": individual.name,
         }
-        folds = prepare_for_comparison(observed, observed)
-        for model, surface in models.items():
-            row = {
-                "grown_by": atlas,
-                "persistence": persistence,
-                "individual": name,
-                "horizon": week - start,
-            }
-            row |= {
-                "model": model,
-                "distance_mm": aligned_distances(surface, observed)["distance_mm"],
-            }
-            row["r_shape_index"] = r_shape_index(surface, observed, folds)
-            if model == "delivered":
-                row |= differences(delivered_metrics[week], observed_metrics)
-            rows.append(row)
-    return rows
+        labels["horizon"] = week - start.week
+        delivered = models["delivered"]
+        sides = cut_sides(delivered, left_faces_of(start, delivered, week))
+        found = metrics_of([delivered, *sides])
+        for persistence, time in FADING_GW.items():
+            share = float(np.exp((start.week - week) / time))
+            observed = individual.surfaces(week, share)
+            folds = prepare_for_comparison(observed[0], observed[0])
+            errors = differences(found, metrics_of(observed))
+            for model in MODELS:
+                row = labels | {"persistence": persistence, "model": model}
+                row |= scores_of(models[model], observed[0], folds)
+                yield row | errors if model == "delivered" else row
 
 
-def run_study(
-    folder: Path, atlas: str, files: Path, arguments: argparse.Namespace
-) -> None:
-    """Deform an atlas' labels into individuals, and run the workflow for the files that
-    are compared."""
-    weeks = sorted(arguments.weeks)
-    series = read_keys(ATLASES / atlas / "atlas.yaml")["series"]["normative"]
-    start = weeks[0]
-    scheme = series["scheme"]
-    growing = list(range(weeks[0], weeks[-1] + 1))
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = {
-        week: files / series["files"]["labels"].format(week=week) for week in weeks
-    }
-    volumes = {
-        week: read_label_volume(path, cropped=True) for week, path in paths.items()
-    }
-    brains = []
-    for name, persistence, week in product(arguments.individuals, KEPT_GW, weeks):
-        if persistence == "kept" or week > start:
-            path = folder / f"{name}-{persistence}-{week}.nii.gz"
-            share = float(np.exp((start - week) / KEPT_GW[persistence]))
-            if not path.exists():
-                write_label_volume(
-                    path, deformed(volumes[week], volumes[start], scheme, name, share)
-                )
-            brain = {
-                "id": path.name[:-7],
-                "week": week,
-                "subject": f"{name}-{persistence}",
-                "population": "synthetic",
-            }
-            brains.append(brain | {"labels": str(path), "scheme": scheme})
-    starts = [f"{name}-kept-{start}" for name in arguments.individuals]
-    accepted, chain = arguments.accept_licence, [f"{atlas}-{week}" for week in growing]
-    config = {
-        "atlas": {
-            "name": atlas,
-            "folder": str(files),
-            "weeks": growing,
-            "accept_licence": accepted,
-        },
-        "brains": brains,
-        "growth": {"brains": {"atlas": chain}},
-        "start": starts,
-        "mesh": MESH_SETTINGS,
-        "folding": {
-            "preset": "expected",
-            "end_week": weeks[-1],
-            "output_every_gw": 4,
-            "ranks": 1,
-        },
-        "runs": {"expected": {}},
-    }
-    made = [
-        PIAL["whole"].format(brain=brain)
-        for brain in [*chain, *(brain["id"] for brain in brains)]
-    ]
-    made += [MESH["mesh"].format(brain=brain) for brain in starts]
-    pairs = [*((brain, chain[0]) for brain in starts), *pairwise(chain)]
-    made += [
-        REGISTERED.format(earlier=earlier, later=later) for earlier, later in pairs
-    ]
-    run_workflow(folder, config, arguments.cores, *made)
+def left_faces_of(start: Start, delivered: TriangleMesh, week: float) -> Mask:
+    """Return the (m,) mask of the left faces of the surface that is delivered at a
+    week: the atlas' own one, moved, or the mesh's, where that would cross itself."""
+    stated = start.stated_week(week)
+    whole, left, right = surfaces_of(start, stated)
+    if len(whole.faces) != len(delivered.faces):
+        body = start.carried[start.path.shapes.weeks.index(stated)]
+        whole = start.boundary(body)
+    return nearer_left(whole, left, right)
+
+
+def print_table(title: str, table: pd.DataFrame) -> None:
+    """Print a table below its title."""
+    print(title)
+    print(table.to_string(float_format="%.3f"))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", type=Path)
-    parser.add_argument(
-        "--atlas",
-        nargs=2,
-        action="append",
-        required=True,
-        metavar=("NAME", "FILES"),
-        help="atlas with a normative series",
-    )
-    parser.add_argument(
-        "--accept-licence",
-        action="store_true",
-        help="accept the licences of the atlases",
-    )
+    parser.add_argument("pairs", type=Path)
     parser.add_argument(
         "--individuals", nargs="+", metavar="KIND-SIZE-SEED", default=INDIVIDUALS
     )
-    parser.add_argument(
-        "--weeks",
-        type=int,
-        nargs="+",
-        default=[22, 26, 30],
-        help="week of the start brains, and later weeks",
-    )
-    parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--weeks", type=float, nargs="+", default=[26.0, 30.0])
+    parser.add_argument("--match-error", type=float, default=0.3, metavar="MM")
     arguments = parser.parse_args()
-    weeks, rows = sorted(arguments.weeks), []
-    for atlas, files in arguments.atlas:
-        folder = arguments.folder.resolve() / atlas
-        run_study(folder, atlas, Path(files).resolve(), arguments)
-        score = partial(scores_of, folder, atlas=atlas, weeks=weeks)
-        with ProcessPoolExecutor(arguments.cores) as pool:
-            rows += [
-                row for found in pool.map(score, arguments.individuals) for row in found
-            ]
+    # remeshing loads PETSc without initialising it
+    petsc4py.init()
+    rows = []
+    pairs = pd.read_csv(arguments.pairs).drop_duplicates(["study", "start"])
+    for _, pair in pairs.iterrows():
+        start = read_start(pair)
+        for name in arguments.individuals:
+            individual = Individual(name, start)
+            for row in rows_of(individual, arguments.weeks, arguments.match_error):
+                print(row, flush=True)
+                rows.append(row)
     table = pd.DataFrame(rows)
-    means = table.groupby(["persistence", "horizon", "model"])
-    columns = ["distance_mm", "r_shape_index"]
-    print(means[columns].mean().to_string(float_format="%.3f"))
-    delivered = table[table["model"] == "delivered"]
-    errors = delivered.filter(like="_difference").abs()
-    by_horizon = errors.groupby([delivered["persistence"], delivered["horizon"]])
-    squares = (errors**2).groupby([delivered["persistence"], delivered["horizon"]])
-    print("largest")
-    print(by_horizon.max().to_string(float_format="%.3f"))
-    print("root mean square")
-    print(np.sqrt(squares.mean()).to_string(float_format="%.3f"))
+    size = table["individual"].str.split("-").str[1].rename("size_mm")
+    scores = table[["distance_mm", "r_shape_index"]]
+    by_model = [size, table["persistence"], table["horizon"], table["model"]]
+    print_table("mean", scores.groupby(by_model).mean())
+    delivered = table["model"] == "delivered"
+    errors = table[delivered].filter(like="_difference").abs()
+    by_horizon = [table["persistence"][delivered], table["horizon"][delivered]]
+    print_table("largest", errors.groupby(by_horizon).max())
+    mean_squares = (errors**2).groupby(by_horizon).mean()
+    print_table("root mean square", mean_squares**0.5)
     print_rows(rows)
 
 

@@ -1,7 +1,7 @@
 """Estimate how much of an individual difference lasts, from brains with a later scan,
 and compare predictions that keep it with simpler ones.
 
-    ./run python benchmarks/persistence.py PAIRS.csv [--scores] [--synthetic ...]
+    ./run python benchmarks/persistence.py PAIRS.csv [--scores]
 
 PAIRS.csv has a row for each later scan of a brain:
 
@@ -25,11 +25,7 @@ followed fetuses give LASTING, a share with a uniform prior. Without any, it sta
 with all of the smooth difference (`whole`), the atlas' own brain
 with its volume (`atlas`) and the surface that is delivered (`delivered`), all before a
 body follows the shape.
-
-`--synthetic KIND-SIZE-SEED ...` scores individuals as in benchmarks/individuals.py
-instead, of which the study's mesh, placed in the atlas, and the atlas' surfaces are
-deformed. The match to the atlas has an error: a random map with waves of 15 to 25 mm
-and a root mean square of `--match-error` mm. The last line is one JSON object.
+The last line is one JSON object.
 """
 
 import argparse
@@ -44,7 +40,6 @@ import numpy as np
 import pandas as pd
 import petsc4py
 from common import print_rows, r_shape_index
-from individuals import FLOW_STEPS, KEPT_GW, velocity
 
 from gyriflow.compare.comparison import aligned_distances
 from gyriflow.compare.placement import number_patches
@@ -86,7 +81,6 @@ ERRORS_MM = np.arange(0.0, 1.01, 0.01)
 SHARES = np.linspace(0.0, 1.0, 101)
 FETUSES_SD = 0.2
 """Spread between fetuses of what is left of a difference."""
-SYNTHETIC_WEEKS = (26.0, 30.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,11 +135,16 @@ class Start:
         if finer_share(expected.kept, self.week, week) > MIN_OWN_SHARE:
             own = self.boundary(self.mesh.vertices).vertices
             return moved_surface(ObservedSurface(self.surface, own), shape)
-        weeks = self.ages.weeks.tolist()
-        stated = weeks[nearest_in_age(self.ages.table(), weeks, week)]
+        stated = self.stated_week(week)
         places = self.boundary(self.carried[self.path.shapes.weeks.index(stated)])
         observed = ObservedSurface(self.atlas_surface(stated), places.vertices)
         return moved_surface(observed, shape)
+
+    def stated_week(self, week: float) -> float:
+        """Return the stated week of the atlas' brain with the age by size nearest to a
+        week."""
+        weeks = self.ages.weeks.tolist()
+        return float(weeks[nearest_in_age(self.ages.table(), weeks, week)])
 
 
 def read_start(row: pd.Series) -> Start:
@@ -268,69 +267,6 @@ def scores_of(
     }
 
 
-def flow(points: Floats, parts: list[tuple[float, str, int]]) -> Floats:
-    """Move (n, 3) points in mm by a one-to-one random map: sizes, kinds and seeds."""
-    for _ in range(FLOW_STEPS):
-        step = np.zeros_like(points)
-        for size_mm, kind, seed in parts:
-            step += size_mm / FLOW_STEPS * velocity(kind, seed, points)
-        points = points + step
-    return points
-
-
-def synthetic_rows(
-    start: Start, name: str, weeks: list[float], match_error_mm: float
-) -> Iterator[dict[str, Any]]:
-    """Yield the scores of a synthetic individual of the atlas, whose difference is kept
-    or fading."""
-    kind, size, seed = name.split("-")
-    weeks_of_path = np.asarray(start.path.shapes.weeks)
-    near = int(np.argmin(np.abs(weeks_of_path - start.week)))
-    body = start.carried[near]
-    centre = body.mean(axis=0)
-    lengths = body.std(axis=0)
-
-    def factor(kind: str, seed: int, size_mm: float) -> float:
-        field = velocity(kind, seed, body[::20] - centre)
-        return size_mm / np.sqrt((field**2).sum(axis=1).mean())
-
-    def individual(points: Floats, shape: Floats, share: float) -> Floats:
-        """Return points of the atlas in the individual, in units of the start."""
-        parts = [(share * factor(kind, int(seed), float(size)), kind, int(seed))]
-        other = int(seed) + 1000
-        rest = np.sqrt(1 - share**2) * factor(kind, other, float(size))
-        parts.append((rest, kind, other))
-        ratio = shape.std(axis=0) / lengths
-        relative = (points - shape.mean(axis=0)) / ratio
-        return flow(relative, parts) * ratio
-
-    error = factor("sulci", 77, match_error_mm) * velocity("sulci", 77, body - centre)
-    tets = start.mesh.tets
-    inside = start.path.carry(body + error, start.path.shapes.weeks[near])
-    mesh = TetrahedralMesh(individual(body, body, 1.0), tets)
-    made = Start(
-        study=start.study,
-        name=name,
-        week=float(start.path.shapes.weeks[near]),
-        first=start.first,
-        mesh=mesh,
-        path=start.path,
-        carried=inside,
-        surface=start.surface,
-    )
-    for week, models in zip(weeks, models_of(made, weeks), strict=True):
-        shape = start.carried[start.path.shapes.weeks.index(week)]
-        atlas = start.atlas_surface(week)
-        for persistence, time in KEPT_GW.items():
-            share = float(np.exp((made.week - week) / time))
-            places = individual(atlas.vertices, shape, share)
-            observed = TriangleMesh(places, atlas.faces)
-            folds = prepare_for_comparison(observed, observed)
-            row = {"individual": name, "persistence": persistence, "week": week}
-            for model in ("whole", "atlas", "delivered"):
-                yield row | {"model": model} | scores_of(models[model], observed, folds)
-
-
 def match_error(rows: pd.DataFrame) -> float:
     """Return the MATCH_ERROR_MM with the smallest squared error of the weighted smooth
     differences of pairs."""
@@ -392,8 +328,6 @@ def main() -> None:
     )
     parser.add_argument("pairs", type=Path)
     parser.add_argument("--scores", action="store_true", help="compare surfaces")
-    parser.add_argument("--synthetic", nargs="+", metavar="KIND-SIZE-SEED")
-    parser.add_argument("--match-error", type=float, default=0.3, metavar="MM")
     arguments = parser.parse_args()
     # remeshing loads PETSc without initialising it
     petsc4py.init()
@@ -402,15 +336,6 @@ def main() -> None:
     left = []
     for _, group in pairs.groupby(["study", "start"], sort=False):
         start = read_start(group.iloc[0])
-        if arguments.synthetic:
-            error_mm = arguments.match_error
-            for name in arguments.synthetic:
-                for scores in synthetic_rows(
-                    start, name, list(SYNTHETIC_WEEKS), error_mm
-                ):
-                    rows.append(scores)
-                    print(scores, flush=True)
-            continue
         scans = group.to_dict("records")
         weeks = [float(scan["week"]) for scan in scans]
         for scan, parts in zip(scans, parts_of(start, weeks), strict=True):
