@@ -11,8 +11,9 @@ deformed by a random smooth map: `shape` has waves of 40 to 60 mm and `sulci` of
 follows the centre of the brain and its lengths along three axes over the weeks, so the
 individual difference is `kept`; or it is `fading` as e^(-weeks/8), and another one of
 the same size replaces it. The deformed mesh is the start brain; the deformed surfaces
-of the atlas are its later scans. The match to the atlas has an error: a random map with
-waves of 15 to 25 mm and a root mean square of `--match-error` mm.
+of the atlas at `--weeks` are its later scans, which are predicted at their ages by
+size. The match to the atlas has an error: a random map with waves of 15 to 25 mm and a
+root mean square of `--match-error` mm.
 
 Models are those of benchmarks/persistence.py without the scaled start: the atlas' own
 brain, the predicted shape with all of the smooth difference (`whole`) and the surface
@@ -176,36 +177,40 @@ def rows_of(
     individual: Individual, weeks: list[float], match_error_mm: float
 ) -> Iterator[dict[str, Any]]:
     """Yield the scores of an individual, whose difference is kept or fading."""
-    start = individual.start(match_error_mm)
-    for week, models in zip(weeks, models_of(start, weeks), strict=True):
-        labels: dict[str, Any] = {
-            "grown_by": start.first,
-            "individual": individual.name,
-        }
-        labels["horizon"] = week - start.week
-        delivered = models["delivered"]
-        sides = cut_sides(delivered, left_faces_of(start, delivered, week))
+    ages = individual.atlas.ages.table().set_index("stated_week")["age_by_size"]
+    start = replace(individual.start(match_error_mm), week=float(ages[individual.week]))
+    predicted = [float(ages[week]) for week in weeks]
+    models = models_of(start, predicted, weeks)
+    for week, age, surfaces in zip(weeks, predicted, models, strict=True):
+        labels: dict[str, Any] = {"grown_by": start.first, "week": week}
+        labels |= {"individual": individual.name, "horizon": age - start.week}
+        delivered = surfaces["delivered"]
+        sides = cut_sides(delivered, left_faces_of(individual, start, delivered, week))
         found = metrics_of([delivered, *sides])
         for persistence, time in FADING_GW.items():
-            share = float(np.exp((start.week - week) / time))
+            share = float(np.exp((start.week - age) / time))
             observed = individual.surfaces(week, share)
             folds = prepare_for_comparison(observed[0], observed[0])
             errors = differences(found, metrics_of(observed))
             for model in MODELS:
                 row = labels | {"persistence": persistence, "model": model}
-                row |= scores_of(models[model], observed[0], folds)
+                row |= scores_of(surfaces[model], observed[0], folds)
                 yield row | errors if model == "delivered" else row
 
 
-def left_faces_of(start: Start, delivered: TriangleMesh, week: float) -> Mask:
+def left_faces_of(
+    individual: Individual, start: Start, delivered: TriangleMesh, week: float
+) -> Mask:
     """Return the (m,) mask of the left faces of the surface that is delivered at a
-    week: the atlas' own one, moved, or the mesh's, where that would cross itself."""
-    stated = start.stated_week(week)
-    whole, left, right = surfaces_of(start, stated)
-    if len(whole.faces) != len(delivered.faces):
-        body = start.carried[start.path.shapes.weeks.index(stated)]
-        whole = start.boundary(body)
-    return nearer_left(whole, left, right)
+    stated week: the atlas' or the start's own one, moved, or the mesh's, where these
+    would cross themselves."""
+    atlas = surfaces_of(start, week)
+    own = individual.surfaces(individual.week)
+    boundary = start.boundary(start.mesh.vertices)
+    for whole, left, right in (atlas, own, [boundary, *own[1:]]):
+        if np.array_equal(whole.faces, delivered.faces):
+            return nearer_left(whole, left, right)
+    raise ValueError("the delivered surface has the faces of no known one")
 
 
 def print_table(title: str, table: pd.DataFrame) -> None:
@@ -239,13 +244,13 @@ def main() -> None:
     table = pd.DataFrame(rows)
     size = table["individual"].str.split("-").str[1].rename("size_mm")
     scores = table[["distance_mm", "r_shape_index"]]
-    by_model = [size, table["persistence"], table["horizon"], table["model"]]
+    by_model = [size, table["persistence"], table["week"], table["model"]]
     print_table("mean", scores.groupby(by_model).mean())
     delivered = table["model"] == "delivered"
     errors = table[delivered].filter(like="_difference").abs()
-    by_horizon = [table["persistence"][delivered], table["horizon"][delivered]]
-    print_table("largest", errors.groupby(by_horizon).max())
-    mean_squares = (errors**2).groupby(by_horizon).mean()
+    by_week = [table["persistence"][delivered], table["week"][delivered]]
+    print_table("largest", errors.groupby(by_week).max())
+    mean_squares = (errors**2).groupby(by_week).mean()
     print_table("root mean square", mean_squares**0.5)
     print_rows(rows)
 

@@ -240,14 +240,17 @@ def difference_left(parts: Parts, observed: TriangleMesh) -> dict[str, Any]:
     return row
 
 
-def models_of(start: Start, weeks: list[float]) -> Iterator[dict[str, TriangleMesh]]:
-    """Yield for each week the surfaces that are compared."""
+def models_of(
+    start: Start, weeks: list[float], stated_weeks: list[float]
+) -> Iterator[dict[str, TriangleMesh]]:
+    """Yield for each week the surfaces that are compared, with the atlas' brain of the
+    stated week."""
     whole = start.predict(weeks, keep_all=True)
     kept = start.predict(weeks)
     first = start.boundary(start.mesh.vertices)
-    for number, week in enumerate(weeks, 1):
+    for number, stated_week in enumerate(stated_weeks, 1):
         shape = start.boundary(whole.positions[number])
-        atlas = start.atlas_surface(week)
+        atlas = start.atlas_surface(stated_week)
         yield {
             "scaled": scale_to_volume(first, shape),
             "whole": shape,
@@ -344,7 +347,7 @@ def main() -> None:
             observed = read_surface(scan["observed"])
             left.append(labels | difference_left(parts, observed))
             print(left[-1], flush=True)
-        models = models_of(start, weeks) if arguments.scores else iter(())
+        models = models_of(start, weeks, weeks) if arguments.scores else iter(())
         for scan, surfaces in zip(scans, models, strict=False):
             observed = read_surface(scan["observed"])
             folds = prepare_for_comparison(observed, observed)

@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do
 not predict later folds."""
-FADING_GW = 4.0
+FADING_GW = 8.0
 """Time constant with which finer differences fade: of 1, 4 and 16 weeks the best for
 synthetic individuals (docs/science.md)."""
 MATCH_ERROR_MM = 0.5

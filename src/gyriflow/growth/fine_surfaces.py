@@ -24,7 +24,7 @@ SPREADS_MM = (1.0, 2.0, 4.0, 8.0)
 """Widths (SD) of the mean of displacements; the first without crossing faces counts."""
 N_NEIGHBOURS = 100
 """Vertices of the mesh whose displacements are averaged at most."""
-MIN_OWN_SHARE = 0.5
+MIN_OWN_SHARE = 0.6
 """Share of the finer individual differences that a prediction keeps, above which its
 surface is the start brain's own."""
 
