@@ -44,8 +44,9 @@ DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do
 not predict later folds."""
 FADING_GW = 8.0
-"""Time constant with which finer differences fade: of 1, 4 and 16 weeks the best for
-synthetic individuals (docs/science.md)."""
+"""Time constant with which finer differences fade. With 8 weeks synthetic individuals
+whose differences last lose little, and those whose differences fade nothing
+(docs/science.md)."""
 MATCH_ERROR_MM = 0.5
 """Root mean square of the individual difference that is no individual's: the
 error of the match to the atlas, and of the atlas as an average. From pairs of averages
