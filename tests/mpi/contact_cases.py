@@ -1,6 +1,7 @@
 """Contact of the surface with itself: forces, pressed blocks, and large steps that
 cross nothing."""
 
+import ipctk
 import numpy as np
 import pytest
 from boxes import COMM, gathered, smooth_displacement, solved
@@ -11,6 +12,7 @@ from contact_bodies import (
     approach,
     in_a_tube,
     problem_with_contact,
+    slab_with_a_sulcus,
     stress_at,
     two_blocks,
 )
@@ -132,3 +134,32 @@ def test_no_pair_is_missed_where_the_distance_has_grown():
     assert contact.forces(problem.rest()) == pytest.approx(
         wider.forces(problem.rest()), rel=1e-12
     )
+
+
+@pytest.mark.slow
+def test_large_random_steps_of_a_groove_cross_nothing():
+    # unlike balls, the walls of a groove face each other, and a step that is not cut
+    # does cross them
+    mesh = slab_with_a_sulcus()
+    facets, _ = boundary_faces(mesh)
+    domain = Domain(COMM, mesh)
+    displacement = np.zeros((len(domain.vertex_of_node), 3))
+    contact = SelfContact(domain, facets, 1000.0, 0.1)
+    used = np.unique(facets)
+    number = np.searchsorted(used, facets).astype(np.int32)
+    surface = ipctk.CollisionMesh(mesh.vertices[used], ipctk.edges(number), number)
+    random, cut, would_cross = np.random.default_rng(6), 0, 0
+    for _ in range(600 // COMM.size**2):
+        direction = random.normal(0.0, 0.05, mesh.vertices.shape) * M_PER_MM
+        direction[:, 0] -= np.sign(mesh.vertices[:, 0]) * 0.3 * M_PER_MM
+        length = contact.max_step(displacement, domain.local(direction))
+        now = mesh.vertices + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
+        whole = now + direction * MM_PER_M
+        would_cross += ipctk.has_intersections(surface, np.asfortranarray(whole[used]))
+        cut += length < 1
+        displacement = displacement + length * domain.local(direction)
+        place = mesh.vertices + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
+        assert not ipctk.has_intersections(surface, np.asfortranarray(place[used]))
+        if contact.smallest_distance_mm(displacement) < 1e-3:
+            displacement = np.zeros_like(displacement)
+    assert min(cut, would_cross) > 10

@@ -50,6 +50,19 @@ def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
     assert (COMM.bcast(state.positions) == state.positions).all()
 
 
+@pytest.mark.slow
+@pytest.mark.one_rank
+def test_a_resumed_run_in_contact_equals_one_without_interruption():
+    tight = {"newton_tolerance": 1e-11}
+    folding, state = closing_sulcus("global", **tight)
+    middle = after_steps(folding, state, 9)
+    assert middle.rows[-1]["contact_pairs"] > 0
+    ended = after_steps(folding, middle, 2)
+    anew = after_steps(closing_sulcus("global", **tight)[0], middle, 2)
+    moved = np.abs(ended.positions - middle.positions).max()
+    assert np.abs(anew.positions - ended.positions).max() <= 1e-8 * moved
+
+
 def free_blocks(gap, **changes):
     """Return what folds two free blocks whose meshes match across a gap, and the state
     at the start."""
