@@ -41,8 +41,8 @@ from .series_shapes import (
 
 log = logging.getLogger(__name__)
 DIFFERENCE_SMOOTHING_MM = 8.0
-"""Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do
-not predict later folds."""
+"""Smoothing (SD, mm) of the individual difference. Finer differences fade by FADING_GW
+too."""
 FADING_GW = 8.0
 """Time constant with which finer differences fade. With 8 weeks synthetic individuals
 whose differences last lose little, and those whose differences fade nothing

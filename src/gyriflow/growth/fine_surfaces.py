@@ -2,7 +2,7 @@
 
 A mesh is coarser than the surfaces on which brains are measured. So an observed
 surface is moved by the body's map: that of the atlas' brain of the week, or the start
-brain's own as long as most of its finer differences are kept.
+brain's own as long as more than MIN_OWN_SHARE of its finer differences is kept.
 """
 
 import logging
