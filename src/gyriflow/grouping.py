@@ -11,16 +11,16 @@ one kind differ."""
 
 
 class Kinds:
-    """Messages that come one after another, by kind: of each only the first ones are
-    shown."""
+    """Messages that come one after another, the distinct `messages` by kind: of each
+    kind only the first ones are shown."""
 
     def __init__(self) -> None:
-        self._messages: dict[str, list[str]] = {}
+        self.messages: dict[str, list[str]] = {}
 
     def add(self, name: str, message: str) -> bool:
         """Add a message, and return whether to show it; `name` is that of its scan or
         job, or ""."""
-        alike = self._messages.setdefault(_kind_of(name, message), [])
+        alike = self.messages.setdefault(_kind_of(name, message), [])
         if message in alike:
             return False
         alike.append(message)
@@ -28,7 +28,7 @@ class Kinds:
 
     def others(self) -> list[str]:
         """Return a line about the messages of each kind that were not shown."""
-        hidden = [alike for alike in self._messages.values() if len(alike) > N_SHOWN]
+        hidden = [alike for alike in self.messages.values() if len(alike) > N_SHOWN]
         return [
             f"… and {len(alike) - N_SHOWN} more like: {alike[0]}" for alike in hidden
         ]
@@ -37,13 +37,11 @@ class Kinds:
 def grouped(messages: Iterable[tuple[str, str]]) -> list[tuple[str, int]]:
     """Return the lines that stand for messages, those of a kind together, and for how
     many each stands. A message has the name of its scan or ""."""
-    kinds: dict[str, list[str]] = {}
+    kinds = Kinds()
     for name, message in messages:
-        alike = kinds.setdefault(_kind_of(name, message), [])
-        if message not in alike:
-            alike.append(message)
+        kinds.add(name, message)
     lines = []
-    for alike in kinds.values():
+    for alike in kinds.messages.values():
         lines += [(message, 1) for message in alike[:N_SHOWN]]
         count = len(alike) - N_SHOWN
         if count > 0:

@@ -367,7 +367,7 @@ def shape_maps(grid: Grid) -> Figure:
 def brain_depth(halves: Halves, *, sides: Sequence[str]) -> Figure:
     """Draw the sulcal depth of a brain, at the scale and in the colours of all brains'
     pages; `sides` are those of its `halves`."""
-    grid = _bra_in_views(halves, sides)
+    grid = _views_of_brain(halves, sides)
     return _brain_grid(grid, "sulcal_depth_mm", limit=DEEP_MM, at_page_scale=True)
 
 
@@ -375,10 +375,12 @@ def brain_depth(halves: Halves, *, sides: Sequence[str]) -> Figure:
 def brain_maps(halves: Halves, *, sides: Sequence[str]) -> Figure:
     """Draw the shape index of a brain at the scale of all brains' pages; `sides` are
     those of its `halves`."""
-    return _brain_grid(_bra_in_views(halves, sides), "shape_index", at_page_scale=True)
+    return _brain_grid(
+        _views_of_brain(halves, sides), "shape_index", at_page_scale=True
+    )
 
 
-def _bra_in_views(halves: Halves, sides: Sequence[str]) -> list[GridBrain]:
+def _views_of_brain(halves: Halves, sides: Sequence[str]) -> list[GridBrain]:
     """Return a brain from outside, from above, and the inner face of each
     hemisphere."""
     grid = []

@@ -196,13 +196,13 @@ def atlas_problems(used: UsedAtlas) -> Problems:
             ("accept_licence",),
         )
     available = set.union(*map(used._known_weeks, used._series))
-    un_known_weeks = set(settings.weeks or ()) - available
-    if un_known_weeks:
+    unknown_weeks = set(settings.weeks or ()) - available
+    if unknown_weeks:
         source = atlas.name
         if settings.series is not None:
             source += f" ({', '.join(used._series)})"
         yield KeyProblem(
-            f"{source} has no files of {_listed(un_known_weeks)} GW; it has"
+            f"{source} has no files of {_listed(unknown_weeks)} GW; it has"
             f" {_listed(available)} GW. Weeks are not rounded: write one of these",
             ("weeks",),
         )
