@@ -354,7 +354,8 @@ class NonlinearProblem:
 def _facet_tags(domain: Domain, zones: Zones) -> dolfinx.mesh.MeshTags:
     """Return the zones of the local boundary facets.
 
-    The four triangles of a quadratic element's face have one zone.
+    The four triangles of a quadratic element's face have one zone. ValueError where the
+    facets of the zones are not the boundary.
     """
     topology = domain.mesh.topology
     topology.create_entities(2)
@@ -368,7 +369,10 @@ def _facet_tags(domain: Domain, zones: Zones) -> dolfinx.mesh.MeshTags:
     local_faces = domain.mesh.geometry.input_global_indices[corners]
     local_keys = _face_numbers(local_faces, count)
     order = np.argsort(keys)
-    index = order[np.searchsorted(keys, local_keys, sorter=order)]
+    place = np.searchsorted(keys, local_keys, sorter=order)
+    index = order[place.clip(max=len(order) - 1)]
+    if (keys[index] != local_keys).any():
+        raise ValueError("the facets are not the boundary of the mesh")
     face_zone = zones.facet_zone[:: PIECES_OF_ORDER[domain.order]]
     tags = face_zone[index].astype(np.int32)
     return dolfinx.mesh.meshtags(domain.mesh, 2, local, tags)
