@@ -16,6 +16,18 @@ RUN = {
     "thickness_mm": 4.0,
     "contact": "planes",
 }
+FREE_BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
+FREE_RUN = {
+    "start_week": 21.0,
+    "end_week": 23.0,
+    "output_weeks": [21.0, 23.0],
+    "fissure_x_mm": 0.0,
+    "step_s": 86_400.0,
+    "support": "free",
+    "contact": "none",
+    "thickness_mm": 4.0,
+}
+"""A body around the origin, and its run without contact and support."""
 GAP_MM = 8.0
 """Width of its fissure."""
 

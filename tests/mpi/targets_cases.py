@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from boxes import COMM, box_with_a_bowed_side
 from contact_bodies import after_steps, in_a_tube, problem_with_contact, two_blocks
-from shapes import box_mesh, ellipsoid_mesh, rigid
+from ellipsoid import FREE_BODY, FREE_RUN
+from shapes import box_mesh, rigid
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.growth import GrowthInputs
@@ -28,37 +29,26 @@ from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
 
 DAY_S = 86_400.0
-BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
-RUN = {
-    "start_week": 21.0,
-    "end_week": 23.0,
-    "output_weeks": [21.0, 23.0],
-    "fissure_x_mm": 0.0,
-    "step_s": DAY_S,
-    "support": "free",
-    "contact": "none",
-    "thickness_mm": 4.0,
-}
 
 
 def bent(week):
     """Return the target of the body's vertices after some weeks: larger, and bent
     smoothly."""
-    x, y, z = BODY.vertices.T
+    x, y, z = FREE_BODY.vertices.T
     wave = np.stack(
         [1.2 * np.sin(y / 12), 0.8 * np.cos(z / 10), 1.0 * np.sin(x / 14)], axis=1
     )
-    return 1.04**week * BODY.vertices + week * wave
+    return 1.04**week * FREE_BODY.vertices + week * wave
 
 
-def towards(targets, mesh=BODY, **changes):
+def towards(targets, mesh=FREE_BODY, **changes):
     """Return a free body with target shapes by week, and its state at the start."""
     uniform = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0}
     sizes = {"area_cm2": {21.0: 1.0, 23.0: 1.0}, "volume_ml": {21.0: 1.0, 23.0: 1.0}}
     names = {week: f"target_{week:05.2f}" for week in targets}
     growth = {"model": "shapes"} | sizes
     settings = uniform | {"growth": growth, "targets": names} | changes
-    parameters = parameters_from(RUN | settings)
+    parameters = parameters_from(FREE_RUN | settings)
     maps = {
         f"{names[week]}_{axis}": places
         for week, at in targets.items()
@@ -69,13 +59,13 @@ def towards(targets, mesh=BODY, **changes):
 
 
 def volume(vertices):
-    return cell_sizes(vertices, linear_pieces(BODY)).sum()
+    return cell_sizes(vertices, linear_pieces(FREE_BODY)).sum()
 
 
 def misfit(state, target):
     """Return the root mean square distance in mm to a target, without rigid motion."""
     now = state.positions * MM_PER_M
-    sizes = vertex_sizes(now, linear_pieces(BODY))
+    sizes = vertex_sizes(now, linear_pieces(FREE_BODY))
     left = without_rigid_motion(now, target, sizes)
     return float(np.sqrt(np.average((left**2).sum(axis=1), weights=sizes)))
 
@@ -96,7 +86,7 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
 
     # the sum of growth is that of the target: 4 % in each direction, and the bend
     ratios = np.linalg.det(first.growth)
-    assert ratios @ cell_sizes(BODY.vertices, BODY.tets) == pytest.approx(
+    assert ratios @ cell_sizes(FREE_BODY.vertices, FREE_BODY.tets) == pytest.approx(
         volume(targets[22.0]), rel=1e-3
     )
     assert first.growth_s == 7 * DAY_S
@@ -214,8 +204,8 @@ def test_a_displacement_that_is_far_too_long_for_contact_is_shortened():
 def following(growth):
     """Return a free ellipsoid that is to grow by (area, volume) per week as logarithms,
     and the state before."""
-    mesh = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
-    zones = zones_of_run(mesh, parameters_from(RUN))
+    mesh = FREE_BODY
+    zones = zones_of_run(mesh, parameters_from(FREE_RUN))
     start = GrowthInputs(mesh, zones, {}).size(mesh.vertices)
     sizes = {
         "area_cm2": start.area_mm2 * CM2_PER_MM2,
@@ -225,7 +215,7 @@ def following(growth):
         name: {21.0: size, 23.0: size * math.exp(2 * rate)}
         for (name, size), rate in zip(sizes.items(), growth, strict=True)
     }
-    parameters = parameters_from(RUN | {"growth": {"model": "sizes", **curves}})
+    parameters = parameters_from(FREE_RUN | {"growth": {"model": "sizes", **curves}})
     folding = Folding(COMM, mesh, zones, parameters)
     return folding, State.at_start(mesh.vertices * M_PER_MM, DAY_S)
 

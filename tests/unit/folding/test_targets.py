@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ellipsoid import FREE_BODY, FREE_RUN
 from facts import Facts
-from shapes import ellipsoid_mesh
 from verification_cases.growth_maps import WavyBox, errors_of_map
 
 from gyriflow.errors import InputError
@@ -28,16 +28,7 @@ from gyriflow.geometry.paths import path_through
 from gyriflow.settings.folding import parameters_from
 
 DAY_S, DAY_GW = 86_400.0, 1 / 7
-BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
-RUN = {
-    "start_week": 21.0,
-    "end_week": 23.0,
-    "output_weeks": [21.0, 23.0],
-    "fissure_x_mm": 0.0,
-    "step_s": DAY_S,
-    "support": "free",
-    "contact": "none",
-    "thickness_mm": 4.0,
+RUN = FREE_RUN | {
     "growth": {
         "model": "shapes",
         "area_cm2": {21.0: 1.0, 23.0: 1.0},
@@ -79,9 +70,9 @@ def remaining_share(before, after):
 
 @pytest.mark.parametrize("steps", [1, 3])
 def test_feedback_makes_up_for_a_misfit_with_its_time_constant(steps):
-    x, y, z = BODY.vertices.T
+    x, y, z = FREE_BODY.vertices.T
     waves = 0.4 * np.stack([np.sin(y / 8), np.cos(z / 8), np.sin(x / 8)], axis=1)
-    misfits = misfits_after_steps(BODY, waves, steps)
+    misfits = misfits_after_steps(FREE_BODY, waves, steps)
     assert np.sqrt((misfits[0] ** 2).sum(axis=1)).max() > 0.3
     expected = np.exp(-steps * DAY_GW / FEEDBACK_GW)
     assert remaining_share(misfits[0], misfits[-1]) == pytest.approx(expected, abs=0.01)
@@ -145,13 +136,13 @@ def test_a_run_off_its_path_tells_how_far_and_how_many_elements_were_held_in_any
 
 
 def test_shapes_of_a_run_are_those_after_its_start_and_reach_to_its_end():
-    x, y, z = 1.1 * BODY.vertices.T
+    x, y, z = 1.1 * FREE_BODY.vertices.T
     shape = {"target_x": x, "target_y": y, "target_z": z}
     p = parameters_from(RUN | {"targets": {21.0: "earlier", 23.0: "target"}})
-    inputs = GrowthInputs(BODY, zones_of_run(BODY, p), shape)
+    inputs = GrowthInputs(FREE_BODY, zones_of_run(FREE_BODY, p), shape)
     path = path_of_run(p, inputs)
     assert list(path.weeks) == [21.0, 23.0]
-    assert path(23.0) == pytest.approx(1.1 * BODY.vertices, abs=1e-6)
+    assert path(23.0) == pytest.approx(1.1 * FREE_BODY.vertices, abs=1e-6)
     short = parameters_from(RUN | {"targets": {22.9: "target"}})
     with pytest.raises(InputError, check=Facts("22.9 GW", "23 GW")):
         path_of_run(short, inputs)
