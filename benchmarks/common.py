@@ -8,8 +8,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from gyriflow.compare.accuracy import log_value
 from gyriflow.compare.placement import correlation, interpolate_measures
 from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison
 from gyriflow.errors import GyriflowError
@@ -67,6 +69,13 @@ def r_shape_index(
     """
     values, _ = interpolate_measures(prepare_for_comparison(surface, observed), folds)
     return correlation(folds.shape_index, values["shape_index"], folds.areas)
+
+
+def relative_difference(metric: str, found: float, observed: float) -> float:
+    """Return the difference of a metric from an observed brain's as a fraction of it;
+    that of the gyrification index is of the folding."""
+    difference = log_value(metric, found) - log_value(metric, observed)
+    return float(np.expm1(difference))
 
 
 def print_rows(rows: list[dict[str, Any]], **more: Any) -> None:

@@ -29,11 +29,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
-from common import run_workflow
+from common import relative_difference, run_workflow
 
-from gyriflow.compare.accuracy import DEFAULT_PROTOCOL, log_value
+from gyriflow.compare.accuracy import DEFAULT_PROTOCOL
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.settings.terms import SIDES
@@ -188,14 +187,11 @@ def folding_differences(
         table[table["hemisphere"] == "whole"].set_index("metric")["value"]
         for table in tables
     )
-    logs = {
-        metric: log_value(metric, found[metric]) - log_value(metric, real[metric])
-        for metric in FOLDING
-    }
-    return {
-        name: round(float(np.expm1(logs[metric])), 4)
-        for metric, name in FOLDING.items()
-    }
+    differences = {}
+    for metric, name in FOLDING.items():
+        difference = relative_difference(metric, found[metric], real[metric])
+        differences[name] = round(difference, 4)
+    return differences
 
 
 def main() -> None:

@@ -34,18 +34,16 @@ import dolfinx_solver  # noqa: F401
 import numpy as np
 import pandas as pd
 import petsc4py
-from common import print_rows
+from common import print_rows, relative_difference
 from persistence import Start, models_of, read_start, scores_of
 
 from gyriflow.anatomy.fissure import cut_sides, nearer_left
-from gyriflow.compare.accuracy import FOLDING, QUANTITIES, log_value
+from gyriflow.compare.accuracy import FOLDING, QUANTITIES
 from gyriflow.compare.shapes import prepare_for_comparison
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
-from gyriflow.geometry.triangles import Floats, Mask, TriangleMesh
-from gyriflow.io.surfaces import read_surface
+from gyriflow.geometry.triangles import Floats, Mask, TriangleMesh, rms_length
 from gyriflow.metrics.measure import folding_metrics, measure_folds, size_metrics
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM, SIDES
-from gyriflow.study.paths import PIAL
 
 WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
 N_WAVES, FLOW_STEPS = 40, 8
@@ -103,7 +101,7 @@ class Individual:
         replacing = np.sqrt(1 - share**2)
         steps = []
         for part, number in ((share, int(seed)), (replacing, int(seed) + REPLACED)):
-            unit_mm = root_mean_square(velocity(kind, number, centred))
+            unit_mm = rms_length(velocity(kind, number, centred))
             steps.append((part * float(size_mm) / unit_mm / FLOW_STEPS, number))
         ratio = shape.std(axis=0) / first.std(axis=0)
         centre = shape.mean(axis=0)
@@ -129,7 +127,7 @@ class Individual:
         """Return the individual as a start brain, placed in the atlas with an error."""
         body = self.body(self.week)
         error = velocity("sulci", MATCH_SEED, body - body.mean(axis=0))
-        matched = body + match_error_mm / root_mean_square(error) * error
+        matched = body + match_error_mm / rms_length(error) * error
         deformed = self.moved(body, self.week, share=1.0)
         return replace(
             self.atlas,
@@ -141,16 +139,9 @@ class Individual:
         )
 
 
-def root_mean_square(vectors: Floats) -> float:
-    """Return the root mean square length of (n, 3) vectors."""
-    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
-
-
 def surfaces_of(start: Start, week: float) -> list[TriangleMesh]:
     """Return the surfaces of the atlas' brain of a stated week: whole, left, right."""
-    brain = f"{start.first.rsplit('-', 1)[0]}-{week:g}"
-    files = [PIAL[part].format(brain=brain) for part in ("whole", *SIDES)]
-    return [read_surface(start.study / file) for file in files]
+    return [start.atlas_surface(week, part) for part in ("whole", *SIDES)]
 
 
 def metrics_of(surfaces: list[TriangleMesh]) -> dict[str, float]:
@@ -163,13 +154,12 @@ def metrics_of(surfaces: list[TriangleMesh]) -> dict[str, float]:
 def differences(
     found: dict[str, float], observed: dict[str, float]
 ) -> dict[str, float]:
-    """Return the differences of metrics from the observed brain's, as fractions; that
-    of the gyrification index is of the folding."""
+    """Return the differences of metrics from the observed brain's, as fractions."""
     result = {}
     for metric in QUANTITIES:
         name = "folding" if metric == FOLDING else metric
-        error = log_value(metric, found[metric]) - log_value(metric, observed[metric])
-        result[f"{name}_difference"] = float(np.expm1(error))
+        difference = relative_difference(metric, found[metric], observed[metric])
+        result[f"{name}_difference"] = difference
     return result
 
 

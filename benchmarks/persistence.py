@@ -123,10 +123,10 @@ class Start:
         surface, used = boundary_surface(self.mesh)
         return TriangleMesh(positions[used], surface.faces)
 
-    def atlas_surface(self, week: float) -> TriangleMesh:
-        """Return the surface of the atlas' brain of a stated week."""
+    def atlas_surface(self, week: float, part: str = "whole") -> TriangleMesh:
+        """Return a surface of the atlas' brain of a stated week."""
         name = f"{self.first.rsplit('-', 1)[0]}-{week:g}"
-        return read_surface(self.study / PIAL["whole"].format(brain=name))
+        return read_surface(self.study / PIAL[part].format(brain=name))
 
     def delivered(self, expected: Expectation, number: int) -> TriangleMesh:
         """Return the surface that is delivered at one of the predicted weeks."""
