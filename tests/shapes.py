@@ -245,6 +245,27 @@ def box_mesh(
     )
 
 
+def joined(*parts) -> TetrahedralMesh:
+    """Return one mesh of some, each with a shift in mm."""
+    vertices = [mesh.vertices + shift for mesh, shift in parts]
+    first = np.cumsum([0, *map(len, vertices)])
+    tets = [mesh.tets + number for (mesh, _), number in zip(parts, first, strict=False)]
+    return TetrahedralMesh(np.concatenate(vertices), np.concatenate(tets))
+
+
+def waves_on(
+    mesh: TetrahedralMesh, semi_axes, height_mm: float, length_mm: float
+) -> np.ndarray:
+    """Return how far (n, 3) vertices of an ellipsoid move by waves along y, which fade
+    inside."""
+    radius = np.linalg.norm(mesh.vertices / np.array(semi_axes), axis=1, keepdims=True)
+    length = np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
+    outward = mesh.vertices / np.maximum(length, 1e-6)
+    shell = np.exp(-(((1 - radius) / 0.25) ** 2))
+    wave = np.cos(2 * np.pi * mesh.vertices[:, 1:2] / length_mm)
+    return height_mm * wave * shell * outward
+
+
 def ellipsoid_mesh(
     cells: int, semi_axes: tuple[float, float, float], centre=(0.0, 0.0, 0.0)
 ) -> TetrahedralMesh:

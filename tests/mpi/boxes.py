@@ -23,20 +23,21 @@ MATERIAL = NeoHookean(poisson_ratio=0.45)
 def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
     """Return a box in mm whose inner vertices are moved at random (seeded): no symmetry
     helps."""
-    mesh = box_mesh(cells, size)
-    inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
-    vertices = mesh.vertices.copy()
-    vertices[inner] += np.random.default_rng(3).uniform(-by, by, (len(inner), 3))
-    return type(mesh)(vertices, mesh.tets)
+    return shaken(box_mesh(cells, size), by, seed=3)
 
 
 def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
     """Return a box in mm of quadratic elements, whose inner nodes are moved at random
     (seeded): sides are curved."""
-    mesh = quadratic(distorted_box(cells, size))
+    return shaken(quadratic(distorted_box(cells, size)), by, seed=5)
+
+
+def shaken(mesh, by, seed):
+    """Return a mesh whose inner vertices are moved at random by up to some mm."""
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
     vertices = mesh.vertices.copy()
-    vertices[inner] += np.random.default_rng(5).uniform(-by, by, (len(inner), 3))
+    random = np.random.default_rng(seed)
+    vertices[inner] += random.uniform(-by, by, (len(inner), 3))
     return TetrahedralMesh(vertices, mesh.tets)
 
 
@@ -85,15 +86,13 @@ class EvenGrowth(StepGrowth):
 
     def inverse(self, tissue):
         elements = tissue.elements
-        return np.tile(
-            np.eye(3) / (1 + self.by),
-            (len(elements.cells), len(elements.points.weights), 1, 1),
-        )
+        points = len(elements.cells), len(elements.points.weights)
+        return np.tile(np.eye(3) / (1 + self.by), (*points, 1, 1))
 
 
-def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, comm=COMM):
+def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, comm=COMM, stretch=None):
     """Return a problem with layers that are uniform, or nodal functions of the position
-    in m."""
+    in m, and an old stretch everywhere."""
     domain = Domain(comm, mesh)
     problem = NonlinearProblem(domain, zones, MATERIAL, has_planes=True)
     x = domain.local(domain.positions)
@@ -101,8 +100,10 @@ def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, comm=COMM):
     def nodal(value):
         return value(x) if callable(value) else np.full(len(x), value)
 
-    up = np.tile([0.0, 0.0, 1.0], (len(domain.cells), 1))
-    set_layers(problem, nodal(mu), nodal(dg), nodal(dr), up)
+    cells = len(domain.cells)
+    V = None if stretch is None else np.tile(stretch, (cells, 1, 1, 1))
+    up = np.tile([0.0, 0.0, 1.0], (cells, 1))
+    set_layers(problem, nodal(mu), nodal(dg), nodal(dr), up, V)
     return problem
 
 
@@ -118,15 +119,9 @@ def solved(problem, **settings):
 def smooth_displacement(domain, size=1e-3):
     """Return a smooth displacement of the local nodes in m that does not depend on the
     ranks."""
-    x = domain.local(domain.positions) * 1e3
-    return size * np.stack(
-        [
-            np.sin(0.3 * x[:, 1] + 0.1),
-            np.cos(0.25 * x[:, 2]) - 0.4 * x[:, 0] / 8,
-            np.sin(0.2 * x[:, 0] * x[:, 1] / 4),
-        ],
-        axis=1,
-    )
+    x, y, z = domain.local(domain.positions).T * 1e3
+    across = np.sin(0.3 * y + 0.1), np.cos(0.25 * z) - 0.4 * x / 8
+    return size * np.column_stack([*across, np.sin(0.2 * x * y / 4)])
 
 
 def gathered(domain, u):
@@ -144,7 +139,6 @@ def box_with_a_bowed_side():
     positions = mesh.vertices.copy()
     along = np.diff(positions[sides[inner]], axis=0)[0]
     across = np.cross(along, [0.3, 0.5, 0.8])
-    positions[middles[inner]] += (
-        0.15 * np.linalg.norm(along) * across / np.linalg.norm(across)
-    )
+    length_mm = 0.15 * np.linalg.norm(along)
+    positions[middles[inner]] += length_mm * across / np.linalg.norm(across)
     return TetrahedralMesh(positions, mesh.tets), middles[inner]

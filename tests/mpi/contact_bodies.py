@@ -1,20 +1,25 @@
 """Bodies that come into contact with each other or with themselves."""
 
 import numpy as np
-from boxes import COMM, MATERIAL, set_layers, smooth_displacement
-from shapes import box_mesh
+from boxes import (
+    COMM,
+    MATERIAL,
+    gathered,
+    problem_on,
+    smooth_displacement,
+    zones_of,
+)
+from shapes import box_mesh, joined
 from verification_cases.boxes import box_zones
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import SelfContact
-from gyriflow.folding.domain import Domain
-from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import Zones, zones_of_run
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
+from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.settings.folding import parameters_from
-from gyriflow.settings.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
-from gyriflow.units import M_PER_MM
+from gyriflow.settings.terms import CLAMPED, SIDE_X, SIDE_Y
+from gyriflow.units import M_PER_MM, MM_PER_M
 
 HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2
 MU, NU = 1000.0, MATERIAL.poisson_ratio
@@ -31,36 +36,24 @@ def two_blocks(cells=(5, 5, 3), upper=(5, 5, 3), gap=GAP_MM):
     """Return a box above another with a gap between them."""
     low, high = (box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM)) for n in (cells, upper))
     shift = np.array([0.0, 0.0, (HEIGHT_MM + gap) / 2])
-    vertices = np.concatenate([low.vertices - shift, high.vertices + shift])
-    return TetrahedralMesh(
-        vertices, np.concatenate([low.tets, high.tets + len(low.vertices)])
-    )
+    return joined((low, -shift), (high, shift))
 
 
 def in_a_tube(mesh):
     """Return zones that hold the ends of two blocks and let their sides slide."""
-    facets, _ = boundary_faces(mesh)
-    centre = mesh.vertices[facets].mean(axis=1)
-    zone = np.full(len(facets), FREE)
-    zone[np.abs(centre[:, 0]) > SIDE_MM / 2 - 1e-6] = SIDE_X
-    zone[np.abs(centre[:, 1]) > SIDE_MM / 2 - 1e-6] = SIDE_Y
-    zone[np.abs(centre[:, 2]) > np.abs(mesh.vertices[:, 2]).max() - 1e-6] = CLAMPED
-    return Zones(facets, zone, np.ones(len(mesh.vertices)), 0.0, (-0.5, 0.5))
+    zones = zones_of(mesh)
+    outside = np.abs(mesh.vertices).max(axis=0) - 1e-6
+    centre = np.abs(mesh.vertices[zones.facets].mean(axis=1))
+    for axis, zone in enumerate((SIDE_X, SIDE_Y, CLAMPED)):
+        zones.facet_zone[centre[:, axis] > outside[axis]] = zone
+    return zones
 
 
-def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z=0.0):
-    domain = Domain(COMM, mesh)
-    problem = NonlinearProblem(domain, zones, MATERIAL)
-    nodes, cells = len(domain.vertex_of_node), len(domain.cells)
-    normal = np.tile([0.0, 0.0, 1.0], (cells, 1))
-    set_layers(
-        problem,
-        np.full(nodes, MU),
-        np.zeros(nodes),
-        np.full(nodes, growth_along_z),
-        normal,
-    )
-    contact = SelfContact(domain, zones.facets, stiffness, distance)
+def problem_with_contact(mesh, distance, growth_along_z=0.0, comm=COMM):
+    """Return the problem of two blocks in a tube, and their contact."""
+    zones = in_a_tube(mesh)
+    problem = problem_on(mesh, zones, MU, dr=growth_along_z, comm=comm)
+    contact = SelfContact(problem.domain, zones.facets, 2 * MU, distance)
     problem.contributions.append(contact)
     return problem, contact
 
@@ -72,6 +65,18 @@ def approach(domain):
     u = smooth_displacement(domain, 1e-5)
     u[:, 2] -= np.sign(x[:, 2]) * GAP_MM / 4 * M_PER_MM
     return u
+
+
+def gap_and_pressure(mesh, problem, contact, u):
+    """Return the mean gap of two blocks in mm, and the pressure in Pa between them."""
+    places = mesh.vertices + gathered(problem.domain, u) * MM_PER_M
+    top, bottom = (
+        np.isclose(mesh.vertices[:, 2], side * GAP_MM / 2) for side in (-1, 1)
+    )
+    forces = np.zeros_like(places)
+    forces[np.unique(boundary_faces(mesh)[0])] = contact.forces(u)
+    pressure = forces[top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
+    return places[bottom, 2].mean() - places[top, 2].mean(), pressure
 
 
 def stress_at(stretch, growth):
@@ -87,14 +92,8 @@ def stress_at(stretch, growth):
 
 def slab_with_a_sulcus():
     """Return a block with a narrow groove along y in its top, in mm."""
-    mesh = grid(
-        [
-            np.linspace(-6.0, 6.0, 25),
-            np.linspace(-1.5, 1.5, 4),
-            np.linspace(0.0, 6.0, 11),
-        ]
-    )
-    x, y, z = mesh.vertices.T
+    mesh = box_mesh((24, 3, 10), (12.0, 3.0, 6.0))
+    x, y, z = mesh.vertices.T + [[0.0], [0.0], [3.0]]
     groove = 3.0 * np.exp(-((x / 0.5) ** 2))
     # even in y but for a trace, so that nothing meets exactly
     lift = 1 - groove / 6.0 + 1e-3 * np.sin(1.3 * y + x)
@@ -108,9 +107,13 @@ def closing_sulcus(kind, comm=COMM, support="box", **changes):
     growth = {"thickness_mm": 2.0, "growth_rate_per_s": 1e-6, "contact": kind}
     p = parameters_from(RUN | growth | changes)
     zones = zones_of_run(mesh, p) if support == "free" else box_zones(mesh, p)
-    return Folding(comm, mesh, zones, p), State.at_start(
-        mesh.vertices * M_PER_MM, p.step_s
-    )
+    return at_start(mesh, zones, p, comm)
+
+
+def at_start(mesh, zones, p, comm=COMM, maps=None):
+    """Return what folds a mesh, and its state at the start."""
+    state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    return Folding(comm, mesh, zones, p, maps), state
 
 
 def after_steps(folding, state, number):

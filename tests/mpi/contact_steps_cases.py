@@ -6,43 +6,42 @@ from dataclasses import replace
 import igl.predicates
 import numpy as np
 import pytest
-from boxes import COMM
+from boxes import COMM, zones_of
 from contact_bodies import (
     RUN,
     SIDE_MM,
     after_steps,
+    at_start,
     closing_sulcus,
     in_a_tube,
-    slab_with_a_sulcus,
     two_blocks,
 )
 from mpi4py import MPI
 from verification_cases.mirrored import block, folded, hemisphere, rounded
 
-from gyriflow.folding.checkpoint import State
-from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import Zones
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.settings.folding import parameters_from
-from gyriflow.settings.terms import FREE
-from gyriflow.units import M_PER_MM, MM_PER_M
 
 
 def closed_sulcus(kind):
     folding, state = closing_sulcus(kind)
     state = after_steps(folding, state, 12)
-    _, crossing, _ = igl.predicates.find_self_intersections(
-        state.positions * MM_PER_M, folding.zones.facets
-    )
-    return state, len(crossing) > 0
+    return state, crosses(folding, state)
+
+
+def crosses(folding, state):
+    """Return whether the surface crosses itself."""
+    facets = folding.zones.facets
+    _, pairs, _ = igl.predicates.find_self_intersections(state.positions, facets)
+    return len(pairs) > 0
 
 
 @pytest.mark.one_rank
 def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
-    _, crosses = closed_sulcus("none")
-    assert crosses
-    state, crosses = closed_sulcus("global")
-    assert not crosses
+    _, has_crossed = closed_sulcus("none")
+    assert has_crossed
+    state, has_crossed = closed_sulcus("global")
+    assert not has_crossed
     row = state.rows[-1]
     assert row["contact_pairs"] > 0
     assert 0 < row["min_distance_mm"] < 0.2
@@ -63,32 +62,13 @@ def test_a_resumed_run_in_contact_equals_one_without_interruption():
     assert np.abs(anew.positions - ended.positions).max() <= 1e-8 * moved
 
 
-def free_blocks(gap, **changes):
-    """Return what folds two free blocks whose meshes match across a gap, and the state
-    at the start."""
-    mesh = two_blocks(gap=gap)
-    facets, _ = boundary_faces(mesh)
-    zones = Zones(
-        facets,
-        np.full(len(facets), FREE),
-        np.ones(len(mesh.vertices)),
-        0.0,
-        (-0.5, 0.5),
-        free=True,
-    )
-    p = parameters_from(RUN | changes)
-    return Folding(COMM, mesh, zones, p), State.at_start(
-        mesh.vertices * M_PER_MM, p.step_s
-    )
-
-
 @pytest.mark.parametrize("support", ["free", "box"])
 def test_blocks_near_each_other_that_do_not_grow_do_not_move(support):
     # the gap is two thirds of the distance that contact would begin at with this mesh
-    folding, state = free_blocks(0.1, growth_rate_per_s=0.0)
-    if support == "box":
-        mesh = two_blocks(gap=0.1)
-        folding = Folding(COMM, mesh, in_a_tube(mesh), folding.parameters)
+    mesh = two_blocks(gap=0.1)
+    zones = in_a_tube(mesh) if support == "box" else replace(zones_of(mesh), free=True)
+    p = parameters_from(RUN | {"growth_rate_per_s": 0.0})
+    folding, state = at_start(mesh, zones, p)
     assert folding.contact.distance_mm < 0.1
     after = folding.step(state, state.step_s)
     assert (after.positions == state.positions).all()
@@ -98,12 +78,11 @@ def test_blocks_near_each_other_that_do_not_grow_do_not_move(support):
 def test_parts_that_touch_move_as_one():
     # one part grows towards the other, which has to give way: only the whole has no
     # motion of its own
-    folding, state = free_blocks(
-        0.02, growth_rate_per_s=1e-6, core_growth_rate_per_s=1e-6
-    )
-    domain = folding.domain
-    low = domain.part == domain.part[np.argmin(state.positions[:, 2])]
-    folding.zones = replace(folding.zones, growing=low.astype(float))
+    mesh = two_blocks(gap=0.02)
+    low = mesh.vertices[:, 2] < 0
+    zones = replace(zones_of(mesh), free=True, growing=low.astype(float))
+    rates = {"growth_rate_per_s": 1e-6, "core_growth_rate_per_s": 1e-6}
+    folding, state = at_start(mesh, zones, parameters_from(RUN | rates))
     # in the first step they come to touch
     after = after_steps(folding, state, 2)
     u = after.last
@@ -124,9 +103,8 @@ def test_each_guess_is_swept_for_crossings_from_rest(support, monkeypatch):
     tried, residual = [], problem.residual
     monkeypatch.setattr(problem, "residual", lambda u: tried.append(u) or residual(u))
     folding.solver.solve(*guesses)
-    for guess, u in zip(
-        map(problem.without_rigid_motion, guesses), tried[1:], strict=False
-    ):
+    for guess, u in zip(guesses, tried[1:], strict=False):
+        guess = problem.without_rigid_motion(guess)
         part = problem.max_step(problem.rest(), guess)
         assert 0.3 < part < 0.9
         assert u == pytest.approx(part * guess, rel=1e-9, abs=1e-12)
@@ -139,10 +117,9 @@ def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
     assert state.rows[-1]["contact_pairs"] > 0
     # the first rank and the last one
     if COMM.rank in (0, COMM.size - 1):
-        single = after_steps(*closing_sulcus("global", comm=MPI.COMM_SELF, **tight), 10)
-        moved = np.abs(
-            single.positions - slab_with_a_sulcus().vertices * M_PER_MM
-        ).max()
+        folding, start = closing_sulcus("global", comm=MPI.COMM_SELF, **tight)
+        single = after_steps(folding, start, 10)
+        moved = np.abs(single.positions - start.positions).max()
         assert np.abs(single.positions - state.positions).max() <= 1e-6 * moved
         assert single.rows[-1]["contact_pairs"] == state.rows[-1]["contact_pairs"]
     COMM.barrier()
@@ -187,16 +164,13 @@ def vertices_pulled_near(gap, count, growth_rate_per_s=0.0):
     """Return what folds two blocks in a tube, and their start: few vertices of the
     upper one almost touch the lower."""
     mesh = two_blocks(gap=gap)
-    facing = np.isclose(mesh.vertices[:, 2], gap / 2) & (
-        np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6
-    )
+    facing = np.isclose(mesh.vertices[:, 2], gap / 2)
+    facing &= np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6
     positions = mesh.vertices.copy()
     positions[np.flatnonzero(facing)[[1, 11][:count]], 2] = 0.01 - gap / 2
     mesh = TetrahedralMesh(positions, mesh.tets)
-    p = free_blocks(gap, growth_rate_per_s=growth_rate_per_s)[0].parameters
-    return Folding(COMM, mesh, in_a_tube(mesh), p), State.at_start(
-        mesh.vertices * M_PER_MM, p.step_s
-    )
+    p = parameters_from(RUN | {"growth_rate_per_s": growth_rate_per_s})
+    return at_start(mesh, in_a_tube(mesh), p)
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -214,17 +188,11 @@ def test_a_few_vertices_that_nearly_touch_are_pressed_apart_and_set_no_contact_d
     assert np.median(moved) < 0.1 * moved.max()
 
 
-@pytest.mark.parametrize("gap", [0.5, 0.24])
-def test_where_few_vertices_start_at_a_hundredth_of_a_mm_nothing_crosses_as_it_grows(
-    gap,
-):
-    folding, state = vertices_pulled_near(gap, 2, growth_rate_per_s=2e-7)
+def test_where_few_vertices_start_at_a_hundredth_of_a_mm_nothing_crosses_as_it_grows():
+    folding, state = vertices_pulled_near(0.24, 2, growth_rate_per_s=2e-7)
     for _ in range(4):
         state = folding.step(state, state.step_s)
-        _, crossing, _ = igl.predicates.find_self_intersections(
-            state.positions * MM_PER_M, folding.zones.facets
-        )
-        assert len(crossing) == 0
+        assert not crosses(folding, state)
     assert min(row["min_distance_mm"] for row in state.rows) > 0.02
 
 

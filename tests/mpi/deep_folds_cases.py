@@ -24,10 +24,8 @@ def found_at(slab):
 
 def test_a_deep_fold_presses_on_itself_where_it_crosses_without_contact():
     slab = Slab(2, 1, 0.04)
-    assert (
-        max(fold.crossing for fold in folded(replace(slab, contact="none"), AREA_RATIO))
-        > 0
-    )
+    without = folded(replace(slab, contact="none"), AREA_RATIO)
+    assert any(fold.crossing for fold in without)
     growth, depth_mm, pressure_pa = found_at(slab)
     # two linear elements through the cortex are too stiff: they need more growth
     assert growth == pytest.approx(GROWTH, rel=0.15)

@@ -15,9 +15,10 @@ from boxes import (
 from contact_bodies import (
     GAP_MM,
     HEIGHT_MM,
-    SIDE_MM,
     approach,
-    in_a_tube,
+    at_start,
+    gap_and_pressure,
+    problem_with_contact,
     stress_at,
     two_blocks,
 )
@@ -25,15 +26,12 @@ from mpi4py import MPI
 from shapes import box_mesh
 from verification_cases.boxes import slab_parameters
 
-from gyriflow.folding.checkpoint import State
-from gyriflow.folding.contact import SelfContact
-from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.straightening import straightness
 from gyriflow.geometry.tetrahedra import (
     boundary_faces,
     quadratic,
 )
-from gyriflow.units import M_PER_MM, MM_PER_M
+from gyriflow.units import M_PER_MM
 
 
 def test_an_element_that_inverts_between_its_points_is_detected():
@@ -53,49 +51,33 @@ def test_an_element_that_inverts_between_its_points_is_detected():
     assert bounds[0] > 0 >= bounds[1]
 
 
-def pressed_blocks(comm, growth, distance):
-    """Return the problem of two blocks in a tube that grow towards each other, their
-    contact, and the mesh."""
-    mesh = quadratic(two_blocks((2, 2, 1), (3, 2, 2)))
-    zones = in_a_tube(mesh)
-    problem = problem_on(mesh, zones, dr=growth, comm=comm)
-    contact = SelfContact(problem.domain, zones.facets, 2000.0, distance)
-    problem.contributions.append(contact)
-    return problem, contact, mesh
+BLOCKS = quadratic(two_blocks((2, 2, 1), (3, 2, 2)))
 
 
 def test_pressed_blocks_have_the_pressure_of_the_closed_answer_on_any_number_of_ranks():
-    places = []
+    moved = []
     for comm in (COMM, MPI.COMM_SELF):
-        problem, contact, mesh = pressed_blocks(comm, growth=0.1, distance=0.1)
+        problem, contact = problem_with_contact(
+            BLOCKS, 0.1, growth_along_z=0.1, comm=comm
+        )
         u = solved(
             problem, newton_tolerance=1e-10, krylov_tolerance=1e-8, max_newton=80
         ).displacement
         assert contact.pair_count(u) > 10
-        places.append(mesh.vertices + gathered(problem.domain, u) * MM_PER_M)
-    assert (
-        np.abs(places[0] - places[1]).max()
-        <= 1e-6 * np.abs(places[1] - mesh.vertices).max()
-    )
-    place = places[0]
-    on_top, below = (
-        np.isclose(mesh.vertices[:, 2], side * GAP_MM / 2) for side in (-1, 1)
-    )
-    gap = place[below, 2].mean() - place[on_top, 2].mean()
-    forces = np.zeros_like(place)
-    forces[np.unique(boundary_faces(mesh)[0])] = contact.forces(u)
-    pressure = forces[on_top, 2].sum() / (SIDE_MM * M_PER_MM) ** 2
+        moved.append(gathered(problem.domain, u))
+    assert np.abs(moved[0] - moved[1]).max() <= 1e-6 * np.abs(moved[1]).max()
+    gap, pressure = gap_and_pressure(BLOCKS, problem, contact, u)
     assert 0 < gap < 0.1
-    assert pressure == pytest.approx(
-        -stress_at(1 + (GAP_MM - gap) / 2 / HEIGHT_MM, 0.1), rel=0.01
-    )
+    stretch = 1 + (GAP_MM - gap) / 2 / HEIGHT_MM
+    assert pressure == pytest.approx(-stress_at(stretch, 0.1), rel=0.01)
     # an even pressure leaves faces even, although the meshes do not match: elements are
     # 2 and 3 mm long
-    assert place[below, 2].std() < 0.01
+    below = np.isclose(BLOCKS.vertices[:, 2], GAP_MM / 2)
+    assert moved[0][below, 2].std() < 0.01 * M_PER_MM
 
 
 def test_the_diagonal_has_the_blocks_of_contact():
-    problem, contact, _ = pressed_blocks(COMM, growth=0.0, distance=0.15)
+    problem, contact = problem_with_contact(BLOCKS, 0.15)
     u = approach(problem.domain)
     tangent = problem.tangent(problem.residual(u))
     assert contact.pair_count(u) > 0
@@ -119,15 +101,10 @@ def test_the_diagonal_has_the_blocks_of_contact():
 @pytest.mark.parametrize("memory_gw", [0.0, 1.0])
 def test_inner_sides_that_bow_are_straightened_unless_stress_is_kept(memory_gw):
     mesh, bowed = box_with_a_bowed_side()
-    p = slab_parameters(
-        5.0,
-        0.01,
-        stress_memory_gw=memory_gw,
-        fissure_x_mm=0.0,
-        contact="global",
-    )
-    state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
-    after = Folding(COMM, mesh, zones_of(mesh, at_the_bottom), p).step(state, p.step_s)
+    changes = {"stress_memory_gw": memory_gw, "contact": "global"}
+    p = slab_parameters(5.0, 0.01, fissure_x_mm=0.0, **changes)
+    folding, state = at_start(mesh, zones_of(mesh, at_the_bottom), p)
+    after = folding.step(state, p.step_s)
     moved_by_solver = state.positions + after.last
     is_moved = (after.positions != moved_by_solver).any(axis=1)
     least = straightness(after.positions, mesh.tets).min()

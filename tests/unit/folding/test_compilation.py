@@ -70,22 +70,23 @@ def test_products_refuse_arrays_that_c_code_would_misread():
     blocks, x, y = np.ones((4, 3, 3), np.float32), np.ones(12), np.zeros(12)
     multiply_blocks(blocks, x, y)
     assert y == pytest.approx(3.0)
-    motions = PartMotions(np.array([0, 0, 1, 1]), np.ones((4, 3), np.float32))
+    part, arms = np.array([0, 0, 1, 1]), np.ones((4, 3), np.float32)
+    motions = PartMotions(part, arms)
     assert motions.restrict(x, 2)[:3] == pytest.approx(2.0)
-    double = PartMotions(np.array([0, 0, 1, 1]), np.ones((4, 3)))
-    for misread in (
-        lambda: multiply_blocks(blocks.astype(float), x, y),
-        lambda: multiply_blocks(blocks, x.astype(np.float32), y),
-        lambda: multiply_blocks(blocks, x, y.astype(int)),
-        lambda: motions.restrict(x.astype(np.float32), 2),
-        lambda: double.restrict(x, 2),
+    single = x.astype(np.float32)
+    for function, *misread in (
+        (multiply_blocks, blocks.astype(float), x, y),
+        (multiply_blocks, blocks, single, y),
+        (multiply_blocks, blocks, x, y.astype(int)),
+        (motions.restrict, single, 2),
+        (PartMotions(part, arms.astype(float)).restrict, x, 2),
     ):
         with pytest.raises(TypeError):
-            misread()
-    for short in (
-        lambda: multiply_blocks(blocks, x[:9], y),
-        lambda: multiply_blocks(blocks, x, y[:9]),
-        lambda: motions.add(np.zeros(12), y[:9]),
+            function(*misread)
+    for function, *short in (
+        (multiply_blocks, blocks, x[:9], y),
+        (multiply_blocks, blocks, x, y[:9]),
+        (motions.add, x, y[:9]),
     ):
         with pytest.raises(ValueError, check=Facts(12, "(9,)")):
-            short()
+            function(*short)

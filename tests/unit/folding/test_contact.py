@@ -52,9 +52,8 @@ def test_distant_edges_on_one_line_are_no_pair_and_do_not_stop_a_step():
     assert search.collision_free_step(near, DISPLACEMENT) == 1.0
 
 
-@pytest.mark.parametrize("gap_mm", [0.02, 0.04])
-def test_edges_on_one_line_whose_ends_are_near_are_pairs_and_stop_each_other(gap_mm):
-    upper = [2, 3, 5]
+def test_edges_on_one_line_whose_ends_are_near_are_pairs_and_stop_each_other():
+    upper, gap_mm = [2, 3, 5], 0.04
     positions = POSITIONS.copy()
     positions[upper, 2] += positions[1, 2] + gap_mm - positions[3, 2]
     search = search_at(positions)
@@ -75,9 +74,8 @@ def test_each_pair_in_contact_belongs_to_one_rank():
     def pairs_of(owned):
         search = ContactSearch(mesh.faces, owned, mesh.vertices, 0.6)
         found = search.near(mesh.vertices).pairs
-        kinds = (found.vv_collisions, found.ev_collisions)
-        kinds += (found.ee_collisions, found.fv_collisions)
-        return np.array([len(pairs) for pairs in kinds])
+        kinds = "vv_collisions", "ev_collisions", "ee_collisions", "fv_collisions"
+        return np.array([len(getattr(found, kind)) for kind in kinds])
 
     every = pairs_of(np.ones(len(x), dtype=bool))
     assert (every > 3).sum() >= 3
@@ -100,13 +98,11 @@ UNEVEN = np.linspace(0.5, 0.9, 300)
     ("gaps_mm", "limit_mm"),
     [
         # a quarter of the gap of the vertex after the twelve that are left out
-        (gaps([0.01], 300, 700), UNEVEN[11] / 4),
         (gaps([0.012, 0.01, 0.03], 300, 700), UNEVEN[9] / 4),
         (gaps(np.linspace(0.01, 0.02, 12), 300, 700), UNEVEN[0] / 4),
         # many near vertices, or few that are hardly nearer than the rest, set it
         (gaps(np.linspace(0.01, 0.02, 13), 300, 700), 0.01),
         (gaps([0.13, 0.4], 300, 700), 0.13),
-        (np.linspace(0.02, 0.07, 1000), 0.02),
         # few are a thousandth of 40 000 vertices, a fiftieth of 100
         (gaps(np.full(40, 0.01), 5000, 34_960), 0.125),
         (gaps(np.full(41, 0.01), 5000, 34_959), 0.01),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import box_mesh, ellipsoid_mesh, rigid
+from shapes import box_mesh, ellipsoid_mesh, joined, rigid, waves_on
 
 from gyriflow.errors import SolverError
 from gyriflow.folding import elastic_fit
@@ -18,32 +18,29 @@ from gyriflow.geometry.matching import crossing_faces
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_surface,
-    linear_pieces,
     volumes_between,
 )
 from gyriflow.geometry.triangles import TriangleMesh, rms_length
 
-BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
+SEMI_AXES = (20.0, 24.0, 18.0)
+BODY = ellipsoid_mesh(8, SEMI_AXES)
 SMALL = ellipsoid_mesh(8, (7.0, 8.4, 6.3))
-PIECES = linear_pieces(BODY)
 USED = boundary_surface(BODY)[1]
 
 
-def ratios(positions):
-    return volumes_between(positions, PIECES) / volumes_between(BODY.vertices, PIECES)
+def ratios(positions, body=BODY):
+    """Return the volumes of elements over those at the start."""
+    before = volumes_between(body.vertices, body.tets)
+    return volumes_between(positions, body.tets) / before
 
 
 def waves(height_mm, length_mm):
-    x, y, z = BODY.vertices.T
-    radius = np.sqrt((x / 20) ** 2 + (y / 24) ** 2 + (z / 18) ** 2)
-    outward = (
-        BODY.vertices / np.maximum(np.linalg.norm(BODY.vertices, axis=1), 1e-6)[:, None]
-    )
-    shell = np.exp(-(((1 - radius) / 0.25) ** 2))
-    return (
-        BODY.vertices * 1.05
-        + height_mm * (np.cos(2 * np.pi * y / length_mm) * shell)[:, None] * outward
-    )
+    return 1.05 * BODY.vertices + waves_on(BODY, SEMI_AXES, height_mm, length_mm)
+
+
+def misfits(positions, shape):
+    """Return the distances in mm of vertices of the surface."""
+    return np.linalg.norm(positions - shape, axis=1)[USED]
 
 
 def test_a_shape_with_inverted_elements_is_followed_by_one_without():
@@ -51,20 +48,18 @@ def test_a_shape_with_inverted_elements_is_followed_by_one_without():
     assert (ratios(shape) < 0).sum() > 50
     found = ElasticFit(BODY).follow(shape)
     assert ratios(found).min() > 0.05
-    misfits = np.linalg.norm(found - shape, axis=1)[USED]
-    start = np.linalg.norm(1.05 * BODY.vertices - shape, axis=1)[USED]
-    assert misfits.mean() < 0.7 * start.mean()
+    start = misfits(1.05 * BODY.vertices, shape)
+    assert misfits(found, shape).mean() < 0.7 * start.mean()
 
 
 def test_a_shape_that_a_body_can_have_is_reached_where_it_lies():
-    shape = transform_points(
-        waves(0.5, 30.0), rigid(30, -20, 10, shift=(50.0, 0.0, -9.0))
-    )
+    pose = rigid(30, -20, 10, shift=(50.0, 0.0, -9.0))
+    shape = transform_points(waves(0.5, 30.0), pose)
     body = ElasticFit(BODY)
-    before = np.linalg.norm(body.follow(shape) - shape, axis=1)
-    after = np.linalg.norm(body.draw(shape[USED]) - shape, axis=1)[USED]
-    assert before.max() < 0.3
-    assert after.mean() < 0.7 * before[USED].mean()
+    followed = body.follow(shape)
+    before = misfits(followed, shape)
+    assert np.linalg.norm(followed - shape, axis=1).max() < 0.3
+    assert misfits(body.draw(shape[USED]), shape).mean() < 0.7 * before.mean()
     assert body.boundary.vertices == pytest.approx(body.positions_mm[USED])
 
 
@@ -81,42 +76,37 @@ def test_a_shape_that_no_tissue_can_have_is_followed_by_a_limited_stretch():
     assert np.linalg.norm(found - BODY.vertices, axis=1).max() < 0.3
 
 
-def slit_block(low, high):
-    """Return a block with a slit 1 mm wide in the plane x = 0, open above z = 4."""
-    box = box_mesh((11, 6, 7), tuple(high - low))
-    places = box.vertices - box.vertices.min(axis=0) + low
-    centres = places[box.tets].mean(axis=1)
-    inside = (np.abs(centres[:, 0]) < 1.0) & (centres[:, 2] > 4.0)
-    kept, numbers = np.unique(box.tets[~inside], return_inverse=True)
-    return TetrahedralMesh(places[kept], numbers.reshape(-1, 4))
+def slit_block():
+    """Return a block from z = 0 to 12 with a slit 1 mm wide in the plane x = 0, open
+    above z = 4."""
+    box = box_mesh((11, 6, 7), (20.0, 10.0, 12.0))
+    places = box.vertices + [0.0, 0.0, 6.0]
+    x, _, z = places[box.tets].mean(axis=1).T
+    inside = (np.abs(x) < 1.0) & (z > 4.0)
+    used, numbers = np.unique(box.tets[~inside], return_inverse=True)
+    return TetrahedralMesh(places[used], numbers.reshape(-1, 4))
 
 
-UNSOLVABLE = replace(
-    elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12, min_progress=1.0
-)
-"""Tolerances that no step meets."""
-
-
-def test_a_shape_that_cannot_be_reached_is_refused_with_its_place(monkeypatch):
-    monkeypatch.setattr(elastic_fit, "SETTINGS", UNSOLVABLE)
+def test_a_step_that_is_not_solved_goes_as_far_as_it_comes_and_is_refused_by_place(
+    monkeypatch,
+):
+    unsolvable = {"max_newton": 1, "newton_tolerance": 1e-12, "min_progress": 1.0}
+    settings = replace(elastic_fit.SETTINGS, **unsolvable)
+    monkeypatch.setattr(elastic_fit, "SETTINGS", settings)
+    shape = waves(0.5, 20.0)
+    body = ElasticFit(BODY)
+    body.positions_mm = 1.05 * BODY.vertices
+    before = misfits(body.positions_mm, shape)
+    found = body.draw(shape[USED])
+    assert misfits(found, shape).mean() < 0.3 * before.mean()
+    assert (volumes_between(found, BODY.tets) > 0).all()
     monkeypatch.setattr(elastic_fit, "MAX_LEFT_MM", 0.3)
     with pytest.raises(SolverError, check=Facts("det F", "element", "mm")):
         ElasticFit(BODY).follow(BODY.vertices * [1.6, 0.6, 1.0])
 
 
-def test_a_step_that_is_not_solved_goes_as_far_as_it_comes(monkeypatch):
-    monkeypatch.setattr(elastic_fit, "SETTINGS", UNSOLVABLE)
-    goals = waves(0.5, 20.0)[USED]
-    body = ElasticFit(BODY)
-    body.positions_mm = 1.05 * BODY.vertices
-    before = np.linalg.norm(body.positions_mm[USED] - goals, axis=1).mean()
-    found = body.draw(goals)
-    assert np.linalg.norm(found[USED] - goals, axis=1).mean() < 0.3 * before
-    assert (volumes_between(found, BODY.tets) > 0).all()
-
-
 def test_what_cannot_be_drawn_is_held_and_the_rest_is_drawn():
-    mesh = slit_block(np.array([-10.0, -5.0, 0.0]), np.array([10.0, 5.0, 12.0]))
+    mesh = slit_block()
     surface, used = boundary_surface(mesh)
     goals = mesh.vertices[used].copy()
     # the walls of the slit would move through each other
@@ -127,10 +117,10 @@ def test_what_cannot_be_drawn_is_held_and_the_rest_is_drawn():
     body = ElasticFit(mesh)
     found = body.draw(goals)[used]
     assert crossing_faces(TriangleMesh(found, surface.faces)) == 0
-    misfit = np.linalg.norm(found - goals, axis=1)
+    left = np.linalg.norm(found - goals, axis=1)
     before = np.linalg.norm(mesh.vertices[used] - goals, axis=1)
-    assert misfit[bottom].mean() < 0.3 * before[bottom].mean()
-    assert misfit.mean() < 0.6 * before.mean()
+    assert left[bottom].mean() < 0.3 * before[bottom].mean()
+    assert left.mean() < 0.6 * before.mean()
 
 
 def inside_vertex(mesh, place):
@@ -157,10 +147,9 @@ def test_flat_elements_are_elastic_and_open_in_the_next_steps():
     assert ratios(found).min() > 0.25
     assert found[USED] == pytest.approx(BODY.vertices[USED], abs=0.05)
     # nothing moves where the elements are as those around them
-    body.positions_mm = BODY.vertices * [1.2, 1.0, 0.9]
-    assert body.draw(body.positions_mm[USED]) == pytest.approx(
-        BODY.vertices * [1.2, 1.0, 0.9], abs=1e-6
-    )
+    even = BODY.vertices * [1.2, 1.0, 0.9]
+    body.positions_mm = even
+    assert body.draw(even[USED]) == pytest.approx(even, abs=1e-6)
 
 
 def test_a_step_that_flat_elements_prevent_is_made_without_their_stress(monkeypatch):
@@ -180,20 +169,18 @@ def test_a_step_that_flat_elements_prevent_is_made_without_their_stress(monkeypa
 
     monkeypatch.setattr(body._problem, "set_step", set_and_note)
     monkeypatch.setattr(solver, "solve", fail_with_stress)
-    goals = waves(0.0, 20.0)[USED] + [0.0, 0.0, 0.5] * np.sin(
-        BODY.vertices[USED, :1] / 5
-    )
-    before = np.linalg.norm(body.boundary.vertices - goals, axis=1).mean()
-    assert np.linalg.norm(body.draw(goals)[USED] - goals, axis=1).mean() < 0.3 * before
+    shape = 1.05 * BODY.vertices
+    shape[:, 2] += 0.5 * np.sin(BODY.vertices[:, 0] / 5)
+    before = misfits(BODY.vertices, shape).mean()
+    assert misfits(body.draw(shape[USED]), shape).mean() < 0.3 * before
 
 
 def test_elements_that_a_step_leaves_flat_are_opened(monkeypatch):
     monkeypatch.setattr(ElasticFit, "_flattening", lambda self: None)
     body = ElasticFit(BODY)
     body.positions_mm = flattened()
-    assert ratios(body.draw(body.boundary.vertices)).min() == pytest.approx(
-        0.2, abs=1e-6
-    )
+    drawn = body.draw(body.boundary.vertices)
+    assert ratios(drawn).min() == pytest.approx(0.2, abs=1e-6)
 
 
 def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypatch):
@@ -259,12 +246,8 @@ def test_a_body_that_stays_behind_when_it_follows_is_moved_to_the_smoothed_shape
 def two_boxes(shift_mm):
     """Return two boxes, the right one shifted along x from where it is 0.5 mm away from
     the left one."""
-    boxes = [box_mesh((4, 4, 4), (6.0, 6.0, 6.0)) for _ in range(2)]
-    right = boxes[1].vertices + [6.5 + shift_mm, 0.3, 0.2]
-    tets = [boxes[0].tets, boxes[1].tets + len(right)]
-    return TetrahedralMesh(
-        np.concatenate([boxes[0].vertices, right]), np.concatenate(tets)
-    )
+    box = box_mesh((4, 4, 4), (6.0, 6.0, 6.0))
+    return joined((box, np.zeros(3)), (box, [6.5 + shift_mm, 0.3, 0.2]))
 
 
 def test_a_body_is_not_moved_to_a_shape_whose_faces_cross():
@@ -279,9 +262,8 @@ def test_a_body_is_not_moved_to_a_shape_whose_faces_cross():
     assert 5.7 < right.mean() - left.mean() < 6.3
 
 
-def grown_body(monkeypatch):
-    """Return a body that has grown by a fifth in twenty states, as if each way between
-    two of them inverted an element."""
+def test_stops_are_looked_for_in_halves_of_halves_of_halves(monkeypatch):
+    # twenty states of growth, as if each way between two of them inverted an element
     body = ElasticFit(BODY)
     states = [(1 + 0.01 * number) * BODY.vertices for number in range(21)]
     body._passed = states[1:-1]
@@ -290,18 +272,6 @@ def grown_body(monkeypatch):
     monkeypatch.setattr(
         body, "_untangled", lambda before, after, lengths: (after, fault)
     )
-    return body
-
-
-def test_stops_are_looked_for_in_halves_of_halves_of_halves(monkeypatch):
-    body = grown_body(monkeypatch)
-    way = body.way_from(BODY.vertices)
-    fractions = [fraction for fraction, _ in way]
-    assert fractions == pytest.approx(np.arange(1, 8) / 8, abs=0.06)
-
-
-def test_what_opens_a_shape_is_judged_on_the_way_from_the_last_stop(monkeypatch):
-    body = grown_body(monkeypatch)
     starts = []
 
     def note_start(before, places):
@@ -310,7 +280,9 @@ def test_what_opens_a_shape_is_judged_on_the_way_from_the_last_stop(monkeypatch)
 
     monkeypatch.setattr(body, "_opened_after", note_start)
     way = body.way_from(BODY.vertices)
-    assert len(way) > 1
+    fractions = [fraction for fraction, _ in way]
+    assert fractions == pytest.approx(np.arange(1, 8) / 8, abs=0.06)
+    # what opens a shape is judged on the way from the last stop
     np.testing.assert_array_equal(starts, [way[-1][1]])
 
 
@@ -372,14 +344,10 @@ def test_a_displacement_is_smoothed_only_around_elements_that_lose_most_of_their
     assert len(faults) == 0
     moved = np.linalg.norm(found - wanted, axis=1)
     assert (moved.max() > 0.1) == is_changed
-    volumes = volumes_between(found, SMALL.tets) / volumes_between(
-        SMALL.vertices, SMALL.tets
-    )
-    assert volumes.min() > 0.2
+    assert ratios(found, SMALL).min() > 0.2
     # a motion of all is kept, and what is far from the fault stays as it is wanted
-    distance = np.linalg.norm(
-        SMALL.vertices - SMALL.vertices[inside_vertex(SMALL, place)], axis=1
-    )
+    fault = SMALL.vertices[inside_vertex(SMALL, place)]
+    distance = np.linalg.norm(SMALL.vertices - fault, axis=1)
     assert moved[distance > 6.0].max() < 0.001
     others = distance > 0.0
     assert np.linalg.norm(found - SMALL.vertices - shift, axis=1)[others].max() < 0.5

@@ -6,12 +6,9 @@ from typing import get_args
 import pytest
 from facts import Facts
 from pydantic import ValidationError
-from shapes import ellipsoid_mesh
 
 from gyriflow.errors import InputError
-from gyriflow.folding.growth import GrowthInputs, StepGrowth, StepStart
-from gyriflow.folding.growth_models import BUILDERS, growth_model
-from gyriflow.folding.zones import zones_of_run
+from gyriflow.folding.growth_models import BUILDERS
 from gyriflow.report.page import methods_text
 from gyriflow.settings.folding import GROWTH_RATES, FoldingSettings, parameters_from
 from gyriflow.settings.growth import GROWTH_MODELS, Growth, ModelName
@@ -22,38 +19,12 @@ VALUES = {
     "fissure_x_mm": 0.0,
     "output_weeks": [21.0, 22.0],
 }
-RATES = dict.fromkeys(GROWTH_RATES, 3e-7)
-
-
-def run_of(model, growth_of="own"):
-    return {
-        "parameters": {"growth": {"model": model, "of": "self"}, **RATES},
-        "growth_of": growth_of,
-    }
 
 
 def test_a_model_is_named_in_the_configuration_the_registry_and_the_solver():
     assert set(get_args(ModelName)) == set(GROWTH_MODELS) == set(BUILDERS)
     described = Growth.model_fields["model"].description
     assert [name for name in GROWTH_MODELS if f"`{name}`" not in described] == []
-
-
-@pytest.mark.parametrize("name", BUILDERS)
-def test_a_model_gives_the_growth_of_a_step(name):
-    mesh = ellipsoid_mesh(4, (20.0, 26.0, 18.0))
-    model, sizes, targets, maps = GROWTH_MODELS[name], {}, {}, {}
-    for key, size in (("area_cm2", 50.0), ("volume_ml", 30.0)):
-        if key in (*model.keys, *model.resolved):
-            sizes[key] = {21.0: size, 22.0: 1.1 * size}
-    if model.measured == "shapes":
-        targets = {22.0: "target"}
-        for axis, values in zip("xyz", 1.05 * mesh.vertices.T, strict=True):
-            maps[f"target_{axis}"] = values
-    growth = {"model": name, **sizes}
-    p = parameters_from(VALUES | {"growth": growth, "targets": targets})
-    inputs = GrowthInputs(mesh, zones_of_run(mesh, p), maps)
-    step = growth_model(p, inputs)(StepStart(mesh.vertices, 0.0, p.step_s))
-    assert isinstance(step, StepGrowth)
 
 
 @pytest.mark.parametrize("name", GROWTH_MODELS)
@@ -78,18 +49,17 @@ def test_a_model_uses_keys_that_there_are_and_refuses_all_others(name):
 
 def test_each_model_has_a_sentence_of_its_own_in_the_methods():
     template = "{{ growth_sentence(run, number) }}"
-    found = {
-        name: methods_text(template, run=run_of(name), number="{:g}".format)
-        for name in GROWTH_MODELS
-    }
-    assert len(set(found.values())) == len(found)
-    assert all(text[0].isupper() and text.endswith(".") for text in found.values())
-    # no sentence names rates that the model does not use
-    assert [name for name, text in found.items() if "3e-07" in text] == ["rates"]
+    sentences = set()
     for name, model in GROWTH_MODELS.items():
-        run = run_of(name, "population cohort")
+        growth = {"model": name, "of": "self"}
+        parameters = {"growth": growth, **dict.fromkeys(GROWTH_RATES, 3e-7)}
+        run = {"parameters": parameters, "growth_of": "population cohort"}
         text = methods_text(template, run=run, number="{:g}".format)
+        # it names what the model uses only
+        assert ("3e-07" in text) == (name == "rates")
         assert ("cohort" in text) == (model.measured is not None)
+        sentences.add(text)
+    assert len(sentences) == len(GROWTH_MODELS)
 
 
 def test_target_shapes_are_given_to_the_models_that_need_them_and_to_no_other():

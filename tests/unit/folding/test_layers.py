@@ -57,13 +57,12 @@ def test_rates_that_change_with_the_weeks_are_those_of_the_middle_of_a_step():
         at_points=lambda values: values[None],
         normals=lambda wanted: (wanted, np.array([[[0.0, 0.0, 1.0]]])),
     )
-    inverse = GrowthByRates(p, StepStart(np.empty((0, 3)), 2 * day, day)).inverse(
-        tissue
-    )
+    start = StepStart(np.empty((0, 3)), 2 * day, day)
+    inverse = GrowthByRates(p, start).inverse(tissue)
     # two days and a half after the start
-    np.testing.assert_allclose(
-        inverse[0, 0], np.diag([1 / (1 + 2.5 / 7 * 1e-6 * day)] * 2 + [1.0]), rtol=1e-12
-    )
+    tangential = 1 / (1 + 2.5 / 7 * 1e-6 * day)
+    expected = np.diag([tangential, tangential, 1.0])
+    np.testing.assert_allclose(inverse[0, 0], expected, rtol=1e-12)
 
 
 def test_distance_is_to_the_triangles_not_to_the_vertices_within_reach():
@@ -84,14 +83,10 @@ def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights
     for powers in itertools.product(range(degree + 1), repeat=4):
         if sum(powers) <= degree:
             # the mean of a product of barycentric coordinates
-            exact = (
-                6
-                * math.prod(map(math.factorial, powers))
-                / math.factorial(sum(powers) + 3)
-            )
-            assert points.weights @ (points.barycentric**powers).prod(
-                axis=1
-            ) == pytest.approx(exact, rel=1e-12)
+            product = math.prod(map(math.factorial, powers))
+            exact = 6 * product / math.factorial(sum(powers) + 3)
+            found = points.weights @ (points.barycentric**powers).prod(axis=1)
+            assert found == pytest.approx(exact, rel=1e-12)
 
 
 def test_smooth_values_are_quadratic_and_bounded_ones_stay_between_the_nodes():
@@ -127,7 +122,6 @@ def test_normals_of_opposed_walls_do_not_cancel():
     # and turn with the surface between the nodes
     angle = 0.3 * NODES[:, 1]
     turning = np.stack([np.sin(angle), np.zeros(10), np.cos(angle)], axis=1)
-    found = normals_at_points(turning, points)
-    np.testing.assert_allclose(
-        np.arctan2(found[:, 0], found[:, 2]), 0.3 * points.barycentric[:, 1], atol=2e-3
-    )
+    x, _, z = normals_at_points(turning, points).T
+    expected = 0.3 * points.barycentric[:, 1]
+    np.testing.assert_allclose(np.arctan2(x, z), expected, atol=2e-3)

@@ -4,7 +4,7 @@ does not know of it."""
 from itertools import pairwise
 
 import numpy as np
-from shapes import box_mesh
+from shapes import box_mesh, scaling
 from skimage.measure import marching_cubes
 
 from gyriflow.folding.elastic_fit import ElasticFit
@@ -29,29 +29,22 @@ DEPTHS_MM = (0.0, 1.5, 3.0)
 
 def grid(margin_mm):
     """Return the (3, i, j, k) places of a grid around the block, and its affine."""
-    sides = [
-        np.arange(low - margin_mm, low + size + margin_mm + 1e-9, VOXEL_MM)
-        for low, size in zip(
-            (-SIZE_MM[0] / 2, -SIZE_MM[1] / 2, -SIZE_MM[2]), SIZE_MM, strict=True
-        )
-    ]
-    affine = np.diag([VOXEL_MM] * 3 + [1.0])
-    affine[:3, 3] = [side[0] for side in sides]
-    return np.stack(np.meshgrid(*sides, indexing="ij")), affine
+    low = -SIZE_MM / [2, 2, 1] - margin_mm
+    shape = ((SIZE_MM + 2 * margin_mm) / VOXEL_MM).astype(int) + 1
+    places = VOXEL_MM * np.indices(shape) + low.reshape(3, 1, 1, 1)
+    return places, scaling(VOXEL_MM, low)
 
 
 def block_with_slit(depth_mm):
     """Return the surface of the block with a slit; its bottom is half an ellipse."""
     (x, y, z), affine = grid(2 * VOXEL_MM)
     over = np.abs([x, y, z + SIZE_MM[2] / 2]) - SIZE_MM.reshape(3, 1, 1, 1) / 2
-    signed = np.linalg.norm(np.maximum(over, 0), axis=0) + np.minimum(
-        over.max(axis=0), 0
-    )
+    outside = np.linalg.norm(np.maximum(over, 0), axis=0)
+    signed = outside + np.minimum(over.max(axis=0), 0)
     depth = depth_mm * np.sqrt(np.clip(1 - (y / HALF_LENGTH_MM) ** 2, 0, 1))
     slit = np.where(depth > 0.2, np.maximum(np.abs(x) - WIDTH_MM / 2, -z - depth), 0.3)
-    places, faces, _, _ = marching_cubes(
-        np.maximum(signed, -slit), 0.0, spacing=(VOXEL_MM,) * 3
-    )
+    distance = np.maximum(signed, -slit)
+    places, faces, _, _ = marching_cubes(distance, 0.0, spacing=(VOXEL_MM,) * 3)
     return TriangleMesh(places + affine[:3, 3], faces)
 
 
@@ -68,10 +61,8 @@ def registration(before_mm, after_mm):
 
 
 def area_at_slit(surface):
-    centres = corners(surface).mean(axis=1)
-    near = (
-        (np.abs(centres[:, 0]) < 6) & (np.abs(centres[:, 1]) < 7) & (centres[:, 2] > -6)
-    )
+    x, y, z = corners(surface).mean(axis=1).T
+    near = (np.abs(x) < 6) & (np.abs(y) < 7) & (z > -6)
     return face_areas(surface)[near].sum()
 
 
@@ -80,14 +71,8 @@ def test_a_body_opens_a_slit_that_registration_does_not_know():
     mesh = TetrahedralMesh(box.vertices - [0, 0, SIZE_MM[2] / 2], box.tets)
     surfaces = [block_with_slit(depth) for depth in DEPTHS_MM]
     pairs = [registration(*depths) for depths in pairwise(DEPTHS_MM)]
-    shapes = follow_series(
-        mesh,
-        range(len(surfaces)),
-        pairs,
-        surfaces[1:],
-        ElasticFit(mesh),
-        has_slits=True,
-    )
+    body = ElasticFit(mesh)
+    shapes = follow_series(mesh, range(3), pairs, surfaces[1:], body, has_slits=True)
     faces, used = boundary_surface(mesh)[0].faces, boundary_surface(mesh)[1]
     start = area_at_slit(surfaces[0])
     for week, surface in enumerate(surfaces[1:], start=1):

@@ -17,14 +17,12 @@ from gyriflow.folding import (
     output,
     run,
     steering,
-    step_fields,
     stretches,
     targets,
 )
 from gyriflow.folding.checks import zone_report
-from gyriflow.folding.contact import small_gap_mm, stiffening
+from gyriflow.folding.contact import stiffening
 from gyriflow.folding.domain import bisect_points
-from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.folding.start_regions import start_regions
 from gyriflow.folding.tangent import part_arms, rigid_motions
 from gyriflow.folding.zones import zones_of_run
@@ -166,19 +164,6 @@ def x_of(mesh):
     return corners(boundary_surface(mesh)[0])[:, :, 0].mean(axis=1)
 
 
-def test_numbers_of_steering(recorded):
-    results = {}
-    made = np.array([[2.0, 0.3], [1.2, 1.75]])
-    for required in ((0.9, 1.1), (2.5, 0.1), (0.01, 3.0)):
-        results[f"{required}"] = steering.steered_rates(
-            np.array(required), made, (0.0, 1.0)
-        )
-    row = {"week": 23.0, "area_cm2": 97.0, "area_aim_cm2": 100.0}
-    row |= {"volume_ml": 52.0, "volume_aim_ml": 50.0}
-    results["missed"] = steering.missed_curves(row)
-    recorded(results)
-
-
 def test_numbers_of_growth_on_a_path(recorded):
     mesh = uneven_body(4)
     p = parameters_from(RUN | KINDS["shapes"])
@@ -206,8 +191,6 @@ def test_numbers_of_tensors(recorded):
     gradients = stretches.deformation_gradients(
         mesh.vertices, target(mesh), mesh.tets, SLOPES[None]
     )
-    stress = gradients @ np.swapaxes(gradients, -1, -2) * 300.0
-    normal = np.broadcast_to([0.6, 0.0, 0.8], (len(gradients.reshape(-1, 9)), 3))
     flat = gradients.reshape(-1, 3, 3)
     logs = stretches.log_stretch(flat, limit=0.06)
     powers = np.where(np.arange(len(flat)) % 2, 1.0, 0.4)
@@ -220,12 +203,6 @@ def test_numbers_of_tensors(recorded):
             "left logs": stretches.log_stretch(flat, left=True),
             "left": stretches.left_stretch(flat, 0.4),
             "relaxed": stretches.relaxed(stretches.left_stretch(flat), 0.3, 1.2),
-            "pressure": step_fields.pressure(stress),
-            "von Mises": step_fields.von_mises(stress),
-            "principal": step_fields.principal_stretches(flat),
-            "Hencky": step_fields.hencky_equivalent(flat),
-            "Green": step_fields.green_lagrange_maximum(flat),
-            "area": step_fields.areal_stretch(flat, normal),
             "logarithm": elastic_fit.inverse_exponential(logs),
         },
         rtol=1e-3,
@@ -236,18 +213,12 @@ def test_numbers_of_parts_and_contact(recorded):
     mesh = uneven_body(4)
     part = bisect_points(mesh.vertices, 5)
     arms = part_arms(mesh.vertices, part)
-    lengths = np.linspace(0.3, 2.0, 50) ** 2
     recorded(
         {
             "parts": part,
             "arms": arms,
             "motions": rigid_motions(arms),
-            "small gap": small_gap_mm(lengths),
             "stiffening": [stiffening(gap) for gap in (1e-9, 0.01, 0.3, np.inf)],
-            "memory": [
-                predicted_memory_mib(250_000, 2, "global"),
-                predicted_memory_mib(250_000, 4, "planes", 2),
-            ],
         }
     )
 

@@ -52,30 +52,23 @@ def misfits_after_steps(mesh, misfit, steps):
     positions = mesh.vertices + misfit
     misfits = [without_rigid_motion(positions, path(21.0), sizes)]
     for number in range(steps):
-        growth = growth_on_path(
-            p, inputs, path, StepStart(positions, number * DAY_S, DAY_S)
-        )
-        positions = growth.goal_mm
-        misfits.append(
-            without_rigid_motion(positions, path(21.0 + (number + 1) * DAY_GW), sizes)
-        )
+        start = StepStart(positions, number * DAY_S, DAY_S)
+        positions = growth_on_path(p, inputs, path, start).goal_mm
+        on_path = path(21.0 + (number + 1) * DAY_GW)
+        misfits.append(without_rigid_motion(positions, on_path, sizes))
     return misfits
-
-
-def remaining_share(before, after):
-    """Return the part of a misfit (n, 3) that remains: by projection, so that what else
-    changed does not count."""
-    return float((before * after).sum() / (before**2).sum())
 
 
 @pytest.mark.parametrize("steps", [1, 3])
 def test_feedback_makes_up_for_a_misfit_with_its_time_constant(steps):
     x, y, z = FREE_BODY.vertices.T
     waves = 0.4 * np.stack([np.sin(y / 8), np.cos(z / 8), np.sin(x / 8)], axis=1)
-    misfits = misfits_after_steps(FREE_BODY, waves, steps)
-    assert np.sqrt((misfits[0] ** 2).sum(axis=1)).max() > 0.3
+    before, *_, after = misfits_after_steps(FREE_BODY, waves, steps)
+    assert np.linalg.norm(before, axis=1).max() > 0.3
+    # by projection, so that what else changed does not count
+    remaining = (before * after).sum() / (before**2).sum()
     expected = np.exp(-steps * DAY_GW / FEEDBACK_GW)
-    assert remaining_share(misfits[0], misfits[-1]) == pytest.approx(expected, abs=0.01)
+    assert remaining == pytest.approx(expected, abs=0.01)
 
 
 def test_a_map_of_growth_has_the_error_of_its_elements():
@@ -88,9 +81,7 @@ def test_a_map_of_growth_has_the_error_of_its_elements():
 
 def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goal():
     p = parameters_from(RUN)
-    tets = (
-        np.array([[0, 1, 2, 3], [0, 1, 2, 3], [0, 1, 2, 3]]) + 4 * np.arange(3)[:, None]
-    )
+    tets = np.arange(12).reshape(3, 4)
     single = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     goals = np.concatenate(
         [single * [1.5, 1.0, 1.0], single * [3.0, 1.0, 1.0], single * [1.0, 1.0, -1.2]]
@@ -119,20 +110,16 @@ def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goa
 
 def test_a_run_off_its_path_tells_how_far_and_how_many_elements_were_held_in_any_step():
     row = {"week": 23.0, "to_path_mm": 0.15, "held_elements": 0}
-    assert (
-        missed_targets([row])
-        == missed_targets([])
-        == missed_targets([{"week": 22.0}])
-        == []
-    )
+    for rows in ([row], [], [{"week": 22.0}]):
+        assert missed_targets(rows) == []
     assert missed_targets([row | {"to_path_mm": 0.25}]) == [Facts("GW 23", "0.25 mm")]
     assert missed_targets([row | {"held_elements": 7}, row]) == [Facts("GW 23", 7)]
-    steps = [
-        {"shrinking_elements": 3, "min_J": 0.4},
-        {"shrinking_elements": 0, "min_J": 0.9},
-    ]
-    assert shrinkage_note(steps) == Facts(3, "10%", "0.40")
-    assert shrinkage_note(steps[1:]) == ""
+    shrinking, growing = (
+        {"shrinking_elements": count, "min_J": ratio}
+        for count, ratio in ((3, 0.4), (0, 0.9))
+    )
+    assert shrinkage_note([shrinking, growing]) == Facts(3, "10%", "0.40")
+    assert shrinkage_note([growing]) == ""
 
 
 def test_shapes_of_a_run_are_those_after_its_start_and_reach_to_its_end():

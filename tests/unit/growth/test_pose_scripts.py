@@ -58,25 +58,18 @@ GROWN = rigid(5.0, -4.0, 8.0, shift=(6.0, -3.0, 2.0)) @ scaling(1.1)
 """From the files of the first brain to those of the second: larger and turned a
 little."""
 NAMES = {1: "a", 2: "b", 3: "c", 4: "d"}
-WHETHER_POSED = pytest.mark.parametrize(
-    "posed", [(False, False), (True, False), (False, True), (True, True)]
-)
-
-
-def spread(matrix) -> Deformation:
-    """Return the registration that is an affine map, on a grid around the origin."""
-    return Deformation(matrix, np.zeros((21, 21, 21, 3)), scaling(6.0, -60.0))
+WHETHER_POSED = pytest.mark.parametrize("posed", [(True, False), (False, True)])
 
 
 def write_pair(folder, name, matrix, worlds, posed) -> None:
-    """Write the correspondence of two brains, from and to the posed ones if so."""
+    """Write the affine correspondence of two brains, from and to the posed ones if
+    so."""
     first, second = (
         world if is_posed else np.eye(4)
         for world, is_posed in zip(worlds, posed, strict=True)
     )
-    write_correspondence(
-        folder / name, between_moved(spread(matrix), first, second), {}
-    )
+    affine = Deformation(matrix, np.zeros((21, 21, 21, 3)), scaling(6.0, -60.0))
+    write_correspondence(folder / name, between_moved(affine, first, second), {})
 
 
 def write_brains(folder, posed) -> dict[str, dict[str, TriangleMesh]]:
@@ -181,9 +174,9 @@ def test_maps_come_to_the_template_from_the_brain(tmp_path, posed):
     assert found["x"] == pytest.approx(template.vertices[:, 0], abs=0.1)
     assert found["template_distance_mm"].max() < 0.3
     # of the template itself nothing is carried
-    own = {name: file for name, file in inputs.items() if name != "correspondence"}
-    own |= {"template": "second.right.gii", "template_report": "second.json"}
-    run_script("template_maps.py", tmp_path, own, {0: "found.gii"}, **job)
+    del inputs["correspondence"]
+    inputs |= {"template": "second.right.gii", "template_report": "second.json"}
+    run_script("template_maps.py", tmp_path, inputs, {0: "found.gii"}, **job)
     assert read_vertex_maps(tmp_path / "found.gii")["x"] == pytest.approx(x)
 
 
@@ -202,9 +195,8 @@ def test_matched_surfaces_correspond_in_the_coordinates_of_the_files(tmp_path):
         for side, mesh in halves.items():
             in_file = transformed(transformed(mesh, grown), np.linalg.inv(poses[side]))
             write_surface(tmp_path / f"{number}.{side}.gii", in_file)
-        brains.append(
-            transformed(merged(*halves.values()), np.linalg.inv(world) @ grown)
-        )
+        whole = merged(*halves.values())
+        brains.append(transformed(whole, np.linalg.inv(world) @ grown))
     files = [
         [str(tmp_path / f"{number}.{side}.gii") for side in SIDES] for number in (0, 1)
     ]
@@ -233,7 +225,7 @@ def write_ball(path, semi_axes, centre, spacing_mm=2.0) -> LabelSource:
 
 
 def test_a_registration_leads_from_the_earlier_brain_to_the_later_one(tmp_path):
-    small, large = np.array([14.0, 20.0, 16.0]), np.array([16.0, 23.0, 18.0])
+    small, large = (14.0, 20.0, 16.0), (16.0, 23.0, 18.0)
     at, later_at = np.array([120.0, -200.0, 150.0]), np.array([110.0, -190.0, 155.0])
     sources = [
         write_ball(tmp_path / "a.nii.gz", small, at),
@@ -286,7 +278,7 @@ def test_a_series_is_followed_through_the_poses_of_its_brains(tmp_path, monkeypa
     assert kept.positions == pytest.approx(found.positions)
 
 
-@pytest.mark.parametrize("posed", [(False, False), (True, False), (False, True)])
+@WHETHER_POSED
 def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
     """The brain is the atlas' of 22 GW, and grows as it does: by 4 % a week."""
     atlas = ellipsoid_mesh(6, (14.0, 20.0, 16.0))
@@ -313,10 +305,9 @@ def test_a_brain_is_predicted_from_its_place_in_the_atlas(tmp_path, posed):
     # on all brains of the atlas
     assert list(found.placed) == [21.0, 22.0, 23.0, 24.0, 25.0]
     volumes = found.sizes["volume_ml"]
-    assert volumes / volumes[0] == pytest.approx(
-        1.04 ** (3 * (found.weeks - 22.0)), rel=0.01
-    )
-    if posed == (False, False):
+    expected = 1.04 ** (3 * (found.weeks - 22.0))
+    assert volumes / volumes[0] == pytest.approx(expected, rel=0.01)
+    if posed == (True, False):
         # a member: older than stated, so it grows as one of the atlas half a week later
         scales = {"difference_smoothing_mm": 8.0, "fading_gw": 4.0, "lasting": 0.5}
         params["variation"] = Variation(0, 1, 1.0, age_shift_gw=0.5, **scales)

@@ -30,7 +30,6 @@ from gyriflow.growth import (
     registration,
     series_shapes,
 )
-from gyriflow.settings.folding import params_content
 
 WEEKS = np.array([21.0, 21.0, 22.5, 23.0, 25.0, 25.0, 26.5, 28.0])
 
@@ -82,8 +81,6 @@ def test_numbers_of_curves(recorded):
     at = np.array([20.0, 21.7, 24.0, 29.0])
     growth = {"model": "sizes", "area_cm2": "measured", "volume_ml": {21: 40, 27: 99}}
     weeks = [21.0, 22.0, 24.0]
-    sizes = {"area_cm2": {21.0: 90.0, 23.0: 120.0, 24.0: 150.0}}
-    surface = {"fissure_x_mm": 1.5, "side": "left"}
     recorded(
         {
             "fits": fits,
@@ -94,15 +91,6 @@ def test_numbers_of_curves(recorded):
             "rates": [curves.rate(kept.curve, at)],
             "followed": curves.followed_sizes(growth, table, "surface", weeks, False),
             "sizes": curves.sizes_on_curves({"model": "rates"}, table, "volume", weeks),
-            "parameters": params_content(
-                {"growth": {"model": "shapes"}, "thickness_mm": 2.0},
-                {"model": "shapes"}
-                | curves.followed_sizes(sizes, table, "volume", weeks, True),
-                weeks,
-                surface,
-                [23.0, 24.0],
-                [23.0],
-            ),
         }
     )
 

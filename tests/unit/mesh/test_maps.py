@@ -4,12 +4,22 @@ surfaces are refused."""
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import FAR, LONG_MM, box_mesh, ellipsoid_mesh, rigid, scaling, sphere
+from shapes import (
+    FAR,
+    LONG_MM,
+    box_mesh,
+    ellipsoid,
+    ellipsoid_mesh,
+    moved,
+    rigid,
+    scaling,
+    sphere,
+)
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
-from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.geometry.triangles import TriangleMesh, submesh, transformed
 from gyriflow.mesh.maps import (
     move_to_mesh,
     require_within,
@@ -61,11 +71,8 @@ LEFT_HALF = SPHERE.vertices[SPHERE.faces][:, :, 0].mean(axis=1) < 0
     [
         (sphere(RADIUS + 4.8, 3), None),
         (sphere(RADIUS + 5.2, 3), r"5\.\d mm .*5\.\d mm "),
-        (transformed(SPHERE, rigid(shift=(30.0, 0, 0))), r"28\.\d mm .*16\.\d mm "),
-        (
-            TriangleMesh(SPHERE.vertices, SPHERE.faces[LEFT_HALF]),
-            r"20\.\d mm .*0\.\d mm ",
-        ),
+        (moved(SPHERE, 30.0), r"28\.\d mm .*16\.\d mm "),
+        (submesh(SPHERE, LEFT_HALF)[0], r"20\.\d mm .*0\.\d mm "),
     ],
     ids=["near", "inflated", "elsewhere", "one hemisphere"],
 )
@@ -79,29 +86,24 @@ def test_a_surface_may_lie_5_mm_from_the_mesh(ball, surface, found):
             vertex_map_on_mesh(ball.vertices, facets, surface, values, "a.shape.gii")
 
 
-@pytest.mark.parametrize("is_posed", [False, True])
-def test_a_turned_brain_takes_its_map_in_either_coordinates(is_posed):
+def test_a_turned_brain_takes_its_map_in_either_coordinates():
     matrix = rigid(5, 0, 8, shift=(4.0, -3.0, 2.0))
-    brain = ellipsoid_mesh(8, (15.0, 20.0, 12.0))
-    facets, _ = boundary_faces(brain)
-    surface = TriangleMesh(brain.vertices, facets)
+    surface = ellipsoid((15.0, 20.0, 12.0), 3)
     posed = transformed(surface, matrix)
-    points = posed.vertices[np.unique(facets)]
-    found = move_to_mesh(points, posed if is_posed else surface, matrix)
-    np.testing.assert_allclose(found.vertices, posed.vertices)
+    for given in (surface, posed):
+        found = move_to_mesh(posed.vertices, given, matrix)
+        np.testing.assert_allclose(found.vertices, posed.vertices)
 
 
 def test_the_outermost_voxels_are_covered_to_their_rim():
     data = np.arange(4.0)[:, None, None] * np.ones((4, 5, 6))
     affine = FAR[0] @ scaling(LONG_MM)
     corners = np.array([[-0.5, 1, 1], [0.25, 1, 1], [3.5, 4.5, 5.5]])
-    assert volume_map_on_mesh(
-        transform_points(corners, affine), data, affine
-    ) == pytest.approx([0.0, 0.25, 3.0])
+    found = volume_map_on_mesh(transform_points(corners, affine), data, affine)
+    assert found == pytest.approx([0.0, 0.25, 3.0])
 
 
-@pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize("is_first", [True, False])
+@pytest.mark.parametrize(("axis", "is_first"), [(0, True), (2, False)])
 def test_a_vertex_outside_a_volume_is_refused_at_each_of_its_ends(axis, is_first):
     data = np.ones((4, 5, 6))
     affine = FAR[0] @ scaling(LONG_MM)

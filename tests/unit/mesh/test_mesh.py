@@ -9,7 +9,7 @@ import pytest
 import shapes
 from facts import Facts
 from scripts import run_script
-from shapes import box_mesh, inner_edges_of_the_surface, moved, sphere
+from shapes import box_mesh, inner_edges_of_the_surface, joined, moved, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.matching import nearest_on
@@ -184,7 +184,6 @@ BRIDGE = box_mesh((1, 6, 2), (0.5, 6.0, 2.0))
 @pytest.mark.parametrize(
     ("left_open", "parts", "kept"),
     [
-        (0.5, [], 1.0),
         (0.7, [], 1.0),
         (0.3, [], 1.0),
         (0.2, [], 0.0),
@@ -195,13 +194,9 @@ BRIDGE = box_mesh((1, 6, 2), (0.5, 6.0, 2.0))
 )
 def test_a_gap_is_kept_where_half_of_its_width_is(left_open, parts, kept):
     half = box_mesh((4, 6, 6), (4.0, 6.0, 6.0))
-    shift = [2 + left_open / 2, 0, 0]
-    vertices = [half.vertices - shift, half.vertices + shift]
-    tets = [half.tets, half.tets + len(half.vertices)]
-    for part in parts:
-        tets.append(part.tets + 2 * len(half.vertices))
-        vertices.append(part.vertices + [0, 0, 2.0])
-    mesh = TetrahedralMesh(np.vstack(vertices), np.vstack(tets))
+    shift = np.array([2 + left_open / 2, 0, 0])
+    bridges = [(part, [0, 0, 2.0]) for part in parts]
+    mesh = joined((half, -shift), (half, shift), *bridges)
     found = quality_summary(mesh, two_boxes(0.5))["gap_kept"]
     assert found == pytest.approx(kept, abs=0.05)
     assert quality_summary(mesh, two_boxes(4.0))["gap_kept"] is None
@@ -258,7 +253,7 @@ def test_the_folder_of_a_mesher_is_its_users_only(stand_in):
     before = os.umask(0)
     try:
         with pytest.raises(MeshError, match="mode 700"):
-            tetrahedralise(BALL, mesher="tetgen", **SIZES)
+            by_tetgen(BALL)
     finally:
         os.umask(before)
 
@@ -280,7 +275,7 @@ def test_a_mesher_that_is_not_installed_is_said_so(stand_in):
     stand_in("tetgen", "raise ImportError('cannot find its library')")
     facts = Facts("tetgen", "cannot find its library", "envs/requirements.txt")
     with pytest.raises(MeshError, check=facts):
-        tetrahedralise(BALL, mesher="tetgen", **SIZES)
+        by_tetgen(BALL)
 
 
 def mesh_in(folder, mesher, gates=GATES):
@@ -337,17 +332,22 @@ def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_at
     assert not refused.exists()
 
 
+def by_tetgen(surface, surface_edge_mm=SIZES["surface_edge_mm"], **changes):
+    """Return the elements of TetGen."""
+    sizes = SIZES | {"surface_edge_mm": surface_edge_mm} | changes
+    return tetrahedralise(surface, mesher="tetgen", **sizes)
+
+
 @pytest.fixture(scope="module")
 def filled():
-    return tetrahedralise(BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2}))
+    return by_tetgen(BALL, 1.2)
 
 
 def test_tetgen_keeps_the_remeshed_surface_exactly(filled):
     own, even = boundary_surface(filled)[0], remesh(BALL, 1.2)
     assert len(own.faces) == len(even.faces)
-    np.testing.assert_array_equal(
-        *(np.unique(surface.vertices, axis=0) for surface in (own, even))
-    )
+    found, expected = (np.unique(mesh.vertices, axis=0) for mesh in (own, even))
+    np.testing.assert_array_equal(found, expected)
     assert (signed_volumes(filled) > 0).all()
     assert signed_volumes(filled).sum() == pytest.approx(signed_volume(even), rel=1e-12)
 
@@ -359,33 +359,23 @@ def test_elements_of_tetgen_grow_inwards_up_to_the_core(filled):
     # the regular element with edges of core_edge_mm; a few that touch the surface can't
     # be divided
     largest = 1.5**3 / (6 * np.sqrt(2))
-    fine = tetrahedralise(
-        BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2, "core_edge_mm": 1.5})
-    )
-    assert (
-        np.quantile(signed_volumes(fine), 0.99) <= largest < np.quantile(volumes, 0.7)
-    )
+    fine = by_tetgen(BALL, 1.2, core_edge_mm=1.5)
+    assert np.quantile(signed_volumes(fine), 0.99) <= largest
+    assert largest < np.quantile(volumes, 0.7)
 
 
 def test_a_narrow_gap_between_two_parts_stays_open():
     half = sphere(4.0, 3)
-    apart = moved(half, 8.2)
-    mesh = tetrahedralise(
-        merged(half, apart), mesher="tetgen", **(SIZES | {"surface_edge_mm": 0.6})
-    )
-    left, right = (
-        mesh.vertices[side]
-        for side in (mesh.vertices[:, 0] < 4.1, mesh.vertices[:, 0] > 4.1)
-    )
-    assert right[:, 0].min() - left[:, 0].max() == pytest.approx(0.2, abs=0.03)
+    mesh = by_tetgen(merged(half, moved(half, 8.2)), 0.6)
+    x = mesh.vertices[:, 0]
+    assert x[x > 4.1].min() - x[x < 4.1].max() == pytest.approx(0.2, abs=0.03)
     assert radius_ratios(mesh).min() > 0.02
 
 
 def test_a_surface_that_cuts_itself_is_refused():
     half = sphere(4.0, 2)
-    into = moved(half, 5.0)
     with pytest.raises(MeshError, match=r"335 mm3 .*518|\d .*1\.50 mm"):
-        tetrahedralise(merged(half, into), mesher="tetgen", **SIZES)
+        by_tetgen(merged(half, moved(half, 5.0)))
 
 
 @pytest.mark.parametrize(
@@ -408,15 +398,7 @@ def test_few_quadratic_elements_follow_the_surface(mesher, max_tets):
 
 def test_no_side_of_a_quadratic_element_joins_two_corners_on_the_surface():
     surface = box((8.0, 6.0, 2.0))
-    linear, bent = (
-        tetrahedralise(
-            surface,
-            mesher="tetgen",
-            order=order,
-            **(SIZES | {"surface_edge_mm": 2.0 / order}),
-        )
-        for order in (1, 2)
-    )
+    linear, bent = (by_tetgen(surface, 2.0 / order, order=order) for order in (1, 2))
     # elements of the same size have such sides until these are split
     assert inner_edges_of_the_surface(linear)
     corners = TetrahedralMesh(bent.vertices, bent.corners)
@@ -429,9 +411,8 @@ def test_a_node_that_would_fold_its_element_over_stays_back():
     cube = box_mesh((3, 3, 3), (2.0, 2.0, 2.0))
     length = np.linalg.norm(cube.vertices, axis=1, keepdims=True)
     outer = np.unique(boundary_faces(cube)[0])
-    vertices = cube.vertices.copy()
-    vertices[outer] = 8.0 * vertices[outer] / length[outer]
-    vertices[np.setdiff1d(np.arange(len(vertices)), outer)] *= 4.0
+    vertices = 4.0 * cube.vertices
+    vertices[outer] = 8.0 * cube.vertices[outer] / length[outer]
     mesh = curve_edges(TetrahedralMesh(vertices, cube.tets), sphere(8.0, 4))
     ratios = jacobian_ratios(mesh)
     assert 0 < ratios.min() < 0.5

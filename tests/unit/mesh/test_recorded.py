@@ -7,6 +7,7 @@ from shapes import (
     LONG_MM,
     box,
     box_mesh,
+    joined,
     scaling,
     smooth_field,
     uneven_body,
@@ -66,10 +67,7 @@ def test_numbers_of_quality(recorded):
     below = box((8.0, 6.0, 2.0), subdivisions=3)
     above = box((7.0, 6.5, 2.0), (0.4, 0.3, 2.6), subdivisions=3)
     plates = box_mesh((8, 6, 2), (8.0, 6.0, 2.0))
-    near = TetrahedralMesh(
-        np.concatenate([plates.vertices, plates.vertices + [0.9, 0.3, 2.35]]),
-        np.concatenate([plates.tets, plates.tets + len(plates.vertices)]),
-    )
+    near = joined((plates, np.zeros(3)), (plates, [0.9, 0.3, 2.35]))
     summary = quality.quality_summary(mesh, surface)
     recorded(
         {
