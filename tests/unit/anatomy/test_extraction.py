@@ -41,14 +41,6 @@ def test_ball_has_its_area_volume_and_place(ball, signs):
     assert surface.vertices.mean(axis=0) == pytest.approx(centre, abs=0.05)
 
 
-def test_cavities_are_filled_and_the_surface_is_a_sphere(ball):
-    hollow = ball.copy()
-    hollow[14:20, 14:20, 14:20] = False
-    field, report = make_simple(smooth_mask(hollow, 1.0))
-    assert report["voxels_filled"] > 100
-    assert euler_number(isosurface(field, np.eye(4))) == 2
-
-
 def test_structure_thinner_than_the_smoothing_is_refused():
     thin = np.zeros((20, 20, 20), dtype=bool)
     thin[10, 5:15, 5:15] = True
@@ -72,20 +64,6 @@ def test_slit_one_voxel_wide_stays_open_at_its_width():
     assert removed == pytest.approx(24 * 16 * 0.5**3, rel=0.2)
     # two walls more, less the slit's own opening
     assert area(opened) - area(block) == pytest.approx(2 * 24 * 16 * 0.5**2, rel=0.2)
-
-
-@pytest.mark.parametrize("case", ["rough labels", "a slit that pierces the mask"])
-def test_what_is_no_slit_stays_as_smoothing_leaves_it(case):
-    mask = np.zeros((40, 40, 40), dtype=bool)
-    mask[8:32, 8:32, 8:32] = True
-    if case == "rough labels":
-        mask[8, 8:32, 8:32] = np.random.default_rng(0).random((24, 24)) > 0.2
-    else:
-        mask[20, 14:26, :] = False
-    field = smooth_mask(mask, 1.0)
-    same, reopened = remove_bridges(mask, field)
-    assert reopened == 0
-    np.testing.assert_array_equal(same, field)
 
 
 def field(mask):

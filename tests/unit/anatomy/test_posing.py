@@ -2,7 +2,6 @@
 file, or refused."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import odd_brains
@@ -10,16 +9,13 @@ import pytest
 from atlas_brains import atlas_brain, atlas_halves
 from facts import Facts
 from scipy.spatial.transform import Rotation
-from shapes import LPS, cerebrum_surface, ellipsoid, moved, phantom, rigid
+from shapes import LPS, cerebrum_surface, ellipsoid, phantom, rigid
 
-from gyriflow.anatomy import pose as posing
+from gyriflow.anatomy import template
 from gyriflow.anatomy.fissure import smallest_gap
 from gyriflow.anatomy.pial import from_hemispheres
 from gyriflow.anatomy.plausible import require_left_and_right
 from gyriflow.anatomy.pose import (
-    PosedShape,
-    axes_of_file,
-    pose_from_rotation,
     pose_of_hemisphere,
     pose_of_labels,
     pose_of_pair,
@@ -28,10 +24,9 @@ from gyriflow.anatomy.pose import (
     require_coordinates,
 )
 from gyriflow.anatomy.repair import pieces
-from gyriflow.anatomy.template import PointCloud, shape_of
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import MIRROR, angle_deg, motion
-from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.alignment import MIRROR, RigidFit, angle_deg, motion
+from gyriflow.geometry.poses import CONVENTIONS
 from gyriflow.geometry.triangles import (
     euler_number,
     flipped,
@@ -96,104 +91,16 @@ def test_separately_moved_hemispheres_are_posed(halves):
 
 
 @pytest.mark.parametrize(
-    ("degrees", "has_frame"),
+    ("there", "frame"),
     [
-        ((14.9, 0, 0), True),
-        ((-14.9, 0, 0), True),
-        ((15.2, 0, 0), False),
-        ((0, 9.9, 0), True),
-        ((0, 0, -9.9), True),
-        ((0, 10.1, 0), False),
-        ((0, 0, 10.1), False),
+        (drawn(3), None),
+        (LPS, "lps"),
+        # a pitch of up to 15° and a tilt of up to 10°
+        (rigid(9, 0, 0), "ras"),
+        (rigid(21, 0, 0), None),
+        (rigid(0, 0, -7) @ LPS, "lps"),
+        (rigid(0, 13, 0) @ LPS, None),
     ],
-)
-def test_a_pose_near_the_axes_of_a_convention_is_that_of_the_file(degrees, has_frame):
-    for frame, axes in (("ras", np.eye(4)), ("lps", LPS)):
-        found = posing._frame(rigid(*degrees) @ axes)
-        assert found == (frame if has_frame else None)
-
-
-@pytest.mark.parametrize(
-    ("degrees", "has_sides", "by", "warnings"),
-    [
-        ((14.5, 0, 0), True, "file", []),
-        ((15.6, 0, 0), True, "file", [Facts("16°", "hindbrain")]),
-        ((30.0, 44.0, 0), True, "file", [Facts("53°")]),
-        ((40.0, 55.0, 0), False, "hindbrain", [Facts("67°", "left", "right")]),
-        ((40.0, 55.0, 0), True, "hindbrain", [Facts("67°")]),
-        # a quarter turn, nearly and not nearly enough
-        ((76.0, 0, 0), True, "hindbrain", [Facts("90°")]),
-        ((74.0, 0, 0), True, "hindbrain", [Facts("74°")]),
-    ],
-)
-def test_a_volume_is_turned_if_it_is_far_from_its_axes(
-    degrees, has_sides, by, warnings
-):
-    turn = rigid(*degrees)[:3, :3]
-    pose = pose_from_rotation(turn, "the hindbrain", has_sides)
-    assert (pose.by, list(pose.warnings)) == (by, warnings)
-    if by == "file":
-        assert np.array_equal(pose.world, np.eye(4))
-    else:
-        angle = 90.0 if degrees[0] == 76.0 else angle_deg(turn)
-        assert angle_deg(pose.world[:3, :3]) == pytest.approx(angle, abs=1e-5)
-        assert has_sides != ("left" in pose.warnings[0])
-
-
-def posed_pair():
-    """Return the shapes of a left hemisphere, mirrored, and a right one, whose centres
-    and walls differ."""
-    cloud = PointCloud(np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(3), 20.0)
-    pair = []
-    for turn, centre, wall_mm in (
-        (rigid(10, 20, 30), [-80.0, 20.0, 50.0], -8.0),
-        (rigid(-20, 5, 60), [90.0, -30.0, 10.0], -9.5),
-    ):
-        shape = replace(cloud, centre=np.array(centre))
-        fit = turn[:3, :3], wall_mm, 0.05, 2.0, 1.2, np.eye(3)
-        pair.append(PosedShape("hemisphere", shape, *fit))
-    return pair
-
-
-@pytest.mark.parametrize(
-    ("turn_deg", "shift_mm", "declared", "expected"),
-    [
-        (4.9, (0.0, 0.0, 0.0), False, True),
-        (5.1, (0.0, 0.0, 0.0), False, False),
-        # a size is 20 mm
-        (0.0, (2.9, 0.0, 0.0), False, True),
-        (0.0, (-3.1, 0.0, 0.0), False, False),
-        (0.0, (0.0, 1.1, 1.1), False, True),
-        (0.0, (0.0, -1.2, 1.2), False, False),
-        (29.0, (0.0, 30.0, 0.0), True, True),
-        (31.0, (0.0, 0.0, 0.0), True, False),
-    ],
-)
-def test_files_of_nearly_one_pose_share_their_coordinates(
-    turn_deg, shift_mm, declared, expected
-):
-    left, right = posed_pair()
-    to_right = rigid(40.0, -70.0, 10.0, shift=(5.0, 6.0, 7.0))
-    # about the centre of the left one in its file
-    centre = MIRROR[:3, :3] @ left.shape.centre
-    about = motion(shift=centre) @ rigid(0, 0, turn_deg) @ motion(shift=-centre)
-    to_left = motion(shift=-np.array(shift_mm)) @ to_right @ about
-    found = posing._share_coordinates(to_left, to_right, left, right, declared)
-    assert found == expected
-    angle, shift = posing._difference(to_left, to_right, left)
-    assert angle == pytest.approx(turn_deg, abs=1e-5)
-    assert shift == pytest.approx(shift_mm, abs=1e-9)
-    # the mean of both motions, at the middle of both centres
-    mean = posing._mean_motion(to_left, to_right, left, right)
-    middle = 0.5 * (centre + right.shape.centre)
-    place = transform_points(middle, 0.5 * (to_left + to_right))
-    assert transform_points(middle, mean) == pytest.approx(place)
-    half = mean[:3, :3] @ to_right[:3, :3].T
-    assert angle_deg(half) == pytest.approx(turn_deg / 2, abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("there", "frame"), [(drawn(3), None), (np.eye(4), "ras"), (LPS, "lps")]
 )
 def test_hemispheres_of_one_pose_stay_together_and_keep_the_axes_of_a_convention(
     halves, there, frame
@@ -201,22 +108,40 @@ def test_hemispheres_of_one_pose_stay_together_and_keep_the_axes_of_a_convention
     pose = pose_of_pair(*both_moved(halves, there))
     assert pose.together
     np.testing.assert_array_equal(pose.of_file("left"), pose.of_file("right"))
-    require_upright(pose, there, there, pitch=5.0)
     assert pose.evidence["coordinates"] == frame
     assert pose.by == ("file" if frame else "shape")
     if frame:
-        np.testing.assert_array_equal(pose.of_file("left"), there)
+        np.testing.assert_array_equal(pose.of_file("left"), CONVENTIONS[frame])
+    else:
+        require_upright(pose, there, there, pitch=5.0)
 
 
-def test_files_that_name_one_system_stay_together_however_they_lie(halves):
-    lower, right = moved(halves[0], 0.0, 0.0, -9.0), halves[1]
-    apart = pose_of_pair(lower, right)
-    assert not apart.together
-    (warning,) = apart.warnings
-    assert 8.0 < float(re.search(r"([\d.]+) mm", warning)[1]) < 10.0
-    pose = pose_of_pair(lower, right, declared=True)
-    assert pose.together
-    np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))
+@pytest.mark.parametrize(
+    ("off", "declared", "together"),
+    [
+        (rigid(0, 0, 3), False, True),
+        (rigid(0, 0, 8), False, False),
+        (rigid(0, 0, 8), True, True),
+        (rigid(0, 0, 40), True, False),
+        (rigid(shift=(-2.0, 0.0, 0.0)), False, True),
+        (rigid(shift=(-9.0, 0.0, 0.0)), False, False),
+        (rigid(shift=(0.0, 0.0, -9.0)), False, False),
+        (rigid(shift=(0.0, 0.0, -9.0)), True, True),
+    ],
+)
+def test_files_of_nearly_one_pose_or_that_name_one_system_share_their_coordinates(
+    halves, off, declared, together
+):
+    centre = halves[0].vertices.mean(axis=0)
+    about = rigid(shift=centre) @ off @ rigid(shift=-centre)
+    pose = pose_of_pair(*both_moved(halves, about, np.eye(4)), declared=declared)
+    assert pose.together == together
+    if together:
+        np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))
+    elif shift_mm := np.linalg.norm(off[:3, 3]):
+        (warning,) = pose.warnings
+        found = float(re.search(r"([\d.]+) mm", warning)[1])
+        assert found == pytest.approx(shift_mm, abs=1.0)
 
 
 def test_brains_of_another_size_and_shape_are_posed(halves):
@@ -248,12 +173,6 @@ AXES = {
 }
 """Coordinates of files as (3, 3) matrices from RAS+, by their axes; all but RAS, RPI
 and PIR mirror."""
-
-
-def test_the_axes_of_a_file_are_named():
-    assert [axes_of_file(axes.T) for axes in AXES.values()] == list(AXES)
-    assert axes_of_file(rigid(40, 0, 0)[:3, :3]) == ""
-    assert axes_of_file(rigid(20, -9, 12)[:3, :3]) == "RAS"
 
 
 @pytest.mark.parametrize(
@@ -339,12 +258,10 @@ def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
 
 def test_doubtful_shapes_are_taken_as_ras_or_refused(halves, monkeypatch):
     # as if another pose of every hemisphere fitted the template nearly as well
-    by_shape = posing.hemisphere_by_shape
-
-    def doubtful(mesh):
-        return replace(by_shape(mesh), confidence=1.05)
-
-    monkeypatch.setattr(posing, "hemisphere_by_shape", doubtful)
+    search = template.register_from_all_sides
+    monkeypatch.setattr(
+        template, "register_from_all_sides", lambda *shapes: (search(*shapes)[0], 1.05)
+    )
     pose = pose_of_pair(*both_moved(halves, rigid(9, -14, 12)))
     assert pose.by == "default"
     np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))
@@ -462,13 +379,16 @@ def test_exchanged_files_are_refused_though_the_left_one_lies_on_the_left(halves
 def test_odd_shapes_in_named_coordinates_are_doubted_and_measured(
     halves, monkeypatch, turn, confidence, ratios
 ):
-    # as if hemispheres in RAS fitted the other sides better, in axes turned by `turn`
-    fit = turn[:3, :3], 0.0, 0.05, confidence
-    found = iter([*ratios, 1.2, 1.2])
+    # as if hemispheres in RAS fitted the other sides better, in axes turned by `turn`:
+    # the residual of each shape, then that of its mirror image
+    residuals = iter(
+        [0.05, 0.05 * ratios[0], 0.05, 0.05 * ratios[1], *[0.05, 0.06] * 2]
+    )
 
-    def posed(mesh):
-        return PosedShape("hemisphere", shape_of(mesh), *fit, next(found), np.eye(3))
+    def found(*_):
+        fit = RigidFit(turn[:3, :3], np.zeros(3), 0.05 * next(residuals))
+        return fit, confidence
 
-    monkeypatch.setattr(posing, "hemisphere_by_shape", posed)
+    monkeypatch.setattr(template, "register_from_all_sides", found)
     (doubt,) = require_coordinates(*halves, "ras")
     assert doubt == Facts("left", "right", "RAS", "coordinates: auto")

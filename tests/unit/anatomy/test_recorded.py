@@ -7,6 +7,7 @@ import numpy as np
 import odd_brains
 import pytest
 import shapes
+from atlas_brains import atlas_halves
 from phantoms import CEREBELLUM, CORTEX
 from recording import answer_of, numbers_in
 from shapes import FAR, LONG_MM, rigid, scaling
@@ -70,6 +71,7 @@ def test_numbers_of_label_volumes(recorded):
     layout = labels.layout_of(volume)
     faulty = np.where(volume == CEREBELLUM, CORTEX, volume)
     faulty[2:6, 2:5, 2:4] = CORTEX
+    without = np.where(np.isin(volume, ATLAS.ventricles), 0, volume)
     cut, its_affine = odd_brains.crop(volume, affine)
     schemes = {}
     for name, scheme in SCHEMES.items():
@@ -82,10 +84,7 @@ def test_numbers_of_label_volumes(recorded):
             "schemes": schemes,
             "counts": layout.count,
             "contacts": layout.contact,
-            "outside ventricles": labels.outside_ventricles(volume, ATLAS),
-            "unlabelled": labels.unlabelled_ventricles(
-                np.where(np.isin(volume, ATLAS.ventricles), 0, volume), ATLAS, affine
-            ),
+            "unlabelled": labels.read_cerebrum(without, affine, ATLAS),
             "border": labels.border_share(cut > 0),
             "misplaced": answer_of(misplaced.misplaced_cortex, faulty, affine, ATLAS),
         },
@@ -169,29 +168,47 @@ def test_numbers_of_a_fissure(recorded):
     )
 
 
+TURNS = {
+    "small": rigid(4.0, -3.0, 2.0),
+    "oblique": rigid(30.0, 44.0, -10.0),
+    "quarter": rigid(88.0, 3.0, 1.0),
+    "half": rigid(2.0, -4.0, 176.0),
+    "far": FAR[1],
+}
+
+
+def numbers_of(found):
+    """Return the fields of a pose, of warnings only the numbers."""
+    texts = [numbers_in(text) for text in found.warnings]
+    return vars(found) | {"warnings": texts}
+
+
 def test_numbers_of_poses(recorded):
     volume, affine = brain()
-    turns = {
-        "small": rigid(4.0, -3.0, 2.0),
-        "oblique": rigid(30.0, 44.0, -10.0),
-        "quarter": rigid(88.0, 3.0, 1.0),
-        "half": rigid(2.0, -4.0, 176.0),
-        "far": FAR[1],
-    }
+    sided = odd_brains.add_sides(volume, shapes.phantom(24.0, VOXEL_MM)[1])
     results = {}
-    for name, turn in turns.items():
-        rotation = turn[:3, :3]
-        found = answer_of(pose.pose_of_labels, volume, turn @ affine, ATLAS)
+    for name, turn in TURNS.items():
+        for key, labelled, scheme in (
+            ("labels", volume, ATLAS),
+            ("sided", sided, SCHEMES["dhcp-19"]),
+        ):
+            found = pose.pose_of_labels(labelled, turn @ affine, scheme)
+            results[f"{name}.{key}"] = numbers_of(found)
+    recorded(results, rtol=ROUGH)
+
+
+@pytest.mark.usefixtures("quick_poses")
+def test_numbers_of_poses_by_shape(recorded):
+    left, right = atlas_halves()
+    results = {}
+    for name, turn in TURNS.items():
+        there = transformed(left, turn), transformed(right, turn)
+        near = transformed(right, turn @ rigid(1.0, 0.0, 2.0, shift=(0.0, 1.0, -0.5)))
         results[name] = {
-            "labels": {
-                "world": found.world,
-                "by": found.by,
-                "evidence": found.evidence,
-                "warnings": [numbers_in(text) for text in found.warnings],
-            },
-            "axes": pose.axes_of_file(rotation),
-            "rotation": pose.pose_from_rotation(rotation, "hindbrain", False).world,
-            "sided": pose.pose_from_rotation(rotation, "hindbrain", True).world,
+            "together": numbers_of(pose.pose_of_pair(*there)),
+            "near": numbers_of(pose.pose_of_pair(there[0], near)),
+            "apart": numbers_of(pose.pose_of_pair(there[0], right)),
+            "hemisphere": numbers_of(pose.pose_of_hemisphere(near, "right", "auto")),
         }
     recorded(results, rtol=ROUGH)
 

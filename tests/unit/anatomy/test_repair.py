@@ -73,7 +73,6 @@ def with_spike(ball, factor):
     [
         (4, 1.95, []),
         (4, 2.1, [Facts("11 mm")]),
-        (4, 7.0, [Facts("60 mm")]),
         (1, 5.0, []),
         (1, 9.0, [Facts("82 mm")]),
     ],

@@ -14,7 +14,6 @@ from gyriflow.geometry.matching import (
     match_points,
     match_surface,
     nearest_on,
-    surface_distance,
     surface_mask,
     values_at,
 )
@@ -72,16 +71,6 @@ def test_the_tissue_below_tells_the_wall(wall):
     assert place[0, 0] == pytest.approx(wall)
     assert match.agrees.all()
     assert match.distance_mm == pytest.approx(np.linalg.norm(place - point))
-
-
-def test_a_distance_is_the_mean_of_both_ways_and_the_larger_of_both_quantiles():
-    # (distances, weights) of either surface
-    ways = [
-        (np.array([4.0, 1.0, 9.0]), np.array([2.0, 6.0, 0.0])),
-        (np.array([2.0, 3.0]), np.array([1.0, 3.0])),
-    ]
-    assert surface_distance(ways) == (pytest.approx((1.75 + 2.75) / 2), 4.0)
-    assert surface_distance(ways[::-1], 0.5)[1] == 3.0
 
 
 def test_diffusion_in_a_bar_has_the_variance_of_the_gaussian_and_keeps_the_integral():

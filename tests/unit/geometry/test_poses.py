@@ -14,17 +14,9 @@ from gyriflow.geometry.alignment import (
     follow_planes,
     residual_ratio,
 )
-from gyriflow.geometry.poses import Pose, pose_from, turned
+from gyriflow.geometry.poses import Pose, turned
 
 TURN = rigid(10, 20, 30, shift=(4.0, -3.0, 2.0))
-
-
-def test_without_motions_of_files_these_are_in_the_world_of_the_volumes():
-    pose = Pose(TURN)
-    assert (
-        pose.of_file("left") is pose.of_file() is pose.of_volume("a.nii") is pose.world
-    )
-    np.testing.assert_allclose(pose.inverse @ TURN, np.eye(4), atol=1e-15)
 
 
 @pytest.mark.parametrize(("coordinates", "flip"), [("lps", LPS), ("ras", np.eye(4))])
@@ -34,21 +26,9 @@ def test_surfaces_in_lps_are_flipped_once_and_volumes_never(coordinates, flip):
     np.testing.assert_allclose(pose.of_volume("a.nii")[:3, :3], TURN[:3, :3])
 
 
-def test_a_motion_after_a_pose_moves_all_and_sides_may_have_their_own():
-    pose = Pose(files={"left": TURN, "whole": LPS}, by="shape").then(rigid(0, 0, 90))
-    np.testing.assert_allclose(pose.of_file("left"), rigid(0, 0, 90) @ TURN)
-    np.testing.assert_allclose(pose.of_file("right"), rigid(0, 0, 90) @ LPS)
-    np.testing.assert_allclose(pose.world, rigid(0, 0, 90))
-
-
 def test_a_volume_cannot_follow_hemispheres_that_were_posed_separately():
     with pytest.raises(InputError, check=Facts("a.nii:", "GIFTI")):
         Pose(together=False).of_volume("a.nii")
-
-
-def test_a_pose_is_the_same_after_writing():
-    pose = Pose(TURN, {"left": LPS}, "file", False, {"pitch_deg": 2.0}, ("look",))
-    assert pose_from(pose.plain()).plain() == pose.plain()
 
 
 def test_a_sphere_is_not_turned():

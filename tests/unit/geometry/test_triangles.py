@@ -6,7 +6,6 @@ import shapes
 
 from gyriflow.geometry.triangles import (
     TriangleMesh,
-    area,
     convex_hull,
     face_components,
     flipped,
@@ -43,22 +42,6 @@ def test_a_hull_has_no_points_inside_and_looks_outwards(box):
     hull = convex_hull(transformed(merged(within, box), shapes.FAR[0]))
     assert signed_volume(hull) == pytest.approx(24.0)
     assert len(hull.vertices) == 8
-
-
-def test_components_are_numbered_by_area(ball, box):
-    both = merged(box, ball)
-    component = face_components(both)
-    assert (component[: len(box.faces)] == 1).all()
-    assert (component[len(box.faces) :] == 0).all()
-    largest, used = submesh(both, component == 0)
-    assert area(largest) == pytest.approx(area(ball))
-    np.testing.assert_array_equal(both.vertices[used], largest.vertices)
-
-
-def test_a_mirroring_motion_keeps_the_surface_outward(box):
-    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
-    assert signed_volume(transformed(box, mirror)) == pytest.approx(24.0)
-    assert signed_volume(flipped(box)) == pytest.approx(-24.0)
 
 
 @pytest.mark.parametrize("first", [0, 1])

@@ -245,27 +245,24 @@ def test_vertices_that_are_no_places_and_faces_beyond_the_vertices_are_refused(
             read_surface(path)
 
 
-def test_named_maps_come_back_and_are_what_workbench_calls_metric_files(tmp_path):
-    path = tmp_path / "a.shape.gii"
+def test_maps_and_labels_come_back_with_names_and_what_workbench_reads(tmp_path):
     maps = {"shape_index": np.linspace(-1, 1, 50), "curvedness": np.arange(50)}
-    write_vertex_maps(path, maps, "CortexRight")
-    found, image = read_vertex_maps(path), nib.load(path)
+    write_vertex_maps(tmp_path / "a.shape.gii", maps, "CortexRight")
+    found = read_vertex_maps(tmp_path / "a.shape.gii")
     assert list(found) == list(maps)
-    assert image.meta["AnatomicalStructurePrimary"] == "CortexRight"
-    for (name, values), array in zip(maps.items(), image.darrays, strict=True):
-        assert found[name] == pytest.approx(values, abs=1e-6)
-        assert intent_codes.niistring[array.intent] == "NIFTI_INTENT_SHAPE"
-
-
-def test_labels_and_names_come_back(tmp_path):
-    path = tmp_path / "left.label.gii"
-    labels = np.array([0, 3, 3, 12])
-    write_vertex_labels(path, labels, {3: "frontal", 12: "insula"}, "CortexLeft")
-    found, names = read_vertex_labels(path)
-    assert found.tolist() == labels.tolist()
+    assert found["shape_index"] == pytest.approx(maps["shape_index"], abs=1e-6)
+    labels, regions = np.array([0, 3, 3, 12]), {3: "frontal", 12: "insula"}
+    write_vertex_labels(tmp_path / "a.label.gii", labels, regions, "CortexLeft")
+    back, names = read_vertex_labels(tmp_path / "a.label.gii")
     # the label of no region is none of the names
-    assert names == {3: "frontal", 12: "insula"}
-    assert nib.load(path).meta["AnatomicalStructurePrimary"] == "CortexLeft"
+    assert (back.tolist(), names) == (labels.tolist(), regions)
+    for name, intent, structure in (
+        ("a.shape.gii", "NIFTI_INTENT_SHAPE", "CortexRight"),
+        ("a.label.gii", "NIFTI_INTENT_LABEL", "CortexLeft"),
+    ):
+        image = nib.load(tmp_path / name)
+        assert intent_codes.niistring[image.darrays[0].intent] == intent
+        assert image.meta["AnatomicalStructurePrimary"] == structure
 
 
 def test_maps_of_hemispheres_are_joined_with_each_value_at_its_vertex(tmp_path):

@@ -30,10 +30,8 @@ from gyriflow.io.frames import (
 )
 from gyriflow.io.tetmeshes import (
     Regions,
-    read_maps,
     read_regions,
     read_tetrahedral_mesh,
-    write_maps,
     write_regions,
     write_tetrahedral_mesh,
 )
@@ -73,13 +71,6 @@ def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, fo
     write_tetrahedral_mesh(tmp_path / "bad.xdmf", mesh)
     with pytest.raises(InputError, check=Facts(tmp_path / "bad.h5", 1, found)):
         read_tetrahedral_mesh(tmp_path / "bad.xdmf")
-
-
-def test_maps_on_a_mesh_come_back_exactly(tmp_path):
-    thickness_mm = np.random.default_rng(0).normal(size=50)
-    maps = {"thickness_mm": thickness_mm, "growth_rate_per_s": np.full(50, 2e-7)}
-    write_maps(tmp_path / "maps.h5", maps)
-    np.testing.assert_equal(read_maps(tmp_path / "maps.h5"), maps)
 
 
 @pytest.mark.parametrize(

@@ -316,15 +316,6 @@ def test_written_volume_comes_back(tmp_path, shear):
     assert nib.load(path).get_data_dtype() == np.uint8
 
 
-def test_volumes_of_labels_are_their_voxels_in_ml():
-    labels = np.zeros((4, 5, 6), np.int32)
-    labels[0, :, :], labels[1, :2, :3] = 7, 2
-    assert LabelVolume(labels, scaling((2.0, 5.0, 1.0))).volumes_ml == {
-        2: pytest.approx(0.06),
-        7: pytest.approx(0.3),
-    }
-
-
 ANISOTROPIC = np.diag([0.8, 0.6, 1.5, 1.0])
 
 
