@@ -38,7 +38,7 @@ from gyriflow.anatomy.labels import read_cerebrum
 from gyriflow.anatomy.pose import pose_of_hemisphere
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.compare.placement import correlation
-from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
+from gyriflow.geometry.alignment import align_points, rigid_fit
 from gyriflow.geometry.matching import (
     match_points,
     nearest_on,
@@ -302,10 +302,9 @@ def difference(
     """Return how a run differs from a reference: material points and surfaces (mm),
     shape index, metrics (relative)."""
     areas = vertex_areas(reference.surface)
-    gaps = without_rigid_motion(reference.surface.vertices, run.surface.vertices, areas)
-    displacements = without_rigid_motion(
-        start.surface.vertices, reference.surface.vertices, areas
-    )
+    places, before = reference.surface.vertices, start.surface.vertices
+    gaps = align_points(run.surface.vertices, places, areas) - places
+    displacements = align_points(places, before, areas) - before
     aligned = transformed(
         run.surface, rigid_fit(run.surface.vertices, reference.surface.vertices, areas)
     )

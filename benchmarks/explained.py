@@ -50,7 +50,7 @@ from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.alignment import rigid_fit
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import diffuse, harmonic_continuation, stiffness_matrix
-from gyriflow.geometry.matching import crossing_faces, nearest_on
+from gyriflow.geometry.matching import faces_that_cross, nearest_on
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_surface,
@@ -157,7 +157,7 @@ def explained_rows(
             row |= {"distance_mm": distance_mm(surface, observed), "r_shape_index": 1.0}
             if surface is not observed:
                 row["r_shape_index"] = r_shape_index(surface, observed, folds)
-            rows.append(row | {"crossing_faces": crossing_faces(surface)})
+            rows.append(row | {"crossing_faces": len(faces_that_cross(surface))})
     return rows
 
 

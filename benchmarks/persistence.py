@@ -47,7 +47,7 @@ from gyriflow.compare.shapes import align, prepare_for_comparison, scale_to_volu
 from gyriflow.errors import InputError
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import MatchedSurfaces, between_moved
-from gyriflow.geometry.matching import crossing_faces, match_surface, values_at
+from gyriflow.geometry.matching import faces_that_cross, match_surface, values_at
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import (
     Floats,
@@ -266,7 +266,7 @@ def scores_of(
     return {
         "distance_mm": aligned_distances(surface, observed)["distance_mm"],
         "r_shape_index": r_shape_index(surface, observed, folds),
-        "crossing_faces": crossing_faces(surface),
+        "crossing_faces": len(faces_that_cross(surface)),
     }
 
 

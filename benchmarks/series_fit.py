@@ -30,7 +30,7 @@ from common import print_rows
 
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import Correspondence, between_moved
-from gyriflow.geometry.matching import crossing_faces
+from gyriflow.geometry.matching import faces_that_cross
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_surface,
@@ -82,7 +82,7 @@ class Measurement:
         )
         row |= {"least_ratio": ratios.min(), "below_0.1": (ratios < 0.1).sum()}
         row["inverted"] = int((~has_volume(places, mesh.tets)).sum())
-        row["crossing"] = crossing_faces(surface)
+        row["crossing"] = len(faces_that_cross(surface))
         self.rows.append({name: float(value) for name, value in row.items()})
         print(json.dumps(self.rows[-1]), flush=True)
         if self._folder:

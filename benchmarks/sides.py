@@ -19,19 +19,21 @@ with warnings, and which.
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import permutations, product
 from typing import Any
 
+import nibabel as nib
 import numpy as np
 from common import print_rows
 
-from gyriflow.anatomy import pose as posing
+from gyriflow.anatomy import template
 from gyriflow.anatomy.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.anatomy.plausible import require_left_and_right
-from gyriflow.anatomy.pose import axes_of_file, pose_of_pair, require_coordinates
+from gyriflow.anatomy.pose import pose_of_pair, require_coordinates
+from gyriflow.anatomy.template import PointCloud
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import motion
+from gyriflow.geometry.alignment import RigidFit, motion
 from gyriflow.geometry.poses import CONVENTIONS
 from gyriflow.geometry.triangles import Floats, TriangleMesh, transformed
 from gyriflow.io.surfaces import read_surface
@@ -74,17 +76,19 @@ def every_axes() -> Iterator[Floats]:
 def remember_shapes() -> None:
     """Let the pose of each hemisphere in each axes be found once: pairs and mirror
     images have the same ones."""
-    found: dict[bytes, posing.PosedShape] = {}
-    by_shape = posing.hemisphere_by_shape
+    found: dict[bytes, tuple[RigidFit, float]] = {}
+    search = template.register_from_all_sides
 
-    def once(mesh: TriangleMesh) -> posing.PosedShape:
+    def once(
+        shape: PointCloud, templates: Sequence[PointCloud]
+    ) -> tuple[RigidFit, float]:
         # without negative zeros
-        key = (mesh.vertices.round(6) + 0.0).tobytes()
+        key = (shape.points.round(6) + 0.0).tobytes()
         if key not in found:
-            found[key] = by_shape(mesh)
+            found[key] = search(shape, templates)
         return found[key]
 
-    posing.hemisphere_by_shape = once
+    template.register_from_all_sides = once
 
 
 def answer(
@@ -127,7 +131,7 @@ def main() -> None:
             for coordinates in files.coordinates:
                 got, has_warnings = answer(*files_given, coordinates, is_exchanged)
                 key = (coordinates, is_exchanged, is_mirrored, got, has_warnings)
-                counts[key].append(axes_of_file(axes.T))
+                counts[key].append("".join(nib.aff2axcodes(motion(axes.T))))
     names = ("coordinates", "exchanged", "mirrored", "answer", "warned")
     rows = []
     for key, found in sorted(counts.items()):

@@ -37,7 +37,7 @@ from gyriflow.anatomy.labels import read_cerebrum
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.anatomy.thickness import border, cortex_of, thickness_from_labels
 from gyriflow.geometry.alignment import motion
-from gyriflow.geometry.matching import inside_mask, layer_thickness, nearest_on
+from gyriflow.geometry.matching import layer_labels, layer_thickness, nearest_on
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import Floats, TriangleMesh, vertex_areas
 from gyriflow.settings.schemes import LabelScheme
@@ -196,7 +196,10 @@ def measure(folds: Folds, voxel_mm: tuple[float, ...], seed: int) -> dict[str, A
     size = np.array(voxel_mm)
     reach = float(np.linalg.norm(pial.vertices, axis=1).max())
     affine, shape = placement(reach, size, seed)
-    body, core = (inside_mask(mesh, tuple(shape), affine) for mesh in (pial, white))
+    body, core = (
+        layer_labels(mesh, np.zeros(len(mesh.vertices)), tuple(shape), affine) > 0
+        for mesh in (pial, white)
+    )
     labels = np.where(body, np.where(core, 1, 2), 0)
     volume = float(body.sum() * size.prod())
     found = surface_of_mask(smooth_mask(body), affine, volume, EDGE_MM).mesh

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding, advance
-from gyriflow.geometry.matching import crossing_faces
+from gyriflow.geometry.matching import faces_that_cross
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, finer_surface, grid, quadratic
 from gyriflow.geometry.triangles import Floats, Ints, TriangleMesh, area
 from gyriflow.settings.folding import FoldingParameters
@@ -147,7 +147,9 @@ def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
         area_ratio=area(top) / area(top_at_start),
         depth_mm=depth_mm,
         pressure_pa=force / bank_area_m2 / growth_of_step,
-        crossing=crossing_faces(curved_surface(places, zones.facets, slab.order)),
+        crossing=len(
+            faces_that_cross(curved_surface(places, zones.facets, slab.order))
+        ),
         least_volume_ratio=row["min_J"],
     )
 

@@ -16,7 +16,7 @@ from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from . import extraction
 from .extraction import Floats, Mask
-from .misplaced import bare_surface, hindbrain_note, misplaced_cortex
+from .misplaced import hindbrain_note, misplaced_cortex
 
 log = logging.getLogger(__name__)
 
@@ -107,12 +107,9 @@ def read_cerebrum(
     require_labels(labels, scheme)
     mask = np.isin(labels, scheme.cerebrum)
     report = _missing_labels(labels, scheme)
-    warnings = list(misplaced_cortex(labels, affine, scheme))
-    # the wall of a hemisphere that is alone may have no cortex
-    if min_cortex:
-        warnings += bare_surface(labels, affine, scheme)
+    warnings = list(misplaced_cortex(labels, affine, scheme, is_whole=min_cortex > 0))
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
-    unlabelled = unlabelled_ventricles(labels, scheme, affine)
+    unlabelled = _unlabelled_ventricles(labels, scheme, affine)
     if scheme.cortex:
         share = _require_cortex_outside(labels, scheme, min_cortex, unlabelled)
         if share < LITTLE_CORTEX:
@@ -125,7 +122,7 @@ def read_cerebrum(
             f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie"
             " inside it and were filled: ventricles without a label?"
         )
-    open_fluid = outside_ventricles(labels, scheme)
+    open_fluid = _outside_ventricles(labels, scheme)
     whole, stalks = extraction.without_stalks(
         (mask & ~open_fluid) | unlabelled,
         affine,
@@ -182,7 +179,7 @@ def read_cerebrum(
     report["label_volumes_mL"] = {
         name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()
     }
-    report["border_share"] = border_share(main)
+    report["border_share"] = _border_share(main)
     (box,) = ndimage.find_objects(main.astype(np.uint8))
     first = np.array([side.start for side in box]) - extraction.PAD_VOXELS
     cropped = np.pad(main[box], extraction.PAD_VOXELS)
@@ -331,7 +328,7 @@ def require_sides(
         )
 
 
-def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
+def _outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     """Return the (i, j, k) mask of ventricles that are not enclosed by the cerebrum's
     tissue.
 
@@ -361,7 +358,7 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     return touching
 
 
-def unlabelled_ventricles(
+def _unlabelled_ventricles(
     labels: Labels,
     scheme: LabelScheme,
     affine: Floats,
@@ -442,7 +439,7 @@ def _ray_share(
     return smooth / np.maximum(weight, 1e-6)
 
 
-def border_share(mask: Mask) -> float:
+def _border_share(mask: Mask) -> float:
     """Return the share of an (i, j, k) mask's surface at those borders of its volume
     that cut it off.
 

@@ -39,9 +39,11 @@ def misplaced_cortex(
     labels: np.ndarray,
     affine: Floats,
     scheme: LabelScheme,
+    *,
+    is_whole: bool = False,
 ) -> Iterator[str]:
     """Yield a warning, with volume (mL) and place, for each kind of place where cortex
-    cannot be.
+    cannot be, and for a whole cerebrum whose surface has too little of it.
 
     `labels` (i, j, k) have a (4, 4) affine to the coordinates in mm of places in
     messages. Nothing is yielded for a volume without cortex, or with nothing else.
@@ -81,6 +83,9 @@ def misplaced_cortex(
             " at most 3 % in atlases"
         )
         yield f"{found}: is tissue around or in the ventricles labelled as cortex?"
+    # the wall of a hemisphere that is alone may have no cortex
+    if is_whole:
+        yield from _bare_surface(around, scheme)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,20 +140,12 @@ def _cropped(
     )
 
 
-def bare_surface(
-    labels: np.ndarray,
-    affine: Floats,
-    scheme: LabelScheme,
-) -> Iterator[str]:
+def _bare_surface(around: _Cropped, scheme: LabelScheme) -> Iterator[str]:
     """Yield a warning, with place and labels, if much of a whole cerebrum's surface is
     far from cortex.
 
-    Ventricles that are open, and what the border of the volume cuts, do not count. The
-    (4, 4) affine leads from voxels (i, j, k) to the mm of the place.
+    Ventricles that are open, and what the border of the volume cuts, do not count.
     """
-    around = _cropped(labels, affine, scheme)
-    if around is None:
-        return
     filled = without_holes(around.cerebrum)
     surface = filled & ~ndimage.binary_erosion(filled)
     is_fluid = np.isin(around.labels, scheme.ventricles)

@@ -147,9 +147,8 @@ def require_plausible_thickness(
         if units
         else "Check its quantity and unit."
     )
-    problem = "does not contain cortical thickness"
     raise InputError(
-        problem,
+        "does not contain cortical thickness",
         path=path,
         found=f"a median of {median:.4g}",
         expected=f"{low:g} to {high:g} mm",

@@ -7,6 +7,7 @@ Left hemispheres are mirrored here and treated as right ones.
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+import nibabel as nib
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -34,8 +35,6 @@ CONVENTION_DEG = 35.0
 # tolerances for agreement of the shape with the axes of the file: tilt of the
 # mid-plane, and pitch
 TILT_TOL_DEG, PITCH_TOL_DEG = 10.0, 15.0
-# of the axes of RAS+, down and up
-DIRECTIONS = ("LR", "PA", "IS")
 # two files share their coordinates if their poses differ by less; distances are in
 # sizes
 COMMON_DEG, COMMON_OFFSET, COMMON_DISTANCE = 5.0, 0.08, 0.15
@@ -100,7 +99,7 @@ def _is_clear(shape: PosedShape) -> bool:
     return shape.confidence >= MIN_CONFIDENCE and shape.residual <= MAX_RESIDUAL
 
 
-def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
+def _hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
     """Estimate the pose of a right hemisphere (or a mirrored left one) from its shape,
     even if it is not clear."""
     shape = template.shape_of(mesh)
@@ -191,7 +190,7 @@ def pose_of_pair(
             f" {np.linalg.norm(shift):.1f} mm and {angle:.0f}° off:"
             " each was posed by its own shape. Are both files in one space?"
         )
-    if together and not frame and (axes := axes_of_file(motions[0][:3, :3])):
+    if together and not frame and (axes := _axes_of_file(motions[0][:3, :3])):
         doubts.append(
             f"the files have the axes {axes} according to the shape; {MIRROR_WARNING}"
         )
@@ -216,7 +215,7 @@ def pose_of_pair(
 
 
 def _shapes_of_pair(left: TriangleMesh, right: TriangleMesh) -> list[PosedShape]:
-    return [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
+    return [_hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
 
 
 def _mean_side_ratio(shapes: list[PosedShape]) -> float:
@@ -260,8 +259,8 @@ def _wrong_sides(shapes: list[PosedShape], found: str) -> InputError:
         mirrored_left.mirrored_rotation,
         mirror @ own_right.mirrored_rotation @ mirror,
     ]
-    exchanged = {axes_of_file(rotation) for rotation in rotations}
-    mirrored = {axes_of_file(mirror @ rotation) for rotation in rotations}
+    exchanged = {_axes_of_file(rotation) for rotation in rotations}
+    mirrored = {_axes_of_file(mirror @ rotation) for rotation in rotations}
     axes = exchanged.pop() if len(exchanged) == 1 else ""
     mirrored_axes = mirrored.pop() if len(mirrored) == 1 else ""
     if axes and axes.lower() not in CONVENTIONS:
@@ -291,22 +290,17 @@ def _wrong_sides(shapes: list[PosedShape], found: str) -> InputError:
     )
 
 
-def axes_of_file(to_ras: Floats) -> str:
+def _axes_of_file(to_ras: Floats) -> str:
     """Return the directions of a file's axes, such as RAS or LPI, or "" if they are
     oblique.
 
     `to_ras` is the (3, 3) rotation, or rotation and reflection, from the coordinates of
     the file to RAS+.
     """
-    columns = to_ras.T
-    along = np.abs(columns).argmax(axis=1)
-    is_oblique = np.abs(columns).max(axis=1) < np.cos(np.radians(CONVENTION_DEG))
-    if is_oblique.any() or len(set(along)) < len(along):
+    cosines = np.abs(to_ras).max(axis=0)
+    if cosines.min() < np.cos(np.radians(CONVENTION_DEG)):
         return ""
-    signs = columns[range(3), along] > 0
-    return "".join(
-        DIRECTIONS[axis][int(sign)] for axis, sign in zip(along, signs, strict=True)
-    )
+    return "".join(nib.aff2axcodes(motion(to_ras)))
 
 
 def _pose_as_ras(shape: PosedShape, name: str) -> Pose:
@@ -520,7 +514,7 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
     return (
         unchecked
         if pose.by == "default"
-        else pose_from_rotation(
+        else _pose_from_rotation(
             pose.of_file()[:3, :3],
             "the shape",
             has_sides,
@@ -544,7 +538,7 @@ def pose_of_hemisphere(
     is ambiguous or the shape is the other hemisphere's.
     """
     mirror = MIRROR if side == "left" else np.eye(4)
-    hemisphere = hemisphere_by_shape(transformed(mesh, mirror))
+    hemisphere = _hemisphere_by_shape(transformed(mesh, mirror))
     rotation = mirror[:3, :3] @ hemisphere.rotation @ mirror[:3, :3]
     side_ratio, other = hemisphere.side_ratio, "right" if side == "left" else "left"
     if (
@@ -706,10 +700,10 @@ def pose_of_labels(
     by = " and ".join(
         [*hindbrain, *(["the labelled sides"] if sides is not None else [])]
     )
-    return pose_from_rotation(rotation, by, sides is not None)
+    return _pose_from_rotation(rotation, by, sides is not None)
 
 
-def pose_from_rotation(
+def _pose_from_rotation(
     rotation: Floats,
     evidence: str,
     has_sides: bool,

@@ -9,12 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..geometry import alignment
-from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Planes, RigidFit
+from ..geometry.alignment import (
+    CUBE_ROTATIONS,
+    MIRROR,
+    Planes,
+    RigidFit,
+    angle_deg,
+    follow_planes,
+)
 from ..geometry.triangles import (
     Floats,
     TriangleMesh,
     corners,
+    dots,
     face_areas,
     face_normals,
     merged,
@@ -81,17 +88,7 @@ def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
     """Sample a closed, outward surface by area, but for points deeper than `max_depth`
     sizes below its hull."""
     triangles, areas = corners(mesh), face_areas(mesh)
-    volumes = (
-        np.einsum(
-            "ij,ij->i",
-            triangles[:, 0],
-            np.cross(
-                triangles[:, 1],
-                triangles[:, 2],
-            ),
-        )
-        / 6.0
-    )
+    volumes = dots(triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0
     centre = 0.75 * volumes @ triangles.mean(axis=1) / volumes.sum()
     size = float(np.cbrt(volumes.sum()))
     random = np.random.default_rng(0)
@@ -130,24 +127,14 @@ def register_shape(
     targets: Sequence[PointCloud],
     rotation: Floats,
     shift: Floats | None = None,
+    every: int = 3,
 ) -> RigidFit:
-    """Return the best fit of a shape to one of several targets, starting from a (3, 3)
-    rotation close to it."""
-    return min(
-        (
-            _descend(
-                shape,
-                target,
-                rotation,
-                shift,
-                FINE,
-                30,
-                3,
-            )
-            for target in targets
-        ),
-        key=lambda fit: fit.residual,
-    )
+    """Return the best fit of every `every`-th point of a shape to one of several
+    targets, starting from a (3, 3) rotation close to it."""
+    fits = [
+        _descend(shape, target, rotation, shift, FINE, 30, every) for target in targets
+    ]
+    return min(fits, key=lambda fit: fit.residual)
 
 
 def register_from_all_sides(
@@ -160,36 +147,29 @@ def register_from_all_sides(
     1 the pose is unclear.
     """
     middle = targets[len(targets) // 2]
-    fits = alignment.fits_from_all_sides(
-        CUBE_ROTATIONS,
-        lambda start: _descend(
-            shape,
-            middle,
-            start,
-            None,
-            COARSE,
-            12,
-            8,
-        ),
-        lambda fit: register_shape(shape, targets, fit.rotation, fit.shift),
-        N_REFINED,
-        DISTINCT_DEG,
-    )
-    best = min(fits, key=lambda fit: fit.residual)
-    confidence = alignment.residual_ratio(fits, best, DISTINCT_DEG)
-    fine = [
-        _descend(
-            shape,
-            target,
-            best.rotation,
-            best.shift,
-            FINE,
-            30,
-            1,
-        )
-        for target in targets
+    coarse = [
+        _descend(shape, middle, start, None, COARSE, 12, 8) for start in CUBE_ROTATIONS
     ]
-    return min(fine, key=lambda fit: fit.residual), confidence
+    distinct: list[RigidFit] = []
+    for fit in sorted(coarse, key=lambda fit: fit.residual):
+        turns = [_turn_deg(fit, other) for other in distinct]
+        if min(turns, default=np.inf) > DISTINCT_DEG:
+            distinct.append(fit)
+    # that from the axes of the file is always one of them
+    refined = [
+        register_shape(shape, targets, fit.rotation, fit.shift)
+        for fit in dict.fromkeys([coarse[0], *distinct[:N_REFINED]])
+    ]
+    best = min(refined, key=lambda fit: fit.residual)
+    others = [fit.residual for fit in refined if _turn_deg(fit, best) > DISTINCT_DEG]
+    confidence = min(others, default=np.inf) / best.residual
+    found = register_shape(shape, targets, best.rotation, best.shift, every=1)
+    return found, confidence
+
+
+def _turn_deg(first: RigidFit, second: RigidFit) -> float:
+    """Return the angle between the rotations of two fits in degrees."""
+    return angle_deg(first.rotation @ second.rotation.T)
 
 
 def _descend(
@@ -215,16 +195,12 @@ def _descend(
         _, nearest = target._tree.query(_features(moved, facing))
         target_normals = target.normals[nearest]
         plane = unit(target_normals + facing)
-        distances = np.einsum(
-            "ij,ij->i",
-            target.points[nearest] - moved,
-            plane,
-        )
-        agrees = np.einsum("ij,ij->i", target_normals, facing) > 0.5
+        distances = dots(target.points[nearest] - moved, plane)
+        agrees = dots(target_normals, facing) > 0.5
         weights = agrees / (1.0 + (distances / scale) ** 2) ** 2
         return Planes(moved, plane, distances, weights)
 
-    rotation, shift = alignment.follow_planes(
+    rotation, shift = follow_planes(
         rotation, np.zeros(3) if shift is None else shift, planes, rounds, _is_converged
     )
     forward, _ = target._tree.query(

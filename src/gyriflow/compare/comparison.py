@@ -13,7 +13,12 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..geometry.alignment import align
-from ..geometry.matching import crossing_faces, nearest_on, surface_distance, values_at
+from ..geometry.matching import (
+    faces_that_cross,
+    nearest_on,
+    surface_distance,
+    values_at,
+)
 from ..geometry.triangles import (
     Floats,
     Ints,
@@ -173,7 +178,7 @@ def compare(
         return row, samples
     prepared = prepare_for_comparison(predicted, observed.surface, radius_mm)
     if "quality" in groups:
-        row["crossing_faces"] = float(crossing_faces(predicted))
+        row["crossing_faces"] = float(len(faces_that_cross(predicted)))
         row["roughness_ratio"] = roughness_mm(prepared.mesh) / roughness_mm(
             observed.prepared.mesh
         )

@@ -1,7 +1,7 @@
 """Rigid registration: of matched points, and of surfaces by iterative closest
 points."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -98,16 +98,6 @@ def align_points(
 ) -> Floats:
     """Return (n, 3) points after their least-squares rigid motion onto others."""
     return transform_points(points, rigid_fit(points, onto, weights))
-
-
-def without_rigid_motion(
-    first: Floats,
-    second: Floats,
-    weights: Floats,
-) -> Floats:
-    """Return the (n, 3) displacement from `first` to `second` after the latter is
-    rigidly aligned to the former."""
-    return align_points(second, first, weights) - first
 
 
 def _step_towards_planes(planes: Planes) -> tuple[Floats, Floats]:
@@ -232,53 +222,3 @@ def align(mesh: TriangleMesh, onto: TriangleMesh) -> TriangleMesh:
     """Align a surface rigidly to another in a similar pose, by iterative closest
     points."""
     return transformed(mesh, _fit_onto(mesh, onto))
-
-
-def fits_from_all_sides(
-    starts: Iterable[Floats],
-    coarse_fit: Callable[[Floats], RigidFit],
-    refine: Callable[[RigidFit], RigidFit],
-    candidates: int,
-    distinct_deg: float,
-) -> list[RigidFit]:
-    """Return refined fits of an alignment whose initial rotation is unknown, that from
-    the first start first.
-
-    A coarse fit from each (3, 3) rotation of `starts` finds the local minima. That from
-    the first start and the best `candidates` of those that differ by more than
-    `distinct_deg` are refined.
-    """
-    coarse = [coarse_fit(start) for start in starts]
-    residuals = [fit.residual for fit in coarse]
-    distinct: list[int] = []
-    for number in np.argsort(residuals, kind="stable").tolist():
-        turns = [
-            _turn_deg(
-                coarse[number],
-                coarse[other],
-            )
-            for other in distinct
-        ]
-        if min(turns, default=np.inf) > distinct_deg:
-            distinct.append(number)
-    refined = dict.fromkeys([0, *distinct[:candidates]])
-    return [refine(coarse[number]) for number in refined]
-
-
-def residual_ratio(
-    fits: Iterable[RigidFit],
-    best: RigidFit,
-    distinct_deg: float,
-) -> float:
-    """Return the least residual in another pose over that of the best fit, ∞ without;
-    near 1 it is ambiguous."""
-    residuals = []
-    for fit in fits:
-        if _turn_deg(fit, best) > distinct_deg:
-            residuals.append(fit.residual)
-    return min(residuals, default=np.inf) / best.residual
-
-
-def _turn_deg(first: RigidFit, second: RigidFit) -> float:
-    """Return the angle between the rotations of two fits in degrees."""
-    return angle_deg(first.rotation @ second.rotation.T)

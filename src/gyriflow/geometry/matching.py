@@ -103,7 +103,7 @@ def surface_mask(
     shape = tuple(size.astype(int) + 1)
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = low
-    return inside_mask(mesh, shape, affine).astype(np.int32), affine
+    return _inside_mask(mesh, shape, affine).astype(np.int32), affine
 
 
 def layer_labels(
@@ -114,7 +114,7 @@ def layer_labels(
 ) -> NDArray[np.int32]:
     """Return labels in a volume's grid, its (4, 4) affine in mm: 2 less deep than (n,)
     thickness in mm, 1 deeper."""
-    index = np.argwhere(inside_mask(mesh, shape, affine))
+    index = np.argwhere(_inside_mask(mesh, shape, affine))
     centres = index @ affine[:3, :3].T + affine[:3, 3]
     depth, faces, _ = nearest_on(centres, mesh)
     thickness_there = thickness[mesh.faces[faces]].mean(axis=1)
@@ -123,7 +123,7 @@ def layer_labels(
     return labels
 
 
-def inside_mask(
+def _inside_mask(
     mesh: TriangleMesh,
     shape: tuple[int, ...],
     affine: Floats,
@@ -218,11 +218,6 @@ def faces_that_cross(mesh: TriangleMesh) -> Ints:
     """Return the faces that cut other faces, ascending, found with exact predicates."""
     _, pairs, _ = igl.predicates.find_self_intersections(mesh.vertices, mesh.faces)
     return np.unique(pairs).astype(np.int64)
-
-
-def crossing_faces(mesh: TriangleMesh) -> int:
-    """Return the number of faces that cut other faces."""
-    return len(faces_that_cross(mesh))
 
 
 def match_points(

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
-from ..geometry.matching import crossing_faces
+from ..geometry.matching import faces_that_cross
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume, vertex_areas
 
 log = logging.getLogger(__name__)
@@ -94,7 +94,7 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
     displacements = boundary.vertices - places
     n_neighbours = min(N_NEIGHBOURS, len(places))
     distances, neighbours = cKDTree(places).query(surface, n_neighbours)
-    n_allowed = crossing_faces(observed.surface)
+    n_allowed = len(faces_that_cross(observed.surface))
     for spread_mm in SPREADS_MM:
         nearness = np.exp(-0.5 * (distances / spread_mm) ** 2)
         weights = areas[neighbours] * nearness
@@ -102,7 +102,7 @@ def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> Triangle
         # n: vertex of the surface, k: neighbour of it, j: axis
         move = np.einsum("nk,nkj->nj", weights, displacements[neighbours])
         moved = TriangleMesh(surface + move, observed.surface.faces)
-        n_crossing = crossing_faces(moved)
+        n_crossing = len(faces_that_cross(moved))
         if n_crossing <= n_allowed:
             return _scaled_to_volume(moved, volume)
     log.warning(

@@ -23,15 +23,14 @@ def require_checksums(recorded: Mapping[str, tuple[str, str]]) -> None:
     the atlas and the SHA-256."""
     for path, (atlas, sha256) in recorded.items():
         if sha256_of(path) != sha256:
-            remedy = (
-                "Delete it, and it is fetched; or give a changed file as a brain of"
-                " your own under brains."
-            )
             raise InputError(
                 f"is not the file of {atlas}",
                 path=path,
                 expected=f"the SHA-256 {sha256}",
-                remedy=remedy,
+                remedy=(
+                    "Delete it, and it is fetched; or give a changed file as a brain of"
+                    " your own under brains."
+                ),
             )
 
 
@@ -125,33 +124,29 @@ def _refused(path: Path, url: str) -> Iterator[None]:
     try:
         yield
     except requests.RequestException as error:
-        remedy = (
-            "Run the same command again to continue, or put the file into"
-            f" {path.parent} by hand."
-        )
         raise StorageError(
             "cannot be fetched",
             path=url,
             found=_cause(error),
-            remedy=remedy,
+            remedy=(
+                "Run the same command again to continue, or put the file into"
+                f" {path.parent} by hand."
+            ),
         ) from error
     except ValueError as error:
         if path.exists():
-            remedy = "It was left as it is. Move it away, and the file is fetched."
             raise StorageError(
                 "is not the file of the atlas",
                 path=path,
                 found=error,
-                remedy=remedy,
+                remedy="It was left as it is. Move it away, and the file is fetched.",
             ) from error
-        remedy = "Check the address, and whether the network asks for a login."
-        problem = "the server sent something else than the file"
         raise StorageError(
-            problem,
+            "the server sent something else than the file",
             path=url,
             found=error,
             expected=path.name,
-            remedy=remedy,
+            remedy="Check the address, and whether the network asks for a login.",
         ) from error
     except OSError as error:
         raise StorageError(

@@ -236,11 +236,10 @@ def _places(
             brains_and_runs = (
                 f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"
             )
-            expected = "ids and runs that differ in their letters and digits"
             raise InputError(
                 f"two brains have the same BIDS name {stem}",
                 found=brains_and_runs,
-                expected=expected,
+                expected="ids and runs that differ in their letters and digits",
             )
     return places
 

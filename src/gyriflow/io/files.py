@@ -305,13 +305,11 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
     rows = []
     for number, cells in enumerate((cells[has_names:] for cells in body), start=2):
         if any(cells[len(head) :]):
-            found = f"{len(cells)} cells in row {number}"
-            expected = f"{len(head)}, as in the heading"
             raise InputError(
                 "has a row that is longer than its heading",
                 path=path,
-                found=found,
-                expected=expected,
+                found=f"{len(cells)} cells in row {number}",
+                expected=f"{len(head)}, as in the heading",
             )
         row: dict[str, str] = {}
         # columns whose names differ only in case are one
@@ -322,23 +320,19 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
             strict=False,
         ):
             if not value.isprintable():
-                problem = (
-                    "has a line break or another character that is not printed in row"
-                    f" {number}, {name}"
-                )
                 raise InputError(
-                    problem,
+                    "has a line break or another character that is not printed in row"
+                    f" {number}, {name}",
                     path=path,
                     found=repr(value),
                     expected="one line of text in each cell",
                 )
             first = names.setdefault(name.lower(), name)
             if row.setdefault(first, value) != value:
-                found = f"{row[first]} and {value} in row {number}"
                 raise InputError(
                     f"has two columns {name}",
                     path=path,
-                    found=found,
+                    found=f"{row[first]} and {value} in row {number}",
                     expected="one value",
                 )
         rows.append(row)

@@ -18,8 +18,8 @@ from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from ..geometry.triangles import TriangleMesh
 from ..units import week_tag
-from .files import AnyPath, new_hdf5, reading_hdf5, write_text
-from .tetmeshes import document, xdmf_grid
+from .files import AnyPath, new_hdf5, reading_hdf5
+from .tetmeshes import write_xdmf, xdmf_grid
 
 POSITIONS = "positions"
 CELL_FIELDS = "cell_fields"
@@ -69,8 +69,8 @@ def join_frames(
             with _reading(frame) as source:
                 for name in source:
                     source.copy(name, file)
-        text = document(_time_series(path.name, file))
-    write_text(path.with_suffix(".xdmf"), text)
+        series = _time_series(path.name, file)
+    write_xdmf(path.with_suffix(".xdmf"), series)
 
 
 def _time_series(data_name: str, file: h5py.File) -> str:

@@ -51,9 +51,10 @@ def require_own_data_set(folder: Path) -> None:
     files are not replaced."""
     path = folder / "dataset_description.json"
     if path.is_file() and not is_own_data_set(path):
-        remedy = "Choose another OUT, such as a new folder in derivatives/."
         raise InputError(
-            "belongs to a data set that gyriflow has not made", path=path, remedy=remedy
+            "belongs to a data set that gyriflow has not made",
+            path=path,
+            remedy="Choose another OUT, such as a new folder in derivatives/.",
         )
 
 

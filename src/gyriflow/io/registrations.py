@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+import h5py
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -43,13 +44,12 @@ def write_correspondence(
                 "faces": pair.first.faces,
             }
         for name, values in large.items():
-            file.create_dataset(
-                name,
-                data=values,
-                compression="gzip",
-                shuffle=True,
-            )
+            _compress(file, name, values)
         file.attrs["report"] = json.dumps(dict(report))
+
+
+def _compress(file: h5py.File, name: str, values: NDArray) -> None:
+    file.create_dataset(name, data=values, compression="gzip", shuffle=True)
 
 
 def read_correspondence(path: AnyPath) -> Correspondence:
@@ -139,19 +139,9 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
         for week, at in shapes.placed.items():
             places[f"placed/{week!r}"] = at
         for name, values in places.items():
-            file.create_dataset(
-                name,
-                data=np.asarray(values, dtype=np.float32),
-                compression="gzip",
-                shuffle=True,
-            )
+            _compress(file, name, np.asarray(values, dtype=np.float32))
         if shapes.tets is not None:
-            file.create_dataset(
-                "tets",
-                data=shapes.tets,
-                compression="gzip",
-                shuffle=True,
-            )
+            _compress(file, "tets", shapes.tets)
         for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
         for group, table in {

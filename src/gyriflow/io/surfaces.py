@@ -88,13 +88,7 @@ def surface_space_structure(
                 remedy=AGAIN,
             )
         vertices, faces, space, structure = read(path)
-    if (
-        vertices.ndim != 2
-        or faces.ndim != 2
-        or vertices.shape[1] != 3
-        or faces.shape[1] != 3
-        or not faces.size
-    ):
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or not faces.size:
         shapes = (
             f"points of shape {vertices.shape}, faces of shape {faces.shape}"
             if faces.size
@@ -111,13 +105,11 @@ def surface_space_structure(
     if not (
         np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)
     ) or (np.abs(faces - np.rint(faces)).max() > 1e-3):
-        indices = f"indices {faces.min():.6g} to {faces.max():.6g}"
-        expected = f"whole numbers from 0 to {len(vertices) - 1}"
         raise InputError(
             "has faces that name vertices which do not exist",
             path=path,
-            found=indices,
-            expected=expected,
+            found=f"indices {faces.min():.6g} to {faces.max():.6g}",
+            expected=f"whole numbers from 0 to {len(vertices) - 1}",
         )
     return (
         TriangleMesh(
@@ -146,16 +138,15 @@ def _require_side(
     named = SIDES_BY_STRUCTURE.get(structure or "")
     if side not in STRUCTURES or named in (None, side):
         return
-    remedy = (
-        f"Give it as the {named} one. If you know that it is the {side} one, correct"
-        " the file's own side (AnatomicalStructurePrimary, or its name)."
-    )
     raise InputError(
         "is the other hemisphere",
         path=path,
         found=structure,
         expected=STRUCTURES[side],
-        remedy=remedy,
+        remedy=(
+            f"Give it as the {named} one. If you know that it is the {side} one,"
+            " correct the file's own side (AnatomicalStructurePrimary, or its name)."
+        ),
     )
 
 
@@ -301,12 +292,14 @@ def _surface_map(
     known."""
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
-        problem = "cannot have a map, since STL files do not number their vertices"
-        expected = (
-            f"the file that {path} was made on, of a format that numbers vertices, such"
-            " as GIFTI"
+        raise InputError(
+            "cannot have a map, since STL files do not number their vertices",
+            path=surface_path,
+            expected=(
+                f"the file that {path} was made on, of a format that numbers vertices,"
+                " such as GIFTI"
+            ),
         )
-        raise InputError(problem, path=surface_path, expected=expected)
     surface, _, structure = surface_space_structure(surface_path)
     image = _load_gifti(path)
     arrays = image.darrays
@@ -319,13 +312,11 @@ def _surface_map(
             f"{intent_codes.niistring[array.intent]} {array.data.shape}"
             for array in arrays
         ]
-        problem = "is not a map of one value per vertex"
-        expected = "one array of numbers (.shape.gii, .func.gii)"
         raise InputError(
-            problem,
+            "is not a map of one value per vertex",
             path=path,
             found=", ".join(kinds) or "none",
-            expected=expected,
+            expected="one array of numbers (.shape.gii, .func.gii)",
         )
     _require_side(surface_path, structure, side)
     surface_side = side or SIDES_BY_STRUCTURE.get(structure or "")
@@ -335,12 +326,13 @@ def _surface_map(
         dtype=float,
     ).ravel()
     if len(values) != len(surface.vertices):
-        expected = f"{len(surface.vertices)}, the number of vertices of {surface_path}"
         raise InputError(
             "does not belong to its surface",
             path=path,
             found=f"{len(values)} values",
-            expected=expected,
+            expected=(
+                f"{len(surface.vertices)}, the number of vertices of {surface_path}"
+            ),
         )
     require_finite(values, path, "values", "vertices")
     return surface, values
@@ -401,17 +393,11 @@ def _read_gifti_surface(path: Path) -> RawSurface:
     image = _load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
-    if (
-        len(points) != 1
-        or len(triangles) != 1
-        or not len(points[0].data)
-        or not len(triangles[0].data)
-    ):
-        arrays = f"{len(points)} arrays of points, {len(triangles)} of triangles"
+    if len(points) != 1 or len(triangles) != 1:
         raise InputError(
             "holds no surface",
             path=path,
-            found=arrays,
+            found=f"{len(points)} arrays of points, {len(triangles)} of triangles",
             expected="one of each (.surf.gii)",
         )
     matrix, space = _to_scanner_space(_coordinate_systems(path), path)
@@ -485,9 +471,11 @@ def _read_obj(path: Path) -> RawSurface:
     with path.open("rb") as file:
         start = file.read(START_BYTES)
     if start.startswith(b"p") and b"\0" in start:
-        problem = "is a binary .obj file of the MNI"
-        expected = "its form as text, or another format such as GIFTI"
-        raise InputError(problem, path=path, expected=expected)
+        raise InputError(
+            "is a binary .obj file of the MNI",
+            path=path,
+            expected="its form as text, or another format such as GIFTI",
+        )
     return _read_mni_obj(path) if MNI_OBJ.match(start) else _read_wavefront(path)
 
 
@@ -603,12 +591,11 @@ def read_vertex_labels(
     arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
         shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
-        expected = "one label for each vertex (.label.gii)"
         raise InputError(
             "is not a label file",
             path=path,
             found=shapes,
-            expected=expected,
+            expected="one label for each vertex (.label.gii)",
         )
     values = np.asarray(arrays[0].data)
     require_finite(values, path, "labels", "vertices")
@@ -641,9 +628,7 @@ def write_vertex_labels(
             if number == NO_REGION
             else DISTINCT_COLOURS[(number - 1) % len(DISTINCT_COLOURS)]
         )
-        red, green, blue = (
-            int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)
-        )
+        red, green, blue = (value / 255 for value in bytes.fromhex(colour[1:]))
         entry = GiftiLabel(
             key=int(number),
             red=red,
@@ -683,16 +668,11 @@ def _coordinate_systems(path: AnyPath) -> list[System]:
     with nib.openers.ImageOpener(str(path), "rb") as stream:
         root = ElementTree.parse(stream).getroot()
     systems: list[System] = []
-    points = [
-        array
-        for array in root.iter("DataArray")
-        if array.get("Intent") in ("NIFTI_INTENT_POINTSET", "1008")
-    ]
-    for element in (
-        element
-        for array in points
-        for element in array.iter("CoordinateSystemTransformMatrix")
-    ):
+    elements: list[ElementTree.Element] = []
+    for array in root.iter("DataArray"):
+        if array.get("Intent") in ("NIFTI_INTENT_POINTSET", "1008"):
+            elements += array.iter("CoordinateSystemTransformMatrix")
+    for element in elements:
         numbers = (element.findtext("MatrixData") or "").split()
         data, to = (
             (element.findtext(tag) or UNKNOWN).strip()
@@ -701,9 +681,10 @@ def _coordinate_systems(path: AnyPath) -> list[System]:
         try:
             matrix = np.array(numbers, dtype=float).reshape(4, 4)
         except ValueError as error:
-            problem = "has an invalid coordinate-system matrix"
             raise InputError(
-                problem, path=path, found=f"{len(numbers)} entries"
+                "has an invalid coordinate-system matrix",
+                path=path,
+                found=f"{len(numbers)} entries",
             ) from error
         require_finite(matrix, path, "entries in a coordinate system", "rows")
         systems.append((data, to, matrix))
@@ -753,12 +734,9 @@ def _to_scanner_space(
             atol=RIGID,
         )
         if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
-            problem = (
-                f"has a coordinate-system matrix from {data} to {to} that changes sizes"
-                " or mirrors"
-            )
             raise InputError(
-                problem,
+                f"has a coordinate-system matrix from {data} to {to} that changes sizes"
+                " or mirrors",
                 path=path,
                 found=f"\n{matrix}\n",
                 expected="a rigid motion",
@@ -815,13 +793,14 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
     """
     # its warnings are about missing geometry, which is reported
     with warnings.catch_warnings(action="ignore", category=UserWarning):
-        vertices, faces, info = read_geometry(str(path), read_metadata=True)
+        points, faces, info = read_geometry(str(path), read_metadata=True)
+    vertices = np.asarray(points, dtype=float)
     # two lines, the numbers of vertices and faces, and these
     start = re.match(rb"[^\n]*\n[^\n]*\n", content := path.read_bytes())
     if start and content.startswith(
         REAL_RAS, start.end() + 8 + 12 * (len(vertices) + len(faces))
     ):
-        return np.asarray(vertices, dtype=float), faces, SCANNER, None
+        return vertices, faces, SCANNER, None
     if not str(info.get("valid", "")).startswith("1") or not {
         "xras",
         "yras",
@@ -833,26 +812,12 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
             " centre (tkr RAS)",
             path,
         )
-        return np.asarray(vertices, dtype=float), faces, None, None
-    axes = np.column_stack(
-        [
-            info["xras"],
-            info["yras"],
-            info["zras"],
-        ]
-    ).astype(float)
+        return vertices, faces, None, None
+    axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
     # tkr RAS has the axes of a coronal volume, with columns to the left, rows down,
     # slices forward
     rotation = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    return (
-        np.asarray(
-            vertices @ rotation.T + info["cras"],
-            dtype=float,
-        ),
-        faces,
-        SCANNER,
-        None,
-    )
+    return vertices @ rotation.T + info["cras"], faces, SCANNER, None
 
 
 SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {

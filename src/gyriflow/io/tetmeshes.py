@@ -1,10 +1,9 @@
 """Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files
 hold mm.
 
-A run's start mesh has its regions in one file, for ParaView as two blocks: `mesh`, the
-elements with fields and tags, and `facets`, the pial triangles. dolfinx reads tags by
-`read_meshtags(mesh, NAME, xpath="/Xdmf/Domain[2]")`: this second domain has a grid for
-each tag, since dolfinx before 0.10 reads a grid's first only.
+A run's start mesh has its regions in one file, as two blocks: `mesh`, the elements with
+fields and tags, and `facets`, the pial triangles. dolfinx reads a tag by
+`read_meshtags(mesh, BLOCK, attribute_name=TAG)`.
 """
 
 from collections.abc import Mapping
@@ -65,10 +64,10 @@ def _data_item(values: NDArray, where: str) -> str:
     )
 
 
-def document(*domains: str) -> str:
-    """Return a whole XDMF document around the grids of its domains."""
-    inside = "".join(f"<Domain>{grids}</Domain>" for grids in domains)
-    return f'<?xml version="1.0"?>\n<Xdmf Version="3.0">{inside}</Xdmf>\n'
+def write_xdmf(path: AnyPath, grids: str) -> None:
+    """Write an XDMF document of grids."""
+    domain = f"<Domain>{grids}</Domain>"
+    write_text(path, f'<?xml version="1.0"?>\n<Xdmf Version="3.0">{domain}</Xdmf>\n')
 
 
 def write_tetrahedral_mesh(
@@ -89,10 +88,7 @@ def write_tetrahedral_mesh(
             file[f"Cell/{name}"] = values
     cells = (mesh.tets, f"{data.name}:/tets")
     points = (mesh.vertices, f"{data.name}:/vertices")
-    write_text(
-        path,
-        document(xdmf_grid("mesh", cells, points, {}, fields)),
-    )
+    write_xdmf(path, xdmf_grid("mesh", cells, points, {}, fields))
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
@@ -123,8 +119,7 @@ class Regions:
     """A tetrahedral mesh in mm with (f, 3) facets of its boundary, and fields (n,) or
     (n, 3) at its vertices by name.
 
-    Tags by name are (m,) of elements and (f,) of facets, which dolfinx reads as
-    `facet_NAME` if both have the name.
+    Tags by name are (m,) of elements and (f,) of facets.
     """
 
     mesh: TetrahedralMesh
@@ -158,13 +153,7 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
     tets, facets = ((cells[kind], f"{data.name}:/{kind}") for kind in cells)
     blocks = xdmf_grid("mesh", tets, points, fields, tags["tets"])
     blocks += xdmf_grid("facets", facets, points, {}, tags["facets"])
-    single = []
-    for name, stored in tags["tets"].items():
-        single.append(xdmf_grid(name, tets, points, {}, {name: stored}))
-    for name, stored in tags["facets"].items():
-        own_name = f"facet_{name}" if name in tags["tets"] else name
-        single.append(xdmf_grid(own_name, facets, points, {}, {name: stored}))
-    write_text(path, document(blocks, "".join(single)))
+    write_xdmf(path, blocks)
 
 
 def read_regions(path: AnyPath) -> Regions:

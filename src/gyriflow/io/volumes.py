@@ -177,14 +177,11 @@ def read_values(
         values = _stored_values(image, path)
     shape = tuple(n for axis, n in enumerate(values.shape) if axis < 3 or n != 1)
     if len(shape) != 3 or values.dtype.kind not in "biuf":
-        form = f"shape {values.shape}, type {values.dtype}"
-        problem = f"is not a volume of {content}"
-        expected = "three axes (further ones of length 1) of numbers"
         raise InputError(
-            problem,
+            f"is not a volume of {content}",
             path=path,
-            found=form,
-            expected=expected,
+            found=f"shape {values.shape}, type {values.dtype}",
+            expected="three axes (further ones of length 1) of numbers",
         )
     affine = np.array(
         _affine(image, affine_from, path),
@@ -291,16 +288,14 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
     packed = data.name.lower().endswith(PACKED_SUFFIXES)
     size = data.stat().st_size
     if needed < 0 or needed > size * (MAX_COMPRESSION if packed else 1):
-        expected = (
-            f"{needed} bytes for {' x '.join(map(str, image.shape))} values of"
-            f" {image.get_data_dtype()}"
-        )
-        problem = "is shorter than its header specifies"
         raise InputError(
-            problem,
+            "is shorter than its header specifies",
             path=data,
             found=f"{size} bytes",
-            expected=expected,
+            expected=(
+                f"{needed} bytes for {' x '.join(map(str, image.shape))} values of"
+                f" {image.get_data_dtype()}"
+            ),
             remedy=AGAIN,
         )
 
@@ -365,12 +360,9 @@ def _affine(
     if isinstance(image, nib.Nifti1Pair):
         return _nifti_affine(image, affine_from, path)
     if isinstance(image, nib.AnalyzeImage):
-        problem = (
-            "is in the Analyze format, which holds no orientation, so left and right"
-            " are unknown"
-        )
         raise InputError(
-            problem,
+            "is in the Analyze format, which holds no orientation, so left and right"
+            " are unknown",
             path=path,
             expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)",
         )
@@ -385,17 +377,15 @@ def _affine(
             expected="sizes above 0",
         )
     if not _has_directions(path):
-        problem = "has no valid directions (goodRASFlag), so left and right are unknown"
-        remedy = (
-            "Set them as in the scan that was labelled, for example with mri_convert"
-            " --in_orientation."
-        )
         raise InputError(
-            problem,
+            "has no valid directions (goodRASFlag), so left and right are unknown",
             path=path,
             found=0,
             expected=1,
-            remedy=remedy,
+            remedy=(
+                "Set them as in the scan that was labelled, for example with"
+                " mri_convert --in_orientation."
+            ),
         )
     return image.affine
 
@@ -419,12 +409,13 @@ def _nifti_affine(
     try:
         matrices = {name: getattr(header, f"get_{name}")() for name in needed}
     except (HeaderDataError, ValueError) as error:
-        remedy = (
-            "If the sform holds, as in the scan that was labelled, set affine_from:"
-            " sform."
-        )
         raise InputError(
-            f"has a broken qform: {error}", path=path, remedy=remedy
+            f"has a broken qform: {error}",
+            path=path,
+            remedy=(
+                "If the sform holds, as in the scan that was labelled, set affine_from:"
+                " sform."
+            ),
         ) from error
     codes = {
         "sform": int(header["sform_code"]),
@@ -441,9 +432,8 @@ def _nifti_affine(
         return scale * matrices[affine_from]
     present = [name for name, code in codes.items() if code > 0]
     if not present:
-        problem = "neither qform nor sform is set, so left and right are unknown"
         raise InputError(
-            problem,
+            "neither qform nor sform is set, so left and right are unknown",
             path=path,
             expected="a code > 0 of one",
             remedy=WHICH_MATRIX,
@@ -515,13 +505,11 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
     except KeyError:
         unit = ""
     if unit not in MM_PER_NIFTI_UNIT:
-        problem = "has a unit of length that is not in NIfTI"
-        expected = "2 (mm), 1 (metres), 3 (micrometres) or 0"
         raise InputError(
-            problem,
+            "has a unit of length that is not in NIfTI",
             path=path,
             found=f"xyzt_units {code}",
-            expected=expected,
+            expected="2 (mm), 1 (metres), 3 (micrometres) or 0",
         )
     return unit
 
@@ -535,23 +523,18 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
             not np.rint(values).any() and values != 0
         )
         if broken.any():
-            problem = (
-                "contains values that are not labels, whole numbers within"
-                f" {MAX_LABEL_ERROR:g}"
-            )
-            broken_values = (
-                f"{np.count_nonzero(broken)} voxels, for example"
-                f" {values[broken][0]:.4g}"
-            )
-            remedy = (
-                "Resample labels with nearest neighbour. gyriflow does not segment"
-                " images."
-            )
             raise InputError(
-                problem,
+                "contains values that are not labels, whole numbers within"
+                f" {MAX_LABEL_ERROR:g}",
                 path=path,
-                found=broken_values,
-                remedy=remedy,
+                found=(
+                    f"{np.count_nonzero(broken)} voxels, for example"
+                    f" {values[broken][0]:.4g}"
+                ),
+                remedy=(
+                    "Resample labels with nearest neighbour. gyriflow does not segment"
+                    " images."
+                ),
             )
         if (error := errors.max(initial=0)) > 1e-3:
             log.warning(
@@ -564,12 +547,10 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
     largest = values.max(initial=0)
     bounds = np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:
-        span = f"{least:.6g} to {largest:.6g}"
-        expected = f"whole numbers up to {bounds.max}"
         raise InputError(
             "contains values that are not tissue labels",
             path=path,
-            found=span,
-            expected=expected,
+            found=f"{least:.6g} to {largest:.6g}",
+            expected=f"whole numbers up to {bounds.max}",
         )
     return values.astype(np.int32)

@@ -41,16 +41,15 @@ def read_vtk(path: Path) -> tuple[NDArray, NDArray]:
             f"VTK's reader ended with code {process.returncode}",
             *process.stderr.decode().splitlines(),
         ]
-        remedy = (
-            "Save its surface as triangles, for example with ParaView (Extract Surface,"
-            " Triangulate). The file may also be truncated."
-        )
         raise InputError(
             "holds no surface of triangles alone",
             path=path,
             found=words,
             expected="triangles (PolyData)",
-            remedy=remedy,
+            remedy=(
+                "Save its surface as triangles, for example with ParaView (Extract"
+                " Surface, Triangulate). The file may also be truncated."
+            ),
         )
     with np.load(io.BytesIO(process.stdout)) as arrays:
         return arrays["points"], arrays["faces"]

@@ -66,23 +66,31 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
         if kind in ("bool", "null") or (
             kind == "int" and not re.fullmatch(r"-?(0|[1-9]\d*)", key.value)
         ):
-            problem = (
-                f"the key {key.value} is another value to YAML; write it in quotes"
+            raise yaml.constructor.ConstructorError(
+                None,
+                None,
+                f"the key {key.value} is another value to YAML; write it in quotes",
+                key.start_mark,
             )
-            raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
         if key.value in first and key.tag != "tag:yaml.org,2002:merge":
-            problem = f"duplicate key {key.value!r} (first on line {first[key.value]})"
-            raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
+            raise yaml.constructor.ConstructorError(
+                None,
+                None,
+                f"duplicate key {key.value!r} (first on line {first[key.value]})",
+                key.start_mark,
+            )
         first[str(key.value)] = line
         # 1 and 1.0 are one key of a dictionary
         value = key.value if kind == "merge" else loader.construct_object(key)
         other = equal.setdefault(value, key.value)
         if other != key.value:
-            problem = (
-                f"the keys {other} and {key.value} are one number to YAML; write them"
-                " in quotes if they are names"
+            raise yaml.constructor.ConstructorError(
+                None,
+                None,
+                f"the keys {other} and {key.value} are one number to YAML; write"
+                " them in quotes if they are names",
+                key.start_mark,
             )
-            raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
     loader.flatten_mapping(node)
     return loader.construct_mapping(node, deep=True)
 
@@ -94,11 +102,13 @@ def _number(loader: _StrictLoader, node: yaml.ScalarNode) -> int | float:
         loader.construct_yaml_int if kind == "int" else loader.construct_yaml_float
     )(node)
     if ":" in node.value or re.match(r"[-+]?0[0-7_]+$", node.value):
-        problem = (
-            f"{node.value} is {read:g} to YAML; write a decimal number without zeros"
-            " before it, or text in quotes"
+        raise yaml.constructor.ConstructorError(
+            None,
+            None,
+            f"{node.value} is {read:g} to YAML; write a decimal number without"
+            " zeros before it, or text in quotes",
+            node.start_mark,
         )
-        raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
     return read
 
 
@@ -114,8 +124,9 @@ def read_yaml(path: AnyPath) -> Any:
     try:
         text = Path(path).read_text(encoding="utf-8")
         if not _has_valid_depth(text):
-            problem = "is nested too deeply"
-            raise InputError(problem, path=path, expected="a configuration")
+            raise InputError(
+                "is nested too deeply", path=path, expected="a configuration"
+            )
         content = yaml.load(text, Loader=_StrictLoader)  # noqa: S506
         size = _size(content, {})
     except OSError as error:
@@ -137,8 +148,11 @@ def read_yaml(path: AnyPath) -> Any:
         ) from error
     except (ValueError, LookupError, TypeError, AttributeError) as error:
         # words that look like a date or a number and are none, such as 2001-99-99 or 0b
-        problem = f"has a value that YAML cannot read: {error}"
-        raise InputError(problem, path=path, remedy="Put texts in quotes.") from error
+        raise InputError(
+            f"has a value that YAML cannot read: {error}",
+            path=path,
+            remedy="Put texts in quotes.",
+        ) from error
     if size > MAX_VALUES:
         raise InputError(
             "has too many values, aliases written out",

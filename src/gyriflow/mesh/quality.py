@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import MeshError
 from ..geometry import tetrahedra, triangles
 from ..geometry.jacobians import lower_bounds
-from ..geometry.matching import crossing_faces, nearest_on, surface_distance
+from ..geometry.matching import faces_that_cross, nearest_on, surface_distance
 from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh
 from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, dots
 
@@ -224,7 +224,7 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "pial_edge_mm": triangles.mean_edge_length(boundary),
         "pial_area_mm2": triangles.area(boundary),
         "smallest_pial_face_mm2": float(triangles.face_areas(boundary).min()),
-        "crossing_faces": crossing_faces(boundary),
+        "crossing_faces": len(faces_that_cross(boundary)),
         "surface_distance_mm": _fidelity(boundary, surface),
         "gap_mm": {
             "input": _gap_summary(walls),

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
-from ..geometry.matching import crossing_faces
+from ..geometry.matching import faces_that_cross
 from ..geometry.remeshing import remesh, untangle
 from ..geometry.tetrahedra import (
     TetrahedralMesh,
@@ -146,10 +146,10 @@ def _even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
     """Remesh a surface with even triangles, fit to bound a mesh as it is; MeshError
     where it cuts itself."""
     even = remesh(surface, edge_mm)
-    crossing = crossing_faces(even)
+    crossing = len(faces_that_cross(even))
     if crossing:
         even, _, _ = untangle(even)
-        crossing = crossing_faces(even)
+        crossing = len(faces_that_cross(even))
     log.info(
         "surface remeshed to %d faces, edges of %.3f mm, %d faces cross",
         len(even.faces),

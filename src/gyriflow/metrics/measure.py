@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import MeshError
 from ..geometry.diffusion import harmonic_continuation
-from ..geometry.matching import crossing_faces
+from ..geometry.matching import faces_that_cross
 from ..geometry.triangles import (
     Floats,
     TriangleMesh,
@@ -176,7 +176,7 @@ def size_metrics(
     volume = volume_ml(cap(mesh))
     cm2 = sum(map(area_cm2, hemispheres)) or area_cm2(mesh)
     relative = cm2 / volume ** (2 / 3) if volume > 0 else np.nan
-    crossing = float(crossing_faces(mesh))
+    crossing = float(len(faces_that_cross(mesh)))
     return {
         "volume": volume,
         "area": cm2,

@@ -10,7 +10,7 @@ from phantoms import BRAINSTEM, CEREBELLUM, CORTEX, CSF, DEEP_GREY, VENTRICLES, 
 from shapes import rigid
 
 from gyriflow.anatomy.labels import read_cerebrum
-from gyriflow.anatomy.misplaced import bare_surface, misplaced_cortex
+from gyriflow.anatomy.misplaced import misplaced_cortex
 from gyriflow.io.yaml_files import SCHEMES
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
@@ -57,10 +57,9 @@ def warnings_of_cortex(labels, mask):
 
 
 def test_a_brain_without_fault_has_no_warning(brain):
-    assert list(misplaced_cortex(brain, AFFINE, ATLAS)) == []
-    assert list(bare_surface(brain, AFFINE, ATLAS)) == []
     # a cut by the border of a volume is no bare surface
-    assert list(bare_surface(brain[: len(brain) // 2], AFFINE, ATLAS)) == []
+    for labels in (brain, brain[: len(brain) // 2]):
+        assert list(misplaced_cortex(labels, AFFINE, ATLAS, is_whole=True)) == []
     assert "hindbrain" not in read_cerebrum(brain, AFFINE, ATLAS).report
 
 
@@ -84,7 +83,7 @@ def test_hindbrain_labelled_as_inner_tissue_is_named_with_its_place(
     brain, tissue, label, name
 ):
     faulty = np.where(brain == tissue, label, brain)
-    (found,) = bare_surface(faulty, AFFINE, ATLAS)
+    (found,) = misplaced_cortex(faulty, AFFINE, ATLAS, is_whole=True)
     assert found == Facts("8 mm", f"{label} {name}")
     # check and the surface take their warnings from here, but for a hemisphere
     assert found in read_cerebrum(faulty, AFFINE, ATLAS, 0.5).warnings
@@ -95,7 +94,8 @@ def test_hindbrain_labelled_as_inner_tissue_is_named_with_its_place(
 def test_cortex_that_lacks_a_label_on_one_side_is_named(brain, label):
     x_mm = np.arange(len(brain))[:, None, None] * SIZE[0]
     missing = (brain == CORTEX) & (x_mm < CENTRE[0] - 8.0)
-    (found,) = bare_surface(np.where(missing, label, brain), AFFINE, ATLAS)
+    faulty = np.where(missing, label, brain)
+    (found,) = misplaced_cortex(faulty, AFFINE, ATLAS, is_whole=True)
     assert found == Facts("1 white matter", "cortex")
     x, y, z = re.search(r"\((-?\d+), (-?\d+), (-?\d+)\) mm", found).groups()
     assert [int(x), int(y), int(z)] == pytest.approx(place(missing), abs=6)

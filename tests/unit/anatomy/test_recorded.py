@@ -85,7 +85,6 @@ def test_numbers_of_label_volumes(recorded):
             "counts": layout.count,
             "contacts": layout.contact,
             "unlabelled": labels.read_cerebrum(without, affine, ATLAS),
-            "border": labels.border_share(cut > 0),
             "misplaced": answer_of(misplaced.misplaced_cortex, faulty, affine, ATLAS),
         },
         rtol=ROUGH,

@@ -21,7 +21,7 @@ from gyriflow.folding.targets import (
 )
 from gyriflow.folding.tissue import Elements
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.geometry.alignment import without_rigid_motion
+from gyriflow.geometry.alignment import align_points
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.paths import path_through
@@ -50,12 +50,15 @@ def misfits_after_steps(mesh, misfit, steps):
     path = path_through([21.0, 23.0], [mesh.vertices, 1.04**2 * mesh.vertices], mesh)
     sizes = vertex_sizes(mesh.vertices, inputs.pieces)
     positions = mesh.vertices + misfit
-    misfits = [without_rigid_motion(positions, path(21.0), sizes)]
+
+    def misfit_at(week):
+        return align_points(path(week), positions, sizes) - positions
+
+    misfits = [misfit_at(21.0)]
     for number in range(steps):
         start = StepStart(positions, number * DAY_S, DAY_S)
         positions = growth_on_path(p, inputs, path, start).goal_mm
-        on_path = path(21.0 + (number + 1) * DAY_GW)
-        misfits.append(without_rigid_motion(positions, on_path, sizes))
+        misfits.append(misfit_at(21.0 + (number + 1) * DAY_GW))
     return misfits
 
 

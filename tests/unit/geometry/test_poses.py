@@ -9,10 +9,8 @@ from shapes import LPS, rigid, sphere
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import (
     Planes,
-    RigidFit,
     angle_deg,
     follow_planes,
-    residual_ratio,
 )
 from gyriflow.geometry.poses import Pose, turned
 
@@ -39,8 +37,3 @@ def test_a_sphere_is_not_turned():
         np.eye(3), np.zeros(3), lambda *_: planes, 1, lambda *_: True
     )
     assert angle_deg(rotation) < 1e-6
-
-
-def test_a_pose_without_another_one_is_certain():
-    fit = RigidFit(np.eye(3), np.zeros(3), 0.5)
-    assert residual_ratio([fit], fit, 30.0) == np.inf

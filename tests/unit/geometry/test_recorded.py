@@ -125,32 +125,10 @@ def test_numbers_of_an_alignment(recorded, surface):
             "aligned": np.round(aligned.vertices.mean(axis=0), 1),
             "fit": onto,
             "angle": alignment.angle_deg(onto[:3, :3]),
-            "left": alignment.without_rigid_motion(first, second, weights),
+            "left": alignment.align_points(second, first, weights) - first,
             "step": alignment.follow_planes(
                 np.eye(3), np.zeros(3), lambda *_: planes, 1, lambda *_: True
             ),
-        }
-    )
-
-
-def fit(angle, residual):
-    turn = alignment.Rotation.from_euler("z", angle, degrees=True).as_matrix()
-    return alignment.RigidFit(turn, np.array([angle, 1.0, 2.0]), residual)
-
-
-def test_numbers_of_the_fits_from_all_sides(recorded):
-    residuals = {0: 5.0, 8: 4.0, 30: 2.0, 60: 3.0, 65: 2.5, 120: 7.0}
-    fits = alignment.fits_from_all_sides(
-        list(residuals),
-        lambda start: fit(start, residuals[start]),
-        lambda found: fit(found.shift[0] + 1.0, found.residual - 0.5),
-        2,
-        10.0,
-    )
-    recorded(
-        {
-            "fits": fits,
-            "ratios": [alignment.residual_ratio(fits, best, 10.0) for best in fits],
         }
     )
 

@@ -6,7 +6,6 @@ import os
 
 import nibabel as nib
 import numpy as np
-import pandas as pd
 import pytest
 from configurations import refusal
 from facts import Facts
@@ -19,12 +18,10 @@ from gyriflow.io.files import (
     contents,
     files_below,
     read_json,
-    read_table,
     read_text_table,
     write_json,
-    write_table,
 )
-from gyriflow.io.origins import joined_contents
+from gyriflow.io.origins import joined_contents, origin_key, present_key
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_keys, read_yaml
@@ -33,31 +30,22 @@ from gyriflow.settings.base import folder_of, located
 from gyriflow.study.loading import load
 
 
-def test_a_file_appears_only_when_the_block_ends_well(tmp_path):
+def test_a_file_appears_whole_and_stays_where_a_later_one_fails(tmp_path):
     path = tmp_path / "new" / "a.surf.gii"
-    with atomic_write(path) as temporary:
-        temporary.write_text("whole")
-        assert not path.exists()
-        assert temporary.parent == path.parent
-        assert temporary.name.startswith(".")
-        assert temporary.name.endswith(".surf.gii")
+
+    def write(text, ending):
+        with atomic_write(path) as temporary:
+            temporary.write_text(text)
+            assert temporary.name.startswith(".")
+            assert temporary.name.endswith(".surf.gii")
+            if ending is not None:
+                raise ending
+
+    write("whole", None)
+    with pytest.raises(KeyboardInterrupt):
+        write("half", KeyboardInterrupt())
     assert path.read_text() == "whole"
     assert list(path.parent.iterdir()) == [path]
-
-
-def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("earlier")
-
-    def stopped_half_way():
-        with atomic_write(path) as temporary:
-            temporary.write_text("half")
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        stopped_half_way()
-    assert path.read_text() == "earlier"
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
@@ -107,21 +95,6 @@ def test_a_workbook_of_excel_is_named_with_what_to_do(tmp_path, start):
     (tmp_path / "participants.tsv").write_bytes(start + b"\x84\0\xff")
     with pytest.raises(InputError, check=Facts("participants.tsv:", "Excel", ".tsv")):
         read_text_table(tmp_path / "participants.tsv")
-
-
-NAMES = ["021", "7", "1e5", "NA", "None", "true", "1.0", "2024-01-01", "-", "nan"]
-TEXTS = ("subject", "run", "region", "observed", "start", "series", "page")
-
-
-@pytest.mark.parametrize("names", [NAMES, *([name] * 2 for name in NAMES)])
-def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path, names):
-    table = dict.fromkeys(TEXTS, names)
-    table["week"] = [21.25 + number for number in range(len(names))]
-    table["explained"] = [week % 2 > 1 for week in table["week"]]
-    write_table(tmp_path / "a.csv", pd.DataFrame(table).assign(value=np.nan, unit=""))
-    back = read_table(tmp_path / "a.csv")
-    assert back[[*table]].to_dict("list") == table
-    assert back[["value", "unit"]].isna().all(axis=None)
 
 
 def test_folders_that_may_not_be_read_are_among_the_files(tmp_path, monkeypatch):
@@ -298,3 +271,37 @@ def test_a_link_to_a_key_is_read_as_its_own_name_says(tmp_path):
     assert len(read_surface(located(tmp_path, "a.surf.gii")).faces) == 80
     # a configuration too has its brains beside it, not in the store
     assert folder_of(link) == tmp_path
+
+
+ORIGIN_TEXTS = {"a.hdr": "header", "a.img": "image", "b": "second"}
+
+
+def origin(folder, weeks=(21, 22.5), **texts):
+    """Return an origin that names two new files of a folder, the first with a
+    companion."""
+    folder.mkdir()
+    for name, text in (ORIGIN_TEXTS | texts).items():
+        (folder / name).write_text(text)
+    files = [{"id": "a", "files": (str(folder / "a.hdr"),)}, str(folder / "b")]
+    return {"weeks": weeks, "brains": files}
+
+
+def test_a_key_is_of_the_contents_of_files_and_their_companions_not_of_their_paths(
+    tmp_path,
+):
+    keys = [present_key(origin(tmp_path / name)) for name in ("first", "second")]
+    for name in ORIGIN_TEXTS:
+        changed = origin(tmp_path / f"changed {name}", **{name: "other"})
+        keys.append(present_key(changed))
+    keys.append(present_key(origin(tmp_path / "changed weeks", (21, 23))))
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 5
+
+
+def test_a_key_is_the_same_from_contents_that_are_known_already(tmp_path):
+    folder = tmp_path / "known"
+    described = origin(folder)
+    known = joined_contents(contents([folder / "a.hdr", folder / "b"], {}))
+    assert origin_key(described, known) == present_key(described)
+    (folder / "b").unlink()
+    assert present_key(described) is None

@@ -9,7 +9,6 @@ import pytest
 import pyvista as pv
 from facts import Facts
 from nibabel.freesurfer.io import write_geometry
-from pydantic import ValidationError
 from shapes import sphere
 
 from gyriflow.cli.recognition import recognise
@@ -19,7 +18,6 @@ from gyriflow.geometry.triangles import is_closed, signed_volume
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.report.page import hide_paths
-from gyriflow.settings.brains import BrainConfig
 
 BALL = sphere(20.0, 2, (30.0, -20.0, 5.0))
 LABELS = np.zeros((4, 5, 6), dtype=np.uint8)
@@ -122,14 +120,6 @@ def test_cifti_files_are_not_volumes(tmp_path, ending):
         recognise(tmp_path)
     save_volume(nib.Nifti1Image)(tmp_path / "sub-1_week24_dseg.nii.gz")
     assert recognised(tmp_path, ["sub-1_week24_dseg.nii.gz"])
-
-
-@pytest.mark.parametrize("suffix", [".nii.gz", ".HDR", ".mgz"])
-def test_a_single_hemisphere_with_a_scheme_may_be_any_volume(suffix):
-    one = {"id": "a", "week": 22, "labels": f"a{suffix}", "side": "left"}
-    assert BrainConfig(**one, scheme="feta-7").labels == f"a{suffix}"
-    with pytest.raises(ValidationError, match="scheme"):
-        BrainConfig(**one)
 
 
 def mni_text(coloured_by=2, corners=3):

@@ -187,22 +187,21 @@ def domain(written):
 
 
 @pytest.mark.parametrize(
-    ("grid", "dimension", "expected"),
+    ("block", "name", "expected"),
     [
-        ("hemisphere", 3, lambda x: np.where(x[:, 0] < 0, 1, 2)),
-        ("layer", 3, lambda x: np.where(x[:, 2] < 0, 5, 7)),
-        ("zone", 2, lambda x: np.where(x[:, 2] > 1 - 1e-9, 3, 0)),
-        ("facet_hemisphere", 2, lambda x: np.where(x[:, 0] < 0, 1, 2)),
+        ("mesh", "hemisphere", lambda x: np.where(x[:, 0] < 0, 1, 2)),
+        ("mesh", "layer", lambda x: np.where(x[:, 2] < 0, 5, 7)),
+        ("facets", "zone", lambda x: np.where(x[:, 2] > 1 - 1e-9, 3, 0)),
+        ("facets", "hemisphere", lambda x: np.where(x[:, 0] < 0, 1, 2)),
     ],
 )
 def test_dolfinx_reads_every_tag_where_it_belongs(
-    written, domain, grid, dimension, expected
+    written, domain, block, name, expected
 ):
     path, mesh, facets, *_ = written
     with XDMFFile(MPI.COMM_SELF, path, "r") as file:
-        tags = file.read_meshtags(domain, grid, xpath="/Xdmf/Domain[2]")
-    assert tags.dim == dimension
-    assert len(tags.values) == (len(facets) if dimension == 2 else len(mesh.tets))
+        tags = file.read_meshtags(domain, block, attribute_name=name)
+    assert len(tags.values) == len(mesh.tets if block == "mesh" else facets)
     np.testing.assert_array_equal(
         tags.values,
         expected(dolfinx.mesh.compute_midpoints(domain, tags.dim, tags.indices)),
