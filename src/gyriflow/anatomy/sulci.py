@@ -6,6 +6,7 @@ There the nearest white matter changes from one bank to the other (Han et al. 20
 """
 
 import heapq
+from collections import defaultdict
 from collections.abc import Mapping
 from itertools import product
 from typing import Any
@@ -299,56 +300,54 @@ def _grow_slits(
     necessary.
     """
     layer, row = inside.shape[1] * inside.shape[2], inside.shape[2]
-    steps = [
-        i * layer + j * row + k
-        for i, j, k in product(
-            (-1, 0, 1),
-            repeat=3,
-        )
-        if (i, j, k) != (0, 0, 0)
-    ]
-    rows = [i * layer + j * row - 1 for i in (-1, 0, 1) for j in (-1, 0, 1)]
-    # flat bytes, since reading single voxels of an array takes ten times as long
-    mask, sheet_bytes = bytearray(inside.tobytes()), sheet.tobytes()
-    places = np.flatnonzero(sheet | (ndimage.binary_closing(sheet, OUTSIDE) & cortex))
-    waiting = {int(place): -float(distance.flat[place]) for place in places}
-    queue = [(value, place) for place, value in waiting.items()]
-    order = []
+    offsets = product((-1, 0, 1), repeat=3)
+    steps = [i * layer + j * row + k for i, j, k in offsets]
+    face_steps = [-layer, -row, -1, 1, row, layer]
+    places = np.flatnonzero(sheet)
+    # the closing of the sheet by a block of 3 × 3 × 3 voxels
+    is_near = np.zeros(inside.size, dtype=bool)
+    for step in steps:
+        is_near[places + step] = True
+    gaps = np.flatnonzero(is_near & (cortex & ~sheet).ravel())
+    for step in steps:
+        gaps = gaps[is_near[gaps + step]]
+    places = np.concatenate([places, gaps])
+    around = places[:, None] + face_steps
+    is_enclosed = inside.ravel()[around].all(axis=1)
+    waiting = dict(zip(places.tolist(), (-distance.flat[places]).tolist(), strict=True))
+    # these come into the queue when a voxel at one of their faces is taken
+    enclosed = set(places[is_enclosed].tolist())
+    queue = [(waiting[place], place) for place in places[~is_enclosed].tolist()]
     heapq.heapify(queue)
-    # voxels that may be put into the queue: they wait, are inside, and are not in it
-    is_idle = bytearray(len(mask))
+    # flat bytes, since reading single voxels of an array takes ten times as long
+    mask, rows = bytearray(inside.tobytes()), steps[::3]
+    order = []
+    # voxels that are not simple come into the queue again when one around them is taken
+    idle = set()
+    idle_around = defaultdict(list)
 
     while queue:
         _, place = heapq.heappop(queue)
-        if _is_enclosed(mask, place, row, layer) or not _is_simple_at(
-            mask, place, rows
-        ):
-            is_idle[place] = 1
+        if not _is_simple_at(mask, place, rows):
+            idle.add(place)
+            for step in steps:
+                idle_around[place + step].append(place)
             continue
         mask[place] = 0
         order.append(place)
-        for step in steps:
+        for step in face_steps:
             near = place + step
-            # an enclosed voxel comes into the queue when one at its faces is taken
-            if is_idle[near] and not _is_enclosed(mask, near, row, layer):
-                is_idle[near] = 0
+            if near in enclosed:
+                enclosed.remove(near)
+                heapq.heappush(queue, (waiting[near], near))
+        for near in idle_around.pop(place, ()):
+            if near in idle:
+                idle.remove(near)
                 heapq.heappush(queue, (waiting[near], near))
     for place in reversed(order):
-        if not sheet_bytes[place] and _is_simple_at(mask, place, rows):
+        if not sheet.flat[place] and _is_simple_at(mask, place, rows):
             mask[place] = 1
     return inside & (np.frombuffer(mask, dtype=np.uint8).reshape(inside.shape) == 0)
-
-
-def _is_enclosed(mask: bytearray, place: int, row: int, layer: int) -> int:
-    """Return whether the voxels at the faces of one in a flat mask are inside."""
-    return (
-        mask[place + 1]
-        and mask[place - 1]
-        and mask[place + row]
-        and mask[place - row]
-        and mask[place + layer]
-        and mask[place - layer]
-    )
 
 
 def _is_simple_at(mask: bytearray, place: int, rows: list[int]) -> bool:
