@@ -27,6 +27,10 @@ from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask, dil
 SAMPLES = 600
 DIRECTIONS = 400
 STARTS = 5
+# larger leaves than usual: single points are searched, often far from the surface
+LEAF_SIZE = 64
+# starts that lead to the same plane but for this
+SAME_NORMAL, SAME_OFFSET_MM = 1e-3, 0.05
 # the left-right axis is searched within this angle of the world's x axis
 SEARCH_DEG = 60.0
 # a plane x = const is accepted if its mirror distance is at most this factor of the
@@ -113,8 +117,10 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
     selection = np.random.default_rng(0).choice(
         len(weights), SAMPLES, p=weights / weights.sum()
     )
-    sample, tree = mesh.vertices[selection], cKDTree(mesh.vertices)
+    sample = mesh.vertices[selection]
+    tree = cKDTree(mesh.vertices, leafsize=LEAF_SIZE)
     planes = _symmetry_planes(sample, tree)
+    normals = triangles.vertex_normals(mesh)
     if named:
         x = np.array([1.0, 0.0, 0.0])
         middle = float(weights @ mesh.vertices[:, 0] / weights.sum())
@@ -125,8 +131,8 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
             < SYMMETRY_TOL_FACTOR * least
             + SYMMETRY_TOL_EDGES * triangles.mean_edge_length(mesh)
         ):
-            return _fit_to_fissure(mesh, x, middle, distance)
-    candidates = [_fit_to_fissure(mesh, *plane) for plane in planes]
+            return _fit_to_fissure(mesh.vertices, normals, x, middle, distance)
+    candidates = [_fit_to_fissure(mesh.vertices, normals, *plane) for plane in planes]
     return max(
         candidates,
         key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5),
@@ -134,16 +140,18 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
 
 
 def _fit_to_fissure(
-    mesh: TriangleMesh,
+    vertices: Floats,
+    normals: Floats,
     normal: Floats,
     offset: float,
     asymmetry: float,
 ) -> MidPlane:
-    fitted = _plane_through(_fissure_points(mesh, normal, offset), normal, offset)
+    middle = _fissure_points(vertices, normals, normal, offset)
+    fitted = _plane_through(middle, normal, offset)
     if fitted is None:
         return MidPlane(normal, offset, asymmetry, 0)
     # the first band may have missed the fissure
-    middle = _fissure_points(mesh, *fitted)
+    middle = _fissure_points(vertices, normals, *fitted)
     fitted = _plane_through(middle, *fitted) or fitted
     count, scatter = _scatter(middle, *fitted)
     before, by_symmetry = _scatter(middle, normal, offset)
@@ -153,15 +161,16 @@ def _fit_to_fissure(
 
 
 def _fissure_points(
-    mesh: TriangleMesh,
+    vertices: Floats,
+    normals: Floats,
     normal: Floats,
     offset: float,
 ) -> Floats:
     """Return the (k, 3) points half-way between facing walls of the fissure, a fifth of
-    the width around a plane."""
-    height = mesh.vertices @ normal - offset
+    the width around a plane, from (n, 3) vertices and their normals."""
+    height = vertices @ normal - offset
     width = np.ptp(height)
-    facing = triangles.vertex_normals(mesh) @ normal
+    facing = normals @ normal
     near = np.abs(height) < FISSURE_BAND * width
     left = np.flatnonzero(near & (facing > 0.5))
     right = np.flatnonzero(near & (facing < -0.5))
@@ -169,21 +178,21 @@ def _fissure_points(
         return np.empty((0, 3))
     return np.concatenate(
         [
-            _middles(mesh, height, left, right, normal),
-            _middles(mesh, -height, right, left, -normal),
+            _middles(vertices, height, left, right, normal),
+            _middles(vertices, -height, right, left, -normal),
         ]
     )
 
 
 def _middles(
-    mesh: TriangleMesh,
+    vertices: Floats,
     height: Floats,
     wall: Ints,
     opposite: Ints,
     normal: Floats,
 ) -> Floats:
     across = np.outer(height, normal)
-    in_plane = mesh.vertices - across
+    in_plane = vertices - across
     # distances along the plane count five times as much as distances across it
     squeezed = in_plane + 0.2 * across
     _, nearest = cKDTree(squeezed[opposite]).query(
@@ -202,9 +211,7 @@ def _middles(
     )
     best = np.argmin(gap, axis=1)
     rows = np.flatnonzero(np.isfinite(gap[np.arange(len(wall)), best]))
-    return 0.5 * (
-        mesh.vertices[wall[rows]] + mesh.vertices[neighbours[rows, best[rows]]]
-    )
+    return 0.5 * (vertices[wall[rows]] + vertices[neighbours[rows, best[rows]]])
 
 
 def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
@@ -256,7 +263,7 @@ def _symmetry_planes(
         )
         if len(starts) < STARTS and is_new:
             starts.append(direction)
-    planes = []
+    planes: list[tuple[Floats, float, float]] = []
     for base in starts:
         tangents = np.linalg.svd(base[None])[2][1:]
         best = minimize(
@@ -274,7 +281,14 @@ def _symmetry_planes(
                 "fatol": 1e-4,
             },
         )
-        planes.append((*_plane_near(best.x, base, tangents, centre), float(best.fun)))
+        normal, offset = _plane_near(best.x, base, tangents, centre)
+        is_new = all(
+            np.abs(normal - other).max() > SAME_NORMAL
+            or abs(offset - middle) > SAME_OFFSET_MM
+            for other, middle, _ in planes
+        )
+        if is_new:
+            planes.append((normal, offset, float(best.fun)))
     return planes
 
 
@@ -379,7 +393,8 @@ def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
         np.ceil((flat.max(axis=0) + MARGIN_MM - corner) / SPACING_MM).astype(int) + 1
     )
     fissure = Fissure(plane, axes, corner, np.zeros(shape))
-    middle = _fissure_points(walls, plane.normal, plane.offset)
+    normals = triangles.vertex_normals(walls)
+    middle = _fissure_points(walls.vertices, normals, plane.normal, plane.offset)
     height = middle @ plane.normal - plane.offset
     cells = np.rint(fissure._cells(middle)).astype(int)
     for _ in range(N_UPDATES):

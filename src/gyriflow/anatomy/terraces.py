@@ -19,6 +19,7 @@ from ..geometry.triangles import (
     corners,
     face_areas,
     face_normals,
+    submesh,
     vertex_areas,
     vertex_normals,
 )
@@ -107,12 +108,20 @@ def without_terraces(
             1e-9,
         ),
     )
+    changed = np.ones(len(mesh.faces), dtype=bool)
     for _ in range(N_RESETS):
         moved = TriangleMesh(start + moves, mesh.faces)
-        if not (bad := self_intersecting_faces(moved) | _degraded(mesh, moved)).any():
+        bad = self_intersecting_faces(moved, changed)
+        bad[changed] |= _degraded(
+            submesh(mesh, changed)[0],
+            submesh(moved, changed)[0],
+        )
+        if not bad.any():
             return moved
         near = np.isin(mesh.faces, mesh.faces[bad]).any(axis=1)
         moves[mesh.faces[near]] = 0.0
+        # others have not changed since they were examined
+        changed = np.isin(mesh.faces, mesh.faces[near]).any(axis=1)
     return mesh
 
 

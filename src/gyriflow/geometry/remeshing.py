@@ -3,8 +3,9 @@ MeshLab's filters."""
 
 import numpy as np
 import pymeshlab
+from scipy.spatial import cKDTree
 
-from .triangles import Mask, TriangleMesh
+from .triangles import Mask, TriangleMesh, corners, submesh
 
 REMESHING_ROUNDS = 5
 UNTANGLING_ROUNDS = 10
@@ -12,15 +13,30 @@ UNTANGLING_ROUNDS = 10
 SHARP_DEG = 30.0
 
 
-def self_intersecting_faces(mesh: TriangleMesh) -> Mask:
+def self_intersecting_faces(mesh: TriangleMesh, among: Mask | None = None) -> Mask:
     """Return the (m,) mask of faces that cut others; unlike in `faces_that_cross`,
-    contacts do not count."""
-    document = in_meshlab(mesh)
-    document.compute_selection_by_self_intersections_per_face()
-    return np.asarray(
-        document.current_mesh().face_selection_array(),
-        dtype=bool,
+    contacts do not count.
+
+    With `among` (m,), only faces that cut one of these are searched, in a shorter time
+    if these are few.
+    """
+    if among is None or among.all():
+        document = in_meshlab(mesh)
+        document.compute_selection_by_self_intersections_per_face()
+        return np.asarray(
+            document.current_mesh().face_selection_array(),
+            dtype=bool,
+        )
+    places = corners(mesh)
+    centres = places.mean(axis=1)
+    radius = np.linalg.norm(places - centres[:, None], axis=2).max()
+    distance, _ = cKDTree(centres[among]).query(
+        centres, distance_upper_bound=2.0 * radius
     )
+    near = np.isfinite(distance)
+    crossing = np.zeros(len(near), dtype=bool)
+    crossing[near] = self_intersecting_faces(submesh(mesh, near)[0])
+    return crossing
 
 
 def remesh(
