@@ -5,12 +5,8 @@ import yaml
 from facts import Facts
 
 from gyriflow.errors import InputError
-from gyriflow.settings.root import Config
 from gyriflow.study import resolve
-from gyriflow.study.atlases import used_atlases
-from gyriflow.study.brains import plan_brains
 from gyriflow.study.loading import load
-from gyriflow.study.series import Series, series_of
 from gyriflow.study.study import Study
 
 LABELLED = {"labels": __file__, "scheme": "spina-bifida-atlas"}
@@ -23,6 +19,12 @@ def labelled(*weeks, names="abcdefgh"):
         {"id": name, "week": week, **LABELLED}
         for name, week in zip(names, weeks, strict=False)
     ]
+
+
+def brain(name, week, side=None, **more):
+    """Return a brain of labels, or of the surface of one hemisphere."""
+    half = {"pial": __file__, "side": side}
+    return {"id": name, "week": week, **(half if side else LABELLED), **more}
 
 
 def study(brains=None, **changes):
@@ -120,18 +122,6 @@ def keys(raw, folder="."):
     return [line.partition(": ")[0] for line in problems(raw, folder)]
 
 
-def growth_series(config: Config) -> Series:
-    """Return the growth series of a configuration, as they are planned."""
-    atlases = used_atlases(config)
-    return series_of(config, plan_brains(config, {}, atlases), atlases)
-
-
 def series_ids(study: Study) -> dict[str, list[str]]:
     """Return the ids of the brains of each growth series."""
     return {name: list(series.brains) for name, series in study.series.items()}
-
-
-def series_for(config: Config, brain: str) -> str | None:
-    """Return the growth series whose curves a brain follows."""
-    brains = plan_brains(config, {}, used_atlases(config))
-    return growth_series(config).for_sizes(brains[brain])

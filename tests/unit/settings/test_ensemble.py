@@ -51,7 +51,3 @@ def test_each_input_fills_its_range():
         place = np.log(values / low) / np.log(high / low)
         counts, _ = np.histogram(place, np.linspace(0.0, 1.0, 5))
         assert counts == pytest.approx(16, abs=2)
-
-
-def test_ensembles_are_the_same_again():
-    assert variations(8) == variations(8)

@@ -26,6 +26,8 @@ from gyriflow.study.records import observed_name
 
 UNOPERATED = "spina bifida aperta, unoperated"
 OPERATED = "spina bifida aperta, operated"
+EARLY = [f"spina-bifida-unoperated-{week}" for week in range(21, 26)]
+LATE = [f"spina-bifida-operated-{week}" for week in range(25, 35)]
 SURFACES = "atlas/fetal.week{}.{}.pial.surf.gii"
 
 
@@ -64,10 +66,7 @@ def test_shipped_atlases_are_valid_and_named_after_their_folder(name):
 
 def test_labels_of_spina_bifida_lie_in_the_checkout_as_published(tmp_path):
     config = load(study("spina-bifida"), tmp_path)
-    unoperated = [f"unoperated-{week}" for week in range(21, 26)]
-    operated = [f"operated-{week}" for week in range(25, 35)]
-    names = [f"spina-bifida-{name}" for name in unoperated + operated]
-    assert [brain.id for brain in config.brains] == names
+    assert [brain.id for brain in config.brains] == EARLY + LATE
     (used,) = used_atlases(config)
     assert used.missing == []
     assert all(sha256_of(file.path) == file.sha256 for file in used.files)
@@ -81,19 +80,16 @@ def test_labels_of_spina_bifida_lie_in_the_checkout_as_published(tmp_path):
 
 def test_populations_are_named_and_never_share_a_curve(tmp_path):
     found = resolve(load(study("spina-bifida"), tmp_path))
-    unoperated = [f"spina-bifida-unoperated-{week}" for week in range(21, 26)]
-    operated = [f"spina-bifida-operated-{week}" for week in range(25, 35)]
-    assert observed_name(found.brains[brain] for brain in unoperated) == UNOPERATED
-    both = observed_name(found.brains[brain] for brain in [*unoperated, operated[0]])
+    assert observed_name(found.brains[brain] for brain in EARLY) == UNOPERATED
+    both = observed_name(found.brains[brain] for brain in [*EARLY, LATE[0]])
     assert both == Facts(f"{UNOPERATED} (21-25 GW)", f"{OPERATED} (25 GW)")
-    assert series_ids(found) == {UNOPERATED: unoperated, OPERATED: operated}
-    (simulation,) = found.run_simulations
-    assert simulation.series == UNOPERATED
-    assert found.norm_reference == unoperated
+    assert series_ids(found) == {UNOPERATED: EARLY, OPERATED: LATE}
+    assert found.run_simulations[0].series == UNOPERATED
+    assert found.norm_reference == EARLY
 
 
 def test_a_growth_curve_across_populations_is_refused(tmp_path):
-    mixed = ["spina-bifida-unoperated-21", "spina-bifida-operated-34"]
+    mixed = [EARLY[0], LATE[-1]]
     named = study("spina-bifida", growth={"brains": {"mixed": mixed}})
     assert problems(named, tmp_path) == [
         Facts("growth.brains.mixed:", OPERATED, UNOPERATED)
@@ -108,8 +104,7 @@ def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_
     some = {"name": "spina-bifida", "series": "unoperated", "weeks": [22, 21]}
     config = load(study([some, "dhcp-surface"], "own", brains=own), tmp_path)
     dhcp = [f"dhcp-surface-{week}" for week in range(21, 37)]
-    few = [f"spina-bifida-unoperated-{week}" for week in (21, 22)]
-    assert [brain.id for brain in config.brains] == ["own", *few, *dhcp]
+    assert [brain.id for brain in config.brains] == ["own", *EARLY[:2], *dhcp]
     twice = study(["dhcp-surface", "dhcp-surface"], "own", brains=own)
     assert problems(twice, tmp_path) == [
         *(Facts("brains:", 2, name) for name in dhcp[:3]),
@@ -162,15 +157,11 @@ def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
         require_checksums(found)
 
 
-def test_two_files_of_one_name_are_refused(tmp_path):
-    copies = [SURFACES.format(21, "left"), "copy/" + SURFACES.format(21, "left")]
-    touched(tmp_path / "mine", *surfaces(21), copies[1])
-    both = [tmp_path / "mine" / copy for copy in copies]
+def test_two_files_of_one_name_or_a_file_in_place_of_the_folder_are_refused(tmp_path):
+    copies = [f"mine/{copy}/{SURFACES.format(21, 'left')}" for copy in "ab"]
+    touched(tmp_path, *copies, "file")
+    both = [tmp_path / copy for copy in copies]
     assert problems(dhcp(21), tmp_path) == [Facts("atlas.folder:", *both)]
-
-
-def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
-    touched(tmp_path, "file")
     found = problems(dhcp(21, folder="file"), tmp_path)
     assert found == [Facts("atlas.folder:", tmp_path / "file")]
 
@@ -253,57 +244,42 @@ def test_mistakes_in_a_description_are_named_with_its_file(
 # licences and mistakes
 
 
-def test_a_narrow_licence_has_to_be_accepted_and_is_reported(tmp_path):
+def test_a_narrow_licence_is_accepted_and_reported_and_whether_checksums_lack(
+    tmp_path,
+):
     crl = {"name": "crl", "weeks": [21, 22]}
     licence = Atlas(**read_yaml(ATLASES / "crl" / "atlas.yaml")).licence
     assert problems(study(crl), tmp_path) == [
         Facts("atlas.accept_licence:", "true", "crl", licence.name, licence.terms)
     ]
     (used,) = used_atlases(load(study(crl | {"accept_licence": True}), tmp_path))
-    folder = tmp_path / "resources" / "atlases" / "crl"
     note = retrieval_note(used)
+    folder = tmp_path / "resources" / "atlases" / "crl"
     assert note == Facts("crl", 2, folder, "Gholipour", licence.terms)
     assert "checksum" not in note
-
-
-def test_files_without_checksums_are_said_to_have_none(tmp_path):
     write_atlas(tmp_path, url="https://example.org/atlas")
     raw = study("atlas.yaml", folding={"end_week": 22})
-    (used,) = used_atlases(load(raw, tmp_path))
-    assert "checksum" in retrieval_note(used)
+    (without,) = used_atlases(load(raw, tmp_path))
+    assert "checksum" in retrieval_note(without)
 
 
-OPERATED_WEEKS = ", ".join(map(str, range(25, 35)))
-
-
-@pytest.mark.parametrize(
+@cases(
     ("atlas", "found"),
-    [
-        ({"name": "crl", "sources": "x"}, [Facts("atlas.sources:", "series")]),
-        (
-            {"name": "spina-bifida", "weeks": [], "images": "all"},
-            [Facts("atlas.weeks:", []), Facts("atlas.images:", "all")],
-        ),
-        (
-            ["spina-bifda", {"name": "spina-bifida", "series": "operatd"}],
-            [
-                Facts("atlas[0].name:", "spina-bifda", "spina-bifida"),
-                Facts("atlas[1].series:", "operatd", "unoperated, operated"),
-            ],
-        ),
-        (
-            {"name": "spina-bifida", "series": "operated", "weeks": [24]},
-            [Facts("atlas.weeks:", 24, "operated", OPERATED_WEEKS)],
-        ),
-        ({"weeks": [21]}, [Facts("atlas.name:")]),
-        ("none.yaml", [Facts("atlas.name:", "none.yaml")]),
-        (7, [Facts("atlas:", 7)]),
-    ],
+    """
+    {name: crl, sources: x} | [["atlas.sources:", series]]
+    {name: crl, weeks: [], images: all} | [["atlas.weeks:", []], ["atlas.images:", all]]
+    [spina-bifda] | [["atlas[0].name:", spina-bifda, spina-bifida]]
+    [{name: spina-bifida, series: oprated}] | [["atlas[0].series:", oprated, operated]]
+    {name: spina-bifida, series: operated, weeks: [24]} | [["atlas.weeks:", 24, 25, 34]]
+    {weeks: [21]} | [["atlas.name:"]]
+    none.yaml | [["atlas.name:", none.yaml]]
+    7 | [["atlas:", 7]]
+    """,
 )
 def test_mistakes_in_a_section_are_named_at_once(tmp_path, atlas, found):
     named = problems(study(atlas, "x", folding={"end_weak": 23}), tmp_path)
     assert named == [
-        *found,
+        *(Facts(*facts) for facts in found),
         Facts("folding.end_week:"),
         Facts("folding.end_weak:", "end_week"),
     ]

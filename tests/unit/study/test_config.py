@@ -8,12 +8,26 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from configurations import cases, keys, labelled, problems, refusal, resolved, study
+import yaml
+from configurations import (
+    cases,
+    keys,
+    labelled,
+    problems,
+    refusal,
+    resolved,
+    study,
+    touched,
+)
 from facts import Facts
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings.atlas import Atlas
-from gyriflow.settings.folding import parameters_from, plain_settings
+from gyriflow.settings.folding import (
+    mapped_parameters,
+    parameters_from,
+    plain_settings,
+)
 from gyriflow.settings.root import Config
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.study.loading import load
@@ -79,48 +93,6 @@ def test_a_folder_of_an_atlas_is_not_made_of_a_variable_or_an_address(folder):
     assert refusal(study(atlas=section)) == Facts("atlas.folder:", folder)
 
 
-@cases(
-    ("folding", "key", "facts"),
-    """
-    {thickness_mm: 0} | thickness_mm | [0]
-    {thickness_mm: {weeks: {21: true}}} | thickness_mm.weeks | [21, true]
-    {thickness_mm: {map: x.shape.gii}} | thickness_mm.map | [x.shape.gii]
-    {step_s: fast} | step_s | [fast]
-    {step_s: true} | step_s | [true]
-    {stress_memory_gw: forever} | stress_memory_gw | [0, infinite, forever]
-    {growth_rate_per_s: .nan} | growth_rate_per_s | [nan]
-    {growth_rate_per_s: -1.0e-8} | growth_rate_per_s | [0, -1.0e-8]
-    {fields: [tension]} | "fields[0]" | [displacement, tension]
-    {contact: walls} | contact | [global, planes, none, walls]
-    {end_week: 21} | end_week | [21, a]
-    {growth_rate_per_s: 1.0e-5, step_s: 604800} | step_s | [604800, 6.05]
-    """,
-)
-def test_an_impossible_value_is_refused_with_its_key_and_the_bound(folding, key, facts):
-    assert problems(study(folding={"end_week": 24} | folding)) == [
-        Facts(f"folding.{key}:", *facts)
-    ]
-
-
-@cases(
-    ("changes", "key", "facts"),
-    """
-    {brains: {id: a}} | brains | [list]
-    {brains: [l.nii.gz]} | "brains[0]" | [keys]
-    {mesh: [{order: 2}]} | mesh | [keys]
-    {mesh: {surface_edge_mm: "0,8"}} | mesh.surface_edge_mm | [write 0.8]
-    {mesh: {surface_edge_mm: 0.8 mm}} | mesh.surface_edge_mm | [number]
-    {start: 2026-11-29} | start | ["2026-11-29", quotes]
-    {start: off} | start | ["no", "off", quotes]
-    {start: 17} | start | [17, quotes]
-    """,
-)
-def test_a_wrong_type_is_named_in_words_of_yaml(changes, key, facts):
-    (found,) = [text for text in problems(study(**changes)) if text.startswith(key)]
-    assert found == Facts(f"{key}:", *facts)
-    assert not any(word in found for word in ("tuple", "dict", "instance", "datetime"))
-
-
 def test_what_is_allowed_by_name_or_missing():
     assert keys({}) == ["brains"]
     assert keys({"start": "a"}) == ["folding.end_week"]
@@ -130,9 +102,8 @@ def test_what_is_allowed_by_name_or_missing():
 
 def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
     folding = {"end_week": 24, "step_s": 0}
-    assert problems(
-        study(folding=folding, runs={"x": {"poison_ratio": 0.4}, "y": {}})
-    ) == [
+    runs = {"x": {"poison_ratio": 0.4}, "y": {}}
+    assert problems(study(folding=folding, runs=runs)) == [
         Facts("folding.step_s:", 0),
         Facts("runs.x.poison_ratio:", "poisson_ratio"),
     ]
@@ -149,11 +120,7 @@ def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
     """,
 )
 def test_a_run_folds_the_brains_that_it_names_or_those_of_the_study(changes, pairs):
-    found = resolved(**changes)
-    assert found.pairs == [tuple(pair) for pair in pairs]
-    for run, brain in found.pairs:
-        first = {"a": 21, "b": 22.5}[brain]
-        assert found.simulations[run, brain].weeks[0] == first
+    assert resolved(**changes).pairs == [tuple(pair) for pair in pairs]
 
 
 MAP = {"map": __file__, "surface": __file__}
@@ -191,12 +158,69 @@ def test_parameters_of_a_run_are_what_the_folding_program_reads():
     plain = plain_settings(one.settings)
     assert plain["stress_memory_gw"] == "infinite"
     assert not {"ranks", "start"} & set(plain)
-    read = parameters_from(known | plain)
-    assert read.stress_memory_gw == math.inf
-    assert read.output_weeks == (21.0, 22.0, 23.0, 24.0)
+    read = parameters_from(known | plain).model_dump()
     given = one.settings.model_dump(exclude={"ranks", "start"})
-    of_program = {"ranks", "side", "targets", "stops", *known}
-    assert read.model_dump(exclude=of_program) == given
+    assert given["stress_memory_gw"] == math.inf
+    assert {key: read[key] for key in given} == given
+
+
+def test_a_map_has_its_parameter_s_name_and_its_files_are_listed(tmp_path):
+    names = ("l.gii", "r.gii", "l.surf.gii", "r.surf.gii", "soft.nii.gz")
+    left, right, left_surface, right_surface, soft = (str(tmp_path / f) for f in names)
+    touched(tmp_path, *names)
+    text = """
+    end_week: 24
+    thickness_mm: {map: [l.gii, r.gii], surface: [l.surf.gii, r.surf.gii]}
+    growth_rate_per_s: {map: l.gii, surface: l.surf.gii, weeks: {30: 0.5, 21: 1}}
+    shear_modulus_core_pa: {map: soft.nii.gz}
+    core_growth_rate_per_s: {weeks: {25: 1.0e-7}}
+    """
+    run = load(study(folding=yaml.safe_load(text)), tmp_path).runs["reference"]
+    settings = plain_settings(run)
+    assert settings["thickness_mm"] == {"map": "thickness_mm"}
+    growth = settings["growth_rate_per_s"]
+    assert growth == {"weeks": {21.0: 1.0, 30.0: 0.5}, "map": "growth_rate_per_s"}
+    assert list(growth["weeks"]) == [21.0, 30.0]
+    assert settings["core_growth_rate_per_s"] == {"weeks": {25.0: 1e-7}}
+    mapped = mapped_parameters(run)
+    assert {name: (value.map, value.surface) for name, value in mapped.items()} == {
+        "thickness_mm": ((left, right), (left_surface, right_surface)),
+        "growth_rate_per_s": (left, left_surface),
+        "shear_modulus_core_pa": (soft, None),
+    }
+
+
+def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
+    curve, larger = {21: 99, 30: 252}, {21: 110, 30: 280}
+    runs = {
+        "large": {"growth": {"area_cm2": larger}},
+        "shapes": {"growth": "shapes"},
+        "same": {"growth": "sizes"},
+    }
+    growth = {"model": "sizes", "area_cm2": curve}
+    folding = {"end_week": 24, "growth": growth}
+    found = load(study(folding=folding, runs=runs)).runs.values()
+    assert [(run.growth.model, run.growth.area_cm2) for run in found] == [
+        ("sizes", larger),
+        ("shapes", "measured"),
+        ("sizes", curve),
+    ]
+
+
+def test_a_run_s_preset_lies_over_folding_and_its_own_keys_over_both():
+    runs = {
+        "plain": {},
+        "paper": {"preset": "fetalfoldsim"},
+        "own": {"preset": "fetalfoldsim", "thickness_mm": 3},
+    }
+    own = {"end_week": 24, "thickness_mm": 2.2, "step_s": 3600}
+    folding = own | {"preset": "expected"}
+    found = load(study(folding=folding, runs=runs)).runs.values()
+    assert [(run.thickness_mm, run.step_s, run.support) for run in found] == [
+        (2.2, 3600, "free"),
+        (1.5, 43200, "ellipsoid"),
+        (3, 43200, "ellipsoid"),
+    ]
 
 
 CONFIG = Path(__file__).parents[3] / "config"

@@ -4,12 +4,11 @@ are individuals."""
 import pytest
 from configurations import (
     LABELLED,
+    brain,
     cases,
-    growth_series,
     labelled,
     problems,
     resolved,
-    series_for,
     series_ids,
     study,
     touched,
@@ -70,27 +69,21 @@ def test_surfaces_match_by_equal_triangles_or_it_is_said_why_not(folder, files, 
         {"id": name, "week": 21 + number, **surface(text)}
         for number, (name, text) in enumerate(zip("abc", files.split(), strict=False))
     ]
-    found = growth_series(load(study(brains), folder))
-    if facts is None:
-        assert found.matched == {"surface": {brain["id"] for brain in brains}}
-        assert found.unmatched == {}
-    else:
-        assert found.matched == {}
-        assert found.unmatched["surface"] == Facts(*facts)
+    (series,) = resolve(load(study(brains), folder)).series.values()
+    assert series.unmatched == (facts and Facts(*facts))
 
 
 def test_an_atlas_is_believed_until_its_files_are_there(folder):
     named = {"name": "dhcp-surface", "weeks": [21, 22], "folder": str(folder)}
     config = {"atlas": named, "start": "first", "folding": {"end_week": 22}}
-    found = growth_series(load(config, folder))
-    assert list(found.matched.values()) == [{"dhcp-surface-21", "dhcp-surface-22"}]
+    (series,) = resolve(load(config, folder)).series.values()
+    assert series.unmatched is None
     for week, file in ((21, "a.gii"), (22, "fine.gii")):
         for side in ("left", "right"):
             path = folder / f"fetal.week{week}.{side}.pial.surf.gii"
             path.write_bytes((folder / file).read_bytes())
-    found = growth_series(load(config, folder))
-    assert found.matched == {}
-    assert list(found.unmatched.values()) == [Facts("dhcp-surface-22", 642, 162)]
+    (series,) = resolve(load(config, folder)).series.values()
+    assert series.unmatched == Facts("dhcp-surface-22", 642, 162)
 
 
 # series of a study
@@ -144,8 +137,8 @@ def test_a_run_follows_the_series_of_its_start_or_the_one_named(
     tmp_path, start, growth, series
 ):
     raw = study(sources("s21 s22 v21 v22 l21 l22"), start=start, growth=growth)
-    config = load(raw, touched(tmp_path, "pial.surf.gii"))
-    assert series_for(config, start) == series
+    found = resolve(load(raw, touched(tmp_path, "pial.surf.gii")))
+    assert found.run_simulations[0].series == series
 
 
 @cases(
@@ -157,7 +150,7 @@ def test_a_run_follows_the_series_of_its_start_or_the_one_named(
 )
 def test_two_series_of_one_name_are_refused(first, second):
     brains = [
-        {"id": f"{name}{week}", "week": week, **source, **LABELLED}
+        brain(f"{name}{week}", week, **source)
         for name, source in (("x", first), ("y", second))
         for week in (21, 22)
     ]
@@ -165,32 +158,12 @@ def test_two_series_of_one_name_are_refused(first, second):
     assert problems(study(brains, start="x21")) == [Facts("growth.brains:", 2, name)]
 
 
-@cases(
-    ("growth", "found"),
-    """
-    {brains: {one: [v21, x], two: [v21, v22]}} | [["brains.one:", x, "v21, v22, s21"]]
-    {brains: {one: [v21, s21], two: [v21, v22]}} | [["brains.one:", 1]]
-    {brains: []} | [["brains:", 0]]
-    {brains: [s21, v22]} | []
-    {series: volumes} | [["series:", volumes, "surface, volume"]]
-    {brains: {one: v21}} | [["brains.one:", v21]]
-    """,
-)
-def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
-    raw = study(sources("v21 v22 s21 s22"), start="v21", growth=growth)
-    lines = problems(raw, touched(tmp_path, "pial.surf.gii"))
-    assert lines == [Facts(f"growth.{facts[0]}", *facts[1:]) for facts in found]
-
-
 # differences between weeks that are growth
 
 
 def test_averages_are_no_individuals():
-    brains = [
-        {"id": f"s{week}", "week": week, "subject": f"s{week}", **LABELLED}
-        for week in (21, 23)
-    ]
-    brains += [{"id": f"n{week}", "week": week, **LABELLED} for week in (21, 21.4, 23)]
+    brains = [brain(f"s{week}", week, subject=f"s{week}") for week in (21, 23)]
+    brains += [brain(f"n{week}", week) for week in (21, 21.4, 23)]
     atlas = {"name": "spina-bifida", "series": "operated", "weeks": [25, 26]}
     reference = {"norm_reference": ["spina-bifida"]}
     found = resolve(load({"brains": brains, "atlas": atlas, "metrics": reference}))
@@ -215,8 +188,8 @@ def test_averages_are_no_individuals():
 )
 def test_only_brains_whose_differences_are_growth_have_rates(subjects, changes, names):
     brains = labelled(21, 22, 23)
-    for brain, subject in zip(brains, subjects or (), strict=False):
-        brain["subject"] = subject
+    for entry, subject in zip(brains, subjects or (), strict=False):
+        entry["subject"] = subject
     found = resolved(brains, **changes)
     assert len(found.growth_brains) == 3
     assert [

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 import yaml
-from configurations import LABELLED, cases
-from configurations import refusal as refusal_of
+from configurations import cases, labelled, refusal, resolved
+from configurations import study as study_of
 from facts import Facts
 
 from gyriflow.settings.runs import PRESETS, Run
-from gyriflow.study import paths, resolve
-from gyriflow.study.loading import load
+from gyriflow.study import paths
 from gyriflow.study.paths import STUDY, log_of
 from gyriflow.study.resolve import _equality_key
 
@@ -27,22 +26,8 @@ THICKNESS = BASE | {
 CALIBRATION = BASE | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}
 
 
-def brains(**weeks):
-    return [{"id": name, "week": week, **LABELLED} for name, week in weeks.items()]
-
-
 def study(**sections):
-    folding = {"end_week": 26}
-    usual = {"brains": brains(a=21, b=25), "start": "first", "folding": folding}
-    return usual | {"runs": RUNS} | sections
-
-
-def resolved(**sections):
-    return resolve(load(study(**sections)))
-
-
-def refusal(**sections):
-    return refusal_of(study(**sections))
+    return study_of(labelled(21, 25), runs=RUNS) | sections
 
 
 # the runs of sweeps
@@ -83,7 +68,7 @@ def test_runs_are_equal_only_where_no_key_that_changes_shapes_differs():
 
 def test_the_run_of_a_single_value_may_differ_further():
     steps = {"fixed": {"step_s": 86400}, "fixed_at": {0.8: {"step_s": 3600}}}
-    found = resolved(sweeps={"s": THICKNESS | steps})
+    found = resolved(labelled(21, 25), runs=RUNS, sweeps={"s": THICKNESS | steps})
     step_of = {}
     for row in found.by_sweep["s"]:
         step_of[row.run] = found.simulations[row.run, row.brain].settings.step_s
@@ -91,47 +76,6 @@ def test_the_run_of_a_single_value_may_differ_further():
 
 
 # what is refused
-
-
-@cases(
-    ("change", "key", "facts"),
-    """
-    {vary: {thicknes_mm: [1]}} | vary.thicknes_mm | []
-    {vary: {thickness_mm: [-1]}} | vary.thickness_mm | [0, -1]
-    {vary: {thickness_mm: [1, 1]}} | vary.thickness_mm | [[1.0, 1.0]]
-    {vary: {preset: [measured]}} | vary.preset | [base]
-    {fixed: {preset: measured}} | fixed.preset | [base]
-    {vary: {}} | vary | [folding]
-    {fixed: {contact.gap: 2}} | fixed.contact.gap | []
-    {fixed_at: {1.2: {step_s: 43200}}} | fixed_at | [1.2]
-    {fixed_at: {1.5: {steps: 1}}} | fixed_at.steps | []
-    {base: ref} | base | [ref, "reference, short"]
-    {compare_week: 24} | compare_week | [24, 21, 25]
-    {compare_with: [a]} | compare_with | [a, 21, 25]
-    """,
-)
-def test_what_is_wrong_with_a_sweep_is_said(change, key, facts):
-    found = refusal(sweeps={"s": THICKNESS | change})
-    assert found == Facts(1, f"sweeps.s.{key}:", *facts)
-
-
-@cases(
-    ("change", "key", "facts"),
-    """
-    {parameters: {thickness_mm: [3, 1]}} | parameters.thickness_mm | [[3.0, 1.0]]
-    {parameters: {thickness_mm: [-1, 1]}} | parameters.thickness_mm | [0, -1]
-    {parameters: {poisson: [0, 0.4]}} | parameters.poisson | []
-    {parameters: {}} | parameters | [0, 1]
-    {rounds: [30, 11]} | rounds | [[30, 11], 3, 40]
-    {score: {}} | score | [shape_index, surface_distance]
-    {score: {beauty: 1}} | score.beauty | [beauty, shape_index, surface_distance]
-    {compare_week: 24} | compare_week | [24, 21, 25]
-    {base: ref} | base | [ref, "reference, short"]
-    """,
-)
-def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
-    found = refusal(calibrate=CALIBRATION | change)
-    assert found == Facts(1, f"calibrate.{key}:", *facts)
 
 
 POISSON = THICKNESS | {"vary": {"poisson_ratio": [0.3, 0.4]}}
@@ -156,7 +100,7 @@ BOTH = THICKNESS | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}}
     ],
 )
 def test_runs_of_all_sections_have_folders_of_their_own(changes, facts):
-    assert refusal(**changes) == Facts(1, *facts)
+    assert refusal(study(**changes)) == Facts(1, *facts)
 
 
 def test_folders_of_results_are_no_names_of_sweeps():
@@ -170,7 +114,7 @@ def test_folders_of_results_are_no_names_of_sweeps():
     assert folders > {"logs", "figures", "calibration", "registration"}
     for folder in folders:
         for name in (folder, folder.upper()):
-            assert refusal(sweeps={name: THICKNESS}) == Facts(f"sweeps.{name}:")
+            assert refusal(study(sweeps={name: THICKNESS})) == Facts(f"sweeps.{name}:")
 
 
 # files

@@ -1,10 +1,13 @@
 """A study resolved from its configuration: which brains, weeks and files stand behind
-each run and comparison."""
+each run, comparison and norm. The order in the configuration decides nothing by chance.
+
+What `plans/` has is not tried again here.
+"""
 
 from pathlib import Path
 
 import pytest
-from configurations import both_kinds, cases, resolved, touched
+from configurations import both_kinds, brain, cases, labelled, resolved
 from facts import Facts
 from shapes import sphere
 
@@ -19,34 +22,18 @@ from gyriflow.study.loading import load
 EXAMPLES = Path(__file__).parents[3] / "config" / "examples"
 EXPECTED = {"runs": {"a": {"preset": "expected"}}}
 MEASURED = {"runs": {"a": {"preset": "measured"}}}
-
-
-@pytest.fixture
-def files(tmp_path):
-    return touched(tmp_path, "labels.nii.gz", "pial.gii", "white.gii")
-
-
-@pytest.fixture
-def labels(files):
-    """What gives a brain of a week from a label volume."""
-    given = {"labels": str(files / "labels.nii.gz"), "scheme": "feta-7"}
-    return lambda week, **more: {"id": f"b{week}", "week": week, **given, **more}
-
-
-@pytest.fixture
-def of_two(labels):
-    """What gives brains of a population, the first of which is to start, and those of
-    an atlas."""
-
-    def brains(*weeks, atlas=(21, 22, 23, 24, 25), population="own"):
-        own = [labels(week, id=f"own{week}", population=population) for week in weeks]
-        return [*own, *(labels(week, population="atlas") for week in atlas)]
-
-    return brains
+BALL = {"id": "ball", "week": 21, "shape": {}}
 
 
 def study(brains, **sections):
     return resolved(brains, **{"start": "first", **sections})
+
+
+def own_and_atlas(*weeks, atlas=(21, 22, 23, 24, 25)):
+    """Return brains of a population, the first of which is to start, and of an
+    atlas."""
+    own = [brain(f"own{week}", week, population="own") for week in weeks]
+    return own + [brain(f"b{week}", week, population="atlas") for week in atlas]
 
 
 def message(brains, **sections):
@@ -56,73 +43,145 @@ def message(brains, **sections):
     return str(error.value)
 
 
-# what is folded
-
-
 def test_the_paper_is_planned_with_the_paper_s_steps_and_ratios():
     found = resolve(load(read_yaml(EXAMPLES / "paper.yaml"), EXAMPLES))
-    settings = {}
-    for name, rows in found.by_sweep.items():
-        settings[name] = [
-            found.simulations[row.run, row.brain].settings for row in rows
-        ]
-    thickness, stiffness = settings["thickness"], settings["stiffness"]
-    steps = {run.thickness_mm: run.step_s for run in thickness}
+    steps, ratios = {}, []
+    for row in found.by_sweep["thickness"]:
+        run = found.simulations[row.run, row.brain].settings
+        steps[run.thickness_mm] = run.step_s
+    for row in found.by_sweep["stiffness"]:
+        run = found.simulations[row.run, row.brain].settings
+        ratios.append(run.shear_modulus_cortex_pa / run.shear_modulus_core_pa)
+        assert run.step_s == 43200
     assert steps == {0.8: 86400, 1.5: 43200, 2.25: 86400, 6.0: 86400}
-    assert {run.step_s for run in stiffness} == {43200}
-    ends = [stiffness[0], stiffness[-1]]
-    ratios = [run.shear_modulus_cortex_pa / run.shear_modulus_core_pa for run in ends]
-    assert ratios == [1, 20]
+    assert (ratios[0], ratios[-1]) == (1, 20)
 
 
-# brains that were refused
+# norms, template and properties of brains
 
 
-def test_a_refused_template_has_no_maps_and_a_refused_brain_is_of_no_norm(labels):
-    brains = [labels(week) for week in (21, 22, 23)]
-    metrics = {"template": "b23", "norm_reference": ["b21", "b22"]}
-    for refused, norm, n_maps in (
-        ((), ["b21", "b22"], 2),
-        (("b22", "b23"), ["b21"], 0),
-    ):
-        found = resolved(brains, refused, start="b21", metrics=metrics)
-        assert found.norm_reference == norm
-        assert {len(row.template_maps) for row in found.exported} == {n_maps}
+@cases(
+    ("start", "named", "reference"),
+    """
+    well22 | null | [well21, well22]
+    ill23 | null | [ill21, ill23]
+    [ill21, well21] | null | [ill21, ill23]
+    half | null | [half]
+    well22 | [ill21, half, well22] | [ill21, well22]
+    """,
+)
+def test_the_norm_is_of_the_population_and_the_hemispheres_of_the_first_start(
+    start, named, reference
+):
+    brains = [
+        brain("ill21", 21, population="ill"),
+        BALL,
+        *(brain(f"well{week}", week, population="well") for week in (21, 22)),
+        brain("half", 22, side="right", population="well"),
+        brain("ill23", 23, population="ill"),
+    ]
+    metrics = {"norm_reference": named}
+    assert resolved(brains, start=start, metrics=metrics).norm_reference == reference
 
 
-def test_nothing_is_left_where_no_start_is(labels):
+def test_the_norm_is_of_all_brains_but_shapes_where_no_population_is_known():
+    brains = [BALL, *labelled(21, 22), {"id": "surface", "week": 23, "pial": __file__}]
+    assert resolved(brains, start="ball").norm_reference == ["a", "b", "surface"]
+    assert resolved([BALL], start="ball").norm_reference == []
+
+
+@pytest.mark.parametrize(("subjects", "drawn"), [(9, False), (10, True)])
+def test_norms_are_drawn_of_ten_subjects_however_often_each_was_scanned(
+    subjects, drawn
+):
+    brains = [
+        brain(f"s{n}w{week}", week, subject=f"s{n}")
+        for n in range(subjects)
+        for week in (21, 22)
+    ]
+    found = resolved(brains, start="s0w21", runs={"reference": {"end_week": 22}})
+    assert found.has_norm == drawn
+
+
+@cases(
+    ("refused", "norm", "n_maps"),
+    """
+    [] | [a, b] | 2
+    [b, c] | [a] | 0
+    """,
+)
+def test_a_refused_template_has_no_maps_and_a_refused_brain_is_of_no_norm(
+    refused, norm, n_maps
+):
+    metrics = {"template": "c", "norm_reference": ["a", "b"]}
+    found = resolved(labelled(21, 22, 23), refused, metrics=metrics)
+    assert found.norm_reference == norm
+    assert {len(row.template_maps) for row in found.exported} == {n_maps}
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_second_hemisphere_is_of_another_norm_and_template(side):
+    halves = [
+        brain(f"{name}{week}", week, name)
+        for name in ("left", "right")
+        for week in (22, 23.5)
+    ]
+    metrics = {"template": "left22"}
+    found = resolved([*halves, *labelled(21)], start=f"{side}22", metrics=metrics)
+    assert found.norm_reference == [f"{side}22", f"{side}23.5"]
+    observed = [row for row in found.exported if row.run == "observed"]
+    with_maps = {row.brain: [*row.template_maps] for row in observed}
+    left, none = ["left"], []
+    assert list(with_maps.values()) == [left, left, none, none, left]
+
+
+def test_nothing_is_left_where_no_start_is():
     later = {"base": "reference", "compare_week": 24}
     search = later | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}
-    empty = resolved([labels(21), labels(24)], ["b21"], calibrate=search, start="b21")
+    empty = resolved(labelled(21, 24), ["a"], calibrate=search)
     assert empty.run_simulations == empty.norm_reference == []
     assert empty.calibration == {}
+
+
+@pytest.mark.parametrize(
+    ("wanted", "expected"), [("given", {"white"}), ("all", {"white", "a"})]
+)
+def test_a_brain_has_white_surfaces_that_are_given_or_follow_from_its_labels(
+    wanted, expected
+):
+    pial = {"week": 23, "pial": __file__}
+    brains = [{"id": "bare", **pial}, {"id": "white", **pial, "white": __file__}]
+    metrics = {"white_surfaces": wanted}
+    found = resolved([*brains, *labelled(22)], start="bare", metrics=metrics)
+    assert {brain.id for brain in found.brains.values() if brain.white} == expected
 
 
 # the brains behind a run's growth
 
 
-def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_the_end(
-    of_two, labels
-):
-    third = [labels(week, population="third", id=f"third{week}") for week in (22, 24)]
+def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_the_end():
+    third = [brain(f"third{week}", week, population="third") for week in (22, 24)]
     for brains, found in (
-        (of_two(22, 24, atlas=()), ["volume"]),
-        (of_two(22, atlas=(21, 23)), ["own22 (22 GW)", "b21 (21 GW)", "b23 (23 GW)"]),
+        (own_and_atlas(22, 24, atlas=()), ["volume"]),
+        (
+            own_and_atlas(22, atlas=(21, 23)),
+            ["own22 (22 GW)", "b21 (21 GW)", "b23 (23 GW)"],
+        ),
         # more than a week before the first brain of the atlas
-        (of_two(22, atlas=(23.5, 24)), ["b23.5 (23.5 GW)", "b24 (24 GW)"]),
-        ([*of_two(22), *third], ["atlas, third"]),
+        (own_and_atlas(22, atlas=(23.5, 24)), ["b23.5 (23.5 GW)", "b24 (24 GW)"]),
+        ([*own_and_atlas(22), *third], ["atlas, third"]),
     ):
         assert message(brains, **EXPECTED) == Facts(
             "own22", 22, 24, "growth.series", *found
         )
-    named = study([*of_two(22), *third], growth={"series": "third"}, **EXPECTED)
+    named = study([*own_and_atlas(22), *third], growth={"series": "third"}, **EXPECTED)
     assert named.chains["own22", "atlas"].later == ("third22", "third24")
 
 
-def test_scans_of_other_subjects_are_grown_towards_only_if_they_are_named(labels):
-    scans = [("a", 22), ("a", 26), ("b", 24), ("b", 27), ("c", 25)]
+def test_scans_of_other_subjects_are_grown_towards_only_if_they_are_named():
     cohort = [
-        labels(week, id=f"{subject}{week}", subject=subject) for subject, week in scans
+        brain(f"{subject}{week}", week, subject=subject)
+        for subject, week in (("a", 22), ("a", 26), ("b", 24), ("b", 27), ("c", 25))
     ]
     late = {"folding": {"end_week": 27}, **MEASURED}
     assert message(cohort, start="c25", **late) == Facts("c25", "a, b", 25, 27)
@@ -132,27 +191,29 @@ def test_scans_of_other_subjects_are_grown_towards_only_if_they_are_named(labels
     assert message(cohort, start="a22", **growth, **late) == Facts("a22", "b", 22, 27)
 
 
-def test_its_own_growth_lacks_brains_whatever_is_named(of_two):
+def test_its_own_growth_lacks_brains_whatever_is_named():
     named = {"growth": {"series": "atlas"}, **MEASURED}
-    assert message(of_two(22), **named) == Facts("atlas", 22, 24, "growth.brains")
-    early = message(of_two(22, 23), **MEASURED)
+    assert message(own_and_atlas(22), **named) == Facts(
+        "atlas", 22, 24, "growth.brains"
+    )
+    early = message(own_and_atlas(22, 23), **MEASURED)
     assert early == Facts("own22 (22 GW)", "own23 (23 GW)", 24, "growth.brains")
 
 
-def test_an_atlas_has_to_reach_the_end_of_sweeps(of_two):
+def test_an_atlas_has_to_reach_the_end_of_sweeps():
     sweep = {"base": "a", "compare_week": 26, "vary": {"thickness_mm": [1.0, 2.0]}}
-    found = message(of_two(22, 24, 26), **EXPECTED, sweeps={"late": sweep})
+    found = message(own_and_atlas(22, 24, 26), **EXPECTED, sweeps={"late": sweep})
     assert found == Facts("own22", 22, 26)
 
 
 # ensembles
 
 
-def test_the_age_of_a_member_stays_within_its_atlas(of_two, monkeypatch):
+def test_the_age_of_a_member_stays_within_its_atlas(monkeypatch):
     monkeypatch.setattr(ensemble, "AGE_SD_GW", 2.0)
     run = {"preset": "expected", "ensemble": 6}
     # the start is a week before the atlas, which ends with the run
-    found = study(of_two(21, 24, atlas=(22, 23, 24)), runs={"a": run})
+    found = study(own_and_atlas(21, 24, atlas=(22, 23, 24)), runs={"a": run})
     chains = [found.chains["own21", f"atlas.a-member-{n}"] for n in range(1, 7)]
     shifts = [chain.variation.age_shift_gw for chain in chains]
     assert (min(shifts), max(shifts)) == (0.0, 0.5)
@@ -184,21 +245,11 @@ def test_members_that_would_be_equal_are_refused(tmp_path, weeks, further):
     {a: {growth: shapes, ensemble: 3}, a-member-2: {}} | [runs.a-member-2]
     """,
 )
-def test_members_need_shapes_and_names_and_are_three_or_more(of_two, runs, facts):
-    assert message(of_two(22, 24), runs=runs) == Facts(*facts)
+def test_members_need_shapes_and_names_and_are_three_or_more(runs, facts):
+    assert message(own_and_atlas(22, 24), runs=runs) == Facts(*facts)
 
 
 # brains that are filled with labels
-
-
-def test_surfaces_are_registered_by_labels_that_they_are_filled_with(of_two, files):
-    pial = str(files / "pial.gii")
-    found = study([{"id": "own22", "week": 22, "pial": pial}, *of_two()])
-    filled = registered_source(found.config, found.brains["own22"])
-    assert filled.path == "results/brains/own22/surface/filled.nii.gz"
-    assert filled.scheme.cortex
-    labels = registered_source(found.config, found.brains["b21"])
-    assert labels.path == str(files / "labels.nii.gz")
 
 
 @cases(
@@ -210,43 +261,50 @@ def test_surfaces_are_registered_by_labels_that_they_are_filled_with(of_two, fil
     """,
 )
 def test_brains_without_labels_are_filled_with_their_own_cortex_or_a_similar_brain_s(
-    of_two, files, surfaces, cortex, similar
+    surfaces, cortex, similar
 ):
-    brains = of_two(22, atlas=(22, 23, 24, 25))
-    for brain in brains:
-        if brain["id"] in surfaces:
-            del brain["labels"], brain["scheme"]
-            brain["pial"] = str(files / "pial.gii")
+    brains = own_and_atlas(22, atlas=(22, 23, 24, 25))
+    as_surfaces = [entry for entry in brains if entry["id"] in surfaces]
+    for entry in as_surfaces:
+        del entry["labels"], entry["scheme"]
+        entry["pial"] = __file__
     settings = EXPECTED | {"growth": {"matched_surfaces": False}}
     found = study(brains, **settings)
     assert found.chains["own22", "atlas"].weeks[1:] == (22, 23, 24)
     assert found.filled == [{"ids": surfaces, "cortex": cortex, "by_cortex": True}]
     assert {found.brains[name].thickness_of for name in surfaces} == {similar}
-    for brain in brains:
-        if brain["id"] in surfaces:
-            brain["white"] = str(files / "white.gii")
+    filled = registered_source(found.config, found.brains[surfaces[0]])
+    assert filled.path == f"results/brains/{surfaces[0]}/surface/filled.nii.gz"
+    for entry in as_surfaces:
+        entry["white"] = __file__
     assert [group["cortex"] for group in study(brains, **settings).filled] == ["white"]
+
+
+def test_thickness_without_labels_is_that_of_another_brain_s_white_surfaces():
+    bare = {"id": "bare", "week": 23, "pial": __file__}
+    white = {"id": "white", "week": 23.1, "pial": __file__, "white": __file__}
+    found = resolved([bare, white], start="bare").brains
+    assert (found["bare"].thickness_of, found["white"].thickness_of) == ("white", None)
 
 
 # predictions
 
 
-def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read(
-    of_two,
-):
-    runs = EXPECTED["runs"] | {"paper": {}, "measured": {"preset": "measured"}}
-    found = study(of_two(22, 23, 24), runs=runs)
+def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read():
+    runs = EXPECTED["runs"] | {"paper": {}} | {"m": {"preset": "measured"}}
+    found = study(own_and_atlas(22, 23, 24), runs=runs)
     # a run that no brain tells of stands beside it, and one that later brains explain
     # does not
     predictions = [(one.run, one.is_atlas_prediction) for one in found.predictions]
     assert predictions == [("a", True), ("paper", False)]
 
 
-def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
-    found = study(of_two(22.4), **EXPECTED, folding={"end_week": 23.9})
-    described = found.prediction_facts
+def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files():
+    found = study(own_and_atlas(22.4), **EXPECTED, folding={"end_week": 23.9})
     at = "results/runs/a/own22.4/surfaces/week-23.90"
-    assert described | {"surfaces": described["surfaces"][:1]} == {
+    described = found.prediction_facts
+    assert described.pop("surfaces")[0] == f"{at}/fine/pial.surf.gii"
+    assert described == {
         "run": "a",
         "brain": "own22.4",
         "start_week": 22.4,
@@ -256,7 +314,6 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         # a series of one's own is no atlas with a licence
         "population": "atlas",
         "atlas": None,
-        "surfaces": [f"{at}/fine/pial.surf.gii"],
         "atlas_surface": f"{at}/atlas.pial.surf.gii",
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
@@ -266,13 +323,11 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         assert [b.id for b in found.atlas_brains_near(simulation, week)] == near
 
 
-def test_no_prediction_is_explained_by_its_own_later_brains_or_one_of_several_runs(
-    of_two,
-):
-    own = study(of_two(22, 23, 24), **MEASURED)
+def test_no_prediction_is_explained_by_its_own_later_brains_or_one_of_several_runs():
+    own = study(own_and_atlas(22, 23, 24), **MEASURED)
     assert own.prediction_facts is None
     # its growth is measured on the mesh's surface
     row = own.rows_of(own.run_simulations[0])[-1]
     assert own.measured_parts(row) == row.parts
     several = EXPECTED["runs"] | {"plain": {}}
-    assert study(of_two(22), runs=several).prediction_facts is None
+    assert study(own_and_atlas(22), runs=several).prediction_facts is None
