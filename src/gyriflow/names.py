@@ -7,9 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 
 from .errors import InputError
 
-DEVICE = re.compile(r"(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?", re.IGNORECASE)
-"""Names that Windows takes for devices, so that its disks have no folders of them."""
-
 
 def merged_names(
     names: Iterable[str], become: Callable[[str], str]

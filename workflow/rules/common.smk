@@ -79,6 +79,11 @@ BRAINS = study.brains
 SIMULATED = study.simulated
 # the runs of each sweep
 SWEEPS = study.by_sweep
+# run and start brain of each simulation of `runs`, those with an ensemble, and the runs of sweeps, calibration and
+# ensembles, which may diverge without stopping the study
+PAIRS = [simulation.key for simulation in study.run_simulations]
+WITH_ENSEMBLE = [simulation for simulation in study.run_simulations if simulation.members]
+MAY_DIVERGE = dict.fromkeys(simulation.run for simulation in study.simulations.values() if simulation.may_diverge)
 # brains refused in an earlier pass of this call; the study is finished without them
 REFUSED = [row.brain for row in study.left_out.values() if row.why == "refused"]
 if REFUSED and PRINTS:
@@ -131,6 +136,6 @@ wildcard_constraints:
     **dict.fromkeys(("earlier", "later"), one_of(BRAINS)),
     brain=ANY_BRAIN,
     sweep=one_of(SWEEPS),
-    run=one_of([*CONFIG.runs, *study.may_diverge]),
+    run=one_of([*CONFIG.runs, *MAY_DIVERGE]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

@@ -1,7 +1,7 @@
 # Ensembles: intervals and spread of a run from its members, runs with uncertain inputs varied.
 def ensemble_of(wildcards):
     """Return the members of a simulation's ensemble."""
-    return study.members(simulation_of(wildcards))
+    return [study.simulations[run, wildcards.brain] for run in simulation_of(wildcards).members]
 
 
 def reached(simulations, weeks):

@@ -215,7 +215,7 @@ if study.growth_brains and (study.run_simulations or (HAS_RATES and HAS_FEW_SERI
 
 
 # start brains of predictions by the growth of an atlas
-BY_ATLAS = {simulation.brain for simulation in study.run_simulations if simulation.shapes == "atlas"}
+BY_ATLAS = {simulation.brain for simulation in study.run_simulations if simulation.settings.growth.shapes == "atlas"}
 CARRIED = [start for start in study.starts if start.id in BY_ATLAS]
 
 
@@ -319,16 +319,16 @@ rule intervals_figure:
     output:
         intervals_figure=multiext(f"{RUN}/figures/intervals", ".png", ".pdf"),
     wildcard_constraints:
-        **only(study.with_ensemble),
+        **only(WITH_ENSEMBLE),
     params:
         **drawn_by("weeks"),
     script:
         "../scripts/figures.py"
 
 
-show(rules.intervals_figure.output, names_of(study.with_ensemble))
+show(rules.intervals_figure.output, names_of(WITH_ENSEMBLE))
 
-ENSEMBLES_WITH_GROWTH = [simulation for simulation in study.with_ensemble if simulation.has_growth_maps]
+ENSEMBLES_WITH_GROWTH = [simulation for simulation in WITH_ENSEMBLE if simulation.has_growth_maps]
 
 
 rule growth_sd_figure:
@@ -364,7 +364,7 @@ rule ensemble_figures:
         position_spread_figure=multiext(f"{RUN}/figures/position_sd", ".png", ".pdf"),
         sulcus_probability_figure=multiext(f"{RUN}/figures/sulcus_probability", ".png", ".pdf"),
     wildcard_constraints:
-        **only(study.with_ensemble),
+        **only(WITH_ENSEMBLE),
     params:
         **drawn_by("pictures"),
         grid=lambda w: ensemble_grid(simulation_of(w)),
@@ -372,7 +372,7 @@ rule ensemble_figures:
         "../scripts/figures.py"
 
 
-show(rules.ensemble_figures.output, names_of(study.with_ensemble))
+show(rules.ensemble_figures.output, names_of(WITH_ENSEMBLE))
 
 WITH_GROWTH = [simulation for simulation in study.run_simulations if simulation.has_growth_maps]
 
@@ -455,7 +455,7 @@ if study.run_simulations:
             displacement_figure=multiext(f"{STUDY}/figures/displacement", ".png", ".pdf"),
         params:
             **drawn_by("weeks"),
-            runs=run_names(study.pairs),
+            runs=run_names(PAIRS),
         script:
             "../scripts/figures.py"
 
@@ -469,7 +469,7 @@ if study.run_simulations:
             paper_displacement_figure=multiext(f"{STUDY}/figures/displacement_paper", ".png", ".pdf"),
         params:
             **drawn_by("weeks"),
-            runs=run_names(study.pairs),
+            runs=run_names(PAIRS),
         script:
             "../scripts/figures.py"
 
@@ -509,7 +509,7 @@ show(rules.shape_maps.output, names_of(study.starts))
 
 # the names and colours of brains in charts over the weeks
 CHARTED = {
-    "runs": run_names(study.pairs),
+    "runs": run_names(PAIRS),
     "subjects": {brain.id: brain.subject for brain in BRAINS.values() if brain.subject is not None},
     "groups": {brain.id: brain.group for brain in BRAINS.values() if brain.group},
 }
@@ -578,7 +578,7 @@ def regions_grid():
     grid = []
     for brain in WITH_REGIONS:
         grid += brain_regions_grid(brain)
-    for simulation, name in zip(study.run_simulations, run_names(study.pairs)):
+    for simulation, name in zip(study.run_simulations, run_names(PAIRS)):
         if simulation.has_regions:
             last = study.rows_of(simulation)[-1]
             column = f"{name}, {last.week:g} GW"

@@ -136,7 +136,7 @@ checkpoint simulate_member:
     log:
         f"{RUN}/logs/simulate.log",
     wildcard_constraints:
-        run=one_of(study.may_diverge),
+        run=one_of(MAY_DIVERGE),
     threads: lambda w: simulation_of(w).settings.ranks
     resources:
         **LIMITED,

@@ -24,6 +24,12 @@ rule measure:
 FINE = [simulation for simulation in study.simulations.values() if study.has_fine_surfaces(simulation)]
 
 
+def age_shift_gw(wildcards):
+    """Return by how much a start brain is older than stated, in an ensemble."""
+    variation = study.chains[wildcards.brain, simulation_of(wildcards).chain].variation
+    return variation.age_shift_gw if variation else 0.0
+
+
 def atlas_brains_of(wildcards):
     """Return the brains of the atlas, one of which is moved to the predicted shape."""
     return study.atlas_brains_near(simulation_of(wildcards), float(wildcards.week))
@@ -44,7 +50,7 @@ rule fine_surface:
     params:
         week=lambda w: float(w.week),
         # of the atlas' brain
-        age=lambda w: float(w.week) + study.age_shift_gw(simulation_of(w)),
+        age=lambda w: float(w.week) + age_shift_gw(w),
         atlas_parts=lambda w: [list(brain.parts.values()) for brain in atlas_brains_of(w)],
         atlas_weeks=lambda w: [brain.week for brain in atlas_brains_of(w)],
     script:

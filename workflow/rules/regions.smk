@@ -23,9 +23,13 @@ def region_pair(wildcards):
     return BRAINS[brain.regions_of], brain
 
 
+# the maps between two brains that no member of an ensemble varies
+LINKS = {(link.earlier, link.later): link for link in study.links.values() if link.seed == 0}
+
+
 def region_link(wildcards):
     """Return the map by which regions are carried."""
-    return study.link(BRAINS[wildcards.brain].regions_of, wildcards.brain)
+    return LINKS[BRAINS[wildcards.brain].regions_of, wildcards.brain]
 
 
 rule carried_regions:
@@ -98,7 +102,7 @@ def mapped_surface(wildcards):
 def template_links(wildcards):
     """Return the map from the template to a brain; none for the template itself."""
     template, brain = on_template(wildcards)
-    return [] if brain is template else [study.link(template.id, brain.id)]
+    return [] if brain is template else [LINKS[template.id, brain.id]]
 
 
 rule template_maps:

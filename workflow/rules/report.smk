@@ -70,7 +70,7 @@ rule study_records:
             )
             for path in paths
         ],
-        folded=study.pairs,
+        folded=PAIRS,
         # also those of sweeps, whose time and memory count
         simulated=list(study.simulations),
         growth_of=[simulation.growth_of for simulation in study.run_simulations],
@@ -128,7 +128,7 @@ def halves(row):
 SURFACES = {
     "runs": {
         name: [[row.week, halves(row)] for row in study.rows_of(simulation)]
-        for name, simulation in zip(run_names(study.pairs), study.run_simulations)
+        for name, simulation in zip(run_names(PAIRS), study.run_simulations)
     },
     "observed": [[brain.week, halves(brain)] for brain in sorted(VIEWED, key=lambda brain: brain.week)],
 }

@@ -53,7 +53,7 @@ rule run_tables:
         table=f"{STUDY}/runs.html",
         displacement=f"{STUDY}/displacement.csv",
     params:
-        folded=study.pairs,
+        folded=PAIRS,
         growth_of=[simulation.growth_of for simulation in study.run_simulations],
     script:
         "../scripts/run_tables.py"
@@ -100,4 +100,4 @@ rule metrics:
         rules.metrics_tables.output,
         rules.run_tables.output if study.run_simulations else [],
         rules.validate.input,
-        [simulation.file(ENSEMBLE) for simulation in study.with_ensemble],
+        [simulation.file(ENSEMBLE) for simulation in WITH_ENSEMBLE],

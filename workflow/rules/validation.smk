@@ -1,9 +1,14 @@
 # Accuracy of simulations: each simulated brain is compared with the observed brain of its week; the scaled start brain
 # is the baseline.
+
+# by start brain and week: the same for all runs
+REFERENCES = {(row.brain, row.week): row for row in study.compared.values() if row.observed}
+
+
 rule prepared_surfaces:
     input:
-        observed=lambda w: BRAINS[study.references[w.brain, float(w.week)].observed].pial,
-        adjacent=lambda w: BRAINS[study.references[w.brain, float(w.week)].adjacent].pial,
+        observed=lambda w: BRAINS[REFERENCES[w.brain, float(w.week)].observed].pial,
+        adjacent=lambda w: BRAINS[REFERENCES[w.brain, float(w.week)].adjacent].pial,
         start=PIAL["whole"],
     output:
         **PREPARED,

@@ -301,7 +301,10 @@ def _deep_curved_folds(study: Study) -> Iterator[str]:
     if study.config.mesh.order == 1:
         return
     for simulation in study.run_simulations:
-        if simulation.shapes and simulation.settings.end_week > DEEP_FOLDS_GW:
+        if (
+            simulation.settings.growth.shapes
+            and simulation.settings.end_week > DEEP_FOLDS_GW
+        ):
             yield (
                 f"run {simulation.run} from {simulation.brain}: quadratic elements"
                 f" fold over on the way to shapes later than {DEEP_FOLDS_GW:g} GW; use"

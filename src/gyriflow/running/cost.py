@@ -127,7 +127,7 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     )
     rates = (
         SHAPES_SECONDS_PER_ELEMENT_AND_STEP
-        if simulation.shapes
+        if simulation.settings.growth.shapes
         else SECONDS_PER_ELEMENT_AND_STEP
     )
     return Needs(rates[mesh.order] * elements * steps, memory, disk)

@@ -29,7 +29,8 @@ def path_origin(study: Study, path: Chain) -> dict[str, Any]:
     fills one of them, with all files that they name; the settings of surfaces and of
     the mesh; and a hash of the rules and scripts.
     """
-    brains = [*study.brains_of(path), *_thickness_sources(study, path)]
+    brains = [study.brains[name] for name in path.brains]
+    brains += _thickness_sources(study, path)
     return {
         "brains": [_description(study.config, brain) for brain in brains],
         # by matched vertices or by registration
@@ -90,7 +91,7 @@ def _code() -> str:
 def store_folder(study: Study, path: Chain) -> Path | None:
     """Return the folder for a path of an atlas, next to the files of the atlas; None
     for other brains."""
-    if not all(brain.atlas for brain in study.brains_of(path)):
+    if not all(study.brains[name].atlas for name in path.brains):
         return None
     return study.atlases[path.brain].folder / "paths"
 

@@ -1,7 +1,7 @@
 """Plan the brains of a study: the files and properties that rules read, one row for
 each brain."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,25 +19,19 @@ from .records import Brain, measured_files
 def plan_brains(
     config: Config,
     refused: Collection[str],
-    atlases: Iterable[UsedAtlas],
+    atlases: Sequence[UsedAtlas],
 ) -> dict[str, Brain]:
     """Return the brains of a configuration that are not refused, by id."""
-    atlases = list(atlases)
     checksums = known_checksums(atlases)
     atlas_of = atlas_by_brain(atlases)
     brains: dict[str, Brain] = {}
     for settings in config.brains:
         if settings.id not in refused:
-            brain = _brain(config, settings, checksums)
-            if brain.id in atlas_of:
-                brain = replace(
-                    brain,
-                    atlas=atlas_of[brain.id].atlas.name,
-                )
-            brains[brain.id] = brain
-    groups = _groups(brains.values())
-    for name, brain in brains.items():
-        brains[name] = replace(brain, group=groups.get(name))
+            used = atlas_of.get(settings.id)
+            atlas = used.atlas.name if used else None
+            brains[settings.id] = _brain(config, settings, checksums, atlas)
+    for name, group in _groups(brains.values()).items():
+        brains[name] = replace(brains[name], group=group)
     _add_regions(config, brains)
     _add_thickness_sources(brains)
     return brains
@@ -47,6 +41,7 @@ def _brain(
     config: Config,
     settings: BrainConfig,
     checksums: Mapping[str, tuple[str, str]],
+    atlas: str | None,
 ) -> Brain:
     names = {"brain": settings.id}
     has_cortex = False
@@ -90,7 +85,7 @@ def _brain(
         thickness_of=None,
         regions_of=None,
         group=None,
-        atlas=None,
+        atlas=atlas,
         files=tuple(settings.files),
         checksums=known,
         covariates=settings.covariates,
@@ -122,19 +117,13 @@ def _groups(brains: Iterable[Brain]) -> dict[str, str]:
 def _add_regions(config: Config, brains: dict[str, Brain]) -> None:
     """Add the regions of each whole brain: its own, or those of the brain closest in
     week that has some."""
-    with_regions = {}
+    given = [brains[name] for name in brains if name in config.metrics.regions]
     for name, brain in brains.items():
-        if name in config.metrics.regions and brain.sides == SIDES:
-            with_regions[name] = brain
-    for name, brain in brains.items():
-        if brain.sides != SIDES or not with_regions:
-            continue
-        if name in with_regions:
-            source = brain
-        elif brain.shape is None:
-            source = closest(with_regions.values(), brain.week)
-        else:
-            continue
+        source = brain
+        if brain not in given:
+            if not given or brain.sides != SIDES or brain.shape is not None:
+                continue
+            source = closest(given, brain.week)
         regions = paths.region_files(brain.folder).values()
         brains[name] = replace(
             brain,
@@ -149,17 +138,14 @@ def _add_thickness_sources(brains: dict[str, Brain]) -> None:
 
     It is the brain with labels, or else with white surfaces, that is closest in week.
     """
+    measured = [brain for brain in brains.values() if brain.thickness is not None]
+    labelled = [brain for brain in measured if brain.labels is not None]
     for name, brain in brains.items():
-        if brain.labels is not None:
-            continue
-        measured = []
-        for other in brains.values():
-            if other.thickness is not None and other.id != name:
-                measured.append(other)
-        if measured:
-            labelled = [other for other in measured if other.labels is not None]
-            source = closest(labelled or measured, brain.week)
-            brains[name] = replace(brain, thickness_of=source.id)
+        if brain.labels is None:
+            others = [other for other in labelled or measured if other.id != name]
+            if others:
+                source = closest(others, brain.week)
+                brains[name] = replace(brain, thickness_of=source.id)
 
 
 def closest(brains: Iterable[Brain], week: float) -> Brain:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
-from ..names import DEVICE, column_part, folder_name, merged_names
+from ..names import column_part, folder_name, merged_names
 from ..quantities import METRICS
 from ..settings.base import Key, KeyProblem, Problems, did_you_mean, problems_in
 from ..settings.folding import VARYING, value_problems
@@ -64,7 +64,6 @@ MIXED_UP = (
     "differ only in case, accents' forms or dots at the end, so some disks mix up their"
     " folders"
 )
-NO_FOLDING_KEY = "is not a key of folding"
 
 
 def problems_between(config: Config) -> list[KeyProblem]:
@@ -110,22 +109,8 @@ def _names(config: Config) -> Problems:
             f"the sweeps {first} and {second} {MIXED_UP}; rename one",
             ("sweeps", second),
         )
-    named: list[tuple[str, Key]] = [(name, ("brains",)) for name in counts]
-    named += [(name, ("runs", name)) for name in config.runs]
-    named += [(name, ("sweeps", name)) for name in config.sweeps]
-    for name, key in named:
-        if DEVICE.fullmatch(name):
-            yield KeyProblem(
-                f"found {name}, a device on Windows, whose disks have no folder of this"
-                " name; choose another",
-                key,
-            )
-    taken: list[Key] = []
-    if OBSERVED in config.runs:
-        taken.append(("runs", OBSERVED))
-    for name in sorted(config.schemes):
-        if name in SCHEMES:
-            taken.append(("schemes", name))
+    taken = [("runs", name) for name in config.runs if name == OBSERVED]
+    taken += [("schemes", name) for name in config.schemes if name in SCHEMES]
     for name in config.sweeps:
         if folder_name(name) in RESERVED_SWEEPS:
             taken.append(("sweeps", name))
@@ -276,12 +261,12 @@ def _growth(config: Config) -> Problems:
     """Yield problems between brains and growth series."""
     settings = config.growth
     lists: dict[Key, Sequence[str]] = {}
-    if settings.brains and isinstance(settings.brains, Mapping):
-        all_brains = [brain.id for brain in config.brains]
+    if isinstance(settings.brains, Mapping):
         for name, ids in settings.brains.items():
-            lists["growth", "brains", name] = all_brains if ALL in ids else ids
+            everyone = [brain.id for brain in config.brains]
+            lists["growth", "brains", name] = everyone if ALL in ids else ids
     elif settings.brains is not None:
-        lists["growth", "brains"] = list(settings.brains)
+        lists["growth", "brains"] = settings.brains
     unknown: list[KeyProblem] = []
     for key, names in lists.items():
         unknown += _unknown(names, config, key)
@@ -394,20 +379,19 @@ def _metrics(config: Config) -> Problems:
             ("metrics", "regions"),
         )
     # regions are carried, and their asymmetry measured, on both hemispheres together
-    single = []
-    scans: Counter[tuple[str, float]] = Counter()
-    for brain in config.brains:
-        if brain.id in settings.regions and brain.side is not None:
-            single.append(brain.id)
-        if brain.subject is not None:
-            scans[brain.subject, brain.week] += 1
+    single = [
+        brain.id
+        for brain in config.brains
+        if brain.id in settings.regions and brain.side is not None
+    ]
     if single:
         yield KeyProblem(
             f"found {', '.join(single)} with one hemisphere; expected brains with both",
             ("metrics", "regions"),
         )
+    scans = Counter((brain.subject, brain.week) for brain in config.brains)
     for (subject, week), count in scans.items():
-        if count > 1:
+        if count > 1 and subject is not None:
             yield KeyProblem(
                 f"found {count} scans of the subject {subject} in week {week:g};"
                 " expected one",
@@ -420,12 +404,12 @@ def _sweeps(config: Config) -> Problems:
     for name, sweep in config.sweeps.items():
         problems = [*_comparison_problems(sweep, config)]
         if sweep.base in config.runs:
-            problems += _member_problems(sweep, config.runs[sweep.base])
+            problems += _sweep_problems(sweep, config.runs[sweep.base])
         for problem in problems:
             yield problem.inside("sweeps", name)
 
 
-def _member_problems(sweep: SweepSettings, base: Run) -> Problems:
+def _sweep_problems(sweep: SweepSettings, base: Run) -> Problems:
     if not sweep.vary:
         yield KeyProblem(
             "found nothing; expected keys of folding with lists of values", ("vary",)
@@ -447,29 +431,37 @@ def _member_problems(sweep: SweepSettings, base: Run) -> Problems:
     sections |= dict.fromkeys(sweep.fixed, "fixed")
     for settings in sweep.fixed_at.values():
         sections |= dict.fromkeys(settings, "fixed_at")
+    changes = [sweep.changes(values) for _, values in variants("", sweep)]
+    yield from _varied_problems(base, sections, changes)
+
+
+def _varied_problems(
+    base: Run,
+    sections: Mapping[str, str],
+    changes: Iterable[Mapping[str, Any]],
+) -> Problems:
+    """Yield problems of runs that differ from a base; `sections` has where each varied
+    key is."""
     for name, section in sections.items():
         if name in NOT_VARIED:
             yield KeyProblem(
-                "cannot differ within a sweep; choose another base", (section, name)
+                "cannot be varied; choose another base",
+                (section, name),
             )
             return
-    for _, combination in variants("", sweep):
+    for values in changes:
         try:
-            run = changed(base, sweep.changes(combination))
+            run = changed(base, values)
         except KeyError as error:
-            name = error.args[0]
-            yield KeyProblem(NO_FOLDING_KEY, (sections[name], name))
-            return
+            problems = [KeyProblem("is not a key of folding", error.args)]
         except ValidationError as error:
-            for problem in problems_in(error, Run):
-                name = ".".join(map(str, problem.key))
-                yield KeyProblem(
-                    problem.text,
-                    (sections.get(name, "fixed"), name),
-                )
+            problems = problems_in(error, Run)
         else:
-            for problem in value_problems(run, run.end_week - 1e-9, {}):
-                yield problem.inside("vary")
+            problems = list(value_problems(run, run.end_week - 1e-9, {}))
+        for problem in problems:
+            name = ".".join(map(str, problem.key))
+            # a key that is not varied is one of the base
+            yield KeyProblem(problem.text, (sections.get(name, "base"), name))
 
 
 def _comparison_problems(settings: ComparisonSettings, config: Config) -> Problems:
@@ -501,32 +493,12 @@ def _calibration(config: Config) -> Problems:
     calibrate = config.calibrate
     if calibrate is None:
         return
-    for problem in _comparison_problems(calibrate, config):
-        yield problem.inside("calibrate")
+    problems = [*_comparison_problems(calibrate, config)]
     if calibrate.base in config.runs:
+        sections = dict.fromkeys(calibrate.parameters, "parameters")
+        changes = []
         for key, bounds in calibrate.parameters.items():
-            for text in _parameter_problems(
-                key,
-                bounds,
-                config.runs[calibrate.base],
-            ):
-                yield KeyProblem(text, ("calibrate", "parameters", key))
-
-
-def _parameter_problems(
-    key: str,
-    bounds: Sequence[float],
-    base: Run,
-) -> Iterator[str]:
-    if key in NOT_VARIED:
-        yield "cannot be calibrated"
-        return
-    for bound in bounds:
-        try:
-            changed(base, {key: bound})
-        except KeyError:
-            yield NO_FOLDING_KEY
-            return
-        except ValidationError as error:
-            problems = problems_in(error, Run)
-            yield from dict.fromkeys(problem.text for problem in problems)
+            changes += [{key: bound} for bound in bounds]
+        problems += _varied_problems(config.runs[calibrate.base], sections, changes)
+    for problem in problems:
+        yield problem.inside("calibrate")

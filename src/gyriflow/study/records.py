@@ -204,15 +204,9 @@ class Simulation:
         return paths.file_of(pattern, **self.names, **wildcards)
 
     @property
-    def shapes(self) -> Origin | None:
-        """The source of the shapes that it grows towards; None for growth by rates or
-        sizes."""
-        return self.settings.growth.shapes
-
-    @property
     def has_growth_maps(self) -> bool:
         """True if maps of the growth that it found can be written."""
-        return self.shapes is not None and "growth" in self.settings.fields
+        return bool(self.settings.growth.shapes) and "growth" in self.settings.fields
 
 
 @dataclass(frozen=True, kw_only=True)

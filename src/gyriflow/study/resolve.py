@@ -2,12 +2,12 @@
 sweep."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from ..errors import InputError
 from ..settings.folding import mapped_parameters, output_weeks
-from ..settings.growth import BEFORE_GW, Origin
+from ..settings.growth import BEFORE_GW
 from ..settings.root import Config
 from ..settings.runs import (
     ComparisonSettings,
@@ -67,6 +67,17 @@ class _Pair:
     settings: Run
 
 
+@dataclass(frozen=True)
+class _Brains:
+    """The brains of a study, and those that growth is measured on. The chains of
+    members of ensembles are added to `chains`."""
+
+    config: Config
+    brains: Mapping[str, Brain]
+    series: Series
+    chains: Chains
+
+
 def resolve(config: Config, refused: Mapping[str, str] | None = None) -> Study:
     """Return the study of a configuration, without the brains that are `refused`, by
     id, each with its cause.
@@ -91,18 +102,23 @@ def resolve(config: Config, refused: Mapping[str, str] | None = None) -> Study:
     if unreachable and not refused:
         raise next(iter(unreachable.values()))
     pairs = [pair for pair in pairs if pair.start.id not in unreachable]
-    planned = _Simulations(config, series, chains, brains)
-    planned.add_runs(pairs)
-    names = planned.add_variants(pairs, swept)
-    simulations = list(planned.simulations.values())
+    known = _Brains(config, brains, series, chains)
+    simulations = _simulations_of_runs(known, pairs)
+    names, ends = _shared_runs(config, swept, simulations)
+    simulations += _simulations_of_variants(known, pairs, ends)
+    simulated: list[MeasuredBrain] = []
+    compared: list[Comparison] = []
+    for simulation in simulations:
+        simulated += _simulated(simulation, brains[simulation.brain])
+        compared += _compared(known, simulation)
     followed = _followed_chains(simulations, chains, series)
     links = _links(config, brains, series, followed.values())
     rows: dict[str, Iterable[Any]] = {
         "brains": brains.values(),
         "series": _series_rows(config, brains, series, followed, simulations),
         "simulations": simulations,
-        "simulated": planned.simulated,
-        "compared": planned.compared,
+        "simulated": simulated,
+        "compared": compared,
         "links": links,
         "chains": followed.values(),
         "sweeps": _sweeps(config, swept, names, simulations, brains),
@@ -306,209 +322,185 @@ def _chains(
     return chains
 
 
-@dataclass
-class _Simulations:
-    """The simulations of a study by run and start brain, with the simulated brains and
-    the comparisons of each. The chains of members of ensembles are added to
-    `chains`."""
-
-    config: Config
-    series: Series
-    chains: Chains
-    brains: Mapping[str, Brain]
-    simulations: dict[tuple[str, str], Simulation] = field(default_factory=dict)
-    simulated: list[MeasuredBrain] = field(default_factory=list)
-    compared: list[Comparison] = field(default_factory=list)
-
-    def add_runs(self, pairs: Iterable[_Pair]) -> None:
-        """Add the simulations of `runs`, and the members of their ensembles."""
-        brains = list(self.brains.values())
-        own = [pair for pair in pairs if pair.run in self.config.runs]
-        predicted = set()
-        for pair in own:
-            if pair.settings.growth.shapes == "atlas":
-                predicted.add(pair.start.id)
-        for pair in own:
-            start = pair.start
-            further: list[float] = []
-            if start.id in predicted:
-                further = later_observed_weeks(start, brains)
-            weeks = _weeks(pair.settings, start, further)
-            self._add(pair, weeks)
-            alone = pair.settings.model_copy(update={"ensemble": None})
-            for name, variation in members_of(pair.run, pair.settings).items():
-                if pair.settings.growth.shapes:
-                    chain = member_chain(
-                        pair.run, start, pair.settings, variation, self.series, brains
-                    )
-                    chain = replace(
-                        chain,
-                        name=f"{chain.origin}.{name}",
-                    )
-                    self.chains[start.id, chain.name] = chain
-                self._add(
-                    _Pair(name, start, alone),
-                    weeks,
-                    pair.run,
-                )
-
-    def add_variants(
-        self, pairs: Iterable[_Pair], variants: Sequence[_Variant]
-    ) -> dict[str, str]:
-        """Add the simulations of sweeps and of the calibration; return the simulated
-        run of each run of a sweep, by its name."""
-        names, compared = _shared_runs(
-            self.config,
-            variants,
-            self.simulations.values(),
-        )
-        calibrate = self.config.calibrate
-        for pair in pairs:
-            if pair.run in compared and pair.run not in self.config.runs:
-                weeks = compared[pair.run]
-                settings = pair.settings.model_copy(update={"end_week": max(weeks)})
-                complete = _Pair(pair.run, pair.start, settings)
-                self._add(complete, _weeks(settings, pair.start, weeks))
-            elif calibrate is not None and pair.run in calibrate.runs:
-                self._add(
-                    pair,
-                    [pair.start.week, pair.settings.end_week],
-                )
-        return names
-
-    def _add(
-        self,
-        pair: _Pair,
-        weeks: Sequence[float],
-        member_of: str | None = None,
-    ) -> None:
-        """Add a simulation, unless there is one of that name, with the brains that it
-        is compared with."""
-        run = pair.run
+def _simulations_of_runs(
+    known: _Brains,
+    pairs: Iterable[_Pair],
+) -> list[Simulation]:
+    """Return the simulations of `runs`, each followed by the members of its
+    ensemble."""
+    brains = list(known.brains.values())
+    own = [pair for pair in pairs if pair.run in known.config.runs]
+    predicted = set()
+    for pair in own:
+        if pair.settings.growth.shapes == "atlas":
+            predicted.add(pair.start.id)
+    simulations = []
+    for pair in own:
         start = pair.start
-        settings = pair.settings
-        key = (run, start.id)
-        if key in self.simulations:
-            return
-        growth = settings.growth
-        # the run is also compared with brains of other subjects if it grows towards
-        # them
-        same = comparable(start, self.brains.values())
-        candidates = list(same)
-        ids = {brain.id for brain in candidates}
-        for name in self.chains[start.id, "self"].later:
-            if self.brains[name].sides == start.sides and name not in ids:
-                candidates.append(self.brains[name])
-                ids.add(name)
-        candidates.sort(key=lambda brain: brain.subject_name != start.subject_name)
-        self.compared += _compared(run, start, weeks, candidates, same)
-        later = set()
-        for brain in self.brains.values():
-            is_scan = start.subject is not None and brain.subject == start.subject
-            if brain.week > start.week and (is_scan or brain.id in ids):
-                later.add(brain.id)
-        atlas_brains = self.chains[start.id, "atlas"].later
-        is_atlas_prediction = growth.shapes == "atlas" and later.isdisjoint(
-            atlas_brains
-        )
-        follows_observed = bool(growth.shapes) or growth.follows_sizes
-        is_explained = follows_observed and not is_atlas_prediction
-        base = run
-        if self.config.calibrate and run in self.config.calibrate.runs:
-            base = self.config.calibrate.base
-        curves = None
-        if growth.follows_sizes:
-            curves = paths.CURVES["curves"]
-        chain: str | None = growth.shapes
-        if chain and member_of:
-            chain = f"{chain}.{run}"
-        maps = None
-        if growth.shapes or mapped_parameters(settings):
-            maps = paths.MAPS.format(run=base, brain=start.id)
-        targets = paths.TARGETS.format(brain=start.id, origin=chain) if chain else None
-        self.simulations[key] = Simulation(
-            run=run,
-            brain=start.id,
-            weeks=tuple(weeks),
-            kind="explained" if is_explained else "predicted",
-            is_atlas_prediction=is_atlas_prediction,
-            growth_of=self._growth_source(
-                start, growth.shapes, has_curves=bool(curves)
-            ),
-            series=self.series.for_sizes(start),
-            curves=curves,
-            chain=chain,
-            targets=targets,
-            base=base,
-            maps=maps,
-            members=tuple(members_of(run, settings)),
-            member_of=member_of,
-            has_regions=bool(start.regions) and run in self.config.runs,
-            may_diverge=run not in self.config.runs,
-            settings=settings,
-        )
-        self.simulated += _simulated(self.simulations[key], start)
-
-    def _growth_source(
-        self,
-        start: Brain,
-        origin: Origin | None,
-        *,
-        has_curves: bool,
-    ) -> str:
-        """Describe whose measured growth a run follows, or return ""."""
-        brains: Sequence[Brain] = ()
-        name = ""
-        if origin:
-            chain = self.chains[start.id, origin]
-            ids = chain.later if origin == "atlas" else chain.brains
-            brains = [self.brains[brain] for brain in ids]
-            name = self.series.with_brain(brains[0])
-        elif has_curves:
-            name = self.series.for_sizes(start) or ""
-            brains = self.series.brains.get(name, ())
-        if several_subjects(brains):
-            return f"population {name}"
-        if start in brains:
-            return "own"
-        return f"series {name}" if brains else ""
-
-
-def _compared(
-    run: str,
-    start: Brain,
-    weeks: Sequence[float],
-    candidates: Sequence[Brain],
-    same: Sequence[Brain],
-) -> list[Comparison]:
-    """Return the comparisons of a run, each with the first candidate of a later week.
-
-    `same` are the brains that are comparable with the start brain itself.
-    """
-    rows = []
-    observed_brains = [brain for brain in candidates if brain.shape is None]
-    if start.shape is not None:
-        observed_brains = []
-    adjacent_brains = [brain for brain in same if brain.shape is None]
-    for week in weeks[1:]:
-        shown = [brain.id for brain in candidates if brain.week == week]
-        observed = [brain.id for brain in observed_brains if brain.week == week]
-        earlier = [brain for brain in adjacent_brains if brain.week < week]
-        adjacent = max(
-            earlier,
-            key=lambda brain: brain.week,
-            default=None,
-        )
-        if shown:
-            row = Comparison(
-                run=run,
-                brain=start.id,
-                week=week,
-                shown=shown[0],
-                observed=observed[0] if observed else None,
-                adjacent=adjacent.id if adjacent and observed else None,
+        further: list[float] = []
+        if start.id in predicted:
+            further = later_observed_weeks(start, brains)
+        weeks = _weeks(pair.settings, start, further)
+        simulations.append(_simulation(known, pair, weeks))
+        alone = pair.settings.model_copy(update={"ensemble": None})
+        for name, variation in members_of(pair.run, pair.settings).items():
+            chain = member_chain(
+                pair.run, start, pair.settings, variation, known.series, brains
             )
-            rows.append(row)
+            chain = replace(
+                chain,
+                name=f"{chain.origin}.{name}",
+            )
+            known.chains[start.id, chain.name] = chain
+            member = _Pair(name, start, alone)
+            simulations.append(_simulation(known, member, weeks, pair.run))
+    return simulations
+
+
+def _simulations_of_variants(
+    known: _Brains,
+    pairs: Iterable[_Pair],
+    ends: Mapping[str, set[float]],
+) -> list[Simulation]:
+    """Return the simulations of sweeps, each with the weeks at which it is compared,
+    and of the calibration."""
+    simulations = []
+    calibrate = known.config.calibrate
+    for pair in pairs:
+        settings = pair.settings
+        if pair.run in known.config.runs:
+            continue
+        if pair.run in ends:
+            weeks = ends[pair.run]
+            settings = settings.model_copy(update={"end_week": max(weeks)})
+            pair = _Pair(pair.run, pair.start, settings)
+            simulations.append(
+                _simulation(known, pair, _weeks(settings, pair.start, weeks))
+            )
+        elif calibrate is not None and pair.run in calibrate.runs:
+            weeks = [pair.start.week, settings.end_week]
+            simulations.append(_simulation(known, pair, weeks))
+    return simulations
+
+
+def _candidates(known: _Brains, start: Brain) -> list[Brain]:
+    """Return the brains that simulations from a start brain may be compared with, those
+    of its own subject first.
+
+    Besides comparable ones, these are brains of its growth series, also of other
+    subjects.
+    """
+    candidates = comparable(start, known.brains.values())
+    for name in known.chains[start.id, "self"].later:
+        brain = known.brains[name]
+        if brain.sides == start.sides and brain not in candidates:
+            candidates.append(brain)
+    return sorted(
+        candidates,
+        key=lambda brain: brain.subject_name != start.subject_name,
+    )
+
+
+def _simulation(
+    known: _Brains,
+    pair: _Pair,
+    weeks: Sequence[float],
+    member_of: str | None = None,
+) -> Simulation:
+    run = pair.run
+    start = pair.start
+    settings = pair.settings
+    growth = settings.growth
+    later = {brain.id for brain in _candidates(known, start)}
+    for brain in known.brains.values():
+        if start.subject is not None and brain.subject == start.subject:
+            later.add(brain.id)
+    grown = known.chains[start.id, "atlas"].later
+    knows_later = any(
+        name in later and known.brains[name].week > start.week for name in grown
+    )
+    is_atlas_prediction = growth.shapes == "atlas" and not knows_later
+    follows_observed = bool(growth.shapes) or growth.follows_sizes
+    is_explained = follows_observed and not is_atlas_prediction
+    calibrate = known.config.calibrate
+    base = run
+    if calibrate is not None and run in calibrate.runs:
+        base = calibrate.base
+    chain: str | None = growth.shapes
+    if chain and member_of:
+        chain = f"{chain}.{run}"
+    maps = None
+    if growth.shapes or mapped_parameters(settings):
+        maps = paths.MAPS.format(run=base, brain=start.id)
+    return Simulation(
+        run=run,
+        brain=start.id,
+        weeks=tuple(weeks),
+        kind="explained" if is_explained else "predicted",
+        is_atlas_prediction=is_atlas_prediction,
+        growth_of=_growth_source(known, start, settings),
+        series=known.series.for_sizes(start),
+        curves=paths.CURVES["curves"] if growth.follows_sizes else None,
+        chain=chain,
+        targets=paths.TARGETS.format(brain=start.id, origin=chain) if chain else None,
+        base=base,
+        maps=maps,
+        members=tuple(members_of(run, settings)),
+        member_of=member_of,
+        has_regions=bool(start.regions) and run in known.config.runs,
+        may_diverge=run not in known.config.runs,
+        settings=settings,
+    )
+
+
+def _growth_source(known: _Brains, start: Brain, settings: Run) -> str:
+    """Describe whose measured growth a run follows, or return ""."""
+    brains: Sequence[Brain] = ()
+    name = ""
+    origin = settings.growth.shapes
+    if origin:
+        chain = known.chains[start.id, origin]
+        ids = chain.later if origin == "atlas" else chain.brains
+        brains = [known.brains[brain] for brain in ids]
+        name = known.series.with_brain(brains[0])
+    elif settings.growth.follows_sizes:
+        name = known.series.for_sizes(start) or ""
+        brains = known.series.brains.get(name, ())
+    if several_subjects(brains):
+        return f"population {name}"
+    if start in brains:
+        return "own"
+    return f"series {name}" if brains else ""
+
+
+def _compared(known: _Brains, simulation: Simulation) -> list[Comparison]:
+    """Return the comparisons of a simulation, each with the first candidate of a later
+    week."""
+    start = known.brains[simulation.brain]
+    candidates = _candidates(known, start)
+    same = comparable(start, known.brains.values())
+    rows = []
+    for week in simulation.weeks[1:]:
+        shown = [brain for brain in candidates if brain.week == week]
+        if not shown:
+            continue
+        row = Comparison(
+            run=simulation.run,
+            brain=start.id,
+            week=week,
+            shown=shown[0].id,
+            observed=None,
+            adjacent=None,
+        )
+        observed = [brain for brain in shown if brain.shape is None]
+        if observed and start.shape is None:
+            earlier = []
+            for brain in same:
+                if brain.week < week and brain.shape is None:
+                    earlier.append(brain)
+            adjacent = max(earlier, key=lambda brain: brain.week)
+            row = replace(row, observed=observed[0].id, adjacent=adjacent.id)
+        rows.append(row)
     return rows
 
 
@@ -544,13 +536,13 @@ def _shared_runs(
     Equal runs are simulated once, to the latest of their weeks. If a run of `runs` is
     equal too, and its simulations have all their weeks, they share that one.
     """
-    compared: dict[str, set[float]] = {}
+    weeks_of: dict[str, set[float]] = {}
     for variant in variants:
-        weeks = compared.setdefault(_equality_key(variant.settings), set())
+        weeks = weeks_of.setdefault(_equality_key(variant.settings), set())
         weeks.add(variant.settings.end_week)
     lacking = set()
     for simulation in simulations:
-        weeks = compared.get(_equality_key(simulation.settings), set())
+        weeks = weeks_of.get(_equality_key(simulation.settings), set())
         if not weeks <= set(simulation.weeks):
             lacking.add(simulation.run)
     shared: dict[str, str] = {}
@@ -561,7 +553,7 @@ def _shared_runs(
     for variant in variants:
         key = _equality_key(variant.settings)
         names[variant.run] = shared.setdefault(key, variant.run)
-    return names, {shared[key]: weeks for key, weeks in compared.items()}
+    return names, {shared[key]: weeks for key, weeks in weeks_of.items()}
 
 
 def _equality_key(run: Run) -> str:
@@ -665,13 +657,11 @@ def _compared_with(
     if settings.compare_with is not None:
         return tuple(name for name in brains if name in settings.compare_with)
     same_week = []
-    own = []
     for brain in brains.values():
         if brain.week == settings.compare_week:
-            same_week.append(brain.id)
-            if brain.population == start.population:
-                own.append(brain.id)
-    return tuple(own or same_week)
+            same_week.append(brain)
+    own = [brain for brain in same_week if brain.population == start.population]
+    return tuple(brain.id for brain in own or same_week)
 
 
 def _sweeps(
@@ -690,19 +680,19 @@ def _sweeps(
     rows = []
     for variant in variants:
         settings = config.sweeps[variant.sweep]
+        run = simulated_by[variant.run]
         for simulation in simulations:
-            if simulation.run != simulated_by[variant.run]:
-                continue
-            row = SweepRun(
-                sweep=variant.sweep,
-                member=variant.run,
-                week=settings.compare_week,
-                run=simulation.run,
-                brain=simulation.brain,
-                values=variant.values,
-                observed=_compared_with(settings, brains[simulation.brain], brains),
-            )
-            rows.append(row)
+            if simulation.run == run:
+                row = SweepRun(
+                    sweep=variant.sweep,
+                    member=variant.run,
+                    week=settings.compare_week,
+                    run=run,
+                    brain=simulation.brain,
+                    values=variant.values,
+                    observed=_compared_with(settings, brains[simulation.brain], brains),
+                )
+                rows.append(row)
     return rows
 
 

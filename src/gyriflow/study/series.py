@@ -287,18 +287,12 @@ def member_chain(
         # ages of one series have the same error
         return replace(chain, variation=replace(variation, age_shift_gw=0.0))
     atlases = series.from_other_populations(start, all_atlases=True)
-    names = [
-        name
-        for name in atlases
-        if _covers(
-            series.brains[name],
-            start.week,
-            end,
-        )
-    ]
-    if not names:
-        # the run itself is refused
-        return _chain("atlas", [start], series)
+    names = []
+    for name in atlases:
+        weeks = [brain.week for brain in series.brains[name]]
+        starts_before = min(weeks) <= start.week + BEFORE_GW
+        if len(set(weeks)) > 1 and starts_before and max(weeks) >= end:
+            names.append(name)
     name = names[variation.number % len(names)]
     atlas_weeks = [brain.week for brain in series.brains[name]]
     # the age of the whole run is shifted, as far as the atlas goes, or a little further
@@ -340,16 +334,6 @@ def _chain(
         weeks=tuple(brain.week for brain in brains),
         links=tuple(links),
     )
-
-
-def _covers(
-    brains: Iterable[Brain],
-    week: float,
-    end: float,
-) -> bool:
-    """Return whether growth from a week to an end is known from brains of an atlas."""
-    weeks = {brain.week for brain in brains}
-    return len(weeks) > 1 and min(weeks) <= week + BEFORE_GW and max(weeks) >= end
 
 
 def _own_chain(

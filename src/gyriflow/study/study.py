@@ -17,7 +17,7 @@ import yaml
 from ..io.exports import ExportedBrain, labels_file
 from ..io.yaml_files import read_keys
 from ..settings.root import Config
-from ..settings.terms import OBSERVED, SIDES, min_norm_subjects
+from ..settings.terms import OBSERVED, SIDES, Side, min_norm_subjects
 from . import paths
 from .atlases import UsedAtlas, atlas_by_brain, used_atlases
 from .brains import closest, label_source, registered_source
@@ -73,23 +73,6 @@ class Study:
             if not simulation.may_diverge
         ]
 
-    @cached_property
-    def may_diverge(self) -> list[str]:
-        """The runs of sweeps, calibration and ensembles, which may diverge without
-        stopping the study."""
-        runs = [
-            simulation.run
-            for simulation in self.simulations.values()
-            if simulation.may_diverge
-        ]
-        return list(dict.fromkeys(runs))
-
-    @property
-    def pairs(self) -> list[tuple[str, str]]:
-        return [
-            (simulation.run, simulation.brain) for simulation in self.run_simulations
-        ]
-
     def files(self, *patterns: str) -> list[str]:
         """Return the files of patterns for each of `run_simulations`."""
         files = []
@@ -129,22 +112,6 @@ class Study:
                 paths[chain.brain] = chain
         return paths
 
-    def brains_of(self, chain: Chain) -> list[Brain]:
-        """Return the brains of a chain."""
-        return [self.brains[name] for name in chain.brains]
-
-    def link(self, earlier: str, later: str) -> Link:
-        """Return the map between two brains that no member of an ensemble varies."""
-        return self._plain_links[earlier, later]
-
-    @cached_property
-    def _plain_links(self) -> dict[tuple[str, str], Link]:
-        links = {}
-        for link in self.links.values():
-            if link.seed == 0:
-                links[link.earlier, link.later] = link
-        return links
-
     @cached_property
     def growth_brains(self) -> list[tuple[str, Brain]]:
         """All brains that growth is measured on, each with its series, in the order of
@@ -155,15 +122,6 @@ class Study:
                 (series.name, self.brains[name]) for name in series.brains
             ]
         return growth_brains
-
-    @cached_property
-    def with_ensemble(self) -> list[Simulation]:
-        """The simulations of runs that have an ensemble."""
-        return [simulation for simulation in self.run_simulations if simulation.members]
-
-    def members(self, simulation: Simulation) -> list[Simulation]:
-        """Return the members of a simulation's ensemble."""
-        return [self.simulations[run, simulation.brain] for run in simulation.members]
 
     # comparison with observed brains
 
@@ -192,17 +150,6 @@ class Study:
             for simulation in self.run_simulations
             if self.observed(simulation)
         ]
-
-    @cached_property
-    def references(self) -> dict[tuple[str, float], Comparison]:
-        """The comparisons of validated simulations by start brain and week, which are
-        the same for all runs."""
-        references = {}
-        for simulation in self.validated:
-            for row in self.comparisons(simulation):
-                if row.observed is not None:
-                    references[row.brain, row.week] = row
-        return references
 
     @cached_property
     def atlas_predictions(self) -> list[Simulation]:
@@ -241,29 +188,19 @@ class Study:
             name: simulation.file(file, week=row.week) for name, file in parts.items()
         }
 
-    def age_shift_gw(self, simulation: Simulation) -> float:
-        """Return by how much a start brain is older than stated, in an ensemble."""
-        variation = self.chains[simulation.brain, str(simulation.chain)].variation
-        return variation.age_shift_gw if variation else 0.0
-
     def atlas_brains_near(self, simulation: Simulation, week: float) -> list[Brain]:
         """Return the brains of a prediction's atlas that may have the age of a week,
         those within `MAX_AGE_OFF_GW` of it or else the nearest."""
-        assert simulation.chain is not None
-        chain = self.chains[simulation.brain, simulation.chain]
-        path = self.paths[str(chain.path)]
-        brains = self.brains_of(path)
+        path = self.chains[simulation.brain, str(simulation.chain)].path
+        brains = [self.brains[name] for name in self.chains[str(path), PATH].brains]
         near = [brain for brain in brains if abs(brain.week - week) <= MAX_AGE_OFF_GW]
         return near or [closest(brains, week)]
 
     def atlas_brain(self, simulation: Simulation) -> Brain:
         """Return the brain of a prediction's atlas that is closest in week to its
         end."""
-        chain = self.chains[simulation.brain, "atlas"]
-        return closest(
-            self.brains_of(chain)[1:],
-            simulation.weeks[-1],
-        )
+        later = self.chains[simulation.brain, "atlas"].later
+        return closest([self.brains[name] for name in later], simulation.weeks[-1])
 
     @cached_property
     def predictions(self) -> list[Simulation]:
@@ -352,16 +289,11 @@ class Study:
     def scans(self) -> dict[str, list[str]]:
         """The ids of the scans of each subject that was scanned several times, in the
         order of weeks."""
-        scans: dict[str, list[Brain]] = {}
-        for brain in self.brains.values():
+        scans: dict[str, list[str]] = {}
+        for brain in sorted(self.brains.values(), key=attrgetter("week")):
             if brain.subject is not None:
-                scans.setdefault(brain.subject, []).append(brain)
-        several = {}
-        for subject in sorted(scans):
-            if len(scans[subject]) > 1:
-                by_week = sorted(scans[subject], key=lambda brain: brain.week)
-                several[subject] = [brain.id for brain in by_week]
-        return several
+                scans.setdefault(brain.subject, []).append(brain.id)
+        return {subject: ids for subject, ids in sorted(scans.items()) if len(ids) > 1}
 
     @property
     def filled(self) -> list[dict[str, Any]]:
@@ -370,22 +302,25 @@ class Study:
 
         The source is "white", "measured" (on a similar brain) or "typical".
         """
-        groups: dict[tuple[str, bool], dict[str, None]] = {}
-        for link in self._followed_links:
+        groups: dict[tuple[str, bool], list[str]] = {}
+        for file in self._followed_links:
+            link = self.links[file]
             pair = (self.brains[link.earlier], self.brains[link.later])
-            by_cortex = all(self._has_cortex(brain) for brain in pair)
+            sources = [registered_source(self.config, brain) for brain in pair]
+            by_cortex = all(source.scheme.cortex for source in sources)
             for brain, is_posed in zip(pair, link.posed, strict=True):
                 if is_posed:
-                    group = (self._cortex_source(brain), by_cortex)
-                    groups.setdefault(group, {})[brain.id] = None
+                    measured = "measured" if brain.thickness_of else "typical"
+                    cortex = "white" if brain.white_files else measured
+                    groups.setdefault((cortex, by_cortex), []).append(brain.id)
         return [
-            {"ids": list(ids), "cortex": cortex, "by_cortex": by_cortex}
+            {"ids": [*dict.fromkeys(ids)], "cortex": cortex, "by_cortex": by_cortex}
             for (cortex, by_cortex), ids in groups.items()
         ]
 
     @property
-    def _followed_links(self) -> list[Link]:
-        """The links of the chains that runs, without their ensembles, follow."""
+    def _followed_links(self) -> list[str]:
+        """The files of the chains that runs, without their ensembles, follow."""
         files: list[str] = []
         for simulation in self.run_simulations:
             if simulation.chain is not None:
@@ -393,15 +328,7 @@ class Study:
                 files += chain.links
                 if chain.path is not None:
                     files += self.chains[chain.path, PATH].links
-        return [self.links[file] for file in files]
-
-    def _cortex_source(self, brain: Brain) -> str:
-        if brain.white_files:
-            return "white"
-        return "measured" if brain.thickness_of else "typical"
-
-    def _has_cortex(self, brain: Brain) -> bool:
-        return bool(registered_source(self.config, brain).scheme.cortex)
+        return files
 
     # export
 
@@ -413,16 +340,17 @@ class Study:
         ]
 
     def _exported(self, row: MeasuredBrain, brain: Brain) -> ExportedBrain:
-        is_observed = row.run == OBSERVED
         volume: dict[str, Any] = {}
-        if brain.labels and not is_observed:
+        if brain.labels and row.run != OBSERVED:
             volume = {
                 "labels": label_source(self.config, brain),
                 "surface": row.pial,
                 "thickness": row.thickness,
             }
-        white = brain.white if is_observed else ()
-        white_maps = brain.white_maps if is_observed else ()
+
+        def by_side(files: Iterable[str]) -> dict[Side, str]:
+            return dict(zip(row.sides, files, strict=False))
+
         template_maps = {}
         template = self.brains.get(self.config.metrics.template or "")
         for side in row.sides:
@@ -435,25 +363,14 @@ class Study:
             run=row.run,
             week=row.week,
             subject=brain.subject_name,
-            surfaces=dict(
-                zip(
-                    row.sides,
-                    row.hemispheres,
-                    strict=True,
-                )
-            ),
-            maps=dict(
-                zip(
-                    row.sides,
-                    row.maps,
-                    strict=True,
-                )
-            ),
-            regions=dict(zip(SIDES, row.regions, strict=False)),
+            surfaces=by_side(row.hemispheres),
+            maps=by_side(row.maps),
+            regions=by_side(row.regions),
             report=brain.report,
             covariates=brain.covariates,
-            white=dict(zip(row.sides, white, strict=False)),
-            white_maps=dict(zip(row.sides, white_maps, strict=False)),
+            # simulated brains have none
+            white=by_side(brain.white) if row is brain else {},
+            white_maps=by_side(brain.white_maps) if row is brain else {},
             template=self.config.metrics.template,
             template_maps=template_maps,
             volume=volume,
@@ -539,20 +456,8 @@ def write_plan(study: Study, folder: Path) -> None:
 
 def read_plan(folder: Path) -> Study:
     """Return the study whose plan is in a folder; InputError if there is none."""
-    rows: dict[str, list[Any]] = {}
+    rows = {}
     for name, table in TABLES.items():
-        rows[name] = read_rows(
-            folder / f"{name}.csv",
-            table.kind,
-        )
-    # a file of an atlas may be missing
-    awaited: list[str | None] = []
-    for brain in rows["brains"]:
-        awaited += [
-            *brain.files,
-            *brain.white_files.values(),
-            brain.image,
-        ]
-    context = {"folder": str(folder), "awaited": awaited}
-    plain = read_keys(folder / "config.yaml")
-    return study_of(Config.model_validate(plain, context=context), rows)
+        rows[name] = read_rows(folder / f"{name}.csv", table.kind)
+    # its paths are absolute, and files of an atlas may be missing
+    return study_of(Config.model_validate(read_keys(folder / "config.yaml")), rows)

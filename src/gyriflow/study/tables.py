@@ -9,7 +9,6 @@ import io
 import json
 from collections.abc import Iterable
 from dataclasses import fields
-from functools import cache
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -25,13 +24,14 @@ def write_rows(
     rows: Iterable[Any],
 ) -> None:
     """Write records of one dataclass as CSV, unless the file has these rows already."""
-    types = get_type_hints(kind)
-    names = [column.name for column in fields(kind)]
     text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(names)
+    names = [column.name for column in fields(kind)]
+    table = csv.DictWriter(text, names, lineterminator="\n")
+    table.writeheader()
+    adapter = TypeAdapter(kind)
     for row in rows:
-        table.writerow([_cell(getattr(row, name), types[name]) for name in names])
+        plain = adapter.dump_python(row, mode="json", exclude_unset=True)
+        table.writerow({name: _cell(value) for name, value in plain.items()})
     write_changed(path, text.getvalue())
 
 
@@ -52,22 +52,10 @@ def read_rows[Row](path: AnyPath, kind: type[Row]) -> list[Row]:
     return TypeAdapter(list[kind]).validate_python(rows)  # type: ignore[valid-type]
 
 
-def _cell(value: Any, kind: Any) -> str:
+def _cell(value: Any) -> str:
     if value is None:
         return ""
-    if _is_text(kind):
-        return str(value)
-    plain = _adapter(kind).dump_python(
-        value,
-        mode="json",
-        exclude_unset=True,
-    )
-    return json.dumps(plain, ensure_ascii=False)
-
-
-@cache
-def _adapter(kind: Any) -> TypeAdapter:
-    return TypeAdapter(kind)
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
 def _value(text: str, kind: Any) -> Any:

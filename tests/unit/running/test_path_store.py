@@ -207,7 +207,7 @@ def test_a_path_has_another_key_after_a_change_of_the_code_behind_a_script(
 def test_a_path_is_made_from_every_brain_whose_thickness_fills_one_of_its(paths):
     """Also where two of these are of one week."""
     study, path = paths()
-    first, second, third = study.brains_of(path)[:3]
+    first, second, third = (study.brains[name] for name in path.brains[:3])
     third = replace(third, week=first.week)
     first = replace(first, thickness_of=third.id)
     second = replace(second, thickness_of=first.id)

@@ -60,10 +60,6 @@ def test_files_are_found_beside_the_configuration(folder):
     [a., a] | [["brains:", a., a]]
     [a.., A] | [["brains:", a.., A]]
     [sub-1, sub-1.] | [["brains:", sub-1, sub-1.]]
-    [con] | [["brains:", con]]
-    [aux.1] | [["brains:", aux.1]]
-    [Lpt9] | [["brains:", Lpt9]]
-    [xcon, x.nul] | []
     """,
 )
 def test_each_brain_has_a_folder_on_every_disk(names, found):

@@ -120,7 +120,8 @@ def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
     """,
 )
 def test_a_run_folds_the_brains_that_it_names_or_those_of_the_study(changes, pairs):
-    assert resolved(**changes).pairs == [tuple(pair) for pair in pairs]
+    found = [simulation.key for simulation in resolved(**changes).run_simulations]
+    assert found == [tuple(pair) for pair in pairs]
 
 
 MAP = {"map": __file__, "surface": __file__}
