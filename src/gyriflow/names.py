@@ -1,7 +1,6 @@
 """Names that become one: in folders, labels and columns, where two things must not
 share a name."""
 
-import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 

@@ -371,12 +371,11 @@ def _simulations_of_variants(
         if pair.run in known.config.runs:
             continue
         if pair.run in ends:
-            weeks = ends[pair.run]
-            settings = settings.model_copy(update={"end_week": max(weeks)})
+            compared = ends[pair.run]
+            settings = settings.model_copy(update={"end_week": max(compared)})
             pair = _Pair(pair.run, pair.start, settings)
-            simulations.append(
-                _simulation(known, pair, _weeks(settings, pair.start, weeks))
-            )
+            weeks = _weeks(settings, pair.start, compared)
+            simulations.append(_simulation(known, pair, weeks))
         elif calibrate is not None and pair.run in calibrate.runs:
             weeks = [pair.start.week, settings.end_week]
             simulations.append(_simulation(known, pair, weeks))

@@ -456,7 +456,7 @@ def write_plan(study: Study, folder: Path) -> None:
 
 def read_plan(folder: Path) -> Study:
     """Return the study whose plan is in a folder; InputError if there is none."""
-    rows = {}
+    rows: dict[str, list[Any]] = {}
     for name, table in TABLES.items():
         rows[name] = read_rows(folder / f"{name}.csv", table.kind)
     # its paths are absolute, and files of an atlas may be missing

@@ -28,7 +28,7 @@ def write_rows(
     names = [column.name for column in fields(kind)]
     table = csv.DictWriter(text, names, lineterminator="\n")
     table.writeheader()
-    adapter = TypeAdapter(kind)
+    adapter: TypeAdapter = TypeAdapter(kind)
     for row in rows:
         plain = adapter.dump_python(row, mode="json", exclude_unset=True)
         table.writerow({name: _cell(value) for name, value in plain.items()})

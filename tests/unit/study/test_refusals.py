@@ -92,7 +92,7 @@ def folder(tmp_path):
     sweep | {vary: {thickness_mm: [-1]}} | vary.thickness_mm | [0, -1]
     sweep | {vary: {thickness_mm: [1, 1]}} | vary.thickness_mm | [[1.0, 1.0]]
     sweep | {vary: {preset: [measured]}} | vary.preset | [base]
-    sweep | {vary: {growth_rate_per_s: [1.0e-5]}, fixed: {step_s: 6e+5}} | fixed.step_s | [6]
+    sweep | {vary: {growth_rate_per_s: [1.0e-5], step_s: [6.0e+5]}} | vary.step_s | [6]
     sweep | {vary: {}} | vary | [folding]
     sweep | {fixed: {contact.gap: 2}} | fixed.contact.gap | []
     sweep | {fixed_at: {1.2: {step_s: 43200}}} | fixed_at | [1.2]
