@@ -2,7 +2,7 @@
 curvature that a wave keeps.
 
     ./run python benchmarks/spectra.py [--surface NAME.surf.gii ...] \\
-        [--per-wavelength 8 7 6 5] [--last B5]
+        [--per-wavelength 8 7 6 5] [--evenness 0.1 0.001] [--last B5]
 
 The folds are radial waves of degree 8 on a sphere of 25 mm radius: 18.5 mm long, in the
 middle of B3; the power in B4 is of harmonics. `isotropic` waves run in all directions,
@@ -10,7 +10,7 @@ middle of B3; the power in B4 is of harmonics. `isotropic` waves run in all dire
 plane; `closed form` is `gyriflow.metrics.curvature.kept_curvature`.
 
 With surfaces, these are compared instead: spectra of a hemisphere on copies with fewer
-vertices, against those on all of its own vertices, which should have at least ten for
+vertices and triangles of another evenness (`remeshing.EVENNESS`), against those on all of its own vertices, which should have at least ten for
 the shortest wave. Of both proxies, the errors of the powers of B1 to the last band and
 the share of the area with the same dominant band; and, against the consistent mass
 matrix, the numbers of modes.
@@ -18,6 +18,7 @@ matrix, the numbers of modes.
 
 import argparse
 import time
+from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
@@ -26,6 +27,7 @@ from scipy.spatial import Delaunay
 from scipy.special import sph_harm_y
 from trimesh.creation import icosphere
 
+from gyriflow.geometry import remeshing
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics import spangy
@@ -78,7 +80,9 @@ def kept_share(wavelength_radii: float, edges_per_radius: float) -> tuple[float,
     )
 
 
-def compare_copies(path: Path, per_wavelength: list[float], last: str) -> None:
+def compare_copies(
+    path: Path, per_wavelength: list[float], evenness: list[float], last: str
+) -> None:
     """Print a row for the surface as it is, with both mass matrices, and for each
     copy."""
     mesh = read_surface(path)
@@ -113,13 +117,15 @@ def compare_copies(path: Path, per_wavelength: list[float], last: str) -> None:
 
     print(
         f"\n{path}\n\n"
-        "| edges per wave | vertices | CPU s | modes |"
+        "| edges per wave; evenness | vertices | CPU s | modes |"
         " H, % | same | shape index, % | same |"
     )
     print("| --- | ---: | ---: | --- | --- | ---: | --- | ---: |")
     row("as it is")
-    for edges in per_wavelength:
-        row(f"{edges:g}", VERTICES_PER_WAVELENGTH=edges, WORTHWHILE=np.inf)
+    for edges, even in product(per_wavelength, evenness):
+        with patch.object(remeshing, "EVENNESS", even):
+            name = f"{edges:g}; {even:g}"
+            row(name, VERTICES_PER_WAVELENGTH=edges, WORTHWHILE=np.inf)
     row("as it is, consistent", "consistent")
 
 
@@ -164,10 +170,15 @@ def main() -> None:
     parser.add_argument(
         "--per-wavelength", type=float, nargs="+", default=[10.0, 8.0, 7.0, 6.0, 5.0]
     )
+    parser.add_argument(
+        "--evenness", type=float, nargs="+", default=[remeshing.EVENNESS, 0.001]
+    )
     parser.add_argument("--last", choices=["B4", "B5", "B6"], default="B5")
     arguments = parser.parse_args()
     for path in arguments.surface:
-        compare_copies(path, arguments.per_wavelength, arguments.last)
+        compare_copies(
+            path, arguments.per_wavelength, arguments.evenness, arguments.last
+        )
     if not arguments.surface:
         print_waves()
 

@@ -51,7 +51,7 @@ OPEN_AND_CLOSED = "open and closed hemispheres"
 5 to 7 % shorter."""
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
-VERTICES_PER_WAVELENGTH = 8.0
+VERTICES_PER_WAVELENGTH = 6.0
 """Edges per shortest wave on the surface that modes are computed on;
 `benchmarks/spectra.py` compares other numbers."""
 LONGEST_EDGE_MM = 1.8
