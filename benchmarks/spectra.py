@@ -10,10 +10,10 @@ middle of B3; the power in B4 is of harmonics. `isotropic` waves run in all dire
 plane; `closed form` is `gyriflow.metrics.curvature.kept_curvature`.
 
 With surfaces, these are compared instead: spectra of a hemisphere on copies with fewer
-vertices and triangles of another evenness (`remeshing.EVENNESS`), against those on all of its own vertices, which should have at least ten for
-the shortest wave. Of both proxies, the errors of the powers of B1 to the last band and
-the share of the area with the same dominant band; and, against the consistent mass
-matrix, the numbers of modes.
+vertices and triangles of another evenness (`remeshing.EVENNESS`), against those on all
+of its own vertices, which should have at least ten for the shortest wave. Of both
+proxies, the errors of the powers of B1 to the last band and the share of the area with
+the same dominant band; and, against the consistent mass matrix, the numbers of modes.
 """
 
 import argparse

@@ -5,18 +5,20 @@
         [--command measure] [--repeats 5]
 
 CONFIG is a configuration, for example of one brain from labels. Both checkouts make its
-study in turn, each time in a new folder in FOLDER, by `./run gyriflow COMMAND CONFIG
---cores 1`. For each kind of step: processor time as its steps have recorded it, with
-child processes (s; median, smallest and largest of the repeats), and the largest memory
-(MiB). Of the metrics of measured brains the last table has the largest differences,
-relative to the value but for metrics that may be negative, and in units of the noise:
-one standard deviation of the difference between two measurements of one brain
-(`norms/repeatability.yaml`). The last line is one JSON object.
+study at the same time, so that they have the same load, on one core each and in new
+folders in FOLDER, by `./run gyriflow COMMAND CONFIG --cores 1`. For each kind of step,
+and run: processor time as its steps have recorded it, with child processes (s; median,
+smallest and largest of the repeats), and the largest memory (MiB). Of the metrics of
+measured brains the last table has the largest differences, relative to the value but
+for metrics that may be negative, and in units of the noise: one standard deviation of
+the difference between two measurements of one brain (`norms/repeatability.yaml`). The
+last line is one JSON object.
 """
 
 import argparse
 import shutil
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,19 +36,25 @@ N_DIFFERENCES = 10
 """Metrics in the table of differences, the largest in units of the noise first."""
 
 
-def make_study(checkout: Path, command: str, config: Path, folder: Path) -> None:
-    """Make a study in a new folder; CalledProcessError if a step fails."""
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    program = ["./run", "gyriflow", command, str(config), "-d", str(folder)]
-    subprocess.run([*program, "--cores", "1"], cwd=checkout, check=True)
+def make_studies(folders: Mapping[Path, Path], command: str, config: Path) -> None:
+    """Make a study with each checkout in its folder, all at the same time;
+    CalledProcessError if a step fails."""
+    processes = []
+    for checkout, folder in folders.items():
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        program = ["./run", "gyriflow", command, str(config), "-d", str(folder)]
+        processes.append(subprocess.Popen([*program, "--cores", "1"], cwd=checkout))
+    for process in processes:
+        if process.wait():
+            raise subprocess.CalledProcessError(process.returncode, process.args)
 
 
 def steps_in(folder: Path) -> pd.DataFrame:
-    """Return what the steps of a study took: a row per kind of step with cpu_s and
-    memory_MiB."""
-    steps = pd.DataFrame(read_usage(folder)).groupby("rule")
-    return steps.agg({"cpu_s": "sum", "memory_MiB": "max"}).rename_axis("step")
+    """Return what the steps of a study took: a row per kind of step and run with cpu_s
+    and memory_MiB."""
+    steps = pd.DataFrame(read_usage(folder)).groupby(["rule", "run"])
+    return steps.agg({"cpu_s": "sum", "memory_MiB": "max"})
 
 
 def metrics_in(folder: Path) -> pd.Series:
@@ -91,15 +99,17 @@ def main() -> None:
     checkouts = {"before": arguments.before.resolve(), "now": ROOT}
     parts = []
     for repeat in range(arguments.repeats):
-        for name, checkout in checkouts.items():
-            folder = out / f"{name}-{repeat}"
-            make_study(checkout, arguments.command, config, folder)
+        folders = {name: out / f"{name}-{repeat}" for name in checkouts}
+        studies = {checkouts[name]: folder for name, folder in folders.items()}
+        make_studies(studies, arguments.command, config)
+        for name, folder in folders.items():
             parts.append(steps_in(folder).assign(checkout=name))
     rows = []
     steps = pd.concat(parts).reset_index()
-    for (kind, name), taken in steps.groupby(["step", "checkout"], sort=False):
+    kinds = ["rule", "run", "checkout"]
+    for (rule, run, name), taken in steps.groupby(kinds, sort=False):
         seconds = taken["cpu_s"]
-        row = {"step": kind, "checkout": name, "cpu_s": seconds.median()}
+        row = {"step": rule, "run": run, "checkout": name, "cpu_s": seconds.median()}
         row |= {"smallest": seconds.min(), "largest": seconds.max()}
         rows.append(row | {"memory_MiB": taken["memory_MiB"].max()})
     before, now = (metrics_in(out / f"{name}-0") for name in checkouts)
