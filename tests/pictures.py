@@ -60,6 +60,25 @@ def ends(item: object) -> np.ndarray:
     return item.get_path().vertices
 
 
+def surfaces_seen(figure: Figure) -> dict:
+    """Return the words of pictures of surfaces, the limits of colour bars, and of each
+    picture its scale, what is not background and its colour, for a recorded table."""
+    bars = [axes for axes in figure.axes if hasattr(axes, "_colorbar")]
+    found = {"words": sorted(words(figure))}
+    found["bars"] = {axes.get_xlabel(): axes.get_xlim() for axes in bars}
+    for number, axes in enumerate(pictures(figure)):
+        image = picture(figure, number)
+        shown = covered(image)
+        found[f"{number} {axes.get_label()}"] = {
+            "dots per mm": axes.get_window_extent().width / np.ptp(axes.get_xlim()),
+            "width and height": [shown.any(axis=0).sum(), shown.any(axis=1).sum()],
+            # over the whole, and over the upper left part
+            "tone": tone(image),
+            "tone of a part": tone(image[: len(image) // 2, : image.shape[1] // 2]),
+        }
+    return found
+
+
 def pictures(figure: Figure) -> list[Axes]:
     """Return the panels that show a picture."""
     return [axes for axes in figure.axes if axes.images]

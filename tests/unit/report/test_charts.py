@@ -1,13 +1,13 @@
 """Charts hold what the tables say: metrics, norms, growth and scores."""
 
 import os
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from facts import Facts
-from matplotlib.figure import Figure
 from pictures import contents
 from text_tables import frame
 
@@ -89,12 +89,6 @@ def spectrum_rows(
 NO_ATLASES = pd.DataFrame(columns=CURVES)
 
 
-def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
-    """Draw the spectra of a study with one member at 28 GW."""
-    values = {"thin": {"thickness_mm": 1.5}}
-    return influence_spectra([pd.concat(members)], real, values=values, week=28.0)
-
-
 def metrics_with_norms() -> pd.DataFrame:
     """Return metrics of brains of a norm, of one beside it, and of a run."""
     brains = {"subject": REFERENCE, "week": WEEKS, "value": 10 * WEEKS + NOISE}
@@ -109,18 +103,22 @@ def metrics_with_norms() -> pd.DataFrame:
     return table.assign(hemisphere="whole", metric="area", unit="cm2")
 
 
-def scans_of_subjects(groups=None):
-    """Return metrics of scans of two subjects and of one of none, and the subjects."""
-    weeks = {"a2": (26.0, 140.0), "a1": (22.0, 100.0), "b1": (24.0, 120.0)}
-    parts = []
-    for brain, (week, value) in (weeks | {"none": (23.0, 110.0)}).items():
-        rows = metric_rows("observed", "whole", "area", {week: value}, "cm2")
-        parts.append(rows.assign(subject=brain))
-    return pd.concat(parts), {"a1": "sub-a", "a2": "sub-a", "b1": "sub-b"}
-
-
 def subjects_by_marker_and_groups_by_colour():
-    metrics, subjects = scans_of_subjects()
+    """Scans of two subjects, and of one of none."""
+    metrics = frame(
+        """
+        subject week value
+        a2      26   140
+        a1      22   100
+        b1      24   120
+        none    23   110
+        """,
+        run="observed",
+        hemisphere="whole",
+        metric="area",
+        unit="cm2",
+    )
+    subjects = {"a1": "sub-a", "a2": "sub-a", "b1": "sub-b"}
     groups = {"a1": "sex: F", "a2": "sex: F", "b1": "sex: M"}
     return metrics_figure(metrics, NO_ATLASES, subjects=subjects, groups=groups)
 
@@ -133,61 +131,42 @@ def more_subjects_than_a_legend_holds():
     return metrics_figure(metrics, NO_ATLASES, subjects=subjects)
 
 
-def runs_as_lines_and_observed_brains_as_stars():
-    area = {22.0: 110.0, 21.0: 100.0}
+def runs_as_lines_brains_as_stars_and_atlases_near_their_weeks():
+    """An atlas that is later than all brains is not drawn."""
+    area = {26.0: 110.0, 25.0: 100.0}
     metrics = [
         metric_rows("thin", "whole", "area", area, "cm2"),
-        metric_rows("observed", "whole", "area", {21.0: 99.0, 22.0: 120.0}, "cm2"),
-        metric_rows("thin", "left", "area", {21.0: 50.0}, "cm2"),
-        metric_rows("thin", "whole", "mean_curvedness", {21.0: 0.1, 22.0: 0.2}, "1/mm"),
+        metric_rows("observed", "whole", "area", {25.0: 99.0, 26.0: 120.0}, "cm2"),
+        metric_rows("thin", "left", "area", {25.0: 50.0}, "cm2"),
+        metric_rows("thin", "whole", "mean_curvedness", {25.0: 0.1, 26.0: 0.2}, "1/mm"),
     ]
-    return metrics_figure(pd.concat(metrics), NO_ATLASES)
-
-
-def atlases_near_the_weeks_of_the_brains():
-    """An atlas that is later than all brains is not drawn."""
-    area = {25.0: 100.0, 26.0: 110.0}
     rows = [("late", "whole", "area", week, 300.0) for week in (36.0, 37.0)]
     for atlas, factor in (("one", 4.0), ("two", 5.0)):
-        for side in ("whole", "left"):
-            for metric in ("area", "volume"):
-                for week in np.arange(20.0, 39.0):
-                    rows.append((atlas, side, metric, week, factor * week))
-    metrics = metric_rows("observed", "whole", "area", area, "cm2")
-    return metrics_figure(metrics, pd.DataFrame(rows, columns=CURVES))
+        for side, metric in product(("whole", "left"), ("area", "volume")):
+            for week in np.arange(20.0, 39.0):
+                rows.append((atlas, side, metric, week, factor * week))
+    return metrics_figure(pd.concat(metrics), pd.DataFrame(rows, columns=CURVES))
 
 
 def spectra_of_a_sweep():
+    """A band of the run is cut off."""
     thin = [
-        *spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}),
+        *spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3}),
+        *spectrum_rows("thin", 28.0, {6: 0.1}, complete=False),
         *spectrum_rows("thin", 27.0, {4: 0.9}),
     ]
-    return study_of(thin, spectrum_rows("observed", 28.0, {4: 0.25, 5: 0.15}))
-
-
-def cut_off(run):
-    """Return the spectra of a run and a brain, with a band of one that is cut off."""
-    found = {name: spectrum_rows(name, 28.0, {4: 0.2}) for name in ("thin", "observed")}
-    found[run] += spectrum_rows(run, 28.0, {5: 0.1}, complete=False)
-    return found
-
-
-def a_band_of_a_run_that_is_cut_off():
-    return study_of(*cut_off("thin").values())
-
-
-def a_band_of_a_brain_that_is_cut_off_over_weeks():
-    found = cut_off("observed")
-    return spectra_figure(pd.concat([*found["thin"], *found["observed"]]), NO_ATLASES)
+    observed = spectrum_rows("observed", 28.0, {4: 0.25, 5: 0.15})
+    values = {"thin": {"thickness_mm": 1.5}}
+    return influence_spectra([pd.concat(thin)], observed, values=values, week=28.0)
 
 
 def spectra_over_weeks():
-    """By side and band, and open where a band is cut off."""
+    """By side and band, and open where a band is cut off, of the run or a brain."""
     thin = spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3})
     thin += spectrum_rows("thin", 26.5, {4: 0.1, 5: 0.2}, complete=False)
     scans = []
     for brain, week, power in (("a1", 26.0, {4: 0.25}), ("a2", 27.5, {4: 0.15})):
-        parts = spectrum_rows("observed", week, power)
+        parts = spectrum_rows("observed", week, power, complete=brain == "a1")
         scans += [part.assign(subject=brain) for part in parts]
     metric = "spangy_B4_relative_power"
     rows = [("one", "left", metric, week, 0.01 * week) for week in (26.0, 27.0)]
@@ -207,6 +186,7 @@ def a_norm_with_its_reference_and_others():
     """Half a brain is not compared with whole ones."""
     metrics = metrics_with_norms()
     curves = norm_curves(cohort_norms(metrics, REFERENCE))
+    curves = pd.concat([curves.assign(hemisphere="left", expected=1.0), curves])
     half = metrics[:1].assign(subject="half", value=5.0)
     return norms_figure(pd.concat([metrics, half]), curves, **NORM_BRAINS)
 
@@ -216,23 +196,6 @@ def a_norm_of_averages():
     metrics = metrics_with_norms()
     curves = norm_curves(cohort_norms(metrics, REFERENCE, individuals=False))
     return norms_figure(metrics, curves, **NORM_BRAINS, groups={"case": "sex: F"})
-
-
-def bands_between_centiles():
-    curves = frame(
-        """
-        week expected q05 q25 q75 q95
-        22   100      90  95  106 118
-        23   130      110 122 141 160
-        25.5 200      160 185 220 270
-        """,
-        hemisphere="whole",
-        metric="area",
-    )
-    other = curves.assign(hemisphere="left", expected=1.0, q05=0.0, q95=2.0)
-    brain = metric_rows("observed", "whole", "area", {24.0: 150.0}, "cm2")
-    own = {"reference": ["s"], "brains": ["s"]}
-    return norms_figure(brain, pd.concat([other, curves]), **own)
 
 
 def intervals_around_a_run():
@@ -318,9 +281,11 @@ def parameters_of_a_calibration():
     return calibration_figure(tried, optimum, score=["size"])
 
 
-def gains(runs, start="a"):
+def gains_with_their_kind_and_interval():
+    """Two lines of a run beside each other, from two start brains."""
     rows = []
-    for number, run in enumerate(runs):
+    lines = [("reference", "a"), ("measured", "a"), ("reference", "b")]
+    for number, (run, start) in enumerate(lines):
         for week in (22, 23, 24):
             kind = "predicted" if week > 23 else "explained"
             row = {"run": run, "start": start, "week": week, "kind": kind}
@@ -330,17 +295,7 @@ def gains(runs, start="a"):
                 row[f"gain_low_{measure}"] = gain - 0.02
                 row[f"gain_high_{measure}"] = gain + 0.05
             rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def gains_with_their_kind_and_interval():
-    return validation_figure(gains(["reference", "measured"]))
-
-
-def gains_of_two_start_brains():
-    """Two lines beside each other."""
-    both = [gains(["reference"]), gains(["reference"], start="b")]
-    return validation_figure(pd.concat(both))
+    return validation_figure(pd.DataFrame(rows))
 
 
 def runs_and_simpler_predictions():
@@ -357,48 +312,40 @@ def runs_and_simpler_predictions():
     return prediction_figure(pd.DataFrame(rows), runs=["expected", "stiff"])
 
 
-SWEEP = {"varied": "thickness_mm", "subject": "s", "observed": ["r"], "week": 28.0}
-
-
-def distances(values: dict[float, float], **labels: str) -> pd.DataFrame:
-    known = {"subject": "s", "observed": "r", "unit": "mm", "flag": "ok"}
-    known |= {"resolution": "ok", "hemisphere": "whole", "measure": "hausdorff95"}
-    table = {"thickness_mm": list(values), "distance": list(values.values())}
-    return pd.DataFrame(table).assign(**known | labels)
-
-
-def the_nearest_member():
-    """One that is not trusted is not it."""
-    good = distances({0.8: 3.0, 1.5: 2.0, 2.25: 1.0})
-    bad = distances({6.0: 0.1}, flag="not resolved by the mesh")
-    return nearest_figure(pd.concat([good, bad]), **SWEEP)
-
-
-def a_published_nearest_value():
-    """It is a line in the panel of its measure and week."""
-    names = ("area", "shape_index_relative_power_B4_weyl")
-    rows = [distances({0.8: 2.0, 2.25: 1.0}, measure=name) for name in names]
+def the_nearest_member_and_a_published_one():
+    """One that is not trusted is not the nearest. The published value is a line in the
+    panel of its measure and week."""
+    known = {"subject": "s", "observed": "r", "hemisphere": "whole", "unit": "mm"}
+    rows = frame(
+        """
+        thickness_mm distance flag    measure
+        0.8          3.0      ok      hausdorff95
+        1.5          2.0      ok      hausdorff95
+        2.25         1.0      ok      hausdorff95
+        6.0          0.1      cut_off hausdorff95
+        0.8          2.0      ok      area
+        2.25         1.0      ok      shape_index_relative_power_B4_weyl
+        """,
+        resolution="ok",
+        **known,
+    )
     found = {"parameter": "thickness_mm", "week": 28, "value": 1.3}
     found["measure"] = "shape_index_relative_power_B4"
     later = found | {"week": 29, "value": 1.4}
     other = found | {"parameter": "step_s", "value": 1.5}
-    published = {"nearest": [found, later, other]}
-    return nearest_figure(pd.concat(rows), **SWEEP, published=published)
+    sweep = {"varied": "thickness_mm", "subject": "s", "observed": ["r"], "week": 28.0}
+    return nearest_figure(rows, **sweep, published={"nearest": [found, later, other]})
 
 
 CHARTS = (
     subjects_by_marker_and_groups_by_colour,
     more_subjects_than_a_legend_holds,
-    runs_as_lines_and_observed_brains_as_stars,
-    atlases_near_the_weeks_of_the_brains,
+    runs_as_lines_brains_as_stars_and_atlases_near_their_weeks,
     spectra_of_a_sweep,
-    a_band_of_a_run_that_is_cut_off,
-    a_band_of_a_brain_that_is_cut_off_over_weeks,
     spectra_over_weeks,
     sums_of_areas_and_means_of_depths_of_regions,
     a_norm_with_its_reference_and_others,
     a_norm_of_averages,
-    bands_between_centiles,
     intervals_around_a_run,
     rates_of_growth,
     rates_of_one_of_two_series,
@@ -407,10 +354,8 @@ CHARTS = (
     displacement_beside_a_published_one,
     parameters_of_a_calibration,
     gains_with_their_kind_and_interval,
-    gains_of_two_start_brains,
     runs_and_simpler_predictions,
-    the_nearest_member,
-    a_published_nearest_value,
+    the_nearest_member_and_a_published_one,
 )
 
 
