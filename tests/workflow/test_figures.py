@@ -5,7 +5,6 @@ import re
 from importlib import import_module
 
 import pytest
-from facts import Facts
 from planned_figures import planned_figures
 
 from gyriflow.report.page import caption_html
@@ -102,12 +101,6 @@ def rules(plans):
     return names
 
 
-def only(figures, name):
-    """Return the only figure of a name."""
-    (figure,) = [figure for figure in figures if figure.name == name]
-    return figure
-
-
 def sectioned(rules):
     """Return the names of the figures of pages, in their order."""
     pages = rules["SECTIONS"], rules["BRAIN_SECTIONS"]
@@ -121,14 +114,6 @@ def drawing_function(figure):
         if figure.name in functions:
             return functions[figure.name]
     raise AssertionError(figure)
-
-
-def places(figure):
-    """Return rows and columns of a grid with their first surfaces."""
-    return {
-        (brain["row"], brain["column"]): brain["surfaces"][0]
-        for brain in figure.params["grid"]
-    }
 
 
 def test_a_function_gets_its_arguments_and_all_that_a_rule_has_is_of_use(figures):
@@ -213,59 +198,38 @@ def test_the_paper_is_named_in_its_own_figures_alone(figures, rules):
     assert not with_paper & set(sectioned(rules))
 
 
-def test_runs_with_equal_zones_have_one_figure_of_them(figures):
-    zones = only(figures["shapes"], "zones_figure")
-    assert zones.files[0] == "results/runs/thin/a/figures/zones.png"
+# a figure of each kind of grid, frames and tables
+RECORDED = {
+    "shapes": (
+        "weekly_figure",
+        "shape_maps",
+        "displacement_maps",
+        # runs with equal zones have one
+        "zones_figure",
+        # members of a sweep that ended before have no files
+        "influence_figure",
+        "influence_spectra",
+        "growth_figure",
+    ),
+    "prediction": ("predicted_figure", "atlas_ages"),
+    "predictions": ("expected_figure", "regions_figure", "intervals_figure"),
+}
 
 
-def test_simulated_and_measured_brains_are_not_exchanged(figures):
-    observed = {
-        ("ellipsoid", week): f"results/brains/{brain}/surface"
-        for week, brain in ((21.0, "a"), (22.0, "b"))
-    }
-    simulated = {
-        (run, week): f"results/runs/{run}/a/surfaces/week-{week:.2f}"
-        for run in ("thin", "thick")
-        for week in (21.0, 22.0)
-    }
-    weekly = only(figures["shapes"], "weekly_figure")
-    folders = observed | simulated
-    assert places(weekly) == {
-        place: f"{folder}/pial.surf.gii" for place, folder in folders.items()
-    }
-    shapes = only(figures["shapes"], "shape_maps")
-    assert places(shapes) == {
-        place: f"{folder}/left.pial.surf.gii" for place, folder in folders.items()
-    }
-    for figure in (weekly, shapes):
-        for brain in figure.params["grid"]:
-            assert brain["simulated"] == (brain["row"] != "ellipsoid")
-    displacement = only(figures["shapes"], "displacement_maps")
-    frames = [f"results/runs/{run}/a/folding/frames.h5" for run in ("thin", "thick")]
-    assert list(displacement.inputs["frames"]) == frames
-    assert displacement.params["runs"] == ["thin", "thick"]
-
-
-def test_members_of_a_sweep_that_ended_before_have_no_files(figures):
-    influence = only(figures["shapes"], "influence_figure")
-    surfaces = {
-        brain["column"]: brain["surfaces"] for brain in influence.params["grid"]
-    }
-    assert list(surfaces) == ["rate-1e-07", ENDED, "ellipsoid"]
-    assert [run for run, files in surfaces.items() if not files] == [ENDED]
-    spectra = only(figures["shapes"], "influence_spectra")
-    assert len(spectra.inputs["members"]) == 1
-    assert list(spectra.params["values"]) == ["rate-1e-07", ENDED]
-
-
-def test_a_prediction_is_drawn_between_its_start_and_the_atlas(figures):
-    predicted = only(figures["prediction"], "predicted_figure")
-    surfaces = {
-        22.4: "results/brains/own22.4/surface/pial.surf.gii",
-        23.9: "results/runs/reference/own22.4/surfaces/week-23.90/fine/pial.surf.gii",
-        24: "results/brains/atlas24/surface/pial.surf.gii",
-    }
-    assert [
-        (brain["column"], brain["surfaces"], brain["simulated"])
-        for brain in predicted.params["grid"]
-    ] == [(Facts(week, "GW"), [path], week == 23.9) for week, path in surfaces.items()]
+@pytest.mark.parametrize("study", RECORDED)
+def test_figures_are_drawn_of_these_files(study, figures, recorded):
+    found = {}
+    for number, figure in enumerate(figures[study]):
+        if figure.name in RECORDED[study]:
+            params = {
+                name: value
+                for name, value in figure.params.items()
+                if name not in ("modules", "code")
+            }
+            inputs = {
+                name: [files] if isinstance(files, str) else list(map(str, files))
+                for name, files in figure.inputs.items()
+            }
+            drawn = {"files": figure.files, "inputs": inputs, "params": params}
+            found[f"{number} {figure.name}"] = drawn
+    recorded(found)

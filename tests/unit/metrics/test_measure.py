@@ -31,7 +31,6 @@ from gyriflow.metrics.measure import (
     BrainMetrics,
     measure_brain,
     measure_white,
-    thickness_metrics,
 )
 from gyriflow.metrics.tables import region_metrics
 from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness
@@ -97,14 +96,6 @@ def test_two_spheres(apart: BrainMetrics) -> None:
         assert numbers["whole", metric] == pytest.approx(both)
 
 
-def test_only_the_whole_has_volumes_of_tissues(apart: BrainMetrics) -> None:
-    found = apart.table[apart.table["metric"].str.startswith("volume_")]
-    assert found.drop(columns="unit").to_numpy().tolist() == [
-        ["whole", "volume_tissue", 90.0],
-        ["whole", "volume_cortex", 20.0],
-    ]
-
-
 def test_neither_the_fissure_nor_a_cut_is_a_sulcus(
     apart: BrainMetrics, cut: BrainMetrics
 ) -> None:
@@ -166,19 +157,6 @@ def test_cut_is_left_out(cut: BrainMetrics) -> None:
         assert power["mean_curvature"] < 1e-3 * half["spangy_B0_power"]
 
 
-def test_surfaces_that_cut_each_other_are_counted() -> None:
-    left, right = (sphere(20.0, 3, (x, 0, 0)) for x in (-18.0, 18.0))
-    metrics = measure_brain(
-        merged(left, right), left, right, curvature_radius_mm=6.0, spangy_modes=10
-    )
-    # the two spheres meet in a circle of radius √(20² − 18²), which at most a face or
-    # two per edge length cross
-    circle = 2 * np.pi * np.sqrt(20.0**2 - 18.0**2)
-    assert circle / 3.0 < value(metrics, "whole", "crossing_faces") < 8 * circle / 3.0
-    sides = [value(metrics, side, "crossing_faces") for side in ("left", "right")]
-    assert sides == [0, 0]
-
-
 def test_a_radius_that_reaches_the_cut_everywhere_is_refused() -> None:
     whole = sphere(10.0, 3)
     with pytest.raises(MeshError, check=Facts("metrics.curvature_radius_mm")):
@@ -223,27 +201,13 @@ def test_the_border_is_carried_with_the_tissue() -> None:
     assert found.mean() == pytest.approx(expected, abs=0.15)
 
 
-def test_values_of_a_part() -> None:
+def test_values_of_a_part_of_another_surface_are_refused() -> None:
     whole = sphere(RADIUS, 2)
     part = TriangleMesh(whole.vertices[[5, 3, 8]].astype(np.float32), [[0, 1, 2]])
-    np.testing.assert_array_equal(at_part(np.arange(162), whole, part), [5, 3, 8])
     with pytest.raises(InputError):
         at_part(np.arange(162), whole, moved(part, 1.0))
     with pytest.raises(InputError, check=Facts(161, 162)):
         at_part(np.arange(161), whole, part)
-
-
-def test_thickness_metrics_leave_out_what_was_not_measured() -> None:
-    rows = thickness_metrics(np.array([1.0, 2.0, np.nan]), np.array([3.0, 1.0, 4.0]))
-    expected = {
-        "mean_thickness": 1.25,
-        "thickness_sd": np.sqrt(0.75 * 0.25**2 + 0.25 * 0.75**2),
-        "thickness_q05": 1.0,
-        "thickness_q95": 2.0,
-        "thickness_measured_share": 0.5,
-    }
-    assert rows == pytest.approx(expected)
-    assert thickness_metrics(np.full(3, np.nan), np.ones(3)) == {}
 
 
 def test_means_of_regions_are_over_the_reliable_area() -> None:

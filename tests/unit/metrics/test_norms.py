@@ -23,11 +23,7 @@ from gyriflow.metrics.norms import (
     published_norms,
     volume_tables,
 )
-from gyriflow.metrics.tables import (
-    asymmetry,
-    described_columns,
-    wide_table,
-)
+from gyriflow.metrics.tables import asymmetry, wide_table
 from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
 from gyriflow.shipped import SHIPPED
 from gyriflow.study.checks import norm_settings
@@ -133,16 +129,6 @@ def test_skewness_is_estimated_from_many_subjects() -> None:
         assert norm.skewness == expected
 
 
-def test_a_run_is_compared_with_all_subjects_and_a_scan_with_the_others() -> None:
-    metrics, reference = near_a_line()
-    run = metrics[metrics["subject"] == "s5"].assign(run="expected", value=263.0)
-    found = scores(pd.concat([metrics, run]), reference).query("subject == 's5'")
-    assert found.set_index("run")["brains"].to_dict() == {
-        "observed": 11,
-        "expected": 12,
-    }
-
-
 @pytest.mark.parametrize(
     ("subjects", "weeks", "is_positive"),
     [(200, 160, True), (200, 7, False), (200, 1, True), (20, 16, False), (20, 3, True)],
@@ -172,14 +158,6 @@ def test_whole_weeks_of_many_subjects_have_their_own_scatter() -> None:
     low = values < norm.values(weeks, stats.norm.ppf(0.1))
     for week in ends:
         assert low[weeks == week].mean() == pytest.approx(0.1, abs=0.08)
-
-
-def test_values_that_a_norm_cannot_have_are_not_scored() -> None:
-    weeks, values = grown_brains(40)
-    flat = scores(*table(weeks, values, ("flat", 25.0, 0.0))).iloc[-1]
-    assert (flat["flag"], np.isnan(flat["centile"])) == ("not positive", True)
-    same = scores(*table(weeks, np.full(40, 5.0), ("other", 25.0, 6.0))).iloc[-1]
-    assert (same["flag"], np.isnan(same["z"])) == ("no spread", True)
 
 
 def test_a_brain_of_the_reference_is_compared_with_the_others() -> None:
@@ -322,15 +300,6 @@ def test_centiles_of_few_skewed_subjects_end_early() -> None:
     assert wide.is_skewed
 
 
-def test_a_norm_that_has_not_converged_is_flagged(monkeypatch) -> None:
-    monkeypatch.setattr("gyriflow.metrics.lms.ROUNDS", 1)
-    random = np.random.default_rng(7)
-    weeks = random.uniform(21.0, 37.0, 40)
-    values = 10 * weeks * (1 + 0.02 * (weeks - 20) * random.standard_normal(40))
-    found = scores(*table(weeks, values, ("other", 29.0, 300.0)))
-    assert set(found["flag"]) == {"not converged"}
-
-
 @pytest.mark.parametrize("subjects", [60, 150])
 def test_reference_brains_far_from_the_norm_are_named(subjects) -> None:
     random = np.random.default_rng(11)
@@ -346,15 +315,31 @@ def test_reference_brains_far_from_the_norm_are_named(subjects) -> None:
     assert outlying_brains(metrics, reference, averages) == {}
 
 
-def test_what_cannot_be_scored_is_said() -> None:
-    found = scores(*near_a_line(("a", 33.0, 1.0), ("b", 25.0, 250.0)))
-    assert found["flag"].iloc[-2:].tolist() == [
-        "outside the reference's weeks",
-        "few brains",
-    ]
-    weeks = np.arange(21.0, 30.0)
-    few = scores(*table(weeks, weeks, ("a", 22.0, 1.0))).iloc[-1]
-    assert (few["flag"], np.isnan(few["centile"])) == ("too few brains", True)
+def not_converged(monkeypatch):
+    monkeypatch.setattr("gyriflow.metrics.lms.ROUNDS", 1)
+    random = np.random.default_rng(7)
+    weeks = random.uniform(21.0, 37.0, 40)
+    values = 10 * weeks * (1 + 0.02 * (weeks - 20) * random.standard_normal(40))
+    return table(weeks, values, ("other", 29.0, 300.0))
+
+
+GROWN = grown_brains(40)
+FLAGGED = {
+    "outside the reference's weeks": near_a_line(("a", 33.0, 1.0)),
+    "few brains": near_a_line(("b", 25.0, 250.0)),
+    "too few brains": table(*[np.arange(21.0, 30.0)] * 2, ("a", 22.0, 1.0)),
+    "not positive": table(*GROWN, ("flat", 25.0, 0.0)),
+    "no spread": table(GROWN[0], np.full(40, 5.0), ("other", 25.0, 6.0)),
+    "not converged": not_converged,
+}
+
+
+@pytest.mark.parametrize("flag", FLAGGED)
+def test_what_cannot_be_scored_is_said(flag, monkeypatch) -> None:
+    study = FLAGGED[flag]
+    found = scores(*(study(monkeypatch) if callable(study) else study)).iloc[-1]
+    assert found["flag"] == flag
+    assert np.isnan(found["z"]) == (flag not in ("few brains", "not converged"))
 
 
 def test_averages_give_a_curve_and_no_centiles() -> None:
@@ -422,17 +407,6 @@ def test_regions_of_one_column_are_refused_with_both_names(first, second) -> Non
     table = rows_of((*first, "1"), (*second, "1"))
     with pytest.raises(InputError, check=Facts(repr(first[0]), repr(second[0]))):
         wide_table(table, {})
-
-
-def test_columns_are_described_by_side_region_and_unit() -> None:
-    table = rows_of(("frontal", "area", "cm2"), ("", "mean_curvedness", "1/mm"))
-    whole = table[:1].assign(hemisphere="whole", region="")
-    columns = described_columns(pd.concat([table, whole]))
-    of_region, unit = columns["left_frontal_area_cm2"]
-    assert (of_region, unit) == (Facts("region frontal", "left hemisphere"), "cm2")
-    assert columns["whole_area_cm2"] == (Facts("both hemispheres"), "cm2")
-    of_side, unit = columns["left_mean_curvedness_1_per_mm"]
-    assert ("region" in of_side, unit) == (False, "1/mm")
 
 
 def test_asymmetry_of_sides() -> None:

@@ -224,13 +224,6 @@ def test_pictures_show(drawn, recorded):
     recorded(surfaces_seen(drawn()), rtol=5e-2, atol=2.0)
 
 
-@pytest.fixture
-def blank(monkeypatch):
-    """Draw no surfaces, where only their places matter."""
-    white = np.full((2, 2, 3), 255, np.uint8)
-    monkeypatch.setattr(panels, "render", lambda *_, **__: white)
-
-
 @pytest.mark.usefixtures("blank")
 def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before():
     weeks = np.arange(21.0, 31.0)

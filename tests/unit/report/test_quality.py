@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from facts import Facts
 from matplotlib.collections import LineCollection
 from pictures import tone, words
 from PIL import Image
@@ -12,7 +11,7 @@ from shapes import box, rigid, scaling, sphere
 from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
 from gyriflow.geometry.triangles import merged, transformed
-from gyriflow.io.files import read_json, write_json
+from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface, write_vertex_maps
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.messages import Message, write_message
@@ -66,7 +65,7 @@ def test_verdicts_and_refused_brains_stand_in_one_table(recorded):
 # the page
 
 
-def test_the_page_shows_planes_views_and_warnings():
+def test_the_page_shows_planes_views_and_warnings(recorded):
     radius = np.linalg.norm(np.indices((60, 60, 60)) - 30, axis=0)
     inner = [radius < 5, radius < 18, radius < 20, radius < 24]
     tissues = np.select(inner, [3, 2, 1, 4], 0), scaling(1.0, -30)
@@ -77,15 +76,7 @@ def test_the_page_shows_planes_views_and_warnings():
     )
     brain = QualityBrain(sphere(20.0, 3), 0.0, tissues=tissues)
     figure = quality_page(brain, row, warnings, notes=["it is small"])
-    shown = words(figure)
-    assert {"a, 24 GW", "NEEDS REVIEW", "coronal, y = 0 mm"} <= shown
-    assert "Warnings:\n• it is crooked\nNote: it is small" in shown
-    assert {"left", "right medial", "front"} <= shown
-    (head,) = (text for text in shown if "cm²" in text)
-    head = head.replace("\N{NO-BREAK SPACE}", " ")
-    assert head == Facts("labels", "100.0 cm²", 49, 51, "with ventricles: 40.0 mL")
-    assert head == Facts("0.84 mm (inaccurate, measured on 70 %)", "180.0°")
-    assert head == Facts("mirror image: 0.5 mm", "31 %", "23 %")
+    recorded({"words": sorted(words(figure))})
     # the inner border is a circle of 18 mm in the coronal plane
     (coronal,) = (
         axes for axes in figure.axes if axes.get_title().startswith("coronal")
@@ -152,6 +143,7 @@ def test_line_and_edge_agree_in_every_plane(figure, number, name, axes, ends, sh
     np.testing.assert_allclose((last - first) * size / 2, half, atol=0.5)
 
 
+@pytest.mark.usefixtures("recorded_outputs")
 def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
     left, right = box((18, 20, 20), (-9, 0, 0)), box((18, 20, 20), (9, 0, 0))
     surfaces = {"left": left, "right": right, "whole": merged(left, right)}
@@ -188,18 +180,6 @@ def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
         "log": tmp_path / "surface.log",
     }
     run_script("brain_figures.py", tmp_path, inputs, outputs, params)
-    row = read_json(tmp_path / "row.json")
-    expected = {
-        "subject": "a",
-        "verdict": "needs review",
-        "warnings": "it is crooked",
-        "area_left_cm2": 49.0,
-        "mean_thickness_mm": 1.5,
-        # a thickness that is inaccurate tells nothing of the area
-        "thickness_is_inaccurate": True,
-        "area_is_lower_bound": False,
-    }
-    assert {name: row[name] for name in expected} == expected
     assert all((tmp_path / file).stat().st_size for file in outputs.values())
     # all red, as ridges are
     for name in ("maps", "small"):

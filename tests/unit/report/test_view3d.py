@@ -20,6 +20,10 @@ def shorts(text: str) -> np.ndarray:
     return np.frombuffer(b64decode(text), dtype="<u2")
 
 
+def drawn(runs, observed=()) -> dict:
+    return surfaces_view(runs, observed, observed_name="observed brain")
+
+
 def positions(data: dict, frame: dict) -> np.ndarray:
     """Return positions as the view makes them."""
     return (
@@ -40,7 +44,7 @@ def growing(values: np.ndarray | None = None) -> list:
 
 def test_thinning_keeps_the_shape(monkeypatch):
     monkeypatch.setattr(view3d, "MAX_VERTICES", 600)
-    data = surfaces_view({"thin": growing()}, [], observed_name="observed brain")
+    data = drawn({"thin": growing()})
     (group,) = data["groups"]
     places = positions(data, group["frames"][0])
     assert len(places) == pytest.approx(600, rel=0.1)
@@ -49,7 +53,7 @@ def test_thinning_keeps_the_shape(monkeypatch):
 
 
 def test_a_run_has_one_triangulation_and_its_positions_each_week():
-    data = surfaces_view({"thin": growing()}, [], observed_name="observed brain")
+    data = drawn({"thin": growing()})
     (group,) = data["groups"]
     places = [positions(data, frame) for frame in group["frames"]]
     assert [frame["week"] for frame in group["frames"]] == [21.0, 22.0]
@@ -61,7 +65,7 @@ def test_a_run_has_one_triangulation_and_its_positions_each_week():
 def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_reported():
     values = np.linspace(0.0, 0.2, len(BALL.vertices))
     values[0] = np.nan
-    data = surfaces_view({"thin": growing(values)}, [], observed_name="observed brain")
+    data = drawn({"thin": growing(values)})
     described, _ = data["maps"]
     levels = np.frombuffer(
         b64decode(data["groups"][0]["frames"][0]["values"]["curvedness"]),
@@ -75,16 +79,15 @@ def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_reported()
 
 
 def test_displacement_is_measured_from_the_first_week():
-    data = surfaces_view({"thin": growing()}, growing(), observed_name="observed brain")
+    data = drawn({"thin": growing()}, growing())
     assert [described["name"] for described in data["maps"]] == ["displacement_mm"]
     simulated, real = data["groups"]
     start, later = (
         b64decode(frame["values"]["displacement_mm"]) for frame in simulated["frames"]
     )
     assert set(start) == {0}
-    assert np.frombuffer(later, dtype=np.uint8) / 254 * data["maps"][0][
-        "high"
-    ] == pytest.approx(4.0, abs=0.02)
+    moved_mm = np.frombuffer(later, dtype=np.uint8) / 254 * data["maps"][0]["high"]
+    assert moved_mm == pytest.approx(4.0, abs=0.02)
     # what was measured has not moved
     assert real["name"] == "observed brain"
     assert not any(frame["values"] for frame in real["frames"])
@@ -92,8 +95,4 @@ def test_displacement_is_measured_from_the_first_week():
 
 def test_surfaces_of_a_run_with_other_vertices_are_refused():
     with pytest.raises(InputError, check=Facts("22 GW", 642, 2562)):
-        surfaces_view(
-            {"thin": [growing()[0], (22.0, [(sphere(20.0, 3), {})])]},
-            [],
-            observed_name="observed brain",
-        )
+        drawn({"thin": [growing()[0], (22.0, [(sphere(20.0, 3), {})])]})
