@@ -22,6 +22,7 @@ import numpy as np
 from common import print_rows
 
 from gyriflow.growth.atlas_path import ages_by_size
+from gyriflow.growth.curves import value
 from gyriflow.io.volumes import read_label_volume
 
 MAX_WEEKS = 12
@@ -70,7 +71,7 @@ def on_curve(
     """Return the volumes at its weeks of the curve of an atlas, whose growth is also
     that of others."""
     ages = ages_by_size(list(sizes), list(sizes.values()), others)
-    return {week: ages.volume(week) for week in sizes}
+    return {week: float(value(ages.curve, week)) for week in sizes}
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ class Mixed(Material):
     name: ClassVar[str] = "mixed"
 
     @staticmethod
-    def energy_of_invariants(I1, J, mu, K):
+    def _energy_of_invariants(I1, J, mu, K):
         return mu / 7 * I1**2 / J + K * (J - 1) ** 4 - mu * ufl.ln(J) * I1
 
 

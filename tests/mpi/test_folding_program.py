@@ -17,7 +17,7 @@ from processes import ran
 from shapes import ellipsoid_mesh
 
 from gyriflow.errors import StorageError
-from gyriflow.folding.__main__ import require_space
+from gyriflow.folding.__main__ import _require_space
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
@@ -226,10 +226,10 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(
 def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
     brain, parameters = ellipsoid_mesh(4, (20.0, 26.0, 18.0)), parameters_from(WEEK)
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=10**9))
-    require_space(tmp_path, brain, parameters)
+    _require_space(tmp_path, brain, parameters)
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=1000))
     with pytest.raises(StorageError, check=Facts(tmp_path, "0 MiB")):
-        require_space(tmp_path, brain, parameters)
+        _require_space(tmp_path, brain, parameters)
 
 
 def test_bad_parameters_end_in_code_two(mesh, tmp_path):

@@ -23,7 +23,7 @@ from ..io.yaml_files import read_yaml
 from ..messages import MessageHandler, error_message, write_message
 from ..settings.folding import FoldingParameters, parameters_from, require_maps
 from ..settings.terms import ELEMENT_FIELDS, ZONE_NAMES
-from ..settings.varying import Maps, value_at
+from ..settings.varying import value_at
 from ..step import Usage, record_usage, usage
 from .checks import refuse_impossible, stiffness_warning, zone_report
 from .output import print_line
@@ -93,7 +93,7 @@ def locked(folder: Path) -> Iterator[None]:
         yield
 
 
-def require_space(
+def _require_space(
     out: Path,
     mesh: TetrahedralMesh,
     parameters: FoldingParameters,
@@ -101,10 +101,9 @@ def require_space(
     """Raise StorageError if the disk has no room for the run's frames, which exist
     twice while they are joined."""
     # positions in double precision, fields in single
+    per_vertex = 24 + 12 * len(parameters.fields)
     per_element = 16 * len(set(ELEMENT_FIELDS) & set(parameters.fields))
-    frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(
-        mesh.tets
-    )
+    frame = per_vertex * len(mesh.vertices) + per_element * len(mesh.tets)
     points = len(IntegrationPoints.for_order(mesh.order).weights)
     values = 6 if parameters.stress_memory_gw > 0 else 0
     stretch = 8 * values * points * len(mesh.tets)
@@ -125,15 +124,12 @@ def require_space(
 def _fold(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     """Read and check the inputs, print a summary of them, and run the simulation."""
     parameters = parameters_from(read_yaml(arguments.params))
-    mesh = comm.bcast(
-        read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0
-    )
-    zones = comm.bcast(
-        zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0
-    )
-    maps: Maps = comm.bcast(
-        read_maps(arguments.maps) if comm.rank == 0 and arguments.maps else {}, root=0
-    )
+    inputs = None
+    if comm.rank == 0:
+        mesh = read_tetrahedral_mesh(arguments.mesh)
+        maps = read_maps(arguments.maps) if arguments.maps else {}
+        inputs = mesh, zones_of_run(mesh, parameters), maps
+    mesh, zones, maps = comm.bcast(inputs)
     if comm.rank == 0:
         require_maps(parameters, maps, len(mesh.vertices))
         thickness = value_at(parameters.thickness_mm, parameters.start_week, maps)
@@ -141,12 +137,9 @@ def _fold(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         memory = predicted_memory_mib(
             len(mesh.tets), comm.size, parameters.contact, mesh.order
         )
-        size = (
-            f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size}"
-            " ranks"
-        )
         print_line(
-            f"{size}, about {memory:.0f} MiB",
+            f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size}"
+            f" ranks, about {memory:.0f} MiB",
             "size",
             elements=len(mesh.tets),
             ranks=comm.size,
@@ -173,7 +166,7 @@ def _fold(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         if locking:
             log.warning(locking)
         refuse_impossible(mesh, zones)
-        require_space(arguments.out, mesh, parameters)
+        _require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / "zones.json", report)
     comm.barrier()
     run(

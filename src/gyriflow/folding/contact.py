@@ -52,7 +52,7 @@ MAX_STIFFENING = 32.0
 """Largest stiffness of the barrier, as a multiple of the initial one."""
 MAX_GAP_FRACTION = 0.999
 """Largest contact distance as a fraction of the small gap at the start of a run
-(`small_gap_mm`)."""
+(`_small_gap_mm`)."""
 FEW_VERTICES, FEW_SHARE, MAX_FEW_SHARE = 12, 0.001, 0.02
 """Number of vertices, at least those around one, that may be nearer than the rest and
 do not set the distance: this number or this share of all, and at most the last
@@ -132,7 +132,7 @@ class SelfContact:
                 axis=0,
             )
             # round-off must not make a pair of surface elements exactly at the limit
-            self._max_mm = MAX_GAP_FRACTION * small_gap_mm(gaps)
+            self._max_mm = MAX_GAP_FRACTION * _small_gap_mm(gaps)
             self.begin_step()
 
     def _lower_gaps(self, gaps: Floats, near: NearPairs) -> None:
@@ -185,7 +185,7 @@ class SelfContact:
                 self._near.gap_mm,
                 op=MPI.MIN,
             )
-            self.stiffness_pa *= stiffening(gap_mm / self.distance_mm)
+            self.stiffness_pa *= _stiffening(gap_mm / self.distance_mm)
         self._potential = ipctk.BarrierPotential(
             BARRIER,
             self.distance_mm,
@@ -193,7 +193,7 @@ class SelfContact:
             use_physical_barrier=True,
         )
 
-    def near_pairs(self, u: Floats) -> NearPairs:
+    def _near_pairs(self, u: Floats) -> NearPairs:
         """Return this rank's pairs. Those of the last displacement are cached."""
         positions = self._rest + self.surface.displacement_mm(u)
         if self._near is None or not np.array_equal(positions, self._near.positions):
@@ -206,7 +206,7 @@ class SelfContact:
         if part.max() == 0:
             return part
         no_motion = np.zeros((len(self.domain.vertex_of_node), 3))
-        near = self.near_pairs(no_motion)
+        near = self._near_pairs(no_motion)
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
         part_of_node = part[self.surface.nodes]
         part_of_vertex = part_of_node[nearest_node]
@@ -222,7 +222,7 @@ class SelfContact:
 
     def energy(self, u: Floats) -> float:
         """Return the barrier's energy in J."""
-        near = self.near_pairs(u)
+        near = self._near_pairs(u)
         energy = self._potential(
             near.pairs,
             near.mesh,
@@ -232,7 +232,7 @@ class SelfContact:
 
     def forces(self, u: Floats) -> Floats:
         """Return the (n, 3) derivative of the energy in N at the surface's nodes."""
-        near = self.near_pairs(u)
+        near = self._near_pairs(u)
         return self.surface.nodal_sum(near.part, self._forces_of(near))
 
     def _forces_of(self, near: NearPairs) -> Floats:
@@ -254,7 +254,7 @@ class SelfContact:
     def stiffness(self, u: Floats, *, convex: bool = False) -> PETSc.Mat | None:
         """Return the second derivative in N/m, None without any pair; `convex` makes
         each pair's part semidefinite."""
-        near = self.near_pairs(u)
+        near = self._near_pairs(u)
         if not self.domain.comm.allreduce(len(near.pairs)):
             return None
         own = None
@@ -278,7 +278,7 @@ class SelfContact:
         # the candidates near a longer displacement would fill the memory
         longest_mm = max(float(lengths.max()), MAX_DISPLACEMENT_MM)
         part = MAX_DISPLACEMENT_MM / longest_mm
-        near = self.near_pairs(u)
+        near = self._near_pairs(u)
         step = self._search.collision_free_step(near, part * displacement)
         return part * self.domain.comm.allreduce(step, op=MPI.MIN)
 
@@ -286,18 +286,18 @@ class SelfContact:
         """Return the smallest distance between the two sides of a pair, infinite
         without pairs."""
         return self.domain.comm.allreduce(
-            self.near_pairs(u).gap_mm,
+            self._near_pairs(u).gap_mm,
             op=MPI.MIN,
         )
 
     def pair_count(self, u: Floats) -> int:
         """Return the number of pairs within the contact distance."""
-        return self.domain.comm.allreduce(len(self.near_pairs(u).pairs))
+        return self.domain.comm.allreduce(len(self._near_pairs(u).pairs))
 
     def pressure(self, u: Floats) -> Floats:
         """Return the (n,) contact pressure in Pa at all vertices of the mesh, force per
         area, 0 off the surface."""
-        near = self.near_pairs(u)
+        near = self._near_pairs(u)
         part = near.part
         forces = np.zeros_like(self._rest)
         forces[part.vertices] = self._forces_of(near)
@@ -322,7 +322,7 @@ def _contact_distance_mm(lengths: Floats) -> float:
     return min(by_mean, by_short)
 
 
-def small_gap_mm(gaps: Floats) -> float:
+def _small_gap_mm(gaps: Floats) -> float:
     """Return the gap that limits the contact distance, from those (n,) of all vertices,
     infinite where none is near.
 
@@ -337,7 +337,7 @@ def small_gap_mm(gaps: Floats) -> float:
     return max(float(ascending[0]), FEW_BELOW * next_gap)
 
 
-def stiffening(gap: float) -> float:
+def _stiffening(gap: float) -> float:
     """Return the stiffness of a step's barrier, as a multiple of the initial one.
 
     `gap` is the smallest gap at the step's start as a fraction of the contact distance,

@@ -75,22 +75,12 @@ def bisect_points(positions: Floats, count: int) -> Ints:
             box[inside] = first
             continue
         axis = np.ptp(positions[inside], axis=0).argmax()
-        inside = inside[
-            np.argsort(
-                positions[inside, axis],
-                kind="stable",
-            )
-        ]
+        order = np.argsort(positions[inside, axis], kind="stable")
+        inside = inside[order]
         low = number // 2
         cut = len(inside) * low // number
         stack.append((inside[:cut], first, low))
-        stack.append(
-            (
-                inside[cut:],
-                first + low,
-                number - low,
-            )
-        )
+        stack.append((inside[cut:], first + low, number - low))
     return box
 
 
@@ -258,18 +248,10 @@ class Domain:
     ) -> tuple[float, int, Floats]:
         """Return the smallest of the local values over all ranks, with its index in the
         file and its position."""
-        smallest = (
-            np.inf,
-            -1,
-            np.full(3, np.nan),
-        )
+        smallest = np.inf, -1, np.full(3, np.nan)
         if len(values):
             i = int(values.argmin())
-            smallest = (
-                float(values[i]),
-                int(indices[i]),
-                positions[i],
-            )
+            smallest = float(values[i]), int(indices[i]), positions[i]
         return min(
             self.comm.allgather(smallest),
             key=lambda entry: entry[:2],

@@ -20,7 +20,7 @@ from ..errors import SolverError
 from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh, radius_ratios
 from ..geometry.triangles import Floats
 from ..io.files import write_json, write_table
-from ..io.frames import join_frames, read_positions, write_frame
+from ..io.frames import join_frames, write_frame
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 from ..units import MM_PER_M, SECONDS_PER_GW, week_tag
@@ -64,10 +64,10 @@ def run(
     folding = Folding(comm, mesh, zones, parameters, maps)
     key = run_key(mesh, parameters, maps)
     folder = out / f"checkpoint-{key}"
-    loaded = load_state(folder, key, parameters) if comm.rank == 0 else None
+    loaded = _load_state(folder, key, parameters) if comm.rank == 0 else None
     state, message = comm.bcast(loaded, root=0)
     if comm.rank == 0:
-        for note in (message, *delete_old_checkpoints(out, folder)):
+        for note in (message, *_delete_old_checkpoints(out, folder)):
             if note:
                 print_line(note)
     if state is None:
@@ -75,25 +75,14 @@ def run(
         state = _save_frame(folding, state, parameters.output_weeks[0], folder)
     resumed_after = len(state.rows)
     state, diverged = _simulate(folding, state, folder, key, may_diverge=may_diverge)
-    memory = comm.reduce(
-        _peak_memory_mib(),
-        op=MPI.SUM,
-        root=0,
-    )
-    processor = comm.reduce(
-        time.process_time(),
-        op=MPI.SUM,
-        root=0,
-    )
+    memory_mib = comm.reduce(_peak_memory_mib())
+    cpu_s = comm.reduce(time.process_time())
     if comm.rank != 0:
         return
     reached = parameters.start_week + state.time_s / SECONDS_PER_GW
     weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
-    join_frames(
-        out / FRAMES,
-        mesh.tets,
-        [_frame_path(folder, week) for week in weeks],
-    )
+    frames = [_frame_path(folder, week) for week in weeks]
+    join_frames(out / FRAMES, mesh.tets, frames)
     seconds = time.monotonic() - began
     summary = {
         "tets": len(mesh.tets),
@@ -102,10 +91,9 @@ def run(
         "ranks": comm.size,
         **_steps_summary(state.rows),
         "seconds": seconds,
-        "cpu_seconds": processor,
-        "peak_memory_MiB": memory,
+        "cpu_seconds": cpu_s,
+        "peak_memory_MiB": memory_mib,
         "weeks": weeks,
-        "radius_ratio_01": [_low_radius_ratio(mesh, out, week) for week in weeks],
         "reached_week": reached,
         "diverged": diverged,
         "resumed_after_step": resumed_after,
@@ -116,25 +104,10 @@ def run(
     shrinkage = shrinkage_note(state.rows)
     if shrinkage:
         print_line(shrinkage)
-    quality, is_bad = quality_note(mesh, state.positions * MM_PER_M, reached)
-    if is_bad:
-        log.warning(quality)
-    elif quality:
-        print_line(quality)
+    _report_flat_elements(mesh, state.positions * MM_PER_M, reached)
     if diverged is not None:
         log.warning("the run diverges and ends at GW %.3f: %s", reached, diverged)
     print_line(f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s")
-
-
-def _low_radius_ratio(
-    mesh: TetrahedralMesh,
-    out: Path,
-    week: float,
-) -> float:
-    """Return the radius ratio that 1 % of the elements are below at an output week."""
-    positions = read_positions(out / FRAMES, week)
-    ratios = radius_ratios(TetrahedralMesh(positions, mesh.tets))
-    return float(np.quantile(ratios, 0.01))
 
 
 def _simulate(
@@ -171,7 +144,7 @@ def _simulate(
                 write_checkpoint(folder / "state.h5", key, state)
                 seconds = time.monotonic() - began
                 n_steps = len(state.rows) - n_steps_before
-                report_step(state, p.end_week, seconds / n_steps)
+                _report_step(state, p.end_week, seconds / n_steps)
     return state, None
 
 
@@ -231,7 +204,7 @@ def _save_frame(
     return replace(state, growth=None, growth_s=0.0)
 
 
-def report_step(
+def _report_step(
     state: State,
     end_week: float,
     seconds_per_step: float,
@@ -269,28 +242,27 @@ def _steps_summary(rows: Sequence[dict]) -> dict[str, float]:
     }
 
 
-def quality_note(
+def _report_flat_elements(
     mesh: TetrahedralMesh,
     positions: Floats,
     week: float,
-) -> tuple[str, bool]:
-    """Return a note if elements are flatter than any may be at the start, else an empty
-    text, and if they are many."""
-    ratios_before = radius_ratios(mesh)
+) -> None:
+    """Print how many elements are flatter than any may be at the start; warn of
+    many."""
     ratios = radius_ratios(TetrahedralMesh(positions, mesh.tets))
-    allowed = min(MIN_RADIUS_RATIO, float(ratios_before.min()))
+    allowed = min(MIN_RADIUS_RATIO, radius_ratios(mesh).min())
     n_flat = int((ratios < allowed).sum())
-    if not n_flat:
-        return "", False
-    text = (
-        f"at GW {week:g} {n_flat} of {len(ratios)} elements are flatter than a mesh may"
-        f" be at the start (radius ratio {ratios.min():.3f} of {MIN_RADIUS_RATIO:g}):"
-        " results are less accurate there"
-    )
-    return text, n_flat > MAX_FLAT_SHARE * len(ratios)
+    if n_flat:
+        text = (
+            f"at GW {week:g} {n_flat} of {len(ratios)} elements are flatter than a mesh"
+            f" may be at the start (radius ratio {ratios.min():.3f} of"
+            f" {MIN_RADIUS_RATIO:g}): results are less accurate there"
+        )
+        tell = log.warning if n_flat > MAX_FLAT_SHARE * len(ratios) else print_line
+        tell(text)
 
 
-def load_state(
+def _load_state(
     folder: Path,
     key: str,
     parameters: FoldingParameters,
@@ -340,7 +312,7 @@ def _seconds_to(week: float, parameters: FoldingParameters) -> float:
     return (week - parameters.start_week) * SECONDS_PER_GW
 
 
-def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
+def _delete_old_checkpoints(out: Path, own: Path) -> list[str]:
     """Delete all but the newest two checkpoints of other meshes or parameters, and
     return messages about these two."""
     folders = [path for path in out.glob("checkpoint-*") if path != own]

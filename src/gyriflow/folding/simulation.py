@@ -107,7 +107,6 @@ class Folding:
         self.elements = Elements(
             self.domain.cells, self.domain.vertex_of_node, self.problem.points
         )
-        self._pial = np.unique(zones.cortex_facets)
         # with stress memory, or growth that is recorded by element, tissue must stay in
         # its element
         has_free_nodes = mesh.order == 2 and p.stress_memory_gw == 0 and not p.targets
@@ -223,15 +222,29 @@ class Folding:
         return grown if state.growth is None else grown @ state.growth
 
     def _elements_through_cortex(self, tissue: Tissue, growth: StepGrowth) -> float:
-        """Return the elements through the cortex at mid-step, NaN if growth has no
-        layers, so that depths are not needed."""
+        """Return the cortical thickness at mid-step over the mean edge length of the
+        elements in the cortex.
+
+        It is NaN if there are none, and if growth has no layers, so that depths are not
+        needed.
+        """
         p = self.parameters
         if not p.growth.definition.has_layers:
             return math.nan
         week = growth.start.week(p, 0.5)
         thickness_mm = value_at(p.thickness_mm, week, self.maps)
         thickness = float(np.mean(thickness_mm)) * M_PER_MM
-        return _elements_through(self.domain, tissue.layers.depth, thickness)
+        domain = self.domain
+        depth = tissue.layers.depth[domain.corners].mean(axis=1)
+        inside = domain.corners[depth <= thickness]
+        nodes = domain.local(domain.positions)
+        own_total = 0.0
+        for i, j in EDGES:
+            edges = nodes[inside[:, i]] - nodes[inside[:, j]]
+            own_total += np.linalg.norm(edges, axis=1).sum()
+        own_count = len(EDGES) * len(inside)
+        total, count = domain.comm.allreduce(np.array([own_total, own_count]))
+        return float(thickness * count / total) if count else math.nan
 
     def _solution_row(
         self, solution: Solution, displacement: Floats
@@ -244,13 +257,8 @@ class Folding:
             "krylov": solution.krylov,
             "residual": solution.residual,
             "converged": solution.converged,
-            "energy_J": self.problem.energy(u),
             "min_J": self.domain.min_over_ranks(ratios),
-            "max_J": -self.domain.min_over_ranks(-ratios),
             "max_u_mm": float(length.max()),
-            "mean_u_mm": float(length.mean()),
-            "max_u_pial_mm": float(length[self._pial].max()),
-            "mean_u_pial_mm": float(length[self._pial].mean()),
         }
 
     def _contact_row(self, u: Floats, positions: Floats) -> dict[str, float]:
@@ -306,11 +314,9 @@ def advance(
             state = replace(state, step_s=half, successes=0)
             continue
         if folding.domain.comm.rank == 0:
-            warnings = [_unconverged_warning(after.rows[-1])]
+            _warn_of_unconverged(after.rows[-1])
             if p.growth.definition.has_layers:
-                warnings.append(_resolution_warning(after.rows, folding.domain.order))
-            for warning in filter(None, warnings):
-                log.warning(warning)
+                _warn_of_coarse_cortex(after.rows, folding.domain.order)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
             after = replace(
                 after,
@@ -332,53 +338,26 @@ def _modulus_of_tissue(
     return shear_modulus(p, weight, tissue.maps, week)
 
 
-def _elements_through(
-    domain: Domain,
-    distance: Floats,
-    thickness: float,
-) -> float:
-    """Return a cortical thickness over the mean edge length of the elements in the
-    cortex; NaN if there are none.
-
-    `distance` (k,) is from the local nodes to the pial surface, in m like the
-    thickness.
-    """
-    depth = distance[domain.corners].mean(axis=1)
-    inside = domain.corners[depth <= thickness]
-    nodes = domain.local(domain.positions)
-    own_total = 0.0
-    for i, j in EDGES:
-        edges = nodes[inside[:, i]] - nodes[inside[:, j]]
-        own_total += np.linalg.norm(edges, axis=1).sum()
-    own_count = len(EDGES) * len(inside)
-    total, count = domain.comm.allreduce(np.array([own_total, own_count]))
-    if not count:
-        return math.nan
-    return float(thickness * count / total)
-
-
-def _resolution_warning(rows: Sequence[dict], order: int) -> str:
-    """Return a warning at the first step with too few elements through the cortex, else
-    an empty text."""
+def _warn_of_coarse_cortex(rows: Sequence[dict], order: int) -> None:
+    """Warn at the first step with too few elements through the cortex."""
     coarse = [is_too_coarse(order, row["elements_through_cortex"]) for row in rows[-2:]]
-    was_coarse = len(rows) > 1 and coarse[0]
-    if was_coarse or not coarse[-1]:
-        return ""
-    start = (
-        f"from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
-    )
-    return (
-        f"{start} fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the"
-        " cortex, so folds may be mesh noise: reduce mesh.surface_edge_mm to resolve"
-        " the growing cortex longer"
-    )
+    if coarse in ([True], [False, True]):
+        start = f"GW {rows[-1]['week']:.2f}" if len(rows) > 1 else "the start"
+        log.warning(
+            "from %s on fewer than %g elements lie through the cortex, so folds may be"
+            " mesh noise: reduce mesh.surface_edge_mm to resolve the growing cortex"
+            " longer",
+            start,
+            ELEMENTS_NEEDED[order],
+        )
 
 
-def _unconverged_warning(row: dict) -> str:
-    """Return a warning if a step ended above the tolerance, else an empty text."""
-    if row["converged"]:
-        return ""
-    return (
-        f"step {row['step']} ends at {row['residual']:.1e} of its initial residual,"
-        " above folding.newton_tolerance: round-off prevents further progress"
-    )
+def _warn_of_unconverged(row: dict) -> None:
+    """Warn if a step ended above the tolerance."""
+    if not row["converged"]:
+        log.warning(
+            "step %s ends at %.1e of its initial residual, above"
+            " folding.newton_tolerance: round-off prevents further progress",
+            row["step"],
+            row["residual"],
+        )

@@ -63,11 +63,11 @@ def _elastic_fields(folding: Folding, names: Collection[str]) -> dict[str, Float
     fields: dict[str, Floats] = {}
     if "stress" in names:
         stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
-        fields["von_mises_pa"] = von_mises(stress)
-        fields["pressure_pa"] = pressure(stress)
+        fields["von_mises_pa"] = _von_mises(stress)
+        fields["pressure_pa"] = _pressure(stress)
     if "strain" in names:
         elastic = problem.evaluate("elastic", u).reshape(-1, 3, 3)
-        fields["elastic_strain"] = hencky_equivalent(elastic)
+        fields["elastic_strain"] = _hencky_equivalent(elastic)
         fields["elastic_volume_strain"] = np.log(np.linalg.det(elastic))
     return fields
 
@@ -92,8 +92,8 @@ def _total_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]
             len(slopes),
             axis=0,
         )
-        fields["total_strain"] = green_lagrange_maximum(total)
-        fields["area_stretch"] = areal_stretch(total, normals)
+        fields["total_strain"] = _green_lagrange_maximum(total)
+        fields["area_stretch"] = _areal_stretch(total, normals)
     if "volume_ratio" in names:
         deformation = folding.problem.evaluate("deformation", u).reshape(-1, 3, 3)
         fields["volume_ratio_step"] = np.linalg.det(deformation)
@@ -101,13 +101,13 @@ def _total_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]
     return fields
 
 
-def pressure(stress: Floats) -> Floats:
+def _pressure(stress: Floats) -> Floats:
     """Return the (c,) pressures −tr(σ)/3, positive where tissue is pressed, in the unit
     of the stress."""
     return -np.trace(stress, axis1=1, axis2=2) / 3
 
 
-def von_mises(stress: Floats) -> Floats:
+def _von_mises(stress: Floats) -> Floats:
     """Return the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the
     stress."""
     mean = np.trace(stress, axis1=1, axis2=2) / 3
@@ -117,34 +117,34 @@ def von_mises(stress: Floats) -> Floats:
     return np.sqrt(1.5) * norm
 
 
-def principal_stretches(F: Floats) -> Floats:
+def _principal_stretches(F: Floats) -> Floats:
     """Return the (c, 3) principal stretches of (c, 3, 3) deformation gradients,
     ascending."""
     # twice as fast as singular values
     return np.sqrt(np.linalg.eigvalsh(F @ F.transpose(0, 2, 1)))
 
 
-def hencky_equivalent(F: Floats) -> Floats:
+def _hencky_equivalent(F: Floats) -> Floats:
     """Return the (c,) equivalent strains √(2/3 dev h : dev h) of the Hencky strain h =
     ln V.
 
     It is 0 where the shape is unchanged, and the logarithm of the stretch in a bar
     drawn out at constant volume.
     """
-    h = np.log(principal_stretches(F))
+    h = np.log(_principal_stretches(F))
     mean = h.mean(axis=1, keepdims=True)
     deviator = h - mean
     norm = np.linalg.norm(deviator, axis=1)
     return np.sqrt(2 / 3) * norm
 
 
-def green_lagrange_maximum(F: Floats) -> Floats:
+def _green_lagrange_maximum(F: Floats) -> Floats:
     """Return the (c,) largest principal values of the Green-Lagrange strain (FᵀF −
     I)/2."""
-    return (principal_stretches(F)[:, -1] ** 2 - 1) / 2
+    return (_principal_stretches(F)[:, -1] ** 2 - 1) / 2
 
 
-def areal_stretch(F: Floats, N: Floats) -> Floats:
+def _areal_stretch(F: Floats, N: Floats) -> Floats:
     """Return the (c,) ratios of areas, after to before, of planes with unit normals N
     (c, 3) before: det F·|F⁻ᵀ·N|."""
     turned = np.linalg.solve(

@@ -25,12 +25,7 @@ from .products import PartMotions, SymmetricProducts
 def part_arms(positions: Floats, part: Ints) -> NDArray[np.float32]:
     """Return (n, 3) positions relative to the centres of their parts (n,), divided by
     the largest component of all."""
-    x, y, z = positions.T
-    sums = [
-        np.bincount(part, x),
-        np.bincount(part, y),
-        np.bincount(part, z),
-    ]
+    sums = [np.bincount(part, coordinates) for coordinates in positions.T]
     counts = np.maximum(np.bincount(part), 1)
     centres = np.stack(sums, axis=1) / counts[:, None]
     arms = positions - centres[part]
@@ -60,20 +55,12 @@ class RigidMotions:
         self._domain = domain
         self._parts = int(part.max()) + 1
         owned = domain.vertex_of_node[: domain.n_owned]
-        arms = part_arms(domain.positions, part)
-        own_arms = arms[owned]
+        own_arms = part_arms(domain.positions, part)[owned]
         own_part = part[owned]
         self._motions = PartMotions(own_part, own_arms)
         # six columns for each part, zero elsewhere
         node = np.arange(len(owned))
-        modes = np.zeros(
-            (
-                len(owned),
-                3,
-                self._parts,
-                6,
-            )
-        )
+        modes = np.zeros((len(owned), 3, self._parts, 6))
         modes[node, :, own_part] = rigid_motions(own_arms)
         self.modes: Floats = modes.reshape(-1, 6 * self._parts)
         gram = domain.sum_over_ranks(self.modes.T @ self.modes)

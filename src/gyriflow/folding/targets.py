@@ -22,7 +22,6 @@ from ..geometry.paths import Path, path_through
 from ..geometry.tetrahedra import has_volume, volumes_between
 from ..geometry.triangles import Mask
 from ..settings.folding import AXES, FoldingParameters
-from ..settings.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
 from .stretches import deformation_gradients, inverse_growth
@@ -123,7 +122,13 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
             found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
             remedy="End the run earlier, or add brains of later weeks.",
         )
-    weeks, shapes = _shapes_of_run(p, inputs.maps, inputs.mesh.vertices)
+    weeks = [p.start_week]
+    shapes = [inputs.mesh.vertices]
+    for week, name in sorted(p.targets.items()):
+        if week > p.start_week + WEEK_TOL_GW:
+            places = [inputs.maps[f"{name}_{axis}"] for axis in AXES]
+            weeks.append(week)
+            shapes.append(np.stack(places, axis=1))
     return path_through(
         weeks,
         shapes,
@@ -131,28 +136,6 @@ def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
         p.step_s / SECONDS_PER_GW,
         p.stops,
     )
-
-
-def _shapes_of_run(
-    p: FoldingParameters,
-    maps: Maps,
-    positions_mm: Floats,
-) -> tuple[list[float], list[Floats]]:
-    """Return the ascending weeks and (n, 3) shapes in mm of a run: that at its start,
-    and the targets in its maps."""
-    weeks = [p.start_week]
-    shapes = [positions_mm]
-    for week, name in sorted(p.targets.items()):
-        if week > p.start_week + WEEK_TOL_GW:
-            x, y, z = (maps[f"{name}_{axis}"] for axis in AXES)
-            weeks.append(week)
-            shapes.append(
-                np.stack(
-                    [x, y, z],
-                    axis=1,
-                )
-            )
-    return weeks, shapes
 
 
 def growth_on_path(

@@ -43,11 +43,6 @@ class AtlasAges:
     curve: Curve
     ages: Floats
 
-    def volume(self, week: float) -> float:
-        """Return the volume of the atlas at a week, in the unit of its brains'
-        volumes."""
-        return float(value(self.curve, week))
-
     def table(self) -> pd.DataFrame:
         """Return a row per brain: stated_week, age_by_size, volume_ml and curve_ml, the
         curve at the stated week."""
@@ -152,12 +147,7 @@ class AtlasPath:
     @property
     def observed(self) -> Ints:
         """The numbers of the weeks with a brain of the atlas."""
-        return np.flatnonzero(
-            ~np.isin(
-                self.shapes.weeks,
-                self.shapes.stops,
-            )
-        )
+        return np.flatnonzero(~np.isin(self.shapes.weeks, self.shapes.stops))
 
     def ages(self, others: Sequence[Mapping[float, float]] = ()) -> AtlasAges:
         """Return the ages by size of the atlas' brains in all its weeks; `others` as
@@ -265,19 +255,14 @@ def resample_by_size(
     """
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
     # the mesh is not quite the atlas' brain
-    atlas_volumes = np.array([ages.volume(age) for age in knots])
     own_volumes = sizes_of(mesh, shapes)["volume_ml"]
-    ratio = np.exp(np.mean(np.log(own_volumes / atlas_volumes)))
+    ratio = np.exp(np.mean(np.log(own_volumes / value(ages.curve, knots))))
     resampled = []
-    for week in weeks:
-        age = np.clip(
-            week,
-            knots[0],
-            knots[-1],
-        )
+    for week, wanted in zip(weeks, value(ages.curve, weeks), strict=True):
+        age = np.clip(week, knots[0], knots[-1])
         shape = positions_at(age, shapes, knots, sizes)
         volume = sizes_of(mesh, [shape])["volume_ml"][0]
-        scale = (ratio * ages.volume(week) / volume) ** (1 / 3)
+        scale = (ratio * wanted / volume) ** (1 / 3)
         centre = np.average(shape, axis=0, weights=sizes)
         resampled.append(centre + scale * (shape - centre))
     return np.stack(resampled)
@@ -295,19 +280,9 @@ def positions_at(
     The later week is first aligned rigidly to the earlier one, with points weighted by
     their (n,) sizes.
     """
-    later = np.searchsorted(
-        np.asarray(weeks),
-        week,
-        side="right",
-    )
+    later = np.searchsorted(weeks, week, side="right")
     # beyond the ends along the line of the first or last two weeks
-    second = int(
-        np.clip(
-            later,
-            1,
-            len(weeks) - 1,
-        )
-    )
+    second = min(max(int(later), 1), len(weeks) - 1)
     first = second - 1
     part = (week - weeks[first]) / (weeks[second] - weeks[first])
     aligned = align_points(atlas[second], atlas[first], sizes)

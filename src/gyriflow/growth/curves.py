@@ -133,13 +133,9 @@ def fitted(
     a week. InputError for other values, and if the sizes decrease.
     """
     weeks_, values_ = _checked(weeks, values, name)
-    order = np.argsort(
-        np.asarray(weeks, dtype=float),
-        kind="stable",
-    )
-    source = (
-        np.zeros(len(weeks_), int) if sources is None else np.asarray(sources)[order]
-    )
+    source = np.zeros(len(weeks_), int)
+    if sources is not None:
+        source = np.asarray(sources)[np.argsort(weeks, kind="stable")]
     n_levels = int(source.max())
     count = len(np.unique(weeks_))
     degrees = min(degrees_of_freedom, max(count - 1.0, 2.0))
@@ -172,10 +168,7 @@ def fitted(
     count = round((weeks_[-1] - weeks_[0]) / SPACING_WEEKS) + 1
     at = np.linspace(*ends, max(2, count))
     rows = splines.design(at, *ends, KNOT_INTERVALS)
-    rows = np.pad(
-        rows,
-        ((0, 0), (0, n_levels)),
-    )
+    rows = np.pad(rows, ((0, 0), (0, n_levels)))
     # rates at their bound of 0 are not free
     free = np.ones(len(coefficients), dtype=bool)
     free[rates] = coefficients[rates] > 1e-8
@@ -289,14 +282,7 @@ def _robust_weights(
         scatter = 1.4826 * float(np.median(np.abs(residuals[is_first])))
         scatter *= np.sqrt(count / (count - degrees))
         scale = TUKEY * max(scatter, MIN_SCATTER)
-        weights = (
-            np.clip(
-                1 - (residuals / scale) ** 2,
-                0,
-                None,
-            )
-            ** 2
-        )
+        weights = np.maximum(1 - (residuals / scale) ** 2, 0) ** 2
         coefficients = _solve(design, logs, weights, strength * penalty, n_levels)
         residuals = logs - design @ coefficients
     return weights
@@ -355,11 +341,11 @@ def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:
     """
     fits: dict[str, dict[str, CurveFit]] = {}
     for name, brains in areas.groupby("series", sort=False):
+        weeks = brains["week"].tolist()
         of_series: dict[str, CurveFit] = {}
         for quantity in SIZES:
-            of_series[quantity] = fitted(
-                brains["week"].tolist(), brains[quantity].tolist(), name=quantity
-            )
+            sizes = brains[quantity].tolist()
+            of_series[quantity] = fitted(weeks, sizes, name=quantity)
         fits[str(name)] = of_series
     return fits
 
@@ -379,11 +365,7 @@ def followed_sizes(
     columns series, quantity, week and value, are needed for `measured`; InputError if
     the start brain's `series` is not in them. `weeks` are the output weeks of the run.
     """
-    at = np.arange(
-        weeks[0],
-        weeks[-1] + 1e-9 + SPACING_GW,
-        SPACING_GW,
-    )
+    at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
     for quantity in SIZES:
         source = growth.get(quantity)
@@ -398,11 +380,7 @@ def followed_sizes(
                 name=quantity,
                 may_shrink=shrink,
             )
-        by_week = zip(
-            at.tolist(),
-            value(curve, at).tolist(),
-            strict=True,
-        )
+        by_week = zip(at.tolist(), value(curve, at).tolist(), strict=True)
         tables[quantity] = {round(week, 6): size for week, size in by_week}
     return tables
 

@@ -295,9 +295,10 @@ def predict_shapes(
         shapes += with_stops(shapes[-1], week, body)
         reached = shapes[-1].positions[used]
         reached = align_points(reached, shape[used], sizes[used])
-        misfits_mm[week] = rms_length(reached - shape[used])
-        log.info("GW %g: %.2f mm from the expected shape", week, misfits_mm[week])
-    misfits_mm = {week: mm for week, mm in misfits_mm.items() if week <= end_week}
+        misfit_mm = rms_length(reached - shape[used])
+        log.info("GW %g: %.2f mm from the expected shape", week, misfit_mm)
+        if week <= end_week:
+            misfits_mm[week] = misfit_mm
     if misfits_mm:
         worst = max(misfits_mm, key=misfits_mm.__getitem__)
         warn_of_distance(f"at most, at GW {worst:g}, the brain", misfits_mm[worst])
@@ -309,13 +310,7 @@ def predict_shapes(
         stops=found.stops,
     )
     between = sorted({*further_weeks} - {*found.weeks})
-    by_week = dict(
-        zip(
-            found.weeks,
-            found.positions,
-            strict=True,
-        )
-    )
+    by_week = dict(zip(found.weeks, found.positions, strict=True))
     for week in between:
         by_week[week] = way(week)
     weeks = sorted(by_week)
@@ -328,19 +323,11 @@ def predict_shapes(
         smoothing_mm=0,
         keep_all=True,
     ).positions
-    atlas = [
-        positions_at(
-            week,
-            carried,
-            path.shapes.weeks,
-            sizes,
-        )
-        for week in weeks
-    ]
-    baselines = {
-        "atlas": [places[used] for places in atlas],
-        "atlas_deformed": [places[used] for places in deformed],
-    }
+    baselines: dict[str, list[Floats]] = {"atlas": [], "atlas_deformed": []}
+    for week, places in zip(weeks, deformed, strict=True):
+        atlas = positions_at(week, carried, path.shapes.weeks, sizes)
+        baselines["atlas"].append(atlas[used])
+        baselines["atlas_deformed"].append(places[used])
     positions = np.stack([by_week[week] for week in weeks])
     placed = {}
     for number in path.observed:

@@ -49,10 +49,8 @@ def nearest_in_age(
     `ages` is the table of `AtlasAges`.
     """
     by_week = ages.set_index("stated_week")["age_by_size"]
-    of_brains = by_week.loc[list(weeks)].to_numpy()
-    distances = np.abs(of_brains - week)
-    nearest = np.argmin(distances)
-    return int(nearest)
+    distances = (by_week.loc[list(weeks)] - week).abs()
+    return int(distances.argmin())
 
 
 def finer_share(
@@ -64,8 +62,7 @@ def finer_share(
     between those of `Expectation.kept`, 1 at the start."""
     weeks = [start_week, *kept["week"]]
     shares = [1.0, *kept["finer_share"]]
-    share = np.interp(week, weeks, shares)
-    return float(share)
+    return float(np.interp(week, weeks, shares))
 
 
 def moved_surface(observed: ObservedSurface, boundary: TriangleMesh) -> TriangleMesh:

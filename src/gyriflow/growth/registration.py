@@ -139,12 +139,7 @@ def channels(
     low = centres.min(axis=0) - MARGIN_MM
     high = centres.max(axis=0) + MARGIN_MM
     # start at a voxel's centre, so that a suitable grid is not resampled
-    index = np.rint(
-        transform_points(
-            low,
-            np.linalg.inv(affine),
-        )
-    )
+    index = np.rint(transform_points(low, np.linalg.inv(affine)))
     low = transform_points(index, affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
@@ -233,11 +228,7 @@ def _intensity(
 ) -> NDArray[np.float32]:
     values, affine = image
     values = np.asarray(values, dtype=np.float32)
-    finite = np.where(
-        np.isfinite(values),
-        values,
-        np.float32(0),
-    )
+    finite = np.nan_to_num(values, posinf=0, neginf=0)
     intensity = _resample(finite, affine, grid, shape)
     bright = float(np.quantile(intensity[inside], BRIGHT))
     covered = float((intensity[inside] != 0).mean())
@@ -301,8 +292,8 @@ def register(
     for the affine map, normalised cross-correlation for the deformation. It starts with
     centroids and volumes of the cerebra matched, rotated if this fits clearly better
     (`START_ROTATIONS`, `REFINED_DEG`). The result is deterministic. InputError if
-    greedy fails; `measure_quality` measures how good the result is. `smoothing` is a
-    factor of `SMOOTHING_VOXELS`.
+    greedy fails; `register_and_measure` also measures how good the result is.
+    `smoothing` is a factor of `SMOOTHING_VOXELS`.
     """
     began = time.perf_counter()
     pairs_of_volumes = _common_channels(earlier, later)
@@ -385,11 +376,9 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
     image = SimpleITK.GetImageFromArray(reversed_values)
     linear = affine[:3, :3]
     spacing = np.linalg.norm(linear, axis=0)
-    direction = linear / spacing
-    origin = affine[:3, 3]
     image.SetSpacing(spacing.tolist())
-    image.SetDirection(direction.ravel().tolist())
-    image.SetOrigin(origin.tolist())
+    image.SetDirection((linear / spacing).ravel().tolist())
+    image.SetOrigin(affine[:3, 3].tolist())
     return image
 
 
@@ -422,12 +411,7 @@ def _find_start(
 
     turn = min(START_ROTATIONS, key=difference)
     for step in REFINED_DEG:
-        angles = list(
-            product(
-                (0, -step, step),
-                repeat=3,
-            )
-        )
+        angles = list(product((0, -step, step), repeat=3))
         nearby = Rotation.from_euler("xyz", angles, degrees=True)
         turn = min(nearby.as_matrix() @ turn, key=difference)
     if difference(turn) >= MAX_ROTATED_SHARE * difference(np.eye(3)):
@@ -448,7 +432,7 @@ def _cerebrum_mm(brain: Channels) -> Floats:
     return transform_points(index, brain.affine)
 
 
-def measure_quality(
+def _measure_quality(
     earlier: Channels,
     later: Channels,
     deformation: Deformation,
@@ -520,7 +504,7 @@ def register_and_measure(
     registered without cortex, with a warning.
     """
     found = register(earlier, later, smoothing=smoothing, threads=threads)
-    quality = measure_quality(earlier, later, found.deformation)
+    quality = _measure_quality(earlier, later, found.deformation)
     if not (is_filled and quality["dice_cortex"] < MIN_DICE["cortex"]):
         return found, quality
     log.warning(
@@ -583,12 +567,6 @@ def _dice(
 ) -> float:
     first = (earlier.tissue & bit > 0).ravel()
     mask = later.tissue & bit > 0
-    carried = map_coordinates(
-        mask.astype(np.float32),
-        places,
-        order=1,
-    )
-    second = carried > 0.5
-    both = first & second
+    second = map_coordinates(mask.astype(np.float32), places, order=1) > 0.5
     total = first.sum() + second.sum()
-    return float(2 * both.sum() / max(total, 1))
+    return float(2 * (first & second).sum() / max(total, 1))

@@ -29,7 +29,7 @@ class Material(ABC):
 
     @staticmethod
     @abstractmethod
-    def energy_of_invariants(
+    def _energy_of_invariants(
         I1: Expr,
         J: Expr,
         mu: Expr,
@@ -46,7 +46,7 @@ class Material(ABC):
         K: Expr,
     ) -> Expr:
         """Return ψ in Pa of the elastic deformation Fe."""
-        return cls.energy_of_invariants(
+        return cls._energy_of_invariants(
             ufl.inner(Fe, Fe),
             ufl.det(Fe),
             mu,
@@ -78,7 +78,7 @@ class NeoHookean(Material):
     name = "neo-hookean"
 
     @staticmethod
-    def energy_of_invariants(
+    def _energy_of_invariants(
         I1: Expr,
         J: Expr,
         mu: Expr,
@@ -98,7 +98,7 @@ class CompressibleNeoHookean(Material):
     name = "compressible-neo-hookean"
 
     @staticmethod
-    def energy_of_invariants(
+    def _energy_of_invariants(
         I1: Expr,
         J: Expr,
         mu: Expr,
@@ -123,7 +123,7 @@ def energy_code(material: Material) -> str:
     # the values are not used: the variables stand for names in C
     variables = {name: ufl.variable(ufl.as_ufl(1.0)) for name in ("I1", "J", "mu", "K")}
     I1, J = variables["I1"], variables["J"]
-    psi = material.energy_of_invariants(**variables)
+    psi = material._energy_of_invariants(**variables)
     slopes = ufl.diff(psi, I1), ufl.diff(psi, J)
     functions = dict(
         zip(

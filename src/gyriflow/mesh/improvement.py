@@ -44,13 +44,7 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     on_surface[outer] = True
     for element in flat.tolist():
         for _ in range(ROUNDS):
-            if (
-                signed_ratios(
-                    vertices,
-                    mesh.tets[[element]],
-                )[0]
-                >= WANTED_RATIO
-            ):
+            if signed_ratios(vertices[mesh.tets[[element]]])[0] >= WANTED_RATIO:
                 break
             best: Move | None = None
             for vertex in mesh.tets[element].tolist():
@@ -93,13 +87,10 @@ def _best_move(
     others = vertices[corners[corners != vertex]]
     edges = start - others
     longest = float(np.linalg.norm(edges, axis=1).max())
-    normal = np.cross(
-        others[1] - others[0],
-        others[2] - others[0],
-    )
+    normal = np.cross(others[1] - others[0], others[2] - others[0])
     across = start - others.mean(axis=0)
     largest_step = MAX_SURFACE_STEP if on_surface[vertex] else np.inf
-    least = _signed_ratios_of(vertices[star]).min()
+    least = signed_ratios(vertices[star]).min()
     best = None
     for direction in (normal, across, *edges):
         length = np.linalg.norm(direction)
@@ -111,19 +102,15 @@ def _best_move(
                 place = start + sign * size * longest / length * direction
                 trial = vertices[star]
                 trial[star == vertex] = place
-                gain = float(_signed_ratios_of(trial).min() - least)
+                gain = float(signed_ratios(trial).min() - least)
                 if gain > (best.gain if best else 0.0):
                     best = Move(gain, vertex, place)
     return best
 
 
-def signed_ratios(vertices: Floats, tets: Ints) -> Floats:
-    """Return the (m,) radius ratios of linear elements, negative for inverted ones."""
-    return _signed_ratios_of(vertices[tets])
-
-
-def _signed_ratios_of(corners: Floats) -> Floats:
-    """Return the same from the corners (m, 4, 3)."""
+def signed_ratios(corners: Floats) -> Floats:
+    """Return the (m,) radius ratios of linear elements with (m, 4, 3) corners, negative
+    for inverted ones."""
     edges = corners[:, 1:] - corners[:, :1]
     signs = np.sign(np.linalg.det(edges))
     vertices = corners.reshape(-1, 3)

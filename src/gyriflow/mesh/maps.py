@@ -2,6 +2,7 @@
 and from volumes."""
 
 import logging
+import operator
 from collections.abc import Mapping
 
 import numpy as np
@@ -29,6 +30,7 @@ QUANTILE = 0.95
 """A map's surface may be this far from the mesh's: all surfaces of one brain are
 nearer, but where they are cut."""
 NEIGHBOURS = 8
+SIGNS = {"gt": ">", "ge": "≥", "le": "≤"}
 TIE = 1e-9
 """Relative difference below which two distances count as equal."""
 
@@ -60,15 +62,13 @@ def vertex_map_on_mesh(
         far,
     )
     if far > FARTHEST_MM:
-        problem = "the surface of a map lies far from that of the start brain's mesh"
-        found = (
-            f"{far:.1f} mm for a twentieth of the mesh's surface,"
-            f" {np.median(distance):.1f} mm for half of it"
-        )
         raise InputError(
-            problem,
+            "the surface of a map lies far from that of the start brain's mesh",
             path=path,
-            found=found,
+            found=(
+                f"{far:.1f} mm for a twentieth of the mesh's surface,"
+                f" {np.median(distance):.1f} mm for half of it"
+            ),
             expected=f"at most {FARTHEST_MM:g} mm",
         )
     weights = barycentric(nearest, corners(surface)[faces])
@@ -97,42 +97,32 @@ def volume_map_on_mesh(
         (mesh_vertices_mm - matrix[:3, 3]).T,
     ).T
     # rounding must not push a vertex on the rim outside
-    covered = np.clip(
-        index,
-        -0.5 - 1e-6,
-        np.array(data.shape) - 0.5 + 1e-6,
-    )
-    outside = np.linalg.norm(
-        (index - covered) @ matrix[:3, :3].T,
-        axis=1,
-    )
+    last = np.array(data.shape) - 0.5 + 1e-6
+    beyond = index - np.clip(index, -0.5 - 1e-6, last)
+    outside = np.linalg.norm(beyond @ matrix[:3, :3].T, axis=1)
     expected = f"values at all {len(index)} vertices of the start brain's mesh"
-    if (outside > 0).any():
-        found = (
-            f"{int((outside > 0).sum())} vertices outside it, by up to"
-            f" {outside.max():.1f} mm"
-        )
+    if outside.any():
         raise InputError(
             "a map's volume does not cover the start brain",
             path=path,
-            found=found,
+            found=(
+                f"{np.count_nonzero(outside)} vertices outside it, by up to"
+                f" {outside.max():.1f} mm"
+            ),
             expected=expected,
         )
     values = map_coordinates(data, index.T, order=1, mode="nearest")
     undefined = ~np.isfinite(values)
     if undefined.any():
-        problem = "a map has no number in parts of the start brain"
-        found = f"{int(undefined.sum())} vertices at voxels that are NaN or infinite"
-        remedy = (
-            "Fill these voxels, and a voxel or two around the brain, for example with"
-            " the nearest values."
-        )
         raise InputError(
-            problem,
+            "a map has no number in parts of the start brain",
             path=path,
-            found=found,
+            found=f"{undefined.sum()} vertices at voxels that are NaN or infinite",
             expected=expected,
-            remedy=remedy,
+            remedy=(
+                "Fill these voxels, and a voxel or two around the brain, for example"
+                " with the nearest values."
+            ),
         )
     return values
 
@@ -144,29 +134,21 @@ def require_within(
 ) -> None:
     """Raise InputError where (n,) values of a map are not within the bounds (gt, ge,
     le) of its parameter."""
-    holds = {
-        "gt": np.greater,
-        "ge": np.greater_equal,
-        "le": np.less_equal,
-    }
-    signs = {"gt": ">", "ge": "≥", "le": "≤"}
-    outside = ~np.logical_and.reduce(
-        [holds[name](values, bound) for name, bound in bounds.items()]
-    )
-    if outside.any():
-        wrong = values[outside]
-        found = (
-            f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to"
-            f" {wrong.max():g}"
-        )
-        expected = " and ".join(
-            f"{signs[name]} {bound:g}" for name, bound in bounds.items()
-        )
+    is_within = np.ones(len(values), dtype=bool)
+    limits = []
+    for name, bound in bounds.items():
+        is_within &= getattr(operator, name)(values, bound)
+        limits.append(f"{SIGNS[name]} {bound:g}")
+    wrong = values[~is_within]
+    if len(wrong):
         raise InputError(
             "holds values that the parameter cannot have",
             path=path,
-            found=found,
-            expected=expected,
+            found=(
+                f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to"
+                f" {wrong.max():g}"
+            ),
+            expected=" and ".join(limits),
         )
 
 

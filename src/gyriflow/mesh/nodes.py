@@ -19,6 +19,7 @@ from ..geometry.triangles import (
     Floats,
     Mask,
     TriangleMesh,
+    dots,
     edge_lengths,
     edges,
     face_normals,
@@ -52,14 +53,9 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
     middles = way & (np.arange(len(way)) >= len(mesh.vertices))
     result, left = _move(straight, target, middles, _are_unsound)
     log.info(
-        "quadratic elements: %d of %d nodes on middles of outer edges on the surface,"
-        " least ratio of Jacobians %.2f",
-        int(left.sum()),
-        int(
-            (
-                np.unique(tetrahedra.boundary_faces(straight)[0]) >= len(mesh.vertices)
-            ).sum()
-        ),
+        "quadratic elements: %d nodes on middles of outer edges on the surface, least"
+        " ratio of Jacobians %.2f",
+        left.sum(),
         jacobian_ratios(result).min(),
     )
     return result
@@ -94,8 +90,7 @@ def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask
     # the wall of a sulcus may be nearer to a node than the place it comes from
     normals = vertex_normals(boundary)
     normals_there = face_normals(surface)[face]
-    cosines = np.einsum("ij,ij->i", normals, normals_there)
-    agrees = cosines >= MIN_NORMAL_COSINE
+    agrees = dots(normals, normals_there) >= MIN_NORMAL_COSINE
     is_near = agrees & (distance <= FARTHEST * shortest)
     moved = outer[is_near]
     target = mesh.vertices.copy()

@@ -72,14 +72,8 @@ def _gap_walls(mesh: TriangleMesh) -> GapWalls:
     start = triangles.corners(mesh).mean(axis=1) + OFF_MM * normals
     face, distance = _first_hits(mesh, start, normals)
     facing = face >= 0
-    facing[facing] = (
-        np.einsum(
-            "ij,ij->i",
-            normals[facing],
-            normals[face[facing]],
-        )
-        < PARALLEL
-    )
+    cosines = dots(normals[facing], normals[face[facing]])
+    facing[facing] = cosines < PARALLEL
     half = 0.5 * distance[facing, None] * normals[facing]
     return GapWalls(
         start[facing] + half,
@@ -95,19 +89,14 @@ def _gap_summary(walls: GapWalls) -> dict[str, float | None]:
 
     The minimum is not given, since the width is 0 at the bottom of every gap.
     """
-    widths: list[float | None] = [None, None]
+    narrow = median = None
     if len(walls.width):
-        widths = [
-            *map(
-                float,
-                np.quantile(
-                    walls.width, [0.01, 0.5], weights=walls.area, method="inverted_cdf"
-                ),
-            )
-        ]
+        narrow, median = np.quantile(
+            walls.width, [0.01, 0.5], weights=walls.area, method="inverted_cdf"
+        ).tolist()
     return {
-        "percentile1": widths[0],
-        "median": widths[1],
+        "percentile1": narrow,
+        "median": median,
         "area_mm2": float(walls.area.sum()),
     }
 
@@ -143,19 +132,15 @@ def _first_hits(
         np.asfortranarray(mesh.faces, dtype=np.int32),
         True,
     )
-    hits = [
-        rays.intersectRay_first(origin, towards, 0.0, GAP_MM)
-        for origin, towards in zip(
-            start.astype(np.float32), direction.astype(np.float32), strict=True
+    faces = np.empty(len(start), dtype=np.int64)
+    distances = np.empty(len(start))
+    for i, (origin, towards) in enumerate(
+        zip(start.astype(np.float32), direction.astype(np.float32), strict=True)
+    ):
+        faces[i], distances[i], *_ = rays.intersectRay_first(
+            origin, towards, 0.0, GAP_MM
         )
-    ]
-    return np.array(
-        [hit[0] for hit in hits],
-        dtype=np.int64,
-    ), np.array(
-        [hit[1] for hit in hits],
-        dtype=np.float64,
-    )
+    return faces, distances
 
 
 def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats]:
@@ -180,9 +165,8 @@ def jacobian_ratios(mesh: TetrahedralMesh) -> Floats:
     positive if folded."""
     if mesh.order == 1:
         return np.ones(len(mesh.tets))
-    return lower_bounds(mesh.vertices, mesh.tets) / (
-        6 * tetrahedra.signed_volumes(mesh)
-    )
+    mean = 6 * tetrahedra.signed_volumes(mesh)
+    return lower_bounds(mesh.vertices, mesh.tets) / mean
 
 
 def _dihedral_angles(mesh: TetrahedralMesh) -> Floats:
@@ -223,7 +207,6 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "pial_faces": len(boundary.faces),
         "pial_edge_mm": triangles.mean_edge_length(boundary),
         "pial_area_mm2": triangles.area(boundary),
-        "smallest_pial_face_mm2": float(triangles.face_areas(boundary).min()),
         "crossing_faces": len(faces_that_cross(boundary)),
         "surface_distance_mm": _fidelity(boundary, surface),
         "gap_mm": {
@@ -234,7 +217,6 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
         "volume_mm3": float(volumes.sum()),
         "volume_change": float(volumes.sum() / triangles.signed_volume(surface) - 1),
         "min_radius_ratio": float(ratios.min()),
-        "mean_radius_ratio": float(ratios.mean()),
         "median_radius_ratio": float(np.median(ratios)),
         "min_dihedral_deg": float(angles.min()),
         "max_dihedral_deg": float(angles.max()),

@@ -81,7 +81,7 @@ def _best_place(
     best, best_ratio = start, -np.inf
     for part in PARTS:
         places[is_own] = start + part * way
-        ratio = signed_ratios(places, elements).min()
+        ratio = signed_ratios(places[elements]).min()
         if ratio > best_ratio:
             best, best_ratio = start + part * way, ratio
     return best

@@ -48,7 +48,7 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 """Volume of the regular tetrahedron, in edges cubed."""
 
 
-def edge_length_at(
+def _edge_length_at(
     depth: Floats,
     surface_edge_mm: float,
     core_edge_mm: float,
@@ -85,7 +85,7 @@ def _background_mesh(
     winding = igl.fast_winding_number(surface.vertices, surface.faces, places)
     is_needed = (winding > 0.5) | (depth < spacing)
     needed = background.tets[is_needed[background.tets].any(axis=1)]
-    lengths = edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
+    lengths = _edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
     return TetrahedralMesh(places, needed), lengths
 
 

@@ -21,7 +21,7 @@ from gyriflow.folding.checkpoint import (
     run_key,
     write_checkpoint,
 )
-from gyriflow.folding.run import delete_old_checkpoints, load_state
+from gyriflow.folding.run import _delete_old_checkpoints, _load_state
 from gyriflow.settings.folding import parameters_from
 from gyriflow.units import SECONDS_PER_GW, week_tag
 
@@ -137,23 +137,23 @@ def test_a_run_is_resumed_with_the_frames_it_has_and_the_steps_before_its_end(tm
     write_checkpoint(tmp_path / "state.h5", "key", state)
     run = parameters_from(values)
     for week in weeks[:2]:
-        assert load_state(tmp_path, "key", run)[0] is None
+        assert _load_state(tmp_path, "key", run)[0] is None
         (tmp_path / f"frame-{week_tag(week)}.h5").touch()
-    resumed, message = load_state(tmp_path, "key", run)
+    resumed, message = _load_state(tmp_path, "key", run)
     assert message == Facts(3)
     assert [row["week"] for row in resumed.rows] == [21.5, 22.0, 22.5]
     # an earlier end leaves out later steps
     earlier = parameters_from(values | {"end_week": 22.0, "output_weeks": weeks[:2]})
-    resumed, _ = load_state(tmp_path, "key", earlier)
+    resumed, _ = _load_state(tmp_path, "key", earlier)
     assert [row["week"] for row in resumed.rows] == [21.5, 22.0]
     # growth towards shapes is recorded since the last output week
     sizes = {"area_cm2": {21: 90, 23: 99}, "volume_ml": {21: 40, 23: 46}}
     towards = {"growth": {"model": "shapes", **sizes}, "targets": {23.0: "target"}}
-    assert load_state(tmp_path, "key", parameters_from(values | towards))[0]
+    assert _load_state(tmp_path, "key", parameters_from(values | towards))[0]
     others = {"output_weeks": [21.0, 22.25, 23.0]}
     (tmp_path / f"frame-{week_tag(22.25)}.h5").touch()
     other = parameters_from(values | towards | others)
-    found, message = load_state(tmp_path, "key", other)
+    found, message = _load_state(tmp_path, "key", other)
     assert found is None
     assert message == Facts(tmp_path, "output weeks")
 
@@ -164,6 +164,6 @@ def test_of_checkpoints_of_other_runs_the_last_two_are_kept(tmp_path):
         folder.mkdir()
         os.utime(folder, (1e9 - age, 1e9 - age))
     last, second, own, oldest = folders
-    assert delete_old_checkpoints(tmp_path, own) == [Facts(last), Facts(second)]
+    assert _delete_old_checkpoints(tmp_path, own) == [Facts(last), Facts(second)]
     assert not oldest.exists()
     assert own.exists()

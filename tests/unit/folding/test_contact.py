@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from shapes import box, rigid
 
-from gyriflow.folding.contact import small_gap_mm
+from gyriflow.folding.contact import _small_gap_mm
 from gyriflow.folding.contact_search import ContactSearch
 from gyriflow.geometry.triangles import merged, transformed
 
@@ -113,4 +113,4 @@ UNEVEN = np.linspace(0.5, 0.9, 300)
     ],
 )
 def test_few_vertices_do_not_set_the_contact_distance(gaps_mm, limit_mm):
-    assert small_gap_mm(gaps_mm) == pytest.approx(limit_mm)
+    assert _small_gap_mm(gaps_mm) == pytest.approx(limit_mm)

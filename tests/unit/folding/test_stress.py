@@ -15,12 +15,12 @@ from shapes import box_mesh
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.step_fields import (
-    areal_stretch,
-    green_lagrange_maximum,
-    hencky_equivalent,
-    pressure,
-    principal_stretches,
-    von_mises,
+    _areal_stretch,
+    _green_lagrange_maximum,
+    _hencky_equivalent,
+    _pressure,
+    _principal_stretches,
+    _von_mises,
 )
 from gyriflow.folding.stretches import deformation_gradients
 from gyriflow.folding.zones import Zones
@@ -125,13 +125,13 @@ def test_a_free_body_that_grows_as_it_likes_has_no_stress(law, dr):
     growth = {"law": law, "dg": 0.2, "dr": dr, "normal": normal}
     Fe, stress = outcomes(F, "elastic", **growth), outcomes(F, "stress", **growth)
     for found in (
-        von_mises(stress),
-        pressure(stress),
-        hencky_equivalent(Fe),
+        _von_mises(stress),
+        _pressure(stress),
+        _hencky_equivalent(Fe),
         np.log(np.linalg.det(Fe)),
     ):
         assert found == pytest.approx(0, abs=1e-12 * K)
-    assert areal_stretch(F[None], normal[None]) == pytest.approx(1.44)
+    assert _areal_stretch(F[None], normal[None]) == pytest.approx(1.44)
 
 
 @pytest.mark.parametrize("law", MATERIALS.values())
@@ -156,24 +156,24 @@ def test_simple_shear():
     (stress,) = stress_of(F)
     assert [stress[0, 1], stress[1, 0]] == pytest.approx([MU * gamma] * 2)
     assert stress[0, 0] - stress[1, 1] == pytest.approx(MU * gamma**2)
-    assert pressure(stress[None]) == pytest.approx(0, abs=1e-12 * K)
-    assert von_mises(stress[None]) == pytest.approx(MU * gamma * np.sqrt(gamma**2 + 3))
+    assert _pressure(stress[None]) == pytest.approx(0, abs=1e-12 * K)
+    assert _von_mises(stress[None]) == pytest.approx(MU * gamma * np.sqrt(gamma**2 + 3))
     # the plane of the shear keeps its area, one across it does not
     np.testing.assert_allclose(
-        areal_stretch(np.array([F, F]), np.eye(3)[[1, 0]]), [1, np.sqrt(1 + gamma**2)]
+        _areal_stretch(np.array([F, F]), np.eye(3)[[1, 0]]), [1, np.sqrt(1 + gamma**2)]
     )
 
 
 def test_strain_of_known_stretches():
     bar = np.diag([2.0**-0.5, 2.0**-0.5, 2.0])[None]
-    assert hencky_equivalent(bar) == pytest.approx(np.log(2))
+    assert _hencky_equivalent(bar) == pytest.approx(np.log(2))
     # a change of volume alone is no change of shape
-    assert hencky_equivalent(1.7 * bar) == pytest.approx(np.log(2))
-    assert green_lagrange_maximum(bar) == pytest.approx(1.5)
+    assert _hencky_equivalent(1.7 * bar) == pytest.approx(np.log(2))
+    assert _green_lagrange_maximum(bar) == pytest.approx(1.5)
     F = np.array([turn(0.3, 1, 1, 0) @ np.diag([1.1, 1.3, 0.8]) @ turn(0.9, 0, 1, 2)])
-    np.testing.assert_allclose(principal_stretches(F), [[0.8, 1.1, 1.3]])
+    np.testing.assert_allclose(_principal_stretches(F), [[0.8, 1.1, 1.3]])
     E = (F[0].T @ F[0] - np.eye(3)) / 2
-    assert green_lagrange_maximum(F) == pytest.approx(np.linalg.eigvalsh(E)[-1])
+    assert _green_lagrange_maximum(F) == pytest.approx(np.linalg.eigvalsh(E)[-1])
 
 
 def test_every_material_that_the_configuration_names_is_a_law_and_the_reverse():

@@ -140,7 +140,7 @@ def test_numbers_of_an_atlas_path(recorded, path):
     recorded(
         {
             "ages": ages.table(),
-            "volume": [ages.volume(week) for week in (20.0, 23.7, 29.0)],
+            "volume": curves.value(ages.curve, [20.0, 23.7, 29.0]),
             "own": own.table(),
             "knots": knots,
             "observed": path.observed,
@@ -227,7 +227,7 @@ def test_numbers_of_a_registration(recorded):
     ticks = [np.linspace(0.0, 2.0, 4)] * 3
     u = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1) ** 2
     matrix, grid = other @ np.linalg.inv(affine), affine @ scaling(10.0)
-    quality = registration.measure_quality(first, second, Deformation(matrix, u, grid))
+    quality = registration._measure_quality(first, second, Deformation(matrix, u, grid))
     recorded(
         {
             "first": first,

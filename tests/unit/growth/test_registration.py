@@ -12,8 +12,8 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import Deformation, carry, transform_points
 from gyriflow.growth.registration import (
     Channels,
+    _measure_quality,
     channels,
-    measure_quality,
     perturb_labels,
     register,
     require_good,
@@ -115,20 +115,20 @@ def test_a_brain_in_another_pose_is_turned_first():
 def test_a_failed_registration_is_refused_with_numbers(later):
     shape = (*EARLIER.tissue.shape, 3)
     none = Deformation(np.eye(4), np.zeros(shape), EARLIER.affine)
-    quality = measure_quality(EARLIER, later, none)
+    quality = _measure_quality(EARLIER, later, none)
     facts = Facts("21-22", 0.95, 0.6)
     with pytest.raises(InputError, match=r"0\.7\d+ .*0\.2\d+ ", check=facts):
         require_good(quality, pair="21-22")
 
 
 def test_a_map_that_folds_is_refused(later, found):
-    quality = measure_quality(EARLIER, later, found.deformation)
+    quality = _measure_quality(EARLIER, later, found.deformation)
     assert quality["volume_ratio"] == pytest.approx(1.10 * 1.14 * 1.08, rel=0.05)
     require_good(quality, pair="21-22")
     displacement = found.deformation.displacement.copy()
     displacement[18:21] += [8.0, 0.0, 0.0]
     folded = replace(found.deformation, displacement=displacement)
-    quality = measure_quality(EARLIER, later, folded)
+    quality = _measure_quality(EARLIER, later, folded)
     assert quality["least_determinant"] < 0
     with pytest.raises(InputError, check=Facts("21-22", "0.50%")):
         require_good(quality, pair="21-22")

@@ -76,7 +76,7 @@ def test_numbers_of_quality(recorded):
             "of plates": quality.quality_summary(near, merged(below, above)),
             "Jacobians": quality.jacobian_ratios(bent),
             "curved": curved,
-            "edges": tetrahedralisation.edge_length_at(
+            "edges": tetrahedralisation._edge_length_at(
                 np.linspace(0.0, 30.0, 40), 1.5, 4.0, 2
             ),
             "refused": [
@@ -102,7 +102,7 @@ def test_numbers_of_changed_elements(recorded):
     crooked = TetrahedralMesh(flat, mesh.tets)
     recorded(
         {
-            "ratios": improvement.signed_ratios(flat, mesh.tets),
+            "ratios": improvement.signed_ratios(flat[mesh.tets]),
             "improved": improvement.improve_flat_elements(crooked),
             "split": splitting.split_inner_edges(mesh),
         },
