@@ -35,8 +35,6 @@ def write(log, *messages):
     [
         # a brain may have any name
         ("results/brains/results/logs/pial.log", "results", ""),
-        ("results/runs/r/a/metrics/week-22.00/logs/pial.log", "a", "r"),
-        ("results/study/growth/logs/pial.log", "", ""),
         ("elsewhere/pial.log", "", ""),
     ],
 )

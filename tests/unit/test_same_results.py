@@ -9,30 +9,21 @@ import pandas as pd
 import pytest
 from same_results import compare
 
+STUDY = "demo/results/study"
+MORE = 1.0 + 1e-6
 
-def write(
-    folder,
-    *,
-    value=1.0,
-    height=3.0,
-    column="area",
-    file="metrics.csv",
-    verdict="look",
-    seconds=1.0,
-    mm=5.0,
-):
-    """Write a results folder with a file of each kind."""
-    study = folder / "demo" / "results" / "study"
+
+def write(folder, mm=5.0, height=3.0, value=1.0, seconds=1.0, **table):
+    """Write a results folder with a file of each kind, the table as a file with a
+    column and a verdict."""
+    table = {"file": "metrics.csv", "column": "area", "verdict": "look"} | table
+    study = folder / STUDY
     study.mkdir(parents=True)
-    pd.DataFrame(
-        {"brain": ["a", "b"], "verdict": verdict, column: [value, 2.0]}
-    ).to_csv(study / file, index=False)
-    summary = {
-        "min_J": value,
-        "seconds": seconds,
-        "mesh": f"{folder}/brain.xdmf",
-        "weeks": [21.0, None],
-    }
+    columns = {"brain": ["a", "b"], "verdict": table["verdict"]}
+    columns |= {table["column"]: [value, 2.0]}
+    pd.DataFrame(columns).to_csv(study / table["file"], index=False)
+    mesh = f"{folder}/brain.xdmf"
+    summary = {"min_J": value, "seconds": seconds, "mesh": mesh, "weeks": [21.0, None]}
     (study / "summary.json").write_text(json.dumps(summary))
     with h5py.File(study / "frames.h5", "w") as frames:
         frames["week_21.00/positions"] = np.array([[1e-7, height, np.nan]])
@@ -43,70 +34,52 @@ def write(
     return folder
 
 
-def compare_with(tmp_path, changes, renamed=None):
-    return compare(
-        write(tmp_path / "before"), write(tmp_path / "after", **changes), renamed or {}
-    )
-
-
-def test_equal_results_are_equal_whatever_their_times_and_folders(tmp_path):
-    lines, summary = compare_with(tmp_path, {"seconds": 2.0})
-    assert lines == []
-    assert summary["files"] == 4
-    assert (
-        summary["largest_relative_difference"],
-        summary["only_before"],
-        summary["only_after"],
-    ) == (0.0, [], [])
+RENAMED = {"area": "area_mm2", "metrics.csv": "numbers.csv", "look": "needs review"}
 
 
 @pytest.mark.parametrize(
-    ("changes", "places"),
+    ("changes", "renamed", "places", "largest"),
     [
-        ({"value": 1.0 + 1e-6}, ["metrics.csv: area", "summary.json: min_J"]),
-        ({"height": 3.0 * (1 + 1e-6)}, ["frames.h5: week_21.00/positions"]),
-        ({"mm": 5.0 * (1 + 1e-6)}, ["pial.surf.gii: 0 "]),
-        ({"verdict": "fine"}, ["metrics.csv: verdict"]),
-        ({"height": np.nan}, ["frames.h5: week_21.00/positions"]),
+        # whatever their times and folders
+        ({"seconds": 2.0}, {}, [], 0.0),
+        ({"value": MORE}, {}, ["metrics.csv: area", "summary.json: min_J"], 1e-6),
+        ({"height": 3.0 * MORE}, {}, ["frames.h5: week_21.00/positions"], 1e-6),
+        ({"height": np.nan}, {}, ["frames.h5: week_21.00/positions"], None),
+        ({"mm": 5.0 * MORE}, {}, ["pial.surf.gii: 0 "], 1e-6),
+        # a rounding in single precision
+        ({"mm": float(np.nextafter(np.float32(5.0), np.float32(6.0)))}, {}, [], 1e-7),
+        ({"verdict": "fine"}, {}, ["metrics.csv: verdict"], None),
+        (
+            {"column": "area_mm2"},
+            {},
+            ["metrics.csv: area: only before", "metrics.csv: area_mm2: only after"],
+            None,
+        ),
+        (
+            {"column": "area_mm2", "file": "numbers.csv", "verdict": "needs review"},
+            RENAMED,
+            [],
+            0.0,
+        ),
     ],
 )
-def test_a_change_is_found_in_every_kind_of_file(tmp_path, changes, places):
-    lines, summary = compare_with(tmp_path, changes)
+def test_a_change_is_found_in_every_kind_of_file(
+    tmp_path, changes, renamed, places, largest
+):
+    after = write(tmp_path / "after", **changes)
+    lines, summary = compare(write(tmp_path / "before"), after, renamed)
     assert len(lines) == len(places) == summary["differences"]
-    assert all(
-        line.startswith(f"demo/results/study/{place}: ")
-        for line, place in zip(lines, places, strict=True)
-    )
-    if changes != {"verdict": "fine"} and not np.isnan(changes.get("height", 0.0)):
-        assert summary["largest_relative_difference"] == pytest.approx(1e-6, rel=0.1)
-
-
-def test_a_rounding_in_single_precision_is_no_difference(tmp_path):
-    lines, summary = compare_with(
-        tmp_path, {"mm": float(np.nextafter(np.float32(5.0), np.float32(6.0)))}
-    )
-    assert lines == []
-    assert 0 < summary["largest_relative_difference"] < 2e-7
+    for line, place in zip(lines, places, strict=True):
+        assert line.startswith(f"{STUDY}/{place}")
+    if largest is not None:
+        found = summary["largest_relative_difference"]
+        assert found == pytest.approx(largest, rel=0.1)
+    assert summary["only_before"] == summary["only_after"] == []
 
 
 def test_a_lost_file_and_a_new_one_are_named(tmp_path):
-    _, summary = compare_with(tmp_path, {"file": "numbers.csv"})
-    assert summary["only_before"] == ["demo/results/study/metrics.csv"]
-    assert summary["only_after"] == ["demo/results/study/numbers.csv"]
-
-
-def test_a_renamed_column_is_a_difference_unless_it_is_declared(tmp_path):
-    changes = {"column": "area_mm2", "file": "numbers.csv", "verdict": "needs review"}
-    lines, _ = compare(
-        write(tmp_path / "a"), write(tmp_path / "b", column="area_mm2"), {}
-    )
-    assert lines == [
-        f"demo/results/study/metrics.csv: area{end}"
-        for end in (": only before", "_mm2: only after")
-    ]
-    lines, summary = compare_with(
-        tmp_path,
-        changes,
-        {"area": "area_mm2", "metrics.csv": "numbers.csv", "look": "needs review"},
-    )
-    assert (lines, summary["only_before"], summary["only_after"]) == ([], [], [])
+    after = write(tmp_path / "after", file="numbers.csv")
+    _, summary = compare(write(tmp_path / "before"), after, {})
+    assert summary["files"] == 3
+    assert summary["only_before"] == [f"{STUDY}/metrics.csv"]
+    assert summary["only_after"] == [f"{STUDY}/numbers.csv"]

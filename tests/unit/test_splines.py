@@ -70,29 +70,29 @@ def test_freedom_that_no_penalty_gives_is_warned_of(caplog) -> None:
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("missing", [-0.009, -1e-7, 0.0, 1e-7, 0.009])
+@pytest.mark.parametrize("missing", [-0.009, 0.009])
 def test_near_an_end_of_the_range_the_strength_is_that_end(
     order: int, missing: float, caplog
 ) -> None:
     normal, penalty = matrices(WEEKS[:5], order)
     weakest, strongest = range_of_strengths(normal, penalty)
     assert splines.strength(normal, penalty, 5.0 + missing) == pytest.approx(weakest)
-    assert splines.strength(normal, penalty, order + 1 + missing) == pytest.approx(
-        strongest
-    )
+    least = splines.strength(normal, penalty, order + 1 + missing)
+    assert least == pytest.approx(strongest)
     assert not caplog.messages
 
 
-def test_where_any_strength_will_do_it_is_the_strongest() -> None:
-    # two weeks have two degrees of freedom with any penalty
+def test_weeks_that_coincide_or_nearly_so_have_a_strength() -> None:
+    # two weeks have two degrees of freedom with any penalty: the strongest
     normal, penalty = matrices(np.array([21.0, 21.0, 24.0]))
-    assert splines.strength(normal, penalty, 2.0) == pytest.approx(
-        range_of_strengths(normal, penalty)[1]
-    )
+    _, strongest = range_of_strengths(normal, penalty)
+    assert splines.strength(normal, penalty, 2.0) == pytest.approx(strongest)
+    weeks = np.array([21.0, 21.0 + 1e-9, 21.0 + 2e-9, 24.0])
+    assert splines.strength(*matrices(weeks, order=2), 3.0) > 0
 
 
-@pytest.mark.parametrize("span", [0.2, 1.0, 10.0])
-@pytest.mark.parametrize("freedom", [3.0, 3.02, 3.9, 4.5, 6.0])
+@pytest.mark.parametrize("span", [0.2, 10.0])
+@pytest.mark.parametrize("freedom", [3.02, 4.5, 6.0])
 def test_rounding_does_not_decide_the_strength(span: float, freedom: float) -> None:
     normal, penalty = matrices(21 + span * (WEEKS - 21) / 10, order=2)
     expected = splines.strength(normal, penalty, freedom)
@@ -111,9 +111,3 @@ def test_the_unit_of_time_does_not_matter(freedom: float) -> None:
     in_days = splines.strength(*matrices(7 * WEEKS), freedom)
     # the penalty is on the square of a change of rate, 1/week², the data on a value
     assert in_days / in_weeks == pytest.approx(7.0**4, rel=1e-6)
-
-
-def test_weeks_that_nearly_coincide_have_a_strength() -> None:
-    weeks = np.array([21.0, 21.0 + 1e-9, 21.0 + 2e-9, 24.0])
-    normal, penalty = matrices(weeks, order=2)
-    assert splines.strength(normal, penalty, 3.0) > 0

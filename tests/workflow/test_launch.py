@@ -5,9 +5,7 @@ import errno
 import getpass
 import os
 import pwd
-import re
 import signal
-import sys
 import threading
 from types import SimpleNamespace
 
@@ -15,7 +13,6 @@ import pytest
 from configurations import touched
 from facts import Facts
 from mpi4py import MPI
-from processes import ran
 from snakemake import cli
 
 from gyriflow.errors import InputError, StorageError
@@ -204,35 +201,10 @@ def test_results_that_are_a_link_to_nowhere_are_named(workflow, capfd):
     assert "disk space" not in message
 
 
-def gyriflow(workflow, *arguments):
-    command = sys.executable, "-m", "gyriflow.cli", *arguments
-    return ran(*command, cwd=workflow.directory, env=workflow.environment)
-
-
 def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
     name = workflow.write("study.yaml", SMALL_STUDY)
     with pytest.raises(InputError, check=Facts("metrcs", "metrics")):
         workflow.plan("metrcs", "--configfile", name)
-
-
-@pytest.mark.slow
-def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
-    vary = {
-        "thickness_mm": [1 + 0.2 * i for i in range(10)],
-        "shear_modulus_cortex_pa": [300, 600, 900, 1500, 3000],
-    }
-    fifty = {"fifty": {"base": "reference", "vary": vary, "compare_week": 22}}
-    name = workflow.write(
-        "study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "sweeps": fifty}
-    )
-    outcome = gyriflow(workflow, "check", name, "--stage", "sweeps", "--cores", "1000")
-    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-    said = outcome.stdout
-    assert said.splitlines()[0] == Facts("study.yaml:", 2, 1, "reference", 50, "fifty")
-    assert "simulate_member×50" in said
-    assert float(re.search(r" [\d.e+]+ core hours, ([\d.]+)%", said)[1]) > 50
-    # the memory of a cluster is not that of this machine
-    assert len(re.findall(r"\b[MG]i?B", re.search(r"\nmemory .*", said)[0])) == 1
 
 
 def test_a_result_of_an_unknown_brain_is_refused_with_the_name_of_a_similar_one(

@@ -4,12 +4,10 @@ other does."""
 import copy
 import os
 import re
-import shutil
 from collections import Counter
 from contextlib import contextmanager
 
 import pytest
-from facts import Facts
 
 from .conftest import SMALL_STUDY, Workflow, labelled
 
@@ -155,20 +153,3 @@ def test_a_change_of_code_runs_again_what_uses_it(finished, change):
         listed = finished.run("-n", "--configfile", "study.yaml").stdout
     rules = Counter(re.findall(r"^rule (\w+):$", listed, re.MULTILINE))
     assert {rule: rules[rule] for rule in STAGES if rule in rules} == expected
-
-
-def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_why(
-    finished, tmp_path
-):
-    """Without Snakemake's records too, as in a copy of the visible files."""
-    visible = shutil.ignore_patterns(".*")
-    shutil.copytree(finished.directory, tmp_path / "study", ignore=visible)
-    study = Workflow(finished.checkout, tmp_path / "study")
-    assert study.jobs(*CONFIGURED) == {}
-    labels = study.directory / "phantom-22.nii.gz"
-    labels.write_bytes(labels.read_bytes() + b"other")
-    # an older file, as `mv` and `rsync -a` leave it
-    os.utime(labels, (1e9, 1e9))
-    assert planned(study, *CONFIGURED) == OF_THE_OTHER_BRAIN
-    reason = study.reasons(*CONFIGURED)["pial_with_thickness"]
-    assert reason == Facts("changed input", labels.name)

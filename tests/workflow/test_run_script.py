@@ -458,12 +458,6 @@ def test_conda_environment_is_made_once_and_activated(
     assert (tmp_path / "record").read_text().splitlines() == [made, hook, hook]
 
 
-def test_bytecode_is_kept_which_every_process_would_make_again(outside):
-    name = "PYTHONDONTWRITEBYTECODE"
-    done = run("printenv", name, env=outside | {name: "1"})
-    assert (done.stdout, done.returncode) == ("", 1)
-
-
 def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(
     outside, programs, tmp_path
 ):

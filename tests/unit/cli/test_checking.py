@@ -1,10 +1,6 @@
 """What `gyriflow check` says of input files and of the mesh, and what it leaves
 behind."""
 
-import os
-import tempfile
-from pathlib import Path
-
 import nibabel as nib
 import numpy as np
 import pytest
@@ -12,7 +8,7 @@ import yaml
 from atlas_brains import atlas_halves
 from configurations import labelled
 from facts import Facts
-from shapes import hemisphere, inner, moved
+from shapes import hemisphere, inner, moved, phantom, save_labels
 
 from gyriflow.cli import check as checking
 from gyriflow.cli.check import check_study, plan, work_of
@@ -20,9 +16,8 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import MIRROR
 from gyriflow.geometry.triangles import transformed
 from gyriflow.io.surfaces import write_surface, write_vertex_labels, write_vertex_maps
-from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
+from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.settings.terms import ELEMENTS_NEEDED, element_error, is_too_coarse
-from gyriflow.shipped import SHIPPED
 
 SIDES = {"left": -1, "right": 1}
 N_VERTICES = len(hemisphere(1).vertices)
@@ -91,28 +86,39 @@ def test_the_labels_of_one_hemisphere_are_read_as_labels(tmp_path, refusals):
     assert found == [Facts(scheme, "99 among 1, 5, 99")]
 
 
-def test_the_surface_of_one_hemisphere_is_of_its_side(tmp_path, refusals):
-    write_hemispheres(tmp_path)
-    assert refusals(pial="right.surf.gii", side="right") == []
-    found = refusals(pial="right.surf.gii", side="left")
-    assert found == [Facts(tmp_path / "right.surf.gii", "CortexRight", "CortexLeft")]
+RIGHT = {"pial": "right.surf.gii"}
+OUTSIDE = "white surface (left)"
 
 
-def test_white_surfaces_outside_their_pial_ones_are_refused(tmp_path, refusals):
-    write_hemispheres(tmp_path)
-    for name, sign in (("white0", -1), ("white1", 1)):
-        white = inner(hemisphere(sign), 1.5)
-        write_surface(tmp_path / f"{name}.ply", white)
-        write_surface(tmp_path / f"shifted_{name}.ply", moved(white, 6.0))
-    for whites, facts in (
-        (["white0", "white1"], None),
-        (["white1", "white0"], ["100 %", "swapped"]),
+@pytest.mark.parametrize(
+    ("scale", "brain", "facts"),
+    [
+        (1.0, RIGHT | {"side": "right"}, None),
+        (1.0, RIGHT | {"side": "left"}, ["right.surf.gii", "CortexRight"]),
+        (1.0, PAIR | {"white": ["white0.ply", "white1.ply"]}, None),
+        (1.0, PAIR | {"white": ["white1.ply", "white0.ply"]}, [OUTSIDE, "swapped"]),
         # as where FreeSurfer's centre of the volume was added to one of them
-        (["shifted_white0", "shifted_white1"], ["coordinates"]),
-    ):
-        files = [f"{name}.ply" for name in whites]
-        found = refusals(**PAIR, white=files)
-        assert found == ([Facts("white surface (left)", *facts)] if facts else [])
+        (1.0, PAIR | {"white": ["far0.ply", "far1.ply"]}, [OUTSIDE, "coordinates"]),
+        (1e-3, PAIR, ["brain sub-1", "metres"]),
+        (10.0, PAIR, ["brain sub-1", 23]),
+    ],
+)
+def test_surfaces_of_another_side_place_or_unit_are_refused(
+    tmp_path, refusals, scale, brain, facts
+):
+    matrix = np.diag([scale, scale, scale, 1.0])
+    write_hemispheres(tmp_path, lambda mesh: transformed(mesh, matrix))
+    for number, sign in enumerate(SIDES.values()):
+        white = inner(hemisphere(sign), 1.5)
+        write_surface(tmp_path / f"white{number}.ply", white)
+        write_surface(tmp_path / f"far{number}.ply", moved(white, 6.0))
+    assert refusals(**brain) == ([Facts(*facts)] if facts else [])
+
+
+def test_labels_that_lie_as_those_of_another_scheme_are_refused(tmp_path, refusals):
+    save_labels(tmp_path / "l.nii.gz", *phantom(24.0, 2.0))
+    found = refusals(labels="l.nii.gz", scheme="dhcp-19")
+    assert found[0] == Facts("l.nii.gz", "spina-bifida-atlas", "dhcp-19")
 
 
 @pytest.mark.parametrize(
@@ -124,15 +130,6 @@ def test_a_size_that_is_not_that_of_the_week_is_doubted(tmp_path, check, mm, fac
     lines, bad = check(brain)
     assert bad == []
     assert [line for line in warnings(lines) if "brain a" in line] == facts
-
-
-def test_labels_that_lie_as_those_of_another_scheme_are_refused(tmp_path, refusals):
-    folder = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA28_operated"
-    volume = read_label_volume(folder / "parcellation.nii.gz")
-    coarse = volume.affine @ np.diag([2, 2, 2, 1])
-    write_labels(tmp_path / "l.nii.gz", volume.labels[::2, ::2, ::2], coarse)
-    found = refusals(week=28, labels="l.nii.gz", scheme="dhcp-19")
-    assert found[0] == Facts("l.nii.gz", "spina-bifida-atlas", "dhcp-19", "%")
 
 
 def test_every_file_is_reported_with_its_size_side_and_number_of_vertices(
@@ -231,13 +228,6 @@ def test_files_of_regions_and_white_surfaces_are_opened(tmp_path, check):
     assert bad == [Facts("brain sub-1", tmp_path / "white.surf.gii")]
 
 
-@pytest.mark.parametrize(("scale", "fact"), [(1e-3, "metres"), (10.0, 23)])
-def test_surfaces_in_other_units_are_refused(tmp_path, check, scale, fact):
-    matrix = np.diag([scale, scale, scale, 1.0])
-    write_hemispheres(tmp_path, lambda mesh: transformed(mesh, matrix))
-    assert check(PAIR)[1] == [Facts("brain sub-1", fact)]
-
-
 @pytest.mark.parametrize(
     ("coordinates", "facts"),
     [
@@ -250,6 +240,14 @@ def test_mirrored_hemispheres_are_refused(tmp_path, check, coordinates, facts):
         write_surface(tmp_path / f"{side}.surf.gii", transformed(half, MIRROR))
     _, bad = check(PAIR | {"week": 24, "coordinates": coordinates})
     assert bad == [Facts("brain sub-1", *facts)]
+
+
+def test_the_first_line_counts_brains_simulations_and_members(check):
+    vary = {"thickness_mm": [1.0, 2.0, 3.0]}
+    sweep = {"base": "run1", "vary": vary, "compare_week": 24}
+    runs = {f"run{number}": {} for number in range(1, 8)}
+    lines, _ = check(*labelled(23, 24), runs=runs, sweeps={"thick": sweep})
+    assert lines[0] == Facts("2 brains", 7, "run1", "run6, …", "3 of sweep thick")
 
 
 def test_subjects_that_would_be_one_in_the_export_are_reported(check):
@@ -355,14 +353,7 @@ def test_a_look_leaves_nothing_behind(tmp_path, config):
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
-def test_the_exit_code_of_an_earlier_process_with_the_same_number_does_not_count(
-    tmp_path, config
-):
-    Path(tempfile.gettempdir(), f"gyriflow-exit-{os.getpid()}").write_text("3")
-    assert plan(config, tmp_path / "new", ["surface"])
-
-
-@pytest.mark.parametrize("directory", ["", "/proc/self", "a.yaml/below"])
+@pytest.mark.parametrize("directory", ["", "/proc/self"])
 def test_a_look_needs_no_folder_to_write_in(tmp_path, config, directory):
     (tmp_path / ".snakemake").touch()
     assert plan(config, tmp_path / directory, ["surface"])

@@ -157,7 +157,6 @@ def test_a_folder_may_hold_two_data_sets_but_a_subject_is_of_one(tmp_path):
     ("first", "second", "id"),
     [
         ("case 1", "case-1", "case-1"),
-        ("müller1", "möller1", "m-ller1"),
         ("李1", "王1", "1"),
     ],
 )

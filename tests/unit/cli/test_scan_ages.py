@@ -9,7 +9,6 @@ from scan_trees import make_tree
 
 from gyriflow.cli.recognition import UNSET, recognise
 from gyriflow.errors import InputError
-from gyriflow.study.ages import AT_SCAN
 
 LONE = "sub-01/lh.pial"
 FIRST, SECOND = BOTH = [f"sub-01/ses-{session}/lh.pial" for session in (1, 2)]
@@ -42,7 +41,7 @@ def age_of_row(folder, columns, cells, sidecar=None):
     return found
 
 
-@pytest.mark.parametrize("column", [*sorted(AT_SCAN), "PMA", "AgeAtScan"])
+@pytest.mark.parametrize("column", ["age_at_mri", "PMA", "AgeAtScan"])
 def test_an_age_at_the_scan_comes_before_others_which_are_said(tmp_path, column):
     rows = f"participant_id gestational_age age {column} | sub-01 33.1 31 29.4"
     (brain,) = recognise(tree(tmp_path, [LONE], {TABLE: rows})).brains
@@ -54,18 +53,12 @@ def test_an_age_at_the_scan_comes_before_others_which_are_said(tmp_path, column)
     ("column", "text", "units", "week"),
     [
         ("Gestational-Weeks", "24", None, 24.0),
-        ("week", "24w", None, 24.0),
-        ("ga", "22wks1day", None, 22.14),
         ("ga", "24.3GW", None, 24.3),
-        ("ga", "24+3weeks", None, 24.43),
-        ("ga", "24+3/7", None, 24.43),
         ("ga", "24", "completed weeks", 24.0),
         ("ga", "170", "day", 24.29),
         ("scan_age_days", "170", None, 24.29),
         ("ga_days", "170", "weeks", Facts("ga_days", "days and weeks", SIDECAR)),
         ("ga", "24", "months", Facts("ga", "months", SIDECAR, "row 2")),
-        ("ga_days", "24", None, Facts("ga_days", "24 in days", "row 2")),
-        ("ga", "NaN", None, Facts("ga", "NaN", f"{TABLE} row 2")),
         ("ga", "n/a", None, Facts("ga", "n/a", f"{TABLE} row 2")),
     ],
 )
@@ -80,10 +73,7 @@ def test_ages_have_their_unit_from_the_name_or_the_sidecar(
     ("key", "text"),
     [
         ("Description", "gestational age at birth"),
-        ("Description", "GA (months)"),
-        ("Description", "corrected age"),
         ("Description", "weeks since conception"),
-        ("Description", "chronological age"),
         ("AgeReference", "of the mother"),
     ],
 )
@@ -97,17 +87,13 @@ def test_a_column_that_is_described_as_another_age_is_refused(tmp_path, key, tex
     [
         # not named as a gestational age at the scan
         ("age", "24", ["age 24"]),
-        ("age_months", "6", ["age_months 6"]),
         ("postnatal_age_weeks", "24", ["postnatal_age_weeks 24"]),
         # beside one that may be at birth
         ("ga age", "33.1 29.4", ["ga 33.1", "age 29.4"]),
         ("ga age_at_fetal_mri", "33.1 29.4", ["age_at_fetal_mri", "scan_age"]),
-        ("ga age_since_birth", "33.1 4", ["ga 33.1", "age_since_birth 4"]),
         ("week age_reference", "24 DOB", ["week 24", "age_reference DOB"]),
-        ("scan_age age_type", "24 postnatal", ["scan_age 24", "age_type postnatal"]),
         # two that differ
         ("ga week", "22 28", ["ga 22", "week 28"]),
-        ("scan_age pma", "22 28", ["scan_age 22", "pma 28"]),
         ("pma weeks_at_scan", "22 28", ["weeks_at_scan", "scan_age"]),
         # days of a week in a column of their own
         ("ga days", "24 3", ["days", "3 in days"]),
@@ -164,8 +150,10 @@ def test_an_age_is_that_of_exactly_this_session(tmp_path, participants, sessions
     assert found == {"sub-01_ses-1": Facts(*age) if isinstance(age, list) else age}
 
 
-@pytest.mark.parametrize("column", ["session_id", "session", "ses", "Visit"])
-@pytest.mark.parametrize("name", [TABLE, "sessions.tsv"])
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [(TABLE, "session_id"), (TABLE, "Visit"), ("sessions.tsv", "ses")],
+)
 def test_a_table_may_have_a_row_for_each_session(tmp_path, name, column):
     table = f"participant_id {column} ga | sub-01 1 22 | 01 ses-2 28"
     found = ages(tree(tmp_path, BOTH, {name: table}))
@@ -243,21 +231,14 @@ def test_an_age_is_that_of_exactly_this_file(tmp_path, files, tables, expected):
     [
         ("week24+3", 24.43),
         ("GA24w3d", 24.43),
-        ("ga-26.4", 26.4),
         ("week21_T2", 21.0),
-        ("week24_1mm", 24.0),
         ("week24_5", Facts("week24_5")),
-        ("week24-26", Facts("week24-26")),
-        ("week24_ga26", Facts("24", "26")),
         ("week99", Facts(99, 15, 45)),
         ("GA24,3", 24.3),
-        ("GA24w3", 24.43),
         ("week24to26", Facts("week24to26")),
         ("week24_0.5mm", 24.0),
-        ("week24_1_5T", 24.0),
         ("GA24/week26", Facts("24", "26")),
         ("sub-21", Facts("week24.3")),
-        ("image24", Facts("week24.3")),
         ("AGA23", Facts("week24.3")),
     ],
 )
@@ -270,8 +251,7 @@ def test_names_give_ages_or_are_refused_as_ambiguous(tmp_path, name, age):
     ("text", "age"),
     [
         ("Participant ID;Gestational age (weeks)\nsub-01;24,5", 24.5),
-        ('"participant_id","GA"\n"sub-01","24.5"', 24.5),
-        ("participant_id, GA \r\nsub-01 , 24+3\r\n", 24.43),
+        ('"participant_id", GA \r\n"sub-01" , 24+3\r\n', 24.43),
         ("participant_id,ga,ga\nsub-01,22,28", Facts("ga", 22, 28, "row 2")),
         ("participant_id,ga\nsub-01,24,5", Facts("row 2", 3, 2)),
         ("name,ga\nsub-01,24", Facts("participants.csv", "participant_id")),

@@ -3,7 +3,6 @@ same for everything else."""
 
 import shutil
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -202,17 +201,3 @@ def test_a_path_has_another_key_after_a_change_of_the_code_behind_a_script(
 
     monkeypatch.setattr(path_store, "code_hash", changed)
     assert keys() != before
-
-
-def test_a_path_is_made_from_every_brain_whose_thickness_fills_one_of_its(paths):
-    """Also where two of these are of one week."""
-    study, path = paths()
-    first, second, third = (study.brains[name] for name in path.brains[:3])
-    third = replace(third, week=first.week)
-    first = replace(first, thickness_of=third.id)
-    second = replace(second, thickness_of=first.id)
-    brains = {brain.id: brain for brain in (first, second, third)}
-    link = replace(study.links[path.links[0]], posed=(True, True))
-    study = SimpleNamespace(brains=brains, links={link.file: link})
-    path = replace(path, links=(link.file,))
-    assert path_store._thickness_sources(study, path) == [third, first]
