@@ -154,7 +154,7 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     record_usage(log, usage())
 
 
-def end_shell_step(code: int, log: str) -> int:
+def _end_shell_step(code: int, log: str) -> int:
     """Write the message of a failed program that has written none, and return the exit
     code of its step."""
     message = ENDINGS.get(code)
@@ -176,9 +176,4 @@ def end_shell_step(code: int, log: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(
-        end_shell_step(
-            int(sys.argv[1]),
-            sys.argv[2],
-        )
-    )
+    sys.exit(_end_shell_step(int(sys.argv[1]), sys.argv[2]))

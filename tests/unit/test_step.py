@@ -3,12 +3,12 @@ log and as data."""
 
 import logging
 import resource
+import runpy
 import sys
 from types import SimpleNamespace
 
 import pytest
 from facts import Facts
-from processes import ran
 
 from gyriflow import step as step_module
 from gyriflow.errors import MeshError
@@ -19,7 +19,7 @@ from gyriflow.messages import (
     read_messages,
     write_message,
 )
-from gyriflow.step import OUT_OF_MEMORY_MESSAGE, end_shell_step, step
+from gyriflow.step import OUT_OF_MEMORY_MESSAGE, step
 
 HOLE = {"path": "x.gii", "found": "12 mm", "expected": "at most 3 mm"}
 
@@ -88,14 +88,18 @@ def test_warnings_of_a_step_are_messages_and_replace_those_of_an_earlier_try(tmp
     assert log.read_text() == Facts("fine", "it is thin", "odd", "deprecated")
 
 
-def test_a_killed_program_is_said_to_have_run_out_of_memory(tmp_path):
-    log = tmp_path / "log"
-    log.write_text("before\n")
-    end = ran(sys.executable, "-m", "gyriflow.step", "137", str(log))
-    assert end.returncode == 137
-    assert log.read_text() == Facts("before", "gyriflow:", "memory")
-    (message,) = read_messages(log)
-    assert (message.text, message.exit_code) == (OUT_OF_MEMORY_MESSAGE.text, 137)
+@pytest.fixture
+def end_shell_step(monkeypatch):
+    """Return the exit code of the program that ends a shell step."""
+
+    def ended(code, log):
+        monkeypatch.delitem(sys.modules, "gyriflow.step", raising=False)
+        monkeypatch.setattr(sys, "argv", ["step", str(code), str(log)])
+        with pytest.raises(SystemExit) as end:
+            runpy.run_module("gyriflow.step", run_name="__main__")
+        return end.value.code
+
+    return ended
 
 
 @pytest.mark.parametrize(
@@ -103,28 +107,30 @@ def test_a_killed_program_is_said_to_have_run_out_of_memory(tmp_path):
     [
         (7, "x", 5, Facts("/dev/shm")),
         (9, "EXIT STRING: Killed", 137, OUT_OF_MEMORY_MESSAGE.text),
+        (137, "before", 137, OUT_OF_MEMORY_MESSAGE.text),
         (130, "step 3", 130, STOPPED),
         (255, "mpiexec: one\n\ntwo\n", 255, "mpiexec: one\ntwo"),
         (127, "", 127, Facts(127)),
     ],
 )
 def test_a_program_without_a_message_is_given_one(
-    tmp_path, code, printed, ended, expected
+    tmp_path, end_shell_step, code, printed, ended, expected
 ):
     log = tmp_path / "simulate.log"
     log.write_text(printed)
-    assert end_shell_step(code, str(log)) == ended
+    assert end_shell_step(code, log) == ended
     (message,) = read_messages(log)
     assert expected == message.text
     assert message == Message("error", message.text, "simulate", exit_code=ended)
+    assert log.read_text().startswith(printed)
 
 
-def test_the_message_of_a_program_itself_is_kept(tmp_path):
+def test_the_message_of_a_program_itself_is_kept(tmp_path, end_shell_step):
     log = tmp_path / "simulate.log"
     log.write_text("gyriflow: no step left\nbad termination\n")
     write_message(log, Message("warning", "coarse"))
     write_message(log, Message("error", "no step left", exit_code=4))
-    assert end_shell_step(4, str(log)) == 4
+    assert end_shell_step(4, log) == 4
     assert [message.text for message in read_messages(log)] == [
         "coarse",
         "no step left",

@@ -20,7 +20,7 @@ from gyriflow.folding.__main__ import locked as locked_simulation
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
 from gyriflow.running import launch
-from gyriflow.running.launch import hold_lock, locked, main, set_user_name
+from gyriflow.running.launch import hold_lock, locked, main
 from gyriflow.running.planning import Events
 from gyriflow.shipped import SHIPPED
 
@@ -46,10 +46,10 @@ def test_a_user_whom_the_system_does_not_know_has_a_name(monkeypatch):
     for variable in ("LOGNAME", "USER", "LNAME", "USERNAME"):
         monkeypatch.delenv(variable, raising=False)
     monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
-    set_user_name()
+    launch._set_user_name()
     assert getpass.getuser() == f"user-{os.getuid()}"
     monkeypatch.setenv("LOGNAME", "ana")
-    set_user_name()
+    launch._set_user_name()
     assert getpass.getuser() == "ana"
 
 
@@ -61,10 +61,10 @@ def test_a_signal_stops_jobs_and_timers_of_the_scheduler_end(tmp_path, monkeypat
         os.kill(os.getpid(), signal.SIGTERM)
 
     monkeypatch.setattr(launch, "received_signals", [])
-    monkeypatch.setattr(launch, "stop_jobs", stopped.set)
+    monkeypatch.setattr(launch, "_stop_jobs", stopped.set)
     monkeypatch.setattr(cli, "main", schedule)
     with launching(tmp_path):
-        assert launch.call_snakemake([], Events()) == 128 + signal.SIGTERM
+        assert launch._call_snakemake([], Events()) == 128 + signal.SIGTERM
     scheduler.join(20)
     assert not scheduler.is_alive()
     assert stopped.wait(20)
@@ -96,7 +96,7 @@ def test_a_run_is_locked_before_it_reads_the_rules_that_write_its_plan(
 ):
     seen = []
     monkeypatch.setattr(
-        launch, "plan_and_run", lambda _: seen.append(hold_lock(tmp_path)) or 0
+        launch, "_plan_and_run", lambda _: seen.append(hold_lock(tmp_path)) or 0
     )
     with launching(tmp_path):
         assert main(["--cores", "1", "--directory", str(tmp_path)]) == 0

@@ -73,6 +73,7 @@ try:
     study, CONTENTS = planned_study() if workflow.is_main_process else (read_plan(Path(PLAN)), {})
 except GyriflowError as error:
     end_with(error)
+session.study = study
 CONFIG = study.config
 BRAINS = study.brains
 # by run, start brain and week

@@ -6,16 +6,14 @@ import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import chdir, contextmanager, suppress
+from contextlib import chdir, contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
-from typing import NamedTuple
 
 from ..errors import InputError
 from ..grouping import grouped
-from ..io.files import read_json
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
 from ..running.cost import (
@@ -29,7 +27,7 @@ from ..running.cost import (
 )
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
-from ..running.manifest import CHANGED_CODE
+from ..running.manifest import Job
 from ..running.planning import BY_ANOTHER_JOB, MISSING, Plan
 from ..running.status import format_duration
 from ..settings.base import folder_of
@@ -48,12 +46,13 @@ from ..study.loading import load
 from ..study.paths import PLAN
 from ..study.resolve import resolve
 from ..study.study import Study
-from ..version import version
 from .init import commented_scans
 from .readings import ScanFiles, collected_warnings, readings
 from .scans import ScanRow, scan_lines
 
 NAMED_RUNS = 6
+GENERAL_REASONS = (MISSING, BY_ANOTHER_JOB)
+"""Reasons to run a job that are shown without their files."""
 THROUGH_CORTEX = {
     ("pytetwild", 1): 0.95,
     ("pytetwild", 2): 0.39,
@@ -62,17 +61,6 @@ THROUGH_CORTEX = {
 }
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as
 found on the shipped brains."""
-
-
-class PlannedJob(NamedTuple):
-    """A job of a dry run, with the reason to run it."""
-
-    rule: str
-    wildcards: dict[str, str]
-    threads: int
-    reason: str
-    inputs: Sequence[str] = ()
-    outputs: Sequence[str] = ()
 
 
 def check_study(
@@ -163,14 +151,16 @@ def work_of(
     The study is read from `path` unless given. `further` are arguments for Snakemake.
     With `show`, it lists every job on the terminal first.
     """
-    jobs = plan(path, directory, further, show=show)
-    if not jobs:
+    planned = plan(path, directory, further, show=show)
+    if not planned:
         yield "nothing to run: everything is up to date", False
         return
-    yield f"to run: {len(jobs)} step{'s' if len(jobs) > 1 else ''}", False
+    yield f"to run: {len(planned)} step{'s' if len(planned) > 1 else ''}", False
     rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
-    for job in jobs:
-        rules_by_reason[_why(job.reason, directory)][job.rule] += 1
+    for job, reason in planned:
+        for words in GENERAL_REASONS:
+            reason = words if reason.startswith(words) else reason
+        rules_by_reason[reason][job.rule] += 1
     for reason, counts in rules_by_reason.items():
         rules = []
         for rule, count in counts.items():
@@ -180,29 +170,7 @@ def work_of(
     if study is None:
         with _read_study(path, directory) as read:
             study = read
-    yield from _needs(jobs, study, directory, cores)
-
-
-def _why(reason: str, directory: Path) -> str:
-    """Return the reason to run a job, without the files of a general one."""
-    if reason == CHANGED_CODE:
-        made_by, this = _recorded_version(directory), version()
-        if made_by not in (None, this):
-            return f"{reason} (gyriflow {made_by}, now {this})"
-    for words in (MISSING, BY_ANOTHER_JOB):
-        if reason.startswith(words):
-            return words
-    return reason
-
-
-def _recorded_version(directory: Path) -> str | None:
-    """Return the version of gyriflow that made the report in a working directory, or
-    None if there is none."""
-    with suppress(InputError, KeyError):
-        return str(
-            read_json(directory / "results" / "report" / "provenance.json")["gyriflow"]
-        )
-    return None
+    yield from _needs([job for job, _ in planned], study, directory, cores)
 
 
 def plan(
@@ -211,9 +179,9 @@ def plan(
     further: Sequence[str],
     *,
     show: bool = False,
-) -> list[PlannedJob]:
-    """Return the jobs that Snakemake would run, without targets, or exit with its code;
-    `show` lists them, too."""
+) -> list[tuple[Job, str]]:
+    """Return the jobs that Snakemake would run, without targets, each with the reason,
+    or exit with its code; `show` lists them, too."""
     plans: list[Plan] = []
     with TemporaryDirectory() as empty:
         place = directory.resolve() if directory.is_dir() else empty
@@ -225,22 +193,9 @@ def plan(
         ]
         call = [*options, "--dry-run", *further]
         code = launch(call, plans.append, is_shown=show)
-        if code:
-            sys.exit(code)
-        jobs = []
-        for job, why in plans[0].reasoned_jobs:
-            names = dict(job.wildcards)
-            files = job.files, job.outputs
-            jobs.append(
-                PlannedJob(
-                    job.rule,
-                    names,
-                    job.threads(),
-                    why,
-                    *files,
-                )
-            )
-        return jobs
+    if code:
+        sys.exit(code)
+    return plans[0].reasoned_jobs
 
 
 def _contents(study: Study) -> str:
@@ -395,7 +350,7 @@ def _scans(
 
 
 def _needs(
-    jobs: Sequence[PlannedJob],
+    jobs: Sequence[Job],
     study: Study,
     directory: Path,
     cores: int,
@@ -410,10 +365,10 @@ def _needs(
         """Return when a job ends whose inputs are made as early as possible."""
         job = jobs[number]
         start_s = 0.0
-        for file in job.inputs:
+        for file in job.files:
             if file in made_by:
                 start_s = max(start_s, end_s(made_by[file]))
-        return start_s + seconds[number] / min(job.threads, cores)
+        return start_s + seconds[number] / min(job.threads(), cores)
 
     foldings = [job for job in jobs if job.rule in FOLDINGS]
     needs = []
@@ -433,7 +388,7 @@ def _needs(
         folding_s = sum(need.seconds for need in needs)
         share = f", {folding_s / work_s:.0%} of them for folding"
     yield f"work    about {work_s / 3600:.2g} core hours{share}", False
-    threads = max((job.threads for job in foldings), default=1)
+    threads = max((job.threads() for job in foldings), default=1)
     at_once = max(cores // threads, 1)
     largest_first = sorted((need.memory_mib for need in needs), reverse=True)
     memory_mib = sum(largest_first[:at_once]) or MIN_SURFACE_MIB / 4
@@ -450,7 +405,7 @@ def _needs(
 
 
 def _path_lines(
-    jobs: Sequence[PlannedJob],
+    jobs: Sequence[Job],
     seconds: Sequence[float],
     study: Study,
     directory: Path,

@@ -20,7 +20,7 @@ from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED, shipped_atlases
 
 if TYPE_CHECKING:
-    from .recognition import FoundBrain, FoundScans
+    from .recognition import FoundScans
 
 LEVELS = ("participant", "group")
 BIDS_LEVELS = [[level] for level in LEVELS]
@@ -36,6 +36,7 @@ NOTHING_TO_FOLD = (
     " name start and folding.end_week in --settings."
 )
 NOT_FOLDED = "gyriflow: --settings: without --fold, these are not used:"
+NOTATIONS = {None: None, True: "decimal", False: "days"}
 REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 """Options of Snakemake with which jobs run on other machines."""
 
@@ -119,8 +120,9 @@ files_option = click.option(
 )
 notation_option = click.option(
     "--decimal-weeks/--weeks-days",
-    "decimal_weeks",
+    "notation",
     default=None,
+    callback=lambda _, __, value: NOTATIONS[value],
     help="Whether an age of 24.3 is decimal, or 24+3.",
 )
 dry_run_option = click.option(
@@ -191,9 +193,7 @@ def _command_name() -> str:
     run = SHIPPED / "run"
     if shutil.which("gyriflow") or not run.is_file():
         return "gyriflow"
-    if run.parent == Path.cwd():
-        return "./run gyriflow"
-    return f"{os.path.relpath(run)} gyriflow"
+    return f"./{os.path.relpath(run)} gyriflow"
 
 
 def _print_version(
@@ -274,9 +274,10 @@ def init(
     be used are listed with the cause; the exit code is then 2.
     """
     from .init import write_configuration
+    from .recognition import recognise
 
     path = output or folder / CONFIG
-    found = _recognise(folder, **selection)
+    found = recognise(folder, **selection)
     kept = write_configuration(found, folder, path, force=force)
     if kept:
         click.echo(f"the earlier configuration is now {kept}")
@@ -284,49 +285,6 @@ def init(
     code = _show_scans(found, may_fill_in=True)
     click.echo(f"wrote {path}; next: {_command_name()} check {argument}")
     sys.exit(code)
-
-
-def _recognise(
-    folder: Path,
-    *,
-    decimal_weeks: bool | None,
-    files: str | None,
-    **selection: Any,
-) -> "FoundScans":
-    from .recognition import recognise
-
-    notation: Any = {
-        None: None,
-        True: "decimal",
-        False: "days",
-    }[decimal_weeks]
-    found = recognise(folder, files or "*", notation=notation, **selection)
-    for line in _scheme_lines(found.brains):
-        click.echo(line)
-    return found
-
-
-def _scheme_lines(brains: Sequence["FoundBrain"]) -> Iterator[str]:
-    """Yield the number of volumes of each chosen scheme, then contradictions to it, and
-    the schemes that do not fit."""
-    from .recognition import UNSET
-
-    by_scheme: dict[str, list[FoundBrain]] = {}
-    for brain in brains:
-        by_scheme.setdefault(brain.entry.get("scheme", UNSET), []).append(brain)
-    by_scheme.pop(UNSET, None)
-    for name, with_scheme in by_scheme.items():
-        number = len(with_scheme)
-        yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
-        causes: dict[str, str] = {}
-        for brain in with_scheme:
-            for scheme, cause in (brain.fits or {}).items():
-                if cause:
-                    causes[scheme] = cause
-        if name in causes:
-            yield f"  but {causes.pop(name)}"
-        if causes:
-            yield f"  label schemes that do not fit: {', '.join(causes)}"
 
 
 def _show_scans(
@@ -385,6 +343,7 @@ def check(
     from ..running.launch import MEASURE_ONLY_VAR
     from .check import check_study
     from .init import write_configuration
+    from .recognition import recognise
 
     is_folder = data is not None and data.is_dir() and not (data / CONFIG).exists()
     problems = 0
@@ -393,7 +352,7 @@ def check(
         if data is not None and is_folder:
             config = Path(scratch) / CONFIG
             os.environ[MEASURE_ONLY_VAR] = "1"
-            found = _recognise(data, **selection)
+            found = recognise(data, **selection)
             write_configuration(found, data, config, only_measured=True)
             problems += sum(bool(brain.causes) for brain in found.brains)
             for brain in found.brains:
@@ -446,7 +405,7 @@ def _require_no_selection(data: Path | None, **selection: Any) -> None:
     names = {
         "scheme": "--scheme",
         "files": "--files",
-        "decimal_weeks": "--decimal-weeks, --weeks-days",
+        "notation": "--decimal-weeks, --weeks-days",
     }
     if given := [names[key] for key, value in selection.items() if value is not None]:
         remedy = (
@@ -576,13 +535,14 @@ def measure(
     """
     from ..running.launch import MEASURE_ONLY_VAR
     from .init import commented_scans, write_configuration
+    from .recognition import recognise
 
     config = data / CONFIG if data.is_dir() else data
     os.environ[MEASURE_ONLY_VAR] = "1"
     refused = 0
     found = None
     if not config.exists():
-        found = _recognise(data, **selection)
+        found = recognise(data, **selection)
     else:
         _require_no_selection(data, **selection)
         for line in commented_scans(config) if data.is_dir() else ():
@@ -668,6 +628,8 @@ def predict(
     files: Sequence[Path],
     week: float,
     until: float,
+    atlas: str | None,
+    force: bool,
     directory: Path,
     cores: int,
     dry_run: bool,
@@ -681,18 +643,24 @@ def predict(
     where the predicted surfaces and labels are. After an interruption, the same command
     resumes.
     """
-    from .init import predicted_study, write_prediction
+    from .init import SHIPPED_ATLAS, predicted_study, replace_configuration
 
-    force = settings.pop("force")
-    prediction = predicted_study(files, (week, until), **settings)
-    for line in prediction.warnings:
-        click.echo(line)
-    shown_path = directory / CONFIG
+    if atlas is None:
+        click.echo(
+            f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina"
+            " bifida aperta and are not normal; unoperated ones end at 25 GW"
+        )
+    text, description = predicted_study(
+        files, (week, until), atlas=atlas or SHIPPED_ATLAS, **settings
+    )
+    path = directory / CONFIG
     with _place_to_write(directory, dry_run) as place:
-        for line in write_prediction(
-            prediction, place / CONFIG, shown_path, force=force
-        ):
-            click.echo(line)
+        kept = replace_configuration(
+            place / CONFIG, text, path, "--directory", force=force
+        )
+        if kept:
+            click.echo(f"the earlier configuration is now {kept}")
+        click.echo(f"{description}; configuration: {path}")
         code = _run(
             place / CONFIG,
             directory,
@@ -768,6 +736,7 @@ def bids(
         with_earlier_options,
         write_bids,
     )
+    from .recognition import recognise
 
     require_own_data_set(out)
     work = work or out / "work"
@@ -776,7 +745,7 @@ def bids(
     if level == "group":
         selection = with_earlier_options(options, selection)
     folding = {key: selection[key] for key in ("settings", "fold")}
-    found = _recognise(
+    found = recognise(
         data, **{key: value for key, value in selection.items() if key not in folding}
     )
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]

@@ -2,8 +2,7 @@
 or for a BIDS data set."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import count
 from pathlib import Path
 from string import Template
@@ -47,15 +46,9 @@ def write_configuration(
     comments in it, with the cause.
 
     By default, one of them is folded, and values may be left to fill in. InputError if
-    no scan can be used or if the configuration exists, unless `force` is set: then it
-    gets another name, which is returned.
+    no scan can be used. An earlier configuration is replaced as by
+    `replace_configuration`.
     """
-    if path.exists() and not force:
-        raise InputError(
-            "already exists",
-            path=path,
-            remedy="Choose another file with --output, or add --force.",
-        )
     inside = path.resolve().parent == folder.resolve()
     usable = []
     for brain in found.brains:
@@ -101,25 +94,40 @@ def write_configuration(
         if several and _have_shapes(series, folder):
             measured_run = "\n  measured: {preset: measured}"
         text += _from_template("folding", start=start, end=end, measured=measured_run)
-    kept = _keep_other(path, text)
-    write_text(path, text)
-    return kept
+    return replace_configuration(path, text, path, "--output", force=force)
 
 
 def _from_template(name: str, **values: object) -> str:
     return Template(read_text(TEMPLATES / f"{name}.yaml")).substitute(values)
 
 
-def _keep_other(path: Path, text: str) -> Path | None:
-    """Rename a configuration with another text, such as to gyriflow.yaml.1, and return
-    its new path."""
-    if not path.exists() or read_text(path) == text:
-        return None
-    for number in count(1):
-        other = path.with_name(f"{path.name}.{number}")
-        if not other.exists():
-            break
-    return path.rename(other)
+def replace_configuration(
+    path: Path,
+    text: str,
+    shown_path: Path,
+    option: str,
+    *,
+    force: bool,
+) -> Path | None:
+    """Write a configuration; rename one with another text, such as to gyriflow.yaml.1,
+    and return its new path.
+
+    InputError if the one at `shown_path` has another text, unless `force` is set;
+    `option` of the command names another path.
+    """
+    if shown_path.exists() and read_text(shown_path) != text and not force:
+        raise InputError(
+            "already exists with different content",
+            path=shown_path,
+            remedy=f"Choose another place with {option}, or add --force.",
+        )
+    kept = None
+    if path.exists() and read_text(path) != text:
+        names = (f"{path.name}.{number}" for number in count(1))
+        free = (path.with_name(name) for name in names)
+        kept = path.rename(next(other for other in free if not other.exists()))
+    write_text(path, text)
+    return kept
 
 
 def commented_scans(path: Path) -> list[str]:
@@ -143,40 +151,26 @@ def _grouped_causes(scans: Iterable[tuple[str, str]]) -> list[str]:
     return [line for line, _ in grouped(messages)]
 
 
-@dataclass(frozen=True)
-class PredictedStudy:
-    """The configuration that predicts a brain, what it says, and warnings about it."""
-
-    text: str
-    description: str
-    warnings: list[str]
-
-
 def predicted_study(
     files: Sequence[Path],
     weeks: tuple[float, float],
     *,
     white: Sequence[Path],
-    atlas: str | None,
+    atlas: str,
     folder: Path | None,
     scheme: str | None,
     image: Path | None,
     accepted: bool,
     ensemble: int | None,
     quick: bool,
-) -> PredictedStudy:
-    """Return a configuration that folds a brain by the growth of an atlas.
+) -> tuple[str, str]:
+    """Return a configuration that folds a brain by the growth of an atlas, and a line
+    on it.
 
     `files` are its label volume or pial surfaces; `weeks` are the week of the brain and
     the week to predict; `folder` has the atlas' files; `accepted` is about its licence.
     InputError if anything is missing.
     """
-    warnings = []
-    if atlas is None:
-        warnings.append(
-            f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina"
-            " bifida aperta and are not normal; unoperated ones end at 25 GW"
-        )
     entry = recognise_brain(files, white, scheme)
     if image and "scheme" not in entry:
         raise InputError(
@@ -191,7 +185,7 @@ def predicted_study(
     } | entry
     entry |= {"image": str(own_name(image))} if image else {}
     keys = {
-        "name": atlas or SHIPPED_ATLAS,
+        "name": atlas,
         "folder": folder and str(folder),
         "accept_licence": accepted,
     }
@@ -215,46 +209,11 @@ def predicted_study(
     config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
     load(config)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
-    given = entry.get(
-        "scheme",
-        f"pial{' and white' if white else ''} surfaces",
-    )
-    names = (
-        ", ".join(
-            f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()
-        )
-        or files[0]
-    )
+    sides = entry.get("hemispheres", {}).items()
+    names = ", ".join(f"{side} {path}" for side, path in sides) or files[0]
+    given = entry.get("scheme", "surfaces")
     text = yaml.safe_dump(config, sort_keys=False)
-    return PredictedStudy(
-        text,
-        f"{entry['id']}: {names} ({given}), {span}",
-        warnings,
-    )
-
-
-def write_prediction(
-    prediction: PredictedStudy, path: Path, shown_path: Path, *, force: bool
-) -> Iterator[str]:
-    """Write the configuration of a prediction; yield lines about it.
-
-    InputError if the one at `shown_path` exists with different content and `force` is
-    not set.
-    """
-    text = prediction.text
-    if (
-        shown_path.exists()
-        and shown_path.read_text(encoding="utf-8") != text
-        and not force
-    ):
-        remedy = "Choose another --directory, or add --force."
-        raise InputError(
-            "already exists with different content", path=shown_path, remedy=remedy
-        )
-    if kept := _keep_other(path, text):
-        yield f"the earlier configuration is now {kept}"
-    write_text(path, text)
-    yield f"{prediction.description}; configuration: {shown_path}"
+    return text, f"{entry['id']}: {names} ({given}), {span}"
 
 
 def with_earlier_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:
@@ -347,15 +306,11 @@ def write_bids(
             else:
                 text[key] = value
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
-    is_own = shown_path.with_name(BIDS_OPTIONS).exists() or (
-        shown_path.exists() and read_text(shown_path).startswith(BIDS_HEAD)
-    )
-    if shown_path.exists() and not is_own:
-        remedy = "Choose another folder with --work-dir."
+    if shown_path.exists() and not read_text(shown_path).startswith(BIDS_HEAD):
         raise InputError(
             "was not written by gyriflow bids and is not replaced",
             path=shown_path,
-            remedy=remedy,
+            remedy="Choose another folder with --work-dir.",
         )
     write_text(path, BIDS_HEAD + yaml.safe_dump(text, sort_keys=False))
     names = [brain.entry["id"] for brain in brains]

@@ -91,6 +91,8 @@ ENTITY = re.compile(r"(?<![A-Za-z0-9])(sub|ses)-([^_/.]+)")
 FREESURFER_INPUT = re.compile(r"\.T[12]$")
 """Suffix for the image that a surface was made with: lh.pial is often a link to
 lh.pial.T1."""
+OF_A_TEMPLATE = "of a template, "
+"""Start of the space of files in the folder of a template."""
 RESAMPLED = "resampled"
 """Space of a subject's own surface on the mesh of a template."""
 WHOLE_BRAIN_ML = (15.0, 700.0)
@@ -120,7 +122,6 @@ class FoundBrain:
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     fits: dict[str, str] | None = None
-    is_template: bool = False
     named_age: str = ""
 
     @property
@@ -198,39 +199,35 @@ def _scan_name(file: Path) -> str:
 
 def recognise(
     folder: Path,
-    pattern: str = "*",
+    files: str | None = None,
     scheme: str | None = None,
     notation: WeekNotation | None = None,
     participants: Collection[str] | None = None,
     sessions: Collection[str] | None = None,
 ) -> FoundScans:
-    """Return the scans of a folder and of those in it, from files whose paths match a
-    pattern.
+    """Return the scans of a folder and of those in it, from files whose paths match
+    the pattern `files`, if there is one.
 
     Results and data sets of gyriflow itself are left out. If a `scheme` is named, all
     labels are of it. If `participants` or `sessions` are named, with or without `sub-`
     and `ses-`, files of others are not read. InputError if no scan is found, or none of
     a named participant or session.
     """
-    files = _files_of_others(folder)
-    table_files = [folder / file for file in files if TABLE_NAME.fullmatch(file.name)]
+    paths = _files_of_others(folder)
+    table_files = [folder / path for path in paths if TABLE_NAME.fullmatch(path.name)]
     tables = ScanTables(table_files, notation)
-    unreadable = [file for file in files if (folder / file).is_dir()]
-    candidates = [*_hemispheres(files), *_whole_surfaces(files)]
-    candidates += _volumes(files, unreadable)
+    candidates = [*_hemispheres(paths), *_whole_surfaces(paths)]
+    candidates += _volumes(paths, [path for path in paths if (folder / path).is_dir()])
     found: dict[str, list[FoundBrain]] = defaultdict(list)
     for brain in candidates:
-        if fnmatch(str(brain.file), pattern):
+        if fnmatch(str(brain.file), files or "*"):
             found[_scan_of(brain.file)].append(brain)
     # sessions without labels or surfaces count
     sessions_of: dict[str | None, set[str | None]] = defaultdict(set)
-    for file in files:
-        sessions_of[_label(file, "sub")] |= {_label(file, "ses")} - {None}
+    for path in paths:
+        sessions_of[_label(path, "sub")] |= {_label(path, "ses")} - {None}
     if not found:
-        raise _no_brain(
-            folder,
-            {str(file): _rejection(file) for file in files},
-        )
+        raise _no_brain(folder, {str(path): _rejection(path) for path in paths})
     selected = {
         "sub": {label.removeprefix("sub-") for label in participants or ()},
         "ses": {label.removeprefix("ses-") for label in sessions or ()},
@@ -248,7 +245,7 @@ def recognise(
                 found=", ".join(names[:20]) or "none",
                 remedy="Labels must be equal, with their zeros and case.",
             )
-    unused = _in_other_formats(files)
+    unused = _in_other_formats(paths)
     preferred: dict[str, list[FoundBrain]] = {}
     to_read: list[FoundBrain] = []
     for name, group in found.items():
@@ -266,10 +263,10 @@ def recognise(
     for name, files_of_scan in preferred.items():
         brains += _brains_of_scan(name, found[name], files_of_scan, unused)
     # templates among subjects are not scans
-    templates = [brain for brain in brains if brain.is_template]
+    templates = [brain for brain in brains if brain.space.startswith(OF_A_TEMPLATE)]
     if len(templates) < len(brains):
         unused |= {brain.files: brain.problem for brain in templates}
-        brains = [brain for brain in brains if not brain.is_template]
+        brains = [brain for brain in brains if brain not in templates]
     if not brains:
         if unused:
             raise _no_brain(folder, unused)
@@ -471,7 +468,7 @@ def _space(file: Path, *, is_surface: bool) -> str:
     """Return the space of a file, "" for the subject's own; a subject's surface on a
     template's mesh is resampled."""
     if folders := [part for part in file.parts if TEMPLATE_FOLDER.fullmatch(part)]:
-        return "of a template, " + folders[0]
+        return OF_A_TEMPLATE + folders[0]
     space = SPACE_NAME.search(file.name)
     if (
         is_surface
@@ -665,9 +662,6 @@ def _complete(
             f"has other characters than letters and digits in {_scan_name(brain.file)}"
         )
     elif brain.space and brain.space != RESAMPLED:
-        brain.is_template = any(
-            TEMPLATE_FOLDER.fullmatch(part) for part in brain.file.parts
-        )
         brain.problem = f"is in the space {brain.space}; expected the subject's own"
     elif brain.space:
         brain.warnings.append(
@@ -1035,6 +1029,8 @@ def _choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> 
         choices = [scheme] if scheme else sorted(common & set(names)) or names
         if len(choices) == 1:
             brain.entry["scheme"] = choices[0]
+            if against := (brain.fits or {}).get(choices[0]):
+                brain.warnings.append(f"scheme {choices[0]}: {against}")
             by_subject[brain.entry.get("subject", "")].add(choices[0])
         elif choices:
             brain.notes.append(f"scheme: {' or '.join(choices)} both fit the labels")

@@ -91,7 +91,7 @@ def _surface_area_mm2(week: float) -> float:
     return 9900 * (expected_volume_ml(week) / 51) ** 0.74
 
 
-def linear_elements(week: float, mesh: MeshSettings) -> float:
+def _linear_elements(week: float, mesh: MeshSettings) -> float:
     """Predict the number of linear elements of a brain of a week, from its surface area
     and volume."""
     volume_ml, edge = expected_volume_ml(week), mesh.surface_edge_mm
@@ -106,7 +106,7 @@ def linear_elements(week: float, mesh: MeshSettings) -> float:
 def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     """Predict the cost of a simulation."""
     run, week = simulation.settings, simulation.weeks[0]
-    elements = linear_elements(week, mesh)
+    elements = _linear_elements(week, mesh)
     steps = max(
         (run.end_week - week) * SECONDS_PER_GW / run.step_s,
         1.0,
@@ -215,7 +215,7 @@ def _brain_seconds(
 
 
 def _meshing_seconds(week: float, mesh: MeshSettings) -> float:
-    elements = linear_elements(week, mesh) / (8 if mesh.order == 2 else 1)
+    elements = _linear_elements(week, mesh) / (8 if mesh.order == 2 else 1)
     return MESHING_SECONDS_PER_ELEMENT[mesh.mesher] * elements
 
 
@@ -244,7 +244,7 @@ def _prediction_seconds(
         )
         - start
     )
-    elements = linear_elements(start, study.config.mesh)
+    elements = _linear_elements(start, study.config.mesh)
     following_s = PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
     return PREDICTION_SECONDS + following_s * _fused_share(study, "prediction")
 
@@ -258,7 +258,7 @@ def _series_seconds(
     late weeks take most of it."""
     first = weeks[0]
     last = weeks[-1]
-    elements = linear_elements(first, mesh)
+    elements = _linear_elements(first, mesh)
     per_week_s = SERIES_SECONDS_PER_ELEMENT_AND_WEEK * elements
     duration_gw = last - first
     if study.config.surface.open_sulci:
@@ -286,7 +286,7 @@ def targets_memory_mib(start: Brain, mesh: MeshSettings) -> int:
     """Return the memory limit in MiB for the targets of a start brain, whose linear
     elements are fitted on one rank."""
     needed = predicted_memory_mib(
-        round(linear_elements(start.week, mesh)), 1, "global", 1
+        round(_linear_elements(start.week, mesh)), 1, "global", 1
     )
     return max(MIN_SURFACE_MIB, ceil(ERROR_FACTOR * needed))
 

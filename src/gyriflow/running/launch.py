@@ -42,6 +42,7 @@ from ..io.yaml_files import read_keys
 from ..messages import Message, study_messages
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
+from ..study.study import Study
 from .manifest import Job
 from .planning import (
     Events,
@@ -146,7 +147,7 @@ class Session:
     step, or after a row of a table that cannot be used. If it `is_dry` it runs nothing;
     `viewed` is the working directory that a dry run is a view of. The rules are read
     once to plan, and again to run: then the study `is_planned`, and its messages were
-    printed.
+    printed. `study` is what they have planned, `jobs` are those to run.
     """
 
     is_launched: bool = False
@@ -155,6 +156,8 @@ class Session:
     is_dry: bool = False
     viewed: Path | None = None
     is_planned: bool = False
+    study: Study | None = None
+    jobs: Sequence[Job] = ()
 
 
 session = Session()
@@ -267,7 +270,7 @@ def _check_options(unknown: Sequence[str], usage: str) -> None:
 
 
 @contextmanager
-def output_to(log: Path) -> Iterator[None]:
+def _output_to(log: Path) -> Iterator[None]:
     """Append to a file what libraries and child processes print meanwhile. Python's own
     streams stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
@@ -302,7 +305,7 @@ def output_to(log: Path) -> Iterator[None]:
             setattr(sys, name, stream)
 
 
-def stop_jobs() -> None:
+def _stop_jobs() -> None:
     """Stop all processes below this one, MPI ranks included. Simulations keep their
     last checkpoint."""
     jobs: set[psutil.Process] = set()
@@ -368,7 +371,7 @@ def _finish_without(
     try:
         process.wait()
     except KeyboardInterrupt:
-        stop_jobs()
+        _stop_jobs()
         return process.wait()
     finally:
         path.unlink(missing_ok=True)
@@ -382,7 +385,7 @@ def refused_brains() -> dict[str, str]:
     return read_json(path) if path else {}
 
 
-def exit_code(
+def _exit_code(
     code: int,
     failures: Sequence[Message],
     directory: Path,
@@ -416,7 +419,7 @@ def full_disk(directory: Path) -> str:
     return ""
 
 
-def set_cache(directory: Path) -> None:
+def _set_cache(directory: Path) -> None:
     """Let libraries keep their caches with a study if the home folder cannot be written
     or is unknown."""
     try:
@@ -443,10 +446,10 @@ def _set_environment() -> None:
     os.environ["PATH"] = os.pathsep.join(
         [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
     )
-    set_user_name()
+    _set_user_name()
 
 
-def set_user_name() -> None:
+def _set_user_name() -> None:
     """Name a user whom the system does not know, such as one of `docker run -u`, as
     Snakemake asks for a name."""
     try:
@@ -455,7 +458,7 @@ def set_user_name() -> None:
         os.environ["LOGNAME"] = f"user-{os.getuid()}"
 
 
-def call_snakemake(
+def _call_snakemake(
     arguments: Sequence[str],
     events: Events,
     level: int = logging.INFO,
@@ -523,7 +526,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     # a closed terminal sends several
     if len(received_signals) == 1:
         # while Snakemake waits for its jobs
-        threading.Timer(INTERRUPT_S, stop_jobs).start()
+        threading.Timer(INTERRUPT_S, _stop_jobs).start()
     if len(received_signals) == 1 or number == signal.SIGINT:
         raise KeyboardInterrupt
 
@@ -532,7 +535,7 @@ def _end_scheduler_timers() -> None:
     """End the timers of Snakemake's scheduler, for which Python would wait at its
     end."""
     for thread in threading.enumerate():
-        if isinstance(thread, threading.Timer) and thread.function is not stop_jobs:
+        if isinstance(thread, threading.Timer) and thread.function is not _stop_jobs:
             thread.cancel()
 
 
@@ -575,7 +578,7 @@ def _forced(options: Namespace, jobs: Iterable[Job]) -> list[str]:
     return [*(options.forcerun or []), *wanted]
 
 
-def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
+def _plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     """Have Snakemake plan, and call it again without the results that are outdated;
     return its exit code.
 
@@ -588,7 +591,7 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         restore_results(call.directory)
     is_plain = call.options.dryrun or call.runs
     if not is_plain or _has_any(call.options, MANAGING_OPTIONS):
-        code, _ = run_jobs(call, Plan())
+        code, _ = _run_jobs(call, Plan())
         return code
     # the plan has the forced jobs, and Snakemake would leave out some behind a
     # checkpoint; the last of several options counts
@@ -598,7 +601,7 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
     # its settings are those of a run
     profile = [] if call.options.workflow_profile else ["--workflow-profile", "none"]
     arguments = [*BY_MANIFEST, *call.arguments, *profile, *PLANNING]
-    code = call_snakemake(arguments, events, logging.ERROR)
+    code = _call_snakemake(arguments, events, logging.ERROR)
     if code:
         return code
     with chdir(call.directory if call.directory.is_dir() else call.place):
@@ -608,13 +611,15 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         plan = made_plan(events, session.targets, forced)
         if call.runs:
             keep_contents(plan)
+    session.jobs = [job for job, _ in plan.reasoned_jobs]
     if call.take_plan:
         call.take_plan(plan)
     if not call.is_shown:
         return 0
-    if events.nothing and not plan.reasons:
+    if events.has_nothing and not plan.reasons:
         if left is None:
-            _say_nothing_runs(call, events.nothing)
+            place = sys.stdout if call.options.dryrun else sys.stderr
+            print("gyriflow: everything is up to date", file=place)
         return 0
     if not (call.runs or _has_any(call.options, SNAKEMAKE_LISTS)):
         print(listing(plan, _quiet_words(call.options)), end="")
@@ -625,34 +630,23 @@ def plan_and_run(call: Call, *, left: Collection[str] | None = None) -> int:
         link_results(call.directory, call.place, plan.outdated)
     session.is_planned = True
     try:
-        code, ended = run_jobs(call, plan)
+        code, ended = _run_jobs(call, plan)
         still_left = set(plan.reasons) - ended
         if call.runs and code == 0 and ended and still_left:
-            return plan_and_run(call, left=still_left)
+            return _plan_and_run(call, left=still_left)
         return code
     finally:
         session.is_planned = False
 
 
-def _say_nothing_runs(call: Call, record: logging.LogRecord) -> None:
-    """Print that everything is up to date, or Snakemake's `record` of it if its own
-    messages are asked for."""
-    if call.options.dryrun:
-        print(record.getMessage())
-    elif _has_any(call.options, VERBOSE_OPTIONS):
-        print(record.getMessage(), file=sys.stderr)
-    else:
-        print("gyriflow: everything is up to date", file=sys.stderr)
-
-
-def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
+def _run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
     """Run Snakemake, whose outdated results are hidden, and write the manifest of each
     job that ends; return its exit code, and the keys of these jobs."""
     is_detailed = call.options.verbose or call.options.debug_dag
     level = logging.NOTSET if is_detailed else logging.INFO
     arguments = [*BY_MANIFEST, *call.arguments]
     if not call.runs:
-        return call_snakemake(arguments, Events(plan.reasons), level), set()
+        return _call_snakemake(arguments, Events(plan.reasons), level), set()
 
     unwanted: Collection[str] = ()
     quiet = _quiet_words(call.options)
@@ -669,11 +663,11 @@ def run_jobs(call: Call, plan: Plan) -> tuple[int, set[str]]:
         details = call.directory.resolve() / ".snakemake" / "log" / name
         logger = ("--logger", "gyriflow", "--logger-gyriflow-details", str(details))
         arguments = [*logger, *arguments]
-        output = output_to(details)
+        output = _output_to(details)
     events = Events(plan.reasons, plan.found)
     try:
         with output:
-            code = call_snakemake(arguments, events, level, unwanted)
+            code = _call_snakemake(arguments, events, level, unwanted)
     finally:
         restore_results(call.directory, events.started)
     return code, events.ended
@@ -704,30 +698,28 @@ def main(
     if not (options.configfile or options.snakefile or is_second_pass):
         print(f"gyriflow: {_what_runs(directory)}", file=sys.stderr)
     _check_configfiles(options.configfile or [], directory)
-    with nullcontext() if _has_any(options, READ_ONLY_OPTIONS) else locked(directory):
-        return _run_workflow(arguments, options, take_plan, is_shown=is_shown)
+    session.is_launched = True
+    session.targets = options.targets or ["all"]
+    session.keeps_going = options.keep_going
+    session.is_dry = _has_any(options, READ_ONLY_OPTIONS)
+    session.viewed = None
+    with nullcontext() if session.is_dry else locked(directory):
+        return _run_workflow(arguments, options, directory, take_plan, is_shown)
 
 
 def _run_workflow(
     arguments: Sequence[str],
     options: Namespace,
+    directory: Path,
     take_plan: Callable[[Plan], None] | None,
-    *,
     is_shown: bool,
 ) -> int:
     """Run Snakemake as `main` does, in a working directory that is locked unless
     nothing is run."""
-    directory = options.directory or Path()
-    dry_run = _has_any(options, READ_ONLY_OPTIONS)
-    runs_nothing = dry_run and not options.nolock
+    runs_nothing = session.is_dry and not options.nolock
     if not runs_nothing:
-        set_cache(directory)
+        _set_cache(directory)
     _set_environment()
-    session.is_launched = True
-    session.targets = options.targets or ["all"]
-    session.keeps_going = options.keep_going
-    session.is_dry = dry_run
-    session.viewed = None
     complete = list(arguments)
     # a folder of that name may be in the working directory
     if not options.workflow_profile:
@@ -738,19 +730,19 @@ def _run_workflow(
     began_s = time.time()
     with view_of(directory) if runs_nothing else nullcontext(directory) as place:
         if runs_nothing:
-            set_cache(place)
+            _set_cache(place)
             complete += ["--directory", str(place)]
             if directory.is_dir():
                 session.viewed = directory.absolute()
         call = Call(complete, options, directory, place, take_plan, is_shown)
-        code = plan_and_run(call)
+        code = _plan_and_run(call)
     if code > 128:
         print(
             "gyriflow: interrupted; run the same command again to resume",
             file=sys.stderr,
         )
         return code
-    if code == 0 or dry_run:
+    if code == 0 or session.is_dry:
         return code
     messages = study_messages(directory, began_s)
     failures = [message for message in messages if message.level == "error"]
@@ -758,7 +750,7 @@ def _run_workflow(
         brains = _brains_to_refuse(failures)
         if brains and (interrupted := _finish_without(brains, arguments, directory)):
             return interrupted
-    return exit_code(code, failures, directory)
+    return _exit_code(code, failures, directory)
 
 
 if __name__ == "__main__":

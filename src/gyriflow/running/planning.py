@@ -74,14 +74,14 @@ class Events:
     `reasons` replace Snakemake's own reasons to run a job, by the first of its results.
     `found` are the contents of files before a run, with which the manifest of each job
     that finishes is written. `jobs` are the planned ones by key, `ended` the keys of
-    those that have finished, `started` the results of those that have begun. `nothing`
-    is the record that nothing has to be done.
+    those that have finished, `started` the results of those that have begun.
+    Snakemake `has_nothing` to do if it says so.
     """
 
     reasons: Mapping[str, str] = field(default_factory=dict)
     found: Contents | None = None
     jobs: dict[str, Job] = field(default_factory=dict)
-    nothing: logging.LogRecord | None = None
+    has_nothing: bool = False
     ended: set[str] = field(default_factory=set)
     started: set[str] = field(default_factory=set)
     _selected: dict[int, Any] = field(default_factory=dict)
@@ -110,7 +110,7 @@ class Events:
                     with suppress(StorageError):
                         write_manifest(self.jobs[key], self.found)
             case None if record.getMessage().startswith("Nothing to be done"):
-                self.nothing = record
+                self.has_nothing = True
 
     def _add(self, selected: Any) -> None:
         # a job is selected for each of its results

@@ -142,7 +142,7 @@ def _has_python_headers() -> bool:
     return Path(sysconfig.get_path("include"), "Python.h").is_file()
 
 
-def missing_debian_packages() -> list[str]:
+def _missing_debian_packages() -> list[str]:
     """Return the Debian packages that this system lacks."""
     packages = [LIBRARIES[name] for name in _missing_libraries()]
     if not has_compiler():
@@ -162,4 +162,4 @@ def _install(packages: Iterable[str]) -> str:
 
 
 if __name__ == "__main__":
-    print(*missing_debian_packages())
+    print(*_missing_debian_packages())

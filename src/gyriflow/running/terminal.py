@@ -28,33 +28,10 @@ from ..messages import (
     read_messages,
     write_message,
 )
-from .launch import full_disk, received_signals
+from .cost import job_seconds
+from .launch import full_disk, received_signals, session
 from .status import REPORT_PAGE, STATE, format_duration, format_progress
 
-WEIGHTS = {
-    "simulate": 40.0,
-    "simulate_member": 20.0,
-    "tetrahedralise": 15.0,
-    "register": 7.0,
-    "validation": 7.0,
-    # each with its variants of hemispheres
-    **dict.fromkeys(
-        [
-            f"{rule}{side}{ending}"
-            for side in ("", "_left", "_right")
-            for rule, ending in (
-                ("pial", ""),
-                ("pial", "_with_thickness"),
-                ("measure", ""),
-            )
-        ],
-        4.0,
-    ),
-    "brain_figures": 3.0,
-    "metrics_charts": 3.0,
-}
-"""Relative durations of the slow rules' jobs, for the bar and the remaining time; all
-others count 1. Those of measured brains are of the resources of a study of two."""
 SIGNAL_S = 0.2
 """Time to notice a signal."""
 PERCENT_PER_LINE = 5
@@ -80,14 +57,20 @@ cause."""
 
 
 @dataclass
-class Job:
-    """A running job and its log, beside which are its messages."""
+class RunningJob:
+    """A running job with its predicted time and its log, beside which are its
+    messages."""
 
-    rule: str
     name: str
+    seconds: float
     began: float
     log: Path | None
     step: dict[str, Any] | None = None
+
+
+def _seconds(rule: str, wildcards: Mapping[str, str]) -> float:
+    """Predict the time of a job, or return 1 for a workflow that is no study's."""
+    return job_seconds(session.study, rule, wildcards) if session.study else 1.0
 
 
 class RunDisplay:
@@ -125,7 +108,7 @@ class RunDisplay:
         self.state_file = details.parents[2] / STATE
         self.began = datetime.now()
         self.ended: datetime | None = None
-        self.running: dict[int, Job] = {}
+        self.running: dict[int, RunningJob] = {}
         self.work_done = 0.0
         self.done = self.total = self.next_percent = 0
         self.n_failed = 0
@@ -151,28 +134,28 @@ class RunDisplay:
                 jobs = dict(event["stats"] or {})
                 jobs.pop("total", None)
                 self.total = sum(jobs.values())
-                works = [n * WEIGHTS.get(rule, 1) for rule, n in jobs.items()]
-                self.bar.update(
-                    self.task.id,
-                    total=sum(works),
-                )
+                works = [_seconds(job.rule, job.wildcards) for job in session.jobs]
+                self.bar.update(self.task.id, total=sum(works) or self.total)
                 self.console.print(
                     f"gyriflow: {self.total} steps to run; log: {self.details}"
                 )
                 self.bar.start()
             case "job_info":
-                wildcards = " ".join((event["wildcards"] or {}).values())
+                wildcards = dict(event["wildcards"] or {})
                 log = Path(event["log"][0]) if event["log"] else None
                 if log:
                     # those of an earlier try
                     messages_file(log).unlink(missing_ok=True)
-                name = f"{event['rule_name']} {wildcards}".strip()
-                self.running[event["jobid"]] = Job(
-                    event["rule_name"], name, self.clock(), log
+                rule = event["rule_name"]
+                self.running[event["jobid"]] = RunningJob(
+                    " ".join([rule, *wildcards.values()]),
+                    _seconds(rule, wildcards),
+                    self.clock(),
+                    log,
                 )
             case "job_finished" if job := self.running.pop(event["job_id"], None):
                 self._follow(job)
-                self.work_done += WEIGHTS.get(job.rule, 1.0)
+                self.work_done += job.seconds
             case "job_error":
                 # a signal to all processes may have ended a job before it is noticed
                 # here
@@ -247,7 +230,7 @@ class RunDisplay:
             if job.step:
                 since = self.clock() - job.began
                 share = since / max(since + job.step["left_s"], 1e-9)
-                done += WEIGHTS.get(job.rule, 1.0) * share
+                done += job.seconds * share
         self.bar.update(
             self.task.id,
             completed=max(done, self.task.completed),
@@ -303,7 +286,7 @@ class RunDisplay:
             steps = "" if self.done == self.total else f", {done}"
             self.console.print(f"gyriflow: done in {took}{steps}{report}")
 
-    def _follow(self, job: Job) -> None:
+    def _follow(self, job: RunningJob) -> None:
         """Show what a job has written to its messages since."""
         if job.log is None:
             return

@@ -125,8 +125,7 @@ def test_a_profile_names_the_number_of_jobs_and_an_executor_to_be_installed(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "config.yaml").write_text("executor: moon\n")
     profile = ["--profile", str(tmp_path)]
-    with pytest.raises(SystemExit, check=lambda end: end.code == 2):
-        launch.main(["-n", *profile])
+    assert launch.main(["-n", *profile]) == 2
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "moon" in line]
     assert line == Facts("gyriflow:", "snakemake-executor-plugin-moon", "cluster.md")
     # a forecast is for the jobs that run at once
@@ -448,7 +447,7 @@ def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(
         str(tmp_path / home) if home == "file" else home or str(tmp_path / "home"),
     )
     monkeypatch.setenv("XDG_CACHE_HOME", "")
-    launch.set_cache(tmp_path)
+    launch._set_cache(tmp_path)
     expected = str(tmp_path / ".snakemake" / "cache") if home else ""
     assert os.environ["XDG_CACHE_HOME"] == expected
 
@@ -469,5 +468,5 @@ def test_a_full_disk_is_the_cause_where_no_step_has_named_another(
         shutil, "disk_usage", lambda path: SimpleNamespace(total=2**31, free=free)
     )
     failures = [Message("error", "x", exit_code=code) for code in codes]
-    assert launch.exit_code(1, failures, tmp_path) == expected
+    assert launch._exit_code(1, failures, tmp_path) == expected
     assert bool(capsys.readouterr().err) == (expected == 5)

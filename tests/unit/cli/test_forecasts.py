@@ -7,19 +7,18 @@ from configurations import LABELLED
 from facts import Facts
 
 from gyriflow.cli import check as checking
-from gyriflow.cli.check import PlannedJob, work_of
-from gyriflow.io.files import write_json
+from gyriflow.cli.check import work_of
 from gyriflow.running.cost import (
     MIN_SURFACE_MIB,
     Needs,
     job_limits,
     job_seconds,
-    linear_elements,
     simulation_needs,
     surface_memory_mib,
     targets_memory_mib,
 )
-from gyriflow.settings.stages import MeshSettings
+from gyriflow.running.manifest import Job
+from gyriflow.running.planning import BY_ANOTHER_JOB
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
@@ -41,21 +40,6 @@ STUDY = {
         "measured": {"preset": "measured", "start": "x22", "end_week": 30},
     },
 }
-
-
-@pytest.mark.parametrize(
-    ("week", "mesher", "edge", "core", "elements"),
-    [
-        (21, "tetgen", 0.67, 4.0, 156_307),
-        (21, "pytetwild", 0.72, 2.5, 463_621),
-        (22, "tetgen", 1.6, 5.0, 31_232),
-    ],
-)
-def test_a_mesh_has_about_as_many_elements_as_those_that_were_made(
-    week, mesher, edge, core, elements
-):
-    mesh = MeshSettings(mesher=mesher, surface_edge_mm=edge, core_edge_mm=core)
-    assert elements / 1.5 < linear_elements(week, mesh) < 1.5 * elements
 
 
 JOBS = [
@@ -114,17 +98,21 @@ def test_the_memory_of_a_surface_follows_the_header(tmp_path):
     assert needed(0.8, 512) < needed(0.25, 320)
 
 
+def planned(rule, inputs=(), outputs=(), threads=1, **wildcards):
+    """Return a job of a plan, with files of one role."""
+    files = {"": list(inputs)}
+    return Job(rule, files, [*outputs], None, dict, wildcards, lambda: threads)
+
+
 HOURS = {"atlas_path": 4, "kept_path": 0, "predicted_targets": 1, "simulate": 6}
 """Forecasts of jobs, in place of those by the sizes of brains."""
 REASON = "Missing output files: x"
 PATH, SHAPES = "results/x22/shapes.h5", "results/a/targets.atlas.h5"
-MAKE_PATH = PlannedJob("atlas_path", {"brain": "x22"}, 1, REASON, ["x"], [PATH])
-KEPT_PATH = PlannedJob("kept_path", {"brain": "x22"}, 1, REASON, [], [PATH])
-TARGETS = PlannedJob("predicted_targets", {}, 1, REASON, ["x", PATH], [SHAPES])
-EXPECTED, RATES = (
-    PlannedJob("simulate", {"run": run, "brain": "a"}, 2, REASON, [SHAPES])
-    for run in ("expected", "rates")
-)
+MAKE_PATH = planned("atlas_path", ["x"], [PATH], brain="x22")
+KEPT_PATH = planned("kept_path", [], [PATH], brain="x22")
+TARGETS = planned("predicted_targets", ["x", PATH], [SHAPES])
+EXPECTED = planned("simulate", [SHAPES], threads=2, run="expected", brain="a")
+RATES = planned("simulate", [SHAPES], threads=2, run="rates", brain="a")
 
 
 @pytest.fixture
@@ -141,8 +129,9 @@ def forecast(monkeypatch, tmp_path):
         lambda folding, _: Needs(5 * 3600, 1024 * memory_gib[folding.run], 0),
     )
 
-    def lines(jobs, cores=1, study=None):
-        monkeypatch.setattr(checking, "plan", lambda *_, **__: jobs)
+    def lines(jobs, cores=1, study=None, reason=REASON):
+        reasoned = [(job, reason) for job in jobs]
+        monkeypatch.setattr(checking, "plan", lambda *_, **__: reasoned)
         study = study or resolve(load(STUDY))
         found = work_of(tmp_path / "x.yaml", tmp_path / "study", cores, [], study)
         return [line for line, _ in found]
@@ -170,7 +159,7 @@ def test_a_study_takes_its_work_on_all_cores_or_its_longest_chain(
 
 
 def test_the_work_and_the_largest_memory_of_a_study_are_those_of_its_foldings(forecast):
-    jobs = [EXPECTED, RATES, *[PlannedJob("measure", {}, 1, REASON)] * 7]
+    jobs = [EXPECTED, RATES, *[planned("measure")] * 7]
     found = forecast(jobs, 1)
     assert found[:2] == [
         "to run: 9 steps",
@@ -199,9 +188,8 @@ def test_a_path_is_said_to_be_of_this_study_or_of_all_with_its_folder(
         atlas["folder"] = str(tmp_path / folder)
     folding = {"preset": "expected", "end_week": 24}
     study = {"brains": STUDY["brains"][:1], "start": "a"}
-    brain = {"brain": "spina-bifida-unoperated-22"}
     found = forecast(
-        [PlannedJob("atlas_path", brain, 1, REASON)],
+        [planned("atlas_path", brain="spina-bifida-unoperated-22")],
         study=resolve(load(study | {"folding": folding, "atlas": atlas})),
     )
     (line,) = [line for line in found if line.startswith("path of")]
@@ -213,18 +201,11 @@ def test_a_path_is_said_to_be_of_this_study_or_of_all_with_its_folder(
     ("reason", "words"),
     [
         ("Missing output files: a.csv, b.csv", "Missing output files"),
-        (
-            "Input files updated by another job: pial",
-            "Input files updated by another job",
-        ),
+        (f"{BY_ANOTHER_JOB}: pial", BY_ANOTHER_JOB),
         ("changed input a b.nii.gz, c.nii", "changed input a b.nii.gz, c.nii"),
-        ("changed code", "changed code (gyriflow 0.1, now 0.2)"),
     ],
 )
-def test_why_a_step_runs_is_said_in_words(
-    forecast, tmp_path, monkeypatch, reason, words
+def test_why_a_step_runs_is_said_without_the_files_of_a_general_reason(
+    forecast, reason, words
 ):
-    monkeypatch.setattr(checking, "version", lambda: "0.2")
-    provenance = tmp_path / "study" / "results" / "report" / "provenance.json"
-    write_json(provenance, {"gyriflow": "0.1"})
-    assert forecast([PlannedJob("rule", {}, 1, reason)])[1] == f"  {words}: rule"
+    assert forecast([planned("rule")], reason=reason)[1] == f"  {words}: rule"

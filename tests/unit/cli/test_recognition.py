@@ -190,19 +190,18 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
         Facts(f"GA{week}", week, f"name ({week})", volume, scheme, "ok")
         for week in (21, 22)
     ]
-    assert output == Facts(f"{scheme}: 2", "2 scans")
+    assert output == Facts("2 scans")
     config = configured(tmp_path)
     weeks = {brain.id: brain.week for brain in config.brains}
     assert weeks == {"GA21": 21.0, "GA22": 22.0}
     assert (config.start, config.mesh.order) == ("GA21", 2)
     assert list(config.runs) == ["reference", "measured"]
+    (tmp_path / "gyriflow.yaml").write_text("mine")
     with pytest.raises(InputError, check=Facts("gyriflow.yaml", "--force")):
         write_configuration(recognise(tmp_path), tmp_path, tmp_path / "gyriflow.yaml")
+    # what contradicts a scheme that is asked for
     output = called("init", tmp_path, "--force", "--scheme", "drawem-9")
-    # the contradiction to the chosen scheme, the names of others only
-    head, against, others = output.splitlines()[:3]
-    assert (head, against) == (Facts("scheme drawem-9", 2), Facts("but"))
-    assert others.endswith(": crl, dhcp-19, freesurfer, multi-bounti-43")
+    assert output.count("scheme drawem-9: ") == 2
     assert {brain.scheme for brain in configured(tmp_path).brains} == {"drawem-9"}
 
 

@@ -250,11 +250,11 @@ def test_a_run_that_leaves_planned_jobs_is_planned_again(
     def plan_rest(*_):
         return Plan(reasons=dict.fromkeys(waiting, "missing"))
 
-    monkeypatch.setattr(launch, "call_snakemake", lambda *_: 0)
+    monkeypatch.setattr(launch, "_call_snakemake", lambda *_: 0)
     monkeypatch.setattr(launch, "made_plan", plan_rest)
-    monkeypatch.setattr(launch, "run_jobs", run)
+    monkeypatch.setattr(launch, "_run_jobs", run)
     call = launch.Call([], parsed, tmp_path, tmp_path)
-    assert launch.plan_and_run(call) == code
+    assert launch._plan_and_run(call) == code
     assert len(calls) == n_runs
     assert calls[0] == {"a", "b", "c"}
     assert not launch.session.is_planned
@@ -273,7 +273,7 @@ def test_jobs_that_have_ended_are_known(note):
 def test_output_goes_to_a_file_meanwhile_and_then_to_where_it_went(tmp_path, capfd):
     log = tmp_path / "log" / "details"
     for text in ("first", "second"):
-        with launch.output_to(log):
+        with launch._output_to(log):
             os.system(f"echo {text} child")
             print(f"{text} python")
         os.system("echo after")

@@ -125,7 +125,7 @@ def test_without_pythons_headers_only_simulations_are_refused(
     package = f"python3.{sys.version_info.minor}-dev"
     with pytest.raises(InputError, check=Facts("Python.h", f"install {package}")):
         require_for(SIMULATE)
-    assert requirements.missing_debian_packages() == [package]
+    assert requirements._missing_debian_packages() == [package]
 
 
 def test_ziglang_serves_where_there_is_no_compiler(monkeypatch, without_compiler):

@@ -23,7 +23,8 @@ from gyriflow.messages import (
     write_message,
 )
 from gyriflow.running import terminal
-from gyriflow.running.launch import hold_lock
+from gyriflow.running.launch import Session, hold_lock
+from gyriflow.running.manifest import Job
 from gyriflow.running.provenance import check_results_belong_to, input_contents
 from gyriflow.running.status import STATE, status
 from gyriflow.running.terminal import RunDisplay
@@ -103,12 +104,16 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
     assert done == {"done": 100, "total": 100, "running": []}
 
 
-def test_surfaces_and_metrics_count_more_than_tables(run):
-    run.plan(pial_with_thickness=1, measure=1, metrics_tables=2, total=4)
-    for number, rule in enumerate(("pial_with_thickness", "measure")):
+def test_a_job_counts_as_long_as_it_is_predicted_to_take(run, monkeypatch):
+    seconds = {"pial": 8.0, "measure": 8.0, "metrics_tables": 2.0}
+    monkeypatch.setattr(terminal, "job_seconds", lambda _, rule, __: seconds[rule])
+    rules = ("pial", "measure", "metrics_tables", "metrics_tables")
+    jobs = [Job(rule, {}, [rule], None, dict) for rule in rules]
+    monkeypatch.setattr(terminal, "session", Session(study=object(), jobs=jobs))
+    run.plan(pial=1, measure=1, metrics_tables=2, total=4)
+    for number, rule in enumerate(rules[:3]):
         run.begin(rule, number=number)
         run.end(number, number + 1, 4)
-    run.begin("metrics_tables", number=2)
     assert [line.split("%")[0].strip() for line in run.lines[1:]] == ["0", "40", "80"]
 
 
