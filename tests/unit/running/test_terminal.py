@@ -82,6 +82,7 @@ class Run:
 @pytest.fixture
 def run(tmp_path, monkeypatch):
     monkeypatch.setattr(terminal, "SIGNAL_S", 0.0)
+    monkeypatch.setattr(terminal, "session", Session())
     return Run(tmp_path)
 
 
