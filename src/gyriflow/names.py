@@ -1,10 +1,14 @@
 """Names that become one: in folders, labels and columns, where two things must not
 share a name."""
 
+import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 
 from .errors import InputError
+
+DEVICE = re.compile(r"(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?", re.IGNORECASE)
+"""Names that Windows takes for devices, so that its disks have no folders of them."""
 
 
 def merged_names(

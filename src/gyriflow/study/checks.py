@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
-from ..names import column_part, folder_name, merged_names
+from ..names import DEVICE, column_part, folder_name, merged_names
 from ..quantities import METRICS
 from ..settings.base import Key, KeyProblem, Problems, did_you_mean, problems_in
 from ..settings.folding import VARYING, value_problems
@@ -109,6 +109,16 @@ def _names(config: Config) -> Problems:
             f"the sweeps {first} and {second} {MIXED_UP}; rename one",
             ("sweeps", second),
         )
+    named: list[tuple[str, Key]] = [(name, ("brains",)) for name in counts]
+    named += [(name, ("runs", name)) for name in config.runs]
+    named += [(name, ("sweeps", name)) for name in config.sweeps]
+    for name, key in named:
+        if DEVICE.fullmatch(name):
+            yield KeyProblem(
+                f"found {name}, a device on Windows, whose disks have no folder of this"
+                " name; choose another",
+                key,
+            )
     taken = [("runs", name) for name in config.runs if name == OBSERVED]
     taken += [("schemes", name) for name in config.schemes if name in SCHEMES]
     for name in config.sweeps:

@@ -41,6 +41,7 @@ def folder(tmp_path):
     study | {start: 2026-11-29} | start | ["2026-11-29", quotes]
     study | {start: off} | start | ["no", "off", quotes]
     study | {start: 17} | start | [17, quotes]
+    study | {runs: {NUL: {}}} | runs.NUL | [NUL, Windows]
     study | {brains: [l.nii.gz]} | "brains[0]" | [keys]
     brain | {labels: a.nii.gz, scheme: binary, pial: all.stl} | "" | [labels, shape]
     brain | {} | "" | [labels, hemispheres, pial, shape]
