@@ -6,7 +6,6 @@ import pytest
 from ellipsoid import CENTRE_MM, RUN, brain_mesh
 from facts import Facts
 from shapes import box_mesh, joined
-from verification_cases.boxes import box_zones
 
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding import zones as zones_module
@@ -83,19 +82,6 @@ def test_the_planes_follow_the_fissure(gap):
     from_middle = np.abs(pair.vertices[zones.facets, 0] - MIDDLE_MM).max(axis=1)
     walls = np.abs(from_middle - gap / 2) < 1e-9
     assert set(zones.facet_zone[walls]) == {LEFT_CONTACT, RIGHT_CONTACT}
-    assert (zones.growing == 1).all()
-
-
-def test_the_sides_of_a_box_slide_in_their_planes():
-    box = box_mesh((4, 3, 2), (8.0, 6.0, 4.0))
-    values = {"contact": "none", "support": "free"}
-    zones = box_zones(box, parameters_from(RUN | values))
-    x, y, z = box.vertices.T
-    low = z == -2.0
-    np.testing.assert_array_equal(zones.fixed[:, 0], (np.abs(x) == 4.0) | low)
-    np.testing.assert_array_equal(zones.fixed[:, 1], (np.abs(y) == 3.0) | low)
-    np.testing.assert_array_equal(zones.fixed[:, 2], low)
-    assert (box.vertices[zones.cortex_facets][:, :, 2] == 2.0).all()
     assert (zones.growing == 1).all()
 
 

@@ -16,7 +16,7 @@ from gyriflow.geometry.deformations import (
     MatchedSurfaces,
     transform_points,
 )
-from gyriflow.geometry.diffusion import cell_sizes, diffuse, vertex_sizes
+from gyriflow.geometry.diffusion import cell_sizes, vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import (
@@ -24,7 +24,7 @@ from gyriflow.geometry.tetrahedra import (
     boundary_surface,
     linear_pieces,
 )
-from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
+from gyriflow.geometry.triangles import TriangleMesh, signed_volume
 from gyriflow.growth.atlas_path import AtlasPath
 from gyriflow.growth.expected import (
     LASTING_GW,
@@ -45,13 +45,6 @@ BALL = ellipsoid_mesh(8, (20.0, 20.0, 20.0))
 WEEKS = [22.0, 23.0, 24.0]
 
 
-def apart_mm(moving, surface):
-    """Return the mean distance of a surface's vertices from another one, weighted by
-    area."""
-    distances, _, _ = nearest_on(moving.vertices, surface)
-    return np.average(distances, weights=vertex_areas(moving))
-
-
 def wavy(height_mm):
     """Return a sphere with waves of a height in mm."""
     ball = sphere(20.0, 4)
@@ -59,16 +52,6 @@ def wavy(height_mm):
     wave = np.sin(9 * x) * np.cos(8 * y + 1) + np.sin(8 * z + 2) * np.cos(7 * x)
     radius = 1 + height_mm * wave / 20
     return TriangleMesh(ball.vertices * radius[:, None], ball.faces)
-
-
-def test_a_smoothed_surface_is_fitted_onto_the_folded_one():
-    folded = wavy(1.0)
-    smooth = diffuse(folded.vertices, folded.faces, folded.vertices, 3.0)
-    smoothed = TriangleMesh(smooth, folded.faces)
-    assert apart_mm(smoothed, folded) > 0.3
-    fitted = TriangleMesh(fit_onto_surface(smoothed, folded), folded.faces)
-    assert apart_mm(fitted, folded) < 0.06
-    assert apart_mm(folded, fitted) < 0.06
 
 
 def test_needles_do_not_throw_vertices_off_the_surface():
