@@ -116,9 +116,7 @@ class SelfContact:
             0.0,
         )
         self.begin_step()
-        part, mesh = self._search.part_at(start)
-        crosses = ipctk.has_intersections(mesh, part.restrict(start))
-        if domain.comm.allreduce(crosses, op=MPI.LOR):
+        if self.crosses(start):
             raise MeshError(
                 "the pial surface of the mesh crosses itself, which contact cannot"
                 " undo",
@@ -134,6 +132,14 @@ class SelfContact:
             # round-off must not make a pair of surface elements exactly at the limit
             self._max_mm = MAX_GAP_FRACTION * _small_gap_mm(gaps)
             self.begin_step()
+
+    def crosses(self, positions: Floats) -> bool:
+        """Return whether the surface at (s, 3) positions in mm crosses itself."""
+        part, mesh = self._search.part_at(positions)
+        crosses = ipctk.has_intersections(
+            mesh, part.restrict(positions), broad_phase=ipctk.LBVH()
+        )
+        return self.domain.comm.allreduce(crosses, op=MPI.LOR)
 
     def _lower_gaps(self, gaps: Floats, near: NearPairs) -> None:
         """Lower the gap (n,) of each vertex to the smallest of a rank's pairs with it

@@ -121,11 +121,13 @@ class ContactSearch:
         # each with the range of positions for which it holds
         self._part: tuple[SurfacePart, SearchRange] | None = None
         self._candidates: tuple[ipctk.Candidates, SearchRange] | None = None
+        # it has the areas at the step's start
+        self._mesh: ipctk.CollisionMesh | None = None
         if previous is not None:
             self._part = previous._part
             self._candidates = previous._candidates
-        # of each step its own: it has the areas at the step's start
-        self._mesh: ipctk.CollisionMesh | None = None
+            if np.array_equal(rest_mm, previous._rest):
+                self._mesh = previous._mesh
         self._broad_phase = ipctk.LBVH()
 
     def near(self, positions: Floats) -> NearPairs:

@@ -25,10 +25,6 @@ RUNGS = ("cg", "cg, tangent shifted")
 """Ways to solve a linear system: the second is tried where the first fails. A column of
 the step table."""
 PLAIN, SHIFTED = range(2)
-MAX_PARTS = 256
-"""Parts of the mesh whose rigid motions are the coarse level."""
-COARSE_LIFETIME = 8
-"""Number of assembled tangents for which a coarse level is used."""
 REGULARISATION = 1e-6
 """Shift of the coarse matrix, as a fraction of its mean diagonal entry."""
 _REASONS = PETSc.KSP.ConvergedReason
@@ -42,6 +38,23 @@ before that is detected."""
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
 """Shifts of a tangent's diagonal, as fractions of it, tried in turn until the tangent
 is positive definite."""
+
+
+@dataclass(frozen=True)
+class CoarseSettings:
+    """The coarse level of the preconditioner: the rigid motions of at most `max_parts`
+    parts of the mesh, used for `lifetime` assembled tangents.
+
+    It has the stiffness of the elements, and `with_contributions` also that of the
+    contributions to the energy, such as stiff springs.
+    """
+
+    max_parts: int = 256
+    lifetime: int = 8
+    with_contributions: bool = False
+
+
+DEFAULT_COARSE = CoarseSettings()
 
 
 class NotConvergedError(SolverError):
@@ -72,13 +85,19 @@ class TwoLevelPreconditioner:
     is the elastic part alone.
     """
 
-    def __init__(self, domain: Domain, tangent: Tangent) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        tangent: Tangent,
+        settings: CoarseSettings = DEFAULT_COARSE,
+    ) -> None:
         self._domain = domain
+        self._settings = settings
         self._tangent = tangent
         first, end = domain.space.dofmap.index_map.local_range
         self._own = slice(first, end)
         count = min(
-            MAX_PARTS,
+            settings.max_parts,
             max(len(domain.positions) // 50, 1),
         )
         self._part_of_vertex = bisect_points(domain.positions, count)
@@ -92,15 +111,15 @@ class TwoLevelPreconditioner:
         own_parts = np.unique(self._part[self._own])
         self._moved = (6 * own_parts[:, None] + np.arange(6)).ravel()
         self._fixed = np.flatnonzero(tangent.elastic.matrix.fixed[self._own])
-        self._made_at = -COARSE_LIFETIME
+        self._made_at = -settings.lifetime
 
     def renew(self) -> None:
         """Update the diagonal to the present tangent, and the coarse level after
-        `COARSE_LIFETIME` tangents."""
+        its lifetime."""
         inverses = inverse_blocks(self._tangent.diagonal())
         self._inverse_diagonal = inverses.astype(np.float32)
         n_assembled = self._tangent.elastic.assembled
-        if n_assembled >= self._made_at + COARSE_LIFETIME:
+        if n_assembled >= self._made_at + self._settings.lifetime:
             self._made_at = n_assembled
             self._set_coarse_level()
 
@@ -136,6 +155,11 @@ class TwoLevelPreconditioner:
         half = restriction @ (matrix.half() @ prolongation)
         coarse = self._domain.sum_over_ranks(half.toarray())
         coarse += coarse.T
+        if self._settings.with_contributions:
+            for part in self._tangent.parts:
+                rows = sparse.csr_matrix(part.getValuesCSR()[::-1], part.getSize())
+                added = restriction @ (rows @ prolongation)
+                coarse += self._domain.sum_over_ranks(added.toarray())
         scale = np.trace(coarse) / len(coarse)
         coarse[np.diag_indices(len(coarse))] += REGULARISATION * scale
         motions = self._tangent.motions
@@ -209,8 +233,14 @@ class LinearSolver:
     found, not the solution of a step.
     """
 
-    def __init__(self, problem: NonlinearProblem, max_iterations: int) -> None:
+    def __init__(
+        self,
+        problem: NonlinearProblem,
+        max_iterations: int,
+        coarse: CoarseSettings,
+    ) -> None:
         self._problem = problem
+        self._coarse = coarse
         self._preconditioner: TwoLevelPreconditioner | None = None
         self._level = 0  # index in SHIFTS of the shift that the last tangent needed
         self._cg = PETSc.KSP().create(problem.domain.comm)
@@ -272,7 +302,7 @@ class LinearSolver:
         the direction."""
         domain = self._problem.domain
         if self._preconditioner is None:
-            self._preconditioner = TwoLevelPreconditioner(domain, tangent)
+            self._preconditioner = TwoLevelPreconditioner(domain, tangent, self._coarse)
             multilevel = self._cg.getPC()
             multilevel.setType("python")
             multilevel.setPythonContext(self._preconditioner)

@@ -10,7 +10,14 @@ import numpy as np
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..geometry.triangles import Floats
 from ..units import M_PER_MM, MM_PER_M
-from .linear_solver import PLAIN, Direction, LinearSolver, NotConvergedError
+from .linear_solver import (
+    DEFAULT_COARSE,
+    PLAIN,
+    CoarseSettings,
+    Direction,
+    LinearSolver,
+    NotConvergedError,
+)
 from .problem import NonlinearProblem
 from .tangent import Residual, Tangent
 
@@ -48,6 +55,7 @@ class NewtonSettings:
     max_backtracks: int = 8
     min_progress: float = 1e-6
     keeps_iterates: bool = False
+    coarse: CoarseSettings = DEFAULT_COARSE
 
 
 @dataclass
@@ -130,7 +138,7 @@ class NewtonSolver:
         self.problem = problem
         self.settings = settings
         self.residual_floor = residual_floor
-        self.linear_solver = LinearSolver(problem, settings.max_krylov)
+        self.linear_solver = LinearSolver(problem, settings.max_krylov, settings.coarse)
         # fraction of the residual after the first iteration of the last step
         self._first_left = 0.0
         self.last: Residual | None = None

@@ -12,6 +12,7 @@ import ufl
 from dolfinx.la import InsertMode, MatrixCSR
 from petsc4py import PETSc
 
+from ..geometry.jacobians import determinants
 from ..geometry.tetrahedra import PIECES_OF_ORDER, whole_faces
 from ..geometry.triangles import Floats, Indices, Ints
 from ..mechanics.materials import Material
@@ -214,7 +215,7 @@ class NonlinearProblem:
         H = G_inverse
         self._det_V = np.ones_like(mu)
         if V is not None:
-            self._det_V = np.linalg.det(V)
+            self._det_V = determinants(V)
             weight = mu / self._det_V
             H = V @ G_inverse
         _set_at_points(self._weight, weight)

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import SolverError
-from ..geometry.jacobians import EDGES
+from ..geometry.jacobians import EDGES, determinants
 from ..geometry.straightening import InnerSides
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
@@ -205,7 +205,7 @@ class Folding:
             part,
         )
         if not p.targets:
-            ratio = 1.0 / domain.min_over_ranks(np.linalg.det(inverse))
+            ratio = 1.0 / domain.min_over_ranks(determinants(inverse))
             if ratio > MAX_STEP_VOLUME_RATIO:
                 raise NotConvergedError(
                     f"tissue grows to {ratio:.1f} times its volume in one step"

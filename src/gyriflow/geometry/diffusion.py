@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import cg
 
+from .jacobians import EDGES, SLOPES, chunks, cofactors_of, element_maps
 from .tetrahedra import volumes_between
 from .triangles import Floats, Indices, TriangleMesh, face_areas
 
@@ -181,8 +182,30 @@ def _solve(
 def stiffness_matrix(vertices: Floats, cells: Indices) -> sparse.csr_matrix:
     """Return the (n, n) stiffness matrix of linear finite elements, positive
     semidefinite."""
+    if cells.shape[1] == 4:
+        return _stiffness_of_tetrahedra(vertices, cells)
     cotangents = igl.cotmatrix(
         np.ascontiguousarray(vertices),
         np.ascontiguousarray(cells, dtype=np.int64),
     )
     return sparse.csr_matrix(-cotangents)
+
+
+def _stiffness_of_tetrahedra(vertices: Floats, tets: Indices) -> sparse.csr_matrix:
+    # three times as fast as by igl
+    between = np.empty((len(EDGES), len(tets)))
+    for chunk in chunks(len(tets)):
+        (maps,) = element_maps(vertices, tets[chunk], SLOPES[None])
+        cofactors = cofactors_of(maps)
+        volumes6 = np.abs((maps[0] * cofactors[0]).sum(axis=0))
+        # gradients of the shape functions, times six volumes
+        gradients = np.concatenate([-cofactors.sum(axis=0)[None], cofactors])
+        for edge, (i, j) in enumerate(EDGES):
+            products = (gradients[i] * gradients[j]).sum(axis=0)
+            between[edge, chunk] = products / (6 * volumes6)
+    ends = np.sort(tets[:, EDGES], axis=2)
+    rows, columns = ends.transpose(2, 1, 0).reshape(2, -1)
+    size = (len(vertices), len(vertices))
+    above = sparse.coo_matrix((between.ravel(), (rows, columns)), shape=size).tocsr()
+    matrix = above + above.T
+    return sparse.csr_matrix(matrix - sparse.diags(np.ravel(matrix.sum(axis=1))))

@@ -10,9 +10,11 @@ from scipy import sparse
 from .jacobians import (
     CORNER_PARTS,
     EDGES,
+    SLOPES,
     chunks,
     coefficients,
     determinants,
+    element_maps,
     lower_bounds,
     shape_values,
 )
@@ -147,10 +149,8 @@ def volumes_between(vertices: Floats, tets: Indices) -> Floats:
         return coefficients(vertices, tets).mean(axis=1) / 6
     volumes = np.empty(len(tets))
     for chunk in chunks(len(tets)):
-        elements = tets[chunk]
-        first = vertices[elements[:, :1]]
-        edges = np.take(vertices, elements[:, 1:], axis=0) - first
-        volumes[chunk] = determinants(edges) / 6.0
+        (edges,) = element_maps(vertices, tets[chunk], SLOPES[None])
+        volumes[chunk] = determinants(np.moveaxis(edges, 2, 0)) / 6.0
     return volumes
 
 

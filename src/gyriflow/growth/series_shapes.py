@@ -44,7 +44,7 @@ PULL_TOL = 1e-3
 REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
 """Largest distance over which a surface pulls: to points matched by normals, and by the
 tissue below."""
-FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
+FINAL_PULL_MM, OPENING_PULL_MM = 0.5, 0.6
 """Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before
 it with open sulci."""
 MAX_OPENING_DRAWS, OPENED_MM, MAX_GAP_LEFT = 6, 0.06, 0.9
@@ -80,23 +80,51 @@ def fit_onto_surface(
     without a slit opens to both banks of a sulcus.
     """
     vertices = moving.vertices
-    reach_mm = REACH_MM if inner is None else REACH_BY_TISSUE_MM
     for spread_mm in pull_mm:
         moved = TriangleMesh(vertices, moving.faces)
+        vertices = _Pulls.of(moved, surface, inner).goals(spread_mm)
+    return vertices
+
+
+@dataclass(frozen=True, eq=False)
+class _Pulls:
+    """The pulls of a surface on the vertices of a moved one: their weighted (n, 3)
+    sums, and the (n,) sums of the weights, which are areas."""
+
+    moved: TriangleMesh
+    pull: Floats
+    weight: Floats
+    reach_mm: float
+
+    @classmethod
+    def of(
+        cls,
+        moved: TriangleMesh,
+        surface: TriangleMesh,
+        inner: Floats | None,
+    ) -> "_Pulls":
+        """Return the pulls on a surface with tissue below its vertices at (n, 3) places
+        `inner`, if that counts."""
+        reach_mm = REACH_MM if inner is None else REACH_BY_TISSUE_MM
         pull, weight = _pulls(moved, surface, inner, reach_mm)
+        return cls(moved, pull, weight, reach_mm)
+
+    def goals(self, spread_mm: float) -> Floats:
+        """Return the (n, 3) places to which the pulls move the vertices, smoothed over
+        a length."""
+        moved = self.moved
         areas = np.maximum(vertex_areas(moved), 1e-9)
-        pulled = np.column_stack([pull, weight]) / areas[:, None]
-        smooth = diffuse(vertices, moving.faces, pulled, spread_mm, PULL_TOL)
+        pulled = np.column_stack([self.pull, self.weight]) / areas[:, None]
+        smooth = diffuse(moved.vertices, moved.faces, pulled, spread_mm, PULL_TOL)
         move = smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
         # a mean of pulls is at most as long as these; near obtuse faces smoothed
         # weights may be zero or negative
         length = np.linalg.norm(move, axis=1, keepdims=True)
         factor = np.minimum(
             1.0,
-            reach_mm / np.maximum(length, 1e-9),
+            self.reach_mm / np.maximum(length, 1e-9),
         )
-        vertices = vertices + move * factor
-    return vertices
+        return moved.vertices + move * factor
 
 
 def _pulls(
@@ -105,8 +133,7 @@ def _pulls(
     inner: Floats | None,
     reach_mm: float,
 ) -> tuple[Floats, Floats]:
-    """Return the (n, 3) sums of the weighted pulls of a surface on the vertices of a
-    moved one, and the (n,) sums of the weights, which are areas."""
+    """Return the sums of pulls and weights of `_Pulls`."""
     if inner is None:
         forward = match_surface(moved, surface)
         backward = match_surface(surface, moved)
@@ -238,14 +265,16 @@ def fit_body(
         return
     surface, inner = target
     gap_mm = np.inf
+    pulls = _Pulls.of(body.boundary, surface, inner)
     for _ in range(0 if inner is None else MAX_OPENING_DRAWS):
-        goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
+        goals = pulls.goals(OPENING_PULL_MM)
         last_mm = gap_mm
         gap_mm = rms_length(goals - body.boundary.vertices)
         if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
-    body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
+        pulls = _Pulls.of(body.boundary, surface, inner)
+    body.draw(pulls.goals(FINAL_PULL_MM))
 
 
 def warn_of_distance(body: str, misfit_mm: float) -> None:
