@@ -162,7 +162,7 @@ if study.run_simulations:
             mesh_quality=f"{STUDY}/mesh_quality.html",
             metrics_table=f"{STUDY}/metrics_table.html",
         params:
-            **drawn_by("tables"),
+            **drawn_by("measures", "tables"),
             starts=[start.id for start in study.starts],
             gates=CONFIG.mesh.gates,
             observed_name=observed_name(BRAINS.values()),
@@ -180,7 +180,7 @@ HAS_FEW_SERIES = len(study.series) <= MAX_SERIES
 
 
 def common_growth_rate():
-    """Return the growth rate or its curve, if all runs that have one share it."""
+    """Return the growth rate by week, if all runs that have one share it."""
     # other growth models have no rate, or change it
     rates = [
         simulation.settings.growth_rate_per_s
@@ -190,7 +190,7 @@ def common_growth_rate():
     if not rates or any(rate != rates[0] for rate in rates):
         return None
     if isinstance(rates[0], float):
-        return rates[0]
+        return {0.0: rates[0]}
     return dict(rates[0].weeks or {}) if rates[0].map is None else None
 
 

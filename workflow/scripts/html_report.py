@@ -10,8 +10,8 @@ from gyriflow.io.files import read_json, read_table, read_text, write_json, writ
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.report.measures import Tables
 from gyriflow.report.page import (
-    Tables,
     brain_page,
     hide_paths,
     observed_caption,

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping
 from itertools import cycle
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +14,7 @@ from .style import RUN_COLOURS, from_zero, panel_figure, styled, week_axis, wrap
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series, without that of the simulations."""
 MAX_RATE_PANELS = 4
-"""Up to so many series have a panel of rates each; more share one."""
+"""Of more series, no rates are drawn."""
 
 
 @styled
@@ -23,7 +22,7 @@ def growth_figure(
     areas: pd.DataFrame,
     rates: pd.DataFrame,
     *,
-    folding_rate_per_s: float | Mapping[float, float] | None = None,
+    folding_rate_per_s: Mapping[float, float] | None = None,
     observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
     """Draw cortical area and volume over weeks, and the tangential growth rate of each
@@ -34,47 +33,33 @@ def growth_figure(
 
     `areas` has the columns series, subject, week, area_cm2, volume_ml; `rates` series,
     from_week, to_week, rate_per_s (1/s). `folding_rate_per_s` is the growth rate of the
-    simulations in 1/s, drawn as a line over the bars: a number, or values by week,
-    linear in between and constant beyond.
+    simulations in 1/s by week, drawn as a line over the bars, linear in between and
+    constant beyond.
     """
     names = list(dict.fromkeys(areas["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
-    with_rates = rates["series"].unique()
-    is_shared = len(with_rates) > MAX_RATE_PANELS
-    panels = 1 if is_shared else len(with_rates)
+    with_rates = list(rates["series"].unique())
+    shown = with_rates if len(with_rates) <= MAX_RATE_PANELS else []
     figure, (area_axes, volume_axes, *rate_axes) = panel_figure(
-        2 + panels, panel_in=2.4, foot_in=0.0
+        2 + len(shown), panel_in=2.4, foot_in=0.0
     )
-    labels = {
-        "area_cm2": "pial area (cm²)",
-        "volume_ml": "volume, with ventricles (mL)",
-    }
-    for axes, (column, label) in zip(
-        (area_axes, volume_axes), labels.items(), strict=True
-    ):
-        _sizes_panel(axes, areas, column, colours, set(with_rates))
-        axes.set_ylabel(label)
-        if len(names) == 1:
-            axes.set_title(wrap(observed_name, 32))
-    if is_shared:
-        _rates_together(rate_axes[0], rates, colours)
-        return figure
-    for axes, name in zip(rate_axes, with_rates, strict=True):
-        _rates_panel(
-            axes, rates[rates["series"] == name], colours[name], folding_rate_per_s
-        )
-        title = (
-            "tangential growth rate"
-            if len(names) == 1
-            else wrap(f"tangential growth rate: {name}", 28)
-        )
+    _sizes_panel(area_axes, areas, "area_cm2", colours, with_rates)
+    area_axes.set_ylabel("pial area (cm²)")
+    _sizes_panel(volume_axes, areas, "volume_ml", colours, with_rates)
+    volume_axes.set_ylabel("volume, with ventricles (mL)")
+    title = "tangential growth rate"
+    if len(names) == 1:
+        area_axes.set_title(wrap(observed_name, 32))
+        volume_axes.set_title(wrap(observed_name, 32))
+    for axes in rate_axes[1:]:
+        axes.sharey(rate_axes[0])
+    for axes, name in zip(rate_axes, shown, strict=True):
+        own = rates[rates["series"] == name]
+        _rates_panel(axes, own, colours[name], folding_rate_per_s)
         # the legend stands below the title
-        axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
-    limits = [axes.get_ylim() for axes in rate_axes]
-    for axes in rate_axes:
-        axes.set_ylim(
-            min(low for low, _ in limits),
-            max(high for _, high in limits),
+        axes.set_title(
+            title if len(names) == 1 else wrap(f"{title}: {name}", 28),
+            pad=6.0 if folding_rate_per_s is None else 16.0,
         )
     return figure
 
@@ -94,10 +79,6 @@ def _sizes_panel(
         rows = areas[areas["series"] == name].sort_values("week")
         # series often agree: smaller marks of later series stay visible within those of
         # earlier ones
-        style: dict[str, Any] = {
-            "markersize": 3 + 2.5 * number,
-            "markerfacecolor": "white" if number else colour,
-        }
         axes.plot(
             rows["week"],
             rows[column],
@@ -105,7 +86,8 @@ def _sizes_panel(
             color=colour,
             zorder=2 - 0.1 * number,
             label=name,
-            **style,
+            markersize=3 + 2.5 * number,
+            markerfacecolor="white" if number else colour,
         )
     from_zero(axes)
     week_axis(axes, areas["week"])
@@ -119,112 +101,56 @@ def _sizes_panel(
         )
 
 
-def _rates_together(
-    axes: Axes,
-    rates: pd.DataFrame,
-    colours: Mapping[str, str],
-) -> None:
-    """Draw the growth rate of each interval of many series as a line from week to
-    week."""
-    for name, colour in colours.items():
-        for _, row in rates[rates["series"] == name].iterrows():
-            axes.plot(
-                [row["from_week"], row["to_week"]],
-                [1e7 * row["rate_per_s"]] * 2,
-                color=colour,
-            )
-    axes.axhline(0, color="black", linewidth=0.6)
-    axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
-    axes.set_title("tangential growth rate")
-    week_axis(axes, [*rates["from_week"], *rates["to_week"]])
-
-
 def _rates_panel(
     axes: Axes,
     rates: pd.DataFrame,
     colour: str,
-    folding_rate_per_s: float | Mapping[float, float] | None,
+    folding_rate_per_s: Mapping[float, float] | None,
 ) -> None:
     """Draw the growth rate of each interval of one series as a bar, and the simulated
     rate as a line."""
-    labels = [
-        f"{first:g}–{last:g}"
-        for first, last in zip(
-            rates["from_week"],
-            rates["to_week"],
-            strict=True,
-        )
-    ]
-    bars = axes.bar(
-        labels,
-        rates["rate_per_s"] * 1e7,
-        width=0.7,
-        color=colour,
-    )
-    # in front of the line of the simulated rate
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+    weeks = zip(rates["from_week"], rates["to_week"], strict=True)
+    labels = [f"{first:g}–{last:g}" for first, last in weeks]
+    bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
     crowded = len(rates) > 8
-    texts = axes.bar_label(
+    axes.bar_label(
         bars,
         fmt=lambda rate: f"{rate:.2f}".replace("-", "−"),
         fontsize=6.5,
         padding=2,
+        rotation=90 if crowded else 0,
+        # in front of the line of the simulated rate
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+        zorder=3,
     )
-    for text in texts:
-        text.set(
-            bbox=box,
-            zorder=3,
-            rotation=90 if crowded else 0,
-        )
     axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
         _folding_line(axes, rates, folding_rate_per_s)
         # above the axes, so that it hides no bar
-        axes.legend(
-            loc="lower right",
-            bbox_to_anchor=(1.0, 1.01),
-            borderaxespad=0,
-        )
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.margins(y=0.25 if crowded else 0.12)
     axes.set_xlabel("gestational interval (GW)")
-    axes.tick_params(
-        axis="x",
-        rotation=45 if len(labels) > 6 else 0,
-    )
+    axes.tick_params(axis="x", rotation=45 if len(labels) > 6 else 0)
     # room for at least three bars, so that a single one does not fill the panel
     spare = max(0.0, 3 - len(labels)) / 2
     axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
 
 
 def _folding_line(
-    axes: Axes,
-    rates: pd.DataFrame,
-    rate_per_s: float | Mapping[float, float],
+    axes: Axes, rates: pd.DataFrame, rate_per_s: Mapping[float, float]
 ) -> None:
     """Draw the simulated growth rate over bars of equal width, one per interval."""
-    style: dict[str, Any] = {
-        "color": RUN_COLOURS[1],
-        "linestyle": "--",
-    }
-    if not isinstance(rate_per_s, Mapping):
-        rate = rate_per_s * 1e7
-        axes.axhline(
-            rate,
-            label=f"folding: {rate:.3g}·10⁻⁷ s⁻¹",
-            **style,
-        )
-        return
     weeks = np.array(sorted(rate_per_s))
-    values = 1e7 * np.array([rate_per_s[week] for week in weeks])
     ends = np.array([*rates["from_week"], rates["to_week"].iloc[-1]])
     is_inside = (weeks > ends[0]) & (weeks < ends[-1])
     drawn = np.union1d(ends, weeks[is_inside])
     bar_edges = np.arange(len(ends)) - 0.5
-    places = np.interp(drawn, ends, bar_edges)
+    values = [1e7 * rate_per_s[week] for week in weeks]
     axes.plot(
-        places,
+        np.interp(drawn, ends, bar_edges),
         np.interp(drawn, weeks, values),
         label="folding",
-        **style,
+        color=RUN_COLOURS[1],
+        linestyle="--",
     )

@@ -114,17 +114,10 @@ def column_label(key: Hashable) -> str:
 def parameter_label(key: str) -> str:
     """Return the axis label of a parameter, with its unit, for example "cortical
     thickness (mm)"."""
-    name = key
-    unit = None
-    for ending, unit_of_ending in _ENDINGS.items():
-        if key.endswith(ending):
-            name = key.removesuffix(ending)
-            unit = unit_of_ending
-            break
-    title = PARAMETER_TITLES.get(name)
-    if title is None:
-        title = plain(name.replace(".", " "))
-    return with_unit(title, unit)
+    ending = next(filter(key.endswith, _ENDINGS), "")
+    name = key.removesuffix(ending)
+    title = PARAMETER_TITLES.get(name) or plain(name.replace(".", " "))
+    return with_unit(title, _ENDINGS.get(ending))
 
 
 def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -133,16 +126,13 @@ def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
 
     If several keys are varied, each is named.
     """
-    return [
-        "\n".join(
-            _value_label(
-                *item,
-                alone=len(member) == 1,
-            )
-            for item in member.items()
-        )
-        for member in values
-    ]
+    headings = []
+    for member in values:
+        labels = [
+            _value_label(*item, alone=len(member) == 1) for item in member.items()
+        ]
+        headings.append("\n".join(labels))
+    return headings
 
 
 def _value_label(

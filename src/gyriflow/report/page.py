@@ -3,8 +3,8 @@ brain."""
 
 import json
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -15,7 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..formats import ALL_SUFFIXES
-from ..quantities import METRICS, Shown, metrics_shown
+from ..quantities import Shown, metrics_shown
 from ..settings.growth import GROWTH_MODELS
 from ..settings.terms import (
     ELEMENTS_NEEDED,
@@ -28,30 +28,22 @@ from ..settings.terms import (
     rounded_elements,
     run_names,
 )
-from .labels import atlas_label, cited_atlas, metric_title, plain, week_label
-from .tables import (
-    VERDICTS,
-    accuracy_table,
-    brain_table,
-    centile_text,
-    difference_texts,
-    doubtful_metrics,
-    doubtful_title,
-    html_table,
-    kept_sentence,
-    kept_table,
-    predicted_table,
-    range_text,
-    week_errors,
+from .labels import atlas_label, plain, week_label
+from .measures import (
+    Tables,
+    accuracy_sentence,
+    brain_content,
+    brain_rows,
+    cited_atlases,
+    prediction_content,
 )
+from .tables import VERDICTS, html_table
 
 PATH_PLACEHOLDER = "(file)"
 _SUFFIXES = (*ALL_SUFFIXES, ".yaml", ".yml", ".h5", ".csv", ".tsv", ".sif")
 _FILE_NAME = re.compile(
     rf"[/\\]|({'|'.join(map(re.escape, _SUFFIXES))})(\.gz)?$", re.IGNORECASE
 )
-_FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
-"""Folders of a file: they may contain names, so they are stripped."""
 KIND_NOTES = {"explained": ": its growth was measured on that brain"}
 """What the kind of a comparison means, where a reader may take it for a prediction."""
 NOT_COMPARED = (
@@ -79,90 +71,42 @@ def page_figures(
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
         brains.setdefault(figure["name"], set()).add(figure["names"].get("brain"))
-    first = next(
-        (figure["path"] for figure in figures if figure["first"]),
-        None,
-    )
+    first = [figure["path"] for figure in figures if figure["first"]][:1]
     entries = []
     for figure in figures:
         names, content = figure["names"], contents[figure["path"]]
+        keys = ["run", "sweep"]
         # if all figures of a kind are of one brain, the page's title names it
-        keys = (
-            ("run", "sweep", "brain")
-            if len(brains[figure["name"]]) > 1
-            else ("run", "sweep")
-        )
-        title = figure["title"].format(
-            **{key: plain(name.removesuffix("_mm")) for key, name in names.items()}
-        )
-        title = " · ".join(
-            [title, *(name for key, name in names.items() if key in keys)]
-        )
-        entries.append(
-            {
-                "section": figure["section"],
-                "title": title,
-                "content": Markup(content) if isinstance(content, str) else content,
-                "caption": caption_html(figure["caption"].format(**names)),
-                "first": figure["path"] == first,
-                "technical": figure["technical"],
-            }
-        )
+        if len(brains[figure["name"]]) > 1:
+            keys.append("brain")
+        words = {key: plain(name.removesuffix("_mm")) for key, name in names.items()}
+        parts = [figure["title"].format(**words)]
+        parts += [name for key, name in names.items() if key in keys]
+        entry = {
+            "title": " · ".join(parts),
+            "content": Markup(content) if isinstance(content, str) else content,
+            "caption": caption_html(figure["caption"].format(**names)),
+            "first": figure["path"] in first,
+        }
+        entries.append({**figure, **entry})
     return entries
 
 
 def _sections(
     figures: Sequence[Mapping[str, Any]],
 ) -> list[tuple[str, list[dict[str, Any]]]]:
-    """Return the sections, each with its figures and tables, numbered consecutively,
-    technical ones last."""
-    ordered, numbers = (
-        sorted(
-            figures,
-            key=lambda item: item["technical"],
-        ),
-        count(1),
-    )
-    return [
-        (
-            name,
-            [
-                {**item, "number": next(numbers)}
-                for item in ordered
-                if item["section"] == name
-            ],
-        )
-        for name in dict.fromkeys(item["section"] for item in figures)
-    ]
-
-
-@dataclass(frozen=True, eq=False)
-class Tables:
-    """The tables of a study on its pages.
-
-    `quality`, `metrics` and `centiles` are as for `brain_rows`, `curves` and
-    `differences` those of `metrics.atlas_curves`; `warnings` has the columns subject,
-    run, step, level, message. `runs` and `validation` are as for `scores_table`, None
-    if nothing was simulated; `intervals` those of the ensemble of the one prediction,
-    if any.
-    """
-
-    quality: pd.DataFrame
-    metrics: pd.DataFrame
-    centiles: pd.DataFrame
-    curves: pd.DataFrame
-    differences: pd.DataFrame
-    warnings: pd.DataFrame
-    runs: pd.DataFrame | None = None
-    validation: pd.DataFrame | None = None
-    intervals: pd.DataFrame | None = None
-
-    def __post_init__(self) -> None:
-        # messages name files without their folders
-        for name in ("quality", "warnings"):
-            object.__setattr__(
-                self, name, getattr(self, name).replace(_FOLDERS, "", regex=True)
-            )
+    """Return the sections, each with its figures and tables but the first one, numbered
+    consecutively, technical ones last."""
+    numbers = count(1)
+    others = [figure for figure in figures if not figure["first"]]
+    sections: dict[str, list[dict[str, Any]]] = {}
+    for figure in others:
+        sections.setdefault(figure["section"], []).append(dict(figure))
+    for items in sections.values():
+        items.sort(key=lambda item: item["technical"])
+        for item in items:
+            item["number"] = next(numbers)
+    return list(sections.items())
 
 
 def study_page(
@@ -185,27 +129,22 @@ def study_page(
     observed = tables.centiles[tables.centiles["run"] == OBSERVED]
     own = observed[observed["subject"].isin([brain["id"] for brain in brains])]
     summary = [figure for figure in figures if figure["first"]]
-    others = [figure for figure in figures if not figure["first"]]
     page: dict[str, Any] = {
         "title": "Measured cortical folding",
         "verdict": _quality_verdict(tables.quality),
         "prediction": prediction,
         "folded": [],
         "runs": "",
-        "atlases": _cited_atlases(tables.differences),
+        "atlases": cited_atlases(tables.differences),
         "has_norm": bool(own["expected"].notna().any()),
         "brains": brain_rows(brains, replace(tables, centiles=observed), pictures),
         "pictures": pictures,
         "norm": norm,
         "flags": _centile_flags(own),
         "spread_unknown": SPREAD_UNKNOWN,
-        "warnings": (
-            ""
-            if tables.warnings.empty
-            else html_table(_group_warnings(tables.warnings))
-        ),
+        "warnings": _group_warnings(tables.warnings),
         "summary_figure": summary[0] if summary else None,
-        "sections": _sections(others),
+        "sections": _sections(figures),
     }
     # of the page of a single brain
     page |= {
@@ -223,10 +162,10 @@ def study_page(
         page["verdict"] = _simulation_verdict(tables, prediction)
         # without observed brains, a prediction has no scores
         if not prediction or tables.validation is not None:
-            page["runs"] = html_table(scores_table(tables.runs, tables.validation))
+            page["runs"] = html_table(_scores_table(tables.runs, tables.validation))
     if prediction:
         page["title"] = _prediction_title(prediction)
-        page["prediction"] = _with_tables(prediction, tables, norm)
+        page["prediction"] = prediction_content(prediction, tables, norm)
     return page
 
 
@@ -246,7 +185,7 @@ def _simulation_verdict(tables: Tables, prediction: Mapping[str, Any] | None) ->
     runs, validation = tables.runs, tables.validation
     assert runs is not None
     untested = accuracy_sentence(prediction) if prediction else NOT_COMPARED
-    sentence = verdict(runs, validation, tables.warnings, untested)
+    sentence = _verdict(runs, validation, tables.warnings, untested)
     if prediction and validation is not None and len(validation):
         # these verdicts are without the sentence of accuracy, which begins so
         sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
@@ -260,28 +199,6 @@ def _prediction_title(prediction: Mapping[str, Any]) -> str:
     return f"Prediction of {prediction['brain']} to {week}, by the growth of {source}"
 
 
-def _with_tables(
-    prediction: Mapping[str, Any], tables: Tables, norm: str
-) -> dict[str, Any]:
-    """Return the facts of a prediction with its tables and sentences."""
-    numbers = predicted_table(
-        tables.metrics,
-        prediction,
-        tables.centiles,
-        tables.intervals,
-    )
-    has_centiles = any("centile" in str(head) for head in numbers)
-    kept, week = prediction["kept"], prediction["week"]
-    return {
-        **prediction,
-        "numbers": html_table(numbers),
-        "accuracy_table": html_table(accuracy_table(prediction["accuracy"])),
-        "kept_table": html_table(kept_table(kept, week)),
-        "kept_sentence": kept_sentence(kept, week),
-        "individuals": norm if has_centiles else "",
-    }
-
-
 def brain_page(
     brain: Mapping[str, Any],
     tables: Tables,
@@ -291,7 +208,6 @@ def brain_page(
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the page of an observed brain;
     parameters as for `study_page`."""
-    metrics = tables.metrics[tables.metrics["subject"] == brain["id"]]
     # those of simulations are in the report of the study
     is_own = tables.warnings["subject"] == brain["id"]
     warnings = tables.warnings[is_own & tables.warnings["run"].isna()]
@@ -302,30 +218,9 @@ def brain_page(
         norm=norm,
         pictures={},
     )
-    own_quality = tables.quality[tables.quality["subject"] == brain["id"]]
-    doubts = doubtful_metrics(own_quality.iloc[0].to_dict())
-    every = brain_table(metrics, tables.centiles, tables.differences, doubts)
-    sheet = [doubtful_title(name, doubts) for name in metrics_shown(Shown.SHEET)]
-    sheet = [title for title in sheet if title in every.index]
-    differences = tables.differences[tables.differences["subject"] == brain["id"]]
-    atlases = list(differences["atlas"].unique())
-    curves = tables.curves[tables.curves["atlas"].isin(atlases)]
-    return page | {
-        "title": f"Cortical folding of {brain['id']}",
-        "verdict": "",
-        "alone": True,
-        "usual": html_table(every.loc[sheet]),
-        "atlases": _cited_atlases(differences),
-        "has_parts": "volume_tissue" in set(metrics["metric"]),
-        "has_thickness": "mean_thickness" in set(metrics["metric"]),
-        "week_errors": week_errors(curves, brain["week"]),
-        "numbers": html_table(every),
-    }
-
-
-def _cited_atlases(differences: pd.DataFrame) -> list[str]:
-    """Return the atlases of a table of differences, with their citations."""
-    return [cited_atlas(str(name)) for name in differences["atlas"].unique()]
+    title = f"Cortical folding of {brain['id']}"
+    page |= {"title": title, "verdict": "", "alone": True}
+    return page | brain_content(brain, tables)
 
 
 def report_page(
@@ -353,19 +248,16 @@ def report_page(
         lstrip_blocks=True,
     )
     # a script must not contain its own end tag
-    data = Markup(json.dumps(view, separators=(",", ":")).replace("</", "<\\/"))
-    inside = {
-        name: Markup(text.replace("</script", "<\\/script"))
-        for name, text in parts.items()
-    }
-    page = environment.from_string(template)
-    origin = {
-        "provenance": provenance,
-        "methods": caption_html(methods),
-        "configuration": configuration,
-    }
-    return page.render(
-        **content, **inside, **origin, has_view=bool(view["groups"]), surfaces=data
+    data = json.dumps(view, separators=(",", ":")).replace("</", "<\\/")
+    for name, text in parts.items():
+        content[name] = Markup(text.replace("</script", "<\\/script"))
+    return environment.from_string(template).render(
+        **content,
+        provenance=provenance,
+        methods=caption_html(methods),
+        configuration=configuration,
+        has_view=bool(view["groups"]),
+        surfaces=Markup(data),
     )
 
 
@@ -398,104 +290,17 @@ def caption_html(caption: str) -> Markup:
         "raw_enabled": False,
         "file_insertion_enabled": False,
     }
-    return Markup(
-        publish_parts(caption, writer="html5", settings_overrides=settings)["body"]
-    )
+    parts = publish_parts(caption, writer="html5", settings_overrides=settings)
+    return Markup(parts["body"])
 
 
 def observed_caption(caption: str) -> str:
     """Return a caption in reStructuredText without its paragraphs on simulated
     brains."""
-    paragraphs = caption.split("\n\n")
-    observed = [
-        paragraph
-        for paragraph in paragraphs
-        if not paragraph.startswith(SIMULATED_CAPTION)
-    ]
-    return "\n\n".join(observed)
+    return re.sub(rf"(?s)(^|\n\n){SIMULATED_CAPTION}.*?(?=\n\n|$)", "", caption)
 
 
-def brain_rows(
-    brains: Sequence[Mapping[str, Any]],
-    tables: Tables,
-    linked: Collection[str] = (),
-) -> list[dict[str, Any]]:
-    """Return what a page says of each brain: its facts, its numbers, and its verdict
-    with the cause or the warnings.
-
-    Numbers are by title of the metric, each with the texts below it: doubts about it,
-    and its `centile_text` or else its differences from atlases. Brains have id, week,
-    population, source, licence, covariates and whether they are synthetic, as
-    configured. The table `quality` has the columns subject, verdict, cause, warnings.
-    `linked` are the ids of the brains whose source is on a page of their own.
-    """
-    judged = tables.quality.set_index("subject").fillna("")
-    measured = _by_brain(tables.metrics)
-    values = measured["value"].to_dict()
-    names = set(measured["metric"])
-    rated = _by_brain(tables.centiles)
-    texts = dict(
-        zip(
-            rated.index,
-            centile_text(rated),
-            strict=True,
-        )
-    )
-    shown = [name for name in metrics_shown(Shown.BRAINS) if name in names]
-    rows = []
-    for brain in brains:
-        key = brain["id"]
-        doubts = doubtful_metrics(judged.loc[key].to_dict())
-        from_atlases = difference_texts(tables.differences, key, with_noise=False)
-        numbers = {}
-        for name in shown:
-            number: tuple[str, list[str]] = ("–", [])
-            if (key, name) in values:
-                below = [doubts[name]] if name in doubts else []
-                centile = texts.get((key, name), "–")
-                if centile != "–":
-                    below.append(centile)
-                else:
-                    below += [
-                        f"{words[name]} {atlas_label(atlas)}"
-                        for atlas, words in from_atlases.items()
-                        if name in words
-                    ]
-                number = (METRICS[name].text(values[key, name]), below)
-            numbers[metric_title(name)] = number
-        is_linked, is_synthetic = key in linked, brain["synthetic"]
-        licence = brain["licence"] or (
-            "made here" if is_synthetic else "" if is_linked else "your own data"
-        )
-        covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
-        facts = [
-            week_label(brain["week"]),
-            brain["population"] or ("synthetic" if is_synthetic else ""),
-            *covariates,
-        ]
-        facts += ["" if is_linked else brain["source"], licence]
-        cause = judged.loc[key, "cause"] or judged.loc[key, "warnings"]
-        described = {
-            "facts": list(filter(None, facts)),
-            "verdict": judged.loc[key, "verdict"],
-            "cause": cause,
-        }
-        rows.append({**brain, "numbers": numbers, **described})
-    return rows
-
-
-def _by_brain(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the values of whole observed brains, by brain and metric."""
-    is_observed = table["run"] == OBSERVED
-    is_whole = table["hemisphere"] == "whole"
-    has_value = table["value"].notna()
-    rows = table[is_observed & is_whole & has_value]
-    return rows.set_index(["subject", "metric"], drop=False)
-
-
-def scores_table(
-    runs: pd.DataFrame, validation: pd.DataFrame | None = None
-) -> pd.DataFrame:
+def _scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None) -> pd.DataFrame:
     """Return a row for each run: how it ended, and its scores at the last week with an
     observed brain.
 
@@ -503,83 +308,16 @@ def scores_table(
     min_J, elements_through_cortex, order, least_elements_through_cortex,
     unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
     """
-    names = run_names(
-        zip(
-            runs["run"],
-            runs["subject"],
-            strict=True,
-        )
-    )
+    names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
-    for name, (_, run) in zip(
-        names,
-        runs.iterrows(),
-        strict=True,
-    ):
+    for name, (_, run) in zip(names, runs.iterrows(), strict=True):
         scores: Mapping[Any, Any] = {}
         if validation is not None:
             is_own_run = validation["run"] == run["run"]
             own = validation[is_own_run & (validation["start"] == run["subject"])]
             scores = own.sort_values("week").iloc[-1] if len(own) else {}
-        rows.append(
-            {
-                "run": name,
-                "verdict": _run_verdict(run),
-                **_scores(scores),
-            }
-        )
+        rows.append({"run": name, "verdict": _run_verdict(run), **_scores(scores)})
     return pd.DataFrame(rows)
-
-
-def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
-    """Describe how accurate predictions over as many weeks were for brains with a later
-    scan.
-
-    Where the atlas' own brain was better, that comes first.
-    """
-    rows = pd.DataFrame(prediction["accuracy"]["rows"])
-    weeks_ahead = prediction["week"] - prediction["start_week"]
-    # the next longer horizon that was tested, or the longest
-    horizon = min(
-        (tested for tested in rows["horizon"] if tested >= weeks_ahead - 1e-6),
-        default=rows["horizon"].max(),
-    )
-    models = rows[rows["horizon"] == horizon].groupby("model")
-    run, atlas, scaled = (
-        f"{range_text(group['distance_mm'])} mm (r"
-        f" {range_text(group['r_shape_index'])})"
-        for group in map(models.get_group, ("run", "atlas", "scaled"))
-    )
-    means = {
-        name: models.get_group(name)[["distance_mm", "r_shape_index"]].mean()
-        for name in ("run", "atlas")
-    }
-    is_better = {
-        "closer": means["atlas"]["distance_mm"] < means["run"]["distance_mm"],
-        "more similar in shape index": (
-            means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"]
-        ),
-    }
-    better = " and ".join(words for words, holds in is_better.items() if holds)
-    advantage, simpler = prediction["tests"]["advantage"], ""
-    if better and not advantage:
-        simpler = (
-            f" On average the atlas' own brain was {better}; it is stored with the"
-            " prediction."
-        )
-    beyond = (
-        f" No test went as far as {weeks_ahead:.3g} weeks."
-        if weeks_ahead > horizon + 1e-6
-        else ""
-    )
-    return (
-        f"{advantage} This is a prediction, not a scan. In tests over {horizon:g}"
-        " weeks, the mean distance from the observed brain and the correlation of"
-        f" shape index with it were {run} for predictions, {atlas} for the atlas' own"
-        f" brain and {scaled} for the scaled start.{simpler}{beyond} The test brains"
-        " were averages of many normal fetuses; the accuracy for a single fetus is"
-        " unknown."
-    ).lstrip()
 
 
 def _quality_verdict(quality: pd.DataFrame) -> str:
@@ -587,25 +325,24 @@ def _quality_verdict(quality: pd.DataFrame) -> str:
     counts = quality["verdict"].value_counts()
     parts = []
     for verdict in VERDICTS:
-        count = counts.get(verdict, 0)
-        words = verdict.replace("needs", "need") if count > 1 else verdict
-        if count:
+        if count := counts.get(verdict, 0):
+            words = verdict.replace("needs", "need") if count > 1 else verdict
             parts.append(f"{count} {words}")
     plural = "s" if len(quality) > 1 else ""
     return f"{len(quality)} brain{plural}: {', '.join(parts)}."
 
 
-def verdict(
+def _verdict(
     runs: pd.DataFrame,
     validation: pd.DataFrame | None,
     warnings: pd.DataFrame,
-    sentence: str = NOT_COMPARED,
+    sentence: str,
 ) -> str:
     """Return a sentence that compares the best run at the last week with the scaled
     start, and the most serious message: an error, or else a limitation of a run. Plain
     warnings are counted.
 
-    `runs` and `validation` are as for `scores_table`, `warnings` has the columns level
+    `runs` and `validation` are as for `_scores_table`, `warnings` has the columns level
     and message. The `sentence` is used if there is no observed brain.
     """
     if validation is not None and len(validation):
@@ -721,27 +458,21 @@ def _score_with_interval(
     return f"{score} ({low} to {high})"
 
 
-def _group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
-    """Return each distinct warning once, with its brains and runs."""
+def _group_warnings(warnings: pd.DataFrame) -> str:
+    """Return a table of each distinct warning, with its brains and runs; "" without
+    warnings."""
+    if warnings.empty:
+        return ""
     # steps of a brain have no run
     named = warnings[["subject", "run"]].astype(object).fillna("").astype(str)
     rows = warnings.copy()
-    rows["brain, run"] = [
-        ", ".join(filter(None, place)) for place in named.itertuples(index=False)
-    ]
+    rows["brain, run"] = named.agg(", ".join, axis=1).str.strip(", ")
     is_error = rows["level"] != "warning"
     prefix = (rows["level"] + ": ").where(is_error, "")
     rows["message"] = prefix + rows["message"]
-
-    groups = rows.groupby(
-        ["step", "message"],
-        sort=False,
-    )["brain, run"]
-    return groups.agg(_joined).reset_index()
-
-
-def _joined(names: pd.Series) -> str:
-    return "; ".join(filter(None, names.unique()))
+    groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
+    joined = groups.agg(lambda places: "; ".join(filter(None, places.unique())))
+    return html_table(joined.reset_index())
 
 
 def hide_paths(value: Any) -> Any:

@@ -8,7 +8,6 @@ from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
@@ -54,8 +53,6 @@ _LETTER_IN = 0.055
 _LABEL_LETTERS = 26
 # maximum share of the width for the scale bar; the colour bar is right of it
 _SCALE_SHARE = 0.36
-SAME_PLACE_MM = 0.5
-"""Maximum distance of the first hit of a ray from a visible point."""
 _END_NAMES = {
     "A": "anterior",
     "P": "posterior",
@@ -69,10 +66,9 @@ class Panel:
     """One surface of a grid.
 
     `mesh` is the visible part and `colours` its (n, 3) or (m, 3) colours; `light` is
-    `TISSUE` or `MAP` of the scene. `mark` (3,) is a point of the surface marked by a
-    ring, dotted if the point is on the far side; `directions` (n, 3) are vectors at the
-    vertices, drawn as lines on the surface (`direction_lines`). The caption stands
-    below.
+    `TISSUE` or `MAP` of the scene. The vertex `mark` has a ring, dotted if it is on the
+    far side; `directions` (n, 3) are vectors at the vertices, drawn as lines on the
+    surface. The caption stands below.
     """
 
     mesh: TriangleMesh
@@ -80,7 +76,7 @@ class Panel:
     view: View = VIEWS["left"]
     caption: str = ""
     light: Mapping[str, Any] = field(default_factory=lambda: TISSUE)
-    mark: Floats | None = None
+    mark: int | None = None
     directions: Floats | None = None
 
 
@@ -97,13 +93,8 @@ class Row:
 def _round_length(limit_mm: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
     decade = 10.0 ** np.floor(np.log10(limit_mm))
-    return float(
-        max(
-            step * decade
-            for step in (1, 2, 5)
-            if step * decade <= limit_mm * (1 + 1e-9)
-        )
-    )
+    steps = np.array([1, 2, 5]) * decade
+    return float(steps[steps <= limit_mm * (1 + 1e-9)].max())
 
 
 def panel_grid(
@@ -125,13 +116,7 @@ def panel_grid(
     the panels of a single row, have the letters a, b, c … for the caption. `colour_bar`
     is a colour scale and its label, `legend` the entries of a legend.
     """
-    rows = [
-        replace(
-            row,
-            label=wrap(row.label, _LABEL_LETTERS),
-        )
-        for row in rows
-    ]
+    rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
     widths_in, blocks, inches_per_mm = _lay_out_columns(
@@ -165,15 +150,16 @@ def panel_grid(
         block_in = block.heights_in.sum()
         # a letter for each row, or for each panel of a single row
         per_row = 1 if len(rows) > 1 else len(columns) if len(columns) > 1 else 0
+        block_heads, block_widths_in = heads[block.columns], widths_in[block.columns]
         grid = GridSpec(
             len(block.heights_in),
-            len(heads[block.columns]),
+            len(block_heads),
             figure,
             left=left_in / width,
-            right=(left_in + widths_in[block.columns].sum()) / width,
+            right=(left_in + block_widths_in.sum()) / width,
             top=top_in / total,
             bottom=(top_in - block_in) / total,
-            width_ratios=widths_in[block.columns],
+            width_ratios=block_widths_in,
             height_ratios=block.heights_in,
             hspace=0,
             wspace=0,
@@ -182,40 +168,18 @@ def panel_grid(
         for number, row in enumerate(block.rows):
             # pictures are between the headings or captions above and the captions below
             line = 2 * number + 1
-            cells = [
-                figure.add_subplot(grid[line, column])
-                for column in range(len(heads[block.columns]))
-            ]
-            widths_mm = [
-                float(part / inches_per_mm) for part in widths_in[block.columns]
-            ]
-            height_mm = float(block.heights_in[line] / inches_per_mm)
+            columns_in = range(len(block_heads))
+            cells = [figure.add_subplot(grid[line, column]) for column in columns_in]
+            sizes_in = [(part, block.heights_in[line]) for part in block_widths_in]
             panels = row.panels[block.columns]
-            _draw_row(cells, row, panels, widths_mm, height_mm, inches_per_mm)
-            _write_letters(
-                cells[:per_row],
-                letters,
-                is_labelled=bool(row.label),
-            )
+            _draw_row(cells, row, panels, sizes_in, inches_per_mm)
+            _write_letters(cells[:per_row], letters, is_labelled=bool(row.label))
             if number == 0:
-                for axes, head in zip(
-                    cells,
-                    heads[block.columns],
-                    strict=True,
-                ):
-                    _write(
-                        axes,
-                        head,
-                        (0.5, 1.0),
-                        (0, 36 * head_in),
-                        va="center",
-                    )
+                for axes, head in zip(cells, block_heads, strict=True):
+                    _write(axes, head, (0.5, 1.0), (0, 36 * head_in))
     bar_mm = PAGE_BAR_MM
     if not at_page_scale:
-        longest_in = min(
-            0.6 * widths_in.max(),
-            _SCALE_SHARE * width - 2 * _EDGE_IN,
-        )
+        longest_in = min(0.6 * widths_in.max(), _SCALE_SHARE * width - 2 * _EDGE_IN)
         bar_mm = _round_length(longest_in / inches_per_mm)
     _draw_scale_bar(figure, rows, foot_in, bar_mm, inches_per_mm)
     if colour_bar:
@@ -252,18 +216,11 @@ def _write_letters(
     """Write the next letters at the upper left of panels: next to the row's label, or
     above the letters of the ends."""
     for axes, letter in zip(cells, letters, strict=False):
-        align = {"ha": "left", "va": "bottom"}
+        align: dict[str, Any] = {"ha": "left", "va": "bottom"}
         if is_labelled and axes is cells[0]:
             align = {"ha": "right", "va": "top"}
-        bold = {"fontsize": 9, "fontweight": "bold"}
-        _write(
-            axes,
-            letter,
-            (0.0, 1.0),
-            (-2, 2),
-            **bold,
-            **align,
-        )
+        at = (0.0, 1.0), (-2, 2)
+        _write(axes, letter, *at, fontsize=9, fontweight="bold", **align)
 
 
 def _lay_out_columns(
@@ -272,10 +229,7 @@ def _lay_out_columns(
     """Return the widths of all columns in inches, the columns of each block (at most
     `MAX_COLUMNS` side by side), and the scale in inches per mm."""
     half_widths = []
-    for column in zip(
-        *(row.panels for row in rows),
-        strict=True,
-    ):
+    for column in zip(*(row.panels for row in rows), strict=True):
         panels = [half_extents(panel.mesh, panel.view)[0] for panel in column if panel]
         half_widths.append(max(panels, default=0.0))
     half_widths_mm = np.array(half_widths)
@@ -294,25 +248,16 @@ def _lay_out_columns(
     return _dots(widths_mm * inches_per_mm), blocks, inches_per_mm
 
 
-def _heights_in(
-    row: Row,
-    block: slice,
-    inches_per_mm: float,
-) -> tuple[float, float]:
+def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
     """Return the heights of a row's pictures and captions."""
-    picture_mm = 0.0
-    caption_lines = 0
-    for panel in row.panels[block]:
-        if panel is None:
-            continue
-        _, half_height_mm = half_extents(panel.mesh, panel.view)
-        picture_mm = max(picture_mm, 2 * half_height_mm)
-        caption_lines = max(caption_lines, len(panel.caption.splitlines()))
+    panels = [panel for panel in row.panels[block] if panel]
+    halves_mm = [half_extents(panel.mesh, panel.view)[1] for panel in panels]
+    picture = _MARGIN * 2 * max(halves_mm, default=0.0) * inches_per_mm
+    captions = [len(panel.caption.splitlines()) for panel in panels]
     # the label is written along the height
-    longest_line = max(len(line) for line in row.label.split("\n"))
+    longest_line = max(map(len, row.label.split("\n")))
     label = 0.06 * longest_line + 0.1
-    picture = _MARGIN * picture_mm * inches_per_mm
-    return max(picture, label), 0.13 * caption_lines
+    return max(picture, label), 0.13 * max(captions, default=0)
 
 
 def _dots(inches: Any) -> Any:
@@ -329,98 +274,54 @@ def _write(
 ) -> None:
     """Write at a place in fractions of a panel, shifted by points."""
     style = {"fontsize": 7, "ha": "center", "va": "center", **style}
-    axes.annotate(
-        text,
-        at,
-        shift_pt,
-        xycoords="axes fraction",
-        textcoords="offset points",
-        **style,
-    )
+    style |= {"xycoords": "axes fraction", "textcoords": "offset points"}
+    axes.annotate(text, at, shift_pt, **style)
 
 
 def _draw_row(
     cells: Sequence[Axes],
     row: Row,
     panels: Sequence[Panel | None],
-    widths_mm: Sequence[float],
-    height_mm: float,
+    sizes_in: Sequence[tuple[float, float]],
     inches_per_mm: float,
 ) -> None:
-    """Draw the pictures of a row in its cells, whose sizes are given, with the row's
-    label on the left."""
+    """Draw the pictures of a row in its cells, whose widths and heights are given, with
+    the row's label on the left."""
     previous = None
-    _write(
-        cells[0],
-        row.label,
-        (0.0, 0.5),
-        (-4.3, 0),
-        rotation=90,
-        ha="right",
-    )
-    for index, (axes, panel, width_mm) in enumerate(
-        zip(cells, panels, widths_mm, strict=True)
+    _write(cells[0], row.label, (0.0, 0.5), (-4.3, 0), rotation=90, ha="right")
+    for index, (axes, panel, size_in) in enumerate(
+        zip(cells, panels, sizes_in, strict=True)
     ):
         axes.set_label(f"{row.label}, column {index}")
         axes.set_axis_off()
         if panel is None:
             _write(axes, row.absent, (0.5, 0.5), fontsize=6.5)
             continue
-        half = width_mm / 2, height_mm / 2
-        lines = (
-            None
-            if panel.directions is None
-            else direction_lines(panel.mesh, panel.directions, panel.view)
-        )
+        right, up = (float(length / inches_per_mm) / 2 for length in size_in)
+        lines = None
+        if panel.directions is not None:
+            lines = _direction_lines(panel.mesh, panel.directions, panel.view)
         image = render(
             panel.mesh,
             panel.colours,
             panel.view,
-            half,
+            (right, up),
             PIXELS_PER_INCH * inches_per_mm,
             light=panel.light,
             lines=lines,
         )
-        axes.imshow(
-            image,
-            extent=(
-                -half[0],
-                half[0],
-                -half[1],
-                half[1],
-            ),
-            aspect="auto",
-        )
+        axes.imshow(image, extent=(-right, right, -up, up), aspect="auto")
         if panel.view != previous:
-            for place, align, end in (
-                (0.04, "left", panel.view.ends[0]),
-                (0.96, "right", panel.view.ends[1]),
-            ):
-                _write(
-                    axes,
-                    end,
-                    (place, 1.0),
-                    ha=align,
-                    va="top",
-                    fontsize=6,
-                )
+            first, last = panel.view.ends
+            _write(axes, first, (0.04, 1.0), ha="left", va="top", fontsize=6)
+            _write(axes, last, (0.96, 1.0), ha="right", va="top", fontsize=6)
         previous = panel.view
         if panel.mark is not None:
             _draw_ring(axes, panel, panel.mark)
-        _write(
-            axes,
-            panel.caption,
-            (0.5, -0.01),
-            va="top",
-            fontsize=6.5,
-        )
+        _write(axes, panel.caption, (0.5, -0.01), va="top", fontsize=6.5)
 
 
-def direction_lines(
-    mesh: TriangleMesh,
-    directions: Floats,
-    view: View,
-) -> Floats:
+def _direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
     """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of
     `LINES_MM` that faces a view.
 
@@ -430,39 +331,27 @@ def direction_lines(
     cubes = np.floor(mesh.vertices / LINES_MM)
     _, vertices = np.unique(cubes, axis=0, return_index=True)
     vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
-    half = (
-        directions[vertices]
-        * (LINES_MM / 2)
-        / np.linalg.norm(
-            directions[vertices],
-            axis=1,
-            keepdims=True,
-        ).clip(1)
-    )
+    lines = directions[vertices]
+    lengths = np.linalg.norm(lines, axis=1, keepdims=True)
+    half = lines * (LINES_MM / 2) / lengths.clip(1)
     # slightly above the surface, which would otherwise hide parts of them
     at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
-    return np.stack(
-        [at - half, at + half],
-        axis=1,
-    )
+    return np.stack([at - half, at + half], axis=1)
 
 
-def _draw_ring(
-    axes: Axes,
-    panel: Panel,
-    point: Floats,
-) -> None:
-    vertices = panel.mesh.vertices
+def _draw_ring(axes: Axes, panel: Panel, vertex: int) -> None:
+    """Draw a ring around a vertex."""
+    vertices, view = panel.mesh.vertices, panel.view
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    to_right, to_top = picture_axes(panel.view)
-    place = float((point - middle) @ to_right), float((point - middle) @ to_top)
-    radius = 0.05 * np.ptp(axes.get_xlim()) / 2
-    line = "-" if _is_visible(panel.mesh, point, panel.view) else ":"
+    right, up = picture_axes(view)
+    away = vertices[vertex] - middle
+    is_near = vertex_normals(panel.mesh)[vertex] @ view.towards > 0
+    line = "-" if is_near else ":"
     # a white margin below the black ring
     for colour, thickness, style in (("white", 2.0, "-"), ("black", 1.0, line)):
         ring = Circle(
-            place,
-            radius,
+            (float(away @ right), float(away @ up)),
+            0.025 * np.ptp(axes.get_xlim()),
             fill=False,
             edgecolor=colour,
             linewidth=thickness,
@@ -471,26 +360,6 @@ def _draw_ring(
             zorder=5,
         )
         axes.add_patch(ring)
-
-
-def _is_visible(
-    mesh: TriangleMesh,
-    point: Floats,
-    view: View,
-) -> bool:
-    """Return whether a point of the surface is visible in a view."""
-    far = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    body = pv.PolyData.from_regular_faces(
-        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
-    )
-    towards = np.array(view.towards)
-    right, up = picture_axes(view)
-    # slightly shifted: rays through vertices may pass between triangles
-    point = point + 0.013 * right + 0.007 * up
-    hits, _ = body.ray_trace(
-        origin=point + far * towards, end_point=point - 1e-3 * towards
-    )
-    return bool(len(hits) == 0 or ((hits - point) @ towards).max() < SAME_PLACE_MM)
 
 
 def _draw_colour_bar(
@@ -521,38 +390,18 @@ def _draw_scale_bar(
     """Draw the scale bar of a length in mm, and below it what the letters of the views
     mean."""
     width, total = figure.get_size_inches()
-    axes = figure.add_axes(
-        (
-            _EDGE_IN / width,
-            (foot_in - 0.2) / total,
-            length * inches_per_mm / width,
-            0.04 / total,
-        )
-    )
+    left, bottom = _EDGE_IN / width, (foot_in - 0.2) / total
+    axes = figure.add_axes((left, bottom, length * inches_per_mm / width, 0.04 / total))
     axes.set_label("scale bar")
     axes.set_xlim(0, length)
     axes.axvspan(0, length, color="black", linewidth=0)
     axes.set_axis_off()
-    axes.text(
-        0.0,
-        -0.6,
-        f"{length:g} mm",
-        transform=axes.transAxes,
-        ha="left",
-        va="top",
-        fontsize=7,
-    )
-    ends = {
-        end for row in rows for panel in row.panels if panel for end in panel.view.ends
-    }
-    words = ", ".join(
+    label = f"{length:g} mm"
+    axes.text(0.0, -0.6, label, transform=axes.transAxes, va="top", fontsize=7)
+    ends: set[str] = set()
+    for row in rows:
+        ends.update(*(panel.view.ends for panel in row.panels if panel))
+    words = [
         f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends
-    )
-    figure.text(
-        _EDGE_IN / width,
-        0.02 / total,
-        words,
-        ha="left",
-        va="bottom",
-        fontsize=6,
-    )
+    ]
+    figure.text(_EDGE_IN / width, 0.02 / total, ", ".join(words), fontsize=6)

@@ -96,7 +96,7 @@ class GridBrain:
     colours: Floats | None = None
     light: Mapping[str, Any] = field(default_factory=lambda: TISSUE)
     caption: str = ""
-    mark: Floats | None = None
+    mark: int | None = None
     directions: Floats | None = None
 
     @property
@@ -134,12 +134,8 @@ def _brain_grid(
         every = np.concatenate([maps[quantity] for maps in values])
         scale = scale_of(quantity, every)
         if limit is not None:
-            scale = colour_scale(
-                VERTEX_MAPS[quantity].colours,
-                0.0,
-                limit,
-                cut=True,
-            )
+            colours = VERTEX_MAPS[quantity].colours
+            scale = colour_scale(colours, 0.0, limit, cut=True)
         colour_bar = (scale, title or map_title(quantity))
         if not np.isfinite(every).all():
             legend = [*legend, Patch(color=UNKNOWN_COLOUR, label="not measured")]
@@ -150,13 +146,7 @@ def _brain_grid(
         for brain in grid:
             if brain.row == label:
                 panels[brain.column] = _panel(brain, quantity, scale)
-        rows.append(
-            Row(
-                label,
-                [panels.get(column) for column in columns],
-                absent,
-            )
-        )
+        rows.append(Row(label, [panels.get(column) for column in columns], absent))
     return panel_grid(
         columns,
         rows,
@@ -212,25 +202,15 @@ def _in_views(grid: Grid, views: Sequence[str] = SIDE_VIEWS) -> list[GridBrain]:
     for name in views:
         for row in dict.fromkeys(brain.row for brain in grid):
             for column in columns:
-                brain = places.get(
-                    (row, column),
-                    GridBrain(row, column),
-                )
-                heading = column_label(column)
+                brain = places.get((row, column), GridBrain(row, column))
+                heading, label = column_label(column), row
                 if is_wide:
-                    row_label = f"{row}\n{name} view".strip()
+                    label = f"{row}\n{name} view".strip()
                 else:
-                    row_label = row
                     heading = f"{heading}\n{name} view"
-                seen.append(
-                    replace(
-                        brain,
-                        row=row_label,
-                        column=heading,
-                        view=VIEWS[name],
-                        caption=brain.caption if name == views[0] else "",
-                    )
-                )
+                caption = brain.caption if name == views[0] else ""
+                brain = replace(brain, row=label, column=heading, caption=caption)
+                seen.append(replace(brain, view=VIEWS[name]))
     return seen
 
 
@@ -278,22 +258,23 @@ def displacement_maps(
             mesh, _ = weeks[week]
             moved = mesh.vertices - weeks[before][0].vertices
             norms = np.linalg.norm(moved, axis=1)
-            place = mesh.vertices[int(np.nanargmax(norms))]
-            brain = GridBrain(
-                run,
-                (before, week),
-                [(mesh, {"displacement_mm": norms})],
-                caption=_displacement_caption(norms, place),
-                mark=place,
+            largest = int(norms.argmax())
+            place = [f"{value:z.0f}" for value in mesh.vertices[largest]]
+            caption = (
+                f"max {norms[largest]:.2f} mm\nat {', '.join(place)}\n"
+                f"mean {norms.mean():.2f} mm"
+            ).replace("-", "−")
+            grid.append(
+                GridBrain(
+                    run,
+                    (before, week),
+                    [(mesh, {"displacement_mm": norms})],
+                    caption=caption,
+                    mark=largest,
+                )
             )
-            grid.append(brain)
     title = "norm of the displacement (mm)"
     return _brain_grid(_in_views(grid), "displacement_mm", title=title)
-
-
-def _displacement_caption(norms: Floats, place: Floats) -> str:
-    where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
-    return f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
 
 
 def _round_up(value: float) -> float:
@@ -318,11 +299,8 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     rounding = ROUNDING * np.abs(finite).max(initial=0.0)
     signed = record.is_signed or finite.min(initial=0.0) < -rounding
     sizes = np.abs(finite) if signed else finite
-    end = 1.0
-    if len(sizes):
-        high = float(np.quantile(sizes, record.quantile))
-        if high > 0:
-            end = _round_up(high)
+    high = float(np.quantile(sizes, record.quantile)) if len(sizes) else 0.0
+    end = _round_up(high) if high > 0 else 1.0
     is_cut = bool((sizes > end).any())
     if signed:
         return colour_scale(SIGNED_COLOURS, -end, end, cut=is_cut)
@@ -339,18 +317,12 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
         names = [
             name for name in halves[0][1] if all(name in maps for _, maps in halves)
         ]
-    values = {
-        name: np.concatenate(
-            [
-                maps.get(
-                    name,
-                    np.full(len(mesh.vertices), np.nan),
-                )
-                for mesh, maps in halves
-            ]
-        )
-        for name in names
-    }
+    values = {}
+    for name in names:
+        parts = []
+        for mesh, maps in halves:
+            parts.append(maps.get(name, np.full(len(mesh.vertices), np.nan)))
+        values[name] = np.concatenate(parts)
     return merged(*(mesh for mesh, _ in halves)), values
 
 
@@ -422,29 +394,17 @@ def influence_figure(grid: Grid, *, values: Mapping[str, Mapping[str, Any]]) -> 
     The columns are runs, in the order of the sweep, and the observed brain of the week,
     last. `values` are by run the varied parameters with their values, for the headings.
     """
-    headings = dict(
-        zip(
-            values,
-            value_labels(list(values.values())),
-            strict=True,
-        )
-    )
+    headings = dict(zip(values, value_labels(list(values.values())), strict=True))
     placed = []
     for label in ("", "shape index\n"):
         for view in SIDE_VIEWS:
             for brain in grid:
-                halves = brain.halves
+                column = headings.get(brain.column, brain.column)
+                brain = replace(brain, row=f"{label}{view} view", column=column)
                 if not label:
-                    halves = [(mesh, {}) for mesh, _ in halves]
-                placed.append(
-                    replace(
-                        brain,
-                        row=f"{label}{view} view",
-                        column=headings.get(brain.column, brain.column),
-                        halves=halves,
-                        view=VIEWS[view],
-                    )
-                )
+                    plain: Halves = [(mesh, {}) for mesh, _ in brain.halves]
+                    brain = replace(brain, halves=plain)
+                placed.append(replace(brain, view=VIEWS[view]))
     return _brain_grid(placed, "shape_index", absent=ABSENT)
 
 
@@ -492,16 +452,10 @@ def _growth_grid(
             name_in_interval(f"growth_direction_{axis}", *interval) for axis in AXES
         ]
         if names[0] in growth:
-            directions[interval] = np.stack(
-                [growth[name] for name in names],
-                axis=1,
-            )
+            directions[interval] = np.stack([growth[name] for name in names], axis=1)
     if directions:
-        lengths = np.linalg.norm(
-            np.concatenate(list(directions.values())),
-            axis=1,
-        )
-        longest = np.quantile(lengths, DIRECTION_QUANTILE)
+        every = np.concatenate(list(directions.values()))
+        longest = np.quantile(np.linalg.norm(every, axis=1), DIRECTION_QUANTILE)
         directions = {key: lines / longest for key, lines in directions.items()}
     grid = []
     for interval in intervals:
@@ -557,22 +511,10 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
     On a scale from dark to pale, neighbours would look similar, and dark regions like
     shade. Colours repeat from the 22nd region on.
     """
-    shades = [
-        (
-            part[0] + tint * (1 - part[0]),
-            part[1] + tint * (1 - part[1]),
-            part[2] + tint * (1 - part[2]),
-        )
-        for tint in TINTS
-        for part in map(to_rgb, RUN_COLOURS)
-    ]
-    return dict(
-        zip(
-            dict.fromkeys(names),
-            cycle(shades),
-            strict=False,
-        )
-    )
+    pure = np.array([to_rgb(colour) for colour in RUN_COLOURS])
+    shades = np.concatenate([pure + tint * (1 - pure) for tint in TINTS])
+    colours = cycle(map(tuple, shades.tolist()))
+    return dict(zip(dict.fromkeys(names), colours, strict=False))
 
 
 @styled
@@ -596,14 +538,9 @@ def brain_regions(grid: Grid) -> Figure:
     placed = []
     for view in ROUND_VIEWS:
         for brain in grid:
-            placed.append(
-                replace(
-                    brain,
-                    row=f"{view} view",
-                    view=VIEWS[view],
-                    colours=_painted_regions(brain.halves, colours),
-                )
-            )
+            painted = _painted_regions(brain.halves, colours)
+            brain = replace(brain, row=f"{view} view", colours=painted)
+            placed.append(replace(brain, view=VIEWS[view]))
     return _brain_grid(placed, legend=legend)
 
 
@@ -639,18 +576,9 @@ def zones_figure(
     mesh, tags = boundary
     zones = tags["zone"]
     colours = to_rgba_array([ZONE_COLOURS[name] for name in ZONE_NAMES])[:, :3]
-    areas_mm2 = np.bincount(
-        zones,
-        face_areas(mesh),
-        minlength=len(colours),
-    )
+    areas_mm2 = np.bincount(zones, face_areas(mesh), minlength=len(colours))
     legend = []
-    for name, colour, area_mm2 in zip(
-        ZONE_NAMES,
-        colours,
-        areas_mm2,
-        strict=True,
-    ):
+    for name, colour, area_mm2 in zip(ZONE_NAMES, colours, areas_mm2, strict=True):
         if area_mm2:
             label = f"{name} {CM2_PER_MM2 * area_mm2:.1f} cm²"
             legend.append(Patch(color=colour, label=label))
@@ -662,14 +590,6 @@ def zones_figure(
         )
         # a brain of one hemisphere has no medial view of the other
         if len(part.faces):
-            grid.append(
-                GridBrain(
-                    "",
-                    f"{name} view",
-                    [(part, {})],
-                    view=view,
-                    colours=shades,
-                    light=MAP,
-                )
-            )
+            brain = GridBrain("", f"{name} view", [(part, {})], view=view, light=MAP)
+            grid.append(replace(brain, colours=shades))
     return _brain_grid(grid, legend=legend)

@@ -1,6 +1,7 @@
 """One surface seen from one side: cameras, light and off-screen rendering."""
 
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -125,10 +126,14 @@ _LAMPS = (
 def picture_axes(view: View) -> tuple[Floats, Floats]:
     """Return the unit vectors that point right and up in the picture."""
     up = np.array(view.up, dtype=float)
-    return np.cross(
-        up,
-        np.array(view.towards, dtype=float),
-    ), up
+    return np.cross(up, view.towards), up
+
+
+def polydata(mesh: TriangleMesh) -> pv.PolyData:
+    """Return a surface for VTK."""
+    return pv.PolyData.from_regular_faces(
+        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
+    )
 
 
 def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
@@ -150,20 +155,16 @@ def restricted(
     """
     if not hemisphere:
         return mesh, colours
-    left = corners(mesh).mean(axis=1)[:, 0] < fissure_x_mm
-    keep = left if hemisphere == "left" else ~left
+    is_left = corners(mesh).mean(axis=1)[:, 0] < fissure_x_mm
+    keep = is_left if hemisphere == "left" else ~is_left
     part, vertices = submesh(mesh, keep)
-    return part, (
-        colours[vertices] if len(colours) == len(mesh.vertices) else colours[keep]
-    )
+    kept = vertices if len(colours) == len(mesh.vertices) else keep
+    return part, colours[kept]
 
 
 def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
     """Return one colour for every vertex, (n, 3) in 0 to 1."""
-    return np.tile(
-        np.array(to_rgb(colour)),
-        (len(mesh.vertices), 1),
-    )
+    return np.tile(to_rgb(colour), (len(mesh.vertices), 1))
 
 
 def colour_scale(
@@ -180,10 +181,7 @@ def colour_scale(
         colormap, [tuple(shade) for shade in shades]
     )
     colours.colorbar_extend = "max" if cut else "neither"  # type: ignore[assignment]
-    return ScalarMappable(
-        Normalize(low, high if high > low else low + 1.0),
-        colours,
-    )
+    return ScalarMappable(Normalize(low, high), colours)
 
 
 def paint(values: Floats, scale: ScalarMappable) -> Floats:
@@ -211,32 +209,14 @@ def render(
     `half_extents_mm` half the width and half the height of the picture; `lines` (k, 2,
     3) ends of lines, drawn unless the surface hides them.
     """
-    size = [
-        max(
-            2,
-            round(2 * half * pixels_per_mm),
-        )
-        for half in half_extents_mm
-    ]
-    surface = pv.PolyData.from_regular_faces(
-        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
-    )
+    size = [max(2, round(2 * half * pixels_per_mm)) for half in half_extents_mm]
+    surface = polydata(mesh)
     surface.point_data.active_normals = vertex_normals(mesh)
-    bytes_ = np.clip(
-        np.round(255 * np.asarray(colours)),
-        0,
-        255,
-    ).astype(np.uint8)
-    attributes = (
-        surface.point_data if len(bytes_) == len(mesh.vertices) else surface.cell_data
-    )
-    attributes["colour"] = bytes_
-    plotter = pv.Plotter(
-        off_screen=True,
-        window_size=size,
-        lighting="none",
-    )
-    try:
+    is_by_vertex = len(colours) == len(mesh.vertices)
+    attributes = surface.point_data if is_by_vertex else surface.cell_data
+    attributes["colour"] = np.round(255 * colours).astype(np.uint8)
+    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
+    with closing(plotter):
         plotter.set_background("white")  # type: ignore[arg-type]
         plotter.add_mesh(
             surface,
@@ -264,25 +244,19 @@ def render(
                 lighting=False,
             )
         for position, intensity in _LAMPS:
-            plotter.add_light(
-                pv.Light(
-                    position=position,
-                    light_type="camera light",
-                    intensity=intensity,
-                )
+            lamp = pv.Light(
+                position=position,
+                light_type="camera light",
+                intensity=intensity,
             )
+            plotter.add_light(lamp)
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
         distance = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-        plotter.camera_position = [
-            tuple(middle + distance * np.array(view.towards)),
-            tuple(middle),
-            view.up,
-        ]
+        place = middle + distance * np.array(view.towards)
+        plotter.camera_position = [tuple(place), tuple(middle), view.up]
         plotter.camera.parallel_projection = True
         plotter.camera.parallel_scale = half_extents_mm[1]
         plotter.renderer.ResetCameraClippingRange()
         # at twice the resolution of print, smoother edges would not be visible
         plotter.disable_anti_aliasing()
         return np.array(plotter.screenshot(return_img=True))[..., :3]
-    finally:
-        plotter.close()

@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from ..errors import InputError
 from ..quantities import COMPARED_MAPS, VERTEX_MAPS, Shown, metrics_shown
@@ -17,9 +15,11 @@ from .labels import parameter_label, plain, with_unit
 from .style import (
     MUTED_COLOUR,
     RUN_COLOURS,
+    entry,
+    legend_below,
     panel_figure,
     run_colours,
-    run_legend,
+    run_entries,
     styled,
     week_axis,
     wrap,
@@ -50,57 +50,46 @@ def validation_figure(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
     """
     colours = run_colours(validation["run"], runs)
     simulations = validation.groupby(["run", "start"], sort=False)
-    figure, panels = panel_figure(
-        len(COMPARED_MAPS),
-        per_row=2,
-        panel_in=2.5,
-    )
+    figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
     for axes, measure in zip(panels, COMPARED_MAPS, strict=True):
         for number, ((run, _), rows) in enumerate(simulations):
             rows = rows.sort_values("week")
             # side by side, so that their bars do not hide each other
             shift_gw = 0.03 * (number - (simulations.ngroups - 1) / 2)
-            _gain_line(
-                axes,
-                rows["week"] + shift_gw,
-                rows,
-                measure,
-                colours[str(run)],
-            )
+            rows = rows.assign(at=rows["week"] + shift_gw)
+            _gain_line(axes, rows, measure, colours[str(run)])
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
         axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])
     panels[0].set_ylabel("gain in r over the scaled start")
-    run_legend(figure, colours)
+    legend_below(figure, run_entries(colours))
     return figure
 
 
 def _gain_line(
     axes: Axes,
-    x: pd.Series,
     rows: pd.DataFrame,
     measure: str,
     colour: Any,
 ) -> None:
-    """Draw a gain with its interval; filled marks are explained weeks, open ones
-    predicted."""
+    """Draw a gain with its interval at the places `at`; filled marks are explained
+    weeks, open ones predicted."""
     gain = rows[f"gain_{measure}"]
     below = gain - rows[f"gain_low_{measure}"]
     above = rows[f"gain_high_{measure}"] - gain
     lengths = np.stack([below, above]).clip(min=0)
     axes.errorbar(
-        x,
+        rows["at"],
         gain,
         yerr=lengths,
         color=colour,
         linewidth=1.0,
         elinewidth=0.7,
     )
-    for kind, face in (("explained", colour), ("predicted", "white")):
-        if (selected := rows["kind"] == kind).any():
-            axes.plot(
-                x[selected], gain[selected], "o", color=colour, markerfacecolor=face
-            )
+    for kind, part in rows.groupby("kind"):
+        face = colour if kind == "explained" else "white"
+        marks = part["at"], part[gain.name]
+        axes.plot(*marks, "o", color=colour, markerfacecolor=face)
 
 
 @styled
@@ -126,21 +115,19 @@ def nearest_figure(
     The rows `nearest` of `published` have parameter, week, measure, and the nearest
     value, drawn as a dashed line. InputError if there is no distance.
     """
-    rows = comparison[
-        (comparison["subject"] == subject) & comparison["observed"].isin(observed)
-    ].dropna(subset="distance")
+    is_own = comparison["subject"] == subject
+    rows = comparison[is_own & comparison["observed"].isin(observed)]
+    rows = rows.dropna(subset="distance")
     if rows.empty:
         raise InputError(
             "no distance to an observed brain", found=f"{len(comparison)} rows"
         )
-    rows = rows.assign(
-        at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok")
-    )
-    lines = {
-        row["measure"]: row["value"]
-        for row in (published or {"nearest": []})["nearest"]
-        if (row["parameter"], row["week"]) == (varied, week)
-    }
+    trusted = (rows["resolution"] == "ok") & (rows["flag"] == "ok")
+    rows = rows.assign(at=rows[varied], trusted=trusted)
+    lines = {}
+    for row in published["nearest"] if published else []:
+        if (row["parameter"], row["week"]) == (varied, week):
+            lines[row["measure"]] = row["value"]
     measures = list(dict.fromkeys(rows["measure"]))
     figure, panels = panel_figure(len(measures), panel_in=2.1)
     drawn: set[str] = set()
@@ -149,83 +136,36 @@ def nearest_figure(
         sides = ["whole"] if (here["hemisphere"] == "whole").any() else list(SIDES)
         drawn |= set(sides)
         for side in sides:
-            _nearest_line(
-                axes,
-                here[here["hemisphere"] == side].sort_values("at"),
-                *SIDE_STYLES[side],
-            )
+            own = here[here["hemisphere"] == side].sort_values("at")
+            _nearest_line(axes, own, *SIDE_STYLES[side])
         axes.margins(y=0.25)
         # a band cut at Weyl's number is the same measure
         if (value := lines.get(measure.removesuffix("_weyl"))) is not None:
-            axes.axvline(
-                value,
-                color=MUTED_COLOUR,
-                linestyle="--",
-                linewidth=0.9,
-            )
+            axes.axvline(value, color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
         # distances of sizes are relative to the observed brain
         unit = (
             "share of the observed"
             if measure in metrics_shown(Shown.SIZE)
             else here["unit"].iloc[0]
         )
-        axes.set_title(
-            wrap(with_unit(plain(measure), unit), 30),
-            fontsize=7.5,
-        )
+        title = with_unit(plain(measure), unit)
+        axes.set_title(wrap(title, 30), fontsize=7.5)
         axes.set_xlabel(parameter_label(varied))
         if number % 3 == 0:
             axes.set_ylabel("distance from the observed brain")
-    handles: list[Artist] = [
-        Line2D(
-            [],
-            [],
-            color=colour,
-            marker=marker,
-            markersize=4.5,
-            label=SIDE_NAMES[side],
-        )
+    handles = [
+        entry(SIDE_NAMES[side], colour, marker=marker, markersize=4.5)
         for side, (marker, colour) in SIDE_STYLES.items()
         if side in drawn
     ]
-    ring: dict[str, Any] = {
-        "color": MUTED_COLOUR,
-        "linestyle": "none",
-        "marker": "o",
-    }
-    handles.append(
-        Line2D(
-            [],
-            [],
-            markersize=9,
-            markerfacecolor="none",
-            label="nearest",
-            **ring,
-        )
-    )
+    ring: dict[str, Any] = {"linestyle": "none", "marker": "o"}
+    handles.append(entry("nearest", markersize=9, markerfacecolor="none", **ring))
     if not rows["trusted"].all():
         label = "cut off, or not resolved"
-        handles.append(
-            Line2D(
-                [],
-                [],
-                markersize=4.5,
-                markerfacecolor="white",
-                label=label,
-                **ring,
-            )
-        )
+        handles.append(entry(label, markersize=4.5, markerfacecolor="white", **ring))
     if lines:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=MUTED_COLOUR,
-                linestyle="--",
-                label="nearest in the publication",
-            )
-        )
-    run_legend(figure, {}, extra=handles)
+        handles.append(entry("nearest in the publication", linestyle="--"))
+    legend_below(figure, handles)
     return figure
 
 
@@ -241,47 +181,36 @@ def _nearest_line(
 ) -> None:
     if rows.empty:
         return
-    axes.plot(
-        rows["at"],
-        rows["distance"],
-        color=colour,
-        linewidth=1.0,
-    )
+    axes.plot(rows["at"], rows["distance"], color=colour, linewidth=1.0)
     for trusted, part in rows.groupby("trusted"):
-        style: dict[str, Any] = {
-            "markerfacecolor": colour if trusted else "white",
-            "markersize": 4.5,
-        }
         axes.plot(
             part["at"],
             part["distance"],
             marker,
             color=colour,
-            **style,
+            markerfacecolor=colour if trusted else "white",
+            markersize=4.5,
         )
-    sound = rows[rows["trusted"]]
-    best = (sound if len(sound) else rows).sort_values("distance").iloc[0]
+    # those that are trusted first
+    best = rows.sort_values(["trusted", "distance"], ascending=[False, True]).iloc[0]
     place = best["at"], best["distance"]
     axes.plot(
         *place,
         "o",
+        color=colour,
         markersize=11,
         markerfacecolor="none",
-        color=colour,
         markeredgewidth=1.0,
     )
-    below: dict[str, Any] = {
-        "xytext": (0, -8),
-        "textcoords": "offset points",
-        "ha": "center",
-        "va": "top",
-    }
     axes.annotate(
         f"{best['at']:g}",
         place,
+        xytext=(0, -8),
+        textcoords="offset points",
+        ha="center",
+        va="top",
         fontsize=7,
         color=colour,
-        **below,
     )
 
 
@@ -297,55 +226,29 @@ def calibration_figure(
     `runs` has the columns of the parameters, round, score (NaN: diverged); `optimum`
     parameter, value. `score` are the terms of the score.
     """
-    figure, panels = panel_figure(
-        len(optimum),
-        per_row=len(optimum),
-        panel_in=2.0,
-    )
-    finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]
+    figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
+    diverged = runs[runs["score"].isna()]
     # later rounds are darker
-    shades = dict(
-        zip(
-            sorted(set(runs["round"])),
-            np.linspace(0.75, 0, runs["round"].nunique()),
-            strict=True,
-        )
-    )
+    rounds = sorted(set(runs["round"]))
+    shades = np.linspace(0.75, 0, len(rounds))
     for axes, name, value in zip(
         panels, optimum["parameter"], optimum["value"], strict=True
     ):
-        axes.axvline(
-            value,
-            color=RUN_COLOURS[1],
-            linestyle="--",
-            label="optimum",
-        )
-        for number, shade in shades.items():
-            rows = finished[finished["round"] == number]
-            style: dict[str, Any] = {
-                "color": str(shade),
-                "markeredgecolor": "black",
-                "markeredgewidth": 0.4,
-            }
+        axes.axvline(value, color=RUN_COLOURS[1], linestyle="--", label="optimum")
+        for number, shade in zip(rounds, shades, strict=True):
+            rows = runs[runs["round"] == number].dropna(subset="score")
             axes.plot(
                 rows[name],
                 rows["score"],
                 "o",
+                color=str(shade),
+                markeredgecolor="black",
+                markeredgewidth=0.4,
                 label=f"round {number}",
-                **style,
             )
         if len(diverged):
-            top = np.full(
-                len(diverged),
-                float(finished["score"].max()),
-            )
-            axes.plot(
-                diverged[name],
-                top,
-                "x",
-                color=MUTED_COLOUR,
-                label="diverged",
-            )
+            worst = np.full(len(diverged), runs["score"].max())
+            axes.plot(diverged[name], worst, "x", color=MUTED_COLOUR, label="diverged")
         axes.set_xlabel(parameter_label(name))
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
     figure.legend(

@@ -11,18 +11,19 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from ..geometry.alignment import align
 from ..geometry.triangles import Floats, Ints, TriangleMesh
 from .labels import week_label
 from .pictures import Grid
+from .scene import polydata
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
     OBSERVED_COLOUR,
     SINGLE_COLUMN_IN,
     add_letters,
+    entry,
     run_colours,
     styled,
 )
@@ -51,22 +52,11 @@ def draw_outline(
 ) -> None:
     """Draw the intersection of a surface with one of `PLANES` at a position in mm."""
     normal, right, up = PLANES[plane]
-    body = pv.PolyData.from_regular_faces(
-        np.array(surface.vertices), np.array(surface.faces, dtype=int)
-    )
-    cut = body.slice(
-        normal=np.eye(3)[normal],
-        origin=np.eye(3)[normal] * at,
-    )
+    axis = np.eye(3)[normal]
+    cut = polydata(surface).slice(normal=axis, origin=axis * at)
     segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
-    axes.add_collection(
-        LineCollection(
-            list(segments),
-            colors=colour,
-            linewidths=thickness,
-            capstyle="round",
-        )
-    )
+    style: dict[str, Any] = {"colors": colour, "linewidths": thickness}
+    axes.add_collection(LineCollection(list(segments), capstyle="round", **style))
 
 
 def _coronal_section(
@@ -76,27 +66,12 @@ def _coronal_section(
 ) -> pv.PolyData:
     """Cut linear elements at the median y of their nodes: a polygon per element, with
     fields at its points."""
-    cells = np.insert(
-        np.asarray(tets),
-        0,
-        4,
-        axis=1,
-    )
-    body = pv.UnstructuredGrid(
-        cells.ravel(), np.full(len(tets), pv.CellType.TETRA), np.asarray(positions)
-    )
+    body = pv.UnstructuredGrid({pv.CellType.TETRA: np.asarray(tets)}, positions)
     for name, values in fields.items():
         body.point_data[name] = values
+    middle = (0.0, float(np.median(positions[:, 1])), 0.0)
     # one polygon per element, not triangles
-    return body.slice(
-        normal="y",
-        origin=(
-            0.0,
-            float(np.median(positions[:, 1])),
-            0.0,
-        ),
-        generate_triangles=False,
-    )
+    return body.slice(normal="y", origin=middle, generate_triangles=False)
 
 
 @styled
@@ -119,46 +94,24 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
         "tangential growth\nin a step",
         "normals",
     )
-    for row, week in zip(
-        rows,
-        (min(weeks), max(weeks)),
-        strict=True,
-    ):
+    for row, week in zip(rows, (min(weeks), max(weeks)), strict=True):
         fields = dict(weeks[week])
-        section = _coronal_section(
-            fields.pop("positions"),
-            tets[:, :4],
-            fields,
-        )
+        section = _coronal_section(fields.pop("positions"), tets[:, :4], fields)
         points, values = np.asarray(section.points)[:, [0, 2]], section.point_data
         polygons = [points[face] for face in section.irregular_faces]
         style: dict[str, Any] = {"linewidths": 0.05}
-        for axes, (name, top) in zip(
-            row,
-            scales.items(),
-            strict=False,
-        ):
-            means = np.array(
-                [values[name][face].mean() for face in section.irregular_faces]
+        for axes, (name, top) in zip(row, scales.items(), strict=False):
+            means = [values[name][face].mean() for face in section.irregular_faces]
+            colours: dict[str, Any] = {"cmap": "YlGnBu", "norm": Normalize(0, top)}
+            filled = PolyCollection(
+                polygons, array=np.array(means), edgecolors="black", **colours, **style
             )
-            colours: dict[str, Any] = {
-                "array": means,
-                "cmap": "YlGnBu",
-                "norm": Normalize(0, top),
-                "edgecolors": "black",
-            }
-            axes.add_collection(PolyCollection(polygons, **colours, **style))
-        row[3].add_collection(
-            PolyCollection(
-                polygons, facecolors="none", edgecolors=MUTED_COLOUR, **style
-            )
-        )
+            axes.add_collection(filled)
+        edges = {"facecolors": "none", "edgecolors": MUTED_COLOUR, **style}
+        row[3].add_collection(PolyCollection(polygons, **edges))
         # arrows at one point of the cortex in each square
-        _, first = np.unique(
-            np.floor(points / ARROW_MM),
-            axis=0,
-            return_index=True,
-        )
+        squares = np.floor(points / ARROW_MM)
+        _, first = np.unique(squares, axis=0, return_index=True)
         arrows = first[values["weight"][first] > 0.5]
         normals = values["normals"][arrows][:, [0, 2]] * ARROW_MM
         row[3].quiver(
@@ -172,37 +125,23 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
         left, bottom = points.min(axis=0) - ARROW_MM
         right, top = points.max(axis=0) + ARROW_MM
         for axes in row:
-            axes.set(
-                xlim=(left, right),
-                ylim=(bottom, top),
-                aspect="equal",
-            )
+            axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
             axes.set_axis_off()
-        row[0].text(
-            -0.02,
-            0.5,
-            week_label(week),
-            transform=row[0].transAxes,
-            rotation=90,
-            ha="right",
-            va="center",
-        )
-    for axes, title in zip(
-        rows[0],
-        titles,
-        strict=True,
-    ):
+        _label_row(row[0], week_label(week))
+    for axes, title in zip(rows[0], titles, strict=True):
         axes.set_title(title, fontsize=8)
     for column, top in enumerate(scales.values()):
         scale = ScalarMappable(Normalize(0, top), "YlGnBu")
-        figure.colorbar(
-            scale,
-            ax=list(rows[:, column]),
-            location="bottom",
-            shrink=0.8,
-        )
+        panels = list(rows[:, column])
+        figure.colorbar(scale, ax=panels, location="bottom", shrink=0.8)
     add_letters(rows.flat)
     return figure
+
+
+def _label_row(axes: Axes, text: str) -> None:
+    """Write upwards at the left of the first panel of a row."""
+    style: dict[str, Any] = {"rotation": 90, "ha": "right", "va": "center"}
+    axes.text(-0.02, 0.5, text, transform=axes.transAxes, **style)
 
 
 def _aligned(
@@ -222,10 +161,7 @@ def _aligned(
         if brain.is_simulated:
             aligned = runs.setdefault(brain.row, {})
             if brain.column in last:
-                aligned[brain.column] = align(
-                    brain.surface,
-                    last[brain.column],
-                )
+                aligned[brain.column] = align(brain.surface, last[brain.column])
     return last, name, runs
 
 
@@ -243,23 +179,11 @@ def outlines_figure(grid: Grid) -> Figure:
     observed, observed_name, runs = _aligned(grid)
     weeks = sorted(observed)
     colours = run_colours(runs)
-    drawn = [*observed.values()]
+    drawn = [mesh.vertices for mesh in observed.values()]
     for brains in runs.values():
-        drawn += brains.values()
-    low = (
-        np.min(
-            [mesh.vertices.min(axis=0) for mesh in drawn],
-            axis=0,
-        )
-        - 1
-    )
-    high = (
-        np.max(
-            [mesh.vertices.max(axis=0) for mesh in drawn],
-            axis=0,
-        )
-        + 1
-    )
+        drawn += [mesh.vertices for mesh in brains.values()]
+    every = np.concatenate(drawn)
+    low, high = every.min(axis=0) - 1, every.max(axis=0) + 1
     wide = max((high - low)[right] for _, right, _ in PLANES.values())
     tall = [(high - low)[up] for *_, up in PLANES.values()]
     inches_per_mm = min(
@@ -281,66 +205,25 @@ def outlines_figure(grid: Grid) -> Figure:
             at = float(along.min() + part * np.ptp(along))
             # wide enough to stay visible under a run
             draw_outline(axes, observed[week], plane, at, OBSERVED_COLOUR, 1.7)
-            for run in runs:
-                if week in runs[run]:
-                    draw_outline(
-                        axes,
-                        runs[run][week],
-                        plane,
-                        at,
-                        colours[run],
-                    )
+            for run, brains in runs.items():
+                if week in brains:
+                    draw_outline(axes, brains[week], plane, at, colours[run])
             axes.set(
                 xlim=(centre - wide / 2, centre + wide / 2),
                 ylim=(low[up], high[up]),
                 aspect="equal",
             )
             axes.set_axis_off()
-        row[0].text(
-            -0.02,
-            0.5,
-            plane,
-            transform=row[0].transAxes,
-            rotation=90,
-            ha="right",
-            va="center",
-        )
-    for axes, week in zip(
-        panels[0],
-        weeks,
-        strict=True,
-    ):
+        _label_row(row[0], plane)
+    for axes, week in zip(panels[0], weeks, strict=True):
         axes.set_title(week_label(week), fontsize=8)
     foot = panels[-1, 0]
     start, bottom = foot.get_xlim()[0] + 2, low[PLANES["sagittal"][2]]
-    foot.plot(
-        [start, start + SCALE_BAR_MM],
-        [bottom] * 2,
-        color="black",
-        linewidth=2,
-        clip_on=False,
-    )
-    foot.text(
-        start,
-        bottom - 1,
-        f"{SCALE_BAR_MM:g} mm",
-        va="top",
-        fontsize=7,
-    )
+    ends = [start, start + SCALE_BAR_MM]
+    foot.plot(ends, [bottom] * 2, color="black", linewidth=2, clip_on=False)
+    foot.text(start, bottom - 1, f"{SCALE_BAR_MM:g} mm", va="top", fontsize=7)
     add_letters(panels[:, 0])
     named = {**colours, observed_name: OBSERVED_COLOUR}
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=colour,
-            label=label,
-        )
-        for label, colour in named.items()
-    ]
-    figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=4,
-    )
+    handles = [entry(label, colour) for label, colour in named.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure

@@ -8,12 +8,12 @@ from string import ascii_lowercase
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from ..quantities import DISTINCT_COLOURS
 from ..settings.terms import OBSERVED, run_names
@@ -88,14 +88,7 @@ def panel_figure(
     figure = Figure(
         figsize=(width_in, foot_in + panel_in * lines), layout="constrained"
     )
-    panels = list(
-        figure.subplots(
-            lines,
-            columns,
-            squeeze=False,
-            **grid,
-        ).flat
-    )
+    panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
     for spare in panels[count:]:
         spare.remove()
     add_letters(panels[:count])
@@ -109,19 +102,16 @@ def add_letters(panels: Iterable[Axes]) -> None:
     if len(panels) > 1:
         for axes, letter in zip(panels, ascii_lowercase, strict=False):
             # left of the title, which may be as wide as the panel
-            place: dict[str, Any] = {
-                "xytext": (-12, 4),
-                "xycoords": "axes fraction",
-                "textcoords": "offset points",
-            }
             axes.annotate(
                 letter,
                 (0.0, 1.0),
+                xytext=(-12, 4),
+                xycoords="axes fraction",
+                textcoords="offset points",
                 ha="right",
                 va="bottom",
                 fontweight="bold",
                 fontsize=9,
-                **place,
             )
 
 
@@ -136,22 +126,10 @@ def wrap(text: str, letters: int) -> str:
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with columns run and subject, with simulations named by
     `run_names`."""
-    pairs = list(
-        zip(
-            table["run"],
-            table["subject"],
-            strict=True,
-        )
-    )
-    simulated = []
-    for run, subject in dict.fromkeys(pairs):
-        if run != OBSERVED:
-            simulated.append((run, subject))
+    pairs = list(zip(table["run"], table["subject"], strict=True))
+    simulated = [pair for pair in dict.fromkeys(pairs) if pair[0] != OBSERVED]
     names = dict(zip(simulated, run_names(simulated), strict=True))
-    named = []
-    for run, subject in pairs:
-        named.append(names.get((run, subject), run))
-    return table.assign(run=named)
+    return table.assign(run=[names.get(pair, pair[0]) for pair in pairs])
 
 
 def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
@@ -162,37 +140,23 @@ def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, A
     same colour in all figures.
     """
     present = list(present)
-    names = list(dict.fromkeys([*runs, *present]))
-    if OBSERVED in names:
-        names.remove(OBSERVED)
-    colours: dict[str, Any] = {}
-    for i, name in enumerate(names):
-        if name not in present:
-            continue
-        if len(names) <= len(RUN_COLOURS):
-            colours[name] = RUN_COLOURS[i]
-        else:
-            place = 0.92 * i / (len(names) - 1)
-            colours[name] = mpl.colormaps["viridis"](place)
-    return colours
+    names = [name for name in dict.fromkeys([*runs, *present]) if name != OBSERVED]
+    colours: Sequence[Any] = RUN_COLOURS
+    if len(names) > len(RUN_COLOURS):
+        shades = mpl.colormaps["viridis"](np.linspace(0, 0.92, len(names)))
+        colours = [tuple(shade) for shade in shades]
+    by_name = zip(names, colours, strict=False)
+    return {name: colour for name, colour in by_name if name in present}
 
 
 def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
     """Label the horizontal axis as gestational weeks with whole weeks as ticks."""
     values = list(weeks)
     axes.set_xlabel("gestational age (GW)")
-    axes.xaxis.set_major_locator(
-        mpl.ticker.MaxNLocator(
-            nbins=8,
-            integer=True,
-            steps=[1, 2, 5, 10],
-            min_n_ticks=1,
-        )
-    )
+    whole = mpl.ticker.MaxNLocator(8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1)
+    axes.xaxis.set_major_locator(whole)
     # a single week is in the middle of the axis
-    margin = max(
-        0.04 * (max(values) - min(values)), (1.08 - max(values) + min(values)) / 2
-    )
+    margin = max(0.04 * np.ptp(values), (1.08 - np.ptp(values)) / 2)
     axes.set_xlim(min(values) - margin, max(values) + margin)
 
 
@@ -208,76 +172,32 @@ def from_zero(axes: Axes) -> None:
     axes.set_ylim(0, 1.07 * highest if highest > 0 else 1.0)
 
 
-def star(
-    label: str,
-    colour: str = OBSERVED_COLOUR,
-    **style: Any,
-) -> Line2D:
+def entry(label: str, colour: Any = MUTED_COLOUR, **style: Any) -> Line2D:
+    """Return a legend entry."""
+    return Line2D([], [], label=label, **{"color": colour} | style)
+
+
+def star(label: str, colour: Any = OBSERVED_COLOUR, **style: Any) -> Line2D:
     """Return the legend entry of observed brains."""
-    usual: dict[str, Any] = {
-        "marker": "*",
-        "markersize": 7,
-        "linestyle": "none",
-    }
-    return Line2D(
-        [],
-        [],
-        color=colour,
-        label=label,
-        **{**usual, **style},
-    )
+    usual = {"marker": "*", "markersize": 7, "linestyle": "none"}
+    return entry(label, colour, **usual | style)
 
 
-def run_legend(
-    figure: Figure,
-    colours: Mapping[str, Any],
-    *,
-    observed_name: str = "",
-    bars: bool = False,
-    markers: Mapping[str, str] | None = None,
-    extra: Sequence[Artist] = (),
-) -> None:
-    """Draw a legend below the panels: runs, observed brains if named, subjects, and
-    `extra` entries.
+def run_entries(colours: Mapping[str, Any]) -> list[Artist]:
+    """Return the legend entries of runs."""
+    return [entry(run, colour, marker="o") for run, colour in colours.items()]
 
-    Runs have lines or `bars` of their `colours`; `markers` are by subject. The legend
-    has as many columns as its longest label allows, and the figure grows by its rows.
+
+def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    """Draw a legend below the panels.
+
+    It has as many columns as its longest label allows, and the figure grows by its
+    rows.
     """
-    handles: list[Artist] = [
-        (
-            Patch(color=colour, label=run)
-            if bars
-            else Line2D(
-                [],
-                [],
-                color=colour,
-                marker="o",
-                label=run,
-            )
-        )
-        for run, colour in colours.items()
-    ]
-    if observed_name:
-        handles.append(star(observed_name))
-    handles += [
-        star(subject, marker=marker, markersize=5)
-        for subject, marker in (markers or {}).items()
-    ]
-    handles.extend(extra)
     # a letter of the legend is about 0.065 in wide, the line before it and the gap
     # behind 0.5 in
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)
-    columns = max(
-        1,
-        min(
-            len(handles),
-            int(figure.get_figwidth() / longest),
-        ),
-    )
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / longest)))
     lines = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.15 * (lines - 1))
-    figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=columns,
-    )
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)

@@ -6,7 +6,6 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 from matplotlib.cm import ScalarMappable
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -16,6 +15,7 @@ from ..geometry.triangles import Floats, TriangleMesh
 from ..quantities import VERTEX_MAPS
 from .labels import map_title
 from .pictures import Halves, scale_of, whole_maps
+from .scene import polydata
 from .style import OBSERVED_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
 
 BUDGET_BYTES = 12_000_000
@@ -65,40 +65,26 @@ def surfaces_view(
         len(everything) * _BYTES_PER_FRAME
         + (len(runs) + len(observed)) * _BYTES_PER_TRIANGULATION
     )
-    vertices = int(
-        np.clip(
-            BUDGET_BYTES / _LETTERS_PER_BYTE / bytes_per_vertex,
-            MIN_VERTICES,
-            MAX_VERTICES,
-        )
-    )
-    low = np.min(
-        [mesh.vertices.min(axis=0) for _, mesh, _ in everything],
-        axis=0,
-    )
-    high = np.max(
-        [mesh.vertices.max(axis=0) for _, mesh, _ in everything],
-        axis=0,
-    )
-    box = low, float((high - low).max())
+    affordable = BUDGET_BYTES / _LETTERS_PER_BYTE / bytes_per_vertex
+    vertices = int(np.clip(affordable, MIN_VERTICES, MAX_VERTICES))
+    places = np.concatenate([mesh.vertices for _, mesh, _ in everything])
+    low = places.min(axis=0)
+    box = low, float((places.max(axis=0) - low).max())
     scales = {}
     for name in _DRAWN:
         values = [maps[name] for _, _, maps in everything if name in maps]
         if values:
-            every = np.concatenate(values)
-            scales[name] = scale_of(
-                name,
-                every[np.isfinite(every)],
-            )
+            scales[name] = scale_of(name, np.concatenate(values))
     groups: list[dict[str, Any]] = []
     for run, frames in simulated.items():
         vertices_kept, faces = _thin_out(frames[-1][1], vertices)
+        drawn = [_frame(frame, vertices_kept, box, scales) for frame in frames]
         group = {
             "name": run,
             "kind": "simulated",
             "colour": SIMULATED_SURFACE_COLOUR,
             "faces": _text(faces, "<u2"),
-            "frames": [_frame(frame, vertices_kept, box, scales) for frame in frames],
+            "frames": drawn,
         }
         groups.append(group)
     if observed_frames:
@@ -139,11 +125,8 @@ def _drawn_map(name: str, scale: ScalarMappable) -> dict[str, Any]:
 
 def _timed(week: float, halves: Halves) -> Timed:
     mesh, maps = whole_maps(halves)
-    return (
-        week,
-        mesh,
-        {name: values for name, values in maps.items() if VERTEX_MAPS[name].colours},
-    )
+    drawn = {name: values for name, values in maps.items() if name in _DRAWN}
+    return week, mesh, drawn
 
 
 def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
@@ -171,15 +154,9 @@ def _thin_out(
     """
     if len(mesh.vertices) <= vertices:
         return np.arange(len(mesh.vertices)), np.asarray(mesh.faces, dtype=np.int64)
-    body = pv.PolyData.from_regular_faces(
-        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
-    )
-    coarse = body.decimate_pro(
-        1 - vertices / len(mesh.vertices), preserve_topology=True
-    )
-    _, vertices_kept = cKDTree(mesh.vertices).query(
-        np.asarray(coarse.points, dtype=float)
-    )
+    share = 1 - vertices / len(mesh.vertices)
+    coarse = polydata(mesh).decimate_pro(share, preserve_topology=True)
+    _, vertices_kept = cKDTree(mesh.vertices).query(coarse.points)
     return vertices_kept, np.asarray(coarse.regular_faces, dtype=np.int64)
 
 
@@ -193,27 +170,13 @@ def _frame(
     values = {}
     for name, vertex_values in maps.items():
         bottom, top = scales[name].get_clim()
-        shares = (np.asarray(vertex_values, dtype=float)[vertices_kept] - bottom) / (
-            top - bottom
-        )
-        levels = np.clip(
-            np.round(shares * _VALUE_LEVELS),
-            0,
-            _VALUE_LEVELS,
-        )
-        values[name] = _text(
-            np.where(np.isfinite(shares), levels, _UNKNOWN),
-            "u1",
-        )
+        heights = np.asarray(vertex_values, dtype=float)[vertices_kept] - bottom
+        levels = np.round(heights / (top - bottom) * _VALUE_LEVELS)
+        levels = np.where(np.isnan(levels), _UNKNOWN, levels.clip(0, _VALUE_LEVELS))
+        values[name] = _text(levels, "u1")
     places = np.round((mesh.vertices[vertices_kept] - low) / size * _POSITION_LEVELS)
-    return {
-        "week": week,
-        "positions": _text(places, "<u2"),
-        "values": values,
-    }
+    return {"week": week, "positions": _text(places, "<u2"), "values": values}
 
 
 def _text(values: NDArray, kind: str) -> str:
-    return b64encode(np.ascontiguousarray(values.astype(kind)).tobytes()).decode(
-        "ascii"
-    )
+    return b64encode(values.astype(kind).tobytes()).decode("ascii")

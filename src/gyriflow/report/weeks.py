@@ -17,7 +17,6 @@ import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
@@ -37,10 +36,12 @@ from .style import (
     NEUTRAL_COLOUR,
     OBSERVED_COLOUR,
     RUN_COLOURS,
+    entry,
     from_zero,
+    legend_below,
     panel_figure,
     run_colours,
-    run_legend,
+    run_entries,
     runs_by_name,
     star,
     styled,
@@ -63,6 +64,7 @@ NEAR_GW = 2.0
 """The lines of atlases go on so far beyond the brains of a chart."""
 MANY_BRAINS = 30
 """Number of reference brains above which their marks are small."""
+UNTRUSTED = "band cut off or not resolved"
 _FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
 _HATCH = "//////"
 
@@ -91,11 +93,7 @@ def _weeks_chart(
     """Draw layers over the weeks, the first at the back, in a panel for each title;
     `layout` of `panel_figure`."""
     figure, panels = panel_figure(len(titles), **layout)
-    for axes, (panel, title) in zip(
-        panels,
-        titles.items(),
-        strict=True,
-    ):
+    for axes, (panel, title) in zip(panels, titles.items(), strict=True):
         for layer in layers:
             rows = layer.rows[layer.rows["panel"] == panel].sort_values("week")
             if isinstance(layer.value, tuple):
@@ -103,19 +101,9 @@ def _weeks_chart(
                 weeks_at, low, high = (
                     rows[column].astype(float) for column in ("week", *layer.value)
                 )
-                axes.fill_between(
-                    weeks_at,
-                    low,
-                    high,
-                    linewidth=0,
-                    **layer.style,
-                )
+                axes.fill_between(weeks_at, low, high, linewidth=0, **layer.style)
             elif len(rows):
-                axes.plot(
-                    rows["week"],
-                    rows[layer.value],
-                    **layer.style,
-                )
+                axes.plot(rows["week"], rows[layer.value], **layer.style)
             if "trusted" in rows and not rows["trusted"].all():
                 doubtful = rows[~rows["trusted"]]
                 style = {**layer.style, "markerfacecolor": "white", "linestyle": ""}
@@ -127,14 +115,11 @@ def _weeks_chart(
 
 def _run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
     """Return the line of each run."""
-    style = {"marker": "o", "markersize": 2.5}
-    return [
-        Layer(
-            rows[rows["run"] == run],
-            {"color": colour, **style},
-        )
-        for run, colour in colours.items()
-    ]
+    layers = []
+    for run, colour in colours.items():
+        style = {"color": colour, "marker": "o", "markersize": 2.5}
+        layers.append(Layer(rows[rows["run"] == run], style))
+    return layers
 
 
 def _observed_marks(
@@ -149,9 +134,8 @@ def _observed_marks(
     """Return observed brains in their `shades`, else `colour`; scans of a subject are
     joined and have its marker."""
     layers = []
-    for person, scans in rows.groupby(
-        rows["subject"].map(lambda brain: subjects.get(brain, "")), sort=False
-    ):
+    people = rows["subject"].map(lambda brain: subjects.get(brain, ""))
+    for person, scans in rows.groupby(people, sort=False):
         if person and len(set(scans["week"])) > 1:
             layers.append(Layer(scans.assign(trusted=True), JOINED))
         marker = markers.get(str(person), "*")
@@ -162,9 +146,8 @@ def _observed_marks(
             "zorder": 3,
             **style,
         }
-        for shade, part in scans.groupby(
-            scans["subject"].map(lambda brain: shades.get(brain, colour)), sort=False
-        ):
+        colours = scans["subject"].map(lambda brain: shades.get(brain, colour))
+        for shade, part in scans.groupby(colours, sort=False):
             layers.append(Layer(part, {"color": shade, **look}))
     return layers
 
@@ -173,14 +156,15 @@ def _subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[st
     """Return the marker of each subject with observed brains; none if there are more
     subjects than markers."""
     brains = rows.loc[rows["run"] == OBSERVED, "subject"]
-    people = list(
-        dict.fromkeys(subjects[brain] for brain in brains if brain in subjects)
-    )
-    return (
-        dict(zip(people, SUBJECT_MARKERS, strict=False))
-        if 1 < len(people) <= len(SUBJECT_MARKERS)
-        else {}
-    )
+    people = brains.map(subjects).dropna().unique()
+    if not 1 < len(people) <= len(SUBJECT_MARKERS):
+        return {}
+    return dict(zip(people, SUBJECT_MARKERS, strict=False))
+
+
+def _subject_entries(markers: Mapping[str, str]) -> list[Artist]:
+    """Return the legend entries of subjects."""
+    return [star(name, marker=mark, markersize=5) for name, mark in markers.items()]
 
 
 def _group_shades(
@@ -189,44 +173,28 @@ def _group_shades(
     """Return the colour of each brain in a group, not used by any run, and the legend
     entries."""
     free = [colour for colour in RUN_COLOURS if colour not in colours.values()]
-    group_colours = dict(
-        zip(
-            dict.fromkeys(groups.values()),
-            free,
-            strict=False,
-        )
-    )
-    entries: list[Artist] = [
-        star(name, colour, marker="o", markersize=5)
-        for name, colour in group_colours.items()
-    ]
-    return {
+    group_colours = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
+    entries: list[Artist] = []
+    for name, colour in group_colours.items():
+        entries.append(star(name, colour, marker="o", markersize=5))
+    shades = {
         brain: group_colours[name]
         for brain, name in groups.items()
         if name in group_colours
-    }, entries
+    }
+    return shades, entries
 
 
 def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str, str]]:
     """Return the rows of metrics that are shown in a chart, and its titles; InputError
     if there are none."""
-    titles = {
-        name: metric_title(name)
-        for name in metrics_shown(where)
-        if (metrics["metric"] == name).any()
-    }
+    present, expected = set(metrics["metric"]), metrics_shown(where)
+    titles = {name: metric_title(name) for name in expected if name in present}
     if not titles:
-        raise InputError(
-            "no metric to draw",
-            found=sorted(set(metrics["metric"])),
-            expected=metrics_shown(where),
-        )
-    return (
-        metrics[metrics["metric"].isin(titles)].assign(
-            panel=lambda rows: rows["metric"]
-        ),
-        titles,
-    )
+        found = sorted(present)
+        raise InputError("no metric to draw", found=found, expected=expected)
+    rows = metrics.assign(panel=metrics["metric"])
+    return rows[rows["panel"].isin(titles)], titles
 
 
 def _atlas_lines(
@@ -242,40 +210,18 @@ def _atlas_lines(
     keys = zip(atlases["hemisphere"], atlases["metric"], strict=True)
     # of no panel, of hemispheres or metrics that the chart does not show
     rows = atlases.assign(panel=[panels.get(key, "") for key in keys])
-    is_near = rows["week"].between(
-        weeks.min() - NEAR_GW,
-        weeks.max() + NEAR_GW,
-    )
+    is_near = rows["week"].between(weeks.min() - NEAR_GW, weeks.max() + NEAR_GW)
     rows = rows[(rows["panel"] != "") & is_near]
     layers = []
     entries: list[Artist] = []
     # an atlas may have no brain of these weeks
-    names = list(dict.fromkeys(rows["atlas"]))
-    for name, line in zip(
-        names,
-        cycle(LINES[1:]),
-        strict=False,
-    ):
-        style: dict[str, Any] = {
-            "color": MUTED_COLOUR,
-            "linewidth": 0.8,
-            "linestyle": line,
-            "zorder": 1.5,
-        }
-        layers.append(
-            Layer(
-                rows[rows["atlas"] == name],
-                style,
-            )
-        )
-        entries.append(
-            Line2D(
-                [],
-                [],
-                label=f"{cited_atlas(name)}: average of many fetuses",
-                **style,
-            )
-        )
+    parts = rows.groupby("atlas", sort=False)
+    for (name, part), line in zip(parts, cycle(LINES[1:]), strict=False):
+        style = {"color": MUTED_COLOUR, "linewidth": 0.8, "linestyle": line}
+        style["zorder"] = 1.5
+        layers.append(Layer(part, style))
+        label = f"{cited_atlas(str(name))}: average of many fetuses"
+        entries.append(entry(label, **style))
     return layers, entries
 
 
@@ -305,26 +251,19 @@ def metrics_figure(
     rows, titles = _shown(whole, Shown.CHART)
     colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == OBSERVED]
     markers = _subject_markers(whole, subjects)
-    shades, entries = _group_shades(groups, colours)
-    marks = _observed_marks(
-        observed,
-        subjects=subjects,
-        markers=markers,
-        shades=shades,
-    )
+    shades, groups_shown = _group_shades(groups, colours)
+    look = {"subjects": subjects, "markers": markers, "shades": shades}
     panels = {("whole", name): name for name in titles}
-    lines, names = _atlas_lines(atlases, panels, whole["week"])
+    lines, atlases_shown = _atlas_lines(atlases, panels, whole["week"])
+    marks = _observed_marks(observed, **look)
     layers = [*lines, *_run_lines(rows, colours), *marks]
     figure, _ = _weeks_chart(titles, layers, whole["week"])
+    entries = run_entries(colours)
     named = [*(subjects if markers else ()), *shades]
-    has_stars = not observed["subject"].isin(named).all()
-    run_legend(
-        figure,
-        colours,
-        observed_name=observed_name if has_stars else "",
-        markers=markers,
-        extra=[*entries, *names],
-    )
+    if not observed["subject"].isin(named).all():
+        entries.append(star(observed_name))
+    entries += _subject_entries(markers)
+    legend_below(figure, [*entries, *groups_shown, *atlases_shown])
     return figure
 
 
@@ -336,29 +275,19 @@ def intervals_figure(ensemble: pd.DataFrame) -> Figure:
     `ensemble` has columns week, metric, run, low, high, observed_value.
     """
     rows, titles = _shown(ensemble, Shown.INTERVALS)
+    run = {"color": RUN_COLOURS[0], "marker": "o", "markersize": 2.5}
+    brain = {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""}
     layers = [
         Layer(rows, {"color": NEUTRAL_COLOUR}, ("low", "high")),
-        Layer(
-            rows,
-            {"color": RUN_COLOURS[0], "marker": "o", "markersize": 2.5},
-            "run",
-        ),
-        Layer(
-            rows,
-            {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""},
-            "observed_value",
-        ),
+        Layer(rows, run, "run"),
+        Layer(rows, brain, "observed_value"),
     ]
-    figure, _ = _weeks_chart(
-        titles,
-        layers,
-        rows["week"],
-        per_row=2,
-    )
-    extra: list[Artist] = [Patch(color=NEUTRAL_COLOUR, label="interval")]
+    figure, _ = _weeks_chart(titles, layers, rows["week"], per_row=2)
+    entries = run_entries({"run": RUN_COLOURS[0]})
+    entries.append(Patch(color=NEUTRAL_COLOUR, label="interval"))
     if ensemble["observed_value"].notna().any():
-        extra.append(star(OBSERVED_BRAIN))
-    run_legend(figure, {"run": RUN_COLOURS[0]}, extra=extra)
+        entries.append(star(OBSERVED_BRAIN))
+    legend_below(figure, entries)
     return figure
 
 
@@ -395,75 +324,36 @@ def norms_figure(
     norm = norm.assign(panel=norm["metric"])
     colours = run_colours(whole["run"], runs)
     markers = _subject_markers(whole, subjects)
-    shades, extra = _group_shades(groups, colours)
+    shades, groups_shown = _group_shades(groups, colours)
+    look = {"subjects": subjects, "markers": markers, "shades": shades}
     observed = rows[rows["run"] == OBSERVED]
-    own, others = (
-        observed[observed["subject"].isin(reference) == is_own]
-        for is_own in (True, False)
-    )
+    is_own = observed["subject"].isin(reference)
+    own, others = observed[is_own], observed[~is_own]
     small: dict[str, Any] = (
         {"markersize": 3.0} if own["subject"].nunique() > MANY_BRAINS else {}
     )
-    line, thin = (
-        {
-            "color": MUTED_COLOUR,
-            "linewidth": width,
-            "zorder": 4,
-        }
-        for width in (1.3, 0.6)
-    )
+    line = {"color": MUTED_COLOUR, "linewidth": 1.3, "zorder": 4}
+    thin = line | {"linewidth": 0.6}
     layers = [
-        Layer(
-            norm,
-            {"color": NEUTRAL_COLOUR, "alpha": 0.6},
-            ("q05", "q95"),
-        ),
+        Layer(norm, {"color": NEUTRAL_COLOUR, "alpha": 0.6}, ("q05", "q95")),
         Layer(norm, {"color": NEUTRAL_COLOUR}, ("q25", "q75")),
         Layer(norm, line, "expected"),
         *(Layer(norm, thin, quantile) for quantile in ("q05", "q25", "q75", "q95")),
         *_run_lines(rows, colours),
-        *_observed_marks(
-            own,
-            subjects=subjects,
-            markers=markers,
-            shades=shades,
-            **small,
-        ),
-        *_observed_marks(
-            others,
-            RUN_COLOURS[-1],
-            subjects=subjects,
-            markers=markers,
-            shades=shades,
-        ),
+        *_observed_marks(own, **look, **small),
+        *_observed_marks(others, RUN_COLOURS[-1], **look),
     ]
-    figure, _ = _weeks_chart(
-        titles,
-        layers,
-        rows["week"],
-        panel_in=2.0,
-        foot_in=0.6,
-    )
+    figure, _ = _weeks_chart(titles, layers, rows["week"], panel_in=2.0, foot_in=0.6)
+    entries = [*run_entries(colours), star(norm_name), *_subject_entries(markers)]
+    entries += groups_shown
     if not others["subject"].isin(shades).all():
-        extra.append(star("other observed brains", RUN_COLOURS[-1]))
+        entries.append(star("other observed brains", RUN_COLOURS[-1]))
     if curves["q05"].notna().any():
-        extra.append(Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95"))
+        bands = Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95")
+        entries.append(bands)
     elif len(curves):
-        extra.append(
-            Line2D(
-                [],
-                [],
-                color=MUTED_COLOUR,
-                label="norm, spread unknown",
-            )
-        )
-    run_legend(
-        figure,
-        colours,
-        observed_name=norm_name,
-        markers=markers,
-        extra=extra,
-    )
+        entries.append(entry("norm, spread unknown"))
+    legend_below(figure, entries)
     return figure
 
 
@@ -484,92 +374,36 @@ def regions_chart(
     """
     rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
     colours = region_colours(rows["region"])
-    lines = dict(
-        zip(
-            run_colours(rows["run"]),
-            LINES,
-            strict=False,
-        )
-    )
+    lines = dict(zip(run_colours(rows["run"]), LINES, strict=False))
     # both sides together
     keys = ["panel", "subject", "run", "week", "region"]
     rows = rows.groupby(keys, sort=False)["value"].agg(["sum", "mean"])
-    rows = rows.reset_index().assign(
-        value=lambda both: both["sum"].where(
-            both["panel"] == "area",
-            both["mean"],
-        )
-    )
-    of_areas = runs_by_name(
-        asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)]
-    )
-    rows = pd.concat(
-        [
-            rows,
-            of_areas.assign(
-                panel="asymmetry",
-                value=of_areas["asymmetry_index"],
-            ),
-        ]
-    )
-    titles |= {"area": f"{titles['area']}, both sides"} if "area" in titles else {}
+    rows = rows.reset_index()
+    rows["value"] = rows["sum"].where(rows["panel"] == "area", rows["mean"])
+    is_shown = (asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)
+    indices = runs_by_name(asymmetry[is_shown]).assign(panel="asymmetry")
+    indices = indices.rename(columns={"asymmetry_index": "value"})
+    rows = pd.concat([rows, indices])
+    if "area" in titles:
+        titles["area"] += ", both sides"
     titles["asymmetry"] = "asymmetry of area, 2 (L − R)/(L + R)"
     layers = []
     for (region, run), part in rows.groupby(["region", "run"], sort=False):
         if run == OBSERVED:
             layers += _observed_marks(part, colours[str(region)], markersize=6)
         elif run in lines:
-            layers.append(
-                Layer(
-                    part,
-                    {
-                        "color": colours[str(region)],
-                        "linestyle": lines[str(run)],
-                        "linewidth": 1.1,
-                    },
-                )
-            )
-    figure, panels = _weeks_chart(
-        titles,
-        layers,
-        rows["week"],
-        foot_in=0.75,
-    )
+            style = {"color": colours[str(region)], "linestyle": lines[str(run)]}
+            layers.append(Layer(part, style | {"linewidth": 1.1}))
+    figure, panels = _weeks_chart(titles, layers, rows["week"], foot_in=0.75)
+    panels.pop("asymmetry").axhline(0, color=MUTED_COLOUR, linewidth=0.8)
     for name, axes in panels.items():
         # signed numbers and ratios are not compared with 0
-        if (
-            name != "asymmetry"
-            and not METRICS[name].is_signed
-            and METRICS[name].unit != "1"
-        ):
+        if not METRICS[name].is_signed and METRICS[name].unit != "1":
             from_zero(axes)
-    panels["asymmetry"].axhline(0, color=MUTED_COLOUR, linewidth=0.8)
-    extra = [
-        Line2D(
-            [],
-            [],
-            color=c,
-            marker="s",
-            linestyle="none",
-            label=name,
-        )
-        for name, c in colours.items()
-    ]
-    extra += [
-        Line2D(
-            [],
-            [],
-            color=MUTED_COLOUR,
-            linestyle=line,
-            label=run,
-        )
-        for run, line in lines.items()
-    ]
-    run_legend(
-        figure,
-        {},
-        extra=[*extra, star(observed_name, MUTED_COLOUR)],
-    )
+    squares = {"marker": "s", "linestyle": "none"}
+    entries = [entry(name, colour, **squares) for name, colour in colours.items()]
+    entries += [entry(run, linestyle=line) for run, line in lines.items()]
+    legend_below(figure, [*entries, star(observed_name, MUTED_COLOUR)])
     return figure
 
 
@@ -588,74 +422,45 @@ def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
     }
     colours = run_colours(prediction["run"], runs)
     # simpler predictions are the same for all runs
-    rows = prediction.assign(
-        line=prediction["run"].where(
-            prediction["model"] == "run",
-            prediction["model"],
-        )
-    )
-    rows = rows.drop_duplicates(["start", "line", "horizon"]).assign(
-        week=lambda rows: rows["horizon"]
-    )
-    shades = run_colours([*colours, *rows["line"]])
-    simpler = dict(
-        zip(
-            [name for name in shades if name not in colours],
-            reversed(shades.values()),
-            strict=False,
-        )
-    )
-    styles = {
-        name: {"color": colour, "marker": ".", "linestyle": "--"}
-        for name, colour in simpler.items()
-    }
-    styles |= {
-        name: {"color": colour, "marker": "o"} for name, colour in colours.items()
-    }
-    titles = [
-        f"{start}: {title}"
-        for start in dict.fromkeys(rows["start"])
-        for title in columns.values()
-    ]
-    parts = [
-        rows.assign(
-            panel=rows["start"] + f": {title}",
-            value=rows[name],
-        )
-        for name, title in columns.items()
-    ]
+    is_run = prediction["model"] == "run"
+    line = prediction["run"].where(is_run, prediction["model"])
+    rows = prediction.assign(line=line, week=prediction["horizon"])
+    rows = rows.drop_duplicates(["start", "line", "horizon"])
+    shades = run_colours([*colours, *line])
+    others = [name for name in shades if name not in colours]
+    simpler = dict(zip(others, reversed(shades.values()), strict=False))
+    layers = []
+    for name, colour in simpler.items():
+        style = {"color": colour, "marker": ".", "linestyle": "--"}
+        layers.append((name, style))
+    for name, colour in colours.items():
+        layers.append((name, {"color": colour, "marker": "o"}))
+    titles = {}
+    parts = []
+    for start, own in rows.groupby("start", sort=False):
+        for name, title in columns.items():
+            panel = f"{start}: {title}"
+            titles[panel] = panel
+            parts.append(own.assign(panel=panel, value=own[name]))
     rows = pd.concat(parts)
-    layers = [
-        Layer(
-            rows[rows["line"] == name],
-            style,
-        )
-        for name, style in styles.items()
-    ]
-    layout: dict[str, Any] = {
-        "per_row": 2,
-        "panel_in": 2.4,
-        "foot_in": 0.9,
-        "sharex": True,
-        "sharey": "col",
-    }
     figure, panels = _weeks_chart(
-        dict(zip(titles, titles, strict=True)), layers, rows["week"], **layout
+        titles,
+        [Layer(rows[rows["line"] == name], style) for name, style in layers],
+        rows["week"],
+        per_row=2,
+        panel_in=2.4,
+        foot_in=0.9,
+        sharex=True,
+        sharey="col",
     )
     for axes in panels.values():
         axes.set_xlabel("weeks after the start")
     from_zero(list(panels.values())[1])
-    extra = [
-        Line2D(
-            [],
-            [],
-            color=colour,
-            linestyle="--",
-            label=SIMPLER_PREDICTIONS.get(name, plain(name)),
-        )
-        for name, colour in simpler.items()
-    ]
-    run_legend(figure, colours, extra=extra)
+    entries = run_entries(colours)
+    for name, colour in simpler.items():
+        label = SIMPLER_PREDICTIONS.get(name, plain(name))
+        entries.append(entry(label, colour, linestyle="--"))
+    legend_below(figure, entries)
     return figure
 
 
@@ -674,35 +479,20 @@ def displacement_figure(
     of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
     named = runs_by_name(displacement)
-    moved = (
-        published["displacement"]
-        if published
-        else {
-            "from_weeks": [],
-            "rows": [],
-        }
-    )
+    moved = published["displacement"] if published else {"from_weeks": [], "rows": []}
     colours = run_colours(named["run"], runs)
     weeks = np.array(moved["from_weeks"], dtype=float)
-    markers = dict(
-        zip(
-            dict.fromkeys(row["source"] for row in moved["rows"]),
-            cycle(PUBLISHED_MARKERS),
-            strict=False,
-        )
-    )
-    tables = [
-        pd.DataFrame(
-            {
-                **row,
-                "run": row["source"],
-                "from_week": weeks,
-                "to_week": weeks + 1,
-            }
-        )
-        for row in moved["rows"]
-    ]
-    rows = pd.concat([*tables, named[named["nodes"] == "all"]])
+    tables = [named[named["nodes"] == "all"]]
+    styles: dict[str, dict[str, Any]] = {}
+    for row, marker in zip(moved["rows"], cycle(PUBLISHED_MARKERS), strict=False):
+        table = pd.DataFrame({**row, "from_week": weeks, "to_week": weeks + 1})
+        tables.append(table.assign(run=row["source"]))
+        style = {"color": MUTED_COLOUR, "marker": marker, "linestyle": "--"}
+        styles[row["source"]] = style
+    sources = dict(styles)
+    for run, colour in colours.items():
+        styles[run] = {"color": colour, "marker": "o"}
+    rows = pd.concat(tables)
     rows["week"] = (rows["from_week"] + rows["to_week"]) / 2
     duration = rows["to_week"] - rows["from_week"]
     titles = {
@@ -710,46 +500,21 @@ def displacement_figure(
         "mean_mm": "mean displacement, all nodes",
     }
     rows = pd.concat(
-        rows.assign(
-            panel=column,
-            value=rows[column] / duration,
-        )
-        for column in titles
+        rows.assign(panel=column, value=rows[column] / duration) for column in titles
     )
-    styles = {
-        run: {"color": MUTED_COLOUR, "marker": marker, "linestyle": "--"}
-        for run, marker in markers.items()
-    }
-    styles |= {run: {"color": colour, "marker": "o"} for run, colour in colours.items()}
-    layers = [
-        Layer(
-            rows[rows["run"] == run],
-            {"label": run, **style},
-        )
-        for run, style in styles.items()
-    ]
+    layers = []
+    for run, style in styles.items():
+        layers.append(Layer(rows[rows["run"] == run], style))
     figure, panels = _weeks_chart(
         titles, layers, [*rows["from_week"], *rows["to_week"]], per_row=2
     )
     for axes in panels.values():
-        axes.set(
-            ylabel="displacement (mm per week)",
-            xlabel="gestational age (GW), middle of the interval",
-        )
+        axes.set_ylabel("displacement (mm per week)")
+        axes.set_xlabel("gestational age (GW), middle of the interval")
         from_zero(axes)
-    run_legend(
-        figure,
-        colours,
-        extra=[
-            Line2D(
-                [],
-                [],
-                label=run,
-                **styles[run],
-            )
-            for run in markers
-        ],
-    )
+    entries = run_entries(colours)
+    entries += [entry(source, **style) for source, style in sources.items()]
+    legend_below(figure, entries)
     return figure
 
 
@@ -757,11 +522,7 @@ paper_displacement_figure = displacement_figure
 """Of a rule with the values of the paper as `published`."""
 
 
-def _band_rows(
-    spectra: pd.DataFrame,
-    bands: Sequence[int],
-    proxy: str,
-) -> pd.DataFrame:
+def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
     """Return the rows of some bands in the spectra of a proxy, with a column
     `trusted`."""
     trusted = (
@@ -778,58 +539,26 @@ def _beyond_the_modes(
     *,
     rotation: float = 0.0,
 ) -> None:
-    words = "beyond the\nmodes computed"
-    axes.text(
-        x,
-        0.5,
-        words,
-        transform=transform,
-        ha="center",
-        va="center",
-        rotation=rotation,
-    )
+    style: dict[str, Any] = {"ha": "center", "va": "center", "rotation": rotation}
+    axes.text(x, 0.5, "beyond the\nmodes computed", transform=transform, **style)
 
 
-def _spectra_legend(
-    figure: Figure,
-    rows: pd.DataFrame,
-    colours: Mapping[str, Any],
-    name: str,
-    groups: list[Artist],
-    *,
-    bars: bool,
-) -> None:
-    """Draw the legend of a chart of bands, with groups and the marks of bands that are
-    cut off or not resolved."""
-    untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
-    label = "band cut off or not resolved"
-    extra: list[Artist] = []
+def _spectra_entries(
+    rows: pd.DataFrame, name: str, untrusted_run: Artist
+) -> list[Artist]:
+    """Return the legend entries of observed brains, and of bands that are cut off or
+    not resolved, of which that of runs is given."""
+    entries: list[Artist] = []
+    if (rows["run"] == OBSERVED).any():
+        entries.append(star(name))
+    is_untrusted = rows["relative_power"].notna() & ~rows["trusted"]
+    untrusted = set(rows.loc[is_untrusted, "run"])
     if untrusted - {OBSERVED}:
-        hatched = Patch(
-            facecolor=MUTED_COLOUR,
-            edgecolor="white",
-            hatch=_HATCH,
-            label=label,
-        )
-        hollow = star(
-            label,
-            MUTED_COLOUR,
-            marker="o",
-            markersize=5,
-            markerfacecolor="white",
-        )
-        extra.append(hatched if bars else hollow)
+        entries.append(untrusted_run)
     if OBSERVED in untrusted:
-        words = "the same, observed brain" if extra else label
-        extra.append(star(words, markersize=8, markerfacecolor="white"))
-    name = name if (rows["run"] == OBSERVED).any() else ""
-    run_legend(
-        figure,
-        colours,
-        observed_name=name,
-        bars=bars,
-        extra=[*groups, *extra],
-    )
+        label = f"{UNTRUSTED}, observed brain"
+        entries.append(star(label, markersize=8, markerfacecolor="white"))
+    return entries
 
 
 def _sides_in(rows: pd.DataFrame) -> list[str]:
@@ -865,26 +594,28 @@ def spectra_figure(
         value=rows["relative_power"],
     )
     sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
-    shades, entries = _group_shades(groups, colours)
+    shades, groups_shown = _group_shades(groups, colours)
     cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}
     curves = {
         (side, f"spangy_B{band}_relative_power"): cell
         for cell, (side, band) in cells.items()
     }
-    lines, names = _atlas_lines(atlases, curves, rows["week"])
+    lines, atlases_shown = _atlas_lines(atlases, curves, rows["week"])
     marks = _observed_marks(
         rows[rows["run"] == OBSERVED], subjects=subjects, shades=shades
     )
     layers = [*lines, *_run_lines(rows, colours), *marks]
     heads = [f"B{band}, {_FOLDS[band]} folds" for band in bands]
     titles = dict(zip_longest(cells, heads, fillvalue=""))
-    layout: dict[str, Any] = {
-        "per_row": len(bands),
-        "panel_in": 1.75,
-        "sharex": True,
-        "sharey": "col",
-    }
-    figure, panels = _weeks_chart(titles, layers, rows["week"], **layout)
+    figure, panels = _weeks_chart(
+        titles,
+        layers,
+        rows["week"],
+        per_row=len(bands),
+        panel_in=1.75,
+        sharex=True,
+        sharey="col",
+    )
     for cell, (side, band) in cells.items():
         axes = panels[cell]
         if not rows.loc[rows["panel"] == cell, "value"].notna().any():
@@ -896,8 +627,10 @@ def spectra_figure(
             axes.set_ylabel(f"{side} hemisphere\nrelative power")
         if side == sides[0]:
             from_zero(axes)
-    entries += names
-    _spectra_legend(figure, rows, colours, observed_name, entries, bars=False)
+    hollow = star(UNTRUSTED, MUTED_COLOUR, marker="o", markersize=5)
+    hollow.set_markerfacecolor("white")
+    entries = run_entries(colours) + _spectra_entries(rows, observed_name, hollow)
+    legend_below(figure, [*entries, *groups_shown, *atlases_shown])
     return figure
 
 
@@ -922,28 +655,10 @@ def influence_spectra(
     `observed` those of observed brains, whose run is so named. `values` are by run the
     varied parameters with their values, in the order of the sweep.
     """
-    labels = dict(
-        zip(
-            values,
-            value_labels(list(values.values())),
-            strict=True,
-        )
-    )
+    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
     simulated = [table.assign(run=table["run"].map(labels)) for table in members]
-    shades = mpl.colormaps["YlGnBu"](
-        np.linspace(
-            0.3,
-            0.95,
-            max(len(labels), 2),
-        )
-    )
-    colours = dict(
-        zip(
-            labels.values(),
-            shades,
-            strict=False,
-        )
-    )
+    shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
+    colours = dict(zip(labels.values(), shades, strict=False))
     spectra = pd.concat([*simulated, *observed])
     by_proxy = {
         proxy: _band_rows(spectra[spectra["week"] == week], FOLD_BANDS, proxy)
@@ -958,63 +673,41 @@ def influence_spectra(
         sharey="row",
     )
     width = 0.8 / len(colours)
-    for axes, (proxy, hemisphere) in zip(
-        panels,
-        product(PROXIES, sides),
-        strict=True,
-    ):
+    cells = product(PROXIES, sides)
+    for axes, (proxy, hemisphere) in zip(panels, cells, strict=True):
         side = by_proxy[proxy][by_proxy[proxy]["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
             run_rows = side[side["run"] == run]
-            position = [
-                FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width
-                for band in run_rows["band"]
-            ]
+            places = run_rows["band"] - FOLD_BANDS[0] - 0.4 + (index + 0.5) * width
             bars = axes.bar(
-                position, run_rows["relative_power"], width=0.92 * width, color=colour
+                places, run_rows["relative_power"], width=0.92 * width, color=colour
             )
-            for bar, trusted in zip(
-                bars,
-                run_rows["trusted"],
-                strict=True,
-            ):
+            for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
                 if not trusted:
-                    bar.set(
-                        hatch=_HATCH,
-                        edgecolor="white",
-                        linewidth=0,
-                    )
+                    bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
         for _, row in side[side["run"] == OBSERVED].iterrows():
             centre, power = FOLD_BANDS.index(row["band"]), row["relative_power"]
-            axes.hlines(
-                power,
-                centre - 0.42,
-                centre + 0.42,
-                color=OBSERVED_COLOUR,
-                linewidth=0.9,
-            )
+            ends = centre - 0.42, centre + 0.42
+            axes.hlines(power, *ends, color=OBSERVED_COLOUR, linewidth=0.9)
             face = OBSERVED_COLOUR if row["trusted"] else "white"
-            axes.plot(
-                centre,
-                power,
-                "*",
-                color=OBSERVED_COLOUR,
-                markerfacecolor=face,
-                markersize=8,
-            )
+            style: dict[str, Any] = {"markerfacecolor": face, "markersize": 8}
+            axes.plot(centre, power, "*", color=OBSERVED_COLOUR, **style)
         for place, band in enumerate(FOLD_BANDS):
             if not side.loc[side["band"] == band, "relative_power"].notna().any():
-                _beyond_the_modes(
-                    axes, place, axes.get_xaxis_transform(), rotation=90.0
-                )
-        axes.set_xticks(
-            range(len(FOLD_BANDS)), [f"B{band}\n{_FOLDS[band]}" for band in FOLD_BANDS]
-        )
+                transform = axes.get_xaxis_transform()
+                _beyond_the_modes(axes, place, transform, rotation=90.0)
+        ticks = [f"B{band}\n{_FOLDS[band]}" for band in FOLD_BANDS]
+        axes.set_xticks(range(len(ticks)), ticks)
         axes.set_xlabel("SpAnGy band, and the folds that go with it")
         axes.set_xlim(-0.5, len(FOLD_BANDS) - 0.5)
         axes.set_title(f"{hemisphere} hemisphere, {plain(proxy)}")
         if hemisphere == sides[0]:
             axes.set_ylabel("relative power")
             from_zero(axes)
-    _spectra_legend(figure, rows, colours, observed_name, [], bars=True)
+    hatched = Patch(
+        facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=UNTRUSTED
+    )
+    bars_shown = [Patch(color=colour, label=run) for run, colour in colours.items()]
+    marks_shown = _spectra_entries(rows, observed_name, hatched)
+    legend_below(figure, [*bars_shown, *marks_shown])
     return figure

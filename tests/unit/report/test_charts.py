@@ -230,7 +230,7 @@ RATES = frame(
 
 
 def rates_of_growth():
-    return growth_figure(AREAS, RATES, folding_rate_per_s=2e-7)
+    return growth_figure(AREAS, RATES, folding_rate_per_s={0.0: 2e-7})
 
 
 def rates_of_one_of_two_series():

@@ -14,8 +14,8 @@ from text_tables import frame
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
+from gyriflow.report.measures import Tables
 from gyriflow.report.page import (
-    Tables,
     brain_page,
     caption_html,
     hide_paths,
@@ -249,7 +249,7 @@ def a_brain_beside_atlases():
     # one begins at the week of the brain
     later = curves[curves["week"] > 20].assign(atlas="own")
     return sheet(
-        metrics=pd.concat([METRICS, further.assign(subject="young")]),
+        metrics=pd.concat([METRICS, further.assign(subject="young", run="observed")]),
         differences=DIFFERENCES_OF_PARTS,
         curves=pd.concat([curves.assign(atlas="crl"), later]),
         quality=QUALITY.assign(

@@ -19,7 +19,7 @@ from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.quantities import name_in_interval
 from gyriflow.report import panels
-from gyriflow.report.panels import LINES_MM, direction_lines
+from gyriflow.report.panels import LINES_MM
 from gyriflow.report.pictures import (
     GridBrain,
     brain_depth,
@@ -280,25 +280,31 @@ def test_scales_go_from_zero_to_where_few_vertices_are_above(quantity):
 # growth
 
 
-def test_lines_on_a_map_run_along_directions_where_these_are_seen():
-    is_right = SMOOTH.vertices[:, :1] > 0
-    right = np.tile([0.0, 0.5, 0.0], (len(SMOOTH.vertices), 1)) * is_right
-    ends = direction_lines(SMOOTH, right, VIEWS["right"])
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    assert lengths == pytest.approx(0.5 * LINES_MM)
-    longest = direction_lines(SMOOTH, 5 * right, VIEWS["right"])
-    lengths = np.linalg.norm(longest[:, 1] - longest[:, 0], axis=1)
-    assert lengths == pytest.approx(LINES_MM)
-    # one in each cube
-    cubes = np.unique(np.floor(ends.mean(axis=1) / LINES_MM), axis=0)
-    assert len(cubes) > 0.6 * len(ends)
+def test_lines_on_a_map_run_along_directions_where_these_are_seen(monkeypatch):
+    drawn = []
+
+    def noted(*arguments, lines, **more):
+        drawn.append(lines)
+        return render(*arguments, lines=lines, **more)
+
+    monkeypatch.setattr(panels, "render", noted)
+    x, y, _ = SMOOTH.vertices.T
+    # shorter in front
+    along_y = np.where(x > 0, np.where(y > 0, 0.25, 0.5), 0.0)
     name = "area_growth_percent_per_gw"
-    growth = {name_in_interval(name, 21.0, 22.0): np.full(len(right), 0.1)}
-    for number, axis in enumerate("xyz"):
-        direction = name_in_interval(f"growth_direction_{axis}", 21.0, 22.0)
-        growth[direction] = right[:, number]
+    growth = {name_in_interval(name, 21.0, 22.0): np.full(len(x), 0.1)}
+    for axis, values in {"x": 0 * x, "y": along_y, "z": 0 * x}.items():
+        growth[name_in_interval(f"growth_direction_{axis}", 21.0, 22.0)] = values
     frames = {21.0: (SMOOTH, {}), 22.0: (SMOOTH, {})}
     figure = growth_found_figure(frames, growth)
+    _, from_above, _ = drawn
+    along = from_above[:, 1] - from_above[:, 0]
+    lengths = np.unique(along[:, 1].round(6))
+    assert lengths == pytest.approx([0, LINES_MM / 2, LINES_MM])
+    assert not along[:, [0, 2]].any()
+    # one in each cube
+    cubes = np.unique(np.floor(from_above.mean(axis=1) / LINES_MM), axis=0)
+    assert len(cubes) > 0.6 * len(from_above)
     # from the left, and from above with the right on the right
     dark = [(picture(figure, number) < 60).all(axis=-1) for number in (0, 1)]
     middle = dark[1].shape[1] // 2

@@ -8,10 +8,10 @@ import pytest
 from text_tables import frame
 
 from gyriflow.quantities import METRICS
+from gyriflow.report.measures import metrics_table
 from gyriflow.report.tables import (
     html_table,
     mesh_quality,
-    metrics_table,
     resources,
     runs_table,
 )
