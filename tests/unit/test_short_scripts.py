@@ -127,9 +127,8 @@ def test_regions_of_each_side_are_measured_with_its_own_surface_maps_and_names(
 WEEKS = 25.0 + 0.1 * np.arange(12)
 AREAS = 10 * WEEKS + np.tile([1.0, -1.0], 6)
 BRAINS = [f"b{number:02d}" for number in range(12)]
-NUMBERS = [f"{number:03d}" for number in range(12)]
-ODD = ["1e5", "NA", "None", "true", "1.0", "2024-01-01"]
-ODD += [f"{number}e2" for number in range(6)]
+ODD = ["1e5", "NA", "None", "true", "1.0", "2024-01-01", "1e2", "2e2"]
+ODD += [f"{number:03d}" for number in range(4)]
 
 
 def metrics_of(brain, week, area_cm2, run="observed"):
@@ -218,11 +217,10 @@ def test_tables_of_metrics_are_of_all_brains_regions_labels_and_scans(tmp_path):
     assert set(new.query("hemisphere == 'whole'")["brains"]) == {11}
 
 
-@pytest.mark.parametrize("ids", [NUMBERS, ODD], ids=["numbers", "odd"])
-def test_names_that_look_like_numbers_or_nothing_make_the_same_tables(tmp_path, ids):
+def test_names_that_look_like_numbers_or_nothing_make_the_same_tables(tmp_path):
     plain = metrics_tables(tmp_path / "plain")
-    odd = metrics_tables(tmp_path / "odd", ids, run="1", region="NA")
-    letters = dict(zip(ids, BRAINS, strict=True)) | {"1": "run"}
+    odd = metrics_tables(tmp_path / "odd", ODD, run="1", region="NA")
+    letters = dict(zip(ODD, BRAINS, strict=True)) | {"1": "run"}
     places = ("subject", "run", "observed", "from_brain", "to_brain", "person")
     for name, expected in plain.items():
         found = odd[name].rename(columns=lambda text: text.replace("NA", "insula"))
