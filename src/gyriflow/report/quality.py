@@ -115,44 +115,26 @@ def quality_page(
     height_in = HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines)
     figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     heading, colour = VERDICT_HEADINGS[row["verdict"]]
-    left: dict[str, Any] = {
-        "x": 0.015,
-        "ha": "left",
-        "fontsize": 6.5,
-    }
+    left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
+    bold: dict[str, Any] = {"fontsize": 10, "fontweight": "bold"}
     # lines break between facts only
     facts = [
         f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}")
         for name, value in _facts(row).items()
     ]
     words = wrap("   ".join(facts), FACT_LETTERS)
-    title = f"{row['subject']}, {row['week']:g} GW"
-    figure.suptitle(
-        title,
-        x=0.015,
-        ha="left",
-        fontsize=10,
-        fontweight="bold",
-    )
-    box = {"boxstyle": "round,pad=0.3", "facecolor": colour, "edgecolor": "none"}
-    place: dict[str, Any] = {
-        "ha": "right",
-        "va": "top",
-        "fontsize": 10,
-        "fontweight": "bold",
-    }
+    figure.suptitle(f"{row['subject']}, {row['week']:g} GW", **left | bold)
     figure.text(
         0.985,
         0.985,
         row["verdict"].upper(),
         color="white",
-        bbox=box,
-        **place,
+        bbox={"boxstyle": "round,pad=0.3", "facecolor": colour, "edgecolor": "none"},
+        ha="right",
+        va="top",
+        **bold,
     )
-    figure.supxlabel(
-        "\n".join([heading, *lines]),
-        **left,
-    )
+    figure.supxlabel("\n".join([heading, *lines]), **left)
     rows: Any = figure.subfigures(3, 1, height_ratios=ROWS_IN)
     planes, views, thickness = rows
     planes.suptitle(words, **left)
@@ -162,28 +144,17 @@ def quality_page(
     if brain.thickness_mm is None:
         _draw_views(thickness, brain, uniform, OTHER_VIEWS)
     else:
-        scale = colour_scale(
-            VERTEX_MAPS["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True
-        )
-        panels = _draw_views(
-            thickness, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS
-        )
-        unknown = (
-            "" if np.isfinite(brain.thickness_mm).all() else "\ngrey: not measured"
-        )
-        thickness.colorbar(scale, ax=panels).set_label(
-            f"thickness (mm){unknown}", fontsize=6.5
-        )
+        colours = VERTEX_MAPS["thickness_mm"].colours
+        scale = colour_scale(colours, *THICKNESS_LIMITS_MM, cut=True)
+        painted = paint(brain.thickness_mm, scale)
+        panels = _draw_views(thickness, brain, painted, THICKNESS_VIEWS)
+        label = "thickness (mm)"
+        if not np.isfinite(brain.thickness_mm).all():
+            label += "\ngrey: not measured"
+        thickness.colorbar(scale, ax=panels).set_label(label, fontsize=6.5)
     for letter, part in zip("abc", rows, strict=True):
-        part.text(
-            0.015,
-            0.82 if part is planes else 1.0,
-            letter,
-            ha="left",
-            va="top",
-            fontsize=9,
-            fontweight="bold",
-        )
+        height = 0.82 if part is planes else 1.0
+        part.text(0.015, height, letter, va="top", **bold | {"fontsize": 9})
     return figure
 
 
@@ -192,13 +163,7 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
     hemisphere."""
     low, high = brain.pial.vertices.min(axis=0), brain.pial.vertices.max(axis=0)
     middle = (low + high) / 2
-    fissure = float(
-        np.clip(
-            brain.fissure_x_mm,
-            low[0],
-            high[0],
-        )
-    )
+    fissure = float(np.clip(brain.fissure_x_mm, low[0], high[0]))
     # the larger hemisphere, of equal ones the right one
     outer = high[0] if high[0] - fissure > 0.8 * (fissure - low[0]) else low[0]
     at = {
@@ -218,13 +183,7 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         1, 3, width_ratios=[np.ptp(ends[right]) for _, right, _ in PLANES.values()]
     )
     for axes, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
-        points = np.empty(
-            (
-                len(dots[up]),
-                len(dots[right]),
-                3,
-            )
-        )
+        points = np.empty((len(dots[up]), len(dots[right]), 3))
         points[..., normal] = at[plane]
         points[..., right] = dots[right]
         points[..., up] = dots[up][:, None]
@@ -234,49 +193,26 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
             draw_outline(axes, brain.white, plane, at[plane], INNER_COLOUR)
         draw_outline(axes, brain.pial, plane, at[plane], PIAL_COLOUR)
         # all at one scale
-        axes.set(
-            xlim=ends[right],
-            ylim=(sum(ends[up]) / 2 + np.array([-0.5, 0.5]) * tallest),
-            aspect="equal",
-        )
+        heights = sum(ends[up]) / 2 + np.array([-0.5, 0.5]) * tallest
+        axes.set(xlim=ends[right], ylim=heights, aspect="equal")
         axes.set_axis_off()
-        axes.set_title(
-            f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2
-        )
+        title = f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm"
+        axes.set_title(title, fontsize=6.5, pad=2)
         names = "PA" if plane == "sagittal" else "LR"
-        _write_ends(
-            axes,
-            names,
-            0.03,
-            0.5,
-            va="center",
-            fontsize=6.5,
-            color=colour,
-        )
+        style = {"va": "center", "fontsize": 6.5, "color": colour}
+        _write_ends(axes, names, 0.03, 0.5, **style)
     coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
-    coronal.plot(
-        [left, left + SCALE_BAR_MM],
-        [bottom] * 2,
-        color=colour,
-        linewidth=1.2,
-    )
-    coronal.text(
-        left,
-        bottom + 1,
-        f"{SCALE_BAR_MM:g} mm",
-        fontsize=6,
-        color=colour,
-    )
+    bar = [left, left + SCALE_BAR_MM]
+    coronal.plot(bar, [bottom] * 2, color=colour, linewidth=1.2)
+    label = f"{SCALE_BAR_MM:g} mm"
+    coronal.text(left, bottom + 1, label, fontsize=6, color=colour)
     keys = [Patch(color=PIAL_COLOUR, label="pial surface")]
     if brain.white is not None or brain.tissues:
         keys.append(Patch(color=INNER_COLOUR, label="inner border of the cortex"))
     if brain.tissues and not brain.image:
-        codes = np.unique(brain.tissues[0])
-        keys += [
-            Patch(color=TISSUE_COLOURS[code], label=name)
-            for code, name in TISSUE_GROUPS.items()
-            if code in codes
-        ]
+        for code, name in TISSUE_GROUPS.items():
+            if (brain.tissues[0] == code).any():
+                keys.append(Patch(color=TISSUE_COLOURS[code], label=name))
     figure.legend(
         handles=keys,
         loc="outside lower center",
@@ -306,13 +242,7 @@ def _draw_volumes(
         brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
         index = voxel_index(points, affine)
         grey = map_coordinates(np.nan_to_num(values), index, order=1)
-        axes.imshow(
-            grey,
-            cmap="gray",
-            vmin=0,
-            vmax=brightest,
-            **style,
-        )
+        axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **style)
     if not brain.tissues:
         return
     groups, affine = brain.tissues
@@ -320,25 +250,15 @@ def _draw_volumes(
     if not brain.image:
         tissues = map_coordinates(groups, index, order=0, mode="constant")
         colours = ListedColormap(TISSUE_COLOURS)
-        axes.imshow(
-            tissues,
-            cmap=colours,
-            vmin=-0.5,
-            vmax=4.5,
-            **style,
-        )
+        axes.imshow(tissues, cmap=colours, vmin=-0.5, vmax=4.5, **style)
     is_inside = np.isin(groups, (2, 3)).astype(np.float32)
     inside = map_coordinates(is_inside, index, order=1)
     if (groups == 1).any() and inside.min() < 0.5 < inside.max():
         height, width = inside.shape
         across = np.linspace(left, right, width)
         upward = np.linspace(bottom, top, height)
-        border: dict[str, Any] = {
-            "levels": [0.5],
-            "colors": INNER_COLOUR,
-            "linewidths": 0.6,
-        }
-        axes.contour(across, upward, inside, **border)
+        style = {"colors": INNER_COLOUR, "linewidths": 0.6}
+        axes.contour(across, upward, inside, levels=[0.5], **style)
 
 
 def _draw_views(
@@ -354,27 +274,16 @@ def _draw_views(
     wide, tall = 1.04 * np.max(every, axis=0)
     panels = list(figure.subplots(1, len(names)))
     pixels_per_mm = PIXELS_PER_INCH * (FULL_WIDTH_IN - 0.7) / len(names) / (2 * wide)
-    for axes, view in zip(
-        panels,
-        [VIEWS[name] for name in names],
-        strict=True,
-    ):
+    for axes, name in zip(panels, names, strict=True):
+        view = VIEWS[name]
         axes.set_axis_off()
         mesh, painted = restricted(
             brain.pial, colours, view.hemisphere, brain.fissure_x_mm
         )
         if not len(mesh.faces):
             continue
-        axes.imshow(
-            render(
-                mesh,
-                painted,
-                view,
-                (wide, tall),
-                pixels_per_mm,
-            )
-        )
-        axes.set_title(view.name, fontsize=6.5, pad=1)
+        axes.imshow(render(mesh, painted, view, (wide, tall), pixels_per_mm))
+        axes.set_title(name, fontsize=6.5, pad=1)
         style = {"va": "top", "fontsize": 6, "color": MUTED_COLOUR}
         _write_ends(axes, view.ends, 0.05, 0.97, **style)
     return panels
@@ -482,18 +391,8 @@ def quality_table(
 
     `left_out` are columns and cause of the brains without a surface.
     """
-    every = [
-        *rows,
-        *(
-            {
-                **row,
-                "verdict": "refused",
-                "warning_count": 0,
-            }
-            for row in left_out
-        ),
-    ]
-    table = pd.DataFrame(every).set_index("subject", drop=False)
+    refused = [{**row, "verdict": "refused", "warning_count": 0} for row in left_out]
+    table = pd.DataFrame([*rows, *refused]).set_index("subject", drop=False)
     ids = [name for name in order if name in table.index]
     ids += [name for name in table.index if name not in ids]
     return table.loc[ids, [*table.columns.drop("page"), "page"]].reset_index(drop=True)

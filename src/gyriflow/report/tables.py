@@ -79,25 +79,15 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     then `COMMON_PARAMETERS`. Nested names are joined by dots. A curve over weeks is
     shown by its first and last values.
     """
-    flat = pd.DataFrame(
-        {
-            run: pd.Series(_flatten(values), dtype=object)
-            for run, values in parameters.items()
-        }
-    )
-    texts = flat.map(_text)
+    columns = {}
+    for run, values in parameters.items():
+        columns[run] = pd.Series(_flatten(values), dtype=object)
+    texts = pd.DataFrame(columns).map(_text)
     # absent, zero and no count as equal
-    differs = texts.ne(texts.iloc[:, 0], axis=0).any(axis=1) & ~texts.isin(
-        ["–", "0", "no"]
-    ).all(axis=1)
-    names = [
-        *texts.index[differs],
-        *(
-            name
-            for name in COMMON_PARAMETERS
-            if name in texts.index and not differs[name]
-        ),
-    ]
+    is_off = texts.isin(["–", "0", "no"]).all(axis=1)
+    differs = texts.ne(texts.iloc[:, 0], axis=0).any(axis=1) & ~is_off
+    names = list(texts.index[differs])
+    names += [name for name in COMMON_PARAMETERS if not differs.get(name, True)]
     return texts.loc[names].rename(index=parameter_label).rename_axis("parameter")
 
 
@@ -121,10 +111,7 @@ def resolution_over_steps(
     through = steps["elements_through_cortex"].fillna(0.0)
     error, first_week = math.nan, math.nan
     if has_layers:
-        error = round(
-            element_error(order, through.iloc[0])[0],
-            1,
-        )
+        error = round(element_error(order, through.iloc[0])[0], 1)
         too_coarse = [is_too_coarse(order, elements) for elements in through]
         first_week = float(steps.loc[too_coarse, "week"].min())
     return {
@@ -153,29 +140,12 @@ def resources(jobs: pd.DataFrame) -> pd.DataFrame:
         run=jobs["run"].fillna(""),
         jobs=1,
     )
-    totals = {
-        "jobs": "sum",
-        "hours": "sum",
-        "core_hours": "sum",
-        "memory_MiB": "max",
-    }
-    stages = each.groupby(
-        ["rule", "run"],
-        sort=False,
-        as_index=False,
-    ).agg(totals)
-    stages = stages.rename(columns={"rule": "stage"}).sort_values(
-        "core_hours", ascending=False, kind="stable"
-    )
-    whole = pd.DataFrame(
-        [
-            {
-                "stage": "all",
-                "run": "",
-                **stages.agg(totals),
-            }
-        ]
-    )
+    totals = dict.fromkeys(("jobs", "hours", "core_hours"), "sum")
+    totals["memory_MiB"] = "max"
+    stages = each.groupby(["rule", "run"], sort=False, as_index=False).agg(totals)
+    stages = stages.rename(columns={"rule": "stage"})
+    stages = stages.sort_values("core_hours", ascending=False, kind="stable")
+    whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(totals)}])
     return pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
 
 
@@ -267,26 +237,12 @@ def html_table(table: pd.DataFrame) -> Markup:
     named = any(name is not None for name in table.index.names)
     flat = table.reset_index() if named else table
     texts = flat.map(lambda value: _text(value, 4))
-    rows = [
-        [
-            (_kind(name, value, text), text)
-            for name, value, text in zip(
-                flat,
-                row,
-                words,
-                strict=True,
-            )
-        ]
-        for row, words in zip(
-            flat.to_numpy(dtype=object), texts.to_numpy(), strict=True
-        )
-    ]
-    return Markup(
-        _TABLE.render(
-            heads=list(flat),
-            rows=rows,
-        )
-    )
+    rows = []
+    values = flat.to_numpy(dtype=object)
+    for row, words in zip(values, texts.to_numpy(), strict=True):
+        cells = zip(flat, row, words, strict=True)
+        rows.append([(_kind(*cell), cell[-1]) for cell in cells])
+    return Markup(_TABLE.render(heads=list(flat), rows=rows))
 
 
 def _kind(
@@ -295,13 +251,8 @@ def _kind(
     text: str,
 ) -> str:
     """Return the CSS class of a cell."""
-    if (
-        isinstance(
-            value,
-            int | float | np.number,
-        )
-        and not isinstance(value, bool)
-    ) or NUMBER.fullmatch(text):
+    is_number = isinstance(value, int | float | np.number)
+    if (is_number and not isinstance(value, bool)) or NUMBER.fullmatch(text):
         return "number"
     if isinstance(text, Markup):
         return "composed"
@@ -314,24 +265,15 @@ def _kind(
 def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
     flat: dict[str, object] = {}
     for name, value in values.items():
-        if (
-            isinstance(value, Mapping)
-            and value
-            and all(str(week).replace(".", "", 1).isdigit() for week in value)
-        ):
-            ends = [(week, value[week]) for week in sorted(value, key=float)]
-            flat[f"{prefix}{name}"] = " to ".join(
-                f"{_text(at, 4)} at {week} GW" for week, at in (ends[0], ends[-1])
-            )
-        elif isinstance(value, Mapping):
-            flat.update(
-                _flatten(
-                    value,
-                    f"{prefix}{name}.",
-                )
-            )
+        key = f"{prefix}{name}"
+        if not isinstance(value, Mapping):
+            flat[key] = value
+        elif value and all(str(week).replace(".", "", 1).isdigit() for week in value):
+            ends = min(value, key=float), max(value, key=float)
+            texts = [f"{_text(value[week], 4)} at {week} GW" for week in ends]
+            flat[key] = " to ".join(texts)
         else:
-            flat[f"{prefix}{name}"] = value
+            flat |= _flatten(value, f"{key}.")
     return flat
 
 
