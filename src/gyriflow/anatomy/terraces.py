@@ -83,17 +83,18 @@ def without_terraces(
 
     smoothed = partial(_smoothed, mass=mass, poles=poles, solvers=solvers)
     start = mesh.vertices
-    normals = vertex_normals(TriangleMesh(smoothed(start), mesh.faces))
+    smooth = smoothed(start)
+    normals = vertex_normals(TriangleMesh(smooth, mesh.faces))
     lowest, highest = (
         np.where(fixed, 0.0, room)
         for room in _room(mesh, voxels, MAX_MOVE_VOXELS * size)
     )
     allowed, error = start, np.zeros_like(start)
-    for _ in range(ROUNDS):
-        smooth = smoothed(allowed - error)
+    for _ in range(ROUNDS - 1):
         height = np.einsum("ij,ij->i", smooth + error - start, normals)
         allowed = start + np.clip(height, lowest, highest)[:, None] * normals
         error += smooth - allowed
+        smooth = smoothed(allowed - error)
     sharpened = smooth + compensation * (stiffness @ smooth) / mass[:, None]
     moves = np.where(
         np.reshape(fixed, (-1, 1)),
