@@ -77,11 +77,11 @@ def steered_growth(
     )
     target = Size(area_cm2 / CM2_PER_MM2, volume_ml / ML_PER_MM3)
     before = inputs.size(start.positions_mm)
-    by_unit_rates = free_growth(p, start.positions_mm, inputs, week)
+    by_unit_rates = _free_growth(p, start.positions_mm, inputs, week)
     required = before.rates_to(target, start.step_s)
     if start.correction:
         required -= start.correction
-    cortex, core, is_limited = steered_rates(
+    cortex, core, is_limited = _steered_rates(
         required, by_unit_rates, (0.0, MAX_RATE_PER_S)
     )
     rates = {"growth_rate_per_s": cortex, "core_growth_rate_per_s": core}
@@ -95,7 +95,7 @@ def steered_growth(
     )
 
 
-def steered_rates(
+def _steered_rates(
     required: Floats,
     by_unit_rates: Floats,
     bounds: tuple[float, float],
@@ -106,7 +106,7 @@ def steered_rates(
     The rate of the cortex is set by the area, then that of the core by the remaining
     volume. If bounds exclude both curves, that of the volume is followed. `required`
     are the (2,) rates of the logarithms of area and volume, `by_unit_rates` (2, 2) what
-    unit rates of cortex and core add to them (`free_growth`). SolverError if cortex or
+    unit rates of cortex and core add to them (`_free_growth`). SolverError if cortex or
     core adds no volume.
     """
     area, volume = required
@@ -136,7 +136,7 @@ def steered_rates(
     return float(cortex), float(core), is_limited
 
 
-def free_growth(
+def _free_growth(
     p: FoldingParameters,
     positions_mm: Floats,
     inputs: GrowthInputs,

@@ -150,7 +150,7 @@ def test_numbers_of_layers_and_zones(recorded):
             "increments": growths,
             "sizes": [before, after],
             "rates": before.rates_to(after, 1e5),
-            "free growth": steering.free_growth(
+            "free growth": steering._free_growth(
                 parameters, mesh.vertices, inputs, 21.5
             ),
             "regions": start_regions(mesh, planes, {}, lambda _: is_left),

@@ -14,9 +14,9 @@ from gyriflow.folding.growth import GrowthInputs, StepStart
 from gyriflow.folding.growth_models import growth_model
 from gyriflow.folding.output import log_growth_at_vertices
 from gyriflow.folding.steering import (
-    free_growth,
+    _free_growth,
+    _steered_rates,
     missed_curves,
-    steered_rates,
 )
 from gyriflow.folding.stretches import unpacked
 from gyriflow.folding.zones import zones_of_run
@@ -82,7 +82,7 @@ def test_growth_reaches_as_deep_as_the_cortex_is_thick_at_its_thickest():
     by_core = []
     for map_mm in (even, thin_at_one):
         inputs = GrowthInputs(mesh, zones, {"thickness_mm": map_mm})
-        by_core.append(free_growth(p, mesh.vertices, inputs, 21)[1, 0])
+        by_core.append(_free_growth(p, mesh.vertices, inputs, 21)[1, 0])
     assert by_core[1] == pytest.approx(by_core[0], rel=0.005)
 
 
@@ -102,14 +102,14 @@ def test_growth_reaches_as_deep_as_the_cortex_is_thick_at_its_thickest():
     ],
 )
 def test_bounds_leave_the_volume_on_its_curve(required, made, cortex, core, is_limited):
-    *rates, found = steered_rates(np.array(required), made, (0.0, 1.0))
+    *rates, found = _steered_rates(np.array(required), made, (0.0, 1.0))
     assert rates == pytest.approx([cortex, core])
     assert found == is_limited
 
 
 def test_a_core_that_adds_no_volume_is_refused():
     with pytest.raises(SolverError):
-        steered_rates(np.array([0.01, 0.02]), MADE * [[1, 1], [1, 0]], (0.0, 1.0))
+        _steered_rates(np.array([0.01, 0.02]), MADE * [[1, 1], [1, 0]], (0.0, 1.0))
 
 
 @pytest.mark.parametrize("order", [1, 2])
