@@ -7,6 +7,7 @@ import yaml
 
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.simulation import Folding
+from gyriflow.io.frames import read_positions
 
 TIGHT = {"newton_tolerance": 1e-12}
 WEEK = {
@@ -34,21 +35,21 @@ progress."""
 def command(mesh, out, ranks=1, program=PROGRAM, **changes):
     params = out.parent / f"{out.name}.yaml"
     params.write_text(yaml.safe_dump(WEEK | changes))
-    program = [
-        sys.executable,
-        *program,
-        str(mesh),
-        "--params",
-        str(params),
-        "--out",
-        str(out),
-    ]
-    program += ["--log", str(out.with_suffix(".log"))]
-    return ["mpiexec", "-n", str(ranks), *program]
+    files = [mesh, "--params", params, "--out", out, "--log", out.with_suffix(".log")]
+    ranks = ["mpiexec", "-n", str(ranks)]
+    return [*ranks, sys.executable, *program, *map(str, files)]
 
 
-def fold(mesh, out, ranks=1, **changes):
-    return processes.ran(*command(mesh, out, ranks, **changes))
+def fold(mesh, out, ranks=1, code=0, **changes):
+    """Return what the program printed, which has ended in a code."""
+    done = processes.ran(*command(mesh, out, ranks, **changes))
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
+
+
+def end_of(out):
+    """Return the positions in mm at the end of a run."""
+    return read_positions(out / "frames.h5", WEEK["end_week"])
 
 
 def failing_after(steps):

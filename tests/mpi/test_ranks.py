@@ -26,28 +26,20 @@ RUNS = [(2, cases) for cases in batched(CASES, 3)]
 RUNS += [pytest.param(3, [case], marks=pytest.mark.extended) for case in OF_PARTS]
 
 
+PYTEST = "-m pytest -q -x -n 0 -p no:cacheprovider"
+
+
 def names(value):
     """Return the names of files of cases, for the id of a test."""
-    return (
-        None if isinstance(value, int) else "+".join(Path(case).stem for case in value)
-    )
+    if isinstance(value, int):
+        return None
+    return "+".join(Path(case).stem for case in value)
 
 
 @pytest.mark.parametrize(("ranks", "cases"), RUNS, ids=names)
 def test_cases_hold_on(ranks, cases):
-    program = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-x",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-    ]
-    command = ["mpiexec", "-n", str(ranks), *program, "-m", "not one_rank", *cases]
-    done = ran(*command, timeout_s=1200)
+    program = [sys.executable, *PYTEST.split(), "-m", "not one_rank", *cases]
+    done = ran("mpiexec", "-n", str(ranks), *program, timeout_s=1200)
     # 5: all cases are for one rank
     assert done.returncode in (0, 5), done.stdout[-6000:] + done.stderr[-2000:]
     assert done.stdout.count(" passed") == (ranks if done.returncode == 0 else 0), (
