@@ -58,7 +58,12 @@ def growth_figure(
         _rates_panel(axes, own, colours[name], folding_rate_per_s)
         # the legend stands below the title
         axes.set_title(
-            title if len(names) == 1 else wrap(f"{title}: {name}", 28),
+            title
+            if len(names) == 1
+            else wrap(
+                f"{title}: {name}",
+                28,
+            ),
             pad=6.0 if folding_rate_per_s is None else 16.0,
         )
     return figure
@@ -111,11 +116,19 @@ def _rates_panel(
     rate as a line."""
     weeks = zip(rates["from_week"], rates["to_week"], strict=True)
     labels = [f"{first:g}–{last:g}" for first, last in weeks]
-    bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
+    bars = axes.bar(
+        labels,
+        rates["rate_per_s"] * 1e7,
+        width=0.7,
+        color=colour,
+    )
     crowded = len(rates) > 8
     axes.bar_label(
         bars,
-        fmt=lambda rate: f"{rate:.2f}".replace("-", "−"),
+        fmt=lambda rate: f"{rate:.2f}".replace(
+            "-",
+            "−",
+        ),
         fontsize=6.5,
         padding=2,
         rotation=90 if crowded else 0,
@@ -127,11 +140,18 @@ def _rates_panel(
     if folding_rate_per_s is not None:
         _folding_line(axes, rates, folding_rate_per_s)
         # above the axes, so that it hides no bar
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
+        axes.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.01),
+            borderaxespad=0,
+        )
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.margins(y=0.25 if crowded else 0.12)
     axes.set_xlabel("gestational interval (GW)")
-    axes.tick_params(axis="x", rotation=45 if len(labels) > 6 else 0)
+    axes.tick_params(
+        axis="x",
+        rotation=45 if len(labels) > 6 else 0,
+    )
     # room for at least three bars, so that a single one does not fill the panel
     spare = max(0.0, 3 - len(labels)) / 2
     axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)

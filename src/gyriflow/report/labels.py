@@ -91,7 +91,14 @@ def cited_atlas(name: str) -> str:
 
 def plain(name: str) -> str:
     """Return a name of columns or files as words."""
-    return name.replace("_", " ").replace("spangy", "SpAnGy").replace("weyl", "Weyl")
+    return (
+        name.replace("_", " ")
+        .replace("spangy", "SpAnGy")
+        .replace(
+            "weyl",
+            "Weyl",
+        )
+    )
 
 
 def week_label(week: float) -> str:
@@ -116,7 +123,12 @@ def parameter_label(key: str) -> str:
     thickness (mm)"."""
     ending = next(filter(key.endswith, _ENDINGS), "")
     name = key.removesuffix(ending)
-    title = PARAMETER_TITLES.get(name) or plain(name.replace(".", " "))
+    title = PARAMETER_TITLES.get(name) or plain(
+        name.replace(
+            ".",
+            " ",
+        )
+    )
     return with_unit(title, _ENDINGS.get(ending))
 
 
@@ -129,7 +141,11 @@ def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
     headings = []
     for member in values:
         labels = [
-            _value_label(*item, alone=len(member) == 1) for item in member.items()
+            _value_label(
+                *item,
+                alone=len(member) == 1,
+            )
+            for item in member.items()
         ]
         headings.append("\n".join(labels))
     return headings
@@ -143,7 +159,14 @@ def _value_label(
 ) -> str:
     label = parameter_label(key)
     name, _, unit = label.removesuffix(")").partition(" (")
-    words = [f"{value:g}" if isinstance(value, float) else str(value)]
+    words = [
+        f"{value:g}"
+        if isinstance(
+            value,
+            float,
+        )
+        else str(value)
+    ]
     if unit:
         words.append(unit)
     if not (alone and unit):

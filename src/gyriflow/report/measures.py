@@ -118,7 +118,11 @@ def metrics_table(
     shared = set(rows.loc[observed, "week"]) & set(rows.loc[~observed, "week"])
     week = max(shared or set(rows["week"]))
     rows = rows[rows["week"] == week].assign(name=_named)
-    wide = rows.pivot_table("value", "name", "run").reindex(rows["name"].unique())
+    wide = rows.pivot_table(
+        "value",
+        "name",
+        "run",
+    ).reindex(rows["name"].unique())
     # of what may be zero, a difference in per cent is meaningless
     is_signed = wide.index.isin(rows.loc[_signed_metrics(rows), "name"])
     wide = wide.reindex(columns=dict.fromkeys([OBSERVED, *rows["run"]]))
@@ -135,7 +139,13 @@ def _signed(percent: float, unit: str = "") -> str:
     """Return a difference in per cent with its sign; no sign if it rounds to zero."""
     if np.isnan(percent):
         return "–"
-    return f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0") + unit
+    return (
+        f"{percent:+z.1f}".replace("-", "−").replace(
+            "+0.0",
+            "0.0",
+        )
+        + unit
+    )
 
 
 def _centile_text(centiles: pd.DataFrame) -> list[str]:
@@ -223,7 +233,10 @@ def _difference_texts(
     own = differences["subject"] == brain
     rows = differences[own & (differences["run"] == OBSERVED)]
     texts: dict[str, dict[str, str]] = {}
-    for names, parts in rows.groupby(["atlas", "metric"], sort=False):
+    for names, parts in rows.groupby(
+        ["atlas", "metric"],
+        sort=False,
+    ):
         atlas, metric = map(str, names)
         doubt = doubts.get(metric, "")
         by_part = {}
@@ -231,7 +244,10 @@ def _difference_texts(
             words = _difference_text(row, with_noise=with_noise and not doubt)
             by_part[row["hemisphere"]] = f"{words} ({doubt})" if doubt else words
         sides = "; ".join(f"{side} {words}" for side, words in by_part.items())
-        texts.setdefault(atlas, {})[metric] = by_part.get("whole", sides)
+        texts.setdefault(atlas, {})[metric] = by_part.get(
+            "whole",
+            sides,
+        )
     return texts
 
 
@@ -250,7 +266,11 @@ def _week_errors(curves: pd.DataFrame, week: float) -> list[str]:
         for name in DATED_METRICS:
             curve = rows[rows["metric"] == name]
             if others and len(curve):
-                values = np.interp([week, *others], curve["week"], curve["value"])
+                values = np.interp(
+                    [week, *others],
+                    curve["week"],
+                    curve["value"],
+                )
                 changes = 100 * (values[1:] / values[0] - 1)
                 words = " and ".join(_signed(change, " %") for change in changes)
                 label, *_ = METRICS[name].label.split(",")
@@ -261,7 +281,11 @@ def _week_errors(curves: pd.DataFrame, week: float) -> list[str]:
     return texts
 
 
-def _difference_text(row: Mapping[Any, Any], *, with_noise: bool) -> str:
+def _difference_text(
+    row: Mapping[Any, Any],
+    *,
+    with_noise: bool,
+) -> str:
     """Return a difference from an atlas in %, or in the metric's unit if it may be
     negative, and as a multiple of the noise of measuring."""
     text = _signed(100 * row["relative_difference"], " %")
@@ -296,7 +320,13 @@ def brain_rows(
     values = measured["value"].to_dict()
     names = set(measured["metric"])
     rated = _by_brain(tables.centiles)
-    texts = dict(zip(rated.index, _centile_text(rated), strict=True))
+    texts = dict(
+        zip(
+            rated.index,
+            _centile_text(rated),
+            strict=True,
+        )
+    )
     shown = [name for name in metrics_shown(Shown.BRAINS) if name in names]
     rows = []
     for brain in brains:
@@ -331,15 +361,27 @@ def brain_rows(
         ]
         facts += ["" if is_linked else brain["source"], licence]
         cause = judged.loc[key, "cause"] or judged.loc[key, "warnings"]
-        row = {"numbers": numbers, "facts": list(filter(None, facts)), "cause": cause}
-        rows.append({**brain, **row, "verdict": judged.loc[key, "verdict"]})
+        row = {
+            "numbers": numbers,
+            "facts": list(filter(None, facts)),
+            "cause": cause,
+        }
+        rows.append(
+            {
+                **brain,
+                **row,
+                "verdict": judged.loc[key, "verdict"],
+            }
+        )
     return rows
 
 
 def _by_brain(table: pd.DataFrame) -> pd.DataFrame:
     """Return the values of whole observed brains, by brain and metric."""
-    is_observed = (table["run"] == OBSERVED) & (table["hemisphere"] == "whole")
-    rows = table[is_observed & table["value"].notna()]
+    is_observed = table["run"] == OBSERVED
+    is_whole = table["hemisphere"] == "whole"
+    has_value = table["value"].notna()
+    rows = table[is_observed & is_whole & has_value]
     return rows.set_index(["subject", "metric"], drop=False)
 
 
@@ -386,7 +428,10 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
     ).lstrip()
 
 
-def _predicted_table(prediction: Mapping[str, Any], tables: Tables) -> pd.DataFrame:
+def _predicted_table(
+    prediction: Mapping[str, Any],
+    tables: Tables,
+) -> pd.DataFrame:
     """Return the metrics of a predicted brain, its start and the atlas' brain, and the
     difference from the atlas in %.
 
@@ -473,7 +518,10 @@ def _accuracy_table(accuracy: Mapping[str, Any]) -> pd.DataFrame:
     every = pd.DataFrame(accuracy["rows"])
     # predictions first
     every = every.sort_values("model", key=lambda models: models != "run")
-    for (horizon, model), rows in every.groupby(["horizon", "model"], sort=False):
+    for (horizon, model), rows in every.groupby(
+        ["horizon", "model"],
+        sort=False,
+    ):
         row = table.setdefault(horizon, {})
         distance, r = (
             _range_text(rows["distance_mm"]),
@@ -500,7 +548,10 @@ def _range_text(values: pd.Series, pattern: str = ".2f") -> str:
     return " to ".join(dict.fromkeys(ends)) or "–"
 
 
-def brain_content(brain: Mapping[str, Any], tables: Tables) -> dict[str, Any]:
+def brain_content(
+    brain: Mapping[str, Any],
+    tables: Tables,
+) -> dict[str, Any]:
     """Return what the page of an observed brain says of its metrics, for its
     template."""
     key = brain["id"]

@@ -70,7 +70,10 @@ def page_figures(
     """
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
-        brains.setdefault(figure["name"], set()).add(figure["names"].get("brain"))
+        brains.setdefault(
+            figure["name"],
+            set(),
+        ).add(figure["names"].get("brain"))
     first = [figure["path"] for figure in figures if figure["first"]][:1]
     entries = []
     for figure in figures:
@@ -101,7 +104,10 @@ def _sections(
     others = [figure for figure in figures if not figure["first"]]
     sections: dict[str, list[dict[str, Any]]] = {}
     for figure in others:
-        sections.setdefault(figure["section"], []).append(dict(figure))
+        sections.setdefault(
+            figure["section"],
+            [],
+        ).append(dict(figure))
     for items in sections.values():
         items.sort(key=lambda item: item["technical"])
         for item in items:
@@ -179,7 +185,10 @@ def _centile_flags(centiles: pd.DataFrame) -> set[str]:
     return flags
 
 
-def _simulation_verdict(tables: Tables, prediction: Mapping[str, Any] | None) -> str:
+def _simulation_verdict(
+    tables: Tables,
+    prediction: Mapping[str, Any] | None,
+) -> str:
     """Return the verdict on simulations; on predictions that were compared, after how
     much better they are than simpler ones."""
     runs, validation = tables.runs, tables.validation
@@ -248,7 +257,10 @@ def report_page(
         lstrip_blocks=True,
     )
     # a script must not contain its own end tag
-    data = json.dumps(view, separators=(",", ":")).replace("</", "<\\/")
+    data = json.dumps(view, separators=(",", ":")).replace(
+        "</",
+        "<\\/",
+    )
     for name, text in parts.items():
         content[name] = Markup(text.replace("</script", "<\\/script"))
     return environment.from_string(template).render(
@@ -278,7 +290,10 @@ def methods_text(template: str, **used: Any) -> str:
     )
 
 
-def _growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
+def _growth_sentence(
+    run: Mapping[str, Any],
+    number: Callable[[Any], str],
+) -> str:
     model = run["parameters"]["growth"]["model"]
     return GROWTH_MODELS[model].sentence(run, number)
 
@@ -300,7 +315,10 @@ def observed_caption(caption: str) -> str:
     return re.sub(rf"(?s)(^|\n\n){SIMULATED_CAPTION}.*?(?=\n\n|$)", "", caption)
 
 
-def _scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None) -> pd.DataFrame:
+def _scores_table(
+    runs: pd.DataFrame,
+    validation: pd.DataFrame | None,
+) -> pd.DataFrame:
     """Return a row for each run: how it ended, and its scores at the last week with an
     observed brain.
 
@@ -308,15 +326,31 @@ def _scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None) -> pd.Dat
     min_J, elements_through_cortex, order, least_elements_through_cortex,
     unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
     """
-    names = run_names(zip(runs["run"], runs["subject"], strict=True))
+    names = run_names(
+        zip(
+            runs["run"],
+            runs["subject"],
+            strict=True,
+        )
+    )
     rows = []
-    for name, (_, run) in zip(names, runs.iterrows(), strict=True):
+    for name, (_, run) in zip(
+        names,
+        runs.iterrows(),
+        strict=True,
+    ):
         scores: Mapping[Any, Any] = {}
         if validation is not None:
             is_own_run = validation["run"] == run["run"]
             own = validation[is_own_run & (validation["start"] == run["subject"])]
             scores = own.sort_values("week").iloc[-1] if len(own) else {}
-        rows.append({"run": name, "verdict": _run_verdict(run), **_scores(scores)})
+        rows.append(
+            {
+                "run": name,
+                "verdict": _run_verdict(run),
+                **_scores(scores),
+            }
+        )
     return pd.DataFrame(rows)
 
 
@@ -399,7 +433,10 @@ def _run_doubts(run: Mapping[str, Any] | pd.Series) -> list[str]:
     return words
 
 
-def _coarseness(run: Mapping[str, Any] | pd.Series, order: int) -> list[str]:
+def _coarseness(
+    run: Mapping[str, Any] | pd.Series,
+    order: int,
+) -> list[str]:
     """Return a text if the elements of a run were too large for its cortex, at the
     start or later; else nothing."""
     elements, week = run["elements_through_cortex"], run["unresolved_from_week"]
@@ -466,12 +503,22 @@ def _group_warnings(warnings: pd.DataFrame) -> str:
     # steps of a brain have no run
     named = warnings[["subject", "run"]].astype(object).fillna("").astype(str)
     rows = warnings.copy()
-    rows["brain, run"] = named.agg(", ".join, axis=1).str.strip(", ")
+    rows["brain, run"] = named.agg(
+        ", ".join,
+        axis=1,
+    ).str.strip(", ")
     is_error = rows["level"] != "warning"
     prefix = (rows["level"] + ": ").where(is_error, "")
     rows["message"] = prefix + rows["message"]
     groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
-    joined = groups.agg(lambda places: "; ".join(filter(None, places.unique())))
+    joined = groups.agg(
+        lambda places: "; ".join(
+            filter(
+                None,
+                places.unique(),
+            )
+        )
+    )
     return html_table(joined.reset_index())
 
 

@@ -92,9 +92,10 @@ class Row:
 
 def _round_length(limit_mm: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
-    decade = 10.0 ** np.floor(np.log10(limit_mm))
-    steps = np.array([1, 2, 5]) * decade
-    return float(steps[steps <= limit_mm * (1 + 1e-9)].max())
+    exponent = np.floor(np.log10(limit_mm))
+    steps = np.array([1, 2, 5]) * 10.0**exponent
+    is_short = steps <= limit_mm * (1 + 1e-9)
+    return float(steps[is_short].max())
 
 
 def panel_grid(
@@ -116,7 +117,13 @@ def panel_grid(
     the panels of a single row, have the letters a, b, c … for the caption. `colour_bar`
     is a colour scale and its label, `legend` the entries of a legend.
     """
-    rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
+    rows = [
+        replace(
+            row,
+            label=wrap(row.label, _LABEL_LETTERS),
+        )
+        for row in rows
+    ]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
     widths_in, blocks, inches_per_mm = _lay_out_columns(
@@ -176,10 +183,18 @@ def panel_grid(
             _write_letters(cells[:per_row], letters, is_labelled=bool(row.label))
             if number == 0:
                 for axes, head in zip(cells, block_heads, strict=True):
-                    _write(axes, head, (0.5, 1.0), (0, 36 * head_in))
+                    _write(
+                        axes,
+                        head,
+                        (0.5, 1.0),
+                        (0, 36 * head_in),
+                    )
     bar_mm = PAGE_BAR_MM
     if not at_page_scale:
-        longest_in = min(0.6 * widths_in.max(), _SCALE_SHARE * width - 2 * _EDGE_IN)
+        longest_in = min(
+            0.6 * widths_in.max(),
+            _SCALE_SHARE * width - 2 * _EDGE_IN,
+        )
         bar_mm = _round_length(longest_in / inches_per_mm)
     _draw_scale_bar(figure, rows, foot_in, bar_mm, inches_per_mm)
     if colour_bar:
@@ -220,7 +235,14 @@ def _write_letters(
         if is_labelled and axes is cells[0]:
             align = {"ha": "right", "va": "top"}
         at = (0.0, 1.0), (-2, 2)
-        _write(axes, letter, *at, fontsize=9, fontweight="bold", **align)
+        _write(
+            axes,
+            letter,
+            *at,
+            fontsize=9,
+            fontweight="bold",
+            **align,
+        )
 
 
 def _lay_out_columns(
@@ -229,8 +251,18 @@ def _lay_out_columns(
     """Return the widths of all columns in inches, the columns of each block (at most
     `MAX_COLUMNS` side by side), and the scale in inches per mm."""
     half_widths = []
-    for column in zip(*(row.panels for row in rows), strict=True):
-        panels = [half_extents(panel.mesh, panel.view)[0] for panel in column if panel]
+    for column in zip(
+        *(row.panels for row in rows),
+        strict=True,
+    ):
+        panels = [
+            half_extents(
+                panel.mesh,
+                panel.view,
+            )[0]
+            for panel in column
+            if panel
+        ]
         half_widths.append(max(panels, default=0.0))
     half_widths_mm = np.array(half_widths)
     narrowest_mm = _NARROWEST * half_widths_mm.max()
@@ -239,7 +271,14 @@ def _lay_out_columns(
     # blocks with as equal numbers of columns as possible
     n_blocks = math.ceil(len(widths_mm) / MAX_COLUMNS)
     size = math.ceil(len(widths_mm) / n_blocks)
-    blocks = [slice(start, start + size) for start in range(0, len(widths_mm), size)]
+    blocks = [
+        slice(start, start + size)
+        for start in range(
+            0,
+            len(widths_mm),
+            size,
+        )
+    ]
     inches_per_mm = min(
         max_inches_per_mm,
         _PANEL_IN / widths_mm.max(),
@@ -248,10 +287,20 @@ def _lay_out_columns(
     return _dots(widths_mm * inches_per_mm), blocks, inches_per_mm
 
 
-def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
+def _heights_in(
+    row: Row,
+    block: slice,
+    inches_per_mm: float,
+) -> tuple[float, float]:
     """Return the heights of a row's pictures and captions."""
     panels = [panel for panel in row.panels[block] if panel]
-    halves_mm = [half_extents(panel.mesh, panel.view)[1] for panel in panels]
+    halves_mm = [
+        half_extents(
+            panel.mesh,
+            panel.view,
+        )[1]
+        for panel in panels
+    ]
     picture = _MARGIN * 2 * max(halves_mm, default=0.0) * inches_per_mm
     captions = [len(panel.caption.splitlines()) for panel in panels]
     # the label is written along the height
@@ -288,7 +337,14 @@ def _draw_row(
     """Draw the pictures of a row in its cells, whose widths and heights are given, with
     the row's label on the left."""
     previous = None
-    _write(cells[0], row.label, (0.0, 0.5), (-4.3, 0), rotation=90, ha="right")
+    _write(
+        cells[0],
+        row.label,
+        (0.0, 0.5),
+        (-4.3, 0),
+        rotation=90,
+        ha="right",
+    )
     for index, (axes, panel, size_in) in enumerate(
         zip(cells, panels, sizes_in, strict=True)
     ):
@@ -310,15 +366,39 @@ def _draw_row(
             light=panel.light,
             lines=lines,
         )
-        axes.imshow(image, extent=(-right, right, -up, up), aspect="auto")
+        axes.imshow(
+            image,
+            extent=(-right, right, -up, up),
+            aspect="auto",
+        )
         if panel.view != previous:
             first, last = panel.view.ends
-            _write(axes, first, (0.04, 1.0), ha="left", va="top", fontsize=6)
-            _write(axes, last, (0.96, 1.0), ha="right", va="top", fontsize=6)
+            _write(
+                axes,
+                first,
+                (0.04, 1.0),
+                ha="left",
+                va="top",
+                fontsize=6,
+            )
+            _write(
+                axes,
+                last,
+                (0.96, 1.0),
+                ha="right",
+                va="top",
+                fontsize=6,
+            )
         previous = panel.view
         if panel.mark is not None:
             _draw_ring(axes, panel, panel.mark)
-        _write(axes, panel.caption, (0.5, -0.01), va="top", fontsize=6.5)
+        _write(
+            axes,
+            panel.caption,
+            (0.5, -0.01),
+            va="top",
+            fontsize=6.5,
+        )
 
 
 def _direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
@@ -329,10 +409,19 @@ def _direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floa
     """
     normals = vertex_normals(mesh)
     cubes = np.floor(mesh.vertices / LINES_MM)
-    _, vertices = np.unique(cubes, axis=0, return_index=True)
-    vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
+    _, first = np.unique(
+        cubes,
+        axis=0,
+        return_index=True,
+    )
+    is_facing = normals[first] @ view.towards > MIN_FACING_COSINE
+    vertices = first[is_facing]
     lines = directions[vertices]
-    lengths = np.linalg.norm(lines, axis=1, keepdims=True)
+    lengths = np.linalg.norm(
+        lines,
+        axis=1,
+        keepdims=True,
+    )
     half = lines * (LINES_MM / 2) / lengths.clip(1)
     # slightly above the surface, which would otherwise hide parts of them
     at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
@@ -397,11 +486,23 @@ def _draw_scale_bar(
     axes.axvspan(0, length, color="black", linewidth=0)
     axes.set_axis_off()
     label = f"{length:g} mm"
-    axes.text(0.0, -0.6, label, transform=axes.transAxes, va="top", fontsize=7)
+    axes.text(
+        0.0,
+        -0.6,
+        label,
+        transform=axes.transAxes,
+        va="top",
+        fontsize=7,
+    )
     ends: set[str] = set()
     for row in rows:
         ends.update(*(panel.view.ends for panel in row.panels if panel))
     words = [
         f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends
     ]
-    figure.text(_EDGE_IN / width, 0.02 / total, ", ".join(words), fontsize=6)
+    figure.text(
+        _EDGE_IN / width,
+        0.02 / total,
+        ", ".join(words),
+        fontsize=6,
+    )

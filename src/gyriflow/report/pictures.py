@@ -130,7 +130,13 @@ def _brain_grid(
     scale = None
     colour_bar = None
     if quantity and mapped:
-        values = [whole_maps(halves, [quantity])[1] for halves in mapped.values()]
+        values = [
+            whole_maps(
+                halves,
+                [quantity],
+            )[1]
+            for halves in mapped.values()
+        ]
         every = np.concatenate([maps[quantity] for maps in values])
         scale = scale_of(quantity, every)
         if limit is not None:
@@ -146,7 +152,13 @@ def _brain_grid(
         for brain in grid:
             if brain.row == label:
                 panels[brain.column] = _panel(brain, quantity, scale)
-        rows.append(Row(label, [panels.get(column) for column in columns], absent))
+        rows.append(
+            Row(
+                label,
+                [panels.get(column) for column in columns],
+                absent,
+            )
+        )
     return panel_grid(
         columns,
         rows,
@@ -186,7 +198,10 @@ def _panel(
     )
 
 
-def _in_views(grid: Grid, views: Sequence[str] = SIDE_VIEWS) -> list[GridBrain]:
+def _in_views(
+    grid: Grid,
+    views: Sequence[str] = SIDE_VIEWS,
+) -> list[GridBrain]:
     """Return brains from several views, a column per week, interval or name.
 
     Weeks and intervals are sorted, names in their order. Each row has all views, or is
@@ -242,7 +257,9 @@ def expected_figure(grid: Grid) -> Figure:
 
 @styled
 def displacement_maps(
-    frames: Sequence[Mapping[float, SurfaceMaps]], *, runs: Sequence[str]
+    frames: Sequence[Mapping[float, SurfaceMaps]],
+    *,
+    runs: Sequence[str],
 ) -> Figure:
     """Draw the norm of the displacement of runs on the pial surface, a column per
     interval, on one colour scale.
@@ -299,7 +316,16 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     rounding = ROUNDING * np.abs(finite).max(initial=0.0)
     signed = record.is_signed or finite.min(initial=0.0) < -rounding
     sizes = np.abs(finite) if signed else finite
-    high = float(np.quantile(sizes, record.quantile)) if len(sizes) else 0.0
+    high = (
+        float(
+            np.quantile(
+                sizes,
+                record.quantile,
+            )
+        )
+        if len(sizes)
+        else 0.0
+    )
     end = _round_up(high) if high > 0 else 1.0
     is_cut = bool((sizes > end).any())
     if signed:
@@ -307,7 +333,10 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     return colour_scale(record.colours, 0.0, end, cut=is_cut)
 
 
-def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMaps:
+def whole_maps(
+    halves: Halves,
+    names: Iterable[str] | None = None,
+) -> SurfaceMaps:
     """Return the hemispheres of a brain as one surface, with the maps that all of them
     have.
 
@@ -321,7 +350,12 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
     for name in names:
         parts = []
         for mesh, maps in halves:
-            parts.append(maps.get(name, np.full(len(mesh.vertices), np.nan)))
+            parts.append(
+                maps.get(
+                    name,
+                    np.full(len(mesh.vertices), np.nan),
+                )
+            )
         values[name] = np.concatenate(parts)
     return merged(*(mesh for mesh, _ in halves)), values
 
@@ -352,7 +386,10 @@ def brain_maps(halves: Halves, *, sides: Sequence[str]) -> Figure:
     )
 
 
-def _views_of_brain(halves: Halves, sides: Sequence[str]) -> list[GridBrain]:
+def _views_of_brain(
+    halves: Halves,
+    sides: Sequence[str],
+) -> list[GridBrain]:
     """Return a brain from outside, from above, and the inner face of each
     hemisphere."""
     grid = []
@@ -387,20 +424,34 @@ def deviation_figure(grid: Grid, *, quantity: str) -> Figure:
 
 
 @styled
-def influence_figure(grid: Grid, *, values: Mapping[str, Mapping[str, Any]]) -> Figure:
+def influence_figure(
+    grid: Grid,
+    *,
+    values: Mapping[str, Mapping[str, Any]],
+) -> Figure:
     """Draw the surfaces of the runs of a sweep at one week, and below their shape index
     on one scale.
 
     The columns are runs, in the order of the sweep, and the observed brain of the week,
     last. `values` are by run the varied parameters with their values, for the headings.
     """
-    headings = dict(zip(values, value_labels(list(values.values())), strict=True))
+    headings = dict(
+        zip(
+            values,
+            value_labels(list(values.values())),
+            strict=True,
+        )
+    )
     placed = []
     for label in ("", "shape index\n"):
         for view in SIDE_VIEWS:
             for brain in grid:
                 column = headings.get(brain.column, brain.column)
-                brain = replace(brain, row=f"{label}{view} view", column=column)
+                brain = replace(
+                    brain,
+                    row=f"{label}{view} view",
+                    column=column,
+                )
                 if not label:
                     plain: Halves = [(mesh, {}) for mesh, _ in brain.halves]
                     brain = replace(brain, halves=plain)
@@ -452,10 +503,16 @@ def _growth_grid(
             name_in_interval(f"growth_direction_{axis}", *interval) for axis in AXES
         ]
         if names[0] in growth:
-            directions[interval] = np.stack([growth[name] for name in names], axis=1)
+            directions[interval] = np.stack(
+                [growth[name] for name in names],
+                axis=1,
+            )
     if directions:
         every = np.concatenate(list(directions.values()))
-        longest = np.quantile(np.linalg.norm(every, axis=1), DIRECTION_QUANTILE)
+        longest = np.quantile(
+            np.linalg.norm(every, axis=1),
+            DIRECTION_QUANTILE,
+        )
         directions = {key: lines / longest for key, lines in directions.items()}
     grid = []
     for interval in intervals:
@@ -504,7 +561,7 @@ def small_pictures(halves: Halves, *, side: str) -> Figure:
     return figure
 
 
-def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:
+def region_colours(names: Iterable[str]) -> dict[str, Any]:
     """Return a colour for each region in the given order: those of runs, then their
     tints.
 
@@ -512,9 +569,12 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
     shade. Colours repeat from the 22nd region on.
     """
     pure = np.array([to_rgb(colour) for colour in RUN_COLOURS])
-    shades = np.concatenate([pure + tint * (1 - pure) for tint in TINTS])
-    colours = cycle(map(tuple, shades.tolist()))
-    return dict(zip(dict.fromkeys(names), colours, strict=False))
+    shades: list[Any] = []
+    for tint in TINTS:
+        tinted = pure + tint * (1 - pure)
+        shades += map(tuple, tinted.tolist())
+    regions = dict.fromkeys(names)
+    return dict(zip(regions, cycle(shades), strict=False))
 
 
 @styled
@@ -532,7 +592,13 @@ def brain_regions(grid: Grid) -> Figure:
             names += table.values()
             has_unnamed |= not np.isin(numbers, list(table)).all()
     colours = region_colours(names)
-    legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
+    legend = [
+        Patch(
+            color=colour,
+            label=name,
+        )
+        for name, colour in colours.items()
+    ]
     if has_unnamed:
         legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     placed = []
@@ -550,7 +616,7 @@ regions_figure = brain_regions
 
 def _painted_regions(
     halves: Sequence[tuple[TriangleMesh, Any]],
-    colours: Mapping[str, tuple[float, float, float]],
+    colours: Mapping[str, Any],
 ) -> Floats:
     """Return the colours of the vertices of all hemispheres."""
     painted = []
@@ -576,9 +642,18 @@ def zones_figure(
     mesh, tags = boundary
     zones = tags["zone"]
     colours = to_rgba_array([ZONE_COLOURS[name] for name in ZONE_NAMES])[:, :3]
-    areas_mm2 = np.bincount(zones, face_areas(mesh), minlength=len(colours))
+    areas_mm2 = np.bincount(
+        zones,
+        face_areas(mesh),
+        minlength=len(colours),
+    )
     legend = []
-    for name, colour, area_mm2 in zip(ZONE_NAMES, colours, areas_mm2, strict=True):
+    for name, colour, area_mm2 in zip(
+        ZONE_NAMES,
+        colours,
+        areas_mm2,
+        strict=True,
+    ):
         if area_mm2:
             label = f"{name} {CM2_PER_MM2 * area_mm2:.1f} cm²"
             legend.append(Patch(color=colour, label=label))
@@ -590,6 +665,12 @@ def zones_figure(
         )
         # a brain of one hemisphere has no medial view of the other
         if len(part.faces):
-            brain = GridBrain("", f"{name} view", [(part, {})], view=view, light=MAP)
+            brain = GridBrain(
+                "",
+                f"{name} view",
+                [(part, {})],
+                view=view,
+                light=MAP,
+            )
             grid.append(replace(brain, colours=shades))
     return _brain_grid(grid, legend=legend)

@@ -87,7 +87,11 @@ def tissue_groups(
 ) -> NDArray[np.uint8]:
     """Return the (i, j, k) group of each voxel as in `TISSUE_GROUPS`; 0 is
     background."""
-    groups = np.where(labels > 0, 4, 0).astype(np.uint8)
+    groups = np.where(
+        labels > 0,
+        4,
+        0,
+    ).astype(np.uint8)
     groups[np.isin(labels, scheme.cerebrum)] = 2
     groups[np.isin(labels, scheme.cortex)] = 1
     groups[np.isin(labels, scheme.ventricles)] = 3
@@ -115,7 +119,11 @@ def quality_page(
     height_in = HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines)
     figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     heading, colour = VERDICT_HEADINGS[row["verdict"]]
-    left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
+    left: dict[str, Any] = {
+        "x": 0.015,
+        "ha": "left",
+        "fontsize": 6.5,
+    }
     bold: dict[str, Any] = {"fontsize": 10, "fontweight": "bold"}
     # lines break between facts only
     facts = [
@@ -123,7 +131,10 @@ def quality_page(
         for name, value in _facts(row).items()
     ]
     words = wrap("   ".join(facts), FACT_LETTERS)
-    figure.suptitle(f"{row['subject']}, {row['week']:g} GW", **left | bold)
+    figure.suptitle(
+        f"{row['subject']}, {row['week']:g} GW",
+        **left | bold,
+    )
     figure.text(
         0.985,
         0.985,
@@ -154,7 +165,13 @@ def quality_page(
         thickness.colorbar(scale, ax=panels).set_label(label, fontsize=6.5)
     for letter, part in zip("abc", rows, strict=True):
         height = 0.82 if part is planes else 1.0
-        part.text(0.015, height, letter, va="top", **bold | {"fontsize": 9})
+        part.text(
+            0.015,
+            height,
+            letter,
+            va="top",
+            **bold | {"fontsize": 9},
+        )
     return figure
 
 
@@ -163,7 +180,13 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
     hemisphere."""
     low, high = brain.pial.vertices.min(axis=0), brain.pial.vertices.max(axis=0)
     middle = (low + high) / 2
-    fissure = float(np.clip(brain.fissure_x_mm, low[0], high[0]))
+    fissure = float(
+        np.clip(
+            brain.fissure_x_mm,
+            low[0],
+            high[0],
+        )
+    )
     # the larger hemisphere, of equal ones the right one
     outer = high[0] if high[0] - fissure > 0.8 * (fissure - low[0]) else low[0]
     at = {
@@ -182,7 +205,11 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
     panels = figure.subplots(
         1, 3, width_ratios=[np.ptp(ends[right]) for _, right, _ in PLANES.values()]
     )
-    for axes, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
+    for axes, (plane, (normal, right, up)) in zip(
+        panels,
+        PLANES.items(),
+        strict=True,
+    ):
         points = np.empty((len(dots[up]), len(dots[right]), 3))
         points[..., normal] = at[plane]
         points[..., right] = dots[right]
@@ -203,9 +230,20 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         _write_ends(axes, names, 0.03, 0.5, **style)
     coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
     bar = [left, left + SCALE_BAR_MM]
-    coronal.plot(bar, [bottom] * 2, color=colour, linewidth=1.2)
+    coronal.plot(
+        bar,
+        [bottom] * 2,
+        color=colour,
+        linewidth=1.2,
+    )
     label = f"{SCALE_BAR_MM:g} mm"
-    coronal.text(left, bottom + 1, label, fontsize=6, color=colour)
+    coronal.text(
+        left,
+        bottom + 1,
+        label,
+        fontsize=6,
+        color=colour,
+    )
     keys = [Patch(color=PIAL_COLOUR, label="pial surface")]
     if brain.white is not None or brain.tissues:
         keys.append(Patch(color=INNER_COLOUR, label="inner border of the cortex"))
@@ -242,7 +280,13 @@ def _draw_volumes(
         brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
         index = voxel_index(points, affine)
         grey = map_coordinates(np.nan_to_num(values), index, order=1)
-        axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **style)
+        axes.imshow(
+            grey,
+            cmap="gray",
+            vmin=0,
+            vmax=brightest,
+            **style,
+        )
     if not brain.tissues:
         return
     groups, affine = brain.tissues
@@ -250,8 +294,17 @@ def _draw_volumes(
     if not brain.image:
         tissues = map_coordinates(groups, index, order=0, mode="constant")
         colours = ListedColormap(TISSUE_COLOURS)
-        axes.imshow(tissues, cmap=colours, vmin=-0.5, vmax=4.5, **style)
-    is_inside = np.isin(groups, (2, 3)).astype(np.float32)
+        axes.imshow(
+            tissues,
+            cmap=colours,
+            vmin=-0.5,
+            vmax=4.5,
+            **style,
+        )
+    is_inside = np.isin(
+        groups,
+        (2, 3),
+    ).astype(np.float32)
     inside = map_coordinates(is_inside, index, order=1)
     if (groups == 1).any() and inside.min() < 0.5 < inside.max():
         height, width = inside.shape
@@ -269,7 +322,11 @@ def _draw_views(
 ) -> list[Axes]:
     """Draw a row of views at one scale, without views of a missing hemisphere."""
     every = [
-        half_extents(brain.pial, VIEWS[name]) for name in (*SHAPE_VIEWS, *OTHER_VIEWS)
+        half_extents(
+            brain.pial,
+            VIEWS[name],
+        )
+        for name in (*SHAPE_VIEWS, *OTHER_VIEWS)
     ]
     wide, tall = 1.04 * np.max(every, axis=0)
     panels = list(figure.subplots(1, len(names)))
@@ -282,7 +339,15 @@ def _draw_views(
         )
         if not len(mesh.faces):
             continue
-        axes.imshow(render(mesh, painted, view, (wide, tall), pixels_per_mm))
+        axes.imshow(
+            render(
+                mesh,
+                painted,
+                view,
+                (wide, tall),
+                pixels_per_mm,
+            )
+        )
         axes.set_title(name, fontsize=6.5, pad=1)
         style = {"va": "top", "fontsize": 6, "color": MUTED_COLOUR}
         _write_ends(axes, view.ends, 0.05, 0.97, **style)
@@ -391,8 +456,18 @@ def quality_table(
 
     `left_out` are columns and cause of the brains without a surface.
     """
-    refused = [{**row, "verdict": "refused", "warning_count": 0} for row in left_out]
-    table = pd.DataFrame([*rows, *refused]).set_index("subject", drop=False)
+    refused = [
+        {
+            **row,
+            "verdict": "refused",
+            "warning_count": 0,
+        }
+        for row in left_out
+    ]
+    table = pd.DataFrame([*rows, *refused]).set_index(
+        "subject",
+        drop=False,
+    )
     ids = [name for name in order if name in table.index]
     ids += [name for name in table.index if name not in ids]
     return table.loc[ids, [*table.columns.drop("page"), "page"]].reset_index(drop=True)

@@ -132,7 +132,11 @@ def picture_axes(view: View) -> tuple[Floats, Floats]:
 def polydata(mesh: TriangleMesh) -> pv.PolyData:
     """Return a surface for VTK."""
     return pv.PolyData.from_regular_faces(
-        np.array(mesh.vertices), np.array(mesh.faces, dtype=int)
+        np.array(mesh.vertices),
+        np.array(
+            mesh.faces,
+            dtype=int,
+        ),
     )
 
 
@@ -164,7 +168,10 @@ def restricted(
 
 def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
     """Return one colour for every vertex, (n, 3) in 0 to 1."""
-    return np.tile(to_rgb(colour), (len(mesh.vertices), 1))
+    return np.tile(
+        to_rgb(colour),
+        (len(mesh.vertices), 1),
+    )
 
 
 def colour_scale(
@@ -176,7 +183,13 @@ def colour_scale(
 ) -> ScalarMappable:
     """Return a colour scale; `cut` marks values above its upper end."""
     start, end = PARTS.get(colormap, (0.0, 1.0))
-    shades = mpl.colormaps[colormap](np.linspace(start, end, 256))
+    shades = mpl.colormaps[colormap](
+        np.linspace(
+            start,
+            end,
+            256,
+        )
+    )
     colours = LinearSegmentedColormap.from_list(
         colormap, [tuple(shade) for shade in shades]
     )
@@ -209,7 +222,13 @@ def render(
     `half_extents_mm` half the width and half the height of the picture; `lines` (k, 2,
     3) ends of lines, drawn unless the surface hides them.
     """
-    size = [max(2, round(2 * half * pixels_per_mm)) for half in half_extents_mm]
+    size = [
+        max(
+            2,
+            round(2 * half * pixels_per_mm),
+        )
+        for half in half_extents_mm
+    ]
     surface = polydata(mesh)
     surface.point_data.active_normals = vertex_normals(mesh)
     is_by_vertex = len(colours) == len(mesh.vertices)
@@ -251,7 +270,14 @@ def render(
             )
             plotter.add_light(lamp)
         middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-        distance = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+        distance = 4 * float(
+            np.linalg.norm(
+                np.ptp(
+                    mesh.vertices,
+                    axis=0,
+                )
+            )
+        )
         place = middle + distance * np.array(view.towards)
         plotter.camera_position = [tuple(place), tuple(middle), view.up]
         plotter.camera.parallel_projection = True

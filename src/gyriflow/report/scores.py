@@ -38,7 +38,11 @@ SIDE_NAMES = {
 
 
 @styled
-def validation_figure(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+def validation_figure(
+    validation: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+) -> Figure:
     """Draw by week how much better a run's shape index and mean curvature correlate
     with the observed brain's than the scaled start's.
 
@@ -131,7 +135,13 @@ def nearest_figure(
     measures = list(dict.fromkeys(rows["measure"]))
     figure, panels = panel_figure(len(measures), panel_in=2.1)
     drawn: set[str] = set()
-    for number, (axes, measure) in enumerate(zip(panels, measures, strict=True)):
+    for number, (axes, measure) in enumerate(
+        zip(
+            panels,
+            measures,
+            strict=True,
+        )
+    ):
         here = rows[rows["measure"] == measure]
         sides = ["whole"] if (here["hemisphere"] == "whole").any() else list(SIDES)
         drawn |= set(sides)
@@ -159,10 +169,24 @@ def nearest_figure(
         if side in drawn
     ]
     ring: dict[str, Any] = {"linestyle": "none", "marker": "o"}
-    handles.append(entry("nearest", markersize=9, markerfacecolor="none", **ring))
+    handles.append(
+        entry(
+            "nearest",
+            markersize=9,
+            markerfacecolor="none",
+            **ring,
+        )
+    )
     if not rows["trusted"].all():
         label = "cut off, or not resolved"
-        handles.append(entry(label, markersize=4.5, markerfacecolor="white", **ring))
+        handles.append(
+            entry(
+                label,
+                markersize=4.5,
+                markerfacecolor="white",
+                **ring,
+            )
+        )
     if lines:
         handles.append(entry("nearest in the publication", linestyle="--"))
     legend_below(figure, handles)
@@ -181,7 +205,12 @@ def _nearest_line(
 ) -> None:
     if rows.empty:
         return
-    axes.plot(rows["at"], rows["distance"], color=colour, linewidth=1.0)
+    axes.plot(
+        rows["at"],
+        rows["distance"],
+        color=colour,
+        linewidth=1.0,
+    )
     for trusted, part in rows.groupby("trusted"):
         axes.plot(
             part["at"],
@@ -192,7 +221,10 @@ def _nearest_line(
             markersize=4.5,
         )
     # those that are trusted first
-    best = rows.sort_values(["trusted", "distance"], ascending=[False, True]).iloc[0]
+    best = rows.sort_values(
+        ["trusted", "distance"],
+        ascending=[False, True],
+    ).iloc[0]
     place = best["at"], best["distance"]
     axes.plot(
         *place,
@@ -226,7 +258,11 @@ def calibration_figure(
     `runs` has the columns of the parameters, round, score (NaN: diverged); `optimum`
     parameter, value. `score` are the terms of the score.
     """
-    figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
+    figure, panels = panel_figure(
+        len(optimum),
+        per_row=len(optimum),
+        panel_in=2.0,
+    )
     diverged = runs[runs["score"].isna()]
     # later rounds are darker
     rounds = sorted(set(runs["round"]))
@@ -234,7 +270,12 @@ def calibration_figure(
     for axes, name, value in zip(
         panels, optimum["parameter"], optimum["value"], strict=True
     ):
-        axes.axvline(value, color=RUN_COLOURS[1], linestyle="--", label="optimum")
+        axes.axvline(
+            value,
+            color=RUN_COLOURS[1],
+            linestyle="--",
+            label="optimum",
+        )
         for number, shade in zip(rounds, shades, strict=True):
             rows = runs[runs["round"] == number].dropna(subset="score")
             axes.plot(
@@ -247,8 +288,17 @@ def calibration_figure(
                 label=f"round {number}",
             )
         if len(diverged):
-            worst = np.full(len(diverged), runs["score"].max())
-            axes.plot(diverged[name], worst, "x", color=MUTED_COLOUR, label="diverged")
+            worst = np.full(
+                len(diverged),
+                runs["score"].max(),
+            )
+            axes.plot(
+                diverged[name],
+                worst,
+                "x",
+                color=MUTED_COLOUR,
+                label="diverged",
+            )
         axes.set_xlabel(parameter_label(name))
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
     figure.legend(

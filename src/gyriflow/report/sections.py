@@ -54,7 +54,12 @@ def draw_outline(
     normal, right, up = PLANES[plane]
     axis = np.eye(3)[normal]
     cut = polydata(surface).slice(normal=axis, origin=axis * at)
-    segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
+    segments = np.asarray(cut.points)[
+        cut.lines.reshape(
+            -1,
+            3,
+        )[:, 1:]
+    ][..., [right, up]]
     style: dict[str, Any] = {"colors": colour, "linewidths": thickness}
     axes.add_collection(LineCollection(list(segments), capstyle="round", **style))
 
@@ -66,7 +71,10 @@ def _coronal_section(
 ) -> pv.PolyData:
     """Cut linear elements at the median y of their nodes: a polygon per element, with
     fields at its points."""
-    body = pv.UnstructuredGrid({pv.CellType.TETRA: np.asarray(tets)}, positions)
+    body = pv.UnstructuredGrid(
+        {pv.CellType.TETRA: np.asarray(tets)},
+        positions,
+    )
     for name, values in fields.items():
         body.point_data[name] = values
     middle = (0.0, float(np.median(positions[:, 1])), 0.0)
@@ -94,15 +102,30 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
         "tangential growth\nin a step",
         "normals",
     )
-    for row, week in zip(rows, (min(weeks), max(weeks)), strict=True):
+    for row, week in zip(
+        rows,
+        (min(weeks), max(weeks)),
+        strict=True,
+    ):
         fields = dict(weeks[week])
-        section = _coronal_section(fields.pop("positions"), tets[:, :4], fields)
+        section = _coronal_section(
+            fields.pop("positions"),
+            tets[:, :4],
+            fields,
+        )
         points, values = np.asarray(section.points)[:, [0, 2]], section.point_data
         polygons = [points[face] for face in section.irregular_faces]
         style: dict[str, Any] = {"linewidths": 0.05}
-        for axes, (name, top) in zip(row, scales.items(), strict=False):
+        for axes, (name, top) in zip(
+            row,
+            scales.items(),
+            strict=False,
+        ):
             means = [values[name][face].mean() for face in section.irregular_faces]
-            colours: dict[str, Any] = {"cmap": "YlGnBu", "norm": Normalize(0, top)}
+            colours: dict[str, Any] = {
+                "cmap": "YlGnBu",
+                "norm": Normalize(0, top),
+            }
             filled = PolyCollection(
                 polygons, array=np.array(means), edgecolors="black", **colours, **style
             )
@@ -125,7 +148,11 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
         left, bottom = points.min(axis=0) - ARROW_MM
         right, top = points.max(axis=0) + ARROW_MM
         for axes in row:
-            axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+            axes.set(
+                xlim=(left, right),
+                ylim=(bottom, top),
+                aspect="equal",
+            )
             axes.set_axis_off()
         _label_row(row[0], week_label(week))
     for axes, title in zip(rows[0], titles, strict=True):
@@ -140,8 +167,18 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
 
 def _label_row(axes: Axes, text: str) -> None:
     """Write upwards at the left of the first panel of a row."""
-    style: dict[str, Any] = {"rotation": 90, "ha": "right", "va": "center"}
-    axes.text(-0.02, 0.5, text, transform=axes.transAxes, **style)
+    style: dict[str, Any] = {
+        "rotation": 90,
+        "ha": "right",
+        "va": "center",
+    }
+    axes.text(
+        -0.02,
+        0.5,
+        text,
+        transform=axes.transAxes,
+        **style,
+    )
 
 
 def _aligned(
@@ -161,7 +198,10 @@ def _aligned(
         if brain.is_simulated:
             aligned = runs.setdefault(brain.row, {})
             if brain.column in last:
-                aligned[brain.column] = align(brain.surface, last[brain.column])
+                aligned[brain.column] = align(
+                    brain.surface,
+                    last[brain.column],
+                )
     return last, name, runs
 
 
@@ -196,7 +236,11 @@ def outlines_figure(grid: Grid) -> Figure:
     panels = figure.subplots(
         len(tall), len(weeks), squeeze=False, gridspec_kw={"height_ratios": tall}
     )
-    for row, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
+    for row, (plane, (normal, right, up)) in zip(
+        panels,
+        PLANES.items(),
+        strict=True,
+    ):
         centre = (low[right] + high[right]) / 2
         # a sagittal plane in the middle would only show the fissure
         part = 0.75 if plane == "sagittal" else 0.5
@@ -220,10 +264,28 @@ def outlines_figure(grid: Grid) -> Figure:
     foot = panels[-1, 0]
     start, bottom = foot.get_xlim()[0] + 2, low[PLANES["sagittal"][2]]
     ends = [start, start + SCALE_BAR_MM]
-    foot.plot(ends, [bottom] * 2, color="black", linewidth=2, clip_on=False)
-    foot.text(start, bottom - 1, f"{SCALE_BAR_MM:g} mm", va="top", fontsize=7)
+    foot.plot(
+        ends,
+        [bottom] * 2,
+        color="black",
+        linewidth=2,
+        clip_on=False,
+    )
+    foot.text(
+        start,
+        bottom - 1,
+        f"{SCALE_BAR_MM:g} mm",
+        va="top",
+        fontsize=7,
+    )
     add_letters(panels[:, 0])
     named = {**colours, observed_name: OBSERVED_COLOUR}
-    handles = [entry(label, colour) for label, colour in named.items()]
+    handles = [
+        entry(
+            label,
+            colour,
+        )
+        for label, colour in named.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure

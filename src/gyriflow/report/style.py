@@ -88,7 +88,14 @@ def panel_figure(
     figure = Figure(
         figsize=(width_in, foot_in + panel_in * lines), layout="constrained"
     )
-    panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
+    panels = list(
+        figure.subplots(
+            lines,
+            columns,
+            squeeze=False,
+            **grid,
+        ).flat
+    )
     for spare in panels[count:]:
         spare.remove()
     add_letters(panels[:count])
@@ -126,13 +133,30 @@ def wrap(text: str, letters: int) -> str:
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with columns run and subject, with simulations named by
     `run_names`."""
-    pairs = list(zip(table["run"], table["subject"], strict=True))
+    pairs = list(
+        zip(
+            table["run"],
+            table["subject"],
+            strict=True,
+        )
+    )
     simulated = [pair for pair in dict.fromkeys(pairs) if pair[0] != OBSERVED]
     names = dict(zip(simulated, run_names(simulated), strict=True))
-    return table.assign(run=[names.get(pair, pair[0]) for pair in pairs])
+    return table.assign(
+        run=[
+            names.get(
+                pair,
+                pair[0],
+            )
+            for pair in pairs
+        ]
+    )
 
 
-def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
+def run_colours(
+    present: Iterable[str],
+    runs: Sequence[str] = (),
+) -> dict[str, Any]:
     """Return a colour for each simulated run that is present: distinct ones, or a
     sequential scale for many runs.
 
@@ -143,7 +167,13 @@ def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, A
     names = [name for name in dict.fromkeys([*runs, *present]) if name != OBSERVED]
     colours: Sequence[Any] = RUN_COLOURS
     if len(names) > len(RUN_COLOURS):
-        shades = mpl.colormaps["viridis"](np.linspace(0, 0.92, len(names)))
+        shades = mpl.colormaps["viridis"](
+            np.linspace(
+                0,
+                0.92,
+                len(names),
+            )
+        )
         colours = [tuple(shade) for shade in shades]
     by_name = zip(names, colours, strict=False)
     return {name: colour for name, colour in by_name if name in present}
@@ -153,10 +183,18 @@ def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
     """Label the horizontal axis as gestational weeks with whole weeks as ticks."""
     values = list(weeks)
     axes.set_xlabel("gestational age (GW)")
-    whole = mpl.ticker.MaxNLocator(8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1)
+    whole = mpl.ticker.MaxNLocator(
+        8,
+        integer=True,
+        steps=[1, 2, 5, 10],
+        min_n_ticks=1,
+    )
     axes.xaxis.set_major_locator(whole)
     # a single week is in the middle of the axis
-    margin = max(0.04 * np.ptp(values), (1.08 - np.ptp(values)) / 2)
+    margin = max(
+        0.04 * np.ptp(values),
+        (1.08 - np.ptp(values)) / 2,
+    )
     axes.set_xlim(min(values) - margin, max(values) + margin)
 
 
@@ -174,7 +212,12 @@ def from_zero(axes: Axes) -> None:
 
 def entry(label: str, colour: Any = MUTED_COLOUR, **style: Any) -> Line2D:
     """Return a legend entry."""
-    return Line2D([], [], label=label, **{"color": colour} | style)
+    return Line2D(
+        [],
+        [],
+        label=label,
+        **{"color": colour} | style,
+    )
 
 
 def star(label: str, colour: Any = OBSERVED_COLOUR, **style: Any) -> Line2D:
@@ -185,7 +228,14 @@ def star(label: str, colour: Any = OBSERVED_COLOUR, **style: Any) -> Line2D:
 
 def run_entries(colours: Mapping[str, Any]) -> list[Artist]:
     """Return the legend entries of runs."""
-    return [entry(run, colour, marker="o") for run, colour in colours.items()]
+    return [
+        entry(
+            run,
+            colour,
+            marker="o",
+        )
+        for run, colour in colours.items()
+    ]
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
@@ -197,7 +247,10 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     # a letter of the legend is about 0.065 in wide, the line before it and the gap
     # behind 0.5 in
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)
-    columns = max(1, min(len(handles), int(figure.get_figwidth() / longest)))
+    columns = max(
+        1,
+        min(len(handles), int(figure.get_figwidth() / longest)),
+    )
     lines = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.15 * (lines - 1))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)

@@ -84,8 +84,20 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
         columns[run] = pd.Series(_flatten(values), dtype=object)
     texts = pd.DataFrame(columns).map(_text)
     # absent, zero and no count as equal
-    is_off = texts.isin(["–", "0", "no"]).all(axis=1)
-    differs = texts.ne(texts.iloc[:, 0], axis=0).any(axis=1) & ~is_off
+    is_off = texts.isin(
+        [
+            "–",
+            "0",
+            "no",
+        ]
+    ).all(axis=1)
+    differs = (
+        texts.ne(
+            texts.iloc[:, 0],
+            axis=0,
+        ).any(axis=1)
+        & ~is_off
+    )
     names = list(texts.index[differs])
     names += [name for name in COMMON_PARAMETERS if not differs.get(name, True)]
     return texts.loc[names].rename(index=parameter_label).rename_axis("parameter")
@@ -111,7 +123,10 @@ def resolution_over_steps(
     through = steps["elements_through_cortex"].fillna(0.0)
     error, first_week = math.nan, math.nan
     if has_layers:
-        error = round(element_error(order, through.iloc[0])[0], 1)
+        error = round(
+            element_error(order, through.iloc[0])[0],
+            1,
+        )
         too_coarse = [is_too_coarse(order, elements) for elements in through]
         first_week = float(steps.loc[too_coarse, "week"].min())
     return {
@@ -142,11 +157,26 @@ def resources(jobs: pd.DataFrame) -> pd.DataFrame:
     )
     totals = dict.fromkeys(("jobs", "hours", "core_hours"), "sum")
     totals["memory_MiB"] = "max"
-    stages = each.groupby(["rule", "run"], sort=False, as_index=False).agg(totals)
+    stages = each.groupby(
+        ["rule", "run"],
+        sort=False,
+        as_index=False,
+    ).agg(totals)
     stages = stages.rename(columns={"rule": "stage"})
     stages = stages.sort_values("core_hours", ascending=False, kind="stable")
-    whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(totals)}])
-    return pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
+    whole = pd.DataFrame(
+        [
+            {
+                "stage": "all",
+                "run": "",
+                **stages.agg(totals),
+            }
+        ]
+    )
+    return pd.concat(
+        [stages, whole],
+        ignore_index=True,
+    ).astype({"jobs": int})
 
 
 def atlas_ages(ages: pd.DataFrame) -> pd.DataFrame:
@@ -239,7 +269,11 @@ def html_table(table: pd.DataFrame) -> Markup:
     texts = flat.map(lambda value: _text(value, 4))
     rows = []
     values = flat.to_numpy(dtype=object)
-    for row, words in zip(values, texts.to_numpy(), strict=True):
+    for row, words in zip(
+        values,
+        texts.to_numpy(),
+        strict=True,
+    ):
         cells = zip(flat, row, words, strict=True)
         rows.append([(_kind(*cell), cell[-1]) for cell in cells])
     return Markup(_TABLE.render(heads=list(flat), rows=rows))
@@ -252,7 +286,13 @@ def _kind(
 ) -> str:
     """Return the CSS class of a cell."""
     is_number = isinstance(value, int | float | np.number)
-    if (is_number and not isinstance(value, bool)) or NUMBER.fullmatch(text):
+    if (
+        is_number
+        and not isinstance(
+            value,
+            bool,
+        )
+    ) or NUMBER.fullmatch(text):
         return "number"
     if isinstance(text, Markup):
         return "composed"
@@ -262,13 +302,25 @@ def _kind(
     return "wide" if len(text) > _SENTENCE else "whole" if len(text) <= _WORD else ""
 
 
-def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
+def _flatten(
+    values: Mapping[str, object],
+    prefix: str = "",
+) -> dict[str, object]:
     flat: dict[str, object] = {}
     for name, value in values.items():
         key = f"{prefix}{name}"
         if not isinstance(value, Mapping):
             flat[key] = value
-        elif value and all(str(week).replace(".", "", 1).isdigit() for week in value):
+        elif value and all(
+            str(week)
+            .replace(
+                ".",
+                "",
+                1,
+            )
+            .isdigit()
+            for week in value
+        ):
             ends = min(value, key=float), max(value, key=float)
             texts = [f"{_text(value[week], 4)} at {week} GW" for week in ends]
             flat[key] = " to ".join(texts)
@@ -284,7 +336,15 @@ def _text(value: object, digits: int = 6) -> str:
         case float() | np.floating():
             number, _, power = f"{value:.{digits}g}".partition("e")
             raised = f"·10{str(int(power)).translate(_RAISED)}" if power else ""
-            return "–" if np.isnan(value) else number.replace("-", "−") + raised
+            return (
+                "–"
+                if np.isnan(value)
+                else number.replace(
+                    "-",
+                    "−",
+                )
+                + raised
+            )
         case None:
             return "–"
         case Markup():

@@ -100,7 +100,13 @@ def surfaces_view(
             "frames": drawn,
         }
         groups.append(group)
-    maps = [_drawn_map(name, scale) for name, scale in scales.items()]
+    maps = [
+        _drawn_map(
+            name,
+            scale,
+        )
+        for name, scale in scales.items()
+    ]
     return {
         "low": low.tolist(),
         "size": box[1],
@@ -139,7 +145,10 @@ def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
                 found=count,
                 expected=f"{len(start)} vertices",
             )
-        maps["displacement_mm"] = np.linalg.norm(mesh.vertices - start, axis=1)
+        maps["displacement_mm"] = np.linalg.norm(
+            mesh.vertices - start,
+            axis=1,
+        )
     return list(frames)
 
 
@@ -153,7 +162,10 @@ def _thin_out(
     that maps and positions of other weeks can be indexed by the kept vertices.
     """
     if len(mesh.vertices) <= vertices:
-        return np.arange(len(mesh.vertices)), np.asarray(mesh.faces, dtype=np.int64)
+        return np.arange(len(mesh.vertices)), np.asarray(
+            mesh.faces,
+            dtype=np.int64,
+        )
     share = 1 - vertices / len(mesh.vertices)
     coarse = polydata(mesh).decimate_pro(share, preserve_topology=True)
     _, vertices_kept = cKDTree(mesh.vertices).query(coarse.points)
@@ -172,7 +184,11 @@ def _frame(
         bottom, top = scales[name].get_clim()
         heights = np.asarray(vertex_values, dtype=float)[vertices_kept] - bottom
         levels = np.round(heights / (top - bottom) * _VALUE_LEVELS)
-        levels = np.where(np.isnan(levels), _UNKNOWN, levels.clip(0, _VALUE_LEVELS))
+        levels = np.where(
+            np.isnan(levels),
+            _UNKNOWN,
+            levels.clip(0, _VALUE_LEVELS),
+        )
         values[name] = _text(levels, "u1")
     places = np.round((mesh.vertices[vertices_kept] - low) / size * _POSITION_LEVELS)
     return {"week": week, "positions": _text(places, "<u2"), "values": values}

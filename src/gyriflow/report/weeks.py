@@ -93,7 +93,11 @@ def _weeks_chart(
     """Draw layers over the weeks, the first at the back, in a panel for each title;
     `layout` of `panel_figure`."""
     figure, panels = panel_figure(len(titles), **layout)
-    for axes, (panel, title) in zip(panels, titles.items(), strict=True):
+    for axes, (panel, title) in zip(
+        panels,
+        titles.items(),
+        strict=True,
+    ):
         for layer in layers:
             rows = layer.rows[layer.rows["panel"] == panel].sort_values("week")
             if isinstance(layer.value, tuple):
@@ -103,7 +107,11 @@ def _weeks_chart(
                 )
                 axes.fill_between(weeks_at, low, high, linewidth=0, **layer.style)
             elif len(rows):
-                axes.plot(rows["week"], rows[layer.value], **layer.style)
+                axes.plot(
+                    rows["week"],
+                    rows[layer.value],
+                    **layer.style,
+                )
             if "trusted" in rows and not rows["trusted"].all():
                 doubtful = rows[~rows["trusted"]]
                 style = {**layer.style, "markerfacecolor": "white", "linestyle": ""}
@@ -113,7 +121,10 @@ def _weeks_chart(
     return figure, dict(zip(titles, panels, strict=True))
 
 
-def _run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
+def _run_lines(
+    rows: pd.DataFrame,
+    colours: Mapping[str, Any],
+) -> list[Layer]:
     """Return the line of each run."""
     layers = []
     for run, colour in colours.items():
@@ -134,7 +145,12 @@ def _observed_marks(
     """Return observed brains in their `shades`, else `colour`; scans of a subject are
     joined and have its marker."""
     layers = []
-    people = rows["subject"].map(lambda brain: subjects.get(brain, ""))
+    people = rows["subject"].map(
+        lambda brain: subjects.get(
+            brain,
+            "",
+        )
+    )
     for person, scans in rows.groupby(people, sort=False):
         if person and len(set(scans["week"])) > 1:
             layers.append(Layer(scans.assign(trusted=True), JOINED))
@@ -146,13 +162,21 @@ def _observed_marks(
             "zorder": 3,
             **style,
         }
-        colours = scans["subject"].map(lambda brain: shades.get(brain, colour))
+        colours = scans["subject"].map(
+            lambda brain: shades.get(
+                brain,
+                colour,
+            )
+        )
         for shade, part in scans.groupby(colours, sort=False):
             layers.append(Layer(part, {"color": shade, **look}))
     return layers
 
 
-def _subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
+def _subject_markers(
+    rows: pd.DataFrame,
+    subjects: Mapping[str, str],
+) -> dict[str, str]:
     """Return the marker of each subject with observed brains; none if there are more
     subjects than markers."""
     brains = rows.loc[rows["run"] == OBSERVED, "subject"]
@@ -164,7 +188,14 @@ def _subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[st
 
 def _subject_entries(markers: Mapping[str, str]) -> list[Artist]:
     """Return the legend entries of subjects."""
-    return [star(name, marker=mark, markersize=5) for name, mark in markers.items()]
+    return [
+        star(
+            name,
+            marker=mark,
+            markersize=5,
+        )
+        for name, mark in markers.items()
+    ]
 
 
 def _group_shades(
@@ -173,7 +204,13 @@ def _group_shades(
     """Return the colour of each brain in a group, not used by any run, and the legend
     entries."""
     free = [colour for colour in RUN_COLOURS if colour not in colours.values()]
-    group_colours = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
+    group_colours = dict(
+        zip(
+            dict.fromkeys(groups.values()),
+            free,
+            strict=False,
+        )
+    )
     entries: list[Artist] = []
     for name, colour in group_colours.items():
         entries.append(star(name, colour, marker="o", markersize=5))
@@ -185,7 +222,10 @@ def _group_shades(
     return shades, entries
 
 
-def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str, str]]:
+def _shown(
+    metrics: pd.DataFrame,
+    where: Shown,
+) -> tuple[pd.DataFrame, dict[str, str]]:
     """Return the rows of metrics that are shown in a chart, and its titles; InputError
     if there are none."""
     present, expected = set(metrics["metric"]), metrics_shown(where)
@@ -209,14 +249,29 @@ def _atlas_lines(
     """
     keys = zip(atlases["hemisphere"], atlases["metric"], strict=True)
     # of no panel, of hemispheres or metrics that the chart does not show
-    rows = atlases.assign(panel=[panels.get(key, "") for key in keys])
-    is_near = rows["week"].between(weeks.min() - NEAR_GW, weeks.max() + NEAR_GW)
+    rows = atlases.assign(
+        panel=[
+            panels.get(
+                key,
+                "",
+            )
+            for key in keys
+        ]
+    )
+    is_near = rows["week"].between(
+        weeks.min() - NEAR_GW,
+        weeks.max() + NEAR_GW,
+    )
     rows = rows[(rows["panel"] != "") & is_near]
     layers = []
     entries: list[Artist] = []
     # an atlas may have no brain of these weeks
     parts = rows.groupby("atlas", sort=False)
-    for (name, part), line in zip(parts, cycle(LINES[1:]), strict=False):
+    for (name, part), line in zip(
+        parts,
+        cycle(LINES[1:]),
+        strict=False,
+    ):
         style = {"color": MUTED_COLOUR, "linewidth": 0.8, "linestyle": line}
         style["zorder"] = 1.5
         layers.append(Layer(part, style))
@@ -249,7 +304,13 @@ def metrics_figure(
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     rows, titles = _shown(whole, Shown.CHART)
-    colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == OBSERVED]
+    colours, observed = (
+        run_colours(
+            whole["run"],
+            runs,
+        ),
+        rows[rows["run"] == OBSERVED],
+    )
     markers = _subject_markers(whole, subjects)
     shades, groups_shown = _group_shades(groups, colours)
     look = {"subjects": subjects, "markers": markers, "shades": shades}
@@ -335,16 +396,37 @@ def norms_figure(
     line = {"color": MUTED_COLOUR, "linewidth": 1.3, "zorder": 4}
     thin = line | {"linewidth": 0.6}
     layers = [
-        Layer(norm, {"color": NEUTRAL_COLOUR, "alpha": 0.6}, ("q05", "q95")),
+        Layer(
+            norm,
+            {"color": NEUTRAL_COLOUR, "alpha": 0.6},
+            ("q05", "q95"),
+        ),
         Layer(norm, {"color": NEUTRAL_COLOUR}, ("q25", "q75")),
         Layer(norm, line, "expected"),
-        *(Layer(norm, thin, quantile) for quantile in ("q05", "q25", "q75", "q95")),
+        *(
+            Layer(
+                norm,
+                thin,
+                quantile,
+            )
+            for quantile in ("q05", "q25", "q75", "q95")
+        ),
         *_run_lines(rows, colours),
         *_observed_marks(own, **look, **small),
         *_observed_marks(others, RUN_COLOURS[-1], **look),
     ]
-    figure, _ = _weeks_chart(titles, layers, rows["week"], panel_in=2.0, foot_in=0.6)
-    entries = [*run_entries(colours), star(norm_name), *_subject_entries(markers)]
+    figure, _ = _weeks_chart(
+        titles,
+        layers,
+        rows["week"],
+        panel_in=2.0,
+        foot_in=0.6,
+    )
+    entries = [
+        *run_entries(colours),
+        star(norm_name),
+        *_subject_entries(markers),
+    ]
     entries += groups_shown
     if not others["subject"].isin(shades).all():
         entries.append(star("other observed brains", RUN_COLOURS[-1]))
@@ -374,12 +456,24 @@ def regions_chart(
     """
     rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
     colours = region_colours(rows["region"])
-    lines = dict(zip(run_colours(rows["run"]), LINES, strict=False))
+    lines = dict(
+        zip(
+            run_colours(rows["run"]),
+            LINES,
+            strict=False,
+        )
+    )
     # both sides together
     keys = ["panel", "subject", "run", "week", "region"]
-    rows = rows.groupby(keys, sort=False)["value"].agg(["sum", "mean"])
+    rows = rows.groupby(
+        keys,
+        sort=False,
+    )["value"].agg(["sum", "mean"])
     rows = rows.reset_index()
-    rows["value"] = rows["sum"].where(rows["panel"] == "area", rows["mean"])
+    rows["value"] = rows["sum"].where(
+        rows["panel"] == "area",
+        rows["mean"],
+    )
     is_shown = (asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)
     indices = runs_by_name(asymmetry[is_shown]).assign(panel="asymmetry")
     indices = indices.rename(columns={"asymmetry_index": "value"})
@@ -388,11 +482,17 @@ def regions_chart(
         titles["area"] += ", both sides"
     titles["asymmetry"] = "asymmetry of area, 2 (L − R)/(L + R)"
     layers = []
-    for (region, run), part in rows.groupby(["region", "run"], sort=False):
+    for (region, run), part in rows.groupby(
+        ["region", "run"],
+        sort=False,
+    ):
         if run == OBSERVED:
             layers += _observed_marks(part, colours[str(region)], markersize=6)
         elif run in lines:
-            style = {"color": colours[str(region)], "linestyle": lines[str(run)]}
+            style = {
+                "color": colours[str(region)],
+                "linestyle": lines[str(run)],
+            }
             layers.append(Layer(part, style | {"linewidth": 1.1}))
     figure, panels = _weeks_chart(titles, layers, rows["week"], foot_in=0.75)
     panels.pop("asymmetry").axhline(0, color=MUTED_COLOUR, linewidth=0.8)
@@ -401,14 +501,31 @@ def regions_chart(
         if not METRICS[name].is_signed and METRICS[name].unit != "1":
             from_zero(axes)
     squares = {"marker": "s", "linestyle": "none"}
-    entries = [entry(name, colour, **squares) for name, colour in colours.items()]
-    entries += [entry(run, linestyle=line) for run, line in lines.items()]
+    entries = [
+        entry(
+            name,
+            colour,
+            **squares,
+        )
+        for name, colour in colours.items()
+    ]
+    entries += [
+        entry(
+            run,
+            linestyle=line,
+        )
+        for run, line in lines.items()
+    ]
     legend_below(figure, [*entries, star(observed_name, MUTED_COLOUR)])
     return figure
 
 
 @styled
-def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+def prediction_figure(
+    prediction: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+) -> Figure:
     """Draw correlation with and distance from the observed brain by weeks after the
     start: a row of panels per start.
 
@@ -428,7 +545,13 @@ def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
     rows = rows.drop_duplicates(["start", "line", "horizon"])
     shades = run_colours([*colours, *line])
     others = [name for name in shades if name not in colours]
-    simpler = dict(zip(others, reversed(shades.values()), strict=False))
+    simpler = dict(
+        zip(
+            others,
+            reversed(shades.values()),
+            strict=False,
+        )
+    )
     layers = []
     for name, colour in simpler.items():
         style = {"color": colour, "marker": ".", "linestyle": "--"}
@@ -441,11 +564,22 @@ def prediction_figure(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> 
         for name, title in columns.items():
             panel = f"{start}: {title}"
             titles[panel] = panel
-            parts.append(own.assign(panel=panel, value=own[name]))
+            parts.append(
+                own.assign(
+                    panel=panel,
+                    value=own[name],
+                )
+            )
     rows = pd.concat(parts)
     figure, panels = _weeks_chart(
         titles,
-        [Layer(rows[rows["line"] == name], style) for name, style in layers],
+        [
+            Layer(
+                rows[rows["line"] == name],
+                style,
+            )
+            for name, style in layers
+        ],
         rows["week"],
         per_row=2,
         panel_in=2.4,
@@ -479,13 +613,30 @@ def displacement_figure(
     of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
     named = runs_by_name(displacement)
-    moved = published["displacement"] if published else {"from_weeks": [], "rows": []}
+    moved = (
+        published["displacement"]
+        if published
+        else {
+            "from_weeks": [],
+            "rows": [],
+        }
+    )
     colours = run_colours(named["run"], runs)
     weeks = np.array(moved["from_weeks"], dtype=float)
     tables = [named[named["nodes"] == "all"]]
     styles: dict[str, dict[str, Any]] = {}
-    for row, marker in zip(moved["rows"], cycle(PUBLISHED_MARKERS), strict=False):
-        table = pd.DataFrame({**row, "from_week": weeks, "to_week": weeks + 1})
+    for row, marker in zip(
+        moved["rows"],
+        cycle(PUBLISHED_MARKERS),
+        strict=False,
+    ):
+        table = pd.DataFrame(
+            {
+                **row,
+                "from_week": weeks,
+                "to_week": weeks + 1,
+            }
+        )
         tables.append(table.assign(run=row["source"]))
         style = {"color": MUTED_COLOUR, "marker": marker, "linestyle": "--"}
         styles[row["source"]] = style
@@ -500,7 +651,11 @@ def displacement_figure(
         "mean_mm": "mean displacement, all nodes",
     }
     rows = pd.concat(
-        rows.assign(panel=column, value=rows[column] / duration) for column in titles
+        rows.assign(
+            panel=column,
+            value=rows[column] / duration,
+        )
+        for column in titles
     )
     layers = []
     for run, style in styles.items():
@@ -513,7 +668,13 @@ def displacement_figure(
         axes.set_xlabel("gestational age (GW), middle of the interval")
         from_zero(axes)
     entries = run_entries(colours)
-    entries += [entry(source, **style) for source, style in sources.items()]
+    entries += [
+        entry(
+            source,
+            **style,
+        )
+        for source, style in sources.items()
+    ]
     legend_below(figure, entries)
     return figure
 
@@ -522,7 +683,11 @@ paper_displacement_figure = displacement_figure
 """Of a rule with the values of the paper as `published`."""
 
 
-def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
+def _band_rows(
+    spectra: pd.DataFrame,
+    bands: Sequence[int],
+    proxy: str,
+) -> pd.DataFrame:
     """Return the rows of some bands in the spectra of a proxy, with a column
     `trusted`."""
     trusted = (
@@ -539,7 +704,11 @@ def _beyond_the_modes(
     *,
     rotation: float = 0.0,
 ) -> None:
-    style: dict[str, Any] = {"ha": "center", "va": "center", "rotation": rotation}
+    style: dict[str, Any] = {
+        "ha": "center",
+        "va": "center",
+        "rotation": rotation,
+    }
     axes.text(x, 0.5, "beyond the\nmodes computed", transform=transform, **style)
 
 
@@ -595,7 +764,13 @@ def spectra_figure(
     )
     sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
     shades, groups_shown = _group_shades(groups, colours)
-    cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}
+    cells = {
+        f"{side}{band}": (side, band)
+        for side, band in product(
+            sides,
+            bands,
+        )
+    }
     curves = {
         (side, f"spangy_B{band}_relative_power"): cell
         for cell, (side, band) in cells.items()
@@ -655,9 +830,21 @@ def influence_spectra(
     `observed` those of observed brains, whose run is so named. `values` are by run the
     varied parameters with their values, in the order of the sweep.
     """
-    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
+    labels = dict(
+        zip(
+            values,
+            value_labels(list(values.values())),
+            strict=True,
+        )
+    )
     simulated = [table.assign(run=table["run"].map(labels)) for table in members]
-    shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
+    shades = mpl.colormaps["YlGnBu"](
+        np.linspace(
+            0.3,
+            0.95,
+            max(len(labels), 2),
+        )
+    )
     colours = dict(zip(labels.values(), shades, strict=False))
     spectra = pd.concat([*simulated, *observed])
     by_proxy = {
@@ -674,7 +861,11 @@ def influence_spectra(
     )
     width = 0.8 / len(colours)
     cells = product(PROXIES, sides)
-    for axes, (proxy, hemisphere) in zip(panels, cells, strict=True):
+    for axes, (proxy, hemisphere) in zip(
+        panels,
+        cells,
+        strict=True,
+    ):
         side = by_proxy[proxy][by_proxy[proxy]["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
             run_rows = side[side["run"] == run]
@@ -707,7 +898,13 @@ def influence_spectra(
     hatched = Patch(
         facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=UNTRUSTED
     )
-    bars_shown = [Patch(color=colour, label=run) for run, colour in colours.items()]
+    bars_shown = [
+        Patch(
+            color=colour,
+            label=run,
+        )
+        for run, colour in colours.items()
+    ]
     marks_shown = _spectra_entries(rows, observed_name, hatched)
     legend_below(figure, [*bars_shown, *marks_shown])
     return figure
