@@ -1,4 +1,5 @@
-"""Show messages of one kind together: the first three, and how many more there are."""
+"""Count things, and show messages of one kind together: the first three, and how many
+more there are."""
 
 import re
 from collections.abc import Iterable
@@ -47,6 +48,11 @@ def grouped(messages: Iterable[tuple[str, str]]) -> list[tuple[str, int]]:
         if count > 0:
             lines.append((f"… and {count} more like these", count))
     return lines
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things, such as "1 scan" or "2 scans"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _kind_of(name: str, message: str) -> str:

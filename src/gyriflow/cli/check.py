@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from textwrap import fill
 
 from ..errors import InputError
-from ..grouping import grouped
+from ..grouping import counted, grouped
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
 from ..running.cost import (
@@ -43,7 +43,6 @@ from ..settings.varying import Varying, curve_at
 from ..study.atlases import known_checksums, used_atlases
 from ..study.brains import label_scheme
 from ..study.loading import load
-from ..study.paths import PLAN
 from ..study.resolve import resolve
 from ..study.study import Study
 from .init import commented_scans
@@ -111,11 +110,9 @@ def check_study(
     for line in _export_problems(study):
         yield f"  warning: no export: {line}", 0
     if n_downloads:
-        files = "files are" if n_downloads > 1 else "file is"
-        yield f"  {n_downloads} atlas {files} missing and will be downloaded", 0
+        yield f"  {counted(n_downloads, 'missing atlas file')} will be downloaded", 0
     if not refusals:
         yield "  input files: no problem found", 0
-        yield f"  plan: tables in {directory / PLAN}, written before the first step", 0
         options = ["--cores", str(cores), *stages]
         yield from work_of(path, directory, cores, options, study)
     for line in commented_scans(path):
@@ -155,7 +152,7 @@ def work_of(
     if not planned:
         yield "nothing to run: everything is up to date", False
         return
-    yield f"to run: {len(planned)} step{'s' if len(planned) > 1 else ''}", False
+    yield f"to run: {counted(len(planned), 'step')}", False
     rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
     for job, reason in planned:
         for words in GENERAL_REASONS:
@@ -199,16 +196,14 @@ def plan(
 
 
 def _contents(study: Study) -> str:
-    n_brains = len(study.brains)
-    parts = [f"{n_brains} brain{'s' if n_brains > 1 else ''}"]
-    n_simulations = len(study.run_simulations)
-    if n_simulations:
+    parts = [counted(len(study.brains), "brain")]
+    if study.run_simulations:
         runs = list(study.config.runs)
         names = runs[:NAMED_RUNS]
         if len(runs) > NAMED_RUNS:
             names.append("…")
-        plural = "s" if n_simulations > 1 else ""
-        parts.append(f"{n_simulations} simulation{plural} ({', '.join(names)})")
+        simulations = counted(len(study.run_simulations), "simulation")
+        parts.append(f"{simulations} ({', '.join(names)})")
     else:
         parts.append("measured only")
     for name, members in study.by_sweep.items():
@@ -375,12 +370,12 @@ def _needs(
     for job in foldings:
         simulation = study.simulations[job.wildcards["run"], job.wildcards["brain"]]
         needs.append(simulation_needs(simulation, study.config.mesh))
-    for line in _path_lines(jobs, seconds, study, directory):
+    for line in _path_lines(jobs, seconds, study):
         yield line, False
     work_s = sum(seconds)
     longest_s = max(end_s(number) for number in range(len(jobs)))
     duration = format_duration(max(work_s / cores, longest_s))
-    on = f"{cores} core{'s' if cores > 1 else ''} without other load"
+    on = f"{counted(cores, 'core')} without other load"
     within = f"within a factor of {ERROR_FACTOR:g}"
     yield f"time    about {duration} on {on}, {within}", False
     share = ""
@@ -395,8 +390,7 @@ def _needs(
     # the memory of this machine does not limit a cluster
     is_here = cores <= available_cores()
     available_mib = available_memory_mib() if is_here else None
-    users = "the foldings that run" if foldings else "each step that runs"
-    yield _fits("memory", memory_mib, available_mib, users)
+    yield _fits("memory", memory_mib, available_mib)
     disk_mib = sum(need.disk_mib for need in needs) + len(jobs)
     folder = directory.absolute()
     while not folder.is_dir():
@@ -408,10 +402,8 @@ def _path_lines(
     jobs: Sequence[Job],
     seconds: Sequence[float],
     study: Study,
-    directory: Path,
 ) -> Iterator[str]:
-    """Yield a line on each path of an atlas: whether it is kept or has to be made, and
-    where it will be kept."""
+    """Yield a line on each path of an atlas: whether it is kept or has to be made."""
     for job, path_s in zip(jobs, seconds, strict=True):
         brain = job.wildcards.get("brain", "")
         used = study.atlases.get(brain)
@@ -419,32 +411,19 @@ def _path_lines(
         if job.rule == "kept_path":
             yield f"path of {name}: kept from an earlier study"
         elif job.rule == "atlas_path":
-            line = f"path of {name}: has to be made, about {format_duration(path_s)}"
-            yield f"{line}; {_reuse(used.settings.folder, directory)}" if used else line
-
-
-def _reuse(folder: str | None, directory: Path) -> str:
-    """Return which studies find a path again that is kept in the folder of an atlas'
-    files, None for the default."""
-    if folder is None or Path(folder).is_relative_to(directory.resolve()):
-        return (
-            "kept for this study only; with a folder of the atlas outside it (--folder,"
-            " atlas.folder), for others too"
-        )
-    return f"once for all studies with the folder {folder}"
+            yield f"path of {name}: has to be made, about {format_duration(path_s)}"
 
 
 def _fits(
     name: str,
     mib: float,
     available_mib: float | None,
-    users: str = "",
 ) -> tuple[str, bool]:
     """Return a line on a need, and whether it exceeds what is available; None: that of
-    a cluster, for its `users`."""
+    a cluster."""
     line = f"{name:<7} about {_gib(mib)}"
     if available_mib is None:
-        return f"{line}, for {users} at the same time", False
+        return f"{line}, for the steps that run at the same time", False
     line += f"; {_gib(available_mib)} available"
     if mib > available_mib:
         return f"{line}, which is too little", True

@@ -15,7 +15,7 @@ import click
 from click.core import ParameterSource
 
 from ..errors import GyriflowError, InputError
-from ..grouping import grouped
+from ..grouping import counted, grouped
 from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED, shipped_atlases
 
@@ -69,14 +69,13 @@ class InputPath(click.Path):
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            if Path(value).exists():
-                # it is of the wrong kind, which click says
-                raise
-            # settings take a while to import
-            from ..settings.base import hint_for_missing
+            # or it is of the wrong kind, which click says
+            if not Path(value).exists():
+                # settings take a while to import
+                from ..settings.base import hint_for_missing
 
-            message = f"{error.message}{hint_for_missing(Path(value))}"
-            raise click.BadParameter(message, ctx=ctx, param=param) from None
+                error.message += hint_for_missing(Path(value))
+            raise
 
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -193,7 +192,8 @@ def _command_name() -> str:
     run = SHIPPED / "run"
     if shutil.which("gyriflow") or not run.is_file():
         return "gyriflow"
-    return f"./{os.path.relpath(run)} gyriflow"
+    path = os.path.relpath(run)
+    return f"./{path} gyriflow" if path == run.name else f"{path} gyriflow"
 
 
 def _print_version(
@@ -374,9 +374,7 @@ def check(
             click.echo(line)
             problems += bad
     if problems:
-        click.echo(
-            f"gyriflow: {problems} problem{'s' if problems > 1 else ''} found", err=True
-        )
+        click.echo(f"gyriflow: {counted(problems, 'problem')} found", err=True)
         sys.exit(2)
 
 
@@ -759,8 +757,7 @@ def bids(
         )
         if level == "participant" and not dry_run:
             store_options(options, selection)
-        scans = f"{len(brains)} scan{'s' if len(brains) > 1 else ''}"
-        click.echo(f"{scans} to measure: {', '.join(brains)}")
+        click.echo(f"{counted(len(brains), 'scan')} to measure: {', '.join(brains)}")
         if folded:
             click.echo(f"{len(folded)} of them to fold: {', '.join(folded)}")
         elif selection["fold"]:

@@ -35,6 +35,7 @@ from ..geometry.poses import CONVENTIONS
 from ..geometry.triangles import (
     TriangleMesh,
     convex_hull,
+    flipped,
     is_closed,
     signed_volume,
     transformed,
@@ -248,12 +249,7 @@ def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:
 
 
 def _outward(mesh: TriangleMesh) -> TriangleMesh:
-    if signed_volume(mesh) >= 0:
-        return mesh
-    return TriangleMesh(
-        mesh.vertices,
-        mesh.faces[:, ::-1],
-    )
+    return flipped(mesh) if signed_volume(mesh) < 0 else mesh
 
 
 def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:

@@ -708,13 +708,22 @@ def _require_some_content(path: Path) -> None:
 def fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
     """Yield what `scheme_fits` returns for a label volume; nothing for a surface.
 
-    InputError if it cannot be read, or if the surface is not a whole brain.
+    InputError if it cannot be read, has no label, or is not a whole brain.
     """
     (file,) = files
-    if is_volume(file):
-        yield _scheme_fits_of(file)
-    else:
+    if not is_volume(file):
         _require_brain(Path(file))
+        return
+    labels = read_label_volume(file, cropped=True).labels
+    if not labels.any():
+        raise InputError(
+            "has no label",
+            path=file,
+            found="0 in all voxels",
+            expected="tissue labels above 0",
+            remedy="The segmentation has failed, or this is another file.",
+        )
+    yield scheme_fits(labels)
 
 
 def _require_brain(path: Path, *, whole: bool = False) -> None:
@@ -969,21 +978,6 @@ def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
     ]
 
 
-def _scheme_fits_of(file: str | Path) -> dict[str, str]:
-    """Return what `scheme_fits` does for a label volume; InputError if it cannot be
-    read or has no label."""
-    labels = read_label_volume(file, cropped=True).labels
-    if not labels.any():
-        raise InputError(
-            "has no label",
-            path=file,
-            found="0 in all voxels",
-            expected="tissue labels above 0",
-            remedy="The segmentation has failed, or this is another file.",
-        )
-    return scheme_fits(labels)
-
-
 def _recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     """Return the entry of a label volume: its id, file and scheme; InputError if the
     scheme is unknown or unclear."""
@@ -996,7 +990,7 @@ def _recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
         "labels": str(file),
         "scheme": UNSET,
     }
-    fits = _scheme_fits_of(file)
+    (fits,) = fits_of_file([str(file)])
     if scheme:
         require_fit(fits, scheme, file, fits.get(scheme) or "labels that are not in it")
     brain = FoundBrain(file, entry, fits=fits)

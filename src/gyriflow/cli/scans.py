@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from tabulate import tabulate
 
-from ..grouping import Kinds
+from ..grouping import Kinds, counted
 from ..io.files import read_table
 from .recognition import UNSET, FoundScans
 
@@ -62,7 +62,7 @@ def scan_lines(scans: Iterable[ScanRow]) -> Iterator[str]:
         if counts[verdict]:
             unusable.append(f"{counts[verdict]} {text}")
             n_usable -= counts[verdict]
-    total = f"{len(rows)} scan{'s' if len(rows) != 1 else ''}"
+    total = counted(len(rows), "scan")
     if unusable:
         yield f"{n_usable} of {total}; {', '.join(unusable)}"
     else:

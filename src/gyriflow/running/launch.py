@@ -41,7 +41,7 @@ from ..io.locks import UNLOCKABLE, lock_file
 from ..io.yaml_files import read_keys
 from ..messages import Message, study_messages
 from ..settings.base import did_you_mean
-from ..shipped import SHIPPED
+from ..shipped import DEMO, SHIPPED
 from ..study.study import Study
 from .manifest import Job
 from .planning import (
@@ -128,10 +128,6 @@ study is finished without them."""
 MIN_FREE_BYTES = 4 * 2**20
 """If less disk space is left, a run that failed without an exit code of its own has
 filled the disk."""
-MIN_FREE_FILES = 16
-"""Likewise, for systems that can hold a fixed number of files."""
-SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
-"""Where Snakemake finds a workflow by itself."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: dict[Path, IO[str]] = {}
 """The locks that this process holds, by their working directories."""
@@ -242,21 +238,11 @@ def _check_configfiles(files: Sequence[Path], directory: Path) -> None:
 
 
 def _what_runs(directory: Path) -> str:
-    """Return which configuration runs if a call names none, and which workflow in the
-    current folder does not."""
-    demo, own = SHIPPED / "config" / "config.yaml", directory / "config" / "config.yaml"
-    is_demo = not own.is_file() or own.samefile(demo)
-    text = (
-        "without --configfile, this runs"
-        f" {f'the demo, {demo}' if is_demo else own.resolve()}"
-    )
-    for name in SNAKEFILES:
-        if Path(name).is_file() and not Path(name).samefile(SHIPPED / "Snakefile"):
-            return (
-                f"{text}, and not {Path(name).absolute()}: that workflow needs its own"
-                " snakemake"
-            )
-    return text
+    """Return which configuration runs if a call names none."""
+    own = directory / "config" / "config.yaml"
+    is_demo = not own.is_file() or own.samefile(DEMO)
+    config = f"the demo, {DEMO}" if is_demo else own.resolve()
+    return f"without --configfile, this runs {config}"
 
 
 def _check_options(unknown: Sequence[str], usage: str) -> None:
@@ -408,15 +394,8 @@ def _exit_code(
 def full_disk(directory: Path) -> str:
     """Return that the disk of a directory is full and what to do, or "" if it is
     not."""
-    if shutil.disk_usage(directory).free < MIN_FREE_BYTES:
-        return "the disk is full. Free some space"
-    if sys.platform == "win32":
-        return ""
-    system = os.statvfs(directory)
-    # systems without a fixed number of files have 0 of 0
-    if system.f_files and system.f_favail < MIN_FREE_FILES:
-        return "the disk can hold no more files (inodes). Delete some files"
-    return ""
+    is_full = shutil.disk_usage(directory).free < MIN_FREE_BYTES
+    return "the disk is full. Free some space" if is_full else ""
 
 
 def _set_cache(directory: Path) -> None:

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..errors import StorageError
-from ..grouping import Kinds
+from ..grouping import Kinds, counted
 from ..io.files import write_json
 from ..messages import (
     KILLED,
@@ -299,7 +299,7 @@ class RunDisplay:
                     "ranks": ranks,
                     "memory_mib": mib,
                 }:
-                    on = f"{ranks} rank{'s' if ranks > 1 else ''}"
+                    on = counted(ranks, "rank")
                     size = (
                         f"       {job.name}: {elements} elements, {on}, about {mib} MiB"
                     )

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..grouping import grouped
+from ..grouping import counted, grouped
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import PROBLEM, Key, KeyProblem, problems_in
@@ -76,7 +76,7 @@ def load(
     if left_out and not keep_going:
         hints.append("use --keep-going to leave out rows that cannot be used")
     count = len(problems) + len(causes)
-    lines = [f"the configuration has {count} problem{'s' if count > 1 else ''}:"]
+    lines = [f"the configuration has {counted(count, 'problem')}:"]
     texts = [*(("", problem) for problem in problems), *causes]
     lines += [text for text, _ in grouped(texts)]
     raise InputError("\n  ".join(lines) + "\n" + "; ".join(hints))

@@ -129,10 +129,10 @@ def forecast(monkeypatch, tmp_path):
         lambda folding, _: Needs(5 * 3600, 1024 * memory_gib[folding.run], 0),
     )
 
-    def lines(jobs, cores=1, study=None, reason=REASON):
+    def lines(jobs, cores=1, reason=REASON):
         reasoned = [(job, reason) for job in jobs]
         monkeypatch.setattr(checking, "plan", lambda *_, **__: reasoned)
-        study = study or resolve(load(STUDY))
+        study = resolve(load(STUDY))
         found = work_of(tmp_path / "x.yaml", tmp_path / "study", cores, [], study)
         return [line for line, _ in found]
 
@@ -176,25 +176,6 @@ def test_a_path_of_an_atlas_is_kept_or_made_for_some_time(forecast):
     assert Facts("path of x22", "has to be made", "4.0 h") in found
     found = forecast([KEPT_PATH, TARGETS])
     assert Facts("path of x22", "kept") in found
-
-
-# by default in the working directory, which need not be the current folder
-@pytest.mark.parametrize("folder", [None, "study/atlas", "atlas"])
-def test_a_path_is_said_to_be_of_this_study_or_of_all_with_its_folder(
-    forecast, tmp_path, folder
-):
-    atlas = {"name": "spina-bifida", "series": "unoperated", "weeks": [22, 23, 24]}
-    if folder:
-        atlas["folder"] = str(tmp_path / folder)
-    folding = {"preset": "expected", "end_week": 24}
-    study = {"brains": STUDY["brains"][:1], "start": "a"}
-    found = forecast(
-        [planned("atlas_path", brain="spina-bifida-unoperated-22")],
-        study=resolve(load(study | {"folding": folding, "atlas": atlas})),
-    )
-    (line,) = [line for line in found if line.startswith("path of")]
-    fact = tmp_path / "atlas" if folder == "atlas" else "this study only"
-    assert line == Facts("path of spina-bifida", fact)
 
 
 @pytest.mark.parametrize(
