@@ -1,6 +1,5 @@
 """Messages of steps are data, with the brain and run of their log."""
 
-import json
 import os
 from pathlib import Path
 
@@ -28,24 +27,6 @@ def write(log, *messages):
     Path(log).parent.mkdir(parents=True, exist_ok=True)
     for message in messages:
         write_message(log, message)
-
-
-@pytest.mark.parametrize(
-    ("log", "brain", "run"),
-    [
-        # a brain may have any name
-        ("results/brains/results/logs/pial.log", "results", ""),
-        ("elsewhere/pial.log", "", ""),
-    ],
-)
-def test_a_message_names_the_step_brain_and_run_of_its_log(study, log, brain, run):
-    write(log, Message("error", "no brain", found="a leg"))
-    assert read_messages(log) == [
-        Message("error", "no brain", "pial", brain, run, found="a leg")
-    ]
-    # what is not known is left out
-    line = json.loads(messages_file(log).read_text())
-    assert set(line) - {"brain", "run"} == {"level", "text", "step", "found"}
 
 
 def test_messages_are_distinct_and_apart_from_progress(study):

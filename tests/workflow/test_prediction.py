@@ -84,8 +84,8 @@ def test_a_brain_is_predicted_and_compared_with_the_observed_ones_of_any_week(wo
     steps = pd.read_csv(workflow.directory / run / "folding/steps.csv")
     assert steps["to_path_mm"].iloc[-1] < 0.3
     # the observed brain deviates as it is larger or smaller
-    is_area = (deviation["hemisphere"] == "whole") & (deviation["metric"] == "log_area")
-    areas = deviation[is_area].set_index("week")["value"]
+    whole = deviation.query("hemisphere == 'whole' and metric == 'log_area'")
+    areas = whole.set_index("week")["value"]
     errors = prediction.query("model == 'run'").set_index("week")["area_difference"]
     for week, value in areas.items():
         assert value == pytest.approx(-np.log1p(errors[week]), abs=0.05)

@@ -30,7 +30,6 @@ STUDY = {
         "curvature_radius_mm": 6,
         "spangy_modes": 60,
         "template": "p22",
-        "white_surfaces": "all",
         "regions": {
             "p22": {
                 "labels": "regions.nii.gz",
@@ -93,20 +92,15 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
             right = found[clear] == np.where(y[clear] > 0, 1, 2)
             assert right.mean() > 0.97, (labels, side)
 
-    regions, metrics, asymmetry, change = (
+    regions, metrics, change = (
         pd.read_csv(results / "study" / f"{name}.csv")
-        for name in ("regions", "metrics", "asymmetry", "change")
+        for name in ("regions", "metrics", "change")
     )
     keys = ["subject", "run", "week", "hemisphere"]
     areas = regions[regions["metric"] == "area"].groupby(keys)["value"].sum()
     whole = metrics[metrics["metric"] == "area"].set_index(keys)["value"]
     # the regions cover the hemispheres but for what is near the cut
     assert ((areas / whole.reindex(areas.index)).between(0.93, 1.0001)).all()
-    area = asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(NAMES)]
-    # 2 regions of 2 measured brains and of the run at 2 weeks; phantoms are nearly
-    # symmetric
-    assert len(area) == 8
-    assert area["asymmetry_index"].abs().max() < 0.1
     grown = change[(change["metric"] == "area") & (change["region"] == "front")]
     assert set(grown["run"]) == {"observed", "reference"}
     assert (grown["change"] > 0).all()
@@ -120,9 +114,4 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
         maps = read_vertex_maps(results / where / "left.template.shape.gii")
         assert len(maps["thickness_mm"]) == len(template.vertices)
         assert np.median(maps["template_distance_mm"]) < 0.5
-        own = read_vertex_maps(results / where / "left.shape.gii")["sulcal_depth_mm"]
-        assert maps["sulcal_depth_mm"].mean() == pytest.approx(own.mean(), rel=0.2)
-    white = metrics[metrics["metric"] == "white_area"].set_index(keys)["value"]
-    assert len(white) == 2 * 3
-    assert (white / whole.reindex(white.index)).between(0.6, 0.95).all()
     assert (results / "export" / "metrics_wide.tsv").is_file()

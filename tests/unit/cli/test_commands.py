@@ -206,7 +206,7 @@ def test_a_quick_prediction_is_coarse_and_finds_files_from_the_working_directory
 ):
     monkeypatch.chdir(ATLAS.parent)
     place = ("--atlas", f"{ATLAS.name}/atlas.yaml", "--folder", ATLAS.name)
-    predicted("--week", "22", "--until", "24", "--quick", *place)
+    predicted("--week", "25", "--until", "32", "--quick", *place)
     monkeypatch.chdir(tmp_path)
     section, study = configured(tmp_path)
     named = section["atlas"]["name"], section["atlas"]["folder"]
@@ -215,20 +215,10 @@ def test_a_quick_prediction_is_coarse_and_finds_files_from_the_working_directory
         assert all(Path(file).is_file() for file in brain.files)
     assert study.run_simulations[0].settings.step_s == 7 * 86400
     assert study.config.mesh.order == 1
+    # every third week up to the end
+    assert study.config.atlas[0].weeks == (25, 28, 31, 34)
     # a path of the atlas has a quarter as many nodes on the surface
     assert study.config.growth.path_edge_mm == 2 * GrowthSettings().path_edge_mm
-
-
-@pytest.mark.parametrize(
-    ("end", "option", "weeks"),
-    [("32", "--quick", [25, 28, 31, 34]), ("30", "--force", range(25, 35))],
-)
-def test_a_quick_prediction_uses_every_third_week_up_to_its_end(
-    predicted, tmp_path, end, option, weeks
-):
-    asked = ("--week", "25", "--until", end, "--atlas", "spina-bifida")
-    predicted(*asked, option)
-    assert configured(tmp_path)[1].config.atlas[0].weeks == tuple(weeks)
 
 
 @pytest.fixture

@@ -76,9 +76,7 @@ def test_files_are_read_again_whose_content_name_settings_or_code_are_others(
     assert len(calls) == 7
 
 
-@pytest.mark.parametrize(
-    "content", ["", "{", "[]", '{"result": {"values": 1, "x": 2}}']
-)
+@pytest.mark.parametrize("content", ["{", "[]", '{"result": {"x": 2}}'])
 def test_a_damaged_result_is_made_again(scans, own_cache, content):
     found = readings(words_in, scans)
     paths = sorted((own_cache / "readings").iterdir())
