@@ -69,13 +69,13 @@ class InputPath(click.Path):
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            # or it is of the wrong kind, which click says
-            if not Path(value).exists():
-                # settings take a while to import
-                from ..settings.base import hint_for_missing
+            if Path(value).exists():
+                # it is of the wrong kind, which click says
+                raise
+            # settings take a while to import
+            from ..settings.base import hint_for_missing
 
-                error.message += hint_for_missing(Path(value))
-            raise
+            self.fail(f"{error.message}{hint_for_missing(Path(value))}", param, ctx)
 
 
 FOLDER = click.Path(file_okay=False, path_type=Path)

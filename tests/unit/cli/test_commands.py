@@ -176,7 +176,8 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(
     brains = study.config.brains
     assert [brain.week for brain in brains] == [22.4, 22, 23, 24, 25]
     (simulation,) = study.run_simulations
-    assert (simulation.brain, simulation.shapes) == (FOUND, "atlas")
+    growth = simulation.settings.growth
+    assert (simulation.brain, growth.shapes) == (FOUND, "atlas")
     later = [brain.id for brain in brains[1:]]
     assert list(study.chains[FOUND, "atlas"].later) == later
     call = f"--configfile {path} --cores 3 --directory {tmp_path} all export"
