@@ -164,7 +164,7 @@ if study.run_simulations:
         params:
             **drawn_by("measures", "tables"),
             starts=[start.id for start in study.starts],
-            gates=CONFIG.mesh.gates,
+            gates=CONFIG.mesh.model_dump(include={"max_surface_distance_mm"}),
             observed_name=observed_name(BRAINS.values()),
         script:
             "../scripts/figures.py"

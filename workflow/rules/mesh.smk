@@ -1,5 +1,8 @@
 # Tetrahedral meshes of start brains.
 
+# limits on their quality
+GATES = {"max_surface_distance_mm"}
+
 
 rule tetrahedralise:
     input:
@@ -10,8 +13,8 @@ rule tetrahedralise:
     resources:
         mem_mb=6000,
     params:
-        settings=CONFIG.mesh.model_dump(exclude={"max_surface_distance_mm"}),
-        gates=CONFIG.mesh.gates,
+        settings=CONFIG.mesh.model_dump(exclude=GATES),
+        gates=CONFIG.mesh.model_dump(include=GATES),
         # not an output, so that it stays if the rule fails
         refused=f"{BRAIN}/mesh/refused",
     script:
@@ -23,8 +26,8 @@ use rule tetrahedralise as path_mesh with:
     output:
         **PATH_MESH,
     params:
-        settings=CONFIG.growth.path_mesh.model_dump(exclude={"max_surface_distance_mm"}),
-        gates=CONFIG.growth.path_mesh.gates,
+        settings=CONFIG.growth.path_mesh.model_dump(exclude=GATES),
+        gates=CONFIG.growth.path_mesh.model_dump(include=GATES),
         refused=f"{BRAIN}/path/refused",
 
 

@@ -4,7 +4,7 @@ from gyriflow.settings.terms import run_names
 
 # the configuration; brains of atlases and of the table of participants are already among its brains
 USED_SETTINGS = CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
-DESCRIBED = ("id", "week", "population", "source", "synthetic", "covariates")
+DESCRIBED = ("id", "week", "population", "source", "covariates")
 PAGE = f"{workflow.basedir}/workflow/report/page"
 # all figures and tables of the report and of the pages of brains
 ON_PAGES = []
@@ -19,6 +19,7 @@ def descriptions(brains):
     for brain in brains:
         facts = {name: getattr(brain, name) for name in DESCRIBED}
         used = study.atlases.get(brain.id)
+        facts["synthetic"] = brain.shape is not None
         described.append(facts | {"licence": used.atlas.licence.name if used else None})
     return described
 

@@ -816,10 +816,10 @@ def _owners(file: Path, tables: ScanTables) -> list[str]:
     beginnings = {_scan_of(file)}
     for number in range(1, len(parts) + 1):
         beginnings.add("_".join(parts[:number]))
-    in_name = [subject for subject in tables.ids if subject in beginnings]
+    in_name = [subject for subject in tables.rows if subject in beginnings]
     if in_name:
         return [max(in_name, key=len)]
-    return [subject for subject in tables.ids if subject in file.parts[:-1]]
+    return [subject for subject in tables.rows if subject in file.parts[:-1]]
 
 
 def _similar_ids(
@@ -831,11 +831,11 @@ def _similar_ids(
     """Return which ids tables have instead of a subject's, or "": those that differ in
     zeros or case, otherwise, if asked, the first five."""
     found = []
-    for name, place in tables.ids.items():
+    for name, rows in tables.rows.items():
         if _plain_id(name) == _plain_id(subject):
-            found.append(f"{name} ({place})")
-    if not found and or_first and tables.ids:
-        found = [*list(tables.ids)[:5], "…"]
+            found.append(f"{name} ({rows[-1].place})")
+    if not found and or_first and tables.rows:
+        found = [*list(tables.rows)[:5], "…"]
     if not found:
         return ""
     return (

@@ -111,10 +111,6 @@ class BrainConfig(Settings):
         return next(name for name in SOURCES if self.is_set(name))
 
     @property
-    def synthetic(self) -> bool:
-        return self.shape is not None
-
-    @property
     def sides(self) -> tuple[Side, ...]:
         return SIDES if self.side is None else (self.side,)
 

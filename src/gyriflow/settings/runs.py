@@ -151,15 +151,6 @@ def members_of(name: str, run: Run) -> dict[str, Variation]:
     return members
 
 
-def starts_of(
-    study_start: Start | None,
-    run: Run,
-    ids: Sequence[str],
-) -> list[str]:
-    """Return the ids of the brains that a run folds, in the order of `ids`."""
-    return chosen_starts(study_start if run.start is None else run.start, ids)
-
-
 def chosen_starts(start: Start | None, ids: Sequence[str]) -> list[str]:
     """Return the ids that a value of `start` means, in the order of all `ids`."""
     if start is None:

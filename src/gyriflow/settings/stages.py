@@ -48,11 +48,6 @@ class MeshSettings(Settings):
     """Largest 99th percentile of the distance between mesh and pial surface, in both
     directions. [mm]"""
 
-    @property
-    def gates(self) -> dict[str, float]:
-        """The limits on the quality of the mesh."""
-        return {"max_surface_distance_mm": self.max_surface_distance_mm}
-
 
 Modes = Annotated[LastBand | Annotated[int, Field(ge=2, le=20000)], FirstIf(str)]
 

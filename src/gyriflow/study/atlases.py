@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from string import Formatter
 from typing import Any
 
 from ..io.files import files_below
@@ -122,19 +121,9 @@ class UsedAtlas:
 def _copies(pattern: str, files: Iterable[Path]) -> dict[float, list[Path]]:
     """Return files by week: those whose path ends as a pattern does, from the last part
     with the week on."""
-    start = (
-        pattern.rfind(
-            "/",
-            0,
-            pattern.rindex("{week"),
-        )
-        + 1
-    )
-    name = ""
-    for text, field, *_ in Formatter().parse(pattern[start:]):
-        name += re.escape(text)
-        if field:
-            name += r"(\d+(?:\.\d+)?)"
+    folder = pattern[: pattern.rindex("{week")].rpartition("/")[0]
+    name = re.escape(pattern.removeprefix(f"{folder}/"))
+    name = re.sub(r"\\{week.*?\\}", r"(\\d+(?:\\.\\d+)?)", name)
     copies: dict[float, list[Path]] = {}
     for path in files:
         match = re.fullmatch(

@@ -15,6 +15,23 @@ from . import paths
 from .atlases import UsedAtlas, atlas_by_brain, known_checksums
 from .records import Brain, measured_files
 
+GIVEN = (
+    "id",
+    "week",
+    "subject",
+    "population",
+    "source",
+    "labels",
+    "scheme",
+    "affine_from",
+    "image",
+    "white_files",
+    "coordinates",
+    "shape",
+    "covariates",
+)
+"""Columns of a brain that are as in the configuration."""
+
 
 def plan_brains(
     config: Config,
@@ -56,7 +73,7 @@ def _brain(
         for side in settings.sides:
             white.append(patterns[f"{side}_surface"].format(**names))
             white_maps.append(patterns[f"{side}_maps"].format(**names))
-    files: dict[str, Any] = measured_files(
+    results: dict[str, Any] = measured_files(
         settings.sides,
         paths.SURFACE.format(**names),
         paths.METRICS_FOLDER.format(**names),
@@ -65,19 +82,10 @@ def _brain(
     thickness = paths.THICKNESS["measured"].format(**names) if has_thickness else None
     known = {path: checksums[path] for path in settings.files if path in checksums}
     return Brain(
-        id=settings.id,
+        **{name: getattr(settings, name) for name in GIVEN},
+        **results,
         run=OBSERVED,
-        week=settings.week,
-        subject=settings.subject,
-        population=settings.population,
-        source=settings.source,
-        labels=settings.labels,
-        scheme=settings.scheme,
-        affine_from=settings.affine_from,
-        image=settings.image,
-        white_files=settings.white_files,
-        coordinates=settings.coordinates,
-        shape=settings.shape,
+        files=tuple(settings.files),
         report=paths.PIAL["report"].format(**names),
         thickness=thickness,
         white=tuple(white),
@@ -86,10 +94,7 @@ def _brain(
         regions_of=None,
         group=None,
         atlas=atlas,
-        files=tuple(settings.files),
         checksums=known,
-        covariates=settings.covariates,
-        **files,
     )
 
 

@@ -25,9 +25,9 @@ from ..settings.runs import (
     Start,
     SweepSettings,
     changed,
+    chosen_starts,
     growing_groups,
     members_of,
-    starts_of,
     variants,
 )
 from ..settings.terms import OBSERVED
@@ -196,10 +196,11 @@ def _runs(config: Config) -> Problems:
     weeks = {brain.id: brain.week for brain in config.brains}
     for name, run in config.runs.items():
         problems: list[KeyProblem] = []
-        starts = starts_of(config.start, run, list(weeks))
-        for start in starts:
-            called = f"the week of the start brain {start}"
-            problems += value_problems(run, weeks[start], {}, called)
+        start = config.start if run.start is None else run.start
+        starts = chosen_starts(start, list(weeks))
+        for brain in starts:
+            called = f"the week of the start brain {brain}"
+            problems += value_problems(run, weeks[brain], {}, called)
         if not starts:
             # check the values at the end
             problems += value_problems(run, run.end_week - 1e-9, {}, "the start")

@@ -110,12 +110,13 @@ def _plain(value: Any) -> Any:
 def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:
     if raw is None:
         return [], []
-    if not isinstance(raw, list):
-        return _atlas(raw, folder, ("atlas",))
+    places: dict[Key, Any] = {("atlas",): raw}
+    if isinstance(raw, list):
+        places = {("atlas", number): section for number, section in enumerate(raw)}
     atlases: list[UsedAtlas] = []
     problems: list[str] = []
-    for number, section in enumerate(raw):
-        used, wrong = _atlas(section, folder, ("atlas", number))
+    for place, section in places.items():
+        used, wrong = _atlas(section, folder, place)
         atlases += used
         problems += wrong
     return atlases, problems
@@ -135,14 +136,7 @@ def _atlas(
     try:
         atlas = Atlas.model_validate(read_keys(settings.description))
     except InputError as error:
-        return [], [
-            str(
-                KeyProblem(
-                    str(error),
-                    (*place, "name"),
-                )
-            )
-        ]
+        return [], [str(KeyProblem(str(error), (*place, "name")))]
     except ValidationError as error:
         problems = problems_in(error, Atlas)
         return [], [f"{settings.description}: {problem}" for problem in problems]
@@ -156,19 +150,13 @@ def _atlas(
 def _lines(problems: list[KeyProblem]) -> list[str]:
     """Return the lines of problems, each once; those of the atlas are reported
     already."""
-    folding_problems = {problem for problem in problems if problem.key[0] == "folding"}
+    unique = dict.fromkeys(problems)
     lines = []
-    for problem in dict.fromkeys(problems):
+    for problem in unique:
         section, *inner = problem.key
+        in_folding = KeyProblem(problem.text, ("folding", *inner[1:]))
         # runs repeat the problems of folding
-        is_repeated = (
-            section == "runs"
-            and KeyProblem(
-                problem.text,
-                ("folding", *inner[1:]),
-            )
-            in folding_problems
-        )
+        is_repeated = section == "runs" and in_folding in unique
         if section != "atlas" and not is_repeated:
             lines.append(str(problem))
     return lines

@@ -285,11 +285,6 @@ class ScanTables:
     def _cells_of(self, kind: str) -> list[TableAge]:
         return [cell for cell in self.cells if cell.column.kind == kind]
 
-    @cached_property
-    def ids(self) -> dict[str, str]:
-        """The last row of each subject, for messages."""
-        return {subject: rows[-1].place for subject, rows in self.rows.items()}
-
     def sessions_of(self, subject: str) -> list[str]:
         """Return the sessions of a subject that any row names."""
         sessions = dict.fromkeys(row.session for row in self.rows.get(subject, ()))

@@ -13,8 +13,8 @@ from ..settings.runs import (
     ComparisonSettings,
     Run,
     changed,
+    chosen_starts,
     members_of,
-    starts_of,
     variants,
 )
 from . import paths
@@ -285,7 +285,7 @@ def _pairs(
     ids = [brain.id for brain in config.brains]
     starts = {}
     for name, run in config.runs.items():
-        names = starts_of(config.start, run, ids)
+        names = chosen_starts(config.start if run.start is None else run.start, ids)
         starts[name] = [brains[brain] for brain in names if brain in brains]
     for name, run in config.runs.items():
         for start in starts[name]:
@@ -345,11 +345,7 @@ def _simulations_of_runs(
         alone = pair.settings.model_copy(update={"ensemble": None})
         for name, variation in members_of(pair.run, pair.settings).items():
             chain = member_chain(
-                pair.run, start, pair.settings, variation, known.series, brains
-            )
-            chain = replace(
-                chain,
-                name=f"{chain.origin}.{name}",
+                name, pair.run, start, pair.settings, variation, known.series, brains
             )
             known.chains[start.id, chain.name] = chain
             member = _Pair(name, start, alone)

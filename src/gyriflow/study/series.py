@@ -45,15 +45,10 @@ class Series:
     def with_brain(self, brain: Brain) -> str:
         """Return the series that contains a brain (the preferred one of several), or
         ""."""
-        names = self._names_with(brain)
-        return min(
-            names,
-            key=lambda name: name != self.preferred,
-            default="",
-        )
-
-    def _names_with(self, brain: Brain) -> list[str]:
-        return [name for name, brains in self.brains.items() if brain in brains]
+        names = [name for name, brains in self.brains.items() if brain in brains]
+        if self.preferred in names:
+            return self.preferred
+        return next(iter(names), "")
 
     def for_sizes(self, brain: Brain) -> str | None:
         """Return the series whose curves a start brain follows: the preferred one, its
@@ -63,9 +58,9 @@ class Series:
         """
         if self.preferred is not None:
             return self.preferred if self.preferred in self.brains else None
-        own = self._names_with(brain)
+        own = self.with_brain(brain)
         if own:
-            return own[0]
+            return own
         others = [name for name in self.brains if not self._is_single_subject(name)]
         return others[0] if len(others) == 1 else None
 
@@ -161,7 +156,7 @@ def series_of(
     for name, members in growing_groups(configs, config.growth.brains):
         ids = [brain.id for brain in members]
         series[name] = tuple(brains[brain] for brain in ids)
-        if any(brain.labels or brain.synthetic for brain in members):
+        if any(brain.labels or brain.shape for brain in members):
             continue
         cause: str | None = "growth.matched_surfaces is false"
         if config.growth.matched_surfaces:
@@ -263,6 +258,7 @@ def chains_of(
 
 
 def member_chain(
+    member: str,
     run: str,
     start: Brain,
     settings: Run,
@@ -270,8 +266,8 @@ def member_chain(
     series: Series,
     brains: Sequence[Brain],
 ) -> Chain:
-    """Return the chain of a member of a run's ensemble. InputError if it is that of the
-    run."""
+    """Return the chain of a member of a run's ensemble. InputError if it would be that
+    of the run."""
     end = settings.end_week
     varied = (variation.registration_smoothing, variation.seed)
     if settings.growth.shapes == "self":
@@ -285,7 +281,11 @@ def member_chain(
                 remedy="Remove ensemble, or set growth.matched_surfaces to false.",
             )
         # ages of one series have the same error
-        return replace(chain, variation=replace(variation, age_shift_gw=0.0))
+        return replace(
+            chain,
+            name=f"self.{member}",
+            variation=replace(variation, age_shift_gw=0.0),
+        )
     atlases = series.from_other_populations(start, all_atlases=True)
     names = []
     for name in atlases:
@@ -313,6 +313,7 @@ def member_chain(
             series,
             varied,
         ),
+        name=f"atlas.{member}",
         further_weeks=tuple(sorted(further)),
         variation=replace(variation, age_shift_gw=shift),
     )
