@@ -42,10 +42,6 @@ class ShapeSettings(Settings):
     """Semi-axes along X, Y, Z, all the same for a sphere; the longest is at most twice
     the shortest. [mm]"""
 
-    @property
-    def kind(self) -> str:
-        return "sphere" if len(set(self.semi_axes_mm)) == 1 else "ellipsoid"
-
     def problems(self) -> Problems:
         shortest, longest = min(self.semi_axes_mm), max(self.semi_axes_mm)
         if longest > MAX_AXIS_RATIO * shortest:

@@ -104,14 +104,13 @@ def _groups(brains: Iterable[Brain]) -> dict[str, str]:
     That is the first covariate with 2 to `MAX_COLOURS` values and fewer values than
     subjects.
     """
-    by_covariate: dict[str, list[Brain]] = {}
+    brains = list(brains)
+    names: dict[str, None] = {}
     for brain in brains:
-        for name in brain.covariates:
-            by_covariate.setdefault(name, []).append(brain)
-    for name, with_value in by_covariate.items():
-        groups = {}
-        for brain in with_value:
-            groups[brain.id] = f"{name}: {brain.covariates[name]}"
+        names |= dict.fromkeys(brain.covariates)
+    for name in names:
+        with_value = [brain for brain in brains if name in brain.covariates]
+        groups = {brain.id: f"{name}: {brain.covariates[name]}" for brain in with_value}
         n_groups = len(set(groups.values()))
         n_subjects = len({brain.subject_name for brain in with_value})
         if 1 < n_groups <= MAX_COLOURS and n_groups < n_subjects:

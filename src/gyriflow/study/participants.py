@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -264,6 +263,9 @@ class ScanTables:
                 self.cells += row.ages
         kinds = {cell.column.kind for cell in self.cells}
         self.kind = "scan" if "scan" in kinds else "gestational"
+        # in columns that are not named as of gestational ages
+        others = [cell for cell in self._cells_of("other") if not is_missing(cell.text)]
+        self.other_ages = others
 
     @property
     def age_problem(self) -> str:
@@ -362,7 +364,7 @@ class ScanTables:
             # such as the type of an age
             doubtful = [age for age in others if OTHER_AGE.search(age.text)]
         elif present and not others:
-            doubtful = self._other_ages[:1]
+            doubtful = self.other_ages[:1]
         if doubtful:
             found = " and ".join(
                 map(
@@ -388,11 +390,6 @@ class ScanTables:
             age_of_scan,
             source=f"{age_of_scan.source} (not {ignored})",
         )
-
-    @cached_property
-    def _other_ages(self) -> list[TableAge]:
-        """The ages in columns that are not named as of gestational ages."""
-        return [cell for cell in self._cells_of("other") if not is_missing(cell.text)]
 
 
 def _is_in(file: Path | None, folder: Path) -> bool:
@@ -599,7 +596,9 @@ def _entry(
         if len(files) > limit:
             found = f"{len(files)}, {'; '.join(files)}"
             return {}, f"files: found {found}; expected {expected}"
-        values |= _file_keys(files)
+        kind = "labels" if is_volume(files[0]) else "pial"
+        keys = ("hemispheres.left", "hemispheres.right") if len(files) > 1 else (kind,)
+        values |= dict(zip(keys, files, strict=True))
     for column, text in values.items():
         if column not in BRAIN_KEYS:
             continue
@@ -623,14 +622,3 @@ def _entry(
     if not set(SOURCES) & set(entry):
         return entry, f"found no data; expected files, or one of {', '.join(PATHS)}"
     return entry, ""
-
-
-def _file_keys(files: list[str]) -> dict[str, str]:
-    first = files[0]
-    if len(files) == 2:
-        return {
-            "hemispheres.left": first,
-            "hemispheres.right": files[1],
-        }
-    key = "labels" if is_volume(first) else "pial"
-    return {key: first}

@@ -130,13 +130,13 @@ def observed_name(brains: Iterable[Brain]) -> str:
     known.
 
     Several populations are listed with their weeks. Brains of unknown population are
-    called "observed brain"; shapes are called by their kind if they share one.
+    called "observed brain".
     """
     weeks: dict[str, list[float]] = {}
-    shapes = set()
+    shapes = []
     for brain in brains:
         if brain.shape is not None:
-            shapes.add(brain.shape.kind)
+            shapes = ["simple shape"]
         else:
             name = brain.population or OBSERVED_BRAIN
             weeks.setdefault(name, []).append(brain.week)
@@ -146,11 +146,7 @@ def observed_name(brains: Iterable[Brain]) -> str:
         for name, own_weeks in weeks.items():
             ends = sorted({min(own_weeks), max(own_weeks)})
             names.append(f"{name} ({'-'.join(f'{week:g}' for week in ends)} GW)")
-    if len(shapes) == 1:
-        names.append(shapes.pop())
-    elif shapes:
-        names.append("simple shape")
-    return " or ".join(names) or OBSERVED_BRAIN
+    return " or ".join(names + shapes) or OBSERVED_BRAIN
 
 
 # simulations

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from ..errors import InputError
 from ..settings.folding import mapped_parameters, output_weeks
-from ..settings.growth import BEFORE_GW
+from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
 from ..settings.runs import (
     ComparisonSettings,
@@ -46,6 +46,17 @@ from .series import (
 from .study import Study, study_of
 
 Chains = dict[tuple[str, str], Chain]
+GROWN_TOWARDS: dict[Origin, tuple[str, str]] = {
+    "self": (
+        "the start's own growth series with label volumes or matched surfaces",
+        "Add later brains to its series (growth.brains), or grow by sizes or rates.",
+    ),
+    "atlas": (
+        "one series of another population with the same hemispheres",
+        "Add an atlas of these weeks, or name one of several series in growth.series.",
+    ),
+}
+"""Brains that a run grows towards, and the remedy where they are missing."""
 
 
 @dataclass(frozen=True)
@@ -202,15 +213,10 @@ def _links(
         files += chain.links
     template = brains.get(config.metrics.template or "")
     for brain in brains.values():
-        if brain.regions_of not in (None, brain.id):
-            files.append(
-                series.link(
-                    brains[str(brain.regions_of)],
-                    brain,
-                )
-            )
-        if template is not None and template is not brain:
-            files.append(series.link(template, brain))
+        source = brains.get(brain.regions_of or "")
+        for other in (source, template):
+            if other is not None and other is not brain:
+                files.append(series.link(other, brain))
     return [series.links[file] for file in files]
 
 
@@ -580,11 +586,12 @@ def _up_to_last_scan(
 ) -> Run:
     """Return a run that ends with the last scan if it follows the scans of one
     subject."""
-    if run.growth.shapes != "self" or start.subject is None:
-        return run
     scans = series.brains.get(series.with_brain(start), ())
+    follows_scans = run.growth.shapes == "self" and start.subject is not None
+    if not follows_scans or several_subjects(scans):
+        return run
     last = max((brain.week for brain in scans), default=start.week)
-    if several_subjects(scans) or last <= start.week:
+    if last <= start.week:
         return run
     return run.model_copy(update={"end_week": min(run.end_week, last)})
 
@@ -602,42 +609,33 @@ def _missing_brains(
     if origin is None:
         return None
     chain = chains[start.id, origin]
-    with_weeks = zip(chain.brains, chain.weeks, strict=True)
-    available = ", ".join(f"{brain} ({week:g} GW)" for brain, week in with_weeks)
     if origin == "self":
-        own_series = series.with_brain(start)
-        usable_series = [own_series] if own_series else []
+        usable_series = [series.with_brain(start)] if series.with_brain(start) else []
         # the start and a later brain
         is_complete = len(chain.brains) > 1
-        if own_series in series.unmatched:
-            available += f"; {series.unmatched[own_series]}"
-        expected = (
-            "the start's own growth series with label volumes or matched surfaces"
-        )
-        remedy = (
-            "Add later brains to its series (growth.brains), or grow by sizes or rates."
-        )
     else:
         usable_series = series.from_other_populations(start)
         # the start and two brains of the atlas, the first not long after the start
         has_growth = len(chain.brains) > 2
         is_complete = has_growth and start.week >= chain.weeks[1] - BEFORE_GW
-        expected = "one series of another population with the same hemispheres"
-        remedy = (
-            "Add an atlas of these weeks, or name one of several series in"
-            " growth.series."
-        )
     if is_complete and chain.weeks[-1] >= end:
         return None
     if not usable_series:
-        available = f"none; the growth series are {', '.join(series.brains)}"
+        found = f"none; the growth series are {', '.join(series.brains)}"
     elif len(usable_series) > 1:
-        available = f"several series: {', '.join(usable_series)}"
+        found = f"several series: {', '.join(usable_series)}"
+    else:
+        with_weeks = zip(chain.brains, chain.weeks, strict=True)
+        found = ", ".join(f"{brain} ({week:g} GW)" for brain, week in with_weeks)
+        unmatched = series.unmatched.get(usable_series[0])
+        if origin == "self" and unmatched:
+            found += f"; {unmatched}"
+    source, remedy = GROWN_TOWARDS[origin]
     return InputError(
         f"run {pair.run} needs later brains to grow {start.id} towards, up to"
         f" {end:g} GW",
-        found=available,
-        expected=f"brains of {expected}, from {start.week:g} to {end:g} GW",
+        found=found,
+        expected=f"brains of {source}, from {start.week:g} to {end:g} GW",
         remedy=remedy,
     )
 

@@ -191,16 +191,23 @@ class Study:
     def atlas_brains_near(self, simulation: Simulation, week: float) -> list[Brain]:
         """Return the brains of a prediction's atlas that may have the age of a week,
         those within `MAX_AGE_OFF_GW` of it or else the nearest."""
-        path = self.chains[simulation.brain, str(simulation.chain)].path
-        brains = [self.brains[name] for name in self.chains[str(path), PATH].brains]
-        near = [brain for brain in brains if abs(brain.week - week) <= MAX_AGE_OFF_GW]
+        chain = self.chains[simulation.brain, str(simulation.chain)]
+        path = self.chains[str(chain.path), PATH]
+        brains = [self.brains[name] for name in path.brains]
+        near = []
+        for brain in brains:
+            if abs(brain.week - week) <= MAX_AGE_OFF_GW:
+                near.append(brain)
         return near or [closest(brains, week)]
 
     def atlas_brain(self, simulation: Simulation) -> Brain:
         """Return the brain of a prediction's atlas that is closest in week to its
         end."""
-        later = self.chains[simulation.brain, "atlas"].later
-        return closest([self.brains[name] for name in later], simulation.weeks[-1])
+        chain = self.chains[simulation.brain, "atlas"]
+        return closest(
+            [self.brains[name] for name in chain.later],
+            simulation.weeks[-1],
+        )
 
     @cached_property
     def predictions(self) -> list[Simulation]:
@@ -254,10 +261,8 @@ class Study:
         They have the hemispheres of the first start brain. By default, if there are
         several populations, only the start brain's is used.
         """
-        starts = self.starts
-        if not self.config.runs:
-            # without runs, the first brain takes the place of the start brain
-            starts = list(self.brains.values())
+        # without runs, the first brain takes the place of the start brain
+        starts = self.starts if self.config.runs else list(self.brains.values())
         if not starts:
             return []
         start = starts[0]
@@ -290,10 +295,18 @@ class Study:
         """The ids of the scans of each subject that was scanned several times, in the
         order of weeks."""
         scans: dict[str, list[str]] = {}
-        for brain in sorted(self.brains.values(), key=attrgetter("week")):
+        by_week = sorted(
+            self.brains.values(),
+            key=attrgetter("week"),
+        )
+        for brain in by_week:
             if brain.subject is not None:
                 scans.setdefault(brain.subject, []).append(brain.id)
-        return {subject: ids for subject, ids in sorted(scans.items()) if len(ids) > 1}
+        several = {}
+        for subject in sorted(scans):
+            if len(scans[subject]) > 1:
+                several[subject] = scans[subject]
+        return several
 
     @property
     def filled(self) -> list[dict[str, Any]]:
@@ -458,6 +471,11 @@ def read_plan(folder: Path) -> Study:
     """Return the study whose plan is in a folder; InputError if there is none."""
     rows: dict[str, list[Any]] = {}
     for name, table in TABLES.items():
-        rows[name] = read_rows(folder / f"{name}.csv", table.kind)
+        rows[name] = read_rows(
+            folder / f"{name}.csv",
+            table.kind,
+        )
     # its paths are absolute, and files of an atlas may be missing
-    return study_of(Config.model_validate(read_keys(folder / "config.yaml")), rows)
+    plain = read_keys(folder / "config.yaml")
+    config = Config.model_validate(plain)
+    return study_of(config, rows)

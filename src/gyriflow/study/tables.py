@@ -31,7 +31,8 @@ def write_rows(
     adapter: TypeAdapter = TypeAdapter(kind)
     for row in rows:
         plain = adapter.dump_python(row, mode="json", exclude_unset=True)
-        table.writerow({name: _cell(value) for name, value in plain.items()})
+        cells = {name: _cell(value) for name, value in plain.items()}
+        table.writerow(cells)
     write_changed(path, text.getvalue())
 
 
