@@ -35,14 +35,17 @@ def positions(labels: Labels, affine: Floats) -> Floats:
     )
 
 
+def half_extents(labels: Labels, affine: Floats) -> list[float]:
+    """Return how far the cerebrum reaches from the centre along x, y and z, in mm."""
+    cerebrum = np.isin(labels, CEREBRUM)
+    return [np.abs(axis[cerebrum]).max() for axis in positions(labels, affine)]
+
+
 def without_callosum(labels: Labels, affine: Floats) -> Labels:
     """Return a brain whose hemispheres are joined at the thalami alone: agenesis of the
     corpus callosum."""
-    return apart(
-        labels,
-        affine,
-        above_mm=positions(labels, affine)[2][labels == DEEP_GREY].mean(),
-    )
+    thalami = positions(labels, affine)[2][labels == DEEP_GREY]
+    return apart(labels, affine, above_mm=thalami.mean())
 
 
 def apart(
@@ -60,16 +63,14 @@ def holoprosencephaly(labels: Labels, affine: Floats) -> Labels:
     corpus callosum."""
     x, y, z = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
-    a, b, c = (np.abs(axis[np.isin(labels, CEREBRUM)]).max() for axis in (x, y, z))
+    a, b, c = half_extents(labels, affine)
     radius = (x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2
     fused = (np.abs(x) < 6.0) & (y > 0.0) & (labels == CSF) & (radius < 0.72)
     made = np.where(fused, np.where(radius > 0.60, CORTEX, WHITE), made)
-    single = (x / (0.45 * a)) ** 2 + ((y - 2.0) / (0.45 * b)) ** 2 + (
-        (z - 2.0) / 7.0
-    ) ** 2 < 1.0
-    return np.where(
-        single & np.isin(made, (WHITE, VENTRICLES, CORTEX)), VENTRICLES, made
-    ).astype(np.int32)
+    across = (x / (0.45 * a)) ** 2 + ((y - 2.0) / (0.45 * b)) ** 2
+    single = across + ((z - 2.0) / 7.0) ** 2 < 1.0
+    inner = single & np.isin(made, (WHITE, VENTRICLES, CORTEX))
+    return np.where(inner, VENTRICLES, made).astype(np.int32)
 
 
 def warp(
@@ -83,31 +84,31 @@ def warp(
         @ (place.reshape(3, -1).T + CENTRE_MM - affine[:3, 3]).T
     )
     nearest = np.rint(index).astype(int)
-    inside = ((nearest >= 0) & (nearest < np.array(labels.shape)[:, None])).all(axis=0)
-    clipped = np.clip(nearest, 0, np.array(labels.shape)[:, None] - 1)
-    return (
-        np.where(inside, labels[tuple(clipped)], 0)
-        .reshape(labels.shape)
-        .astype(np.int32)
-    )
+    shape = np.array(labels.shape)[:, None]
+    inside = ((nearest >= 0) & (nearest < shape)).all(axis=0)
+    clipped = np.clip(nearest, 0, shape - 1)
+    moved = np.where(inside, labels[tuple(clipped)], 0)
+    return moved.reshape(labels.shape).astype(np.int32)
+
+
+def warp_across(
+    labels: Labels, affine: Floats, x_from: Callable[[Floats], Floats]
+) -> Labels:
+    """Return labels moved along x: `x_from` gives the x that each place's label has."""
+    return warp(labels, affine, lambda place: np.stack([x_from(place), *place[1:]]))
 
 
 def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
     """Return a brain whose middle is pushed to the right by `mm`, its outer sides in
     place: a shift of the midline."""
-    x, _, _ = positions(labels, affine)
-    half = np.abs(x[np.isin(labels, CEREBRUM)]).max()
+    half = half_extents(labels, affine)[0]
 
-    def came_from(place: Floats) -> Floats:
+    def x_from(place: Floats) -> Floats:
         x = place[0]
-        inside = np.abs(x) < half
-        right = x > mm
-        stretched = np.where(
-            right, (x - mm) * half / (half - mm), (x - mm) * half / (half + mm)
-        )
-        return np.stack([np.where(inside, stretched, x), place[1], place[2]])
+        width = np.where(x > mm, half - mm, half + mm)
+        return np.where(np.abs(x) < half, (x - mm) * half / width, x)
 
-    return warp(labels, affine, came_from)
+    return warp_across(labels, affine, x_from)
 
 
 def wide_hemisphere(
@@ -115,19 +116,14 @@ def wide_hemisphere(
 ) -> Labels:
     """Return a brain whose right hemisphere is wider by `factor`: hemimegalencephaly,
     or with a wide ventricle."""
-
-    def came_from(place: Floats) -> Floats:
-        return np.stack(
-            [np.where(place[0] > 0, place[0] / factor, place[0]), place[1], place[2]]
-        )
-
-    made = warp(labels, affine, came_from)
+    made = warp_across(
+        labels, affine, lambda place: place[0] / np.where(place[0] > 0, factor, 1.0)
+    )
     if ventricle:
         x, y, z = positions(made, affine)
-        a, b, c = (np.abs(axis[np.isin(made, CEREBRUM)]).max() for axis in (x, y, z))
-        fluid = (x / (0.3 * a) - 1.5) ** 2 + (y / (0.6 * b)) ** 2 + (
-            (z - 2.0) / (0.35 * c)
-        ) ** 2 < 1.0
+        a, b, c = half_extents(made, affine)
+        across = (x / (0.3 * a) - 1.5) ** 2 + (y / (0.6 * b)) ** 2
+        fluid = across + ((z - 2.0) / (0.35 * c)) ** 2 < 1.0
         made = np.where(fluid & np.isin(made, (WHITE, DEEP_GREY)), VENTRICLES, made)
     return made.astype(np.int32)
 
@@ -178,9 +174,8 @@ def with_fourth_ventricle(labels: Labels, affine: Floats) -> Labels:
     made[brainstem & ~np.isin(labels, CEREBRUM)] = BRAINSTEM
     third = (np.abs(x) < 1.6) & (np.abs(y + 4.0) < 6.0) & (z > below + 4.0) & (z < 0.0)
     aqueduct = (np.hypot(x, y + 6.0) < 1.3) & (z > below - 14.0) & (z < below + 6.0)
-    fourth = (x / 5.0) ** 2 + ((y + 6.0) / 4.0) ** 2 + (
-        (z - below + 15.0) / 6.0
-    ) ** 2 < 1.0
+    across = (x / 5.0) ** 2 + ((y + 6.0) / 4.0) ** 2
+    fourth = across + ((z - below + 15.0) / 6.0) ** 2 < 1.0
     made[third | aqueduct | fourth] = VENTRICLES
     return made
 
@@ -198,11 +193,9 @@ def one_hemisphere(
 def bent_midline(labels: Labels, affine: Floats, mm: float = 3.0) -> Labels:
     """Return a brain whose fissure bends to and fro by `mm`, together with what lies
     beside it."""
-
-    def came_from(place: Floats) -> Floats:
-        return np.stack([place[0] - mm * np.sin(place[1] / 12.0), place[1], place[2]])
-
-    return warp(labels, affine, came_from)
+    return warp_across(
+        labels, affine, lambda place: place[0] - mm * np.sin(place[1] / 12.0)
+    )
 
 
 def crop(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels, Floats]:
