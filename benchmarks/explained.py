@@ -122,7 +122,8 @@ def read_brain(folder: Path, brain: str) -> ExplainedBrain:
         week: TriangleMesh(points[used], boundary.faces)
         for week, points in places.items()
     }
-    weeks = [float(week) for week in shapes.weeks[shapes.passed[1:]]]
+    passed = shapes.weeks[~np.isin(shapes.weeks, shapes.between)]
+    weeks = [float(week) for week in passed[1:]]
     return ExplainedBrain(folder, brain, mesh, boundary, used, targets, weeks)
 
 

@@ -20,9 +20,9 @@ from gyriflow.folding.stretches import (
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import align_points, rigid_fit
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.diffusion import cell_sizes, vertex_sizes
+from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.straightening import straightness
-from gyriflow.geometry.tetrahedra import linear_pieces, quadratic
+from gyriflow.geometry.tetrahedra import linear_pieces, quadratic, volumes_between
 from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
 
@@ -56,7 +56,7 @@ def towards(targets, mesh=FREE_BODY, **changes):
 
 
 def volume(vertices, mesh=FREE_BODY):
-    return cell_sizes(vertices, linear_pieces(mesh)).sum()
+    return volumes_between(vertices, linear_pieces(mesh)).sum()
 
 
 def misfit(state, target):
@@ -82,7 +82,7 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
     assert (COMM.bcast(last.positions) == last.positions).all()
 
     # the sum of growth is that of the target: 4 % in each direction, and the bend
-    sizes = cell_sizes(FREE_BODY.vertices, FREE_BODY.tets)
+    sizes = volumes_between(FREE_BODY.vertices, FREE_BODY.tets)
     grown = np.linalg.det(first.growth) @ sizes
     assert grown == pytest.approx(volume(targets[22.0]), rel=1e-3)
     assert first.growth_s == 7 * DAY_S

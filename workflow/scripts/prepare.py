@@ -1,6 +1,8 @@
 """Prepare a run: write its parameters, their maps on the start mesh, and the mesh's
 zones and fields."""
 
+import numpy as np
+
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.anatomy.plausible import require_plausible_thickness
 from gyriflow.folding.start_regions import start_regions
@@ -50,20 +52,22 @@ with step(snakemake.log[0]):
             require_plausible_thickness(maps[name], source["curve"], path)
     if files.targets:
         targets = read_weekly_shapes(files.targets)
-        passed, stops = targets.passed, targets.stops
-        weekly = targets.weeks[passed].tolist()
+        stops = targets.stops
+        # the weeks that the path is defined by
+        is_passed = ~np.isin(targets.weeks, targets.between)
+        weekly = targets.weeks[is_passed].tolist()
         sizes = {
             name: dict(
                 zip(
                     weekly,
-                    values[passed].tolist(),
+                    values[is_passed].tolist(),
                     strict=True,
                 )
             )
             for name, values in targets.sizes.items()
         }
         target_weeks = weekly[1:]
-        maps |= target_maps(target_weeks, targets.positions[passed[1:]])
+        maps |= target_maps(target_weeks, targets.positions[is_passed][1:])
     curves = read_table(files.curves) if files.curves else None
     growth = {**params.settings["growth"], **sizes}
     growth |= followed_sizes(

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
-from .triangles import Floats, TriangleMesh, frozen, transformed
+from .triangles import Floats, TriangleMesh, freeze, transformed
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,16 +24,8 @@ class Deformation:
     affine: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "matrix",
-            frozen(self.matrix, np.float64, 4),
-        )
-        object.__setattr__(
-            self,
-            "affine",
-            frozen(self.affine, np.float64, 4),
-        )
+        freeze(self, "matrix", np.float64, 4)
+        freeze(self, "affine", np.float64, 4)
         if self.displacement.ndim != 4 or self.displacement.shape[3] != 3:
             raise ValueError(
                 "expected an (i, j, k, 3) displacement, found shape"
@@ -50,11 +42,7 @@ class MatchedSurfaces:
     second: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "second",
-            frozen(self.second, np.float64, 3),
-        )
+        freeze(self, "second", np.float64, 3)
         if self.second.shape != self.first.vertices.shape:
             raise ValueError(
                 f"expected {len(self.first.vertices)} matched vertices, found"

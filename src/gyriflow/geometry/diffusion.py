@@ -20,7 +20,7 @@ shape."""
 MAX_ITERATIONS = 10_000
 
 
-def cell_sizes(vertices: Floats, cells: Indices) -> Floats:
+def _cell_sizes(vertices: Floats, cells: Indices) -> Floats:
     """Return the (m,) areas in mm² of (m, 3) triangles, or signed volumes in mm³ of (m,
     4) tetrahedra."""
     if cells.shape[1] == 4:
@@ -33,7 +33,7 @@ def vertex_sizes(vertices: Floats, cells: Indices) -> Floats:
     """Return the (n,) areas or volumes of the vertices: equal parts of the cells around
     them."""
     n_corners = cells.shape[1]
-    shares = cell_sizes(vertices, cells) / n_corners
+    shares = _cell_sizes(vertices, cells) / n_corners
     parts = np.repeat(shares, n_corners)
     return np.bincount(cells.ravel(), parts, len(vertices))
 
@@ -88,7 +88,7 @@ def integrals_at_vertices(
     """Return the (n, k) integrals around the vertices of the (m, k) values of cells:
     equal parts of the cells' own."""
     corners = cells.shape[1]
-    shares = cell_sizes(vertices, cells) / corners
+    shares = _cell_sizes(vertices, cells) / corners
     integrals = []
     for column in values.T:
         parts = np.repeat(column * shares, corners)

@@ -26,8 +26,7 @@ from .triangles import (
     TriangleMesh,
     connected,
     dots,
-    frozen,
-    require_indices,
+    freeze,
     used_part,
 )
 
@@ -122,13 +121,10 @@ class TetrahedralMesh:
     tets: Ints
 
     def __post_init__(self) -> None:
-        vertices = frozen(self.vertices, np.float64, 3)
+        freeze(self, "vertices", np.float64, 3)
         is_quadratic = np.shape(self.tets)[1:] == (NODES_OF_ORDER[2],)
         order = 2 if is_quadratic else 1
-        tets = frozen(self.tets, np.int64, NODES_OF_ORDER[order])
-        require_indices(tets, len(vertices), "tetrahedron")
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "tets", tets)
+        freeze(self, "tets", np.int64, NODES_OF_ORDER[order], len(self.vertices))
 
     @property
     def order(self) -> int:

@@ -19,28 +19,28 @@ Indices = NDArray[np.integer]
 COINCIDENCE_TOL = 1e-3
 
 
-def frozen(
-    values: ArrayLike,
+def freeze(
+    record: object,
+    name: str,
     dtype: type,
     width: int,
-) -> NDArray:
-    """Return a read-only (n, width) copy of `values`; ValueError for another shape."""
-    array: NDArray = np.array(values, dtype=dtype, order="C")
-    if array.ndim != 2 or array.shape[1] != width:
-        raise ValueError(f"expected an (n, {width}) array, found shape {array.shape}")
-    array.flags.writeable = False
-    return array
-
-
-def require_indices(
-    cells: Ints,
-    count: int,
-    cell: str,
+    n_vertices: int | None = None,
 ) -> None:
-    """Raise ValueError, with the name of a `cell`, if cells have a vertex outside of
-    the first `count`."""
-    if len(cells) and not 0 <= cells.min() <= cells.max() < count:
-        raise ValueError(f"a {cell} has a vertex index out of range")
+    """Make a field of a frozen record a read-only (n, width) copy of its values.
+
+    ValueError for another shape, or indices that are not among `n_vertices`.
+    """
+    array: NDArray = np.array(getattr(record, name), dtype=dtype, order="C")
+    if array.ndim != 2 or array.shape[1] != width:
+        raise ValueError(f"expected (n, {width}) {name}, found shape {array.shape}")
+    if (
+        n_vertices is not None
+        and array.size
+        and not 0 <= array.min() <= array.max() < n_vertices
+    ):
+        raise ValueError(f"the {name} have a vertex index out of range")
+    array.flags.writeable = False
+    object.__setattr__(record, name, array)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +52,8 @@ class TriangleMesh:
     faces: Ints
 
     def __post_init__(self) -> None:
-        vertices = frozen(self.vertices, np.float64, 3)
-        faces = frozen(self.faces, np.int64, 3)
-        require_indices(faces, len(vertices), "face")
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "faces", faces)
+        freeze(self, "vertices", np.float64, 3)
+        freeze(self, "faces", np.int64, 3, len(self.vertices))
 
 
 def corners(mesh: TriangleMesh) -> Floats:

@@ -12,13 +12,17 @@ from ..errors import InputError
 from ..geometry.alignment import align_points
 from ..geometry.deformations import Deformation, carry
 from ..geometry.diffusion import (
-    cell_sizes,
     diffuse,
     harmonic_continuation,
     vertex_sizes,
 )
 from ..geometry.paths import path_through
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
+from ..geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_surface,
+    linear_pieces,
+    volumes_between,
+)
 from ..geometry.triangles import Floats, TriangleMesh, rms_length, vertex_areas
 from ..settings.growth import BEFORE_GW
 from .atlas_path import (
@@ -207,7 +211,7 @@ def expected_positions(
     )
     difference = mesh.vertices - start
     smooth = diffuse(mesh.vertices, pieces, difference, smoothing_mm)
-    size = cell_sizes(start, pieces).sum()
+    size = volumes_between(start, pieces).sum()
     boundary, used = boundary_surface(mesh)
     squares = (difference[used] ** 2).sum(axis=1)
     difference_mm = np.sqrt(np.average(squares, weights=vertex_areas(boundary)))
@@ -216,7 +220,7 @@ def expected_positions(
     kept = []
     for week in weeks:
         places = positions_at(week, atlas, atlas_weeks, sizes)
-        scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
+        scale = (volumes_between(places, pieces).sum() / size) ** (1 / 3)
         smooth_share = persistence.weight(week - start_week)
         finer_share = smooth_share * float(np.exp((start_week - week) / fading_gw))
         remaining = smooth_share * smooth + finer_share * (difference - smooth)

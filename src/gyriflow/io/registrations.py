@@ -101,11 +101,6 @@ class WeeklyShapes:
     kept: pd.DataFrame | None = None
     placed: Mapping[float, Floats] = field(default_factory=dict)
 
-    @property
-    def passed(self) -> NDArray[np.integer]:
-        """The numbers of the weeks that the path is defined by."""
-        return np.flatnonzero(~np.isin(self.weeks, self.between))
-
     def index(self, week: float) -> int:
         """Return the number of a week among those of the shapes; InputError where it is
         missing."""

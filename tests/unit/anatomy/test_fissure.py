@@ -89,7 +89,7 @@ def test_stray_patches_leave_each_hemisphere_in_one_piece():
 
 
 def test_a_brain_of_one_piece_is_cut_in_its_fissure():
-    labels, affine = phantom()
+    labels, affine = phantom(24.0, 1.6)
     mesh = cerebrum_surface(odd_brains.bent_midline(labels, affine), affine)
     fissure = fissure_between(mesh, mid_plane(mesh))
     left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
@@ -192,7 +192,7 @@ def test_hemispheres_are_moved_apart_by_at_most_a_centimetre_each(
 @pytest.fixture(scope="module")
 def centred():
     """The phantom's surface, whose fissure is x = 0."""
-    return moved(cerebrum_surface(*phantom()), *-CENTRE_MM)
+    return moved(cerebrum_surface(*phantom(24.0, 1.6)), *-CENTRE_MM)
 
 
 def angle_to(plane, normal):

@@ -1,5 +1,5 @@
-"""Whole pial surfaces from each kind of input: closed spheres, posed, honest in size,
-split at the fissure."""
+"""Whole pial surfaces from each kind of input: closed, posed, honest in size, split at
+the fissure or by labels of the sides; and simple shapes."""
 
 import json
 import os
@@ -13,24 +13,34 @@ from atlas_brains import atlas_halves
 from facts import Facts
 from phantoms import CENTRE_MM
 from scripts import run_script
-from shapes import LPS, rigid, scaling
+from shapes import LPS, rigid, scaling, sphere
 
 from gyriflow.anatomy.fissure import cut_share, smallest_gap
-from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
+from gyriflow.anatomy.pial import (
+    from_hemispheres,
+    from_labels,
+    from_shape,
+    from_surface,
+)
 from gyriflow.anatomy.plausible import (
     expected_volume_ml,
     max_cut_share,
     require_plausible_size,
 )
-from gyriflow.anatomy.repair import pieces
+from gyriflow.anatomy.repair import pieces, with_volume
+from gyriflow.anatomy.shapes import shape_surface
 from gyriflow.errors import InputError, MeshError
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
     corners,
+    edges,
     euler_number,
+    face_areas,
+    face_normals,
     flipped,
     is_closed,
     mean_edge_length,
@@ -38,11 +48,13 @@ from gyriflow.geometry.triangles import (
     signed_volume,
     submesh,
     transformed,
+    unit,
 )
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import LabelSource, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.mesh.maps import move_to_mesh
+from gyriflow.settings.schemes import LabelScheme
 from gyriflow.shipped import SHIPPED
 from gyriflow.units import ML_PER_MM3
 
@@ -420,3 +432,142 @@ def test_real_labels_and_hemispheres_of_a_week_agree():
     assert surface.report["area_cm2"]["right"] == pytest.approx(49.44, rel=0.01)
     assert surface.report["volume_mL"] == pytest.approx(46.05, rel=0.005)
     assert surface.fissure_x_mm == pytest.approx(0.0, abs=0.1)
+
+
+SIDED = LabelScheme(
+    name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4)
+)
+
+
+def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet():
+    # at a surface bent by 4 mm, cortex on both sides of it and no gap between: the
+    # phantom's own fissure is filled
+    labels, affine = shapes.phantom(24.0, 1.6)
+    x, y, _ = odd_brains.positions(labels, affine)
+    gap = (np.abs(x) < 3.0) & (labels == 4)
+    right, cortex = x > 4.0 * np.sin(y / 12.0), (labels == 5) | gap
+    sided = np.where(
+        np.isin(labels, odd_brains.CEREBRUM) | gap, np.where(cortex, 3, 1) + right, 0
+    )
+    sided[labels == 2] = 5
+    surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=2.0)
+    to_file = np.linalg.inv(surface.pose.world)
+    for part, sign in ((surface.left, -1), (surface.right, 1)):
+        places = transform_points(corners(part).mean(axis=1), to_file) - CENTRE_MM
+        wrong = sign * (places[:, 0] - 4.0 * np.sin(places[:, 1] / 12.0)) < -1.2
+        assert face_areas(part)[wrong].sum() < 0.005 * area(part)
+
+
+def test_a_side_of_a_few_voxels_is_no_hemisphere():
+    labels, affine = shapes.phantom(21.0, 2.0)
+    scheme, sided = SCHEMES["dhcp-19"], odd_brains.add_sides(labels, affine)
+    left = np.argwhere(np.isin(sided, scheme.left))
+    # all but the 40 voxels farthest to the left become the right hemisphere's
+    outermost = left[np.argsort(left @ affine[0, :3])][40:]
+    sided[tuple(outermost.T)] = dict(zip(scheme.left, scheme.right, strict=True))[3]
+    with pytest.raises(InputError, match=r"\d\.\d\d .*\d\d\.\d\d cm²", check=Facts(15)):
+        from_labels(sided, affine, scheme, week=21.0, edge_length_mm=3.0)
+
+
+def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
+    one = sphere(20.0, 3)
+    shift = np.array([2 * one.vertices[:, 0].max() + 0.1, 0.0, 0.0])
+    balls = merged(*(sphere(20.0, 3, k * shift) for k in (0, 1)))
+    wider, report = with_volume(balls, 1.02 * signed_volume(balls), area(balls))
+    assert report["volume_change"] == pytest.approx(0.0, abs=1e-4)
+    assert not self_intersecting_faces(wider).any()
+    still = np.all(wider.vertices == balls.vertices, axis=1)
+    assert 0 < still.mean() < 0.2
+    # at the place where the balls nearly touch
+    assert np.abs(balls.vertices[still, 0] - shift[0] / 2).max() < 5.0
+
+
+def test_a_piece_beside_a_hemisphere_is_left_out_with_its_place():
+    labels, affine = shapes.phantom(28.0, 2.0)
+    labels = odd_brains.add_sides(odd_brains.apart(labels, affine), affine)
+    place = np.array([-55.0, 0.0, 0.0])
+    labels = np.pad(labels, 15)
+    affine = affine @ rigid(shift=(-15.0, -15.0, -15.0))
+    from_place = odd_brains.positions(labels, affine) - place[:, None, None, None]
+    distance = np.linalg.norm(from_place, axis=0)
+    labels[distance < 9.2] = 3
+    labels[distance < 7.2] = 5
+    # the place is told in the coordinates of the file, which lies on its back
+    to_file = rigid(90.0, 0.0, 0.0, shift=(0.0, 90.0, 0.0))
+    surface = from_labels(
+        labels, to_file @ affine, SCHEMES["dhcp-19"], week=28.0, edge_length_mm=2.5
+    )
+    x, y, z = transform_points((place + CENTRE_MM)[None], to_file)[0].round()
+    facts = Facts("left", "2 pieces", f"({x:.0f}, {y:.0f}, {z:.0f})")
+    assert facts in surface.report["warnings"]
+    assert surface.report["pieces"] == 2
+    assert [len(pieces(side)) for side in (surface.left, surface.right)] == [1, 1]
+    assert surface.whole.vertices[:, 0].min() > -45.0 + CENTRE_MM[0]
+
+
+SEMI_AXES = (10.0, 13.0, 8.0)
+
+
+def test_an_ellipsoid_has_the_analytic_size_and_even_triangles_that_look_outwards():
+    volume = 4 / 3 * np.pi * np.prod(SEMI_AXES)
+    coarse, mesh = (
+        shape_surface(SEMI_AXES, edge_length_mm=edge_mm, noise_mm=0.0)
+        for edge_mm in (2.0, 1.0)
+    )
+    assert is_closed(mesh)
+    assert euler_number(mesh) == 2
+    assert signed_volume(mesh) == pytest.approx(volume, rel=0.01)
+    missing = [1 - signed_volume(each) / volume for each in (coarse, mesh)]
+    assert missing[0] / missing[1] == pytest.approx(4.0, rel=0.25)
+    lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=-1)
+    assert lengths.mean() == pytest.approx(1.0, rel=0.1)
+    assert 0.2 < lengths.min() < lengths.max() < 2.2
+    assert np.linalg.norm(mesh.vertices / SEMI_AXES, axis=1) == pytest.approx(
+        1.0, abs=1e-12
+    )
+    normals = unit(corners(mesh).mean(axis=1) / np.square(SEMI_AXES))
+    assert np.einsum("ij,ij->i", normals, face_normals(mesh)).min() > 0.9
+
+
+def test_bumps_have_the_given_height_and_one_pattern_at_any_edge_length():
+    def heights(edge_mm):
+        mesh = shape_surface((40.0, 40.0, 40.0), edge_length_mm=edge_mm, noise_mm=0.2)
+        return np.linalg.norm(mesh.vertices, axis=1) - 40.0, unit(mesh.vertices)
+
+    fine, directions = heights(3.0)
+    assert np.sqrt((fine**2).mean()) == pytest.approx(0.2, rel=0.3)
+    assert np.array_equal(fine, heights(3.0)[0])
+    coarse, coarse_directions = heights(4.0)
+    nearest = (directions @ coarse_directions.T).argmax(axis=1)
+    assert np.corrcoef(fine, coarse[nearest])[0, 1] > 0.8
+
+
+def test_edges_too_long_for_the_shape_are_refused_with_the_bound():
+    with pytest.raises(InputError, check=Facts("2.5 mm", "2.46 mm")):
+        shape_surface(SEMI_AXES, edge_length_mm=2.5)
+
+
+def test_a_shape_is_left_as_it_is_and_cut_at_x_0():
+    shape = shape_surface((10.0, 8.0, 9.0), edge_length_mm=1.0, noise_mm=0.05)
+    surface = from_shape(shape, week=21.0)
+    assert np.array_equal(surface.whole.vertices, shape.vertices)
+    assert np.array_equal(surface.pose.world, np.eye(4))
+    assert surface.fissure_x_mm == 0.0
+    expected = {"source": "shape", "week": 21.0, "fissure_x_mm": 0.0, "warnings": []}
+    assert {name: surface.report[name] for name in expected} == expected
+    left, right = (
+        corners(side)[:, :, 0].mean(axis=1) for side in (surface.left, surface.right)
+    )
+    assert left.max() < 0 < right.min()
+    assert area(surface.left) + area(surface.right) == pytest.approx(area(shape))
+
+
+def test_a_shape_that_is_not_closed_or_cuts_itself_is_refused():
+    mesh = shape_surface((15.0, 15.0, 15.0), edge_length_mm=1.5, noise_mm=0.0)
+    holed, _ = submesh(mesh, np.arange(len(mesh.faces)) > 0)
+    with pytest.raises(MeshError, check=Facts("[1]", 2)):
+        from_shape(holed, week=21.0)
+    vertices = mesh.vertices.copy()
+    vertices[0] *= -1.2
+    with pytest.raises(MeshError, check=Facts(8, 2)):
+        from_shape(TriangleMesh(vertices, mesh.faces), week=21.0)

@@ -200,7 +200,8 @@ def test_numbers_of_poses(recorded):
 def test_numbers_of_poses_by_shape(recorded):
     left, right = atlas_halves()
     results = {}
-    for name, turn in TURNS.items():
+    for name in ("small", "far"):
+        turn = TURNS[name]
         there = transformed(left, turn), transformed(right, turn)
         near = transformed(right, turn @ rigid(1.0, 0.0, 2.0, shift=(0.0, 1.0, -0.5)))
         results[name] = {

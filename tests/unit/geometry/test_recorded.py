@@ -170,7 +170,6 @@ def test_numbers_of_smoothing(recorded, surface, body):
         fixed = np.flatnonzero(values[:, 0] > 2.0)
         extend = diffusion.harmonic_continuation(points, cells, fixed)
         results[name] = {
-            "sizes": diffusion.cell_sizes(points, cells),
             "of vertices": diffusion.vertex_sizes(points, cells),
             "smooth": diffusion.diffuse(points, cells, values, 4.0),
             "integrals": integrals,

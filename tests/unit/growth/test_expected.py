@@ -16,13 +16,14 @@ from gyriflow.geometry.deformations import (
     MatchedSurfaces,
     transform_points,
 )
-from gyriflow.geometry.diffusion import cell_sizes, vertex_sizes
+from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
     boundary_surface,
     linear_pieces,
+    volumes_between,
 )
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume
 from gyriflow.growth.atlas_path import AtlasPath
@@ -208,7 +209,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
         return deformation_gradients(before, after, mesh.tets, SLOPES[None])[:, 0]
 
     def size(parts):
-        volumes = cell_sizes(mesh.vertices, mesh.tets)
+        volumes = volumes_between(mesh.vertices, mesh.tets)
         return np.average(np.linalg.norm(parts, axis=(1, 2)), weights=volumes)
 
     # the growth of the atlas, turned back as the map turns each element
@@ -319,7 +320,7 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
     wanted = growth.prod(axis=1)
     # a part of the difference in size is smoothed away, and a part taken for an error
     assert volumes / volumes[0] == pytest.approx(wanted / wanted[0], rel=0.06)
-    assert (cell_sizes(found.positions[3], ball.tets) > 0).all()
+    assert (volumes_between(found.positions[3], ball.tets) > 0).all()
     faces = boundary_surface(ball)[0].faces
     by_name = {}
     for name, shapes in found.baselines.items():

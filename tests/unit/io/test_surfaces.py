@@ -239,6 +239,7 @@ def test_vertices_that_are_no_places_and_faces_beyond_the_vertices_are_refused(
     for points, faces, facts in (
         (vertices, BALL.faces, [2]),
         (BALL.vertices, BALL.faces + 1, [1, 162, 0, 161]),
+        (BALL.vertices.T, BALL.faces, ["(3, 162)", "(n, 3)"]),
     ):
         save_gifti(path, SimpleNamespace(vertices=points, faces=faces))
         with pytest.raises(InputError, check=Facts(path, *facts)):

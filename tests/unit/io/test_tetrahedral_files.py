@@ -22,7 +22,6 @@ from gyriflow.geometry.tetrahedra import (
 from gyriflow.io.frames import (
     join_frames,
     read_field,
-    read_pial_frames,
     read_positions,
     read_tets,
     read_weeks,
@@ -73,17 +72,7 @@ def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, fo
         read_tetrahedral_mesh(tmp_path / "bad.xdmf")
 
 
-@pytest.mark.parametrize(
-    "read",
-    [
-        read_tetrahedral_mesh,
-        read_regions,
-        read_weeks,
-        read_tets,
-        read_pial_frames,
-        lambda path: read_positions(path, 21.0),
-    ],
-)
+@pytest.mark.parametrize("read", [read_tetrahedral_mesh, read_regions, read_weeks])
 def test_missing_and_torn_files_are_refused(tmp_path, read):
     for content in (b"", b"HDF"):
         if content:

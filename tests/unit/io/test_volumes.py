@@ -316,18 +316,8 @@ def test_written_volume_comes_back(tmp_path, shear):
     assert nib.load(path).get_data_dtype() == np.uint8
 
 
-ANISOTROPIC = np.diag([0.8, 0.6, 1.5, 1.0])
-
-
-@pytest.mark.parametrize(
-    "affine",
-    [
-        rigid(20, -30, 40, shift=(5, -7, 9)) @ ANISOTROPIC,
-        rigid(0, 0, 90) @ np.diag([1, 1, -1, 1.0]) @ ANISOTROPIC,
-    ],
-    ids=["turned", "permuted and mirrored"],
-)
-def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path, affine):
+def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path):
+    affine = rigid(20, -30, 140, shift=(5, -7, 9)) @ np.diag([0.8, 0.6, -1.5, 1.0])
     padding = ((20, 30), (10, 0), (0, 40))
     path = saved(tmp_path / "a.nii.gz", np.pad(LABELS, padding), affine)
     whole, volume = read_label_volume(path), read_label_volume(path, cropped=True)
