@@ -155,7 +155,7 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
     report: dict[str, Any] = {"self_intersections": cutting}
     if not (remaining := faults(smooth, n_crossing)):
         return RepairedSurface(smooth, report, [])
-    mesh, report["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
+    mesh, report["remade"] = _rebuild(mesh, 0.5 * edge_length_mm)
     smooth, _, n_crossing = _make_even(mesh, edge_length_mm)
     require_sound(smooth, n_crossing)
     return RepairedSurface(
@@ -361,7 +361,7 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     vertices, _, _, faces = igl.remove_duplicate_vertices(
         mesh.vertices, mesh.faces, MERGE_MM
     )
-    used = triangles.n_used_vertices(mesh.faces)
+    used = len(np.unique(mesh.faces))
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]
@@ -714,7 +714,9 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
     return mesh
 
 
-def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def _rebuild(
+    mesh: TriangleMesh, voxel_mm: float
+) -> tuple[TriangleMesh, dict[str, Any]]:
     """Rebuild a surface through voxels by winding numbers, free of handles and
     crossings; return it and a report."""
     margin_mm = voxel_mm * MARGIN_VOXELS

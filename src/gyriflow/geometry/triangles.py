@@ -205,16 +205,11 @@ def is_closed(mesh: TriangleMesh) -> bool:
     return not has_repeated and bool((uses == 2).all())
 
 
-def n_used_vertices(faces: Ints) -> int:
-    """Return the number of vertices that faces have."""
-    return int(np.count_nonzero(np.bincount(faces.ravel())))
-
-
 def euler_number(mesh: TriangleMesh) -> int:
     """Return vertices − edges + faces, counting used vertices only: 2 for each closed
     surface without handles."""
     pairs, _ = edges(mesh)
-    return n_used_vertices(mesh.faces) - len(pairs) + len(mesh.faces)
+    return len(np.unique(mesh.faces)) - len(pairs) + len(mesh.faces)
 
 
 def face_components(mesh: TriangleMesh) -> Ints:
@@ -287,7 +282,7 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
         pairs.append(paired)
     corner = _joined_corners(np.concatenate(pairs), start, following)
     _, first = np.unique(corner, return_index=True)
-    if len(first) == n_used_vertices(faces):
+    if len(first) == len(np.unique(faces)):
         return mesh
     return TriangleMesh(
         mesh.vertices[start[first]],

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import MeshError, SolverError
 from ..geometry.diffusion import stiffness_matrix
-from ..geometry.triangles import Floats, TriangleMesh, n_used_vertices, vertex_areas
+from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
 from ..settings.terms import MassMatrix
 
 RESIDUAL_TOL = 1e-6
@@ -55,7 +55,7 @@ def laplacian(
     `consistent` is as in LaPy. The boundary of an open surface is free (Neumann).
     MeshError where a vertex has no face.
     """
-    unused = len(mesh.vertices) - n_used_vertices(mesh.faces)
+    unused = len(mesh.vertices) - len(np.unique(mesh.faces))
     if unused:
         raise MeshError(
             "vertices without a face have no Laplacian", found=unused, expected=0
