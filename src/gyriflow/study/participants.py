@@ -526,7 +526,7 @@ def _session_tables(table: Table) -> Iterator[Path]:
     files = ["sessions.tsv"]
     for name in dict.fromkeys(row.name for row in table.rows):
         # other names could be paths out of the folder
-        if SUBJECT_FOLDER.match(name):
+        if SUBJECT_FOLDER.fullmatch(name):
             files.append(f"{name}/{name}_sessions.tsv")
     for file in files:
         if os.path.lexists(folder / file):
