@@ -257,7 +257,9 @@ class Folding:
             "krylov": solution.krylov,
             "residual": solution.residual,
             "converged": solution.converged,
+            "energy_J": self.problem.energy(u),
             "min_J": self.domain.min_over_ranks(ratios),
+            "max_J": -self.domain.min_over_ranks(-ratios),
             "max_u_mm": float(length.max()),
         }
 
