@@ -52,7 +52,7 @@ ATLAS_ALONE = 0.2
 atlas' own brain."""
 ERROR_HEAD = "error of such predictions, of averages"
 INTERVAL_HEAD = "interval of ensemble and tests of averages"
-"""Columns of `predicted_table`. The tested brains are averages of many fetuses, which
+"""Columns of `_predicted_table`. The tested brains are averages of many fetuses, which
 says little of a single one."""
 
 
@@ -62,7 +62,7 @@ class Tables:
 
     `quality`, `metrics` and `centiles` are as for `brain_rows`, `curves` and
     `differences` those of `metrics.atlas_curves`; `warnings` has the columns subject,
-    run, step, level, message. `runs` and `validation` are as for `scores_table`, None
+    run, step, level, message. `runs` and `validation` are as for `page._scores_table`, None
     if nothing was simulated; `intervals` those of the ensemble of the one prediction,
     if any.
     """
