@@ -107,7 +107,14 @@ def read_cerebrum(
     require_labels(labels, scheme)
     mask = np.isin(labels, scheme.cerebrum)
     report = _missing_labels(labels, scheme)
-    warnings = list(misplaced_cortex(labels, affine, scheme, is_whole=min_cortex > 0))
+    warnings = list(
+        misplaced_cortex(
+            labels,
+            affine,
+            scheme,
+            is_whole=min_cortex > 0,
+        )
+    )
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = _unlabelled_ventricles(labels, scheme, affine)
     if scheme.cortex:

@@ -314,7 +314,13 @@ def _grow_slits(
     places = np.concatenate([places, gaps])
     around = places[:, None] + face_steps
     is_enclosed = inside.ravel()[around].all(axis=1)
-    waiting = dict(zip(places.tolist(), (-distance.flat[places]).tolist(), strict=True))
+    waiting = dict(
+        zip(
+            places.tolist(),
+            (-distance.flat[places]).tolist(),
+            strict=True,
+        )
+    )
     # these come into the queue when a voxel at one of their faces is taken
     enclosed = set(places[is_enclosed].tolist())
     queue = [(waiting[place], place) for place in places[~is_enclosed].tolist()]

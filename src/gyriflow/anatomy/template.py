@@ -132,7 +132,16 @@ def register_shape(
     """Return the best fit of every `every`-th point of a shape to one of several
     targets, starting from a (3, 3) rotation close to it."""
     fits = [
-        _descend(shape, target, rotation, shift, FINE, 30, every) for target in targets
+        _descend(
+            shape,
+            target,
+            rotation,
+            shift,
+            FINE,
+            30,
+            every,
+        )
+        for target in targets
     ]
     return min(fits, key=lambda fit: fit.residual)
 
@@ -148,7 +157,16 @@ def register_from_all_sides(
     """
     middle = targets[len(targets) // 2]
     coarse = [
-        _descend(shape, middle, start, None, COARSE, 12, 8) for start in CUBE_ROTATIONS
+        _descend(
+            shape,
+            middle,
+            start,
+            None,
+            COARSE,
+            12,
+            8,
+        )
+        for start in CUBE_ROTATIONS
     ]
     distinct: list[RigidFit] = []
     for fit in sorted(coarse, key=lambda fit: fit.residual):
@@ -163,7 +181,13 @@ def register_from_all_sides(
     best = min(refined, key=lambda fit: fit.residual)
     others = [fit.residual for fit in refined if _turn_deg(fit, best) > DISTINCT_DEG]
     confidence = min(others, default=np.inf) / best.residual
-    found = register_shape(shape, targets, best.rotation, best.shift, every=1)
+    found = register_shape(
+        shape,
+        targets,
+        best.rotation,
+        best.shift,
+        every=1,
+    )
     return found, confidence
 
 

@@ -167,7 +167,12 @@ def work_of(
     if study is None:
         with _read_study(path, directory) as read:
             study = read
-    yield from _needs([job for job, _ in planned], study, directory, cores)
+    yield from _needs(
+        [job for job, _ in planned],
+        study,
+        directory,
+        cores,
+    )
 
 
 def plan(
@@ -350,7 +355,14 @@ def _needs(
     directory: Path,
     cores: int,
 ) -> Iterator[tuple[str, bool]]:
-    seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
+    seconds = [
+        job_seconds(
+            study,
+            job.rule,
+            job.wildcards,
+        )
+        for job in jobs
+    ]
     made_by: dict[str, int] = {}
     for number, job in enumerate(jobs):
         made_by |= dict.fromkeys(job.outputs, number)
@@ -395,7 +407,11 @@ def _needs(
     folder = directory.absolute()
     while not folder.is_dir():
         folder = folder.parent
-    yield _fits("disk", disk_mib, shutil.disk_usage(folder).free / 2**20)
+    yield _fits(
+        "disk",
+        disk_mib,
+        shutil.disk_usage(folder).free / 2**20,
+    )
 
 
 def _path_lines(

@@ -75,7 +75,11 @@ class InputPath(click.Path):
             # settings take a while to import
             from ..settings.base import hint_for_missing
 
-            self.fail(f"{error.message}{hint_for_missing(Path(value))}", param, ctx)
+            self.fail(
+                f"{error.message}{hint_for_missing(Path(value))}",
+                param,
+                ctx,
+            )
 
 
 FOLDER = click.Path(file_okay=False, path_type=Path)

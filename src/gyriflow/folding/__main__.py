@@ -133,7 +133,11 @@ def _fold(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     if comm.rank == 0:
         require_maps(parameters, maps, len(mesh.vertices))
         thickness = value_at(parameters.thickness_mm, parameters.start_week, maps)
-        report = zone_report(mesh, zones, float(np.median(thickness)))
+        report = zone_report(
+            mesh,
+            zones,
+            float(np.median(thickness)),
+        )
         memory = predicted_memory_mib(
             len(mesh.tets), comm.size, parameters.contact, mesh.order
         )

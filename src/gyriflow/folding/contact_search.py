@@ -141,7 +141,13 @@ class ContactSearch:
         pairs.use_area_weighting = True
         pairs.build(candidates, mesh, places, self._distance)
         pairs = _drop_parallel_edges(pairs, part.edges, places)
-        return NearPairs(positions, part, mesh, places, part.owned_pairs(pairs))
+        return NearPairs(
+            positions,
+            part,
+            mesh,
+            places,
+            part.owned_pairs(pairs),
+        )
 
     def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
         """Return the largest fraction, at most 1, of a displacement (s, 3) in mm from
@@ -188,7 +194,11 @@ class ContactSearch:
         part, _ = self._part
         if self._mesh is None:
             rest = part.restrict(self._rest)
-            self._mesh = ipctk.CollisionMesh(rest, part.edges, part.faces)
+            self._mesh = ipctk.CollisionMesh(
+                rest,
+                part.edges,
+                part.faces,
+            )
         return part, self._mesh
 
     def _new_part(

@@ -80,7 +80,13 @@ def bisect_points(positions: Floats, count: int) -> Ints:
         low = number // 2
         cut = len(inside) * low // number
         stack.append((inside[:cut], first, low))
-        stack.append((inside[cut:], first + low, number - low))
+        stack.append(
+            (
+                inside[cut:],
+                first + low,
+                number - low,
+            )
+        )
     return box
 
 

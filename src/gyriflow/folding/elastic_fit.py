@@ -357,7 +357,11 @@ class ElasticFit:
         n_passed = len(self._passed)
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
         pull = transform_points(goals, motion) - boundary.vertices
-        length = np.linalg.norm(pull, axis=1, keepdims=True)
+        length = np.linalg.norm(
+            pull,
+            axis=1,
+            keepdims=True,
+        )
         longest_mm = max(
             MAX_PULL_MM,
             2 * math.sqrt(np.mean(length**2)),
@@ -481,7 +485,13 @@ class ElasticFit:
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
         fractions = np.cumsum(lengths) / max(sum(lengths), 1e-12)
-        return list(zip(fractions.tolist(), stops, strict=False))
+        return list(
+            zip(
+                fractions.tolist(),
+                stops,
+                strict=False,
+            )
+        )
 
     def _warn_of_more_faults(self, before: Floats, places: Floats) -> None:
         """Warn if the body, whose sides were straightened at `places`, has more faults
@@ -503,7 +513,11 @@ class ElasticFit:
     ) -> tuple[Floats, list[Floats]]:
         """Return the shape `after`, changed around faults, and the shapes to pass
         before it."""
-        untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
+        untangled, faults = self._untangled(
+            before,
+            after,
+            UNTANGLING_MM[:2],
+        )
         # a change that flattens elements is the last resort
         flattens = self._flat_count(untangled) > self._flat_count(after)
         halfway = None
@@ -513,10 +527,20 @@ class ElasticFit:
             # each shape is fitted to the one before, as on the path
             middle = self._aligned(passed[halfway], before)
             earlier = passed[:halfway]
-            stop, first = self._stops(before, middle, earlier, halvings - 1)
+            stop, first = self._stops(
+                before,
+                middle,
+                earlier,
+                halvings - 1,
+            )
             end = self._aligned(after, stop)
             later = passed[halfway + 1 :]
-            last, second = self._stops(stop, end, later, halvings - 1)
+            last, second = self._stops(
+                stop,
+                end,
+                later,
+                halvings - 1,
+            )
             return last, [*first, stop, *second]
         if len(faults):
             # the shape stays as it is: it is valid, and a changed one may not be

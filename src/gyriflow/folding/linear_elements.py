@@ -84,7 +84,13 @@ class LinearElements:
             len(matrix.indices),
             dtype=np.int32,
         )
-        places = sparse.csr_array((numbers, matrix.indices, matrix.indptr))
+        places = sparse.csr_array(
+            (
+                numbers,
+                matrix.indices,
+                matrix.indptr,
+            )
+        )
         cells = self._domain.cells
         rows = np.repeat(cells, 4, axis=1).ravel()
         columns = np.tile(cells, 4).ravel()

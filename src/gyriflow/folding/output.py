@@ -76,7 +76,11 @@ def layer_fields(
     # a vertex gets the highest of its facets' zones
     zone = np.zeros(len(positions_mm), dtype=np.int32)
     zone_at_corners = np.repeat(zones.facet_zone, 3).astype(np.int32)
-    np.maximum.at(zone, zones.facets.ravel(), zone_at_corners)
+    np.maximum.at(
+        zone,
+        zones.facets.ravel(),
+        zone_at_corners,
+    )
     modulus = shear_modulus(parameters, weight, maps, week)
     material = MATERIALS[parameters.material](parameters.poisson_ratio)
     by_name: dict[str, dict[str, NDArray]] = {

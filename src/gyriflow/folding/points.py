@@ -74,7 +74,11 @@ class IntegrationPoints:
         if self.order == 1:
             return self.barycentric
         matrix = np.zeros((len(self.barycentric), len(NODES)))
-        for row, point in zip(matrix, self.barycentric, strict=True):
+        for row, point in zip(
+            matrix,
+            self.barycentric,
+            strict=True,
+        ):
             best = -np.inf
             for part in PARTS:
                 nodes = list(part)

@@ -261,7 +261,12 @@ class NonlinearProblem:
             dtype=np.int32,
         )
         values = self._expressions[name].eval(self.domain.mesh, cells)
-        tensors = values.reshape(len(cells), -1, 3, 3)
+        tensors = values.reshape(
+            len(cells),
+            -1,
+            3,
+            3,
+        )
         if name == "stress":
             # that of w = μ/det V
             tensors = tensors * self._det_V[..., None, None]
@@ -303,7 +308,12 @@ class NonlinearProblem:
         self.clear_fixed(total)
         if self._tangent.motions is not None:
             self._tangent.motions.remove(total)
-        return Residual(u, elastic, total, self.domain.norm(total))
+        return Residual(
+            u,
+            elastic,
+            total,
+            self.domain.norm(total),
+        )
 
     def clear_fixed(self, owned: Floats) -> None:
         """Set the fixed components among the owned ones (3 · n_owned,) to exactly 0."""

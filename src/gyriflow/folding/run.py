@@ -74,7 +74,13 @@ def run(
         state = State.at_start(folding.start, parameters.step_s)
         state = _save_frame(folding, state, parameters.output_weeks[0], folder)
     resumed_after = len(state.rows)
-    state, diverged = _simulate(folding, state, folder, key, may_diverge=may_diverge)
+    state, diverged = _simulate(
+        folding,
+        state,
+        folder,
+        key,
+        may_diverge=may_diverge,
+    )
     memory_mib = comm.reduce(_peak_memory_mib())
     cpu_s = comm.reduce(time.process_time())
     if comm.rank != 0:

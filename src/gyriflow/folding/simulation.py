@@ -83,7 +83,11 @@ class Folding:
             has_planes=p.contact == "planes",
         )
         # of all weeks, so that it does not depend on the end of the run
-        stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, *WEEK_RANGE)[1]
+        stiffest = value_range(
+            p.shear_modulus_cortex_pa,
+            self.maps,
+            *WEEK_RANGE,
+        )[1]
         self.contact: SelfContact | None = None
         if p.contact == "global":
             barrier_pa = STIFFNESS_PER_MODULUS * stiffest
@@ -97,12 +101,23 @@ class Folding:
             newton,
             residual_floor(mesh, stiffest),
         )
-        self.inputs = GrowthInputs(mesh, zones, self.maps, comm.allreduce)
+        self.inputs = GrowthInputs(
+            mesh,
+            zones,
+            self.maps,
+            comm.allreduce,
+        )
         self.model = growth_model(p, self.inputs)
         self.solved = SolvedStep(
             self.problem.rest(),
             p.step_s,
-            self.model(StepStart(mesh.vertices, 0.0, p.step_s)),
+            self.model(
+                StepStart(
+                    mesh.vertices,
+                    0.0,
+                    p.step_s,
+                )
+            ),
         )
         self.elements = Elements(
             self.domain.cells, self.domain.vertex_of_node, self.problem.points

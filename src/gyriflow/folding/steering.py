@@ -155,7 +155,14 @@ def _free_growth(
     for tangential, core in ((1.0, 0.0), (0.0, 1.0)):
         rates = {"growth_rate_per_s": tangential, "core_growth_rate_per_s": core}
         by_rates = p.model_copy(update=rates)
-        dg, dr = increments(by_rates, weight, zones.growing, {}, week, 1.0)
+        dg, dr = increments(
+            by_rates,
+            weight,
+            zones.growing,
+            {},
+            week,
+            1.0,
+        )
         of_volume = 2 * dg + dr
         of_pieces = of_volume[inputs.pieces].mean(axis=1)
         volume_rates.append(np.average(of_pieces, weights=volumes))

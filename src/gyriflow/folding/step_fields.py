@@ -45,7 +45,13 @@ def step_fields(
         by_element = values.reshape(-1, len(points.weights))
         means.append(by_element @ points.weights)
     gathered = folding.domain.gather_cells(np.stack(means, axis=1))
-    return at_vertices, dict(zip(fields, gathered.T, strict=True))
+    return at_vertices, dict(
+        zip(
+            fields,
+            gathered.T,
+            strict=True,
+        )
+    )
 
 
 def _as_rates(folding: Folding, fields: dict[str, Floats]) -> dict[str, Floats]:
@@ -104,13 +110,27 @@ def _total_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]
 def _pressure(stress: Floats) -> Floats:
     """Return the (c,) pressures −tr(σ)/3, positive where tissue is pressed, in the unit
     of the stress."""
-    return -np.trace(stress, axis1=1, axis2=2) / 3
+    return (
+        -np.trace(
+            stress,
+            axis1=1,
+            axis2=2,
+        )
+        / 3
+    )
 
 
 def _von_mises(stress: Floats) -> Floats:
     """Return the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the
     stress."""
-    mean = np.trace(stress, axis1=1, axis2=2) / 3
+    mean = (
+        np.trace(
+            stress,
+            axis1=1,
+            axis2=2,
+        )
+        / 3
+    )
     isotropic = mean[:, None, None] * np.eye(3)
     deviator = stress - isotropic
     norm = np.linalg.norm(deviator, axis=(1, 2))

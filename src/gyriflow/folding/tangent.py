@@ -25,7 +25,9 @@ from .products import PartMotions, SymmetricProducts
 def part_arms(positions: Floats, part: Ints) -> NDArray[np.float32]:
     """Return (n, 3) positions relative to the centres of their parts (n,), divided by
     the largest component of all."""
-    sums = [np.bincount(part, coordinates) for coordinates in positions.T]
+    sums = []
+    for coordinates in positions.T:
+        sums.append(np.bincount(part, coordinates))
     counts = np.maximum(np.bincount(part), 1)
     centres = np.stack(sums, axis=1) / counts[:, None]
     arms = positions - centres[part]
@@ -60,7 +62,14 @@ class RigidMotions:
         self._motions = PartMotions(own_part, own_arms)
         # six columns for each part, zero elsewhere
         node = np.arange(len(owned))
-        modes = np.zeros((len(owned), 3, self._parts, 6))
+        modes = np.zeros(
+            (
+                len(owned),
+                3,
+                self._parts,
+                6,
+            )
+        )
         modes[node, :, own_part] = rigid_motions(own_arms)
         self.modes: Floats = modes.reshape(-1, 6 * self._parts)
         gram = domain.sum_over_ranks(self.modes.T @ self.modes)

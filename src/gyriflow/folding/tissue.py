@@ -219,7 +219,15 @@ def _interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
     signs = np.where(cosines < 0, -1.0, 1.0)
     turned = normals * signs[:, :, None]
     mean = np.matmul(points.interpolation, turned)
-    length = np.linalg.norm(mean, axis=2, keepdims=True)
+    length = np.linalg.norm(
+        mean,
+        axis=2,
+        keepdims=True,
+    )
     nearest_node = points.piecewise_linear.argmax(axis=1)
     unit_mean = mean / np.maximum(length, 0.1)
-    return np.where(length > 0.1, unit_mean, turned[:, nearest_node])
+    return np.where(
+        length > 0.1,
+        unit_mean,
+        turned[:, nearest_node],
+    )

@@ -161,7 +161,11 @@ def _nearest_plane(
     normals: Floats,
     points: Floats,
 ) -> tuple[Floats, Floats]:
-    _, face, places = tree.squared_distance(mesh.vertices, mesh.faces, points)
+    _, face, places = tree.squared_distance(
+        mesh.vertices,
+        mesh.faces,
+        points,
+    )
     return places, normals[face]
 
 

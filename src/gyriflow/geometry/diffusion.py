@@ -35,7 +35,11 @@ def vertex_sizes(vertices: Floats, cells: Indices) -> Floats:
     n_corners = cells.shape[1]
     shares = _cell_sizes(vertices, cells) / n_corners
     parts = np.repeat(shares, n_corners)
-    return np.bincount(cells.ravel(), parts, len(vertices))
+    return np.bincount(
+        cells.ravel(),
+        parts,
+        len(vertices),
+    )
 
 
 def diffuse(
@@ -54,7 +58,11 @@ def diffuse(
     """
     if sigma_mm == 0:
         return values.copy()
-    mass, matrix = _implicit_step(vertices, cells, sigma_mm**2 / 2 / STEPS)
+    mass, matrix = _implicit_step(
+        vertices,
+        cells,
+        sigma_mm**2 / 2 / STEPS,
+    )
     smooth: Floats = values.reshape(len(values), -1).astype(float)
     for _ in range(STEPS):
         smooth = _solve(
@@ -195,7 +203,11 @@ def _stiffness_of_tetrahedra(vertices: Floats, tets: Indices) -> sparse.csr_matr
     # three times as fast as by igl
     between = np.empty((len(EDGES), len(tets)))
     for chunk in chunks(len(tets)):
-        (maps,) = element_maps(vertices, tets[chunk], SLOPES[None])
+        (maps,) = element_maps(
+            vertices,
+            tets[chunk],
+            SLOPES[None],
+        )
         cofactors = cofactors_of(maps)
         volumes6 = np.abs((maps[0] * cofactors[0]).sum(axis=0))
         # gradients of the shape functions, times six volumes
@@ -208,4 +220,5 @@ def _stiffness_of_tetrahedra(vertices: Floats, tets: Indices) -> sparse.csr_matr
     size = (len(vertices), len(vertices))
     above = sparse.coo_matrix((between.ravel(), (rows, columns)), shape=size).tocsr()
     matrix = above + above.T
-    return sparse.csr_matrix(matrix - sparse.diags(np.ravel(matrix.sum(axis=1))))
+    sums = np.ravel(matrix.sum(axis=1))
+    return sparse.csr_matrix(matrix - sparse.diags(sums))

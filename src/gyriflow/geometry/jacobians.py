@@ -115,7 +115,12 @@ def jacobians(
     for chunk in chunks(len(tets)):
         places = np.take(vertices, tets[chunk], axis=0)
         maps = by_node @ places
-        maps = maps.reshape(len(places), -1, 3, 3)
+        maps = maps.reshape(
+            len(places),
+            -1,
+            3,
+            3,
+        )
         values[chunk] = determinants(maps)
     return values
 

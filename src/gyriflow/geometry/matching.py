@@ -71,7 +71,12 @@ def surface_distance(
     quantiles = []
     for distances, weights in ways:
         means.append(np.average(distances, weights=weights))
-        quantile = np.quantile(distances, share, weights=weights, method="inverted_cdf")
+        quantile = np.quantile(
+            distances,
+            share,
+            weights=weights,
+            method="inverted_cdf",
+        )
         quantiles.append(float(quantile))
     return float(np.mean(means)), max(quantiles)
 
@@ -245,7 +250,11 @@ def match_points(
         # a list of ranks, so that also one neighbour is a column
         ranks = np.arange(min(count, len(mesh.vertices))) + 1
         distances, vertices = tree.query(points[unmatched], k=ranks)
-        cosines = np.einsum("ik,ijk->ij", normals[unmatched], directions[vertices])
+        cosines = np.einsum(
+            "ik,ijk->ij",
+            normals[unmatched],
+            directions[vertices],
+        )
         is_agreeing = cosines >= MIN_NORMAL_COSINE
         is_matched = is_agreeing.any(axis=1)
         first = is_agreeing.argmax(axis=1)[is_matched]

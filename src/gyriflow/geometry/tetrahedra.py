@@ -124,7 +124,13 @@ class TetrahedralMesh:
         freeze(self, "vertices", np.float64, 3)
         is_quadratic = np.shape(self.tets)[1:] == (NODES_OF_ORDER[2],)
         order = 2 if is_quadratic else 1
-        freeze(self, "tets", np.int64, NODES_OF_ORDER[order], len(self.vertices))
+        freeze(
+            self,
+            "tets",
+            np.int64,
+            NODES_OF_ORDER[order],
+            len(self.vertices),
+        )
 
     @property
     def order(self) -> int:
@@ -145,7 +151,11 @@ def volumes_between(vertices: Floats, tets: Indices) -> Floats:
         return coefficients(vertices, tets).mean(axis=1) / 6
     volumes = np.empty(len(tets))
     for chunk in chunks(len(tets)):
-        (edges,) = element_maps(vertices, tets[chunk], SLOPES[None])
+        (edges,) = element_maps(
+            vertices,
+            tets[chunk],
+            SLOPES[None],
+        )
         volumes[chunk] = determinants(np.moveaxis(edges, 2, 0)) / 6.0
     return volumes
 

@@ -30,7 +30,11 @@ def freeze(
 
     ValueError for another shape, or indices that are not among `n_vertices`.
     """
-    array: NDArray = np.array(getattr(record, name), dtype=dtype, order="C")
+    array: NDArray = np.array(
+        getattr(record, name),
+        dtype=dtype,
+        order="C",
+    )
     if array.ndim != 2 or array.shape[1] != width:
         raise ValueError(f"expected (n, {width}) {name}, found shape {array.shape}")
     if (
@@ -53,7 +57,13 @@ class TriangleMesh:
 
     def __post_init__(self) -> None:
         freeze(self, "vertices", np.float64, 3)
-        freeze(self, "faces", np.int64, 3, len(self.vertices))
+        freeze(
+            self,
+            "faces",
+            np.int64,
+            3,
+            len(self.vertices),
+        )
 
 
 def corners(mesh: TriangleMesh) -> Floats:

@@ -258,8 +258,16 @@ def resample_by_size(
     own_volumes = sizes_of(mesh, shapes)["volume_ml"]
     ratio = np.exp(np.mean(np.log(own_volumes / value(ages.curve, knots))))
     resampled = []
-    for week, wanted in zip(weeks, value(ages.curve, weeks), strict=True):
-        age = np.clip(week, knots[0], knots[-1])
+    for week, wanted in zip(
+        weeks,
+        value(ages.curve, weeks),
+        strict=True,
+    ):
+        age = np.clip(
+            week,
+            knots[0],
+            knots[-1],
+        )
         shape = positions_at(age, shapes, knots, sizes)
         volume = sizes_of(mesh, [shape])["volume_ml"][0]
         scale = (ratio * wanted / volume) ** (1 / 3)

@@ -365,7 +365,11 @@ def followed_sizes(
     columns series, quantity, week and value, are needed for `measured`; InputError if
     the start brain's `series` is not in them. `weeks` are the output weeks of the run.
     """
-    at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
+    at = np.arange(
+        weeks[0],
+        weeks[-1] + 1e-9 + SPACING_GW,
+        SPACING_GW,
+    )
     tables = {}
     for quantity in SIZES:
         source = growth.get(quantity)
@@ -380,7 +384,11 @@ def followed_sizes(
                 name=quantity,
                 may_shrink=shrink,
             )
-        by_week = zip(at.tolist(), value(curve, at).tolist(), strict=True)
+        by_week = zip(
+            at.tolist(),
+            value(curve, at).tolist(),
+            strict=True,
+        )
         tables[quantity] = {round(week, 6): size for week, size in by_week}
     return tables
 

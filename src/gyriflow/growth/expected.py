@@ -314,7 +314,13 @@ def predict_shapes(
         stops=found.stops,
     )
     between = sorted({*further_weeks} - {*found.weeks})
-    by_week = dict(zip(found.weeks, found.positions, strict=True))
+    by_week = dict(
+        zip(
+            found.weeks,
+            found.positions,
+            strict=True,
+        )
+    )
     for week in between:
         by_week[week] = way(week)
     weeks = sorted(by_week)

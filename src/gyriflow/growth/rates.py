@@ -108,7 +108,11 @@ def growth_sd(
             deviations[name] = np.full_like(values, np.nan)
         else:
             of_members = [maps[name] for maps in members]
-            deviations[name] = np.std(of_members, axis=0, ddof=1)
+            deviations[name] = np.std(
+                of_members,
+                axis=0,
+                ddof=1,
+            )
     return deviations
 
 

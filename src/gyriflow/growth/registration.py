@@ -567,6 +567,13 @@ def _dice(
 ) -> float:
     first = (earlier.tissue & bit > 0).ravel()
     mask = later.tissue & bit > 0
-    second = map_coordinates(mask.astype(np.float32), places, order=1) > 0.5
+    second = (
+        map_coordinates(
+            mask.astype(np.float32),
+            places,
+            order=1,
+        )
+        > 0.5
+    )
     total = first.sum() + second.sum()
     return float(2 * (first & second).sum() / max(total, 1))

@@ -134,7 +134,11 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
         for week, at in shapes.placed.items():
             places[f"placed/{week!r}"] = at
         for name, values in places.items():
-            _compress(file, name, np.asarray(values, dtype=np.float32))
+            _compress(
+                file,
+                name,
+                np.asarray(values, dtype=np.float32),
+            )
         if shapes.tets is not None:
             _compress(file, "tets", shapes.tets)
         for name, values in shapes.sizes.items():

@@ -350,7 +350,13 @@ def read_surface_maps(
     """
     sides = SIDES if len(paths) == 2 else (None,)
     pieces = [
-        _surface_map(*files) for files in zip(paths, surface_paths, sides, strict=True)
+        _surface_map(*files)
+        for files in zip(
+            paths,
+            surface_paths,
+            sides,
+            strict=True,
+        )
     ]
     return merged(*(surface for surface, _ in pieces)), np.concatenate(
         [values for _, values in pieces]
@@ -813,7 +819,13 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
             path,
         )
         return vertices, faces, None, None
-    axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
+    axes = np.column_stack(
+        [
+            info["xras"],
+            info["yras"],
+            info["zras"],
+        ]
+    ).astype(float)
     # tkr RAS has the axes of a coronal volume, with columns to the left, rows down,
     # slices forward
     rotation = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

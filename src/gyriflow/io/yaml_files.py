@@ -200,7 +200,14 @@ def read_keys(path: AnyPath) -> dict[str, Any]:
 
 def write_yaml(path: AnyPath, content: Any) -> None:
     """Write plain dictionaries, lists and numbers, keys in their order."""
-    write_text(path, yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+    write_text(
+        path,
+        yaml.safe_dump(
+            content,
+            sort_keys=False,
+            allow_unicode=True,
+        ),
+    )
 
 
 class Schemes(Mapping[str, LabelScheme]):

@@ -135,7 +135,11 @@ def _first_hits(
     faces = np.empty(len(start), dtype=np.int64)
     distances = np.empty(len(start))
     for i, (origin, towards) in enumerate(
-        zip(start.astype(np.float32), direction.astype(np.float32), strict=True)
+        zip(
+            start.astype(np.float32),
+            direction.astype(np.float32),
+            strict=True,
+        )
     ):
         faces[i], distances[i], *_ = rays.intersectRay_first(
             origin, towards, 0.0, GAP_MM

@@ -310,7 +310,11 @@ def fit_norm(
     covariance = _covariance(model, rows, state) * np.outer(units, units)
     fit *= units
     scale = fit[size : size + model.scale_rows.shape[1]]
-    shared = _spread(scans, np.ones((len(values), 1)), 2).sum()
+    shared = _spread(
+        scans,
+        np.ones((len(values), 1)),
+        2,
+    ).sum()
     is_wide = is_positive and np.exp(model.scale_rows @ scale).max() > SKEWED_SCALE
     is_few = not has_skewness
     return WeeklyNorm(
@@ -552,7 +556,11 @@ def _scans(people: ArrayLike) -> _Scans:
     _, person, counts = np.unique(
         np.asarray(people), return_inverse=True, return_counts=True
     )
-    return _Scans(person, 1.0 / counts[person], 1.0 if counts.max() > 1 else None)
+    return _Scans(
+        person,
+        1.0 / counts[person],
+        1.0 if counts.max() > 1 else None,
+    )
 
 
 def _correlated(scans: _Scans, z: Floats) -> _Scans:

@@ -319,7 +319,15 @@ def region_metrics(
                 mean = np.nan
                 if areas[used].any():
                     mean = float(np.average(values[used], weights=areas[used]))
-                rows.append((side, name, record.mean_name, mean, record.unit))
+                rows.append(
+                    (
+                        side,
+                        name,
+                        record.mean_name,
+                        mean,
+                        record.unit,
+                    )
+                )
     return pd.DataFrame(
         rows, columns=["hemisphere", "region", "metric", "value", "unit"]
     )

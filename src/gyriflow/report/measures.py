@@ -62,9 +62,9 @@ class Tables:
 
     `quality`, `metrics` and `centiles` are as for `brain_rows`, `curves` and
     `differences` those of `metrics.atlas_curves`; `warnings` has the columns subject,
-    run, step, level, message. `runs` and `validation` are as for `page._scores_table`, None
-    if nothing was simulated; `intervals` those of the ensemble of the one prediction,
-    if any.
+    run, step, level, message. `runs` and `validation` are those of
+    `page._scores_table`, None if nothing was simulated; `intervals` those of the
+    ensemble of the one prediction, if any.
     """
 
     quality: pd.DataFrame

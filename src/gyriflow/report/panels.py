@@ -180,7 +180,11 @@ def panel_grid(
             sizes_in = [(part, block.heights_in[line]) for part in block_widths_in]
             panels = row.panels[block.columns]
             _draw_row(cells, row, panels, sizes_in, inches_per_mm)
-            _write_letters(cells[:per_row], letters, is_labelled=bool(row.label))
+            _write_letters(
+                cells[:per_row],
+                letters,
+                is_labelled=bool(row.label),
+            )
             if number == 0:
                 for axes, head in zip(cells, block_heads, strict=True):
                     _write(
@@ -480,7 +484,14 @@ def _draw_scale_bar(
     mean."""
     width, total = figure.get_size_inches()
     left, bottom = _EDGE_IN / width, (foot_in - 0.2) / total
-    axes = figure.add_axes((left, bottom, length * inches_per_mm / width, 0.04 / total))
+    axes = figure.add_axes(
+        (
+            left,
+            bottom,
+            length * inches_per_mm / width,
+            0.04 / total,
+        )
+    )
     axes.set_label("scale bar")
     axes.set_xlim(0, length)
     axes.axvspan(0, length, color="black", linewidth=0)

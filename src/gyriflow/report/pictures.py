@@ -605,7 +605,11 @@ def brain_regions(grid: Grid) -> Figure:
     for view in ROUND_VIEWS:
         for brain in grid:
             painted = _painted_regions(brain.halves, colours)
-            brain = replace(brain, row=f"{view} view", colours=painted)
+            brain = replace(
+                brain,
+                row=f"{view} view",
+                colours=painted,
+            )
             placed.append(replace(brain, view=VIEWS[view]))
     return _brain_grid(placed, legend=legend)
 

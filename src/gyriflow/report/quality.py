@@ -210,7 +210,13 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         PLANES.items(),
         strict=True,
     ):
-        points = np.empty((len(dots[up]), len(dots[right]), 3))
+        points = np.empty(
+            (
+                len(dots[up]),
+                len(dots[right]),
+                3,
+            )
+        )
         points[..., normal] = at[plane]
         points[..., right] = dots[right]
         points[..., up] = dots[up][:, None]
@@ -221,7 +227,11 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
         draw_outline(axes, brain.pial, plane, at[plane], PIAL_COLOUR)
         # all at one scale
         heights = sum(ends[up]) / 2 + np.array([-0.5, 0.5]) * tallest
-        axes.set(xlim=ends[right], ylim=heights, aspect="equal")
+        axes.set(
+            xlim=ends[right],
+            ylim=heights,
+            aspect="equal",
+        )
         axes.set_axis_off()
         title = f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm"
         axes.set_title(title, fontsize=6.5, pad=2)
@@ -311,7 +321,13 @@ def _draw_volumes(
         across = np.linspace(left, right, width)
         upward = np.linspace(bottom, top, height)
         style = {"colors": INNER_COLOUR, "linewidths": 0.6}
-        axes.contour(across, upward, inside, levels=[0.5], **style)
+        axes.contour(
+            across,
+            upward,
+            inside,
+            levels=[0.5],
+            **style,
+        )
 
 
 def _draw_views(

@@ -279,7 +279,11 @@ def render(
             )
         )
         place = middle + distance * np.array(view.towards)
-        plotter.camera_position = [tuple(place), tuple(middle), view.up]
+        plotter.camera_position = [
+            tuple(place),
+            tuple(middle),
+            view.up,
+        ]
         plotter.camera.parallel_projection = True
         plotter.camera.parallel_scale = half_extents_mm[1]
         plotter.renderer.ResetCameraClippingRange()

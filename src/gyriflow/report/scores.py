@@ -54,7 +54,11 @@ def validation_figure(
     """
     colours = run_colours(validation["run"], runs)
     simulations = validation.groupby(["run", "start"], sort=False)
-    figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
+    figure, panels = panel_figure(
+        len(COMPARED_MAPS),
+        per_row=2,
+        panel_in=2.5,
+    )
     for axes, measure in zip(panels, COMPARED_MAPS, strict=True):
         for number, ((run, _), rows) in enumerate(simulations):
             rows = rows.sort_values("week")

@@ -61,7 +61,13 @@ def draw_outline(
         )[:, 1:]
     ][..., [right, up]]
     style: dict[str, Any] = {"colors": colour, "linewidths": thickness}
-    axes.add_collection(LineCollection(list(segments), capstyle="round", **style))
+    axes.add_collection(
+        LineCollection(
+            list(segments),
+            capstyle="round",
+            **style,
+        )
+    )
 
 
 def _coronal_section(
@@ -77,7 +83,11 @@ def _coronal_section(
     )
     for name, values in fields.items():
         body.point_data[name] = values
-    middle = (0.0, float(np.median(positions[:, 1])), 0.0)
+    middle = (
+        0.0,
+        float(np.median(positions[:, 1])),
+        0.0,
+    )
     # one polygon per element, not triangles
     return body.slice(normal="y", origin=middle, generate_triangles=False)
 
@@ -155,7 +165,11 @@ def model_figure(elements: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) ->
             )
             axes.set_axis_off()
         _label_row(row[0], week_label(week))
-    for axes, title in zip(rows[0], titles, strict=True):
+    for axes, title in zip(
+        rows[0],
+        titles,
+        strict=True,
+    ):
         axes.set_title(title, fontsize=8)
     for column, top in enumerate(scales.values()):
         scale = ScalarMappable(Normalize(0, top), "YlGnBu")
@@ -259,7 +273,11 @@ def outlines_figure(grid: Grid) -> Figure:
             )
             axes.set_axis_off()
         _label_row(row[0], plane)
-    for axes, week in zip(panels[0], weeks, strict=True):
+    for axes, week in zip(
+        panels[0],
+        weeks,
+        strict=True,
+    ):
         axes.set_title(week_label(week), fontsize=8)
     foot = panels[-1, 0]
     start, bottom = foot.get_xlim()[0] + 2, low[PLANES["sagittal"][2]]

@@ -191,7 +191,11 @@ def _frame(
         )
         values[name] = _text(levels, "u1")
     places = np.round((mesh.vertices[vertices_kept] - low) / size * _POSITION_LEVELS)
-    return {"week": week, "positions": _text(places, "<u2"), "values": values}
+    return {
+        "week": week,
+        "positions": _text(places, "<u2"),
+        "values": values,
+    }
 
 
 def _text(values: NDArray, kind: str) -> str:

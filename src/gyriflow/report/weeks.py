@@ -105,7 +105,13 @@ def _weeks_chart(
                 weeks_at, low, high = (
                     rows[column].astype(float) for column in ("week", *layer.value)
                 )
-                axes.fill_between(weeks_at, low, high, linewidth=0, **layer.style)
+                axes.fill_between(
+                    weeks_at,
+                    low,
+                    high,
+                    linewidth=0,
+                    **layer.style,
+                )
             elif len(rows):
                 axes.plot(
                     rows["week"],
@@ -213,7 +219,14 @@ def _group_shades(
     )
     entries: list[Artist] = []
     for name, colour in group_colours.items():
-        entries.append(star(name, colour, marker="o", markersize=5))
+        entries.append(
+            star(
+                name,
+                colour,
+                marker="o",
+                markersize=5,
+            )
+        )
     shades = {
         brain: group_colours[name]
         for brain, name in groups.items()
@@ -337,13 +350,23 @@ def intervals_figure(ensemble: pd.DataFrame) -> Figure:
     """
     rows, titles = _shown(ensemble, Shown.INTERVALS)
     run = {"color": RUN_COLOURS[0], "marker": "o", "markersize": 2.5}
-    brain = {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""}
+    brain = {
+        "color": OBSERVED_COLOUR,
+        "marker": "*",
+        "markersize": 7,
+        "linestyle": "",
+    }
     layers = [
         Layer(rows, {"color": NEUTRAL_COLOUR}, ("low", "high")),
         Layer(rows, run, "run"),
         Layer(rows, brain, "observed_value"),
     ]
-    figure, _ = _weeks_chart(titles, layers, rows["week"], per_row=2)
+    figure, _ = _weeks_chart(
+        titles,
+        layers,
+        rows["week"],
+        per_row=2,
+    )
     entries = run_entries({"run": RUN_COLOURS[0]})
     entries.append(Patch(color=NEUTRAL_COLOUR, label="interval"))
     if ensemble["observed_value"].notna().any():
@@ -494,8 +517,17 @@ def regions_chart(
                 "linestyle": lines[str(run)],
             }
             layers.append(Layer(part, style | {"linewidth": 1.1}))
-    figure, panels = _weeks_chart(titles, layers, rows["week"], foot_in=0.75)
-    panels.pop("asymmetry").axhline(0, color=MUTED_COLOUR, linewidth=0.8)
+    figure, panels = _weeks_chart(
+        titles,
+        layers,
+        rows["week"],
+        foot_in=0.75,
+    )
+    panels.pop("asymmetry").axhline(
+        0,
+        color=MUTED_COLOUR,
+        linewidth=0.8,
+    )
     for name, axes in panels.items():
         # signed numbers and ratios are not compared with 0
         if not METRICS[name].is_signed and METRICS[name].unit != "1":
@@ -845,7 +877,13 @@ def influence_spectra(
             max(len(labels), 2),
         )
     )
-    colours = dict(zip(labels.values(), shades, strict=False))
+    colours = dict(
+        zip(
+            labels.values(),
+            shades,
+            strict=False,
+        )
+    )
     spectra = pd.concat([*simulated, *observed])
     by_proxy = {
         proxy: _band_rows(spectra[spectra["week"] == week], FOLD_BANDS, proxy)
@@ -873,7 +911,11 @@ def influence_spectra(
             bars = axes.bar(
                 places, run_rows["relative_power"], width=0.92 * width, color=colour
             )
-            for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
+            for bar, trusted in zip(
+                bars,
+                run_rows["trusted"],
+                strict=True,
+            ):
                 if not trusted:
                     bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
         for _, row in side[side["run"] == OBSERVED].iterrows():

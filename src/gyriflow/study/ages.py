@@ -193,7 +193,11 @@ def read_ages(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanAg
     be read or two differ."""
     weeks = []
     for age in ages:
-        week, problem = read_week(age.text, age.column.unit, notation)
+        week, problem = read_week(
+            age.text,
+            age.column.unit,
+            notation,
+        )
         problem = age.column.problem or problem
         if week is None or problem:
             return ScanAge(

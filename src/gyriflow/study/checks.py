@@ -154,7 +154,11 @@ def _starts(config: Config) -> Problems:
     """Yield problems of the start brains of the study and of its runs."""
     yield from _start_problems(config.start, config, ("start",))
     for name, run in config.runs.items():
-        yield from _start_problems(run.start, config, ("runs", name, "start"))
+        yield from _start_problems(
+            run.start,
+            config,
+            ("runs", name, "start"),
+        )
     if config.start is None and any(run.start is None for run in config.runs.values()):
         yield KeyProblem(
             "is missing; it is the id of the brain that is folded, a list of ids,"
@@ -468,7 +472,13 @@ def _varied_problems(
         except ValidationError as error:
             problems = problems_in(error, Run)
         else:
-            problems = list(value_problems(run, run.end_week - 1e-9, {}))
+            problems = list(
+                value_problems(
+                    run,
+                    run.end_week - 1e-9,
+                    {},
+                )
+            )
         for problem in problems:
             name = ".".join(map(str, problem.key))
             # a key that is not varied is one of the base

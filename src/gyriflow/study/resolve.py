@@ -176,7 +176,13 @@ def _left_out(
                 )
                 rows.append(row)
     for scan, facts in config.left_out.items():
-        rows.append(LeftOut(brain=scan, why="cannot be used", **facts))
+        rows.append(
+            LeftOut(
+                brain=scan,
+                why="cannot be used",
+                **facts,
+            )
+        )
     return rows
 
 
@@ -500,7 +506,11 @@ def _compared(known: _Brains, simulation: Simulation) -> list[Comparison]:
                 if brain.week < week and brain.shape is None:
                     earlier.append(brain)
             adjacent = max(earlier, key=lambda brain: brain.week)
-            row = replace(row, observed=observed[0].id, adjacent=adjacent.id)
+            row = replace(
+                row,
+                observed=observed[0].id,
+                adjacent=adjacent.id,
+            )
         rows.append(row)
     return rows
 

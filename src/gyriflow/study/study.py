@@ -321,13 +321,21 @@ class Study:
             pair = (self.brains[link.earlier], self.brains[link.later])
             sources = [registered_source(self.config, brain) for brain in pair]
             by_cortex = all(source.scheme.cortex for source in sources)
-            for brain, is_posed in zip(pair, link.posed, strict=True):
+            for brain, is_posed in zip(
+                pair,
+                link.posed,
+                strict=True,
+            ):
                 if is_posed:
                     measured = "measured" if brain.thickness_of else "typical"
                     cortex = "white" if brain.white_files else measured
                     groups.setdefault((cortex, by_cortex), []).append(brain.id)
         return [
-            {"ids": [*dict.fromkeys(ids)], "cortex": cortex, "by_cortex": by_cortex}
+            {
+                "ids": [*dict.fromkeys(ids)],
+                "cortex": cortex,
+                "by_cortex": by_cortex,
+            }
             for (cortex, by_cortex), ids in groups.items()
         ]
 
