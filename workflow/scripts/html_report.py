@@ -1,5 +1,6 @@
 """Write the report of a study and the pages of its brains, each a single HTML file."""
 
+import re
 from pathlib import Path
 
 import yaml
@@ -14,7 +15,6 @@ from gyriflow.report.measures import Tables
 from gyriflow.report.page import (
     brain_page,
     hide_paths,
-    observed_caption,
     page_figures,
     report_page,
     study_page,
@@ -42,7 +42,8 @@ def _read_caption(path):
     """Return title and caption of a figure; the title is underlined."""
     title, _, caption = read_text(path).split("\n", 2)
     if not files.runs:
-        caption = observed_caption(caption)
+        # without the paragraphs on simulated brains
+        caption = re.sub(r"(?s)(^|\n\n)Simulated brains: .*?(?=\n\n|$)", "", caption)
     return {"title": title, "caption": caption.strip()}
 
 

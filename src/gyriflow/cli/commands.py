@@ -75,11 +75,8 @@ class InputPath(click.Path):
             # settings take a while to import
             from ..settings.base import hint_for_missing
 
-            self.fail(
-                f"{error.message}{hint_for_missing(Path(value))}",
-                param,
-                ctx,
-            )
+            hint = hint_for_missing(Path(value))
+            self.fail(f"{error.message.rstrip('.')}{hint}.", param, ctx)
 
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -804,10 +801,16 @@ def status(directory: Path) -> None:
     help="Print the path of the report instead of opening it.",
 )
 def view(directory: Path, only_print: bool) -> None:
-    """Open the report of a study."""
-    from ..running.status import find_report
+    """Open the report of the study in a working directory or an export."""
+    from ..running.status import REPORT_PAGE
 
-    report = find_report(directory)
+    pages = directory / REPORT_PAGE, directory / "report" / REPORT_PAGE.name
+    report = next(filter(Path.is_file, pages), None)
+    if report is None:
+        raise InputError(
+            "has no report yet", path=directory.resolve(), expected=str(REPORT_PAGE)
+        )
+    report = report.absolute()
     click.echo(report)
     if not only_print:
         click.launch(str(report))

@@ -725,7 +725,7 @@ class ElasticFit:
         )
         if strain is not None:
             logs = unpacked(problem.points.interpolation @ strain[self._cells])
-            inverse = inverse_exponential(logs)
+            inverse = _inverse_exponential(logs)
         # as one body, also if its parts are not connected
         one_part = np.zeros_like(domain.part)
         moduli = np.full(
@@ -855,7 +855,7 @@ def _exponential(logs: Floats, limit: float) -> Floats:
     )
 
 
-def inverse_exponential(logs: Floats) -> Floats:
+def _inverse_exponential(logs: Floats) -> Floats:
     """Return exp(−L) of small (..., 3, 3) matrices to fourth order in L: to 1e-7 for
     growth of a tenth."""
     result = np.eye(3) - logs / 4

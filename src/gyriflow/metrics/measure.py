@@ -1,8 +1,8 @@
 """Measure a brain: the metrics of its surfaces and the maps over them.
 
 A metric is an entry of `size_metrics` (any surface), `folding_metrics` (one hemisphere
-or both), `thickness_metrics` or `_spectrum_metrics` (one hemisphere); a map is an entry
-of `measure_folds` or added by `measure_brain`. Each has a record in
+or both), `_thickness_metrics` or `_spectrum_metrics` (one hemisphere); a map is an
+entry of `measure_folds` or added by `measure_brain`. Each has a record in
 `gyriflow.quantities`.
 """
 
@@ -229,7 +229,7 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     }
 
 
-def thickness_metrics(values: Floats, areas: Floats) -> Metrics:
+def _thickness_metrics(values: Floats, areas: Floats) -> Metrics:
     """Return the metrics of thickness at (n,) vertices, NaN where it was not measured,
     weighted by area.
 
@@ -263,7 +263,7 @@ def _folding_and_thickness(
     sides: Sequence[Folds], thickness: Sequence[Floats]
 ) -> Metrics:
     areas = np.concatenate([vertex_areas(side.mesh) for side in sides])
-    return folding_metrics(sides) | thickness_metrics(np.concatenate(thickness), areas)
+    return folding_metrics(sides) | _thickness_metrics(np.concatenate(thickness), areas)
 
 
 def _area_ratio(whole: Metrics, mean_curvature: float) -> Metrics:

@@ -562,21 +562,17 @@ def brain_content(
     every = _brain_table(metrics, tables.centiles, tables.differences, doubts)
     sheet = [_doubtful_title(name, doubts) for name in metrics_shown(Shown.SHEET)]
     differences = tables.differences[tables.differences["subject"] == key]
-    curves = tables.curves[tables.curves["atlas"].isin(differences["atlas"])]
+    atlases = differences["atlas"].unique()
+    curves = tables.curves[tables.curves["atlas"].isin(atlases)]
     names = set(metrics["metric"])
     return {
         "usual": html_table(every.loc[[name for name in sheet if name in every.index]]),
-        "atlases": cited_atlases(differences),
+        "atlases": [cited_atlas(str(atlas)) for atlas in atlases],
         "has_parts": "volume_tissue" in names,
         "has_thickness": "mean_thickness" in names,
         "week_errors": _week_errors(curves, brain["week"]),
         "numbers": html_table(every),
     }
-
-
-def cited_atlases(differences: pd.DataFrame) -> list[str]:
-    """Return the atlases of a table of differences, with their citations."""
-    return [cited_atlas(str(name)) for name in differences["atlas"].unique()]
 
 
 def prediction_content(

@@ -28,13 +28,12 @@ from ..settings.terms import (
     rounded_elements,
     run_names,
 )
-from .labels import atlas_label, plain, week_label
+from .labels import atlas_label, cited_atlas, plain, week_label
 from .measures import (
     Tables,
     accuracy_sentence,
     brain_content,
     brain_rows,
-    cited_atlases,
     prediction_content,
 )
 from .tables import VERDICTS, html_table
@@ -50,8 +49,6 @@ NOT_COMPARED = (
     "No simulation is compared: an observed brain of the same population and week is"
     " missing."
 )
-SIMULATED_CAPTION = "Simulated brains: "
-"""Beginning of a paragraph of a caption that is left out if nothing was simulated."""
 MAX_PENETRATION_MM = 0.5
 """Penetration of the contact planes at the start above which the report warns."""
 
@@ -135,13 +132,14 @@ def study_page(
     observed = tables.centiles[tables.centiles["run"] == OBSERVED]
     own = observed[observed["subject"].isin([brain["id"] for brain in brains])]
     summary = [figure for figure in figures if figure["first"]]
+    atlases = tables.differences["atlas"].unique()
     page: dict[str, Any] = {
         "title": "Measured cortical folding",
         "verdict": _quality_verdict(tables.quality),
         "prediction": prediction,
         "folded": [],
         "runs": "",
-        "atlases": cited_atlases(tables.differences),
+        "atlases": [cited_atlas(str(atlas)) for atlas in atlases],
         "has_norm": bool(own["expected"].notna().any()),
         "brains": brain_rows(brains, replace(tables, centiles=observed), pictures),
         "pictures": pictures,
@@ -307,12 +305,6 @@ def caption_html(caption: str) -> Markup:
     }
     parts = publish_parts(caption, writer="html5", settings_overrides=settings)
     return Markup(parts["body"])
-
-
-def observed_caption(caption: str) -> str:
-    """Return a caption in reStructuredText without its paragraphs on simulated
-    brains."""
-    return re.sub(rf"(?s)(^|\n\n){SIMULATED_CAPTION}.*?(?=\n\n|$)", "", caption)
 
 
 def _scores_table(

@@ -104,17 +104,6 @@ def format_progress(step: Mapping[str, Any]) -> str:
     return f"GW {step['week']:.2f} of {step['end_week']:g}"
 
 
-def find_report(directory: Path) -> Path:
-    """Return the report of the study in a working directory or an export; InputError if
-    there is none."""
-    for report in (directory / REPORT_PAGE, directory / "report" / REPORT_PAGE.name):
-        if report.is_file():
-            return report.absolute()
-    raise InputError(
-        "has no report yet", path=directory.resolve(), expected=str(REPORT_PAGE)
-    )
-
-
 def _planned(directory: Path) -> list[tuple[str, str]]:
     """Return run and start brain of each planned simulation of `runs`."""
     # there is no plan before the first run, or one of another version

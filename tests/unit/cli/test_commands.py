@@ -418,7 +418,7 @@ def test_a_brain_is_predicted_from_its_surfaces(
         # labels are alone
         ([LABELS, "brain.stl"], ["parcellation.nii.gz", "brain.stl"]),
         ([LABELS, *whites("brain.stl")], ["parcellation.nii.gz", "brain.stl"]),
-        (["brain.nii"], ["brain.nii", "there is brain.stl"]),
+        (["brain.nii"], ["brain.nii", "brain.stl"]),
     ],
 )
 def test_files_that_are_not_one_brain_to_predict_are_refused(

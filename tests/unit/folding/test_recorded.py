@@ -203,7 +203,6 @@ def test_numbers_of_tensors(recorded):
             "left logs": stretches.log_stretch(flat, left=True),
             "left": stretches.left_stretch(flat, 0.4),
             "relaxed": stretches.relaxed(stretches.left_stretch(flat), 0.3, 1.2),
-            "logarithm": elastic_fit.inverse_exponential(logs),
         },
         rtol=1e-3,
     )
