@@ -394,13 +394,10 @@ def _find_start(
     index = np.argwhere(earlier.cerebrum > 0.01)
     every = max(1, len(index) // N_POINTS)
     index = index[::every]
-    points = transform_points(index, earlier.affine)
-
-    def start_of(turn: Floats) -> Floats:
-        return motion(scale * turn, second - scale * turn @ first)
+    offsets = transform_points(index, earlier.affine) - first
 
     def difference(turn: Floats) -> float:
-        moved = transform_points(points, start_of(turn))
+        moved = second + scale * offsets @ turn.T
         places = voxel_index(moved, later.affine)
         means = []
         for name, (fixed, moving) in volumes.items():
@@ -416,7 +413,7 @@ def _find_start(
         turn = min(nearby.as_matrix() @ turn, key=difference)
     if difference(turn) >= MAX_ROTATED_SHARE * difference(np.eye(3)):
         turn = np.eye(3)
-    return turn, start_of(turn)
+    return turn, motion(scale * turn, second - scale * turn @ first)
 
 
 def _centre_and_size(brain: Channels) -> tuple[Floats, float]:
