@@ -313,91 +313,6 @@ def _is_running(process: psutil.Process) -> bool:
     return False
 
 
-def _brains_to_refuse(failures: Sequence[Message]) -> dict[str, str]:
-    """Return the causes of the brains that the study is finished without, by id: those
-    with a failed step, from the errors of steps."""
-    causes: dict[str, str] = {}
-    for failure in failures:
-        # a failed run refuses no brain
-        if failure.brain and not failure.run:
-            causes.setdefault(failure.brain, failure.first_line)
-    return causes
-
-
-def _finish_without(
-    refused: dict[str, str],
-    arguments: Sequence[str],
-    directory: Path,
-) -> int:
-    """Run the same call again without the refused brains, unless it asks for their
-    files.
-
-    Return the exit code of an interrupted run, or else 0.
-    """
-    if any(
-        argument.startswith(f"results/brains/{brain}/")
-        for argument in arguments
-        for brain in refused
-    ):
-        return 0
-    path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
-    write_json(path, refused)
-    again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
-    environment = os.environ | {REFUSED_FILE_VAR: str(path)}
-    # if this process is killed, the second pass keeps the directory locked; Windows
-    # hands on no files
-    files = list(_held_locks.values()) if sys.platform != "win32" else []
-    process = subprocess.Popen(
-        again,
-        env=environment,
-        stdout=sys.stdout,
-        stderr=sys.stderr,
-        pass_fds=[file.fileno() for file in files],
-    )
-    try:
-        process.wait()
-    except KeyboardInterrupt:
-        _stop_jobs()
-        return process.wait()
-    finally:
-        path.unlink(missing_ok=True)
-    return 0
-
-
-def refused_brains() -> dict[str, str]:
-    """Return the causes of the brains that an earlier pass of this call refused, by
-    id, for the rules (`common.smk`)."""
-    path = os.environ.get(REFUSED_FILE_VAR)
-    return read_json(path) if path else {}
-
-
-def _exit_code(
-    code: int,
-    failures: Sequence[Message],
-    directory: Path,
-) -> int:
-    """Return the exit code of a run that failed with Snakemake's `code`: that of the
-    first error of a step that has one; report a full disk."""
-    code = next(
-        filter(None, (failure.exit_code for failure in failures)),
-        code,
-    )
-    if code == 1 and (full := full_disk(directory)):
-        print(
-            f"gyriflow: {directory.resolve()}: {full}, then run the same command again",
-            file=sys.stderr,
-        )
-        return StorageError.exit_code
-    return code
-
-
-def full_disk(directory: Path) -> str:
-    """Return that the disk of a directory is full and what to do, or "" if it is
-    not."""
-    is_full = shutil.disk_usage(directory).free < MIN_FREE_BYTES
-    return "the disk is full. Free some space" if is_full else ""
-
-
 def _set_cache(directory: Path) -> None:
     """Let libraries keep their caches with a study if the home folder cannot be written
     or is unknown."""
@@ -730,6 +645,91 @@ def _run_workflow(
         if brains and (interrupted := _finish_without(brains, arguments, directory)):
             return interrupted
     return _exit_code(code, failures, directory)
+
+
+def _brains_to_refuse(failures: Sequence[Message]) -> dict[str, str]:
+    """Return the causes of the brains that the study is finished without, by id: those
+    with a failed step, from the errors of steps."""
+    causes: dict[str, str] = {}
+    for failure in failures:
+        # a failed run refuses no brain
+        if failure.brain and not failure.run:
+            causes.setdefault(failure.brain, failure.first_line)
+    return causes
+
+
+def _finish_without(
+    refused: dict[str, str],
+    arguments: Sequence[str],
+    directory: Path,
+) -> int:
+    """Run the same call again without the refused brains, unless it asks for their
+    files.
+
+    Return the exit code of an interrupted run, or else 0.
+    """
+    if any(
+        argument.startswith(f"results/brains/{brain}/")
+        for argument in arguments
+        for brain in refused
+    ):
+        return 0
+    path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
+    write_json(path, refused)
+    again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
+    environment = os.environ | {REFUSED_FILE_VAR: str(path)}
+    # if this process is killed, the second pass keeps the directory locked; Windows
+    # hands on no files
+    files = list(_held_locks.values()) if sys.platform != "win32" else []
+    process = subprocess.Popen(
+        again,
+        env=environment,
+        stdout=sys.stdout,
+        stderr=sys.stderr,
+        pass_fds=[file.fileno() for file in files],
+    )
+    try:
+        process.wait()
+    except KeyboardInterrupt:
+        _stop_jobs()
+        return process.wait()
+    finally:
+        path.unlink(missing_ok=True)
+    return 0
+
+
+def refused_brains() -> dict[str, str]:
+    """Return the causes of the brains that an earlier pass of this call refused, by
+    id, for the rules (`common.smk`)."""
+    path = os.environ.get(REFUSED_FILE_VAR)
+    return read_json(path) if path else {}
+
+
+def _exit_code(
+    code: int,
+    failures: Sequence[Message],
+    directory: Path,
+) -> int:
+    """Return the exit code of a run that failed with Snakemake's `code`: that of the
+    first error of a step that has one; report a full disk."""
+    code = next(
+        filter(None, (failure.exit_code for failure in failures)),
+        code,
+    )
+    if code == 1 and (full := full_disk(directory)):
+        print(
+            f"gyriflow: {directory.resolve()}: {full}, then run the same command again",
+            file=sys.stderr,
+        )
+        return StorageError.exit_code
+    return code
+
+
+def full_disk(directory: Path) -> str:
+    """Return that the disk of a directory is full and what to do, or "" if it is
+    not."""
+    is_full = shutil.disk_usage(directory).free < MIN_FREE_BYTES
+    return "the disk is full. Free some space" if is_full else ""
 
 
 if __name__ == "__main__":
