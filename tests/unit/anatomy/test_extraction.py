@@ -155,3 +155,25 @@ def test_a_bridge_is_cut_though_what_it_joins_meets_far_away_only():
     mask[8, 140, 8:12] = True
     _, counts = make_simple(field(mask))
     assert (counts["handles_left"], counts["voxels_cut_from_bridges"]) == (0, 1)
+
+
+@pytest.mark.parametrize("case", ["rough labels", "a slit that pierces the mask"])
+def test_what_is_no_slit_stays_as_smoothing_leaves_it(case):
+    mask = np.zeros((40, 40, 40), dtype=bool)
+    mask[8:32, 8:32, 8:32] = True
+    if case == "rough labels":
+        mask[8, 8:32, 8:32] = np.random.default_rng(0).random((24, 24)) > 0.2
+    else:
+        mask[20, 14:26, :] = False
+    field = smooth_mask(mask, 1.0)
+    same, reopened = remove_bridges(mask, field)
+    assert reopened == 0
+    np.testing.assert_array_equal(same, field)
+
+
+def test_cavities_are_filled_and_the_surface_is_a_sphere(ball):
+    hollow = ball.copy()
+    hollow[14:20, 14:20, 14:20] = False
+    field, report = make_simple(smooth_mask(hollow, 1.0))
+    assert report["voxels_filled"] > 100
+    assert euler_number(isosurface(field, np.eye(4))) == 2

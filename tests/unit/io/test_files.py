@@ -6,6 +6,7 @@ import os
 
 import nibabel as nib
 import numpy as np
+import pandas as pd
 import pytest
 from configurations import refusal
 from facts import Facts
@@ -18,8 +19,10 @@ from gyriflow.io.files import (
     contents,
     files_below,
     read_json,
+    read_table,
     read_text_table,
     write_json,
+    write_table,
 )
 from gyriflow.io.origins import joined_contents, origin_key, present_key
 from gyriflow.io.surfaces import read_surface, write_surface
@@ -305,3 +308,18 @@ def test_a_key_is_the_same_from_contents_that_are_known_already(tmp_path):
     assert origin_key(described, known) == present_key(described)
     (folder / "b").unlink()
     assert present_key(described) is None
+
+
+NAMES = ["021", "7", "1e5", "NA", "None", "true", "1.0", "2024-01-01", "-", "nan"]
+TEXTS = ("subject", "run", "region", "observed", "start", "series", "page")
+
+
+@pytest.mark.parametrize("names", [NAMES, *([name] * 2 for name in NAMES)])
+def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path, names):
+    table = dict.fromkeys(TEXTS, names)
+    table["week"] = [21.25 + number for number in range(len(names))]
+    table["explained"] = [week % 2 > 1 for week in table["week"]]
+    write_table(tmp_path / "a.csv", pd.DataFrame(table).assign(value=np.nan, unit=""))
+    back = read_table(tmp_path / "a.csv")
+    assert back[[*table]].to_dict("list") == table
+    assert back[["value", "unit"]].isna().all(axis=None)

@@ -245,3 +245,16 @@ def test_labels_of_regions_without_a_name_are_refused() -> None:
     labels = np.where(mesh.vertices[:, 2] > 0, 7, 9)
     with pytest.raises(InputError, check=Facts("left", 9)):
         region_metrics({"left": mesh}, {"left": {}}, {"left": labels}, {7: "top"})
+
+
+def test_surfaces_that_cut_each_other_are_counted() -> None:
+    left, right = (sphere(20.0, 3, (x, 0, 0)) for x in (-18.0, 18.0))
+    metrics = measure_brain(
+        merged(left, right), left, right, curvature_radius_mm=6.0, spangy_modes=10
+    )
+    # the two spheres meet in a circle of radius √(20² − 18²), which at most a face or
+    # two per edge length cross
+    circle = 2 * np.pi * np.sqrt(20.0**2 - 18.0**2)
+    assert circle / 3.0 < value(metrics, "whole", "crossing_faces") < 8 * circle / 3.0
+    sides = [value(metrics, side, "crossing_faces") for side in ("left", "right")]
+    assert sides == [0, 0]
