@@ -211,7 +211,7 @@ def predicted_study(
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
     sides = entry.get("hemispheres", {}).items()
     names = ", ".join(f"{side} {path}" for side, path in sides) or files[0]
-    given = entry.get("scheme", "surfaces")
+    given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
     text = yaml.safe_dump(config, sort_keys=False)
     return text, f"{entry['id']}: {names} ({given}), {span}"
 

@@ -88,7 +88,8 @@ def surface_space_structure(
                 remedy=AGAIN,
             )
         vertices, faces, space, structure = read(path)
-    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or not faces.size:
+    is_empty = not vertices.size or not faces.size
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,) or is_empty:
         shapes = (
             f"points of shape {vertices.shape}, faces of shape {faces.shape}"
             if faces.size

@@ -52,10 +52,13 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
     target, way = _project(straight, surface)
     middles = way & (np.arange(len(way)) >= len(mesh.vertices))
     result, left = _move(straight, target, middles, _are_unsound)
+    outer, _ = tetrahedra.boundary_faces(straight)
+    n_middles = np.count_nonzero(np.unique(outer) >= len(mesh.vertices))
     log.info(
-        "quadratic elements: %d nodes on middles of outer edges on the surface, least"
-        " ratio of Jacobians %.2f",
+        "quadratic elements: %d of %d nodes on middles of outer edges on the surface,"
+        " least ratio of Jacobians %.2f",
         left.sum(),
+        n_middles,
         jacobian_ratios(result).min(),
     )
     return result

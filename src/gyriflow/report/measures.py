@@ -195,7 +195,7 @@ def _brain_table(
     the columns hemisphere, metric, value, unit, of this brain; `centiles`, of the
     study, subject, run, hemisphere, metric, value, expected, z, centile, flag;
     `differences` are those of `metrics.atlas_curves`, of the study; `doubts` the output
-    of `doubtful_metrics`.
+    of `_doubtful_metrics`.
     """
     rows = _reported(metrics).assign(name=_named)
     wide = rows.pivot_table("value", "name", "hemisphere").reindex(
@@ -310,7 +310,7 @@ def brain_rows(
     with the cause or the warnings.
 
     Numbers are by title of the metric, each with the texts below it: doubts about it,
-    and its `centile_text` or else its differences from atlases. Brains have id, week,
+    and its `_centile_text` or else its differences from atlases. Brains have id, week,
     population, source, licence, covariates and whether they are synthetic, as
     configured. The table `quality` has the columns subject, verdict, cause, warnings.
     `linked` are the ids of the brains whose source is on a page of their own.
@@ -516,12 +516,9 @@ def _accuracy_table(accuracy: Mapping[str, Any]) -> pd.DataFrame:
     """
     table: dict[Any, dict[str, str]] = {}
     every = pd.DataFrame(accuracy["rows"])
-    # predictions first
-    every = every.sort_values("model", key=lambda models: models != "run")
-    for (horizon, model), rows in every.groupby(
-        ["horizon", "model"],
-        sort=False,
-    ):
+    # by horizon, the prediction first
+    every["is_simpler"] = every["model"] != "run"
+    for (horizon, _, model), rows in every.groupby(["horizon", "is_simpler", "model"]):
         row = table.setdefault(horizon, {})
         distance, r = (
             _range_text(rows["distance_mm"]),

@@ -194,7 +194,9 @@ def colour_scale(
         colormap, [tuple(shade) for shade in shades]
     )
     colours.colorbar_extend = "max" if cut else "neither"  # type: ignore[assignment]
-    return ScalarMappable(Normalize(low, high), colours)
+    # a map with one value has no range
+    top = high if high > low else low + 1.0
+    return ScalarMappable(Normalize(low, top), colours)
 
 
 def paint(values: Floats, scale: ScalarMappable) -> Floats:
@@ -233,7 +235,8 @@ def render(
     surface.point_data.active_normals = vertex_normals(mesh)
     is_by_vertex = len(colours) == len(mesh.vertices)
     attributes = surface.point_data if is_by_vertex else surface.cell_data
-    attributes["colour"] = np.round(255 * colours).astype(np.uint8)
+    levels = np.clip(np.round(255 * np.asarray(colours)), 0, 255)
+    attributes["colour"] = levels.astype(np.uint8)
     plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
     with closing(plotter):
         plotter.set_background("white")  # type: ignore[arg-type]

@@ -35,6 +35,7 @@ from pydantic_core import (
 from pydantic_core.core_schema import tagged_union_schema
 
 from ..errors import InputError
+from ..formats import ALL_SUFFIXES
 
 PROBLEM = "problem"
 """Type of the errors whose message already contains the value found."""
@@ -377,21 +378,50 @@ def hint_for_missing(path: Path) -> str:
                 return f"; it is a link to {path.readlink()}, which leads back to it"
             return f"; it is a link to {path.readlink()}, which does not exist"
         if path.is_dir():
-            names = sorted(file.name for file in path.iterdir())
-            return f"; it is a folder{_listed(' with', names)}; expected a file"
+            content = _listed(" with", sorted(path.iterdir()))
+            return f"; it is a folder{content}; expected a file"
         absent = [folder for folder in path.parents if not folder.exists()]
         if absent:
             return f"; there is no folder {absent[-1]}"
-        files = {file.name.lower(): file.name for file in path.parent.iterdir()}
-        similar = difflib.get_close_matches(path.name.lower(), files)
-        return _listed("; there is", [files[name] for name in similar])
+        return _listed("; there is", _named_alike(path))
     except OSError:
         return ""
 
 
-def _listed(words: str, names: Sequence[str]) -> str:
-    if not names:
+def _named_alike(path: Path) -> list[Path]:
+    """Return the files next to a missing one with its name, but for ending, case and
+    spaces, or else for numbers."""
+    files = sorted(path.parent.iterdir())
+    stem = _stem(path.name)
+    same = [file for file in files if _stem(file.name) == stem]
+    if same:
+        return same
+    return [
+        file
+        for file in files
+        if _without_numbers(_stem(file.name)) == _without_numbers(stem)
+    ]
+
+
+def _stem(name: str) -> str:
+    name = name.strip().lower()
+    endings = [ending for ending in ALL_SUFFIXES if name.endswith(ending)]
+    longest = max(endings, key=len, default="")
+    return name.removesuffix(longest)
+
+
+def _without_numbers(stem: str) -> str:
+    # such as the week
+    return re.sub(r"\d+(\.\d+)?", "#", stem)
+
+
+def _listed(words: str, files: Sequence[Path]) -> str:
+    if not files:
         return ""
-    more = ", …" if len(names) > MAX_NAMES else ""
-    # in quotes, as a name may end with a space
-    return f"{words} {', '.join(map(repr, names[:MAX_NAMES]))}{more}"
+    names = []
+    for file in files[:MAX_NAMES]:
+        has_spaces = file.name != file.name.strip()
+        names.append(repr(file.name) if has_spaces else file.name)
+    if len(files) > MAX_NAMES:
+        names.append("…")
+    return f"{words} {', '.join(names)}"

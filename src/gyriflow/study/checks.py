@@ -276,12 +276,12 @@ def _growth(config: Config) -> Problems:
     """Yield problems between brains and growth series."""
     settings = config.growth
     lists: dict[Key, Sequence[str]] = {}
-    if isinstance(settings.brains, Mapping):
+    if settings.brains and isinstance(settings.brains, Mapping):
         for name, ids in settings.brains.items():
             everyone = [brain.id for brain in config.brains]
             lists["growth", "brains", name] = everyone if ALL in ids else ids
     elif settings.brains is not None:
-        lists["growth", "brains"] = settings.brains
+        lists["growth", "brains"] = list(settings.brains)
     unknown: list[KeyProblem] = []
     for key, names in lists.items():
         unknown += _unknown(names, config, key)
@@ -457,13 +457,12 @@ def _varied_problems(
 ) -> Problems:
     """Yield problems of runs that differ from a base; `sections` has where each varied
     key is."""
-    for name, section in sections.items():
-        if name in NOT_VARIED:
-            yield KeyProblem(
-                "cannot be varied; choose another base",
-                (section, name),
-            )
-            return
+    fixed = [name for name in sections if name in NOT_VARIED]
+    for name in fixed:
+        text = "cannot be varied; leave it out, or choose another base"
+        yield KeyProblem(text, (sections[name], name))
+    if fixed:
+        return
     for values in changes:
         try:
             run = changed(base, values)

@@ -322,7 +322,7 @@ def predicted(weeks: float, rows=TESTS, advantage="", **more) -> dict:
         "atlas_week": 30,
         "population": "well",
         "atlas": atlas | {"licence": licence | {"accept": True}},
-        "accuracy": ACCURACY | {"rows": rows.to_dict("records")},
+        "accuracy": ACCURACY | {"rows": rows[::-1].to_dict("records")},
         "tests": tests | {"advantage": advantage},
         "kept": frame(KEPT),
         "surfaces": ["results/a.surf.gii"],

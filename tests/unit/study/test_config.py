@@ -65,12 +65,13 @@ def test_all_mistakes_of_keys_are_named_at_once_and_then_all_between_keys():
     file:///scans/week24.nii.gz | ["file://"]
     https://site/week24.nii.gz | ["file://"]
     scans\\week24.nii.gz | [write / between folders]
-    scans | ["folder with 'week24.nii.gz', 'week25.nii'"]
+    scans | ["folder with week24.nii.gz, week25.nii"]
     scan/week24.nii.gz | ["no folder {}/scan"]
-    "scans/week24.nii.gz " | ["there is 'week24.nii.gz'"]
-    scans/week24.nii | [week24.nii.gz]
-    scans/WEEK24.NII.GZ | ["there is 'week24.nii.gz'"]
-    scans/week26.mgz | [week24.nii.gz, week25.nii]
+    "scans/week24.nii.gz " | [there is week24.nii.gz]
+    scans/week24.nii | [there is week24.nii.gz]
+    scans/Week24.nii.gz | [there is week24.nii.gz]
+    scans/week25.nii.gz | [there is week25.nii]
+    scans/week26.mgz | ["there is week24.nii.gz, week25.nii"]
     lost.nii.gz | ["a link to {}/nowhere.nii.gz"]
     """,
 )

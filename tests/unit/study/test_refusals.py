@@ -87,6 +87,7 @@ def folder(tmp_path):
     growth | {brains: {n: [v21, x], m: [v21, v22]}} | brains.n | [x, "v21, v22, s21"]
     growth | {brains: {n: [v21, s21], m: [v21, v22]}} | brains.n | [1]
     growth | {brains: []} | brains | [0]
+    growth | {brains: {}} | brains | [0]
     growth | {series: volumes} | series | [volumes, "surface, volume"]
     growth | {brains: {n: v21}} | brains.n | [v21]
     sweep | {vary: {thicknes_mm: [1]}} | vary.thicknes_mm | []
