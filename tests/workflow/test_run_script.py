@@ -37,6 +37,8 @@ case "$*" in
         cp "$0" "$4/bin/python"
         printf '#!/bin/sh\necho "from the environment: $*"\n' > "$4/bin/tool"
         chmod +x "$4/bin/tool" ;;
+    *gyriflow.running.requirements*)
+        if [ -e "$RECORD.missing" ]; then cat "$RECORD.missing"; fi ;;
     *"pip install"*)
         if [ -e "$RECORD.fails" ]; then
             echo "ConnectionError: no such thing"
@@ -68,12 +70,22 @@ echo "pyenv: $(basename "$0"): command not found" >&2
 exit 127
 """
 APT_GET = r"""#!/bin/sh
-# stands in for apt-get of Debian: notes its arguments
+# stands in for apt-get of Debian: notes its arguments, knows two sources of packages
 echo "apt-get $*" >> "$RECORD"
-case "$*" in *install*) rm -f "$RECORD.no-ensurepip" ;; esac
+case "$*" in
+    *indextargets*)
+        format=$(echo "$3" | sed 's/\$(ORIGIN)/Debian/')
+        echo "$format" | sed 's/\$(LABEL)/Debian-Security/; s/\$(REPO_URI)/security/'
+        echo "$format" | sed 's/\$(LABEL)/Debian/; s/\$(REPO_URI)/mirror/' ;;
+    *install*)
+        rm -f "$RECORD.no-ensurepip"
+        sleep "${SECONDS_TO_INSTALL:-0}"
+        echo "installed" >> "$RECORD" ;;
+esac
 """
 OLD_GLIBC = "#!/bin/sh\necho glibc 2.34\n"
 ARM = '#!/bin/sh\n[ "$1" = -m ] && echo aarch64 || echo Linux\n'
+NOTE_AND_FAIL = '#!/bin/sh\necho "$*" >> "$RECORD"\nexit 1\n'
 FAIL = "#!/bin/sh\nexit 1\n"
 USER, SUPERUSER = "#!/bin/sh\necho 1000\n", "#!/bin/sh\necho 0\n"
 MADE = "from the environment: {}\n".format
@@ -278,6 +290,22 @@ def test_an_active_environment_that_cannot_run_gyriflow_is_not_taken(
     assert run("tool", "1", env=active).stdout == MADE(1)
 
 
+def test_with_conda_and_a_venv_active_the_first_python_on_path_decides(
+    active, tmp_path
+):
+    write_program(tmp_path / "conda" / "bin", "python", FAIL)
+    path = f"{tmp_path / 'conda' / 'bin'}:{active['PATH']}"
+    conda_first = {"CONDA_PREFIX": str(tmp_path / "conda"), "PATH": path}
+    assert run("tool", "1", env=active | conda_first).stdout == MADE(1)
+
+
+def test_ranks_under_mpiexec_are_of_one_run():
+    # without ends of lines: two ranks that write at once may mix them
+    program = "from mpi4py import MPI; print(MPI.COMM_WORLD.size, end='')"
+    done = ran("mpiexec", "-n", "2", RUN, "python", "-c", program, timeout_s=120)
+    assert done.stdout == "22", done.stderr
+
+
 # --- the set-up --------------------------------------------------------------------
 
 
@@ -300,6 +328,12 @@ def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp
 def test_a_python_of_pyenv_is_found_behind_shims(outside, programs, tmp_path):
     programs(**{"python3.13": SHIM})
     write_program(tmp_path / "pyenv" / "versions" / "3.14.2" / "bin", "python3", PYTHON)
+    assert run("tool", "1", env=outside).stdout == MADE(1)
+
+
+def test_a_python_with_wheels_goes_before_3_14(outside, programs):
+    newer = PYTHON.replace("from the environment", "from 3.14")
+    programs(**dict.fromkeys(("python3", "python3.14"), newer))
     assert run("tool", "1", env=outside).stdout == MADE(1)
 
 
@@ -352,6 +386,27 @@ def test_debians_package_for_venv_is_installed_as_root(root_on_debian, tmp_path)
     assert installation in (tmp_path / "record").read_text().splitlines()
 
 
+def test_ctrl_c_lets_an_installation_of_debian_packages_end(root_on_debian, tmp_path):
+    record = tmp_path / "record"
+    (tmp_path / "record.missing").write_text("libgl1\n")
+    env = root_on_debian | {"SECONDS_TO_INSTALL": "1"}
+    process = start("tool", env=env, process_group=0)
+    assert wait_until(lambda: record.exists() and "libgl1" in record.read_text())
+    # as a terminal does: to every process of the group
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(20) == 130
+    assert record.read_text().splitlines()[-1] == "installed"
+
+
+def test_the_tree_comes_from_the_mirror_of_debian_itself(
+    root_on_debian, programs, tmp_path
+):
+    programs(**{"python3.13": SHIM}, unshare=NOTE_AND_FAIL, mmdebstrap="#!/bin/sh\n")
+    done = run("tool", env=root_on_debian)
+    assert done.stderr == Facts("create_tree")
+    assert (tmp_path / "record").read_text().splitlines()[-1].endswith(" mirror")
+
+
 @pytest.mark.parametrize(
     ("setup", "facts"),
     [
@@ -401,6 +456,21 @@ def test_conda_environment_is_made_once_and_activated(
     assert second.stderr == ""
     made = f"{create} -p {prefix} -f {recipe}"
     assert (tmp_path / "record").read_text().splitlines() == [made, hook, hook]
+
+
+def test_bytecode_is_kept_which_every_process_would_make_again(outside):
+    name = "PYTHONDONTWRITEBYTECODE"
+    done = run("printenv", name, env=outside | {name: "1"})
+    assert (done.stdout, done.returncode) == ("", 1)
+
+
+def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(
+    outside, programs, tmp_path
+):
+    programs(getent=f"#!/bin/sh\necho me:x:0:0::{tmp_path}/home:/bin/sh\n")
+    folders = {"GYRIFLOW_CACHE": "", "XDG_CACHE_HOME": "", "HOME": ""}
+    assert run("tool", "1", env=outside | folders).stdout == MADE(1)
+    assert list((tmp_path / "home" / ".cache" / "gyriflow").glob("venv-*/ready"))
 
 
 def in_folder(folder, command, env):
