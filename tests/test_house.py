@@ -11,6 +11,7 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
 import yaml
 
 from gyriflow.code_hash import imported_modules, subpackage_of
@@ -144,6 +145,11 @@ def test_only_io_and_folding_open_files():
         lines = path.read_text().splitlines()
         opening += [(short(path), line) for line in lines if OPENS_A_FILE.search(line)]
     assert opening == []
+
+
+@pytest.mark.parametrize("code", ["open('a')", "with h5py.File('a'): pass"])
+def test_opened_files_are_seen(code):
+    assert OPENS_A_FILE.search(code)
 
 
 def test_scripts_read_call_and_write():
@@ -299,6 +305,24 @@ def test_conda_environment_sets_what_run_sets():
     assert environment["variables"] == {
         name: exports[name] for name in exports if not name.startswith("PYTHON")
     }
+
+
+def test_images_are_made_by_one_script_from_the_lists():
+    for recipe in ("Dockerfile", "gyriflow.def"):
+        image = (ROOT / "envs" / recipe).read_text()
+        assert "/opt/gyriflow/envs/install_image.sh" in image
+        assert "apt-get" not in image
+        assert "pip" not in image
+    text = (ROOT / "envs" / "install_image.sh").read_text()
+    assert "$envs/debian.txt" in text
+    assert "$envs/requirements.txt" in text
+    own = re.findall(r"install (?:-\S+ )*([\w.=-]+)", text)
+    assert set(own) <= {"-r", "--no-deps", "--no-install-recommends"}
+    packages = {
+        line.split("#")[0].strip()
+        for line in (ROOT / "envs" / "debian.txt").read_text().splitlines()
+    }
+    assert packages & set(text.split()) == set()
 
 
 def test_both_images_copy_the_same_files():
