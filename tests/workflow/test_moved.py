@@ -7,7 +7,11 @@ import sys
 
 import pytest
 from processes import ran
+from scan_trees import make_tree
 from shapes import phantom, save_labels
+
+from gyriflow.cli.init import write_bids
+from gyriflow.cli.recognition import recognise
 
 from .conftest import SMALL_STUDY, Workflow
 
@@ -60,3 +64,36 @@ def test_a_moved_study_whose_data_were_moved_too_is_up_to_date(checkout_copy, tm
     said = commands(workflow, "run", "study.yaml", "-n")
     changed = r"^  changed input other name\.nii\.gz: .*pial_with_thickness"
     assert re.search(changed, said, re.MULTILINE)
+
+
+def test_a_moved_data_set_is_up_to_date_for_measuring_and_for_the_bids_app(
+    checkout_copy, tmp_path, monkeypatch
+):
+    workflow = Workflow(checkout_copy, tmp_path / "here")
+    make_tree(
+        workflow.directory / "data",
+        labels=["sub-01/ses-1/anat/sub-01_ses-1_dseg.nii.gz"],
+        tables={"participants.tsv": ["participant_id scan_age", "sub-01 24.0"]},
+    )
+    bids = ("data", "out", "group", "-n")
+    measure = ("measure", "data", "-d", "measured", "-n")
+    config = workflow.directory / "out" / "work" / "gyriflow.yaml"
+    data = workflow.directory / "data"
+    write_bids(recognise(data), data, config, config)
+    commands(workflow, "init", "data")
+    for directory, config, targets in (
+        ("out/work", "out/work/gyriflow.yaml", ("all", "export")),
+        ("measured", "data/gyriflow.yaml", ("all",)),
+    ):
+        if directory == "measured":
+            monkeypatch.setenv("GYRIFLOW_MEASURE_ONLY", "1")
+        inside = Workflow(checkout_copy, workflow.directory / directory)
+        arguments = (*targets, "--configfile", str(workflow.directory / config))
+        inside.directory.mkdir(exist_ok=True)
+        inside.lay_out(*arguments)
+        inside.count_as_made("--forceall", *arguments)
+    monkeypatch.delenv("GYRIFLOW_MEASURE_ONLY")
+    shutil.move(workflow.directory, tmp_path / "there")
+    moved = Workflow(checkout_copy, tmp_path / "there")
+    for command in (bids, measure):
+        assert CURRENT in commands(moved, *command)
