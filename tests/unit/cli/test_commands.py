@@ -119,6 +119,14 @@ def test_an_unknown_option_is_refused_with_the_nearest_one(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_an_executor_of_an_option_is_to_be_installed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit, check=lambda end: end.code == 2):
+        launch.main(["-n", "-e", "moon"])
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "moon" in line]
+    assert line == Facts("gyriflow:", "snakemake-executor-plugin-moon", "cluster.md")
+
+
 def test_a_profile_names_the_number_of_jobs_and_an_executor_to_be_installed(
     tmp_path, monkeypatch, capsys
 ):

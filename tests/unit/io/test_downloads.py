@@ -35,6 +35,18 @@ def fetched(folder, server, name, **known):
     return said
 
 
+@pytest.mark.parametrize(("name", "content"), [(LONG, LABELS), (SHORT, SURFACE)])
+def test_a_file_comes_whole_through_a_linked_folder_and_its_checksum_is_said(
+    tmp_path, server, name, content
+):
+    (tmp_path / "store").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "store")
+    said = fetched(tmp_path / "link", server, name, sha256=sha256(content))
+    assert files_in(tmp_path / "store") == {name: content}
+    assert (tmp_path / "link").is_symlink()
+    assert said == [Facts(tmp_path / "link" / name, sha256(content))]
+
+
 def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     (tmp_path / "atlas").mkdir()
     own = gifti(seed=5)

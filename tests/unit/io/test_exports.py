@@ -106,6 +106,12 @@ def test_a_study_is_a_bids_derivative(tmp_path, brain):
     assert description == Facts("desc-runagw2400\t", "run-a", 24)
 
 
+def test_a_map_without_a_name_in_bids_ends_the_export(tmp_path, brain):
+    write_vertex_maps(brain.maps["left"], {"unheard_of": np.zeros(5)})
+    with pytest.raises(KeyError, match="unheard_of"):
+        exported(tmp_path / "bids", [brain])
+
+
 # as the HCP and smriprep's inverted maps have them: larger on gyri, thickness positive,
 # lengths in mm
 OTHER_TOOLS = {

@@ -69,11 +69,13 @@ PATTERNS = [
     "a\\..\\{week}.nii.gz",
     # fill characters that make a path of a number
     "{week:/>9}.nii.gz",
+    "{week:.>7}/{week:.>5}/x.nii.gz",
     "{week:>999999999}.nii.gz",
     "{week.__class__}.nii.gz",
     "{week!r:/>9}.nii.gz",
     "{week[0]}.nii.gz",
 ]
+URLS = "file:///etc", "ftp://x", "javascript:x", "--out=x"
 
 
 @pytest.mark.parametrize(
@@ -81,7 +83,7 @@ PATTERNS = [
     [
         *(("series.all.files", pattern) for pattern in PATTERNS),
         *(("name", name) for name in ("../x", "/tmp/x", ".", "a/b", "-x")),
-        *(("url", url) for url in ("file:///etc", "javascript:x", "--out=x")),
+        *(("url", url) for url in URLS),
     ],
 )
 def test_an_atlas_has_a_plain_name_is_on_the_web_and_stays_in_its_folder(
