@@ -1,8 +1,8 @@
 """Write the correspondence of two brains whose surfaces have the same vertices."""
 
 from gyriflow.geometry.deformations import between_moved
-from gyriflow.geometry.triangles import merged, transformed
-from gyriflow.growth.carrying import match_surfaces, outward
+from gyriflow.geometry.triangles import merged, outward, transformed
+from gyriflow.growth.carrying import match_surfaces
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.settings.terms import SIDES

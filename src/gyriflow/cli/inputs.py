@@ -35,8 +35,8 @@ from ..geometry.poses import CONVENTIONS
 from ..geometry.triangles import (
     TriangleMesh,
     convex_hull,
-    flipped,
     is_closed,
+    outward,
     signed_volume,
     transformed,
 )
@@ -195,7 +195,7 @@ def _check_surfaces(brain: BrainConfig) -> Iterator[str]:
         _check_whites({"left": left, "right": right}, whites)
     elif brain.files:
         own_side = brain.side
-        mesh = _outward(read_surface(brain.files[0], own_side))
+        mesh = outward(read_surface(brain.files[0], own_side))
         yield from _check_size(brain, mesh)
         if own_side and is_closed(mesh):
             require_single_hemisphere(mesh)
@@ -211,7 +211,7 @@ def _check_whites(
     """Raise InputError if a white surface is not inside the pial one of its side."""
     for side, white in whites.items():
         # the walls of open surfaces are capped by their repair
-        pial = _outward(pials[side])
+        pial = outward(pials[side])
         if is_closed(pial):
             require_inside(pial, white, side)
 
@@ -223,7 +223,7 @@ def _check_pair(
     *,
     declared: bool,
 ) -> Iterator[str]:
-    left, right = _outward(left), _outward(right)
+    left, right = outward(left), outward(right)
     yield from _check_size(brain, left, right)
     if brain.coordinates != "auto":
         left, right = (
@@ -246,10 +246,6 @@ def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:
         sides * sum(volumes) * (1.0 if closed else HULL_SHARE), brain.week
     )
     return doubts if closed else []
-
-
-def _outward(mesh: TriangleMesh) -> TriangleMesh:
-    return flipped(mesh) if signed_volume(mesh) < 0 else mesh
 
 
 def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:

@@ -483,6 +483,11 @@ def flipped(mesh: TriangleMesh) -> TriangleMesh:
     )
 
 
+def outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a surface with its triangles oriented outward."""
+    return flipped(mesh) if signed_volume(mesh) < 0 else mesh
+
+
 def transformed(mesh: TriangleMesh, matrix: ArrayLike) -> TriangleMesh:
     """Apply a (4, 4) affine matrix to a surface; faces are flipped if it mirrors."""
     affine = np.asarray(matrix, dtype=float)

@@ -25,8 +25,7 @@ from ..geometry.triangles import (
     Indices,
     Ints,
     TriangleMesh,
-    flipped,
-    signed_volume,
+    outward,
     vertex_areas,
 )
 
@@ -40,11 +39,6 @@ MAX_SCATTER = 0.3
 a share of the size."""
 MAX_OUTSIDE = 0.001
 """Largest share of points that may lie outside the grid of a displacement."""
-
-
-def outward(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a surface with its triangles oriented outward."""
-    return flipped(mesh) if signed_volume(mesh) < 0 else mesh
 
 
 def match_surfaces(
