@@ -84,7 +84,9 @@ SWEEPS = study.by_sweep
 # ensembles, which may diverge without stopping the study
 PAIRS = [simulation.key for simulation in study.run_simulations]
 WITH_ENSEMBLE = [simulation for simulation in study.run_simulations if simulation.members]
-MAY_DIVERGE = dict.fromkeys(simulation.run for simulation in study.simulations.values() if simulation.may_diverge)
+MAY_DIVERGE = dict.fromkeys(
+    simulation.run for simulation in study.simulations.values() if simulation.may_diverge
+)
 # brains refused in an earlier pass of this call; the study is finished without them
 REFUSED = [row.brain for row in study.left_out.values() if row.why == "refused"]
 if REFUSED and PRINTS:

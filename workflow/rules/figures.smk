@@ -215,7 +215,9 @@ if study.growth_brains and (study.run_simulations or (HAS_RATES and HAS_FEW_SERI
 
 
 # start brains of predictions by the growth of an atlas
-BY_ATLAS = {simulation.brain for simulation in study.run_simulations if simulation.settings.growth.shapes == "atlas"}
+BY_ATLAS = {
+    simulation.brain for simulation in study.run_simulations if simulation.settings.growth.shapes == "atlas"
+}
 CARRIED = [start for start in study.starts if start.id in BY_ATLAS]
 
 
