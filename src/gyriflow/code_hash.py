@@ -26,16 +26,13 @@ def code_hash(program: Path, *modules: Path) -> str:
     for module in modules:
         files.add(module)
         files |= modules_behind(module)
-    named = []
-    for path in files:
-        name = path.relative_to(PACKAGE).as_posix()
-        named.append((name, _digest(path)))
-    text = repr(sorted(named))
+    text = repr(sorted(map(_name_and_digest, files)))
     digest = hashlib.sha256(text.encode()).hexdigest()
     return f"code {digest[:12]}"
 
 
-def modules_behind(program: Path) -> set[Path]:
+@cache
+def modules_behind(program: Path) -> frozenset[Path]:
     """Return the files of all modules of this package that a Python program imports,
     directly or through others.
 
@@ -47,10 +44,7 @@ def modules_behind(program: Path) -> set[Path]:
         module = waiting.pop()
         reached.add(module)
         waiting |= imported_modules(module) - reached
-    c_files = {
-        file for module in reached if (file := module.with_suffix(".c")).is_file()
-    }
-    return (reached | c_files) - {program}
+    return frozenset(reached - {program})
 
 
 @cache
@@ -85,20 +79,20 @@ def subpackage_of(module: Path) -> str:
 
 @cache
 def _files_of(name: str) -> list[Path]:
-    package, *parts = name.split(".")
-    if package != PACKAGE.name:
+    """Return the files of a module of this package and of the packages around it."""
+    if name.partition(".")[0] != PACKAGE.name:
         return []
-    around = [
-        PACKAGE.joinpath(*parts[:count], "__init__.py")
-        for count in range(len(parts) + 1)
-    ]
-    return [
-        path
-        for path in (*around, PACKAGE.joinpath(*parts).with_suffix(".py"))
-        if path.is_file()
-    ]
+    module = PACKAGE.parent / name.replace(".", "/")
+    files = (
+        module / "__init__.py",
+        module.with_suffix(".py"),
+        module.with_suffix(".c"),
+    )
+    around = _files_of(name.rpartition(".")[0])
+    return [*around, *filter(Path.is_file, files)]
 
 
 @cache
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _name_and_digest(path: Path) -> tuple[str, str]:
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    return path.relative_to(PACKAGE).as_posix(), digest

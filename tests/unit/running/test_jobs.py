@@ -68,7 +68,12 @@ def test_steps_that_have_ended_are_found_with_their_rules_brains_and_runs(
 
 
 def forget():
-    for remembered in (sources._digest, sources._files_of, sources.imported_modules):
+    for remembered in (
+        sources._files_of,
+        sources._name_and_digest,
+        sources.imported_modules,
+        sources.modules_behind,
+    ):
         remembered.cache_clear()
 
 
