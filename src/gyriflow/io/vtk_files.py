@@ -79,39 +79,57 @@ def _little_endian_surface(content: bytes) -> tuple[NDArray, NDArray] | None:
     return points.reshape(-1, 3), cells[:, 1:]
 
 
+def _holds_triangles_alone(data: Any) -> bool:
+    if data is None or data.GetClassName() != "vtkPolyData":
+        return False
+    faces = data.GetPolys()
+    is_triangular = data.GetNumberOfPoints() > 0 and faces.IsHomogeneous() == 3
+    return is_triangular and faces.GetNumberOfCells() == data.GetNumberOfCells()
+
+
 def _in_words(data: Any) -> str:
     """Return what a file holds instead of triangles."""
-    kind = type(data).__name__
+    if data is None:
+        return "nothing"
+    kind = data.GetClassName().removeprefix("vtk")
     if kind != "PolyData":
         return kind
     offsets = data.GetPolys().GetOffsetsArray()
     corners = np.diff([offsets.GetValue(n) for n in range(offsets.GetNumberOfTuples())])
-    n_others = int((corners != 3).sum())
     counts = {
-        "points": data.n_points,
-        "faces with other than three corners": n_others,
-        "strips of triangles": data.n_strips,
-        "lines": data.n_lines,
-        "single points": data.n_verts,
+        "points": data.GetNumberOfPoints(),
+        "faces with other than three corners": int((corners != 3).sum()),
+        "strips of triangles": data.GetNumberOfStrips(),
+        "lines": data.GetNumberOfLines(),
+        "single points": data.GetNumberOfVerts(),
     }
-    return ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    found = [f"{count} {name}" for name, count in counts.items() if count]
+    return ", ".join(found) or "nothing"
 
 
 def _send_surface(path: str) -> None:
     output = os.dup(1)
     os.dup2(2, 1)  # what VTK prints must not mix with the arrays
-    import pyvista as pv
+    # pyvista would take half a second more
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOLegacy import vtkDataSetReader
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
-    data = pv.read(path)
+    is_xml = path.lower().endswith(".vtp")
+    reader = vtkXMLPolyDataReader() if is_xml else vtkDataSetReader()
+    reader.SetFileName(path)
+    reader.Update()
+    data = reader.GetOutputDataObject(0)
     # VTK may crash on damaged cells, so these are read without its filters
-    if (
-        not isinstance(data, pv.PolyData)
-        or not data.n_points
-        or not data.is_all_triangles
-    ):
+    if not _holds_triangles_alone(data):
         sys.exit(_in_words(data))
     sent = io.BytesIO()
-    np.savez(sent, points=data.points, faces=data.regular_faces)
+    corners = vtk_to_numpy(data.GetPolys().GetConnectivityArray())
+    np.savez(
+        sent,
+        points=vtk_to_numpy(data.GetPoints().GetData()),
+        faces=corners.reshape(-1, 3),
+    )
     with os.fdopen(output, "wb") as stream:
         stream.write(sent.getvalue())
 
