@@ -1,5 +1,6 @@
 """Fixtures of all tests, and their distribution to workers."""
 
+import gc
 import logging
 import os
 import re
@@ -102,6 +103,17 @@ def recorded_outputs(recorded, request):
         recorded(files, rtol=1e-2, atol=5e-3)
     else:
         recorded(files, rtol=1e-3)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Search nothing that is imported for garbage, then or later: a tenth of the
+    time."""
+    gc.disable()
+    done = yield
+    gc.freeze()
+    gc.enable()
+    return done
 
 
 def pytest_collection_modifyitems(items):
