@@ -46,6 +46,8 @@ SMALL_STUDY = {
     "folding": {"end_week": 22},
     "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
 }
+SHAPES = [{"id": f"b{week}", "week": week, "shape": {}} for week in (21, 22)]
+"""Brains without files."""
 COARSE = {
     "order": 1,
     "mesher": "tetgen",
@@ -137,6 +139,11 @@ class Workflow:
             env=self.environment,
         )
 
+    def call(self, *arguments: str) -> int:
+        """Run the launcher of this checkout in this process; return its exit code."""
+        with launching(self.directory):
+            return launch.main(arguments)
+
     def plan(self, *arguments: str) -> Plan:
         """Return what a dry run plans, in this process and by this checkout's code."""
         plans: list[Plan] = []
@@ -180,9 +187,7 @@ class Workflow:
 
     def count_as_made(self, *arguments: str) -> None:
         """Have Snakemake take the files of a call that are there for made."""
-        with launching(self.directory):
-            code = launch.main(["--touch", "--cores", "1", *arguments])
-        assert code == 0
+        assert self.call("--touch", "--cores", "1", *arguments) == 0
 
     def count_ellipsoid_as_meshed(self, config: dict, cells: int) -> None:
         """Write a configuration of one brain, `a`, as study.yaml, with an ellipsoid's

@@ -2,14 +2,19 @@
 
 import pytest
 import yaml
+from facts import Facts
+
+from gyriflow.shipped import DEMO
 
 from .conftest import CHECKOUT
 
 EXAMPLES = CHECKOUT / "config" / "examples"
 
 
-def test_the_demo_is_planned_from_any_folder(workflow):
+def test_the_demo_is_planned_from_any_folder(workflow, capsys):
     jobs = workflow.jobs()
+    said = capsys.readouterr().err.partition("\n")[0]
+    assert said == Facts("gyriflow:", "demo", DEMO)
     assert jobs["pial_with_thickness"] == 3
     assert jobs["measure"] == 3
     assert jobs["measure_simulated"] == 3 * jobs["simulate"]

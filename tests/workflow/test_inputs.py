@@ -134,6 +134,31 @@ def test_what_deviates_is_compared_with_what_was_expected_at_its_week(planned):
     ]
 
 
+def test_growth_towards_shapes_is_measured_on_fine_surfaces(workflow):
+    """Growth at a rate needs none."""
+    study = {
+        "brains": [*population("a", 21, 22, 23), *population("b", 21.5, 23)],
+        "growth": {"brains": {"atlas": ["a21", "a22", "a23"]}},
+        "start": "b21.5",
+        "folding": {"end_week": 23},
+        "runs": {"expected": {"preset": "expected"}, "own": {}},
+    }
+    name = workflow.write("study.yaml", study)
+    expected, own = (f"results/runs/{run}/b21.5" for run in ("expected", "own"))
+    metrics = "metrics/week-23.00/metrics.csv"
+
+    def fine_surfaces(*targets):
+        plan = workflow.plan(*targets, "--configfile", name)
+        jobs = [job for job in plan.jobs if job.rule == "fine_surface"]
+        return {(job.wildcards["run"], job.wildcards["week"]) for job in jobs}
+
+    half_week = f"{expected}/surfaces/week-22.50/pial.surf.gii"
+    found = fine_surfaces(f"{expected}/{metrics}", half_week, f"{own}/{metrics}")
+    assert found == {("expected", "22.50"), ("expected", "23.00")}
+    found = fine_surfaces("results/study/prediction.csv")
+    assert found == {("expected", "21.50"), ("expected", "23.00")}
+
+
 def test_matched_vertices_take_the_place_of_registration(workflow):
     brains = []
     for week in (21, 22, 23):

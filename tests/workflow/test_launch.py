@@ -22,9 +22,8 @@ from gyriflow.io import locks
 from gyriflow.running import launch
 from gyriflow.running.launch import hold_lock, locked, main
 from gyriflow.running.planning import Events
-from gyriflow.shipped import DEMO
 
-from .conftest import SMALL_STUDY, launching
+from .conftest import SHAPES, launching
 
 
 def test_files_and_tables_are_beside_the_configuration_that_replaces_the_demo(workflow):
@@ -125,8 +124,9 @@ def test_a_second_pass_keeps_the_directory_locked_if_the_first_one_is_killed(
 
 
 def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_look(
-    workflow,
+    workflow, monkeypatch
 ):
+    monkeypatch.setattr(launch, "LOCK_WAIT_S", 0.0)
     lock = stale(workflow.directory)
     with hold_lock(workflow.directory):
         with pytest.raises(StorageError) as refused:
@@ -171,25 +171,18 @@ def test_a_working_directory_that_cannot_be_written_ends_in_5(tmp_path):
 def test_the_first_line_says_what_runs_without_a_configuration_that_is_named(
     workflow, capsys
 ):
-    def first_line(*arguments):
-        assert workflow.jobs("surface", *arguments)
-        return capsys.readouterr().err.partition("\n")[0]
-
-    assert first_line() == Facts("gyriflow:", "demo", DEMO)
     (workflow.directory / "config").mkdir()
-    name = workflow.write("config/config.yaml", SMALL_STUDY)
-    (workflow.directory / "config" / "phantom-21.nii.gz").touch()
-    said = first_line()
+    name = workflow.write("config/config.yaml", {"brains": SHAPES})
+    assert workflow.jobs("surface") == {"shape": 2, "pial": 2}
+    said = capsys.readouterr().err.partition("\n")[0]
     assert said == Facts(workflow.directory / name)
     assert said != Facts("demo")
-    assert "gyriflow" not in first_line("--configfile", name)
 
 
 def test_results_that_are_a_link_to_nowhere_are_named(workflow, capfd):
     (workflow.directory / "results").symlink_to("disk/results")
-    name = workflow.write("study.yaml", SMALL_STUDY)
-    with launching(workflow.directory):
-        code = main(["--cores", "1", "surface", "--configfile", name])
+    name = workflow.write("study.yaml", {"brains": SHAPES})
+    code = workflow.call("--cores", "1", "surface", "--configfile", name)
     message = capfd.readouterr().err
     assert code == 5
     assert message.splitlines()[-1] == Facts("results is a link to disk/results")
@@ -197,7 +190,7 @@ def test_results_that_are_a_link_to_nowhere_are_named(workflow, capfd):
 
 
 def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
-    name = workflow.write("study.yaml", SMALL_STUDY)
+    name = workflow.write("study.yaml", {"brains": SHAPES})
     with pytest.raises(InputError, check=Facts("metrcs", "metrics")):
         workflow.plan("metrcs", "--configfile", name)
 
@@ -205,12 +198,11 @@ def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
 def test_a_result_of_an_unknown_brain_is_refused_with_the_name_of_a_similar_one(
     workflow, capfd
 ):
-    name = workflow.write("study.yaml", SMALL_STUDY)
-    metrics = "results/brains/{}/metrics/metrics.csv".format
-    assert workflow.jobs(metrics("a"), "--configfile", name)
-    capfd.readouterr()
-    with launching(workflow.directory):
-        code = main(["-n", metrics("aa"), "--configfile", name])
+    name = workflow.write("study.yaml", {"brains": SHAPES})
+    metrics = "results/brains/b21x/metrics/metrics.csv"
+    code = workflow.call("-n", metrics, "--configfile", name)
     assert code == InputError.exit_code
     said = capfd.readouterr().err
-    assert said == Facts(metrics("aa"), "no brain aa", "did you mean a?")
+    assert said == Facts(metrics, "no brain b21x", "did you mean b21?")
+    # which configuration runs is not said where it is named
+    assert "--configfile" not in said

@@ -11,6 +11,8 @@ from gyriflow.report.labels import SIMPLER_PREDICTIONS
 
 from .conftest import COARSE
 
+pytestmark = [pytest.mark.slow, pytest.mark.extended]
+
 STUDY = {
     "surface": {"edge_length_mm": 2.0},
     "mesh": COARSE | {"surface_edge_mm": 2.8, "max_surface_distance_mm": 1.5},
@@ -33,8 +35,6 @@ def brains_of(workflow, population, seed, *weeks):
     return entries
 
 
-@pytest.mark.slow
-@pytest.mark.extended
 def test_a_brain_is_predicted_and_compared_with_the_observed_ones_of_any_week(workflow):
     """It is a surface in LPS, in an atlas of labels."""
     start = cerebrum_surface(*phantom_labels(21.5, voxel_mm=2.0, seed=2))
@@ -89,25 +89,3 @@ def test_a_brain_is_predicted_and_compared_with_the_observed_ones_of_any_week(wo
     errors = prediction.query("model == 'run'").set_index("week")["area_difference"]
     for week, value in areas.items():
         assert value == pytest.approx(-np.log1p(errors[week]), abs=0.05)
-
-
-def test_a_prediction_is_measured_and_compared_by_surfaces_of_observed_brains(workflow):
-    brains = [
-        *brains_of(workflow, "a", 1, 21, 22, 23),
-        *brains_of(workflow, "b", 2, 21.5, 23),
-    ]
-    study = STUDY | {"brains": brains, "start": "b21.5"}
-    name = workflow.write("study.yaml", study)
-    folder = "results/runs/expected/b21.5"
-    targets = [
-        f"{folder}/metrics/week-23.00/metrics.csv",
-        f"{folder}/surfaces/week-22.50/pial.surf.gii",
-    ]
-    jobs = workflow.jobs(*targets, "--configfile", name)
-    assert jobs["fine_surface"] == jobs["measure_simulated"] == 2
-    compared = ("results/study/prediction.csv", "--configfile", name)
-    assert workflow.jobs(*compared)["fine_surface"] >= 1
-    # growth at a rate needs none
-    own = workflow.write("own.yaml", study | {"runs": {"own": {}}})
-    own_metrics = "results/runs/own/b21.5/metrics/week-23.00/metrics.csv"
-    assert "fine_surface" not in workflow.jobs(own_metrics, "--configfile", own)

@@ -335,7 +335,6 @@ def config(tmp_path):
 
 
 def test_a_look_leaves_nothing_behind(tmp_path, config):
-    assert plan(config, tmp_path / "new" / "study", ["surface"])
     ((said, _),) = work_of(config, tmp_path / "new" / "study", 1, ["calibrate"])
     assert not any(character.isdigit() for character in said)
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]

@@ -2,7 +2,7 @@
 files that cannot be used."""
 
 import pytest
-import yaml
+from configurations import from_yaml
 from facts import Facts
 from scan_trees import make_tree
 from shapes import cerebrum_surface, phantom
@@ -29,7 +29,7 @@ def brains(folder, **options):
     return found
 
 
-DATA_SETS = yaml.safe_load(
+DATA_SETS = from_yaml(
     """
 FeTA:
   files: [sub-026/anat/sub-026_rec-mial_dseg.nii.gz]

@@ -6,8 +6,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-import yaml
-from configurations import cases, labelled, refusal, resolved
+from configurations import cases, from_yaml, labelled, refusal, resolved
 from configurations import study as study_of
 from facts import Facts
 
@@ -33,7 +32,7 @@ def study(**sections):
 # the runs of sweeps
 
 
-VALUES = yaml.safe_load("""
+VALUES = from_yaml("""
 step_s: [21600, 86400]
 thickness_mm: [1.2, 1.5]
 shear_modulus_cortex_pa: [1000, 1500]

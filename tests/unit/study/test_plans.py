@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from configurations import LABELLED, brain, resolved
+from configurations import LABELLED, brain, from_yaml, resolved
 
 from gyriflow.errors import InputError
 from gyriflow.settings.brains import SOURCES
@@ -29,14 +29,14 @@ VOLUME = str(
 @cache
 def planned(path):
     """Return the content of a file of this folder, and the study that it plans."""
-    plan = yaml.safe_load(path.read_text())
+    plan = from_yaml(path.read_text())
     configuration = plan["configuration"]
     for entry in configuration["brains"]:
         if not any(source in entry for source in SOURCES):
             entry.update(LABELLED)
     # sorts the keys
-    text = yaml.safe_dump(configuration)
-    raw = yaml.safe_load(text.replace("FILE", __file__).replace("VOLUME", VOLUME))
+    text = yaml.dump(configuration, Dumper=yaml.CSafeDumper)
+    raw = from_yaml(text.replace("FILE", __file__).replace("VOLUME", VOLUME))
     refused = dict.fromkeys(plan.get("refused", ()), "not read")
     return plan, resolve(load(raw), refused)
 
