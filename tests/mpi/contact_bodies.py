@@ -92,7 +92,7 @@ def stress_at(stretch, growth):
 
 def slab_with_a_sulcus():
     """Return a block with a narrow groove along y in its top, in mm."""
-    mesh = box_mesh((24, 3, 10), (12.0, 3.0, 6.0))
+    mesh = box_mesh((24, 2, 10), (12.0, 2.0, 6.0))
     x, y, z = mesh.vertices.T + [[0.0], [0.0], [3.0]]
     groove = 3.0 * np.exp(-((x / 0.5) ** 2))
     # even in y but for a trace, so that nothing meets exactly
@@ -120,3 +120,16 @@ def after_steps(folding, state, number):
     for _ in range(number):
         state = folding.step(state, state.step_s)
     return state
+
+
+def vertices_pulled_near(gap, count, growth_rate_per_s=0.0):
+    """Return what folds two blocks in a tube, and their start: few vertices of the
+    upper one almost touch the lower."""
+    mesh = two_blocks(gap=gap)
+    facing = np.isclose(mesh.vertices[:, 2], gap / 2)
+    facing &= np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6
+    positions = mesh.vertices.copy()
+    positions[np.flatnonzero(facing)[[1, 11][:count]], 2] = 0.01 - gap / 2
+    mesh = TetrahedralMesh(positions, mesh.tets)
+    p = parameters_from(RUN | {"growth_rate_per_s": growth_rate_per_s})
+    return at_start(mesh, in_a_tube(mesh), p)

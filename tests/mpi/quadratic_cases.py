@@ -56,7 +56,8 @@ BLOCKS = quadratic(two_blocks((2, 2, 1), (3, 2, 2)))
 
 def test_pressed_blocks_have_the_pressure_of_the_closed_answer_on_any_number_of_ranks():
     moved = []
-    for comm in (COMM, MPI.COMM_SELF):
+    # one rank alone need not solve it twice
+    for comm in (COMM, MPI.COMM_SELF)[: COMM.size]:
         problem, contact = problem_with_contact(
             BLOCKS, 0.1, growth_along_z=0.1, comm=comm
         )
@@ -65,7 +66,7 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_on_any_number_of_
         ).displacement
         assert contact.pair_count(u) > 10
         moved.append(gathered(problem.domain, u))
-    assert np.abs(moved[0] - moved[1]).max() <= 1e-6 * np.abs(moved[1]).max()
+    assert np.abs(moved[0] - moved[-1]).max() <= 1e-6 * np.abs(moved[-1]).max()
     gap, pressure = gap_and_pressure(BLOCKS, problem, contact, u)
     assert 0 < gap < 0.1
     stretch = 1 + (GAP_MM - gap) / 2 / HEIGHT_MM

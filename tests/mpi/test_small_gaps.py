@@ -6,7 +6,7 @@ import sys
 from processes import ran
 
 MAKE_BODIES = """
-from contact_steps_cases import vertices_pulled_near
+from contact_bodies import vertices_pulled_near
 for gap_mm in (0.5, 0.03):
     vertices_pulled_near(gap_mm, 2)
 """
