@@ -25,6 +25,8 @@ from gyriflow.geometry.triangles import TriangleMesh, rms_length
 SEMI_AXES = (20.0, 24.0, 18.0)
 BODY = ellipsoid_mesh(8, SEMI_AXES)
 SMALL = ellipsoid_mesh(8, (7.0, 8.4, 6.3))
+COARSE = ellipsoid_mesh(4, SEMI_AXES)
+"""For steps that are not made."""
 USED = boundary_surface(BODY)[1]
 
 
@@ -266,11 +268,11 @@ def test_a_body_is_not_moved_to_a_shape_whose_faces_cross():
 
 def test_stops_are_looked_for_in_halves_of_halves_of_halves(monkeypatch):
     # twenty states of growth, as if each way between two of them inverted an element
-    body = ElasticFit(BODY)
-    states = [(1 + 0.01 * number) * BODY.vertices for number in range(21)]
+    body = ElasticFit(COARSE)
+    states = [(1 + 0.01 * number) * COARSE.vertices for number in range(21)]
     body._passed = states[1:-1]
     body.positions_mm = states[-1]
-    fault = BODY.vertices[:1]
+    fault = COARSE.vertices[:1]
     monkeypatch.setattr(
         body, "_untangled", lambda before, after, lengths: (after, fault)
     )
@@ -281,7 +283,7 @@ def test_stops_are_looked_for_in_halves_of_halves_of_halves(monkeypatch):
         return places
 
     monkeypatch.setattr(body, "_opened_after", note_start)
-    way = body.way_from(BODY.vertices)
+    way = body.way_from(COARSE.vertices)
     fractions = [fraction for fraction, _ in way]
     assert fractions == pytest.approx(np.arange(1, 8) / 8, abs=0.06)
     # what opens a shape is judged on the way from the last stop
@@ -306,8 +308,8 @@ def steps(monkeypatch):
     ("factor", "n_steps"), [(1.09, 1), (1.12, 2), (1.28, 3), (1 / 1.12, 2)]
 )
 def test_a_body_grows_by_a_tenth_in_a_step_at_most(steps, factor, n_steps):
-    body = ElasticFit(BODY)
-    body.positions_mm = 0.1 * BODY.vertices
+    body = ElasticFit(COARSE)
+    body.positions_mm = 0.1 * COARSE.vertices
     body.follow(factor * body.positions_mm)
     assert len(steps) == n_steps
     # each takes its part of what is left
@@ -323,14 +325,14 @@ def test_a_body_grows_by_a_tenth_in_a_step_at_most(steps, factor, n_steps):
 def test_a_shape_is_refused_if_the_body_stays_more_than_three_millimetres_from_it(
     steps, left_mm, is_refused, caplog
 ):
-    body = ElasticFit(BODY)
+    body = ElasticFit(COARSE)
     radial_mm = math.sqrt(3 * np.mean(body.boundary.vertices**2))
-    shape = (1 + left_mm / radial_mm) * BODY.vertices
+    shape = (1 + left_mm / radial_mm) * COARSE.vertices
     if is_refused:
         with pytest.raises(SolverError, match=r"3\.1 mm.*not solved"):
             body.follow(shape)
     else:
-        assert body.follow(shape) == pytest.approx(BODY.vertices, abs=1e-6)
+        assert body.follow(shape) == pytest.approx(COARSE.vertices, abs=1e-6)
         assert caplog.messages == []
 
 

@@ -38,9 +38,9 @@ def made(tmp_path_factory):
     """A folder with the regions of the brain's mesh, and with the surfaces of its
     second frame."""
     folder = tmp_path_factory.mktemp("folded")
-    brain = brain_mesh(16)
+    brain = brain_mesh(10)
     # the measured brain, in triangles of its own
-    surface = ellipsoid(SEMI_AXES, 5, CENTRE_MM)
+    surface = ellipsoid(SEMI_AXES, 4, CENTRE_MM)
     on_left = beyond_fissure(corners(surface).mean(axis=1)) < 0
     left, right = (submesh(surface, faces)[0] for faces in (on_left, ~on_left))
 

@@ -19,9 +19,9 @@ from gyriflow.geometry.tetrahedra import (
 from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas
 from gyriflow.growth.series_shapes import fit_onto_surface, follow_series
 
-SIZE_MM = np.array([14.0, 16.0, 10.0])
+SIZE_MM = np.array([12.0, 12.0, 8.0])
 """Of a block below z = 0."""
-WIDTH_MM, HALF_LENGTH_MM, VOXEL_MM = 0.5, 5.5, 0.5
+WIDTH_MM, HALF_LENGTH_MM, VOXEL_MM = 0.5, 4.0, 0.5
 CORTEX_MM = 2.0
 DEPTHS_MM = (0.0, 1.5, 3.0)
 """Of the slit in the plane x = 0, week by week. Its banks touch at first."""
@@ -52,7 +52,7 @@ def registration(before_mm, after_mm):
     """Return the map of a week by labels: the tissue below the cortex sinks, and the
     top does not know of the slit."""
     (x, y, z), affine = grid(3.0)
-    place = np.exp(-((x / 2) ** 2) / 2) * np.sqrt(np.clip(1 - (y / 7) ** 2, 0, 1))
+    place = np.exp(-((x / 2) ** 2) / 2) * np.sqrt(np.clip(1 - (y / 5.5) ** 2, 0, 1))
     below = before_mm + CORTEX_MM
     share = np.interp(-z, [0.0, below, SIZE_MM[2]], [0.0, 1.0, 0.0])
     sunk = np.zeros((*x.shape, 3), np.float32)
@@ -62,12 +62,12 @@ def registration(before_mm, after_mm):
 
 def area_at_slit(surface):
     x, y, z = corners(surface).mean(axis=1).T
-    near = (np.abs(x) < 6) & (np.abs(y) < 7) & (z > -6)
+    near = (np.abs(x) < 5) & (np.abs(y) < 5) & (z > -6)
     return face_areas(surface)[near].sum()
 
 
 def test_a_body_opens_a_slit_that_registration_does_not_know():
-    box = box_mesh((14, 16, 10), tuple(SIZE_MM))
+    box = box_mesh((12, 12, 8), tuple(SIZE_MM))
     mesh = TetrahedralMesh(box.vertices - [0, 0, SIZE_MM[2] / 2], box.tets)
     surfaces = [block_with_slit(depth) for depth in DEPTHS_MM]
     pairs = [registration(*depths) for depths in pairwise(DEPTHS_MM)]

@@ -88,9 +88,7 @@ def target(mesh):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_numbers_of_a_simulation(recorded, tmp_path, kind):
-    mesh = uneven_body(4)
-    if "quadratic" in kind:
-        mesh = quadratic(mesh)
+    mesh = quadratic(uneven_body(3)) if "quadratic" in kind else uneven_body(4)
     settings = {"fields": FIELDS if "rates" in kind else ["displacement", "growth"]}
     parameters = parameters_from(RUN | KINDS[kind] | settings)
     maps = {}

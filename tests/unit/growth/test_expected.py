@@ -42,13 +42,13 @@ from gyriflow.growth.series_shapes import (
     sizes_of,
 )
 
-BALL = ellipsoid_mesh(8, (20.0, 20.0, 20.0))
+BALL = ellipsoid_mesh(6, (20.0, 20.0, 20.0))
 WEEKS = [22.0, 23.0, 24.0]
 
 
 def wavy(height_mm):
     """Return a sphere with waves of a height in mm."""
-    ball = sphere(20.0, 4)
+    ball = sphere(20.0, 3)
     x, y, z = (ball.vertices / 20.0).T
     wave = np.sin(9 * x) * np.cos(8 * y + 1) + np.sin(8 * z + 2) * np.cos(7 * x)
     radius = 1 + height_mm * wave / 20
@@ -61,7 +61,7 @@ def test_needles_do_not_throw_vertices_off_the_surface():
     x, y, z = ball.vertices.T
     turn = np.exp(0.8j * z) * (x + 1j * y)
     twisted = TriangleMesh(np.stack([turn.real, turn.imag, z], axis=1), ball.faces)
-    larger = sphere(21.0, 4)
+    larger = sphere(21.0, 3)
     is_upper = larger.vertices[larger.faces].mean(axis=1)[:, 2] > 0
     half = TriangleMesh(larger.vertices, larger.faces[is_upper])
     moves = fit_onto_surface(twisted, half) - twisted.vertices
@@ -199,7 +199,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     difference in size, return to the atlas.
     """
     axes = (30.0, 36.0, 27.0)
-    mesh, fine = ellipsoid_mesh(12, axes), ellipsoid(axes, 5)
+    mesh, fine = ellipsoid_mesh(8, axes), ellipsoid(axes, 4)
     first = to_atlas(fine.vertices)
     surfaces = [TriangleMesh(at, fine.faces) for at in (first, grown_atlas(first))]
     pairs = [sampled(to_atlas, fine.vertices), sampled(grown_atlas, first)]

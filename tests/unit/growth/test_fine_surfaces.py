@@ -22,9 +22,9 @@ COARSE, _ = boundary_surface(ellipsoid_mesh(8, (20.0, 20.0, 20.0)))
 
 def folded(height_mm=0.8):
     """Return a fine surface with waves that the coarse mesh does not resolve."""
-    ball = sphere(20.0, 5)
+    ball = sphere(20.0, 4)
     x, y, z = ball.vertices.T
-    waves = np.sin(1.5 * x) * np.cos(1.5 * y) + np.sin(1.5 * z)
+    waves = np.sin(1.2 * x) * np.cos(1.2 * y) + np.sin(1.2 * z)
     return TriangleMesh(
         ball.vertices * (1 + height_mm * waves / 40)[:, None], ball.faces
     )
@@ -58,9 +58,11 @@ def test_folds_finer_than_the_mesh_move_with_it():
 
 def test_a_surface_that_would_cross_itself_is_that_of_the_mesh(caplog):
     # of one size, since only the displacements matter
-    shaken = np.random.default_rng(0).normal(scale=20.0, size=PLACES.shape)
-    boundary = TriangleMesh(PLACES + shaken, COARSE.faces)
-    assert moved_surface(OBSERVED, boundary) is boundary
+    ball = sphere(20.0, 3)
+    places = nearest_on(COARSE.vertices, ball)[2]
+    shaken = np.random.default_rng(0).normal(scale=40.0, size=places.shape)
+    boundary = TriangleMesh(places + shaken, COARSE.faces)
+    assert moved_surface(ObservedSurface(ball, places), boundary) is boundary
     assert Facts("crosses itself", "mesh") == caplog.text
 
 

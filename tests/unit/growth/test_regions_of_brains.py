@@ -85,7 +85,7 @@ def test_regions_of_another_surface_are_refused(surface, n_labels, facts):
 def test_regions_of_brains_without_labels_are_carried_by_the_masks_of_their_surfaces():
     other = transformed(BRAIN, scaling([1.15, 1.1, 1.2], [5.0, -3.0, 2.0]))
     first, second = (
-        channels(*surface_mask(mesh, 1.5), cerebrum=(1,)) for mesh in (BRAIN, other)
+        channels(*surface_mask(mesh, 2.0), cerebrum=(1,)) for mesh in (BRAIN, other)
     )
     deformation = register(first, second).deformation
     labels = np.where(BRAIN.vertices[:, 1] > 4.0, 1, 2)

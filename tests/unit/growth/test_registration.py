@@ -12,6 +12,7 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import Deformation, carry, transform_points
 from gyriflow.growth.registration import (
     Channels,
+    _common_channels,
     _measure_quality,
     channels,
     perturb_labels,
@@ -189,6 +190,8 @@ def test_images_are_compared_where_both_brains_have_one():
     shown = brain(EARLIER_LABELS, grid(), image=(image, grid()))
     bright = np.quantile(shown.intensity[shown.tissue > 0], 0.99)
     assert bright == pytest.approx(1.0, abs=0.01)
-    assert register(shown, EARLIER).channels == ("cerebrum", "cortex")
+    assert list(_common_channels(shown, EARLIER)) == ["cerebrum", "cortex"]
+    both = _common_channels(shown, shown)
+    assert list(both) == ["cerebrum", "cortex", "intensity"]
     with pytest.raises(InputError, check=Facts("0%", "99 %", 0)):
         brain(EARLIER_LABELS, grid(), image=(0 * image, grid()))
