@@ -62,13 +62,16 @@ MAX_ROTATED_SHARE = 0.7
 rotation."""
 N_POINTS = 3000
 """Number of points of the cerebrum at which starts are compared."""
-_ANGLES = list(
-    product(
+_ANGLES = [
+    (first, second, third)
+    for first, second, third in product(
         range(0, 360, 45),
         range(-90, 91, 45),
         range(0, 360, 45),
     )
-)
+    # at a right angle the first turn and the third are about one axis
+    if third == 0 or abs(second) < 90
+]
 _TURNS = Rotation.from_euler("xyz", _ANGLES, degrees=True).as_matrix()
 START_ROTATIONS = sorted(_TURNS, key=np.trace, reverse=True)
 """Rotations of the start, the identity first. Every rotation is within about 35 degrees
