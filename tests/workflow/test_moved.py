@@ -3,17 +3,17 @@
 import os
 import re
 import shutil
-import sys
 
 import pytest
-from processes import ran
+from click.testing import CliRunner
 from scan_trees import make_tree
 from shapes import phantom, save_labels
 
+from gyriflow.cli.commands import main
 from gyriflow.cli.init import write_bids
 from gyriflow.cli.recognition import recognise
 
-from .conftest import SMALL_STUDY, Workflow
+from .conftest import SMALL_STUDY, Workflow, launching
 
 pytestmark = pytest.mark.slow
 
@@ -22,19 +22,15 @@ CURRENT = "everything is up to date"
 
 def commands(workflow, *command):
     """Return what a command of gyriflow says."""
-    outcome = ran(
-        sys.executable,
-        "-m",
-        "gyriflow.cli",
-        *command,
-        cwd=workflow.directory,
-        env=workflow.environment,
-    )
-    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-    return outcome.stdout
+    with launching(workflow.directory):
+        done = CliRunner().invoke(main, command)
+    assert done.exit_code == 0, done.output
+    return done.output
 
 
-def test_a_moved_study_whose_data_were_moved_too_is_up_to_date(checkout_copy, tmp_path):
+def test_a_moved_study_whose_data_were_moved_too_is_up_to_date(
+    checkout_copy, tmp_path, capfd
+):
     scan = tmp_path / "b.nii.gz"
     save_labels(scan, *phantom(22.0, 2.0))
     a, b = SMALL_STUDY["brains"]
@@ -56,9 +52,8 @@ def test_a_moved_study_whose_data_were_moved_too_is_up_to_date(checkout_copy, tm
     before = {path: path.stat().st_mtime_ns for path in files}
     assert CURRENT in commands(workflow, "run", "study.yaml", "-n")
     assert before == {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    outcome = workflow.run("--cores", "1", "--configfile", "study.yaml")
-    assert outcome.returncode == 0, outcome.stderr
-    assert CURRENT in outcome.stderr
+    assert workflow.call("--cores", "1", "--configfile", "study.yaml") == 0
+    assert CURRENT in capfd.readouterr().err
     # another scan in its place
     save_labels(scan, *phantom(22.5, 2.0))
     said = commands(workflow, "run", "study.yaml", "-n")

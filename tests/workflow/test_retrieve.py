@@ -40,55 +40,58 @@ def study(folder: Path, url: str) -> dict:
     return {"atlas": "atlas.yaml", "start": "far-21", "folding": {"end_week": 22}}
 
 
+@pytest.fixture
+def said(workflow, capfd):
+    """Return a function: what a call for study.yaml that ends in a code has told."""
+
+    def said(*arguments, code=0):
+        capfd.readouterr()
+        call = (*arguments, "--cores", "1", "--configfile", "study.yaml")
+        assert workflow.call(*call) == code
+        return capfd.readouterr().err
+
+    return said
+
+
 def test_missing_files_are_planned_announced_and_fetched_by_what_needs_them(
-    workflow, server
+    workflow, server, said
 ):
-    name = workflow.write("study.yaml", study(workflow.directory, server.url))
+    workflow.write("study.yaml", study(workflow.directory, server.url))
     folder = workflow.directory / "resources" / "atlases" / "far"
-    planned = workflow.run("-n", "growth", "--configfile", name)
-    assert planned.returncode == 0, planned.stderr
-    assert Facts("far:", 2, folder) in planned.stderr.splitlines()
-    assert planned.stderr == Facts("CC0", "Do what you like.")
+    planned = said("-n", "growth")
+    assert Facts("far:", 2, folder) in planned.splitlines()
+    assert planned == Facts("CC0", "Do what you like.")
     assert server.asked == []
 
     long = "w21/labels.nii.gz"
     server.broken_after[long] = [60_000]
     # a surface needs the file of its own week only
-    target = f"{folder}/{long}"
-    first = workflow.run(target, "--cores", "1", "--configfile", name)
-    assert first.returncode == 0, first.stderr
-    assert first.stderr.count("Do what you like.") == 1
+    assert said(f"{folder}/{long}").count("Do what you like.") == 1
     assert files_in(folder) == {long: FILES[long]}
     assert server.asked.count(long) == 2
 
-    second = workflow.run("retrieve", "--cores", "2", "--configfile", name)
-    assert second.returncode == 0, second.stderr
+    said("retrieve")
     assert files_in(folder) == FILES
 
     # then there is nothing to fetch and nothing to tell, whatever is forced
     server.asked.clear()
-    last = workflow.run("retrieve", "--cores", "1", "--configfile", name, "--forceall")
-    assert last.returncode == 0, last.stderr
-    assert "Do what you like." not in last.stderr
-    deleted = workflow.run("--delete-all-output", "--cores", "1", "--configfile", name)
-    assert deleted.returncode == 0, deleted.stderr
+    assert "Do what you like." not in said("retrieve", "--forceall")
+    said("--delete-all-output")
     assert files_in(folder) == FILES
     assert server.asked == []
 
 
-def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
+def test_copies_of_the_users_own_stay_as_they_are(workflow, server, said):
     raw = study(workflow.directory, server.url)
     raw["atlas"] = {"name": "atlas.yaml", "folder": "mine"}
-    name = workflow.write("study.yaml", raw)
+    workflow.write("study.yaml", raw)
     own = workflow.directory / "mine" / "old" / "w21" / "labels.nii.gz"
     own.parent.mkdir(parents=True)
     own.write_bytes(FILES["w21/labels.nii.gz"])
     before = own.stat()
     # the other file never comes whole
     server.files["w22/labels.nii.gz"] = FILES["w22/labels.nii.gz"][:-20]
-    failed = workflow.run("retrieve", "--cores", "1", "--configfile", name)
-    assert failed.returncode == 5
-    assert "Traceback" not in failed.stderr
+    assert "Traceback" not in said("retrieve", code=5)
     assert files_in(workflow.directory / "mine") == {
         "old/w21/labels.nii.gz": FILES["w21/labels.nii.gz"]
     }
@@ -97,8 +100,6 @@ def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
 
     # a changed copy is named by the stage that reads it, and left to the user
     own.write_bytes(packed(1000))
-    surface = "results/brains/far-21/surface/pial.surf.gii"
-    refused = workflow.run(surface, "--cores", "1", "--configfile", name)
-    assert refused.returncode == 2
-    assert refused.stderr == Facts(f"{own}:", "far", sha256(FILES["w21/labels.nii.gz"]))
+    refused = said("results/brains/far-21/surface/pial.surf.gii", code=2)
+    assert refused == Facts(f"{own}:", "far", sha256(FILES["w21/labels.nii.gz"]))
     assert own.read_bytes() == packed(1000)
