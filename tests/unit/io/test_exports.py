@@ -10,7 +10,7 @@ import pytest
 from facts import Facts
 from processes import ran
 from recording import contents
-from shapes import hemisphere, scaling, sphere
+from shapes import HALF_AXES, ellipsoid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.poses import Pose
@@ -38,6 +38,11 @@ POSE = np.array([[0.0, -1, 0, 5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
 SIDES = {"left": -1, "right": 1}
+
+
+def hemisphere(side):
+    """Return an ellipsoid of few vertices in place of a hemisphere."""
+    return ellipsoid(HALF_AXES, 2, centre=(12.5 * side, 0.0, 0.0))
 
 
 @pytest.fixture
