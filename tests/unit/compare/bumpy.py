@@ -9,7 +9,8 @@ from gyriflow.compare.shapes import PreparedSurface
 from gyriflow.geometry.triangles import Floats, TriangleMesh
 from gyriflow.metrics.curvature import curvature
 
-RADIUS = 20.0
+RADIUS = 12.0
+"""Small, as comparisons remesh them to a millimetre."""
 
 
 def field(
@@ -27,7 +28,7 @@ def field(
 
 @cache
 def bumpy(
-    seed: int, height: float = 1.0, sharpness: float = 12.0, subdivisions: int = 4
+    seed: int, height: float = 0.9, sharpness: float = 12.0, subdivisions: int = 4
 ) -> TriangleMesh:
     """Return a sphere with bumps and dents of a height in mm."""
     ball = sphere(1.0, subdivisions)

@@ -24,7 +24,7 @@ from gyriflow.shipped import SHIPPED
 
 from .made_spectra import folded
 
-SEMI_AXES = (10.0, 13.0, 9.0)
+SEMI_AXES = (5.0, 6.5, 4.5)
 SIMULATED = (1.1, 1.2)
 """Growth of the brain in each simulation, in length."""
 OBSERVED = ((1.0, 1.3), (1.05, 1.15, 1.4))
@@ -47,7 +47,7 @@ def made_spectra(left, right, **settings):
     which take a finer mesh."""
     assert settings == SETTINGS
     assert left.vertices[:, 0].mean() < right.vertices[:, 0].mean()
-    return folded(length(left) / 15)
+    return folded(length(left) / 7.5)
 
 
 def is_left(surface):
@@ -107,7 +107,7 @@ def folder(tmp_path_factory):
         for factor in brains:
             brain = TriangleMesh(grown(surface.vertices, factor), surface.faces)
             write_surface(folder / f"{factor}.gii", brain)
-            write_table(folder / f"{factor}.csv", folded(length(brain) / 15))
+            write_table(folder / f"{factor}.csv", folded(length(brain) / 7.5))
     design = pd.DataFrame({"run": ["r1", "r2"], "thickness_mm": [1.5, 2.5]})
     write_table(folder / "design.csv", design)
     return folder

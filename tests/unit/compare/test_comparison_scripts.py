@@ -26,16 +26,14 @@ from gyriflow.metrics.curvature import curvature
 from .bumpy import bumpy
 
 
-def smaller(mesh):
-    """Return a surface of 0.6 times the lengths, which has fewer even triangles."""
-    return TriangleMesh(0.6 * mesh.vertices, mesh.faces)
-
-
-def save_curvature(path, surface, sign=1):
-    """Write the maps of a surface, or those of one with opposite folds."""
+def save_curvature(surface, signs):
+    """Write the maps of a surface to files, with opposite folds where their sign is
+    −1."""
     bend = curvature(surface, radius_mm=3.0)
-    maps = {"mean_curvature": sign * bend.mean, "shape_index": sign * bend.shape_index}
-    write_vertex_maps(path, maps)
+    for path, sign in signs.items():
+        maps = {"mean_curvature": sign * bend.mean}
+        maps["shape_index"] = sign * bend.shape_index
+        write_vertex_maps(path, maps)
 
 
 def validated(folder, inputs, **params):
@@ -51,16 +49,17 @@ def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
     """The run is the observed brain of each week; the start has the opposite folds, the
     brain before equal ones."""
     weeks = (22.0, 24.0)
-    surfaces = {week: smaller(bumpy(int(week))) for week in weeks}
     files = [f"{week}.gii" for week in weeks]
     inputs = {"whole": files, "simulated": files}
-    for week, surface in surfaces.items():
-        write_surface(tmp_path / f"{week}.gii", surface)
-    for name, sign in {"observed": 1, "start": -1, "adjacent": 1}.items():
+    folds = {"observed": 1, "start": -1, "adjacent": 1}
+    for name in folds:
         maps = [f"{name}-{week}.gii" for week in weeks]
         inputs |= {name: files, f"{name}_maps": maps}
-        for week, surface in surfaces.items():
-            save_curvature(tmp_path / f"{name}-{week}.gii", surface, sign)
+    for week in weeks:
+        surface = bumpy(int(week), 0.6)
+        write_surface(tmp_path / f"{week}.gii", surface)
+        signs = {tmp_path / f"{name}-{week}.gii": folds[name] for name in folds}
+        save_curvature(surface, signs)
     run = {"run": "thin", "kind": "explained", "weeks": weeks}
     table = validated(tmp_path, inputs, **run, observed=["b22", "b24"])
     labels = table[["run", "kind", "start", "observed", "week", "horizon"]]
@@ -75,7 +74,7 @@ def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
 def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
     """The brain grows by 10 % a week, along the path that the run follows, the
     registered atlas by half as much."""
-    mesh = ellipsoid_mesh(8, (12.0, 14.0, 13.0))
+    mesh = ellipsoid_mesh(8, (6.0, 7.0, 6.5))
     boundary, used = boundary_surface(mesh)
     positions = [mesh.vertices * factor for factor in (1.0, 1.1, 1.21)]
     atlas = [boundary.vertices * factor for factor in (1.0, 1.05, 1.1)]
@@ -89,7 +88,7 @@ def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
     write_tetrahedral_mesh(tmp_path / "mesh.xdmf", mesh)
     observed = TriangleMesh(positions[1][used], boundary.faces)
     write_surface(tmp_path / "observed.gii", observed)
-    save_curvature(tmp_path / "maps.gii", observed)
+    save_curvature(observed, {tmp_path / "maps.gii": 1})
     inputs = {"targets": "targets.h5", "mesh": "mesh.xdmf", "atlas": []}
     for name in ("whole", "simulated", "observed", "start", "adjacent"):
         inputs |= {name: ["observed.gii"], f"{name}_maps": ["maps.gii"]}
@@ -103,10 +102,10 @@ def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
 @pytest.mark.usefixtures("recorded_outputs")
 @pytest.mark.remeshed
 def test_surfaces_are_prepared_for_the_observed_brain_each_under_its_name(tmp_path):
-    heights = {"observed": 1.0, "start": 0.5, "adjacent": 1.5}
+    heights = {"observed": 0.6, "start": 0.3, "adjacent": 0.9}
     surfaces = {}
     for seed, (name, height) in enumerate(heights.items(), start=1):
-        surfaces[name] = smaller(bumpy(seed, height))
+        surfaces[name] = bumpy(seed, height)
         # start and neighbour lie elsewhere and are smaller
         pose = rigid(0.0, 20.0, 0.0, shift=(3.0, 8.0, -4.0)) @ scaling(0.9)
         moved = transformed(surfaces[name], np.eye(4) if seed == 1 else pose)

@@ -16,6 +16,12 @@ from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 from .bumpy import PREPARED, RADIUS, REAL, SMOOTH, bumpy, shaped
 
 
+@pytest.fixture(scope="module")
+def sampling():
+    """The resampling of the bumpy sphere."""
+    return make_resampling(PREPARED)
+
+
 def test_units_are_drawn_within_their_group_once_less_than_there_are():
     samples = draw_units([12, 5, 1])
     assert (samples[0] == 1).all()
@@ -44,9 +50,8 @@ def waves(points, wavelengths_mm, seed, count=60):
     ("lengths_mm", "share_of_modes"), [((20, 40), 1.0), ((3.5, 4.5), 0.0)]
 )
 def test_coordinates_keep_products_and_are_of_modes_or_of_what_is_finer(
-    lengths_mm, share_of_modes
+    sampling, lengths_mm, share_of_modes
 ):
-    sampling = make_resampling(PREPARED)
     values = waves(REAL.vertices, lengths_mm, 1)
     coordinates = sampling.coordinates(values)
     centred = values - np.average(values, weights=PREPARED.areas)
@@ -63,16 +68,14 @@ def test_coordinates_keep_products_and_are_of_modes_or_of_what_is_finer(
     assert share == pytest.approx(share_of_modes, abs=0.08)
 
 
-def test_a_correlation_with_a_constant_map_is_unknown():
-    sampling = make_resampling(PREPARED)
+def test_a_correlation_with_a_constant_map_is_unknown(sampling):
     values, constant = REAL.vertices[:, 0], np.full(len(REAL.vertices), 0.3)
     assert np.isnan(correlation(values, constant, PREPARED.areas))
     assert np.isnan(sampling.correlations(values, constant)).all()
 
 
-def test_intervals_of_random_maps_hold():
+def test_intervals_of_random_maps_hold(sampling):
     # benchmarks/intervals.py has larger surfaces and more maps
-    sampling = make_resampling(PREPARED)
     held, above = [], []
     for seed in range(60):
         truth, *others = (

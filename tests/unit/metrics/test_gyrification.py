@@ -30,7 +30,7 @@ def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
 def dented(depth: float, width: float) -> TriangleMesh:
     """Return a sphere of 25 mm with a round dent of that depth and width (mm) at the
     top."""
-    shape = sphere(25.0, 5)
+    shape = sphere(25.0)
     across = np.linalg.norm(shape.vertices[:, :2], axis=1)
     hollow = depth * np.exp(-((across / (0.5 * width)) ** 2) * 2)
     dent = np.where(shape.vertices[:, 2] > 0, hollow, 0.0)

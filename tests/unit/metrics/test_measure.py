@@ -63,7 +63,7 @@ def apart() -> BrainMetrics:
 @pytest.fixture(scope="module")
 def cut() -> BrainMetrics:
     """A sphere of 25 mm cut in two, along its edges, far from the origin."""
-    ball = octasphere(25.0)
+    ball = octasphere(25.0, 4)
     left, right = (transformed(half, FAR[0]) for half in halves(ball))
     return measure_brain(transformed(ball, FAR[0]), left, right, spangy_modes=60)
 
