@@ -2,7 +2,9 @@
 not empty."""
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -14,9 +16,24 @@ def words(figure: Figure) -> set[str]:
     """Return all texts that a figure shows."""
     return {
         text.get_text()
-        for text in figure.findobj(Text)
+        for text in parts(figure, Text)
         if text.get_visible() and text.get_text()
     }
+
+
+def parts[Part: Artist](figure: Figure, kind: type[Part]) -> list[Part]:
+    """Return the parts of a kind that a figure has, without axes that are off: their
+    ticks would be made first."""
+    found = []
+    remaining: list[Artist] = [figure]
+    while remaining:
+        part = remaining.pop()
+        if isinstance(part, Axis) and not part.axes.axison:
+            continue
+        if isinstance(part, kind):
+            found.append(part)
+        remaining += part.get_children()
+    return found
 
 
 def contents(figure: Figure) -> dict:

@@ -5,11 +5,13 @@ from string import ascii_lowercase
 
 import matplotlib as mpl
 import pytest
-from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from pictures import parts
 
-from gyriflow.report import panels
+from gyriflow.io import figures
+from gyriflow.report import panels, quality
 
 SMALLEST_PT = 6.0
 """Least size of print in a figure."""
@@ -18,10 +20,14 @@ TOUCH = 3.0
 larger than letters."""
 
 
-@pytest.fixture(autouse=True)
-def quick_pictures(monkeypatch):
-    """Draw surfaces with fewer pixels than print has."""
-    monkeypatch.setattr(panels, "PIXELS_PER_INCH", 100)
+@pytest.fixture(autouse=True, scope="module")
+def quick_pictures():
+    """Draw surfaces and figures with fewer pixels than print has."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(panels, "PIXELS_PER_INCH", 100)
+        patch.setattr(quality, "PIXELS_PER_INCH", 50)
+        patch.setattr(figures, "DPI", 50)
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -43,9 +49,7 @@ def figures_can_be_printed(monkeypatch):
             for axes in drawn_on
             if axes.get_label() != "scale bar" and not hasattr(axes, "_colorbar")
         ]
-        bold = [
-            text for text in figure.findobj(Text) if text.get_fontweight() == "bold"
-        ]
+        bold = [text for text in parts(figure, Text) if text.get_fontweight() == "bold"]
         letters = sorted(text.get_text() for text in bold if len(text.get_text()) == 1)
         assert letters == list(ascii_lowercase[: len(letters)])
         assert (len(letters) > 1) == (len(panels) > 1), [
@@ -80,16 +84,13 @@ def shown_texts(figure: Figure) -> set[Text]:
     """Return the texts that are seen: not those of ticks beyond an axis, nor of an axis
     that is off."""
     hidden = set()
-    for axes in figure.findobj(Axes):
-        for axis in (axes.xaxis, axes.yaxis):
-            low, high = sorted(axis.get_view_interval())
-            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
-                if not axes.axison or not low <= tick.get_loc() <= high:
-                    hidden |= {tick.label1, tick.label2}
-            if not axes.axison:
-                hidden |= {axis.label, axis.offsetText}
+    for axis in parts(figure, Axis):
+        low, high = sorted(axis.get_view_interval())
+        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+            if not low <= tick.get_loc() <= high:
+                hidden |= {tick.label1, tick.label2}
     return {
         text
-        for text in figure.findobj(Text)
+        for text in parts(figure, Text)
         if text.get_visible() and text.get_text().strip()
     } - hidden

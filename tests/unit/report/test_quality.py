@@ -96,14 +96,15 @@ SHIFT = np.array([1.0, 2.0, 3.0])
 @pytest.fixture(scope="module")
 def figure():
     """The page of an ellipsoid in a volume stored obliquely, both turned upright."""
-    oblique = rigid(25, -10, 40) @ scaling(0.8)
-    oblique[:3, 3] = CENTRE - oblique[:3, :3] @ np.full(3, 40.0)
-    index = np.stack(np.indices((81, 81, 81)), axis=-1)
+    oblique = rigid(25, -10, 40) @ scaling(1.6)
+    oblique[:3, 3] = CENTRE - oblique[:3, :3] @ np.full(3, 20.0)
+    index = np.stack(np.indices((41, 41, 41)), axis=-1)
     places = index @ oblique[:3, :3].T + oblique[:3, 3]
     away = np.linalg.norm((places - CENTRE) / HALF, axis=-1)
     surface = isosurface((1.5 - away).astype(np.float32), oblique)
     pose = rigid(shift=SHIFT)
-    image = 100.0 * (away < 1), pose @ oblique
+    # 50 at the surface, and in proportion to the distance around it
+    image = 50.0 * (2.0 - away).clip(0.0), pose @ oblique
     middle_x_mm = CENTRE[0] + SHIFT[0]
     brain = QualityBrain(transformed(surface, pose), middle_x_mm, image=image)
     return quality_page(brain, quality_row(LABELS, REPORT, {}, [], 80.0), [])
