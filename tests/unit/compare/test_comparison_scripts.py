@@ -74,7 +74,7 @@ def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
 def test_predictions_without_mechanics_are_those_of_their_week(tmp_path):
     """The brain grows by 10 % a week, along the path that the run follows, the
     registered atlas by half as much."""
-    mesh = ellipsoid_mesh(8, (6.0, 7.0, 6.5))
+    mesh = ellipsoid_mesh(8, (12.0, 14.0, 13.0))
     boundary, used = boundary_surface(mesh)
     positions = [mesh.vertices * factor for factor in (1.0, 1.1, 1.21)]
     atlas = [boundary.vertices * factor for factor in (1.0, 1.05, 1.1)]
