@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gyriflow.anatomy import template
 from gyriflow.anatomy.template import (
     PointCloud,
     register_from_all_sides,
@@ -15,21 +16,23 @@ from gyriflow.anatomy.template import (
 from gyriflow.geometry.alignment import RigidFit
 
 KNOWN: list[tuple[PointCloud, tuple, RigidFit, float]] = []
-"""A shape, what it was registered with, its fit and the confidence."""
+"""A shape, its targets with the numbers of starts and points, its fit and the
+confidence."""
 TOL = 1e-6
 """Distance of points of copies, in sizes."""
 
 
 def fit_found_once(shape: PointCloud, targets: tuple) -> tuple[RigidFit, float]:
     """Return what `register_from_all_sides` does, from a known copy if there is one."""
-    for known, known_targets, fit, confidence in KNOWN:
-        if known_targets is targets and len(known.points) == len(shape.points):
+    search = targets, len(template.CUBE_ROTATIONS), len(shape.points)
+    for known, known_search, fit, confidence in KNOWN:
+        if known_search == search:
             turn, distance = Rotation.align_vectors(known.points, shape.points)
             if distance < TOL * np.sqrt(len(shape.points)):
                 rotation = fit.rotation @ turn.as_matrix()
                 return replace(fit, rotation=rotation), confidence
     fit, confidence = register_from_all_sides(shape, targets)
-    KNOWN.append((shape, targets, fit, confidence))
+    KNOWN.append((shape, search, fit, confidence))
     return fit, confidence
 
 

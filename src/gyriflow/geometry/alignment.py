@@ -117,7 +117,7 @@ def _step_towards_planes(planes: Planes) -> tuple[Floats, Floats]:
         rows = rows * roots[:, None]
         distances = distances * roots
     solution, *_ = np.linalg.lstsq(rows, distances, rcond=1e-6)
-    turn, move = np.split(solution, 2)
+    turn, move = solution[:3], solution[3:]
     rotation = Rotation.from_rotvec(turn).as_matrix()
     return rotation, centre + move - rotation @ centre
 

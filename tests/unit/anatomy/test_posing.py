@@ -226,12 +226,13 @@ def test_a_hemisphere_of_the_other_shape_is_mirrored_or_of_the_other_side(halves
     assert doubt == Facts("right", "left", "axis")
 
 
+@pytest.mark.usefixtures("few_starts")
 def test_shapes_without_a_pose_are_refused_or_keep_that_of_their_volume():
     # neither front nor back, up nor down, and its axes are no file's
     shape = transformed(ellipsoid((9, 24, 16)), rigid(50, 40, 30))
-    facts = Facts("left hemisphere", 0.13, 1.07, "ras", "lps")
+    facts = Facts("hemisphere", 0.13, 1.07, "ras", "lps")
     with pytest.raises(InputError, check=facts):
-        pose_of_pair(shape, shape)
+        pose_of_hemisphere(shape, "right", "auto")
     with pytest.raises(InputError, check=Facts("brain", 0.13, 1.07)):
         pose_of_surface(shape, "auto")
     pose = pose_of_volume_by_shape(shape, has_sides=False)
@@ -243,7 +244,7 @@ def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
     inside_out = [flipped(half) for half in halves]
     files = both_moved(inside_out, drawn(11), drawn(12))
     surface = from_hemispheres(
-        *files, week=24.0, coordinates="auto", edge_length_mm=2.5
+        *files, week=24.0, coordinates="auto", edge_length_mm=3.0
     )
     sides = pieces(surface.whole)
     assert [euler_number(side) for side in sides] == [2, 2]
@@ -275,7 +276,7 @@ TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90,
 
 @pytest.fixture(scope="module")
 def brain():
-    return phantom(24.0, 1.6)
+    return phantom(24.0, 2.0)
 
 
 @pytest.mark.parametrize(

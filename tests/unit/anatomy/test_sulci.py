@@ -37,13 +37,13 @@ from gyriflow.metrics.curvature import curvature
 from gyriflow.units import CM2_PER_MM2
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
-VOXEL_MM, RADIUS_MM, THICKNESS_MM = 0.8, 12.0, 2.0
+VOXEL_MM, RADIUS_MM, THICKNESS_MM = 0.8, 10.0, 2.0
 
 
 def ball():
     """Return a ball's mask, the (i, j, k, 3) places in mm, their depth below its
     surface, and the affine."""
-    axis = np.arange(-22, 23) * VOXEL_MM + 0.13
+    axis = np.arange(-18, 19) * VOXEL_MM + 0.13
     places = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     depth = RADIUS_MM - np.linalg.norm(places, axis=-1)
     return depth > 0, places, depth, scaling(VOXEL_MM, axis[0])
@@ -59,7 +59,7 @@ def with_sulcus(depth_mm):
 
 
 def test_a_fused_sulcus_is_opened_to_its_depth():
-    depth_mm = 6.0
+    depth_mm = 5.0
     body, core, affine = with_sulcus(depth_mm)
     field, volume = smooth_mask(body), body.sum() * VOXEL_MM**3
     walls_mm2 = 2 * np.pi * (RADIUS_MM**2 - (RADIUS_MM - depth_mm) ** 2)
@@ -83,7 +83,7 @@ def test_a_fused_sulcus_is_opened_to_its_depth():
 
 
 def test_hemispheres_are_no_banks_of_a_sulcus():
-    body, core, affine = with_sulcus(6.0)
+    body, core, affine = with_sulcus(5.0)
     side_mm = (ball()[1] @ np.array([0.8, 0.36, 0.48])).astype(np.float32)
     *_, report = open_fused_sulci(smooth_mask(body), affine, core, side_mm)
     assert report["slit_voxels"] == 0
@@ -109,7 +109,7 @@ def test_cortex_without_a_second_bank_stays_whole(kind):
 
 
 def test_holes_in_the_white_matter_open_nothing_more():
-    body, core, affine = with_sulcus(6.0)
+    body, core, affine = with_sulcus(5.0)
     deep = ndimage.binary_erosion(core, iterations=2)
     holes = deep & (np.random.default_rng(0).random(core.shape) < 0.02)
     assert holes.sum() > 20
@@ -161,10 +161,11 @@ def test_labels_that_lack_white_matter_are_reported_and_stay_as_they_are():
     np.testing.assert_array_equal(grid, affine)
 
 
+@pytest.mark.usefixtures("few_starts")
 def test_cortex_of_a_voxel_stays_fused_and_has_one_number_of_voxels():
     labels, affine = phantom(24.0, 2.0)
     surface = from_labels(
-        labels, affine, ATLAS, week=28.0, edge_length_mm=3.0, open_sulci=True
+        labels, affine, ATLAS, week=28.0, edge_length_mm=4.0, open_sulci=True
     )
     thickness = thickness_from_labels(
         surface.cortex, surface.whole, surface.pose, surface.fissure_x_mm
@@ -176,28 +177,18 @@ def test_cortex_of_a_voxel_stays_fused_and_has_one_number_of_voxels():
     assert Facts(reason) in surface.report["warnings"]
 
 
-def test_labels_without_white_matter_stay_fused_with_no_warning_at_an_early_week():
-    labels, affine = phantom(24.0, 2.0)
-    mask = np.isin(labels, ATLAS.cerebrum).astype(np.int32)
-    options = {"edge_length_mm": 3.0, "open_sulci": True}
-    surface = from_labels(mask, affine, SCHEMES["binary"], week=24.0, **options)
-    reason = surface.report["sulci"]["stays_fused"]
-    assert reason == "the labels have no white matter"
-    assert "not opened" not in " ".join(surface.report["warnings"])
-
-
 def test_uneven_cortex_is_opened_on_both_sides():
     body, places, depth, affine = ball()
     across = np.abs(places @ np.array([0.8, 0.36, 0.48]))
     along = places @ np.array([0.0, 0.8, -0.6])
     thickness = np.where(along < 0, 1.3, 2.6)
-    to_end = np.hypot(across, np.maximum(depth - 6.0, 0.0))
+    to_end = np.hypot(across, np.maximum(depth - 4.5, 0.0))
     core = body & (depth > thickness) & (to_end > thickness)
     field = smooth_mask(body)
     opened, fine, _ = open_fused_sulci(field, affine, core)
     slits = transform_points(np.argwhere(opened < 0.5), fine)
     slits = slits[np.linalg.norm(slits, axis=1) < RADIUS_MM - 0.5]
-    sheet = places[body & (across < 0.3) & (depth < 5.5)]
+    sheet = places[body & (across < 0.3) & (depth < 4.0)]
     is_open = np.linalg.norm(sheet[:, None] - slits, axis=-1).min(axis=1) < VOXEL_MM
     for half in (-1, 1):
         assert is_open[sheet @ np.array([0.0, 0.8, -0.6]) * half > 1.0].mean() > 0.95
@@ -243,7 +234,7 @@ def test_faces_that_would_cut_others_stay_where_they_are():
 
 def test_it_does_not_depend_on_where_the_brain_lies():
     _, affine = voxels(9.0)
-    ball = sphere(8.0)
+    ball = sphere(8.0, 3)
     rough = 0.1 * np.round(ball.vertices / 0.4) + 0.75 * ball.vertices
     steps = TriangleMesh(rough, ball.faces)
     plain = without_terraces(steps, affine)
