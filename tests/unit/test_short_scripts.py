@@ -299,7 +299,7 @@ def white_made(folder, inputs, sides=SIDES, **params):
 @pytest.mark.remeshed
 def test_white_surfaces_of_labels_are_posed_as_volumes_are(tmp_path):
     write_halves(tmp_path)
-    size = np.array(LONG_MM)
+    size = 2 * np.array(LONG_MM)
     axes = [np.arange(-23, 23, step) for step in size]
     affine = np.diag([*size, 1.0])
     affine[:3, 3] = -23.0
@@ -340,7 +340,7 @@ def test_labels_are_filled_with_the_brain_s_cortex_or_that_of_a_similar_one(
     tmp_path, has_white, similar
 ):
     """Halves that are 1 mm apart are joined at their fissure, not at x = 0."""
-    whole = octasphere(PIAL_MM, 4)
+    whole = octasphere(12.0, 4)
     parts = split(whole, 0.0)
     for sign, side, half in zip((-1, 1), SIDES, parts, strict=True):
         write_surface(tmp_path / f"{side}.gii", moved(half, -8.0 + sign * 0.01))
