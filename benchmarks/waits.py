@@ -11,14 +11,15 @@ and run: processor time as its steps have recorded it, with child processes (s; 
 smallest and largest of the repeats), and the largest memory (MiB). Of the metrics of
 measured brains the last table has the largest differences, relative to the value but
 for metrics that may be negative, and in units of the noise: one standard deviation of
-the difference between two measurements of one brain (`norms/repeatability.yaml`). The
-last line is one JSON object.
+the difference between two measurements of one brain (`norms/repeatability.yaml`). A
+study with runs has a table before it: the largest differences of `COMPARED` between
+each run's comparisons with the observed brains. The last line is one JSON object.
 """
 
 import argparse
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,16 @@ from gyriflow.quantities import METRICS
 from gyriflow.shipped import SHIPPED
 from gyriflow.step import read_usage
 
+COMPARED = (
+    "area_difference",
+    "volume_difference",
+    "distance_mm",
+    "r_shape_index",
+    "r_mean_curvature",
+)
+"""Columns of a run's comparison with an observed brain: parts of its size, mm,
+correlations."""
+KEYS_OF_RUNS = ["run", "week", "model"]
 N_DIFFERENCES = 10
 """Metrics in the table of differences, the largest in units of the noise first."""
 
@@ -48,6 +59,18 @@ def make_studies(folders: Mapping[Path, Path], command: str, config: Path) -> No
     for process in processes:
         if process.wait():
             raise subprocess.CalledProcessError(process.returncode, process.args)
+
+
+def differences_of_runs(folders: Sequence[Path]) -> list[dict[str, Any]]:
+    """Return rows of run and the largest differences of `COMPARED` between two studies;
+    none for studies without runs."""
+    files = [folder / "results" / "study" / "validation.csv" for folder in folders]
+    if not files[0].exists():
+        return []
+    columns = [*KEYS_OF_RUNS, *COMPARED]
+    before, now = (pd.read_csv(file)[columns].set_index(KEYS_OF_RUNS) for file in files)
+    by_run = (now - before).abs().groupby("run").max()
+    return by_run.reset_index().to_dict("records")
 
 
 def steps_in(folder: Path) -> pd.DataFrame:
@@ -112,10 +135,13 @@ def main() -> None:
         row = {"step": rule, "run": run, "checkout": name, "cpu_s": seconds.median()}
         row |= {"smallest": seconds.min(), "largest": seconds.max()}
         rows.append(row | {"memory_MiB": taken["memory_MiB"].max()})
-    before, now = (metrics_in(out / f"{name}-0") for name in checkouts)
-    found = differences(before, now)
+    firsts = [out / f"{name}-0" for name in checkouts]
+    runs = differences_of_runs(firsts)
+    if runs:
+        print(pd.DataFrame(runs).to_string(index=False, float_format="%.2g"))
+    found = differences(*map(metrics_in, firsts))
     print(pd.DataFrame(found).to_string(index=False, float_format="%.2g"))
-    print_rows(rows, differences=found)
+    print_rows(rows, differences=found, runs=runs)
 
 
 if __name__ == "__main__":

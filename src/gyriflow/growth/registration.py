@@ -54,7 +54,13 @@ BRIGHT = 0.99
 """Quantile of the intensity inside the cerebrum that counts as 1."""
 WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
 AFFINE = "-a -dof 12 -m SSD -n 60x30"
-DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -wp 0"
+DEFORMABLE = "-m NCC 3x3x3 -wp 0"
+ITERATIONS = "60x40x15"
+"""Of the deformation with voxels four times and twice as large, and with those that
+there are."""
+FINE_ITERATIONS = "60x40x8"
+"""The same for voxels below `FINE_MM`: those twice as large nearly suffice."""
+FINE_MM = 1.0
 SMOOTHING_VOXELS = (2.5, 0.8)
 """SD of the smoothing of updates and of the deformation."""
 MAX_ROTATED_SHARE = 0.7
@@ -322,8 +328,11 @@ def register(
     common = f"-threads {threads} -seed 1 -V 0 {pairs}"
     update, total = (f"{smoothing * voxels:g}vox" for voxels in SMOOTHING_VOXELS)
     affine = f"{AFFINE} {common} -ia-identity -o found"
+    is_fine = earlier.voxel_mm < FINE_MM
+    iterations = FINE_ITERATIONS if is_fine else ITERATIONS
     deformable = (
-        f"{DEFORMABLE} -s {update} {total} {common} -gm where -it found -o warp"
+        f"{DEFORMABLE} -n {iterations} -s {update} {total} {common} -gm where"
+        " -it found -o warp"
     )
     greedy = Greedy3D()
     output = io.StringIO()
