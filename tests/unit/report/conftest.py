@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from pictures import parts
 
 from gyriflow.io import figures
-from gyriflow.report import panels, quality
+from gyriflow.report import panels, quality, style
 
 SMALLEST_PT = 6.0
 """Least size of print in a figure."""
@@ -27,6 +27,8 @@ def quick_pictures():
         patch.setattr(panels, "PIXELS_PER_INCH", 100)
         patch.setattr(quality, "PIXELS_PER_INCH", 50)
         patch.setattr(figures, "DPI", 50)
+        # numbers at axes are set as formulas otherwise, which takes as long as drawing
+        patch.setitem(style.MATPLOTLIB_SETTINGS, "axes.formatter.use_mathtext", False)
         yield
 
 
