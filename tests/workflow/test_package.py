@@ -35,25 +35,22 @@ FOLD = (
 )
 
 
-def installed(wheel, folder, without=""):
-    """Return the command of a virtual environment with the wheel and the packages of
-    this environment.
-
-    Imports of the packages `without` fail.
-    """
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    """The site-packages, the command and the variables of a virtual environment with
+    the wheel and the packages of this environment."""
+    folder = tmp_path_factory.mktemp("installed")
     venv = [sys.executable, "-m", "venv", "--system-site-packages", folder]
     subprocess.run(venv, check=True, timeout=120)
     python = folder / "bin" / "python"
     found = "import sysconfig; print(sysconfig.get_path('purelib'))"
-    site = ran(python, "-c", found).stdout.strip()
-    (Path(site) / "environment.pth").write_text(sysconfig.get_path("purelib") + "\n")
-    blocked = f"import sys; sys.modules.update(dict.fromkeys({without!r}.split()))"
-    (Path(site) / "blocked.pth").write_text(blocked + "\n")
+    site = Path(ran(python, "-c", found).stdout.strip())
+    (site / "environment.pth").write_text(sysconfig.get_path("purelib") + "\n")
     names = set(os.environ) - {"PYTHONPATH", "VIRTUAL_ENV"}
     plain = {name: os.environ[name] for name in names} | {"PATH": "/usr/bin:/bin"}
     install = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
     subprocess.run([*install, wheel], env=plain, check=True, timeout=120)
-    return folder / "bin" / "gyriflow", plain
+    return site, folder / "bin" / "gyriflow", plain
 
 
 def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
@@ -72,8 +69,8 @@ def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
     ]
 
 
-def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory):
-    command, environment = installed(wheel, tmp_path_factory.mktemp("installed"))
+def test_the_command_works_in_an_empty_folder(installed, tmp_path):
+    _, command, environment = installed
 
     def gyriflow(*arguments):
         return ran(command, *arguments, cwd=tmp_path, env=environment)
@@ -92,10 +89,15 @@ def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory)
     assert " core hours, " in dry.stdout
 
 
-@pytest.fixture(scope="module")
-def without_solver(wheel, tmp_path_factory):
-    """The command and variables of an environment without the packages of `fold`."""
-    return installed(wheel, tmp_path_factory.mktemp("installed"), without=FOLD)
+@pytest.fixture
+def without_solver(installed):
+    """The command and variables of this environment, in which imports of the packages
+    of `fold` fail."""
+    site, command, environment = installed
+    blocked = f"import sys; sys.modules.update(dict.fromkeys({FOLD!r}.split()))"
+    (site / "blocked.pth").write_text(blocked + "\n")
+    yield command, environment
+    (site / "blocked.pth").unlink()
 
 
 def test_a_brain_is_measured_without_the_solver(without_solver, tmp_path):

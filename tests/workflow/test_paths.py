@@ -70,8 +70,7 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(
     planned = workflow.jobs(*call)
     counts = [planned[rule] for rule in ("atlas_file", "atlas_path", "register")]
     assert counts == [2, 1, 2]
-    first = workflow.run(*call, timeout_s=900)
-    assert first.returncode == 0, first.stderr
+    assert workflow.call(*call) == 0
     folder = workflow.directory / "atlas" / "paths"
     (kept,) = folder.glob("far-22-*.h5")
     made = read_weekly_shapes(workflow.directory / PATH)
@@ -89,8 +88,7 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(
     planned = workflow.jobs(*call)
     assert (planned["kept_path"], planned["register"]) == (1, 1)
     assert "atlas_path" not in planned
-    second = workflow.run(PATH, *call[1:])
-    assert second.returncode == 0, second.stderr
+    assert workflow.call(PATH, *call[1:]) == 0
     copied = read_weekly_shapes(workflow.directory / PATH)
     assert (copied.positions == made.positions).all()
     folder.rename(workflow.directory / "away")
