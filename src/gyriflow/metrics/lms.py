@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 from scipy.linalg import block_diag
+from scipy.special import ndtr, ndtri, stdtr, stdtrit
 
 from .. import splines
 from ..geometry.triangles import Floats
@@ -158,12 +158,8 @@ class WeeklyNorm:
         )
         freedom, spread = self._student(locations, scales)
         # the smaller tail does not round to 1
-        z = -np.sign(terms.z) * stats.norm.ppf(
-            stats.t.cdf(
-                -np.abs(terms.z) / spread,
-                freedom,
-            )
-        )
+        tail = stdtr(freedom, -np.abs(terms.z) / spread)
+        z = -np.sign(terms.z) * ndtri(tail)
         return z, terms.z + INTERVAL_Z * np.stack([-error, error])
 
     def _terms_at(
@@ -189,17 +185,14 @@ class WeeklyNorm:
             norm = replace(self, skewness=SKEWNESS)
         locations, scales = norm._bases(weeks)
         z = norm._terms_at(locations, scales, values).z
-        deviation = stats.median_abs_deviation(z, scale="normal")
+        deviation = np.median(np.abs(z - np.median(z))) / ndtri(0.75)
         return z / max(float(deviation), MIN_SCATTER)
 
     def values(self, weeks: ArrayLike, z: float) -> Floats:
         """Return the values with a z at weeks (n,): the inverse of `scores`."""
         locations, scales = self._bases(weeks)
         freedom, spread = self._student(locations, scales)
-        new_z = spread * stats.t.ppf(
-            stats.norm.cdf(z),
-            freedom,
-        )
+        new_z = spread * stdtrit(freedom, ndtr(z))
         scale = np.exp(scales @ self.scale)
         if not self.is_positive:
             return locations @ self.location + scale * _signed_distance(
@@ -336,7 +329,10 @@ def fit_norm(
 def _are_skewed(z: Floats) -> bool:
     """Return whether residuals are more skewed than normal ones usually are."""
     expected_sd = np.sqrt(6 / len(z))
-    return bool(abs(stats.skew(z)) > SKEWED_SD * expected_sd)
+    centred = z - z.mean()
+    third_moment = (centred**3).mean()
+    scale = (centred**2).mean() ** 1.5
+    return bool(abs(third_moment) > SKEWED_SD * expected_sd * scale)
 
 
 @dataclass(frozen=True, eq=False)

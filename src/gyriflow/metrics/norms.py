@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+from scipy.special import ndtr, ndtri
 
 from ..geometry.triangles import Floats
 from ..quantities import METRICS
@@ -145,7 +145,7 @@ def _published_scores(
                 "expected": expected,
                 "sd": sd,
                 "z": z,
-                "centile": 100 * stats.norm.cdf(z),
+                "centile": 100 * ndtr(z),
             }
         rows.append(row)
     columns = [
@@ -440,13 +440,13 @@ def _score(
     ends = np.array(centiles) / 100
     scores = np.clip(
         np.append(z, interval),
-        *stats.norm.ppf(ends),
+        *ndtri(ends),
     )
     numbers = (
         expected,
         0.5 * (high - low),
         *scores,
-        *100 * stats.norm.cdf(scores),
+        *100 * ndtr(scores),
     )
     score |= dict(zip(SCORES, numbers, strict=False))
     if score["sd"] <= MIN_SPREAD * abs(score["expected"]):
@@ -510,7 +510,7 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
         spread = {
             name: norm.values(
                 weeks,
-                float(stats.norm.ppf(q)),
+                float(ndtri(q)),
             )
             for name, q in QUANTILES.items()
         }
