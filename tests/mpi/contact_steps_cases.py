@@ -127,8 +127,8 @@ def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
 @pytest.mark.parametrize(
     ("half", "steps", "changes"),
     [
-        (hemisphere(6), 5, {}),
-        (hemisphere(6), 5, {"stress_memory_gw": 1.0}),
+        (hemisphere(5), 5, {}),
+        (hemisphere(5), 5, {"stress_memory_gw": 1.0}),
         (rounded(hemisphere(4)), 4, {"stress_memory_gw": 1.0}),
     ],
     ids=["forgetting", "remembering", "quadratic"],

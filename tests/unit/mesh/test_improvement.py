@@ -26,7 +26,7 @@ def flattened(vertex, towards):
     return TetrahedralMesh(vertices, MESH.tets)
 
 
-@pytest.mark.parametrize("towards", [0, 5, 11])
+@pytest.mark.parametrize("towards", [0, 5])
 def test_a_flat_element_inside_is_improved_and_the_surface_stays(towards):
     centre = int(
         np.argmin(np.linalg.norm(MESH.vertices - MESH.vertices.mean(axis=0), axis=1))
