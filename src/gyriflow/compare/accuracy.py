@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from ..geometry.alignment import align_points
 from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
@@ -245,9 +245,8 @@ def _spread_of_members(values: Floats, level: float) -> float:
     n = len(values)
     if n < 2:
         return np.nan
-    return float(
-        t.ppf((1 + level) / 2, n - 1) * np.std(values, ddof=1) * np.sqrt(1 + 1 / n)
-    )
+    quantile = stdtrit(n - 1, (1 + level) / 2)
+    return float(quantile * np.std(values, ddof=1) * np.sqrt(1 + 1 / n))
 
 
 def interval_table(

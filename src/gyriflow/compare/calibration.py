@@ -11,7 +11,6 @@ import optuna
 import pandas as pd
 from optuna.distributions import BaseDistribution, FloatDistribution
 from optuna.trial import FrozenTrial, TrialState, create_trial
-from scipy.stats import qmc
 
 from ..errors import InputError
 from ..geometry.triangles import TriangleMesh
@@ -44,6 +43,9 @@ def first_round(
 
     The same seed gives the same rows.
     """
+    # takes a second, which scores need not wait for
+    from scipy.stats import qmc
+
     # the sequence is balanced over powers of two
     at_least_two = max(count, 2)
     power = math.ceil(math.log2(at_least_two))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial import cKDTree
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from ..geometry.alignment import MIRROR, align
 from ..geometry.matching import (
@@ -138,7 +138,7 @@ class Resampling:
             1 / (shares**2).sum() - 2,
             1.0,
         )
-        spread = t.ppf(INTERVAL[1], freedom) / norm.ppf(INTERVAL[1])
+        spread = stdtrit(freedom, INTERVAL[1]) / ndtri(INTERVAL[1])
         # about r, since the sides of a symmetric brain are not exactly equal
         return np.append(
             r,

@@ -6,7 +6,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
-from scipy.stats import wasserstein_distance
 
 from ..errors import InputError
 from ..geometry.alignment import align
@@ -104,6 +103,9 @@ def curvature_differences(
     the first Wasserstein distance between the distributions of mean curvature over the
     area.
     """
+    # takes a second, which others of this module need not wait for
+    from scipy.stats import wasserstein_distance
+
     rms_ratio = _curvature_rms(surface) / _curvature_rms(observed)
     distance = wasserstein_distance(
         surface.mean_curvature, observed.mean_curvature, surface.areas, observed.areas
