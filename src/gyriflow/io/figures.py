@@ -7,7 +7,6 @@ from io import BytesIO
 from pathlib import Path
 
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from PIL import Image
 
 from .files import AnyPath, atomic_write, write_text
@@ -37,8 +36,9 @@ def write_figure(
     pixels."""
     with atomic_write(png) as temporary:
         figure.savefig(temporary, dpi=DPI)
-    for picture in figure.findobj(AxesImage):
-        picture.set_interpolation("none")
+    for axes in figure.axes:
+        for picture in axes.images:
+            picture.set_interpolation("none")
     # without a date, so that the same figure gives the same file
     with atomic_write(pdf) as temporary:
         figure.savefig(temporary, dpi=DPI, metadata={"CreationDate": None})
