@@ -187,7 +187,7 @@ def gyrification_row(folder: Path) -> list[Row]:
 def nearest_rows(folder: Path) -> list[Row]:
     """Compare the values of the nearest runs, by cut spectra; the paper has the same
     value on both sides."""
-    nearest = read_table(folder / SWEEP.format(study="thickness") / "nearest.csv")
+    nearest = read_table(folder / SWEEP.format(sweep="thickness") / "nearest.csv")
     rows = []
     for entry in read_yaml(PUBLISHED)["nearest"]:
         parameter, measure = entry["parameter"], entry["measure"]
@@ -309,7 +309,7 @@ def main() -> None:
         mirror_mm = aligned_distances(transformed(left, MIRROR), right)["distance_mm"]
 
     thickness, stiffness = (
-        folder / SWEEP.format(study=name) for name in ("thickness", "stiffness")
+        folder / SWEEP.format(sweep=name) for name in ("thickness", "stiffness")
     )
     comparison = read_table(thickness / "comparison.csv")
     rows = [

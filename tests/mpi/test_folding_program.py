@@ -60,7 +60,7 @@ def test_a_run_leaves_every_file_and_nothing_else(tight_run):
     assert read_json(tight_run / "summary.json")["steps"] == len(steps)
 
 
-def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre_in_the_memory_told(
+def test_memory_is_printed_and_default_tolerances_are_good_to_a_micrometre(
     tight_run, default_run
 ):
     out, printed = default_run

@@ -151,7 +151,7 @@ def test_what_is_doubtful_is_reported(study, name, facts):
 
 
 @pytest.mark.parametrize("name", ["stored_oddly", "polyp"])
-def test_a_brain_is_the_same_however_it_is_stored_and_whatever_hangs_below(study, name):
+def test_a_brain_is_the_same_in_any_storage_and_with_a_piece_on_a_stalk(study, name):
     found, plain = study.report(name), study.report("plain")
     assert found["volume_mL"] == pytest.approx(plain["volume_mL"], rel=0.005)
     assert found["extents_mm"] == pytest.approx(plain["extents_mm"], abs=1.0)

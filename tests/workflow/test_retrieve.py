@@ -44,9 +44,9 @@ def study(folder: Path, url: str) -> dict:
 def said(workflow, capfd):
     """Return a function: what a call for study.yaml that ends in a code has told."""
 
-    def said(*arguments, code=0):
+    def said(*arguments, cores=1, code=0):
         capfd.readouterr()
-        call = (*arguments, "--cores", "1", "--configfile", "study.yaml")
+        call = (*arguments, "--cores", str(cores), "--configfile", "study.yaml")
         assert workflow.call(*call) == code
         return capfd.readouterr().err
 
@@ -70,7 +70,7 @@ def test_missing_files_are_planned_announced_and_fetched_by_what_needs_them(
     assert files_in(folder) == {long: FILES[long]}
     assert server.asked.count(long) == 2
 
-    said("retrieve")
+    said("retrieve", cores=2)
     assert files_in(folder) == FILES
 
     # then there is nothing to fetch and nothing to tell, whatever is forced

@@ -317,8 +317,8 @@ def _memory_doubts(brain: BrainConfig) -> list[str]:
     if memory <= max(available, MIN_SURFACE_MIB):
         return []
     return [
-        f"needs about {_gib(memory)} of memory, {_gib(available)} are here:"
-        " resample it to larger voxels"
+        f"needs about {_memory_text(memory)} of memory,"
+        f" {_memory_text(available)} are here: resample it to larger voxels"
     ]
 
 
@@ -437,14 +437,14 @@ def _fits(
 ) -> tuple[str, bool]:
     """Return a line on a need, and whether it exceeds what is available; None: that of
     a cluster."""
-    line = f"{name:<7} about {_gib(mib)}"
+    line = f"{name:<7} about {_memory_text(mib)}"
     if available_mib is None:
         return f"{line}, for the steps that run at the same time", False
-    line += f"; {_gib(available_mib)} available"
+    line += f"; {_memory_text(available_mib)} available"
     if mib > available_mib:
         return f"{line}, which is too little", True
     return line, False
 
 
-def _gib(mib: float) -> str:
+def _memory_text(mib: float) -> str:
     return f"{mib / 1024:.1f} GB" if mib >= 100 else f"{mib:.0f} MB"

@@ -216,12 +216,12 @@ def prediction_facts(
             " the places of folds, use the atlas' own brain, which is stored with the"
             " prediction."
         )
-    tested_brains = (
-        pd.DataFrame(tests)[["start", "start_week"]]
-        .drop_duplicates()
-        .itertuples(index=False)
-    )
-    starts = [f"{brain} {at:g} GW" for brain, at in tested_brains]
+    rows = pd.DataFrame(tests)
+    counted = rows[rows["protocol"] == DEFAULT_PROTOCOL]
+    tested_brains = counted[["start", "start_week"]].drop_duplicates()
+    starts = [
+        f"{brain} {at:g} GW" for brain, at in tested_brains.itertuples(index=False)
+    ]
     return {"errors": errors, "advantage": advantage, "starts": starts}
 
 

@@ -136,10 +136,10 @@ def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataF
         # scores are computed by hemisphere, so each region is passed as a hemisphere of
         # its own
         parts = table["hemisphere"] + " " + table["region"].fillna("")
+        # brains of one run have norms as observed brains have
         rows = table.assign(run=OBSERVED, hemisphere=parts)
         subjects = list(table["subject"])
-        scores = measured_scores(
-            rows, subjects, cohort_norms(rows, subjects, individuals=individuals)
-        )
+        norms = cohort_norms(rows, subjects, individuals=individuals)
+        scores = measured_scores(rows, subjects, norms)
         tables.append(table.reset_index(drop=True).join(scores[SCORES]))
     return pd.concat(tables, ignore_index=True)

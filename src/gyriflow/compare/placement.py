@@ -82,6 +82,8 @@ class Resampling:
 
     @property
     def is_symmetric(self) -> bool:
+        """Whether the brain is its own mirror image, so that its sides are drawn
+        together."""
         return len(self.sides) > 1
 
     @cached_property

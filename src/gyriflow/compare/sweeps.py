@@ -131,20 +131,14 @@ def member_comparison(
         columns={"metric": "measure", "value": "distance"}
     ).assign(unit="1")
 
-    surfaces = [
-        {
-            "observed": brain,
-            "hemisphere": part,
-            "measure": f"surface_{name}",
-            "distance": found[f"{name}_mm"],
-        }
-        for brain, parts in observed.items()
-        for part, found in (
-            (part, aligned_distances(simulated[part], mesh))
-            for part, mesh in parts.items()
-        )
-        for name in ("distance", "distance95")
-    ]
+    surfaces = []
+    for brain, parts in observed.items():
+        for part, mesh in parts.items():
+            found = aligned_distances(simulated[part], mesh)
+            for name in ("distance", "distance95"):
+                row = {"observed": brain, "hemisphere": part}
+                row["measure"] = f"surface_{name}"
+                surfaces.append({**row, "distance": found[f"{name}_mm"]})
     tables = [
         bands,
         sizes,

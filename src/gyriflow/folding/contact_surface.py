@@ -181,7 +181,7 @@ class ContactSurface:
             for rank, nodes in enumerate(self._rows_by_rank):
                 components = 3 * nodes[:, None] + np.arange(3)
                 rows_for[rank] = nodal[components.ravel()]
-        # each rank receives the rows that it owns from all others
+        # each rank receives the rows that it owns from all others; its own are not sent
         own = rows_for[comm.rank]
         rows_for[comm.rank] = None
         rows = sparse.csr_matrix((3 * len(self.rows), 3 * len(self.nodes)))
@@ -193,7 +193,7 @@ class ContactSurface:
             dtype=PETSc.IntType,
         )
         counts[self.local] = np.diff(rows.indptr).reshape(-1, 3)
-        # owned rows are in the order of the nodes
+        # PETSc has all owned nodes, in their order; rows of inner ones are empty
         start = np.concatenate([[0], np.cumsum(counts)]).astype(PETSc.IntType)
         node, component = np.divmod(rows.indices, 3)
         columns = (3 * self._columns[node] + component).astype(PETSc.IntType)

@@ -181,7 +181,9 @@ class _Springs:
         return self._domain.comm.allreduce(local)
 
     def add_forces(self, u: Floats, out: Floats) -> None:
-        out.reshape(-1, 3)[self._local] += self._weights * (u[self._local] + self._gaps)
+        """Add the gradient of `energy` to `out`, (3 n,)."""
+        forces = out.reshape(-1, 3)
+        forces[self._local] += self._weights * (u[self._local] + self._gaps)
 
     def stiffness(self, u: Floats, *, convex: bool = False) -> PETSc.Mat:
         domain = self._domain

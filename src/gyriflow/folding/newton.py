@@ -161,7 +161,7 @@ class NewtonSolver:
             raise NotConvergedError("the forces at zero displacement are not finite")
         tolerance = max(settings.newton_tolerance * at_rest.norm, self.residual_floor)
         is_solved = at_rest.norm <= tolerance
-        iterate = Iterate(at_rest if is_solved else self._first(guesses, at_rest))
+        iterate = Iterate(at_rest if is_solved else self._best_start(guesses, at_rest))
         norm = iterate.residual.norm
         norm_before = np.inf
         solution = Solution(iterate.residual.displacement)
@@ -215,12 +215,14 @@ class NewtonSolver:
         solution.converged = norm <= tolerance
         return solution
 
-    def _first(self, guesses: Sequence[Floats], at_rest: Residual) -> Residual:
+    def _best_start(self, guesses: Sequence[Floats], at_rest: Residual) -> Residual:
         """Return the first residual at a guess that is below half of that at rest, else
         the residual at rest."""
         problem = self.problem
         for guess in map(problem.without_rigid_motion, guesses):
-            u = problem.max_step(at_rest.displacement, guess) * guess
+            # as far as contact allows
+            length = problem.max_step(at_rest.displacement, guess)
+            u = length * guess
             if problem.domain.smallest_volume_ratio(u) > 0:
                 residual = problem.residual(u)
                 if residual.norm < 0.5 * at_rest.norm:  # false for NaN

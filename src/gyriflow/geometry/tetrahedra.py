@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-import scipy  # submodules load lazily, which a mesher's process does without
+from scipy import sparse
 
 from .jacobians import (
     CORNER_PARTS,
@@ -319,7 +319,7 @@ def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
     return used_part(TriangleMesh(mesh.vertices, faces))
 
 
-def finer_surface(triangles: Ints) -> "tuple[scipy.sparse.csr_array, Ints]":
+def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     """Return a refined surface of curved faces: weights (t, n) of the nodes at its
     vertices, and its (16 f, 3) faces.
 
@@ -351,14 +351,14 @@ def finer_surface(triangles: Ints) -> "tuple[scipy.sparse.csr_array, Ints]":
     n_new, n_around = columns.shape
     rows = np.repeat(np.arange(n_new), n_around)
     values = new_weights[first].ravel()
-    new = scipy.sparse.coo_array(
+    new = sparse.coo_array(
         (values, (rows, columns.ravel())),
         shape=(n_new, n_nodes),
     )
-    matrix = scipy.sparse.vstack([scipy.sparse.eye_array(n_nodes), new])
+    matrix = sparse.vstack([sparse.eye_array(n_nodes), new])
     by_face = number.reshape(-1, len(LATTICE))
     faces = by_face[:, LATTICE_TRIANGLES].reshape(-1, 3)
-    return scipy.sparse.csr_array(matrix), faces
+    return sparse.csr_array(matrix), faces
 
 
 def _distinct_points(nodes: Ints, weights: Floats) -> tuple[Ints, Ints]:

@@ -56,10 +56,11 @@ WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
 AFFINE = "-a -dof 12 -m SSD -n 60x30"
 DEFORMABLE = "-m NCC 3x3x3 -wp 0"
 ITERATIONS = "60x40x15"
-"""Of the deformation with voxels four times and twice as large, and with those that
-there are."""
+"""Rounds of the deformation at four times the voxel size, at twice, and at full
+size."""
 FINE_ITERATIONS = "60x40x8"
-"""The same for voxels below `FINE_MM`: those twice as large nearly suffice."""
+"""The same for voxels below `FINE_MM`: the rounds at twice their size nearly
+suffice."""
 FINE_MM = 1.0
 SMOOTHING_VOXELS = (2.5, 0.8)
 """SD of the smoothing of updates and of the deformation."""

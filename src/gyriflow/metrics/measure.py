@@ -316,11 +316,10 @@ def _spectrum_metrics(spectra: Mapping[str, Spectrum], area_mm2: float) -> Metri
 
 def _table(parts: Mapping[str, Metrics]) -> pd.DataFrame:
     """Return metrics by hemisphere as a table with the units of their records."""
-    rows = [
-        (hemisphere, name, value, METRICS[name].unit)
-        for hemisphere, metrics in parts.items()
-        for name, value in metrics.items()
-    ]
+    rows = []
+    for hemisphere, metrics in parts.items():
+        for name, value in metrics.items():
+            rows.append((hemisphere, name, value, METRICS[name].unit))
     return pd.DataFrame(
         rows,
         columns=["hemisphere", "metric", "value", "unit"],

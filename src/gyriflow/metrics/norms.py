@@ -182,18 +182,12 @@ def volume_tables(
     if the brain lacks a hemisphere of the norm). Expected, z and centile are NaN with
     the last two flags.
     """
-    rows = [
-        (
-            brain.subject,
-            OBSERVED,
-            brain.week,
-            label,
-            brain.scheme.labels.get(label, ""),
-            volume,
-        )
-        for brain in brains
-        for label, volume in brain.volumes.items()
-    ]
+    rows = []
+    for brain in brains:
+        labels = (brain.subject, OBSERVED, brain.week)
+        for label, volume in brain.volumes.items():
+            tissue = brain.scheme.labels.get(label, "")
+            rows.append((*labels, label, tissue, volume))
     scores = pd.concat(
         [_published_scores(brain, norms) for brain in brains], ignore_index=True
     )

@@ -391,19 +391,15 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
         )
         for key, bands in rows.groupby(HEMISPHERE)
     }
-    found = [
-        (
-            *key,
-            other[0],
-            other[2],
-            PROXIES[0],
-            *row,
-        )
-        for key, profile in profiles.items()
-        for other, observed in profiles.items()
-        if other[1] == OBSERVED and other[3] == key[3] and key != other
-        for row in _distances(profile, observed)
-    ]
+    found = []
+    for key, profile in profiles.items():
+        for other, observed in profiles.items():
+            subject, run, week, hemisphere = other
+            if run != OBSERVED or hemisphere != key[3] or key == other:
+                continue
+            labels = (*key, subject, week, PROXIES[0])
+            for row in _distances(profile, observed):
+                found.append((*labels, *row))
     return pd.DataFrame(
         found,
         columns=[

@@ -668,11 +668,8 @@ def _finish_without(
 
     Return the exit code of an interrupted run, or else 0.
     """
-    if any(
-        argument.startswith(f"results/brains/{brain}/")
-        for argument in arguments
-        for brain in refused
-    ):
+    folders = tuple(f"results/brains/{brain}/" for brain in refused)
+    if any(argument.startswith(folders) for argument in arguments):
         return 0
     path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
     write_json(path, refused)

@@ -151,11 +151,11 @@ FOLDING = {
     "summary": f"{RUN}/folding/summary.json",
 }
 
-PREPARED = {
-    f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/{WEEK}/{name}{ending}.gii"
-    for name in ("observed", "start", "adjacent")
-    for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
-}
+PREPARED = {}
+for _name in ("observed", "start", "adjacent"):
+    _file = f"{STUDY}/validation/{{brain}}/{WEEK}/{_name}"
+    PREPARED[_name] = f"{_file}.surf.gii"
+    PREPARED[f"{_name}_maps"] = f"{_file}.shape.gii"
 """Surfaces that all runs from a start brain are compared with in a week, prepared for
 comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"

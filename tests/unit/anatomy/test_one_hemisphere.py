@@ -6,9 +6,10 @@ import odd_brains
 import pytest
 from atlas_brains import atlas_halves
 from facts import Facts
-from shapes import cerebrum_surface, phantom, rigid
+from shapes import LPS, cerebrum_surface, inner, phantom, rigid
 
-from gyriflow.anatomy.pial import from_labels, from_surface
+from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
+from gyriflow.anatomy.thickness import thickness_from_white
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.deformations import transform_points
@@ -100,3 +101,13 @@ def test_a_whole_brain_whose_cortex_has_the_labels_of_one_side_is_reported(label
         merged = np.where(labels == lost, kept, labels)
         with pytest.raises(InputError, check=Facts(f"{side} hemisphere", "scheme")):
             from_labels(merged, affine, DHCP, **QUICK)
+
+
+def test_white_surfaces_give_the_thickness_in_any_pose(sides):
+    moved = {side: transformed(mesh, LPS) for side, mesh in sides.items()}
+    surface = from_hemispheres(*moved.values(), coordinates="lps", **QUICK)
+    whites = {side: inner(mesh, 1.5) for side, mesh in moved.items()}
+    posed = surface.whole, surface.pose, surface.fissure_x_mm
+    thickness = thickness_from_white(*posed, whites)
+    assert thickness.report["mean_mm"] == pytest.approx(1.5, abs=0.15)
+    assert thickness.is_measured.mean() > 0.98

@@ -26,7 +26,7 @@ SEMI_AXES = (20.0, 24.0, 18.0)
 BODY = ellipsoid_mesh(8, SEMI_AXES)
 SMALL = ellipsoid_mesh(8, (7.0, 8.4, 6.3))
 COARSE = ellipsoid_mesh(4, SEMI_AXES)
-"""For steps that are not made."""
+"""For tests in which the steps of the solver are replaced."""
 USED = boundary_surface(BODY)[1]
 
 

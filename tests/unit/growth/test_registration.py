@@ -10,6 +10,7 @@ from shapes import LPS
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import Deformation, carry, transform_points
+from gyriflow.growth import registration
 from gyriflow.growth.registration import (
     Channels,
     _common_channels,
@@ -195,3 +196,26 @@ def test_images_are_compared_where_both_brains_have_one():
     assert list(both) == ["cerebrum", "cortex", "intensity"]
     with pytest.raises(InputError, check=Facts("0%", "99 %", 0)):
         brain(EARLIER_LABELS, grid(), image=(0 * image, grid()))
+
+
+class Stopping:
+    """Stands for greedy and stops at the deformation, whose command it keeps."""
+
+    command = ""
+
+    def execute(self, command: str, **images) -> None:
+        if " -o warp" in command:
+            Stopping.command = command
+            raise RuntimeError("stopped")
+
+
+@pytest.mark.parametrize(
+    ("voxel_mm", "iterations"), [(0.8, "60x40x8"), (1.0, "60x40x15")]
+)
+def test_voxels_below_a_millimetre_take_fewer_rounds(monkeypatch, voxel_mm, iterations):
+    monkeypatch.setattr(registration, "Greedy3D", Stopping)
+    affine = EARLIER.affine @ np.diag([*3 * [voxel_mm / EARLIER.voxel_mm], 1.0])
+    brain = replace(EARLIER, affine=affine)
+    with pytest.raises(InputError, match="stopped"):
+        register(brain, brain)
+    assert f"-n {iterations} " in Stopping.command

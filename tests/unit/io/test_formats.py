@@ -210,11 +210,8 @@ VTK_HEAD = (
         ("a.obj", mni_text()[:-500], []),
         ("a.obj", b"p\x3e\x99\x99\x9a" + b"\0" * 100, ["binary", "MNI"]),
         ("a.obj", "# nothing\n", []),
-        (
-            "a.vtk",
-            f"{VTK_HEAD}POLYGONS 1 5\n4 0 1 3 2\nTRIANGLE_STRIPS 1 5\n4 0 1 2 3",
-            ["1 faces", "1 strips", "Triangulate"],
-        ),
+        ("a.vtk", f"{VTK_HEAD}POLYGONS 1 5\n4 0 1 3 2", ["1 faces", "Triangulate"]),
+        ("a.vtk", f"{VTK_HEAD}TRIANGLE_STRIPS 1 5\n4 0 1 2 3", ["1 strips"]),
         (
             "a.vtk",
             f"{VTK_HEAD}LINES 1 3\n2 0 1\nPOLYGONS 2 8\n3 0 1 2\n3 1 3 2",

@@ -12,6 +12,7 @@ from scripts import run_script
 from shapes import box_mesh, inner_edges_of_the_surface, joined, moved, sphere
 
 from gyriflow.errors import MeshError
+from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
@@ -329,6 +330,29 @@ def test_tetgen_keeps_the_remeshed_surface_exactly_and_its_elements_grow_to_the_
     assert 0.6 * largest < np.quantile(volumes, 0.99) <= largest
 
 
+def test_tetgen_keeps_a_narrow_gap_between_two_parts_open():
+    half = sphere(4.0, 3)
+    sizes = SIZES | {"surface_edge_mm": 0.6}
+    mesh = tetrahedralise(
+        merged(half, moved(half, 8.2)),
+        mesher="tetgen",
+        **sizes,
+    )
+    x = mesh.vertices[:, 0]
+    assert x[x > 4.1].min() - x[x < 4.1].max() == pytest.approx(0.2, abs=0.03)
+    assert radius_ratios(mesh).min() > 0.02
+
+
+def test_linear_elements_of_pytetwild_have_a_surface_within_the_envelope():
+    both = merged(sphere(5.0, 2), moved(sphere(3.0, 2), 9.0))
+    mesh = tetrahedralise(both, **SIZES)
+    surface = boundary_surface(mesh)[0]
+    assert nearest_on(surface.vertices, both)[0].max() <= 0.11
+    assert (signed_volumes(mesh) > 0).all()
+    assert mean_edge_length(surface) == pytest.approx(1.5, rel=0.25)
+    assert quality_summary(mesh, both)["gap_kept"] > 0.95
+
+
 def test_a_surface_that_cuts_itself_is_refused():
     half = sphere(4.0, 2)
     with pytest.raises(MeshError, match=r"335 mm3 .*518|\d .*1\.50 mm"):
@@ -338,7 +362,8 @@ def test_a_surface_that_cuts_itself_is_refused():
 @pytest.mark.parametrize(
     ("mesher", "radius_mm", "surface", "max_tets"),
     [
-        # two parts 0.4 mm apart; elements as fine inside as linear ones would be 5400
+        # two parts 0.4 mm apart; if they were as fine inside as linear elements, they
+        # would be 5400
         (
             "pytetwild",
             12.0,
@@ -373,7 +398,22 @@ def test_few_quadratic_elements_follow_the_surface(
     volumes = signed_volumes(straight)
     inner = np.median(volumes[centre < 0.4 * radius_mm])
     assert inner > 2 * np.median(volumes[is_outer])
-    # of elements with a side between two corners on the surface none is left
+
+
+def test_no_side_of_a_quadratic_element_joins_two_corners_on_the_surface():
+    surface = box((8.0, 6.0, 2.0))
+    linear, bent = (
+        tetrahedralise(
+            surface,
+            mesher="tetgen",
+            order=order,
+            **SIZES | {"surface_edge_mm": 2.0 / order},
+        )
+        for order in (1, 2)
+    )
+    # elements of the same size have such sides until these are split
+    assert inner_edges_of_the_surface(linear)
+    straight = TetrahedralMesh(bent.vertices, bent.corners)
     assert not inner_edges_of_the_surface(straight)
 
 

@@ -70,7 +70,7 @@ def scores(metrics, reference, **options):
     return measured_scores(metrics, reference, cohort)
 
 
-def other_scores(metrics, reference, **options):
+def scores_beside_the_reference(metrics, reference, **options):
     """Return the scores of the brains beside the reference, and of its last one: the
     norm would be fitted without each of a reference."""
     cohort = cohort_norms(metrics, reference, **options)
@@ -179,7 +179,9 @@ def test_a_brain_of_the_reference_is_compared_with_the_others() -> None:
     for number in (0, 1):
         others = np.arange(60) != number
         brain = ("it", weeks[number], values[number])
-        alone = other_scores(*table(weeks[others], values[others], brain)).iloc[-1]
+        alone = scores_beside_the_reference(
+            *table(weeks[others], values[others], brain)
+        ).iloc[-1]
         assert found["z"][number] == pytest.approx(alone["z"], abs=0.03)
 
 
@@ -263,7 +265,7 @@ def test_few_brains_make_centiles_cautious() -> None:
     metrics, reference = table(
         weeks, values, ("run", 26.0, 260.0 + 1.5), ("far", 26.0, 280.0)
     )
-    found = other_scores(metrics, reference).set_index("run")
+    found = scores_beside_the_reference(metrics, reference).set_index("run")
     assert (found.loc["run", "brains"], found.loc["run", "flag"]) == (12, "few brains")
     assert found.loc["run", "expected"] == pytest.approx(260.0, abs=0.3)
     # the normal distribution would be surer than twelve brains allow
@@ -346,14 +348,14 @@ FLAGGED = {
 def test_what_cannot_be_scored_is_said(flag, monkeypatch) -> None:
     study = FLAGGED[flag]
     tables = study(monkeypatch) if callable(study) else study
-    found = other_scores(*tables).iloc[-1]
+    found = scores_beside_the_reference(*tables).iloc[-1]
     assert found["flag"] == flag
     assert np.isnan(found["z"]) == (flag not in ("few brains", "not converged"))
 
 
 def test_averages_give_a_curve_and_no_centiles() -> None:
     metrics, reference = near_a_line(("b", 25.0, 260.0))
-    found = other_scores(metrics, reference, individuals=False).iloc[-1]
+    found = scores_beside_the_reference(metrics, reference, individuals=False).iloc[-1]
     assert found["expected"] == pytest.approx(250.0, abs=0.5)
     assert found[["sd", "z", "centile"]].isna().all()
     assert found["flag"] == SPREAD_UNKNOWN
@@ -372,7 +374,7 @@ def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
         halved.assign(hemisphere="right"),
         metrics[is_half].assign(hemisphere="left"),
     ]
-    found = other_scores(pd.concat(sides, ignore_index=True), reference)
+    found = scores_beside_the_reference(pd.concat(sides, ignore_index=True), reference)
     found = found.set_index(["run", "hemisphere"])
     assert found.loc[("all", "whole"), "flag"] == "few brains"
     for side in ("whole", "left"):

@@ -191,7 +191,7 @@ def test_scans_of_other_subjects_are_grown_towards_only_if_they_are_named():
     assert message(cohort, start="a22", **growth, **late) == Facts("a22", "b", 22, 27)
 
 
-def test_its_own_growth_lacks_brains_whatever_is_named():
+def test_a_series_needs_a_brain_of_the_end_week_whether_named_or_of_the_start_itself():
     named = {"growth": {"series": "atlas"}, **MEASURED}
     assert message(own_and_atlas(22), **named) == Facts(
         "atlas", 22, 24, "growth.brains"
