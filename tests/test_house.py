@@ -10,12 +10,14 @@ import tomllib
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
+from string import Formatter
 
 import pytest
 import yaml
 
 from gyriflow.code_hash import imported_modules, subpackage_of
 from gyriflow.running.requirements import EXTRAS, LIBRARIES
+from gyriflow.study import paths
 from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
@@ -189,6 +191,33 @@ def test_what_scripts_and_benchmarks_import_is_there():
     assert [
         row for row in without if importlib.util.find_spec(f"{row[1]}.{row[2]}") is None
     ] == []
+
+
+def wildcards_and_names(call: ast.Call) -> tuple[set[str], set[str]] | None:
+    """Return the wildcards of a pattern of results and the names that a call of format
+    gives them; None for other calls."""
+    called = call.func
+    if not isinstance(called, ast.Attribute) or called.attr != "format":
+        return None
+    by_name = isinstance(called.value, ast.Name)
+    pattern = getattr(paths, called.value.id, None) if by_name else None
+    if not isinstance(pattern, str):
+        return None
+    wildcards = {name for _, name, _, _ in Formatter().parse(pattern) if name}
+    return wildcards, {keyword.arg for keyword in call.keywords}
+
+
+def test_patterns_of_results_get_the_names_of_their_wildcards():
+    # in benchmarks, too, of which nothing else runs
+    calls = [
+        node
+        for path in [*SOURCES, *PROGRAMS]
+        for node in ast.walk(parsed(path))
+        if isinstance(node, ast.Call)
+    ]
+    found = [pair for pair in map(wildcards_and_names, calls) if pair]
+    assert len(found) > 5
+    assert [pair for pair in found if pair[0] != pair[1]] == []
 
 
 def test_no_vague_names():
