@@ -139,7 +139,11 @@ def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataF
         # brains of one run have norms as observed brains have
         rows = table.assign(run=OBSERVED, hemisphere=parts)
         subjects = list(table["subject"])
-        norms = cohort_norms(rows, subjects, individuals=individuals)
+        norms = cohort_norms(
+            rows,
+            subjects,
+            individuals=individuals,
+        )
         scores = measured_scores(rows, subjects, norms)
         tables.append(table.reset_index(drop=True).join(scores[SCORES]))
     return pd.concat(tables, ignore_index=True)

@@ -564,7 +564,7 @@ def brain_content(
     names = set(metrics["metric"])
     return {
         "usual": html_table(every.loc[[name for name in sheet if name in every.index]]),
-        "atlases": [cited_atlas(str(atlas)) for atlas in atlases],
+        "atlases": list(map(cited_atlas, atlases)),
         "has_parts": "volume_tissue" in names,
         "has_thickness": "mean_thickness" in names,
         "week_errors": _week_errors(curves, brain["week"]),

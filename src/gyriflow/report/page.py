@@ -139,7 +139,7 @@ def study_page(
         "prediction": prediction,
         "folded": [],
         "runs": "",
-        "atlases": [cited_atlas(str(atlas)) for atlas in atlases],
+        "atlases": list(map(cited_atlas, atlases)),
         "has_norm": bool(own["expected"].notna().any()),
         "brains": brain_rows(brains, replace(tables, centiles=observed), pictures),
         "pictures": pictures,

@@ -151,11 +151,15 @@ FOLDING = {
     "summary": f"{RUN}/folding/summary.json",
 }
 
-PREPARED = {}
-for _name in ("observed", "start", "adjacent"):
-    _file = f"{STUDY}/validation/{{brain}}/{WEEK}/{_name}"
-    PREPARED[_name] = f"{_file}.surf.gii"
-    PREPARED[f"{_name}_maps"] = f"{_file}.shape.gii"
+_COMPARED_IN_WEEK = f"{STUDY}/validation/{{brain}}/{WEEK}"
+PREPARED = {
+    "observed": f"{_COMPARED_IN_WEEK}/observed.surf.gii",
+    "observed_maps": f"{_COMPARED_IN_WEEK}/observed.shape.gii",
+    "start": f"{_COMPARED_IN_WEEK}/start.surf.gii",
+    "start_maps": f"{_COMPARED_IN_WEEK}/start.shape.gii",
+    "adjacent": f"{_COMPARED_IN_WEEK}/adjacent.surf.gii",
+    "adjacent_maps": f"{_COMPARED_IN_WEEK}/adjacent.shape.gii",
+}
 """Surfaces that all runs from a start brain are compared with in a week, prepared for
 comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
