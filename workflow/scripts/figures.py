@@ -6,7 +6,6 @@ from inspect import signature
 
 import pandas as pd
 
-from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure, write_html
@@ -16,7 +15,6 @@ from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.report.pictures import GridBrain
 from gyriflow.report.tables import html_table
 from gyriflow.settings.folding import parameters_from
 from gyriflow.step import step
@@ -41,6 +39,7 @@ def _read_elements(frames):
     # only here, as importing them takes half a second of each figure
     from gyriflow.folding.growth import GrowthInputs, StepStart, model_fields
     from gyriflow.folding.growth_models import growth_model
+    from gyriflow.folding.zones import zones_of_run
 
     parameters = _read_parameters(files.parameters)
     weeks = read_weeks(frames)
@@ -89,6 +88,9 @@ def _read_brain(placed):
 
     `placed` are its files and its place in the grid; it may have no maps.
     """
+    # only here, as charts need no VTK, which takes a second to import
+    from gyriflow.report.pictures import GridBrain
+
     contents = [{} for _ in placed["surfaces"]]
     for number, path in enumerate(placed["maps"]):
         is_regions = path.endswith(".label.gii")

@@ -36,6 +36,8 @@ def write_figure(
     pixels."""
     with atomic_write(png) as temporary:
         figure.savefig(temporary, dpi=DPI)
+    # laid out once: both files look the same
+    figure.set_layout_engine("none")
     for axes in figure.axes:
         for picture in axes.images:
             picture.set_interpolation("none")

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import cycle, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import to_rgb, to_rgba_array
+from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -36,8 +36,8 @@ from .style import (
     NEUTRAL_COLOUR,
     OBSERVED_SURFACE_COLOUR,
     RIGHT_COLOUR,
-    RUN_COLOURS,
     SIMULATED_SURFACE_COLOUR,
+    region_colours,
     styled,
 )
 
@@ -73,8 +73,6 @@ DEEP_MM = 5.0
 """Upper end of the depth scale of observed brains, the same on all pages."""
 SMALL_PER_MM, SMALL_PER_INCH = 4.0, 400
 """Small pictures: dots per mm of the brain and per inch of print."""
-TINTS = (0.0, 0.4, 0.7)
-"""Shares of white in the colours of further regions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -559,22 +557,6 @@ def small_pictures(halves: Halves, *, side: str) -> Figure:
     axes.imshow(image)
     axes.set_axis_off()
     return figure
-
-
-def region_colours(names: Iterable[str]) -> dict[str, Any]:
-    """Return a colour for each region in the given order: those of runs, then their
-    tints.
-
-    On a scale from dark to pale, neighbours would look similar, and dark regions like
-    shade. Colours repeat from the 22nd region on.
-    """
-    pure = np.array([to_rgb(colour) for colour in RUN_COLOURS])
-    shades: list[Any] = []
-    for tint in TINTS:
-        tinted = pure + tint * (1 - pure)
-        shades += map(tuple, tinted.tolist())
-    regions = dict.fromkeys(names)
-    return dict(zip(regions, cycle(shades), strict=False))
 
 
 @styled

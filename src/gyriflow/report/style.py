@@ -4,6 +4,7 @@ headings."""
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import cycle
 from string import ascii_lowercase
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -25,6 +27,8 @@ FULL_WIDTH_IN = 7.2
 
 RUN_COLOURS = DISTINCT_COLOURS[:-1]
 """Without yellow, which is too pale on white; black is for observed brains."""
+TINTS = (0.0, 0.4, 0.7)
+"""Shares of white in the colours of further regions."""
 OBSERVED_COLOUR = "#000000"
 MUTED_COLOUR = "#767676"
 RIGHT_COLOUR = "#E0B400"
@@ -177,6 +181,22 @@ def run_colours(
         colours = [tuple(shade) for shade in shades]
     by_name = zip(names, colours, strict=False)
     return {name: colour for name, colour in by_name if name in present}
+
+
+def region_colours(names: Iterable[str]) -> dict[str, Any]:
+    """Return a colour for each region in the given order: those of runs, then their
+    tints.
+
+    On a scale from dark to pale, neighbours would look similar, and dark regions like
+    shade. Colours repeat from the 22nd region on.
+    """
+    pure = np.array([to_rgb(colour) for colour in RUN_COLOURS])
+    shades: list[Any] = []
+    for tint in TINTS:
+        tinted = pure + tint * (1 - pure)
+        shades += map(tuple, tinted.tolist())
+    regions = dict.fromkeys(names)
+    return dict(zip(regions, cycle(shades), strict=False))
 
 
 def week_axis(axes: Axes, weeks: Iterable[float]) -> None:

@@ -30,7 +30,6 @@ from .labels import (
     plain,
     value_labels,
 )
-from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
     NEUTRAL_COLOUR,
@@ -40,6 +39,7 @@ from .style import (
     from_zero,
     legend_below,
     panel_figure,
+    region_colours,
     run_colours,
     run_entries,
     runs_by_name,
