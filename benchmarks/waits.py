@@ -2,18 +2,21 @@
 
     git worktree add ../before 45cdf8ba
     ./run python benchmarks/waits.py CONFIG --before ../before --out FOLDER \\
-        [--command measure] [--repeats 5]
+        [--command measure] [--stage STAGE] [--repeats 5]
 
 CONFIG is a configuration, for example of one brain from labels. Both checkouts make its
 study at the same time, so that they have the same load, on one core each and in new
-folders in FOLDER, by `./run gyriflow COMMAND CONFIG --cores 1`. For each kind of step,
-and run: processor time as its steps have recorded it, with child processes (s; median,
-smallest and largest of the repeats), and the largest memory (MiB). Of the metrics of
-measured brains the last table has the largest differences, relative to the value but
-for metrics that may be negative, and in units of the noise: one standard deviation of
-the difference between two measurements of one brain (`norms/repeatability.yaml`). A
-study with runs has a table before it: the largest differences of `COMPARED` between
-each run's comparisons with the observed brains. The last line is one JSON object.
+folders in FOLDER, by `./run gyriflow COMMAND CONFIG --cores 1`, up to the STAGE or the
+file of this name if there is one. For each kind of step, and run: processor time as its
+steps have recorded it, with child processes (s; median, smallest and largest of the
+repeats), and the largest memory (MiB).
+
+Of the metrics of measured brains the last table has the largest differences, relative
+to the value but for metrics that may be negative, and in units of the noise: one
+standard deviation of the difference between two measurements of one brain
+(`norms/repeatability.yaml`). A study with runs has a table before it: the largest
+differences of `COMPARED` between each run's comparisons with the observed brains. A
+stage before metrics has no tables. The last line is one JSON object.
 """
 
 import argparse
@@ -47,15 +50,19 @@ N_DIFFERENCES = 10
 """Metrics in the table of differences, the largest in units of the noise first."""
 
 
-def make_studies(folders: Mapping[Path, Path], command: str, config: Path) -> None:
-    """Make a study with each checkout in its folder, all at the same time;
-    CalledProcessError if a step fails."""
+def make_studies(
+    folders: Mapping[Path, Path], command: str, config: Path, stages: Sequence[str]
+) -> None:
+    """Make a study with each checkout in its folder up to its stages, all at the same
+    time; CalledProcessError if a step fails."""
+    further = [f"--stage={stage}" for stage in stages]
     processes = []
     for checkout, folder in folders.items():
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         program = ["./run", "gyriflow", command, str(config), "-d", str(folder)]
-        processes.append(subprocess.Popen([*program, "--cores", "1"], cwd=checkout))
+        program += ["--cores", "1", *further]
+        processes.append(subprocess.Popen(program, cwd=checkout))
     for process in processes:
         if process.wait():
             raise subprocess.CalledProcessError(process.returncode, process.args)
@@ -81,8 +88,11 @@ def steps_in(folder: Path) -> pd.DataFrame:
 
 
 def metrics_in(folder: Path) -> pd.Series:
-    """Return the metrics of a study by `KEYS`."""
-    table = pd.read_csv(folder / "results" / "study" / "metrics.csv")
+    """Return the metrics of a study by `KEYS`, none where it has no table of them."""
+    path = folder / "results" / "study" / "metrics.csv"
+    table = (
+        pd.read_csv(path) if path.exists() else pd.DataFrame(columns=[*KEYS, "value"])
+    )
     return table.set_index(KEYS)["value"]
 
 
@@ -115,6 +125,7 @@ def main() -> None:
     parser.add_argument("--before", type=Path, metavar="CHECKOUT", required=True)
     parser.add_argument("--out", type=Path, metavar="FOLDER", required=True)
     parser.add_argument("--command", default="measure", choices=["measure", "run"])
+    parser.add_argument("--stage", action="append", default=[])
     parser.add_argument("--repeats", type=int, default=1)
     arguments = parser.parse_args()
     config = arguments.config.resolve()
@@ -124,7 +135,7 @@ def main() -> None:
     for repeat in range(arguments.repeats):
         folders = {name: out / f"{name}-{repeat}" for name in checkouts}
         studies = {checkouts[name]: folder for name, folder in folders.items()}
-        make_studies(studies, arguments.command, config)
+        make_studies(studies, arguments.command, config, arguments.stage)
         for name, folder in folders.items():
             parts.append(steps_in(folder).assign(checkout=name))
     rows = []
@@ -140,7 +151,8 @@ def main() -> None:
     if runs:
         print(pd.DataFrame(runs).to_string(index=False, float_format="%.2g"))
     found = differences(*map(metrics_in, firsts))
-    print(pd.DataFrame(found).to_string(index=False, float_format="%.2g"))
+    if found:
+        print(pd.DataFrame(found).to_string(index=False, float_format="%.2g"))
     print_rows(rows, differences=found, runs=runs)
 
 
