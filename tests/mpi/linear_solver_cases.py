@@ -22,8 +22,8 @@ from gyriflow.folding.linear_solver import (
     CoarseSettings,
     NotConvergedError,
     TwoLevelPreconditioner,
-    inverse_blocks,
-    inverse_matrix,
+    _inverse_blocks,
+    _inverse_matrix,
 )
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 
@@ -84,7 +84,7 @@ def test_blocks_that_are_not_positive_definite_are_made_so():
     eigenvalues = np.array([[4.0, 2.0, 1.0], [4.0, 2.0, -1.0]])
     blocks = turn * eigenvalues[:, None] @ turn.T
     expected = turn * [0.25, 0.5, 1.0] @ turn.T
-    found = [*inverse_blocks(blocks), *map(inverse_matrix, blocks)]
+    found = [*_inverse_blocks(blocks), *map(_inverse_matrix, blocks)]
     np.testing.assert_allclose(found, np.tile(expected, (4, 1, 1)), atol=1e-12)
 
 

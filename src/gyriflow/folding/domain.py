@@ -100,9 +100,9 @@ class Domain:
     For all vertices in the file's order, equal on every rank: `positions` (n, 3) in m,
     the connected `part` of the mesh (n,), and the global node `node_of_vertex` (n,).
     For the local nodes, the first `n_owned` owned and the others ghosts: the vertex
-    `vertex_of_node` (k,). For the local elements: their nodes in the file's order,
-    `cells` (c, 4) or (c, 10), those at the `corners` (c, 4), their index in the file
-    `tet_of_cell` (c,), and their `volumes` (c,) in m³.
+    `vertex_of_node` (k,), and its position, `nodes` (k, 3) in m. For the local
+    elements: their nodes in the file's order, `cells` (c, 4) or (c, 10), those at the
+    `corners` (c, 4), and their index in the file `tet_of_cell` (c,).
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
@@ -141,7 +141,7 @@ class Domain:
         self.vertex_of_node = vertices[self._geometry_node]
         self._shared = dolfinx.la.vector(index_map, 3)
         self.part = connected_parts(mesh)
-        self._measure(self.local(self.positions))
+        self._measure()
         tets = self.mesh.topology.original_cell_index[: len(self.cells)]
         self.tet_of_cell = np.array(tets)
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
@@ -200,17 +200,16 @@ class Domain:
     def place(self, positions: Floats) -> None:
         """Move the mesh to (n, 3) positions in m."""
         self.positions = positions
-        nodes = self.local(positions)
-        self.mesh.geometry.x[self._geometry_node] = nodes
-        self._measure(nodes)
+        self._measure()
+        self.mesh.geometry.x[self._geometry_node] = self.nodes
 
-    def _measure(self, node_positions: Floats) -> None:
-        self.volumes = volumes_between(node_positions, self.cells)
+    def _measure(self) -> None:
+        self.nodes: Floats = self.local(self.positions)
         if self.order == 2:
             self._determinants_at_nodes = jacobians(
-                node_positions, self.cells, GRADIENTS_AT_NODES
+                self.nodes, self.cells, GRADIENTS_AT_NODES
             )
-            self._upper_bounds = coefficients(node_positions, self.cells).max(axis=1)
+            self._upper_bounds = coefficients(self.nodes, self.cells).max(axis=1)
 
     def volume_ratios(self, u: Floats) -> Floats:
         """Return det F after displacements (k, 3) of the local nodes in m.
@@ -218,11 +217,12 @@ class Domain:
         It has one value in a linear element, (c, 1), and one at each node of a
         quadratic one, (c, 10).
         """
-        node_positions = self.local(self.positions) + u
+        places = self.nodes + u
         if self.order == 1:
-            ratios = volumes_between(node_positions, self.cells) / self.volumes
+            before = volumes_between(self.nodes, self.cells)
+            ratios = volumes_between(places, self.cells) / before
             return ratios[:, None]
-        after = jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
+        after = jacobians(places, self.cells, GRADIENTS_AT_NODES)
         return after / self._determinants_at_nodes
 
     def smallest_volume_ratio(self, u: Floats) -> float:
@@ -236,7 +236,7 @@ class Domain:
         """
         if self.order == 1:
             return self.min_over_ranks(self.volume_ratios(u))
-        after = lower_bounds(self.local(self.positions) + u, self.cells)
+        after = lower_bounds(self.nodes + u, self.cells)
         return self.min_over_ranks(after / self._upper_bounds)
 
     def min_over_ranks(self, local_values: Floats) -> float:

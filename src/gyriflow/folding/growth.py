@@ -254,8 +254,7 @@ def layered_inverse(
     """
     along = (1 + dg)[..., None, None]
     across = (1 + dr)[..., None, None]
-    radial = normals[..., :, None] * normals[..., None, :]
-    tangential = np.eye(3) - radial
     inverse = (1 / along) * np.eye(3)
-    inverse[layered] = tangential / along[layered] + radial / across[layered]
+    difference = 1 / across[layered] - 1 / along[layered]
+    inverse[layered] += (difference * normals[..., None]) * normals[..., None, :]
     return inverse

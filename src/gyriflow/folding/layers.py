@@ -23,6 +23,7 @@ from ..geometry.triangles import (
 from ..settings.folding import FoldingParameters
 from ..settings.terms import CORTICAL_STEEPNESS
 from ..settings.varying import Maps, value_at
+from .nearest_faces import FaceTree
 
 WEIGHT_REACH = 3.0
 """Depth in cortical thicknesses beyond which the cortical weight, below 1e-8, is taken
@@ -83,7 +84,8 @@ class PialSearch:
         # a point at a vertex is on the surface, at exactly 0
         near = (distance > 0) & self._within(distance, reach)
         if near.any():
-            distance[near], _, _ = nearest_on(points[near], self.surface)
+            faces = FaceTree(self.surface)
+            distance[near] = faces.distance(points[near], distance[near])
         return distance
 
     def distance_and_normals(
@@ -130,8 +132,23 @@ class PialSearch:
         opposed walls, it is the normal of the vertex with the smallest coordinates. The
         order of points and candidates does not matter.
         """
-        places = self.surface.vertices[candidates]
-        offsets = places - points[:, None]
+        offsets = self.surface.vertices[candidates] - points[:, None]
+        # k: point, c: candidate, i: axis
+        squares = np.einsum("kci,kci->kc", offsets, offsets)
+        first = squares.argmin(axis=1)[:, None]
+        chosen = np.take_along_axis(candidates, first, axis=1)
+        normals = self.normals[chosen[:, 0]]
+        # twice the tolerance, for squares, and some round-off
+        limits = np.take_along_axis(squares, first, axis=1) * (1 + 3 * TIE_TOL)
+        is_other = (squares <= limits) & (candidates != chosen)
+        may_tie = np.flatnonzero(is_other.any(axis=1))
+        if len(may_tie):
+            normals[may_tie] = self._tied_normals(offsets[may_tie], candidates[may_tie])
+        return normals
+
+    def _tied_normals(self, offsets: Floats, candidates: Ints) -> Floats:
+        """Return the normals of `normals_from` for points at (k, c, 3) offsets from
+        their candidates, of which several may be equally near."""
         gaps = np.linalg.norm(offsets, axis=2)
         least = gaps.min(axis=1, keepdims=True)
         is_nearest = gaps <= least * (1 + TIE_TOL)

@@ -20,13 +20,15 @@ static inline v cofactors(v m[3][3], v c[3][3]) {  // returns the determinant
     return dot(m[0], c[0]);
 }
 
-// Returns the energy of `count` elements, and adds their forces and stiffness unless these are NULL. Nodes have (., 3)
+// Returns the energy of `count` elements, sets `range` to their smallest and largest det F (NaN if one is), and adds
+// their forces and stiffness unless these are NULL. Nodes have (., 3)
 // positions X, displacements u and forces; elements have nodes `cells` (., 4), the inverse growth tensor, the shear
 // modulus, and the `places` (., 4, 4) of their pairs of nodes among the blocks (., 3, 3), negative where there is none.
 double assemble(long count, double bulk_to_shear, const int32_t (*cells)[4], const double (*X)[3],
                 const double (*u)[3], const double (*G_inverse)[3][3], const double *mu,
-                double (*forces)[3], const int32_t (*places)[4][4], double (*blocks)[3][3]) {
+                double *range, double (*forces)[3], const int32_t (*places)[4][4], double (*blocks)[3][3]) {
     double energy = 0;
+    range[0] = INFINITY, range[1] = -INFINITY;
     for (long first = 0; first < count; first += W) {
         int lanes = count - first < W ? count - first : W;
         v edge[3][3], move[3][3], normal[3][3], G[3][3], F[3][3], C[3][3];
@@ -45,10 +47,12 @@ double assemble(long count, double bulk_to_shear, const int32_t (*cells)[4], con
             b[a + 1][j] = (normal[a][0] * G[0][j] + normal[a][1] * G[1][j] + normal[a][2] * G[2][j]) / six;
         EACH(j, 3) b[0][j] = -(b[1][j] + b[2][j] + b[3][j]);
         EACH(i, 3) EACH(j, 3) F[i][j] = G[i][j] + move[0][i] * b[1][j] + move[1][i] * b[2][j] + move[2][i] * b[3][j];
-        v J = cofactors(F, C), I1 = dot(F[0], F[0]) + dot(F[1], F[1]) + dot(F[2], F[2]);
+        v J = cofactors(F, C), ratio = J / cofactors(G, normal), I1 = dot(F[0], F[0]) + dot(F[1], F[1]) + dot(F[2], F[2]);
         EACH(l, lanes) {
             double V = fabs(six[l]) / 6, m = mu[first + l], K = bulk_to_shear * m;
             energy += V * psi(I1[l], J[l], m, K);
+            if (!(ratio[l] >= range[0])) range[0] = range[0] != range[0] ? range[0] : ratio[l];
+            if (!(ratio[l] <= range[1])) range[1] = range[1] != range[1] ? range[1] : ratio[l];
             of_I[l] = V * psi_I(I1[l], J[l], m, K);
             of_J[l] = V * psi_J(I1[l], J[l], m, K);
             if (!blocks) continue;

@@ -1,6 +1,7 @@
 """Energy, forces and stiffness of linear elements, two to four times as fast as code by
 FFCx."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,19 @@ from .domain import Domain
 
 DECLARATION = """
 double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u,
-                void *H, void *weight, void *forces, void *places, void *blocks);
+                void *H, void *weight, void *range, void *forces, void *places,
+                void *blocks);
 """
+
+
+@dataclass(frozen=True)
+class ElementTotals:
+    """Energy in J of a rank's elements, and the smallest and largest det F among them,
+    NaN if any is."""
+
+    energy: float
+    smallest: float
+    largest: float
 
 
 class LinearElements:
@@ -42,14 +54,15 @@ class LinearElements:
         u: Floats,
         forces: Floats | None = None,
         matrix: MatrixCSR | None = None,
-    ) -> float:
-        """Return the energy in J at displacements u (k, 3) in m; add to the given
-        forces in N and matrix in N/m.
+    ) -> ElementTotals:
+        """Return the totals at displacements u (k, 3) in m; add to the given forces in
+        N and matrix in N/m.
 
         Blocks of the stiffness below the diagonal between owned nodes are omitted.
         """
         cells = self._domain.cells
-        nodes = self._domain.local(self._domain.positions)
+        nodes = self._domain.nodes
+        volume_range = np.empty(2)
         count = len(cells)
         values = None
         places = None
@@ -66,6 +79,7 @@ class LinearElements:
             self._pointer(u, np.float64, nodes.size),
             self._pointer(self.H, np.float64, 9 * count),
             self._pointer(self.weight, np.float64, count),
+            self._pointer(volume_range, np.float64, 2, is_written=True),
             self._pointer(
                 forces,
                 np.float64,
@@ -75,7 +89,8 @@ class LinearElements:
             self._pointer(places, np.int32, 16 * count),
             self._pointer(values, np.float64, n_values, is_written=True),
         ]
-        return float(self._code.assemble(count, self._bulk_to_shear, *pointers))
+        energy = self._code.assemble(count, self._bulk_to_shear, *pointers)
+        return ElementTotals(float(energy), *volume_range.tolist())
 
     def _places_in(self, matrix: MatrixCSR) -> NDArray[np.int32]:
         """Return the (16 c,) numbers in a matrix of the blocks of elements' pairs of

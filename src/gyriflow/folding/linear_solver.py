@@ -116,7 +116,7 @@ class TwoLevelPreconditioner:
     def renew(self) -> None:
         """Update the diagonal to the present tangent, and the coarse level after
         its lifetime."""
-        inverses = inverse_blocks(self._tangent.diagonal())
+        inverses = _inverse_blocks(self._tangent.diagonal())
         self._inverse_diagonal = inverses.astype(np.float32)
         n_assembled = self._tangent.elastic.assembled
         if n_assembled >= self._made_at + self._settings.lifetime:
@@ -169,7 +169,7 @@ class TwoLevelPreconditioner:
             removed = self._domain.sum_over_ranks(restriction @ motions.modes)
             squared_norm = np.linalg.norm(removed, 2) ** 2
             coarse += 10 * scale / squared_norm * removed @ removed.T
-        inverse = inverse_matrix(coarse)
+        inverse = _inverse_matrix(coarse)
         self._inverse_coarse = inverse[self._moved].astype(np.float32)
 
     def _in_parts(self, modes: Floats, part: Ints) -> sparse.bsr_matrix:
@@ -183,7 +183,7 @@ class TwoLevelPreconditioner:
         )
 
 
-def inverse_blocks(blocks: Floats) -> Floats:
+def _inverse_blocks(blocks: Floats) -> Floats:
     """Return the inverses of (n, 3, 3) symmetric blocks, as `_positive_inverses` if
     they are indefinite."""
     a, b, c = blocks.swapaxes(0, 1)
@@ -205,7 +205,7 @@ def inverse_blocks(blocks: Floats) -> Floats:
     return np.asarray(inverses)
 
 
-def inverse_matrix(matrix: Floats) -> Floats:
+def _inverse_matrix(matrix: Floats) -> Floats:
     """Return the inverse of a (k, k) symmetric matrix, as `_positive_inverses` if it is
     indefinite."""
     factor, failed = dpotrf(matrix, lower=1)

@@ -223,7 +223,7 @@ class NewtonSolver:
             # as far as contact allows
             length = problem.max_step(at_rest.displacement, guess)
             u = length * guess
-            if problem.domain.smallest_volume_ratio(u) > 0:
+            if problem.keeps_volume(u):
                 residual = problem.residual(u)
                 if residual.norm < 0.5 * at_rest.norm:  # false for NaN
                     return residual
@@ -262,8 +262,7 @@ class NewtonSolver:
         for halvings in range(self.settings.max_backtracks):
             length = longest / 2**halvings
             u = start + length * direction.values
-            has_volume = problem.domain.smallest_volume_ratio(u) > 0  # False for NaN
-            if not has_volume:
+            if not problem.keeps_volume(u):
                 self.inverted = problem.domain.volume_ratios(u)
                 continue
             trial = problem.residual(u)
@@ -298,7 +297,7 @@ class NewtonSolver:
         ratios = self.inverted
         if ratios is None:
             ratios = domain.volume_ratios(last.displacement)
-        nodes_mm = domain.local(domain.positions) * MM_PER_M
+        nodes_mm = domain.nodes * MM_PER_M
         centres_mm = nodes_mm[domain.corners].mean(axis=1)
         ratio, tet, centre = domain.locate_minimum(
             ratios.min(axis=1), domain.tet_of_cell, centres_mm

@@ -20,7 +20,7 @@ from ..settings.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
 from .compilation import form_compiler
 from .domain import Domain
-from .linear_elements import LinearElements
+from .linear_elements import ElementTotals, LinearElements
 from .points import IntegrationPoints
 from .tangent import ElasticMatrix, LaggedTangent, Residual, RigidMotions, Tangent
 from .zones import Zones
@@ -53,6 +53,17 @@ class Forms:
     energy: dolfinx.fem.Form
     residual: dolfinx.fem.Form
     tangent: dolfinx.fem.Form
+
+
+@dataclass(frozen=True, eq=False)
+class _ElementForces:
+    """Forces (3 k,) in N of a rank's linear elements, and their totals, at a
+    displacement (k, 3) in m from (n, 3) positions."""
+
+    positions: Floats
+    displacement: Floats
+    forces: Floats
+    totals: ElementTotals
 
 
 class NonlinearProblem:
@@ -104,6 +115,7 @@ class NonlinearProblem:
         self._expressions: dict[str, dolfinx.fem.Expression] = {}
         dx = self._volume_measure()
         self._linear: LinearElements | None = None
+        self._last_forces: _ElementForces | None = None
         self._energy: ufl.Form | int = 0
         if domain.order == 1:
             # written by hand, instead of the form compiler's code
@@ -223,6 +235,7 @@ class NonlinearProblem:
         if self._linear:
             self._linear.weight = np.ascontiguousarray(weight)
             self._linear.H = np.ascontiguousarray(H)
+        self._last_forces = None
         self._tangent.elastic.forget()
         if self.free:
             part = self.domain.part if part is None else part
@@ -276,12 +289,48 @@ class NonlinearProblem:
         self._u.x.array[:] = u.ravel()
         return self._u.x.array.reshape(-1, 3)
 
+    def _elements_at(self, linear: LinearElements, u: Floats) -> _ElementForces:
+        """Return the forces and totals of linear elements. Those of the last
+        displacement are cached."""
+        last = self._last_forces
+        positions = self.domain.positions
+        if (
+            last is None
+            or last.positions is not positions
+            or not np.array_equal(last.displacement, u)
+        ):
+            u = u.copy()
+            forces = np.zeros(u.size)
+            totals = linear.assemble(u, forces=forces)
+            last = _ElementForces(positions, u, forces, totals)
+            self._last_forces = last
+        return last
+
+    def volume_range(self, u: Floats) -> tuple[float, float]:
+        """Return the smallest and the largest det F of all ranks' elements, NaN if one
+        is; in quadratic elements, those at the nodes."""
+        domain = self.domain
+        if self._linear:
+            totals = self._elements_at(self._linear, u).totals
+            ends = np.array([totals.smallest, -totals.largest])
+        else:
+            ratios = domain.volume_ratios(u)
+            ends = np.array([ratios.min(initial=np.inf), -ratios.max(initial=-np.inf)])
+        smallest, negative = (domain.min_over_ranks(end) for end in ends)
+        return smallest, -negative
+
+    def keeps_volume(self, u: Floats) -> bool:
+        """Return whether no element is inverted anywhere."""
+        if self._linear:
+            return self.volume_range(u)[0] > 0  # false for NaN
+        return self.domain.smallest_volume_ratio(u) > 0
+
     def energy(self, u: Floats) -> float:
         """Return the total energy in J, contact included."""
-        u = self._load(u)
+        self._load(u)
         local = 0.0
         if self._linear:
-            local += self._linear.assemble(u)
+            local += self._elements_at(self._linear, u).totals.energy
         if self._forms:
             local += float(np.real(dolfinx.fem.assemble_scalar(self._forms.energy)))
         total = self.domain.comm.allreduce(local)
@@ -291,12 +340,11 @@ class NonlinearProblem:
         """Return the forces (N) at a displacement, zero where it is fixed: the elastic
         ones, with those of the fissure's planes, and all. A free body's have no rigid
         motions."""
-        # a view that the next call overwrites, so the result has `u`
-        loaded = self._load(u)
+        self._load(u)
         forces = self._forces
         forces.array[:] = 0.0
         if self._linear:
-            self._linear.assemble(loaded, forces=forces.array)
+            forces.array[:] = self._elements_at(self._linear, u).forces
         if self._forms:
             dolfinx.fem.assemble_vector(forces.array, self._forms.residual)
         forces.scatter_reverse(InsertMode.add)

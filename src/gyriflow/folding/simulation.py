@@ -14,7 +14,7 @@ from ..errors import SolverError
 from ..geometry.jacobians import EDGES, determinants
 from ..geometry.straightening import InnerSides
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..geometry.triangles import Floats
+from ..geometry.triangles import Floats, dots
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
 from ..settings.terms import ELEMENTS_NEEDED, is_too_coarse
@@ -252,11 +252,11 @@ class Folding:
         domain = self.domain
         depth = tissue.layers.depth[domain.corners].mean(axis=1)
         inside = domain.corners[depth <= thickness]
-        nodes = domain.local(domain.positions)
+        places = domain.nodes[inside]
         own_total = 0.0
         for i, j in EDGES:
-            edges = nodes[inside[:, i]] - nodes[inside[:, j]]
-            own_total += np.linalg.norm(edges, axis=1).sum()
+            edges = places[:, i] - places[:, j]
+            own_total += np.sqrt(dots(edges, edges)).sum()
         own_count = len(EDGES) * len(inside)
         total, count = domain.comm.allreduce(np.array([own_total, own_count]))
         return float(thickness * count / total) if count else math.nan
@@ -266,15 +266,15 @@ class Folding:
     ) -> dict[str, float]:
         u = solution.displacement
         length = np.linalg.norm(displacement, axis=1) * MM_PER_M
-        ratios = self.domain.volume_ratios(u)
+        smallest, largest = self.problem.volume_range(u)
         return {
             "newton": solution.newton,
             "krylov": solution.krylov,
             "residual": solution.residual,
             "converged": solution.converged,
             "energy_J": self.problem.energy(u),
-            "min_J": self.domain.min_over_ranks(ratios),
-            "max_J": -self.domain.min_over_ranks(-ratios),
+            "min_J": smallest,
+            "max_J": largest,
             "max_u_mm": float(length.max()),
         }
 

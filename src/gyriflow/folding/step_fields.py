@@ -85,7 +85,7 @@ def _total_fields(folding: Folding, names: Collection[str]) -> dict[str, Floats]
     slopes = folding.problem.points.gradients
     u = folding.solved.displacement
     start = domain.local(folding.start)
-    after = domain.local(domain.positions) + u
+    after = domain.nodes + u
     fields: dict[str, Floats] = {}
     if "strain" in names or "volume_ratio" in names:
         total = deformation_gradients(start, after, domain.cells, slopes)

@@ -80,22 +80,39 @@ def inverse_growth(
     of U, and surely below the limit, it is F⁻¹ = U⁻¹·Rᵀ, which costs less: an isotropic
     material does not depend on the rotation.
     """
-    squared = F.swapaxes(-1, -2) @ F
-    strains = np.linalg.norm(
-        squared - np.eye(3),
-        axis=(-2, -1),
-    )
-    is_whole = (np.abs(power - 1) < ROUND_OFF) & (strains < 1 - np.exp(-2 * limit))
-    inverse = np.empty_like(F)
-    inverse[is_whole] = np.linalg.inv(F[is_whole])
+    is_whole = np.abs(power - 1) < ROUND_OFF
+    inverse, strains = _inverse_and_strain(F.reshape(-1, 3, 3))
+    inverse = inverse.reshape(F.shape)
+    is_whole &= strains.reshape(is_whole.shape) < 1 - np.exp(-2 * limit)
     others = ~is_whole
-    logs, axes = _principal_logs(squared[others])
+    stretched = F[others]
+    logs, axes = _principal_logs(stretched.swapaxes(-1, -2) @ stretched)
     limited = np.clip(logs, -limit, limit)
     powers = power[others][:, None]
     inverse[others] = from_principal(np.exp(-powers * limited), axes)
     is_limited = np.zeros(is_whole.shape, dtype=bool)
     is_limited[others] = np.abs(logs).max(axis=-1) > limit
     return inverse, is_limited
+
+
+def _inverse_and_strain(F: Floats) -> tuple[Floats, Floats]:
+    """Return the inverse of (n, 3, 3) matrices, and the norm (n,) of FᵀF − 1.
+
+    Singular ones, whose strain is large, have another one in place of their inverse.
+    """
+    inverse = np.empty_like(F)
+    strains = np.empty(len(F))
+    for chunk in chunks(len(F)):
+        maps = np.ascontiguousarray(np.moveaxis(F[chunk], 0, 2))
+        cofactors = cofactors_of(maps)
+        volumes = (maps * cofactors).sum(axis=(0, 1)) / 3
+        turned = cofactors / np.where(volumes == 0, 1.0, volumes)
+        inverse[chunk] = turned.transpose(2, 1, 0)
+        # i, j, k: axes in space, e: element
+        squared = np.einsum("kie,kje->ije", maps, maps)
+        squared -= np.eye(3)[:, :, None]
+        strains[chunk] = np.sqrt((squared**2).sum(axis=(0, 1)))
+    return inverse, strains
 
 
 def _principal_logs(squared: Floats) -> tuple[Floats, Floats]:

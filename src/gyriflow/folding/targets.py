@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import smooth_integrals, vertex_sizes
+from ..geometry.jacobians import determinants
 from ..geometry.paths import Path, path_through
 from ..geometry.tetrahedra import has_volume, volumes_between
 from ..geometry.triangles import Mask
@@ -57,32 +58,46 @@ class TargetGrowth(StepGrowth):
     `misfit_mm` is the root mean square distance to the path at the start of the step,
     without rigid motion. Elements whose stretch is beyond `MAX_LOG_STRETCH` grow by
     that, and those that the goal inverts do not grow; `inverse` counts both as `held`,
-    with `total` over the ranks. `shrinking` elements lose more than
+    with `total` over the ranks, and as `shrinking` those that lose more than
     `MAX_SHRINKAGE_PER_DAY`.
     """
 
     goal_mm: Floats
     misfit_mm: float
-    shrinking: int
     total: Callable[[int], int]
     held: list[int] = field(default_factory=list)
+    shrinking: list[int] = field(default_factory=list)
     # computed once: the step's growth and the growth of all steps need it
     _deformations: dict[Elements, Floats] = field(default_factory=dict, init=False)
 
     def inverse(self, tissue: Tissue) -> Floats:
-        elements = tissue.elements
-        is_valid = has_volume(self.goal_mm[elements.vertices], elements.cells)
+        is_valid, ratios = self._volume_ratios(tissue.elements)
+        least = 1 - MAX_SHRINKAGE_PER_DAY * self.start.step_s / DAY_S
+        is_shrinking = (ratios > 0) & (ratios < least)
+        self.shrinking.append(self.total(int(is_shrinking.sum())))
         growing = np.where(
             is_valid[:, None],
             tissue.at_points(tissue.growing),
             0.0,
         )
         inverse, is_limited = inverse_growth(
-            self.deformation(elements), growing, MAX_LOG_STRETCH
+            self.deformation(tissue.elements), growing, MAX_LOG_STRETCH
         )
         is_held = ~is_valid | is_limited.any(axis=1)
         self.held.append(self.total(int(is_held.sum())))
         return inverse
+
+    def _volume_ratios(self, elements: Elements) -> tuple[Mask, Floats]:
+        """Return whether elements are valid at the goal, and by how much their volume
+        changes, (c,)."""
+        if elements.points.order == 1:
+            ratios = determinants(self.deformation(elements)[:, 0])
+            return ratios > 0, ratios
+        goal = self.goal_mm[elements.vertices]
+        start = self.start.positions_mm[elements.vertices]
+        cells = elements.cells
+        ratios = volumes_between(goal, cells) / volumes_between(start, cells)
+        return has_volume(goal, cells), ratios
 
     def deformation(self, elements: Elements) -> Floats:
         if elements not in self._deformations:
@@ -104,7 +119,7 @@ class TargetGrowth(StepGrowth):
     def row(self, after: Size) -> dict[str, Any]:
         counts = {
             "held_elements": self.held[-1],
-            "shrinking_elements": self.shrinking,
+            "shrinking_elements": self.shrinking[-1],
         }
         return super().row(after) | {"to_path_mm": self.misfit_mm} | counts
 
@@ -162,11 +177,7 @@ def growth_on_path(
         goal += smooth_integrals(
             positions, inputs.pieces, integrals, FEEDBACK_SMOOTHING_MM
         )
-    tets = inputs.mesh.tets
-    ratios = volumes_between(goal, tets) / volumes_between(positions, tets)
-    least_ratio = 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S
-    n_shrinking = int(((ratios > 0) & (ratios < least_ratio)).sum())
-    return TargetGrowth(p, start, goal, misfit_mm, n_shrinking, inputs.total)
+    return TargetGrowth(p, start, goal, misfit_mm, inputs.total)
 
 
 def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:

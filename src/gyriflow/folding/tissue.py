@@ -8,6 +8,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry.jacobians import chunks
 from ..geometry.triangles import Floats, Indices, Ints, Mask
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
@@ -196,8 +197,13 @@ class Tissue:
             return mask, _interpolated_normals(at_nodes, points)
         mask = needed[cells].any(axis=1)
         nodes = cells[mask]
-        centres = self.nodes[nodes].mean(axis=1)
-        normals = self.layers.pial.normals_from(centres, self.layers.nearest[nodes])
+        normals = np.empty((len(nodes), 3))
+        for chunk in chunks(len(nodes)):
+            corners = nodes[chunk]
+            # faster than a mean over an axis
+            centres = sum(self.nodes[column] for column in corners.T) / 4
+            candidates = self.layers.nearest[corners]
+            normals[chunk] = self.layers.pial.normals_from(centres, candidates)
         return mask, np.repeat(
             normals[:, None],
             len(points.weights),

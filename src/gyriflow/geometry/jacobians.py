@@ -253,11 +253,9 @@ def element_maps(
             axes=1,
         )
     else:
-        edges = nodes[1:] - nodes[0]
-        maps = np.tile(
-            edges,
-            (len(slopes), 1, 1, 1),
-        )
+        maps = (nodes[1:] - nodes[0])[None]
+        if len(slopes) > 1:
+            maps = np.tile(maps, (len(slopes), 1, 1, 1))
     return np.ascontiguousarray(maps.swapaxes(2, 3))
 
 

@@ -21,6 +21,7 @@ from .triangles import (
     dots,
     edges,
     face_normals,
+    order_along_curve,
     transformed,
     vertex_normals,
 )
@@ -50,11 +51,14 @@ class Match:
 def nearest_on(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Floats]:
     """Return the (n,) distances of points from a surface, and faces and (n, 3)
     positions of its nearest points."""
-    squared, face, place = igl.point_mesh_squared_distance(
-        points,
+    order = order_along_curve(points)
+    found = igl.point_mesh_squared_distance(
+        points[order],
         surface.vertices,
         surface.faces,
     )
+    squared, face, place = (np.empty_like(values) for values in found)
+    squared[order], face[order], place[order] = found
     return np.sqrt(squared), face.astype(np.int64), place
 
 
@@ -296,7 +300,12 @@ def match_layers(
     places = mesh.vertices[ends].mean(axis=1)
     inner_places = inner_of_mesh[ends].mean(axis=1)
     tree = cKDTree(np.hstack([places, inner_places]))
-    other_distance, nearest = tree.query(np.hstack([points, inner]))
+    order = order_along_curve(points)
+    other_distance = np.empty(len(points))
+    nearest = np.empty(len(points), dtype=np.int64)
+    other_distance[order], nearest[order] = tree.query(
+        np.hstack([points, inner])[order]
+    )
     rows = np.flatnonzero(other_distance < distance)
     nearest = nearest[rows]
     match.corners[rows] = ends[nearest][:, [0, 1, 1]]

@@ -8,21 +8,43 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ellipsoid import GAP_MM, RUN, brain_mesh
-from shapes import box_mesh
+from shapes import box_mesh, uneven_surface
 
 from gyriflow.folding.growth import GrowthByRates, StepStart
 from gyriflow.folding.layers import PialSearch, cortical_weight
+from gyriflow.folding.nearest_faces import FaceTree
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.points import IntegrationPoints
 from gyriflow.folding.tissue import Elements, Layers, Tissue
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.jacobians import NODES
+from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_faces
+from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.settings.folding import parameters_from
 
 
 def search_of(mesh):
     return PialSearch(mesh.vertices, boundary_faces(mesh)[0])
+
+
+@pytest.mark.parametrize("n_faces", [1, 8, 9, None])
+def test_the_tree_of_faces_finds_the_distances_of_an_exhaustive_search(n_faces):
+    whole = uneven_surface()
+    faces = whole.faces[:n_faces]
+    # a face without area, and points on, in and far from the surface
+    flat = [faces[0, 0], faces[0, 1], faces[0, 1]]
+    surface = TriangleMesh(whole.vertices, np.vstack([flat, faces]))
+    rng = np.random.default_rng(3)
+    around = rng.uniform(-80, 80, (500, 3))
+    centres = whole.vertices[faces].mean(axis=1)
+    points = np.concatenate([around, whole.vertices, centres, 0.9 * centres])
+    expected, _, _ = nearest_on(points, TriangleMesh(whole.vertices, faces))
+    tree = FaceTree(surface)
+    unknown = np.full(len(points), np.inf)
+    np.testing.assert_allclose(tree.distance(points, unknown), expected, atol=1e-12)
+    shorter = expected / 2
+    assert tree.distance(points, shorter) == pytest.approx(shorter)
 
 
 def test_the_layers_of_a_week_have_its_thickness_stiffness_and_growth():

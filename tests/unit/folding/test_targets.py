@@ -92,9 +92,9 @@ def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goa
     start = StepStart(np.concatenate([single] * 3), 0.0, DAY_S)
     counted = []
     growth = TargetGrowth(
-        p, start, goals, 0.0, 0, lambda count: counted.append(count) or count
+        p, start, goals, 0.0, lambda count: counted.append(count) or count
     )
-    points = SimpleNamespace(gradients=SLOPES[None])
+    points = SimpleNamespace(order=1, gradients=SLOPES[None])
     elements = Elements(tets, np.arange(12), points)
     tissue = SimpleNamespace(
         elements=elements,
@@ -104,7 +104,7 @@ def test_an_element_at_most_doubles_in_a_step_and_never_grows_to_an_inverted_goa
     inverse = growth.inverse(tissue)[:, 0]
     for found, stretch in zip(inverse, (1.5, np.exp(0.7), 1.0), strict=True):
         assert found == pytest.approx(np.diag([1 / stretch, 1.0, 1.0]))
-    assert (growth.held, counted) == ([2], [2])
+    assert (growth.shrinking, growth.held, counted) == ([0], [2], [0, 2])
     fixed = np.arange(36).reshape(12, 3) % 5 == 0
     guess = growth.guess(fixed)
     assert (guess[fixed] == 0).all()

@@ -11,6 +11,7 @@ from gyriflow.geometry.triangles import (
     flipped,
     is_closed,
     merged,
+    order_along_curve,
     signed_volume,
     smallest_patch,
     split_sheets,
@@ -79,3 +80,14 @@ def test_bodies_that_share_an_edge_are_parted_there_each_closed(is_outward):
     sizes = [signed_volume(submesh(parted, component == n)[0]) for n in (0, 1)]
     assert np.abs(sizes) == pytest.approx([24.0, 18.0])
     assert split_sheets(large) is large
+
+
+def test_points_along_a_curve_are_near_each_other():
+    points = np.random.default_rng(1).uniform(-3, 9, (4000, 3))
+    order = order_along_curve(points)
+    assert sorted(order) == list(range(4000))
+    steps = np.linalg.norm(np.diff(points[order], axis=0), axis=1)
+    shuffled = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert np.median(steps) < 0.15 * np.median(shuffled)
+    assert order_along_curve(np.zeros((3, 3))).tolist() == [0, 1, 2]
+    assert len(order_along_curve(np.empty((0, 3)))) == 0

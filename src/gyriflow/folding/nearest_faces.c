@@ -1,0 +1,66 @@
+// Distances of points to the nearest of many triangles, eight at a time, by a tree of boxes around them.
+
+#define W 8
+#define DEPTH 64
+#define EACH for (int i = 0; i < 3; i++)
+
+static inline double smaller(double a, double b) { return a < b ? a : b; }
+static inline double larger(double a, double b) { return a > b ? a : b; }
+static inline double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static inline double to_box(const double *p, const double (*box)[3]) {  // squared; box[0] is its low corner, box[1] high
+    double sum = 0;
+    EACH {
+        double gap = larger(larger(box[0][i] - p[i], p[i] - box[1][i]), 0);
+        sum += gap * gap;
+    }
+    return sum;
+}
+
+static inline double to_segment(const double *ap, const double *ab) {  // squared, from a point at ap to 0 ... ab
+    double t = smaller(larger(dot(ap, ab) / dot(ab, ab), 0), 1), gap[3];
+    EACH gap[i] = ap[i] - t * ab[i];
+    return dot(gap, gap);
+}
+
+static inline double to_triangle(const double *p, const double *a, const double *b, const double *c) {  // squared
+    double ab[3], ac[3], bc[3], ap[3], bp[3];
+    EACH ab[i] = b[i] - a[i], ac[i] = c[i] - a[i], bc[i] = c[i] - b[i], ap[i] = p[i] - a[i], bp[i] = p[i] - b[i];
+    double n[3] = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]};
+    double nn = dot(n, n), aa = dot(ab, ab), cc = dot(ac, ac), a_c = dot(ab, ac), pb = dot(ap, ab), pc = dot(ap, ac);
+    double of_b = cc * pb - a_c * pc, of_c = aa * pc - a_c * pb, height = dot(ap, n);  // barycentric, times nn
+    double to_side = smaller(to_segment(ap, ab), smaller(to_segment(ap, ac), to_segment(bp, bc)));
+    return (nn > 0) & (of_b >= 0) & (of_c >= 0) & (of_b + of_c <= nn) ? height * height / nn : to_side;
+}
+
+// Lowers the `squared` distances of points to those of the nearest triangle, if that is nearer. Box 1 contains all
+// triangles, 2 k and 2 k + 1 are the halves of box k, and the last `leaves` boxes contain eight triangles each.
+void lower_distances(long count, long leaves, const double (*boxes)[2][3], const double (*triangles)[3][3][W],
+                     const double (*points)[3], double *squared) {
+    for (long k = 0; k < count; k++) {
+        const double *p = points[k];
+        double nearest = squared[k], far[DEPTH];
+        long stack[DEPTH], top = 0, box = 1;
+        while (box) {
+            if (box < leaves) {
+                double first = to_box(p, boxes[2 * box]), second = to_box(p, boxes[2 * box + 1]);
+                long nearer = 2 * box + (second < first);
+                if (larger(first, second) < nearest) far[top] = larger(first, second), stack[top++] = nearer ^ 1;
+                if (smaller(first, second) < nearest) {
+                    box = nearer;
+                    continue;
+                }
+            } else {
+                double found[W];
+                for (int l = 0; l < W; l++) {
+                    double corner[3][3];
+                    for (int m = 0; m < 3; m++) EACH corner[m][i] = triangles[box - leaves][m][i][l];
+                    found[l] = to_triangle(p, corner[0], corner[1], corner[2]);
+                }
+                for (int l = 0; l < W; l++) nearest = smaller(found[l], nearest);
+            }
+            for (box = 0; top && !box;) if (far[--top] < nearest) box = stack[top];
+        }
+        squared[k] = nearest;
+    }
+}

@@ -1,0 +1,88 @@
+"""Distances of many points from a surface that moves in each step, in C."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from scipy.spatial import cKDTree
+
+from ..geometry.triangles import Floats, TriangleMesh, corners
+from .compilation import compiled, pointer
+
+DECLARATION = """
+void lower_distances(long count, long leaves, void *boxes, void *triangles,
+                     void *points, void *squared);
+"""
+LEAF_SIZE = 8
+"""Number of triangles in the smallest boxes."""
+
+
+@cache
+def _library() -> tuple[Any, Any]:
+    return compiled(
+        MPI.COMM_SELF,
+        DECLARATION,
+        Path(__file__).with_suffix(".c").read_text(encoding="utf-8"),
+    )
+
+
+class FaceTree:
+    """A tree of boxes around the faces of a surface."""
+
+    def __init__(self, surface: TriangleMesh) -> None:
+        triangles = corners(surface)
+        # this tree halves its points, too, and has these in the order of its leaves
+        order = cKDTree(triangles.mean(axis=1), LEAF_SIZE).indices
+        ends = np.array([0, len(order)])
+        while np.diff(ends).max() > LEAF_SIZE:
+            middles = (ends[:-1] + ends[1:]) // 2
+            ends = np.insert(ends, np.arange(1, len(ends)), middles)
+        # all leaves are full: the last of their triangles is there several times
+        places = ends[:-1, None] + np.arange(LEAF_SIZE)
+        places = np.minimum(places, ends[1:, None] - 1)
+        by_leaf = triangles[order[places]]
+        self._triangles = np.ascontiguousarray(np.moveaxis(by_leaf, 1, -1))
+        corners_of_leaf = by_leaf.reshape(len(places), -1, 3)
+        boxes = np.stack(
+            [corners_of_leaf.min(axis=1), corners_of_leaf.max(axis=1)],
+            axis=1,
+        )
+        levels = [boxes]
+        while len(boxes) > 1:
+            first, second = boxes[::2], boxes[1::2]
+            low = np.minimum(first[:, 0], second[:, 0])
+            high = np.maximum(first[:, 1], second[:, 1])
+            boxes = np.stack([low, high], axis=1)
+            levels.append(boxes)
+        # the first box is number 1
+        levels.append(np.zeros((1, 2, 3)))
+        self._boxes = np.concatenate(levels[::-1])
+
+    def distance(self, points: Floats, at_most: Floats) -> Floats:
+        """Return the distances (k,) of points (k, 3) from the surface, if they are not
+        longer than known ones (k,)."""
+        interface, code = _library()
+        points = np.ascontiguousarray(points)
+        squared = at_most**2
+        count = len(points)
+        arrays = [
+            (self._boxes, self._boxes.size),
+            (self._triangles, self._triangles.size),
+            (points, 3 * count),
+            (squared, count),
+        ]
+        pointers = []
+        for array, size in arrays:
+            pointers.append(
+                pointer(
+                    interface,
+                    array,
+                    np.float64,
+                    size,
+                    is_written=array is squared,
+                )
+            )
+        code.lower_distances(count, len(self._triangles), *pointers)
+        return np.sqrt(squared)
