@@ -20,7 +20,7 @@ from common import ROOT, print_rows
 from scipy import ndimage
 
 from gyriflow.anatomy.extraction import dilated
-from gyriflow.anatomy.misplaced import misplaced_cortex
+from gyriflow.anatomy.misplaced import around_cerebrum, misplaced_cortex
 from gyriflow.geometry.deformations import voxel_size
 from gyriflow.io.volumes import LabelVolume, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
@@ -138,7 +138,8 @@ def main() -> None:
                 for fault, labels in faults(volume):
                     if fault != "none" and (week - first) % arguments.every:
                         break
-                    warnings = list(misplaced_cortex(labels, volume.affine, SCHEME))
+                    around = around_cerebrum(labels, volume.affine, SCHEME)
+                    warnings = list(misplaced_cortex(around))
                     print(
                         f"{path}: {fault}: {warnings or 'no warning'}",
                         file=sys.stderr,

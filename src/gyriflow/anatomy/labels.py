@@ -4,6 +4,7 @@ labels, their layout and sides."""
 import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from . import extraction
 from .extraction import Floats, Mask
-from .misplaced import hindbrain_note, misplaced_cortex
+from .misplaced import AroundCerebrum, around_cerebrum, misplaced_cortex
 
 log = logging.getLogger(__name__)
 
@@ -37,8 +38,8 @@ REPORTED_LOSS = 0.005
 # cerebrum, is taken as cut; of 1179 ends that lack up to 8 slices and more than 0.5 %
 # of the brain, 3 are missed
 CUT_SLICE_RATIO = 2 / 3
-# directions of rays from a voxel of fluid: to the faces, edges and corners of its cell
-DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1
+# from a voxel of fluid, so many rays go to the faces, edges and corners of its cell
+N_RAYS = 26
 # fluid belongs to the cerebrum if more than this share of its rays hits the cerebrum's
 # tissue
 ENCLOSED = 0.5
@@ -47,6 +48,8 @@ ENCLOSED = 0.5
 ENCLOSED_WITHOUT_CORTEX = 0.93
 # smoothing of the share of rays, in voxels
 RAY_SMOOTHING = 2.0
+# scipy's Gaussian ends after so many standard deviations
+GAUSSIAN_REACH = 4
 # enclosed parts smaller than this share of the largest are ignored
 MIN_PART_SHARE = 0.02
 # smallest volume of a hemisphere relative to the other one, if the sides are labelled
@@ -65,6 +68,9 @@ MAX_IMBALANCE = 4.0
 # share of the contacts of sided labels that are with the other side; 0.11 or less in 15
 # brains, 0.69 or more if mixed
 MAX_BETWEEN = 0.4
+WHOLE = (slice(None),) * 3
+INNER = (slice(1, -1),) * 3
+"""A volume without a margin of one voxel."""
 HOLE = -1
 """Value for unlabelled voxels enclosed by labels, which are neither inside nor
 outside."""
@@ -104,21 +110,19 @@ def read_cerebrum(
     the labels do not fit the scheme, or if cortex covers less than `min_cortex` of the
     cerebrum's surface.
     """
-    require_labels(labels, scheme)
-    mask = np.isin(labels, scheme.cerebrum)
-    report = _missing_labels(labels, scheme)
-    warnings = list(
-        misplaced_cortex(
-            labels,
-            affine,
-            scheme,
-            is_whole=min_cortex > 0,
-        )
-    )
+    numbers = _numbers_in(labels)
+    require_labels(numbers, scheme)
+    around = around_cerebrum(labels, affine, scheme)
+    report = _missing_labels(numbers, around)
+    warnings = list(misplaced_cortex(around, is_whole=min_cortex > 0))
+    # without the margin that the volume may not have
+    labels = around.labels[INNER]
+    mask = around.cerebrum[INNER]
+    affine = extraction.shifted_affine(affine, around.first + 1)
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
-    unlabelled = _unlabelled_ventricles(labels, scheme, affine)
+    unlabelled = _unlabelled_ventricles(around)
     if scheme.cortex:
-        share = _require_cortex_outside(labels, scheme, min_cortex, unlabelled)
+        share = _require_cortex_outside(around, min_cortex, unlabelled)
         if share < LITTLE_CORTEX:
             warnings.append(
                 f"cortex lies at only {100 * share:.0f} % of the cerebrum's surface:"
@@ -129,7 +133,7 @@ def read_cerebrum(
             f"{unlabelled.sum() * voxel_ml:.2f} mL without a label of the cerebrum lie"
             " inside it and were filled: ventricles without a label?"
         )
-    open_fluid = _outside_ventricles(labels, scheme)
+    open_fluid = _outside_ventricles(around)[INNER]
     whole, stalks = extraction.without_stalks(
         (mask & ~open_fluid) | unlabelled,
         affine,
@@ -137,7 +141,11 @@ def read_cerebrum(
     smallest = (
         MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else extraction.COMPARABLE
     )
-    main, parts, dropped = extraction.main_parts(whole, smallest)
+    main, parts, dropped = extraction.main_parts(
+        whole,
+        smallest,
+        None if unlabelled.any() else around.filled[INNER],
+    )
     if dropped > REPORTED_LOSS * main.sum():
         loss = (
             f"{dropped * voxel_ml:.2f} mL, {100 * dropped / main.sum():.1f} % of the"
@@ -148,17 +156,17 @@ def read_cerebrum(
         )
         warnings.append(f"{dropped_parts} dropped: {loss}")
     tissue = np.where(mask & ~main, 0, labels)
-    cortex = np.isin(tissue, scheme.cortex)
+    cortex = around.cortex[INNER] & main
     holes = main & ~mask
     other = holes & ~unlabelled
     if other.sum() > REPORTED_LOSS * main.sum():
-        numbers = _listed(
+        found = _listed(
             map(int, np.unique(labels[other])),
             scheme,
         )
         warnings.append(
             f"{other.sum() * voxel_ml:.2f} mL inside the cerebrum have labels outside"
-            f" it, {numbers}, and were filled with the tissue around: is tissue of the"
+            f" it, {found}, and were filled with the tissue around: is tissue of the"
             " cerebrum labelled as these?"
         )
     _fill_from_nearest(tissue, holes, mask & main)
@@ -177,7 +185,7 @@ def read_cerebrum(
             f"{lost:.2f} mL of the cerebrum's labels lie outside it or on a thin stalk"
             " and were left out"
         )
-    fluid = main & (np.isin(labels, scheme.ventricles) | unlabelled)
+    fluid = main & (around.fluid[INNER] | unlabelled)
     volumes = {"cerebrum": main}
     if scheme.cortex:
         volumes |= {"cortex": cortex, "inside_cortex": main & ~fluid & ~cortex}
@@ -187,7 +195,7 @@ def read_cerebrum(
         name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()
     }
     report["border_share"] = _border_share(main)
-    (box,) = ndimage.find_objects(main.astype(np.uint8))
+    box = extraction.box_of(main)
     first = np.array([side.start for side in box]) - extraction.PAD_VOXELS
     cropped = np.pad(main[box], extraction.PAD_VOXELS)
     labelled = np.pad(tissue[box], extraction.PAD_VOXELS)
@@ -201,8 +209,13 @@ def read_cerebrum(
     )
 
 
-def _missing_labels(labels: Labels, scheme: LabelScheme) -> dict[str, Any]:
-    """Return what a report says of labels of a scheme that the volume does not have."""
+def _missing_labels(
+    labels: Labels,
+    around: AroundCerebrum,
+) -> dict[str, Any]:
+    """Return what a report says of labels of a scheme that are not among those of a
+    volume."""
+    scheme = around.scheme
     report: dict[str, Any] = {}
     absent = np.setdiff1d(scheme.cerebrum, labels)
     missing_tissues = [
@@ -214,8 +227,11 @@ def _missing_labels(labels: Labels, scheme: LabelScheme) -> dict[str, Any]:
         report["missing_tissues"] = missing_tissues
         names = ", ".join(missing_tissues[:20])
         log.info("tissues that this brain does not have: %s", names)
-    note = hindbrain_note(labels, scheme)
-    if note:
+    if around.missing:
+        note = (
+            f"the volume has no {' and no '.join(around.missing)}: the pose is found"
+            " without, if it was not left out on purpose"
+        )
         report["hindbrain"] = note
         log.info(note)
     return report
@@ -227,11 +243,18 @@ def _fill_from_nearest(
     source: Mask,
 ) -> None:
     """Give empty voxels the label of the nearest one of a source."""
-    if empty.any():
+    for box, part in extraction.parts_in_boxes(empty):
+        beside = extraction.with_neighbours(part) & ~part
+        # the nearest one of a part that is enclosed by a source touches it
+        if not source[box][beside].all():
+            box = WHOLE
+            part = empty
         nearest = ndimage.distance_transform_edt(
-            ~source, return_distances=False, return_indices=True
+            ~source[box], return_distances=False, return_indices=True
         )
-        labels[empty] = labels[tuple(nearest[:, empty])]
+        labels[box][part] = labels[box][tuple(nearest[:, part])]
+        if part is empty:
+            return
 
 
 def require_labels(labels: Labels, scheme: LabelScheme) -> None:
@@ -271,30 +294,21 @@ def require_labels(labels: Labels, scheme: LabelScheme) -> None:
 
 
 def _require_cortex_outside(
-    labels: Labels,
-    scheme: LabelScheme,
+    around: AroundCerebrum,
     minimum: float,
     unlabelled: Mask,
 ) -> float:
     """Return the share of the cerebrum's surface with cortex; InputError below
     `minimum`: another scheme."""
-    cerebrum = extraction.without_holes(
-        np.pad(
-            np.isin(labels, scheme.cerebrum) | unlabelled,
-            1,
-        )
-    )
-    outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
-    cortex = ndimage.binary_dilation(
-        np.pad(
-            np.isin(labels, scheme.cortex),
-            1,
-        )
-    )
-    share = float((outside & cortex).sum() / outside.sum())
+    surface = around.surface
+    if unlabelled.any():
+        filled = extraction.without_holes(around.cerebrum | np.pad(unlabelled, 1))
+        surface = filled & extraction.with_neighbours(~filled)
+    cortex = extraction.with_neighbours(around.cortex)
+    share = float((surface & cortex).sum() / surface.sum())
     if share < minimum:
         raise InputError(
-            f"with the scheme {scheme.name!r} the cortex does not surround the"
+            f"with the scheme {around.scheme.name!r} the cortex does not surround the"
             " cerebrum",
             found=f"cortex at {100 * share:.0f} % of the surface",
             expected=f"{100 * minimum:.0f} % or more",
@@ -335,7 +349,7 @@ def require_sides(
         )
 
 
-def _outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
+def _outside_ventricles(around: AroundCerebrum) -> Mask:
     """Return the (i, j, k) mask of ventricles that are not enclosed by the cerebrum's
     tissue.
 
@@ -343,49 +357,58 @@ def _outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     than half of its 26 rays through fluid hit tissue. With cerebellum or brainstem in
     the scheme, only parts that mostly touch these are left out.
     """
-    fluid = np.isin(labels, scheme.ventricles)
+    fluid = around.fluid
+    touching = np.zeros_like(fluid)
     if not fluid.any():
-        return fluid
-    tissue = np.isin(labels, scheme.cerebrum) & ~fluid
+        return touching
+    hindbrain = around.hindbrain
+    near_hindbrain = extraction.with_neighbours(hindbrain, corners=True)
+    if around.has_hindbrain and not (fluid & near_hindbrain).any():
+        return touching
+    tissue = around.cerebrum & ~fluid
     # rays also pass unlabelled voxels inside: choroid plexus, septum
-    clear = fluid | (extraction.without_holes(tissue | fluid) & ~tissue)
-    out = fluid & (_ray_share(clear, tissue, RAY_SMOOTHING) <= ENCLOSED)
-    hindbrain = np.isin(
-        labels,
-        (*scheme.cerebellum, *scheme.brainstem),
-    )
-    if not hindbrain.any():
-        return out
-    elsewhere = ~hindbrain & ~np.isin(labels, scheme.cerebrum)
-    touching = np.zeros_like(out)
-    for box, part in extraction.parts_in_boxes(out):
-        around = ndimage.binary_dilation(part, extraction.OUTSIDE)
-        if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
-            touching[box] |= part
+    clear = fluid | (around.filled & ~tissue)
+    hits = _hits(clear, tissue)
+    if not around.has_hindbrain:
+        share = _smoothed(hits, clear, RAY_SMOOTHING, WHOLE)
+        return fluid & (share <= ENCLOSED)
+
+    # not beyond the volume
+    elsewhere = np.pad(~(hindbrain | around.cerebrum)[INNER], 1)
+    # smoothing takes long: only around the hindbrain, as far as its parts go
+    margin = 0
+    is_cut = True
+    while is_cut:
+        margin += 8
+        box = extraction.box_of(fluid & near_hindbrain, margin)
+        share = _smoothed(hits, clear, RAY_SMOOTHING, box)
+        out = fluid[box] & (share <= ENCLOSED)
+        is_cut = bool(out.sum() > out[INNER].sum())
+    for place, part in extraction.parts_in_boxes(out):
+        beside = extraction.with_neighbours(part, corners=True)
+        n_hindbrain = (beside & hindbrain[box][place]).sum()
+        if n_hindbrain > (beside & elsewhere[box][place]).sum():
+            touching[box][place] |= part
     return touching
 
 
-def _unlabelled_ventricles(
-    labels: Labels,
-    scheme: LabelScheme,
-    affine: Floats,
-) -> Mask:
-    """Return the (i, j, k) mask of unlabelled ventricles; empty if any ventricle is
-    labelled.
+def _unlabelled_ventricles(around: AroundCerebrum) -> Mask:
+    """Return the (i, j, k) mask of unlabelled ventricles, without the outer margin;
+    empty if any ventricle is labelled.
 
     More than half of the 26 rays of such a voxel hit tissue inside the cortex, almost
     all if no cortex is labelled. Less than `REPORTED_LOSS` of the cerebrum is roughness
     of the labels.
     """
-    filled = np.zeros(labels.shape, dtype=bool)
-    cerebrum = np.isin(labels, scheme.cerebrum)
-    size = voxel_size(affine)
+    scheme = around.scheme
+    cerebrum = around.cerebrum
+    filled = np.zeros_like(cerebrum)
+    size = voxel_size(around.affine)
     margin = int(np.ceil(CLOSING_MM / size.min())) + 2
     # volumes in a far larger unit are reported elsewhere
-    if np.isin(labels, scheme.ventricles).any() or 2 * margin > max(labels.shape):
-        return filled
-    (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
-    numbers = np.pad(labels[box], margin)
+    if around.fluid.any() or 2 * margin > max(around.shape):
+        return filled[INNER]
+    box = extraction.box_of(cerebrum)
     tissue = np.pad(cerebrum[box], margin)
 
     # the cerebrum without its openings
@@ -395,14 +418,12 @@ def _unlabelled_ventricles(
     closed = to_border > CLOSING_MM
     inside = extraction.without_holes(closed | tissue)
 
-    hindbrain = np.isin(
-        numbers,
-        (*scheme.cerebellum, *scheme.brainstem),
-    )
+    hindbrain = np.pad(around.hindbrain[box], margin)
     clear = inside & ~tissue & ~hindbrain
-    cortex = np.isin(numbers, scheme.cortex)
+    cortex = np.pad(around.cortex[box], margin)
     inner_tissue = tissue & ~cortex
-    hit_share = _ray_share(clear, inner_tissue, 0.5 * RAY_SMOOTHING)
+    hits = _hits(clear, inner_tissue)
+    hit_share = _smoothed(hits, clear, 0.5 * RAY_SMOOTHING, WHOLE)
     needed = ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX
     is_enclosed = clear & (hit_share > needed)
     number, _ = ndimage.label(is_enclosed, extraction.OUTSIDE)
@@ -416,34 +437,75 @@ def _unlabelled_ventricles(
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
         without_margin = (slice(margin, -margin),) * 3
         filled[box] = enclosed[without_margin]
-    return filled
+    return filled[INNER]
 
 
-def _ray_share(
+def _hits(
     clear: Mask,
     tissue: Mask,
-    smoothing_voxels: float,
 ) -> NDArray[np.float32]:
-    is_clear = np.pad(clear, 1)
-    is_tissue = np.pad(tissue, 1)
-    start = np.argwhere(is_clear)
-    hits = np.zeros(len(start), dtype=np.int32)
-    for direction in DIRECTIONS:
-        places = start + direction
-        rows = np.arange(len(start))
-        while len(rows):
-            index = tuple(places.T)
-            hits[rows[is_tissue[index]]] += 1
-            # rays go on through what is clear
-            on = is_clear[index]
-            places = places[on] + direction
-            rows = rows[on]
-    share = np.zeros(is_clear.shape, dtype=np.float32)
-    share[tuple(start.T)] = hits / len(DIRECTIONS)
-    inner = share[1:-1, 1:-1, 1:-1]
-    smooth = ndimage.gaussian_filter(inner, smoothing_voxels)
-    weight = extraction.smooth_mask(clear, smoothing_voxels)
-    return smooth / np.maximum(weight, 1e-6)
+    """Return the share of the 26 rays from each clear voxel that hit tissue, through
+    clear voxels only; the outermost voxels are not clear."""
+    share = np.zeros(clear.shape, dtype=np.float32)
+    if not clear.any():
+        return share
+    box = extraction.box_of(clear, 1)
+    clear = clear[box]
+    tissue = tissue[box]
+    count = np.zeros(clear.shape, dtype=np.uint8)
+    for axis in range(3):
+        is_clear = np.moveaxis(clear, axis, 0)
+        is_tissue = np.moveaxis(tissue, axis, 0)
+        hits = np.moveaxis(count, axis, 0)
+        # rays with a step along the axes before this one have been followed
+        steps = [(0,)] * axis + [(-1, 0, 1)] * (2 - axis)
+        shifts = list(product(*steps))
+        forward = range(1, len(hits) - 1)
+        for step, order in ((-1, forward), (1, forward[::-1])):
+            sees = np.zeros((len(shifts), *hits[0].shape), dtype=bool)
+            for place in order:
+                # the next slice hits tissue, or sees it
+                beyond = place + step
+                hit = is_clear[beyond] & sees
+                hit |= is_tissue[beyond]
+                for ray, shift in enumerate(shifts):
+                    plane = hit[ray]
+                    beside = _shifted(plane, shift)
+                    sees[ray][INNER[1:]] = plane[beside]
+                hits[place] += sees.sum(axis=0, dtype=np.uint8)
+    share[box] = count * clear / np.float32(N_RAYS)
+    return share
+
+
+def _shifted(
+    plane: Mask,
+    shift: tuple[int, ...],
+) -> tuple[slice, ...]:
+    """Return the part of a plane next to its inner part."""
+    sides = []
+    for step, size in zip(shift, plane.shape, strict=True):
+        sides.append(slice(1 + step, size - 1 + step))
+    return tuple(sides)
+
+
+def _smoothed(
+    share: NDArray[np.float32],
+    clear: Mask,
+    smoothing_voxels: float,
+    box: tuple[slice, ...],
+) -> NDArray[np.float32]:
+    """Return, in a box, values of clear voxels smoothed over these voxels."""
+    reach = int(GAUSSIAN_REACH * smoothing_voxels) + 1
+    wider = []
+    for side, size in zip(box, share.shape, strict=True):
+        start, stop, _ = side.indices(size)
+        wider.append(slice(start, stop + 2 * reach))
+    values = np.pad(share, reach)[tuple(wider)]
+    is_clear = np.pad(clear, reach)[tuple(wider)]
+    smooth = ndimage.gaussian_filter(values, smoothing_voxels)
+    weight = extraction.smooth_mask(is_clear, smoothing_voxels)
+    inner = (slice(reach, -reach),) * 3
+    return (smooth / np.maximum(weight, 1e-6))[inner]
 
 
 def _border_share(mask: Mask) -> float:
@@ -454,14 +516,17 @@ def _border_share(mask: Mask) -> float:
     twice the area of the first. So a volume that ends exactly at the mask does not cut
     it off (`CUT_SLICE_RATIO`).
     """
-    surface = mask & ~ndimage.binary_erosion(mask, border_value=1)
-    at_border = cut_off = 0
+    surface = mask & extraction.with_neighbours(~mask)
+    at_border = 0
+    cut_off = 0
     for axis in range(3):
-        areas = mask.sum(axis=tuple({0, 1, 2} - {axis}))
-        for end in (areas[:2], areas[:-3:-1]):
-            at_border += int(end[0])
-            if end[0] > CUT_SLICE_RATIO * end[-1]:
-                cut_off += int(end[0])
+        slices = np.moveaxis(mask, axis, 0)
+        for end in (slices[:2], slices[:-3:-1]):
+            first = int(end[0].sum())
+            second = int(end[-1].sum())
+            at_border += first
+            if first > CUT_SLICE_RATIO * second:
+                cut_off += first
     return cut_off / max(at_border + int(surface.sum()), 1)
 
 
@@ -487,26 +552,57 @@ class Layout:
 def layout_of(labels: Labels) -> Layout:
     """Return the contacts between the labels of an (i, j, k) volume; 0 is outside."""
     # most of the volume is air around the head
-    for box in ndimage.find_objects((labels != 0).astype(np.int8)):
-        labels = np.pad(labels[box], 1)
-    labels = np.where(
-        extraction.without_holes(labels != 0) & (labels == 0),
-        HOLE,
-        labels,
-    )
-    numbers, rows = np.unique(labels, return_inverse=True)
-    rows, n = rows.reshape(labels.shape), len(numbers)
+    is_labelled = labels != 0
+    if is_labelled.any():
+        box = extraction.box_of(is_labelled)
+        labels, is_labelled = labels[box], is_labelled[box]
+    labels = np.pad(labels, 1)
+    is_labelled = np.pad(is_labelled, 1)
+    is_hole = extraction.without_holes(is_labelled) & ~is_labelled
+    labels[is_hole] = HOLE
+    numbers = _numbers_in(labels)
+    n = len(numbers)
+    rows = _ranks(labels, numbers).ravel()
     contact = np.zeros((n, n))
-    for axis in range(3):
-        along = np.moveaxis(rows, axis, 0)
-        contact += np.bincount(
-            (along[1:] * n + along[:-1]).ravel(), minlength=n * n
-        ).reshape(n, n)
+    # the margin touches only itself at the ends of lines
+    for stride in (1, labels.shape[2], labels[0].size):
+        voxels = np.flatnonzero(rows[stride:] != rows[:-stride])
+        # a pair of labels as one number
+        pairs = n * rows[voxels + stride].astype(int)
+        pairs += rows[voxels]
+        counts = np.bincount(pairs, minlength=n * n)
+        contact += counts.reshape(n, n)
     return Layout(
         numbers,
-        (contact + contact.T) * ~np.eye(n, dtype=bool),
-        np.bincount(rows.ravel()),
+        contact + contact.T,
+        np.bincount(rows),
     )
+
+
+def _numbers_in(labels: Labels) -> Labels:
+    """Return the labels of a volume in order, as `np.unique`, which takes several times
+    as long."""
+    first = labels.min()
+    span = int(labels.max()) - int(first)
+    if span > labels.size:
+        return np.unique(labels)
+    counts = np.bincount((labels - first).ravel())
+    present = np.flatnonzero(counts)
+    return present.astype(labels.dtype) + first
+
+
+def _ranks(
+    labels: Labels,
+    numbers: Labels,
+) -> NDArray[np.integer[Any]]:
+    """Return the place of each voxel's label among all labels of a volume."""
+    first = numbers[0]
+    last = numbers[-1]
+    kind = np.min_scalar_type(len(numbers))
+    if int(last) - int(first) > labels.size:
+        return np.searchsorted(numbers, labels).astype(kind)
+    table = np.searchsorted(numbers, np.arange(first, last + 1))
+    return table.astype(kind)[labels - first]
 
 
 def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
@@ -546,7 +642,10 @@ def _tissue_voxels(layout: Layout, tissues: Mapping[str, Mask]) -> int:
     )
 
 
-def _wrong_shares(layout: Layout, tissues: Mapping[str, Mask]) -> Iterator[str]:
+def _wrong_shares(
+    layout: Layout,
+    tissues: Mapping[str, Mask],
+) -> Iterator[str]:
     """Yield tissues that would be too much or too little of the cerebrum or of its
     surface."""
     cerebrum = tissues["cerebrum"]

@@ -1,7 +1,7 @@
 """Find cortex labels where no cerebral cortex can be: beyond the brain, inside it,
 around the ventricles; and other tissue at its surface where cortex has to be."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,14 @@ from ..geometry.deformations import transform_points, voxel_size
 from ..settings.schemes import LabelScheme
 from ..units import ML_PER_MM3
 from .extraction import (
-    INSIDE,
     OUTSIDE,
     Floats,
     Mask,
+    box_of,
     dilated,
+    not_touching,
     shifted_affine,
+    with_neighbours,
     without_holes,
 )
 
@@ -35,36 +37,114 @@ MAX_TO_CORTEX_MM = 8.0
 MAX_BARE_SHARE = 0.01
 
 
-def misplaced_cortex(
+@dataclass(frozen=True, eq=False)
+class AroundCerebrum:
+    """A volume of labels, cropped to the cerebrum and a margin of one voxel, if it has
+    that, and one more.
+
+    `shape` is that of the whole volume, `first` the voxel of it with which the cropped
+    one begins. The masks are of tissues of the scheme, of the cerebrum with its holes
+    `filled`, and of the `surface` of that. The whole volume may have labels of the
+    hindbrain, but for the `missing` ones of cerebellum and brainstem.
+    """
+
+    shape: tuple[int, ...]
+    first: np.ndarray
+    labels: np.ndarray
+    affine: Floats
+    scheme: LabelScheme
+    has_hindbrain: bool
+    missing: list[str]
+    cerebrum: Mask
+    cortex: Mask
+    fluid: Mask
+    hindbrain: Mask
+    filled: Mask
+    surface: Mask
+
+
+def around_cerebrum(
+    labels: np.ndarray, affine: Floats, scheme: LabelScheme
+) -> AroundCerebrum:
+    """Return an (i, j, k) volume with a (4, 4) affine around its cerebrum, of which it
+    has to have a voxel."""
+    box = box_of(_has_label(labels, scheme.cerebrum), 1)
+    first = np.array([side.start - 1 for side in box])
+    cropped = np.pad(labels[box], 1)
+    hindbrain = np.zeros(cropped.shape, dtype=bool)
+    has_hindbrain = False
+    missing = []
+    for name in ("cerebellum", "brainstem"):
+        numbers = getattr(scheme, name)
+        tissue = _has_label(cropped, numbers)
+        hindbrain |= tissue
+        # it may lie below the cropped volume
+        if tissue.any() or _has_label(labels, numbers).any():
+            has_hindbrain = True
+        elif numbers:
+            missing.append(name)
+    cerebrum = _has_label(cropped, scheme.cerebrum)
+    filled = without_holes(cerebrum)
+    return AroundCerebrum(
+        labels.shape,
+        first,
+        cropped,
+        shifted_affine(affine, first),
+        scheme,
+        has_hindbrain,
+        missing,
+        cerebrum=cerebrum,
+        cortex=_has_label(cropped, scheme.cortex),
+        fluid=_has_label(cropped, scheme.ventricles),
+        hindbrain=hindbrain,
+        filled=filled,
+        surface=filled & with_neighbours(~filled),
+    )
+
+
+def _has_label(
     labels: np.ndarray,
-    affine: Floats,
-    scheme: LabelScheme,
+    numbers: Sequence[int],
+) -> Mask:
+    """Return where a volume has one of some labels, as `np.isin`, which takes several
+    times as long."""
+    lowest = labels.min(initial=0)
+    highest = labels.max(initial=0)
+    if lowest < 0 or highest > 255:
+        return np.isin(labels, numbers)
+    # a table of all bytes
+    is_wanted = np.isin(np.arange(256), numbers)
+    values = labels.astype(np.uint8)
+    found = values.tobytes().translate(is_wanted.tobytes())
+    mask = np.frombuffer(found, dtype=bool)
+    return mask.reshape(labels.shape)
+
+
+def misplaced_cortex(
+    around: AroundCerebrum,
     *,
     is_whole: bool = False,
 ) -> Iterator[str]:
     """Yield a warning, with volume (mL) and place, for each kind of place where cortex
     cannot be, and for a whole cerebrum whose surface has too little of it.
 
-    `labels` (i, j, k) have a (4, 4) affine to the coordinates in mm of places in
-    messages. Nothing is yielded for a volume without cortex, or with nothing else.
+    Nothing is yielded for a volume without cortex, or with nothing else.
     """
-    around = _cropped(labels, affine, scheme)
-    if around is None:
-        return
     cortex = around.cortex
-    fluid = np.isin(around.labels, scheme.ventricles)
+    fluid = around.fluid
+    if not cortex.any() or not (around.cerebrum & ~cortex).any():
+        return
     core = around.cerebrum & ~cortex & ~fluid
-    outside = ~without_holes(around.cerebrum)
-    enclosed = _cortex_not_touching(outside, cortex)
+    enclosed = not_touching(cortex, ~around.filled)
     is_far = cortex & ~_is_near(around, core, MAX_FROM_CORE_MM)
-    detached = is_far | _cortex_not_touching(core, cortex)
+    detached = is_far | not_touching(cortex, core)
     found = _pieces_in_words(detached & ~enclosed, around.affine)
     if found:
         limit = (
             "apart from the tissue inside the cortex, or further than"
             f" {MAX_FROM_CORE_MM:g} mm from it"
         )
-        yield f"{found} of cortex lie {limit}: {_suspect(labels, scheme)}"
+        yield f"{found} of cortex lie {limit}: {_suspect(around)}"
 
     found = _pieces_in_words(enclosed, around.affine)
     if found:
@@ -73,10 +153,9 @@ def misplaced_cortex(
             " other tissue labelled as cortex?"
         )
 
-    next_to_fluid = ndimage.binary_dilation(fluid, INSIDE) & ~fluid
-    at_ventricles = next_to_fluid & around.cerebrum
+    at_ventricles = with_neighbours(fluid) & ~fluid & around.cerebrum
     is_cortex = at_ventricles & cortex & ~enclosed
-    share = is_cortex.sum() / max(at_ventricles.sum(), 1)
+    share = is_cortex.sum() / max(int(at_ventricles.sum()), 1)
     if share > MAX_AT_VENTRICLES:
         found = (
             f"cortex lies at {100 * share:.0f} % of the ventricles' surface,"
@@ -85,80 +164,46 @@ def misplaced_cortex(
         yield f"{found}: is tissue around or in the ventricles labelled as cortex?"
     # the wall of a hemisphere that is alone may have no cortex
     if is_whole:
-        yield from _bare_surface(around, scheme)
+        yield from _bare_surface(around)
 
 
-@dataclass(frozen=True, eq=False)
-class _Cropped:
-    """A volume of labels around its cerebrum, with a margin of one voxel: voxels at the
-    border of a volume would have no neighbours outside.
-
-    `is_inner` is False in the margin and at the border of the whole volume.
-    """
-
-    labels: np.ndarray
-    affine: Floats
-    cerebrum: Mask
-    cortex: Mask
-    is_inner: Mask
-
-
-def _is_near(around: _Cropped, mask: Mask, distance_mm: float) -> Mask:
+def _is_near(
+    around: AroundCerebrum,
+    mask: Mask,
+    distance_mm: float,
+) -> Mask:
     """Return the mask of the voxels within a distance of a mask."""
     return dilated(mask, distance_mm, voxel_size(around.affine))
 
 
-def _cropped(
-    labels: np.ndarray,
-    affine: Floats,
-    scheme: LabelScheme,
-) -> _Cropped | None:
-    """Return the labels around the cerebrum; None without cortex, or with nothing
-    else."""
-    padded = np.pad(labels, 1)
-    cerebrum = np.isin(padded, scheme.cerebrum)
-    cortex = np.isin(padded, scheme.cortex)
-    if not cortex.any() or cortex.sum() == cerebrum.sum():
-        return None
-    (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
-    around = tuple(
-        slice(
-            side.start - 1,
-            side.stop + 1,
-        )
-        for side in box
-    )
-    first = np.array([side.start - 1 for side in around])
-    is_inner = np.zeros(padded.shape, dtype=bool)
-    is_inner[2:-2, 2:-2, 2:-2] = True
-    return _Cropped(
-        padded[around],
-        shifted_affine(affine, first),
-        cerebrum[around],
-        cortex[around],
-        is_inner[around],
-    )
-
-
-def _bare_surface(around: _Cropped, scheme: LabelScheme) -> Iterator[str]:
+def _bare_surface(around: AroundCerebrum) -> Iterator[str]:
     """Yield a warning, with place and labels, if much of a whole cerebrum's surface is
     far from cortex.
 
     Ventricles that are open, and what the border of the volume cuts, do not count.
     """
-    filled = without_holes(around.cerebrum)
-    surface = filled & ~ndimage.binary_erosion(filled)
-    is_fluid = np.isin(around.labels, scheme.ventricles)
-    is_far = ~_is_near(around, around.cortex, MAX_TO_CORTEX_MM)
-    is_bare = surface & around.is_inner & ~is_fluid & is_far
-    share = is_bare.sum() / surface.sum()
-    if share > MAX_BARE_SHARE:
+    is_inner = np.zeros_like(around.surface)
+    is_inner[2:-2, 2:-2, 2:-2] = True
+    surface = around.surface
+    is_bare = surface & is_inner & ~around.fluid & ~around.cortex
+    n_max = MAX_BARE_SHARE * surface.sum()
+    if is_bare.sum() <= n_max:
+        return
+    size = voxel_size(around.affine)
+    box = box_of(is_bare, int(MAX_TO_CORTEX_MM / size.min()) + 1)
+    is_bare[box] &= ~_is_near(
+        around,
+        around.cortex[box],
+        MAX_TO_CORTEX_MM,
+    )
+    if is_bare.sum() > n_max:
         piece, _ = ndimage.label(is_bare, OUTSIDE)
         largest = np.bincount(piece[is_bare]).argmax()
         place = _place_in_words(np.argwhere(piece == largest), around.affine)
+        share = is_bare.sum() / surface.sum()
         found = []
         for number in np.unique(around.labels[is_bare]):
-            name = scheme.labels.get(int(number), "")
+            name = around.scheme.labels.get(int(number), "")
             found.append(f"{number} {name}".strip())
         yield (
             f"{100 * share:.1f} % of the cerebrum's surface, most of it around"
@@ -168,51 +213,23 @@ def _bare_surface(around: _Cropped, scheme: LabelScheme) -> Iterator[str]:
         )
 
 
-def hindbrain_note(labels: np.ndarray, scheme: LabelScheme) -> str:
-    """Return a note if the scheme has labels of cerebellum or brainstem and the volume
-    has none of these; else ''."""
-    missing = _missing_hindbrain(labels, scheme)
-    if not missing:
-        return ""
-    return (
-        f"the volume has no {' and no '.join(missing)}: the pose is found without, if"
-        " it was not left out on purpose"
-    )
-
-
-def _suspect(labels: np.ndarray, scheme: LabelScheme) -> str:
-    missing = _missing_hindbrain(labels, scheme)
-    if missing:
+def _suspect(around: AroundCerebrum) -> str:
+    if around.missing:
         return (
-            f"the volume has no label of the {' and the '.join(missing)}: labelled as"
-            " cortex?"
+            f"the volume has no label of the {' and the '.join(around.missing)}:"
+            " labelled as cortex?"
         )
     return "is other tissue labelled as cortex there?"
-
-
-def _missing_hindbrain(labels: np.ndarray, scheme: LabelScheme) -> list[str]:
-    tissues = {"cerebellum": scheme.cerebellum, "brainstem": scheme.brainstem}
-    return [
-        name
-        for name, numbers in tissues.items()
-        if numbers and not np.isin(labels, numbers).any()
-    ]
-
-
-def _cortex_not_touching(tissue: Mask, cortex: Mask) -> Mask:
-    """Return the connected pieces of the cortex that do not touch a tissue."""
-    number, _ = ndimage.label(cortex, INSIDE)
-    touching = np.unique(number[ndimage.binary_dilation(tissue, INSIDE)])
-    return cortex & ~np.isin(number, touching)
 
 
 def _pieces_in_words(mask: Mask, affine: Floats) -> str:
     """Return the volume of a mask's pieces of at least `MIN_PIECE_ML`, and the place of
     the largest; or ''."""
-    voxel_mm3 = abs(np.linalg.det(affine[:3, :3]))
+    voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
+    if mask.sum() * voxel_ml < MIN_PIECE_ML:
+        return ""
     number, _ = ndimage.label(mask, OUTSIDE)
-    counts = np.bincount(number.ravel())
-    volumes_ml = counts * (float(voxel_mm3) * ML_PER_MM3)
+    volumes_ml = np.bincount(number.ravel()) * voxel_ml
     volumes_ml[0] = 0.0
     pieces_ml = volumes_ml[volumes_ml >= MIN_PIECE_ML]
     if not len(pieces_ml):
@@ -221,7 +238,10 @@ def _pieces_in_words(mask: Mask, affine: Floats) -> str:
     return f"{pieces_ml.sum():.2f} mL around {_place_in_words(largest, affine)}"
 
 
-def _place_in_words(voxels: np.ndarray, affine: Floats) -> str:
+def _place_in_words(
+    voxels: np.ndarray,
+    affine: Floats,
+) -> str:
     """Return the centre in mm of (n, 3) voxels."""
     place = transform_points(
         voxels.mean(axis=0, keepdims=True),

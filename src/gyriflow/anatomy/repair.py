@@ -629,7 +629,7 @@ def surface_of_mask(
     )
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
-    mesh, smoothing = with_volume(
+    mesh, smoothing = _with_volume(
         smooth, repaired_mm3 - taken_mm3, triangles.area(rough)
     )
     moved = np.linalg.norm(
@@ -664,7 +664,7 @@ def filled_warning(topology: Mapping[str, Any], affine: Floats) -> list[str]:
     ]
 
 
-def with_volume(
+def _with_volume(
     mesh: TriangleMesh,
     volume_mm3: float,
     area_mm2: float,

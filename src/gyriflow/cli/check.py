@@ -148,7 +148,7 @@ def work_of(
     The study is read from `path` unless given. `further` are arguments for Snakemake.
     With `show`, it lists every job on the terminal first.
     """
-    planned = plan(path, directory, further, show=show)
+    planned = _plan(path, directory, further, show=show)
     if not planned:
         yield "nothing to run: everything is up to date", False
         return
@@ -175,7 +175,7 @@ def work_of(
     )
 
 
-def plan(
+def _plan(
     config: Path,
     directory: Path,
     further: Sequence[str],

@@ -688,7 +688,7 @@ def _read_files(brains: Sequence[FoundBrain], folder: Path) -> None:
     scans = [ScanFiles([str((folder / brain.file).absolute())]) for brain in whole]
     for brain, found in zip(
         whole,
-        readings(fits_of_file, scans),
+        readings(_fits_of_file, scans),
         strict=True,
     ):
         for text in found.warnings:
@@ -705,7 +705,7 @@ def _require_some_content(path: Path) -> None:
             raise InputError("is empty", path=path, expected="a surface")
 
 
-def fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
+def _fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
     """Yield what `scheme_fits` returns for a label volume; nothing for a surface.
 
     InputError if it cannot be read, has no label, or is not a whole brain.
@@ -990,7 +990,7 @@ def _recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
         "labels": str(file),
         "scheme": UNSET,
     }
-    (fits,) = fits_of_file([str(file)])
+    (fits,) = _fits_of_file([str(file)])
     if scheme:
         require_fit(fits, scheme, file, fits.get(scheme) or "labels that are not in it")
     brain = FoundBrain(file, entry, fits=fits)

@@ -16,7 +16,6 @@ from nibabel.fileholders import FileHolder
 from nibabel.openers import ImageOpener
 from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ..errors import InputError
 from ..formats import VOLUME_SUFFIXES, format_of
@@ -119,14 +118,17 @@ def _without_empty_border(
 ) -> tuple[NDArray[np.number], Floats]:
     """Return a volume cut to its values other than zero and one voxel around them, and
     its affine."""
-    filled = ndimage.find_objects((values != 0).astype(np.uint8))
-    if not filled:
-        return values, affine
-    first = [max(side.start - 1, 0) for side in filled[0]]
-    end = [side.stop + 1 for side in filled[0]]
+    is_filled = values != 0
+    sides = []
+    for others in ((1, 2), (0, 2), (0, 1)):
+        places = np.flatnonzero(is_filled.any(axis=others))
+        if not len(places):
+            return values, affine
+        first = max(int(places[0]) - 1, 0)
+        sides.append(slice(first, int(places[-1]) + 2))
     moved = affine.copy()
-    moved[:3, 3] += moved[:3, :3] @ first
-    return values[tuple(map(slice, first, end))], moved
+    moved[:3, 3] += moved[:3, :3] @ [side.start for side in sides]
+    return values[tuple(sides)], moved
 
 
 class VolumeHeader(NamedTuple):
@@ -553,4 +555,4 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
             found=f"{least:.6g} to {largest:.6g}",
             expected=f"whole numbers up to {bounds.max}",
         )
-    return values.astype(np.int32)
+    return values.astype(np.int32, order="C")

@@ -10,7 +10,7 @@ from phantoms import BRAINSTEM, CEREBELLUM, CORTEX, CSF, DEEP_GREY, VENTRICLES, 
 from shapes import rigid
 
 from gyriflow.anatomy.labels import read_cerebrum
-from gyriflow.anatomy.misplaced import misplaced_cortex
+from gyriflow.anatomy.misplaced import around_cerebrum, misplaced_cortex
 from gyriflow.io.yaml_files import SCHEMES
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
@@ -53,13 +53,15 @@ def place(mask):
 
 def warnings_of_cortex(labels, mask):
     """Return the warnings of labels that have cortex in a mask."""
-    return list(misplaced_cortex(np.where(mask, CORTEX, labels), AFFINE, ATLAS))
+    around = around_cerebrum(np.where(mask, CORTEX, labels), AFFINE, ATLAS)
+    return list(misplaced_cortex(around))
 
 
 def test_a_brain_without_fault_has_no_warning(brain):
     # a cut by the border of a volume is no bare surface
     for labels in (brain, brain[: len(brain) // 2]):
-        assert list(misplaced_cortex(labels, AFFINE, ATLAS, is_whole=True)) == []
+        around = around_cerebrum(labels, AFFINE, ATLAS)
+        assert list(misplaced_cortex(around, is_whole=True)) == []
     assert "hindbrain" not in read_cerebrum(brain, AFFINE, ATLAS).report
 
 
@@ -83,7 +85,8 @@ def test_hindbrain_labelled_as_inner_tissue_is_named_with_its_place(
     brain, tissue, label, name
 ):
     faulty = np.where(brain == tissue, label, brain)
-    (found,) = misplaced_cortex(faulty, AFFINE, ATLAS, is_whole=True)
+    around = around_cerebrum(faulty, AFFINE, ATLAS)
+    (found,) = misplaced_cortex(around, is_whole=True)
     assert found == Facts("8 mm", f"{label} {name}")
     # check and the surface take their warnings from here, but for a hemisphere
     assert found in read_cerebrum(faulty, AFFINE, ATLAS, 0.5).warnings
@@ -95,7 +98,8 @@ def test_cortex_that_lacks_a_label_on_one_side_is_named(brain, label):
     x_mm = np.arange(len(brain))[:, None, None] * SIZE[0]
     missing = (brain == CORTEX) & (x_mm < CENTRE[0] - 8.0)
     faulty = np.where(missing, label, brain)
-    (found,) = misplaced_cortex(faulty, AFFINE, ATLAS, is_whole=True)
+    around = around_cerebrum(faulty, AFFINE, ATLAS)
+    (found,) = misplaced_cortex(around, is_whole=True)
     assert found == Facts("1 white matter", "cortex")
     x, y, z = re.search(r"\((-?\d+), (-?\d+), (-?\d+)\) mm", found).groups()
     assert [int(x), int(y), int(z)] == pytest.approx(place(missing), abs=6)

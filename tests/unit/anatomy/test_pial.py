@@ -16,6 +16,7 @@ from phantoms import CENTRE_MM
 from scripts import run_script
 from shapes import LPS, rigid, scaling, sphere
 
+from gyriflow.anatomy import repair
 from gyriflow.anatomy.fissure import cut_share, smallest_gap
 from gyriflow.anatomy.pial import (
     from_hemispheres,
@@ -28,7 +29,7 @@ from gyriflow.anatomy.plausible import (
     max_cut_share,
     require_plausible_size,
 )
-from gyriflow.anatomy.repair import pieces, with_volume
+from gyriflow.anatomy.repair import pieces
 from gyriflow.anatomy.shapes import shape_surface
 from gyriflow.errors import InputError, MeshError
 from gyriflow.geometry.deformations import transform_points
@@ -479,7 +480,7 @@ def test_walls_that_would_cut_are_held_back_while_the_rest_takes_the_volume():
     one = sphere(20.0, 3)
     shift = np.array([2 * one.vertices[:, 0].max() + 0.1, 0.0, 0.0])
     balls = merged(*(sphere(20.0, 3, k * shift) for k in (0, 1)))
-    wider, report = with_volume(balls, 1.02 * signed_volume(balls), area(balls))
+    wider, report = repair._with_volume(balls, 1.02 * signed_volume(balls), area(balls))
     assert report["volume_change"] == pytest.approx(0.0, abs=1e-4)
     assert not self_intersecting_faces(wider).any()
     still = np.all(wider.vertices == balls.vertices, axis=1)

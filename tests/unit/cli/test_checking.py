@@ -11,7 +11,8 @@ from facts import Facts
 from shapes import hemisphere, inner, moved, phantom, save_labels
 
 from gyriflow.cli import check as checking
-from gyriflow.cli.check import check_study, plan, work_of
+from gyriflow.cli import check as module
+from gyriflow.cli.check import check_study, work_of
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import MIRROR
 from gyriflow.geometry.triangles import transformed
@@ -343,7 +344,7 @@ def test_a_look_leaves_nothing_behind(tmp_path, config):
 @pytest.mark.parametrize("directory", ["", "/proc/self"])
 def test_a_look_needs_no_folder_to_write_in(tmp_path, config, directory):
     (tmp_path / ".snakemake").touch()
-    assert plan(config, tmp_path / directory, ["surface"])
+    assert module._plan(config, tmp_path / directory, ["surface"])
 
 
 def test_a_study_is_checked_from_its_working_directory(tmp_path):

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from gyriflow.cli import readings as module
+from gyriflow.cli import recognition
 from gyriflow.cli.readings import Reading, ScanFiles, readings
-from gyriflow.cli.recognition import fits_of_file
 from gyriflow.errors import InputError
 from gyriflow.shipped import SHIPPED
 
@@ -119,7 +119,7 @@ def test_many_scans_are_read_by_several_processes_as_by_one(tmp_path, monkeypatc
         scans.append(ScanFiles([str(path)]))
     (tmp_path / "torn.nii.gz").write_bytes(b"torn")
     torn = ScanFiles([str(tmp_path / "torn.nii.gz")])
-    whole, refused = readings(fits_of_file, [scans[0], torn])
+    whole, refused = readings(recognition._fits_of_file, [scans[0], torn])
     assert whole.values[0]["spina-bifida-atlas"] == ""
     assert refused.error.startswith(str(tmp_path))
-    assert readings(fits_of_file, scans[1:]) == [whole] * 3
+    assert readings(recognition._fits_of_file, scans[1:]) == [whole] * 3
