@@ -102,7 +102,9 @@ def shifted_affine(
     return moved
 
 
-def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
+def parts_in_boxes(
+    mask: Mask,
+) -> Iterator[tuple[tuple[slice, ...], Mask]]:
     """Yield for each connected part (faces, edges, corners) of a mask its box plus one
     voxel, and its mask there."""
     if not mask.any():
@@ -206,7 +208,10 @@ def refine(
     return field, fine
 
 
-def without_holes(mask: Mask, structure: Mask = INSIDE) -> Mask:
+def without_holes(
+    mask: Mask,
+    structure: Mask = INSIDE,
+) -> Mask:
     """Fill the holes of an (i, j, k) mask: what voxels outside, connected by a
     structure, do not reach. A dilation from the border takes three times as long.
     """
@@ -219,7 +224,10 @@ def without_holes(mask: Mask, structure: Mask = INSIDE) -> Mask:
     return is_filled[inner, inner, inner]
 
 
-def not_touching(mask: Mask, tissue: Mask) -> Mask:
+def not_touching(
+    mask: Mask,
+    tissue: Mask,
+) -> Mask:
     """Return the parts, connected by faces, of an (i, j, k) mask that do not touch a
     tissue. The mask has an empty margin of one voxel."""
     touching = mask & with_neighbours(tissue)
@@ -358,7 +366,9 @@ def _without_handles(
     }
 
 
-def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
+def unambiguous(
+    field: NDArray[np.float32],
+) -> NDArray[np.float32]:
     """Adjust a field so that its isosurface connects inside voxels through faces only.
 
     Where inside and outside alternate around a square, or two opposite corners of a
@@ -451,7 +461,9 @@ def dilated(
     return unpacked.view(bool)
 
 
-def _shifts(step: int) -> list[tuple[slice, slice]]:
+def _shifts(
+    step: int,
+) -> list[tuple[slice, slice]]:
     """Return the slices along an axis whose voxels are shifted, and to which, by so
     many steps down and up."""
     if step == 0:

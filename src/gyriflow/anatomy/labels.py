@@ -257,7 +257,10 @@ def _fill_from_nearest(
             return
 
 
-def require_labels(labels: Labels, scheme: LabelScheme) -> None:
+def require_labels(
+    labels: Labels,
+    scheme: LabelScheme,
+) -> None:
     """Raise InputError for labels that are not in the scheme, or if the cerebrum or a
     tissue of it is missing."""
     present = set(map(int, np.unique(labels))) - {0}
@@ -508,7 +511,9 @@ def _smoothed(
     return (smooth / np.maximum(weight, 1e-6))[inner]
 
 
-def _border_share(mask: Mask) -> float:
+def _border_share(
+    mask: Mask,
+) -> float:
     """Return the share of an (i, j, k) mask's surface at those borders of its volume
     that cut it off.
 
@@ -530,7 +535,10 @@ def _border_share(mask: Mask) -> float:
     return cut_off / max(at_border + int(surface.sum()), 1)
 
 
-def _listed(numbers: Iterable[int], scheme: LabelScheme | None = None) -> str:
+def _listed(
+    numbers: Iterable[int],
+    scheme: LabelScheme | None = None,
+) -> str:
     names = [
         f"{number} {scheme.labels.get(number, '')}".strip() if scheme else str(number)
         for number in numbers
@@ -549,7 +557,9 @@ class Layout:
     count: NDArray[np.integer[Any]]
 
 
-def layout_of(labels: Labels) -> Layout:
+def layout_of(
+    labels: Labels,
+) -> Layout:
     """Return the contacts between the labels of an (i, j, k) volume; 0 is outside."""
     # most of the volume is air around the head
     is_labelled = labels != 0
@@ -579,7 +589,9 @@ def layout_of(labels: Labels) -> Layout:
     )
 
 
-def _numbers_in(labels: Labels) -> Labels:
+def _numbers_in(
+    labels: Labels,
+) -> Labels:
     """Return the labels of a volume in order, as `np.unique`, which takes several times
     as long."""
     first = labels.min()
@@ -605,7 +617,10 @@ def _ranks(
     return table.astype(kind)[labels - first]
 
 
-def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
+def scheme_contradictions(
+    layout: Layout,
+    scheme: LabelScheme,
+) -> Iterator[str]:
     """Yield the contradictions between the arrangement of labels and a scheme; none for
     a volume without cortex."""
     tissues = {}
@@ -633,7 +648,10 @@ def _with_numbers(
     return f"{name} ({', '.join(numbers)})"
 
 
-def _tissue_voxels(layout: Layout, tissues: Mapping[str, Mask]) -> int:
+def _tissue_voxels(
+    layout: Layout,
+    tissues: Mapping[str, Mask],
+) -> int:
     """Return the number of voxels of the cerebrum without ventricles, at least 1."""
     is_tissue = tissues["cerebrum"] & ~tissues["ventricles"]
     return max(

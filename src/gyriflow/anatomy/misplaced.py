@@ -222,7 +222,10 @@ def _suspect(around: AroundCerebrum) -> str:
     return "is other tissue labelled as cortex there?"
 
 
-def _pieces_in_words(mask: Mask, affine: Floats) -> str:
+def _pieces_in_words(
+    mask: Mask,
+    affine: Floats,
+) -> str:
     """Return the volume of a mask's pieces of at least `MIN_PIECE_ML`, and the place of
     the largest; or ''."""
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3

@@ -28,7 +28,6 @@ from ..anatomy.pose import (
     pose_of_surface,
     require_coordinates,
 )
-from ..anatomy.thickness import require_inside
 from ..errors import GyriflowError, InputError
 from ..formats import is_volume
 from ..geometry.poses import CONVENTIONS
@@ -209,6 +208,9 @@ def _check_whites(
     pials: Mapping[str, TriangleMesh], whites: Mapping[str, TriangleMesh]
 ) -> None:
     """Raise InputError if a white surface is not inside the pial one of its side."""
+    # takes a third of a second, which labels need not wait for
+    from ..anatomy.thickness import require_inside
+
     for side, white in whites.items():
         # the walls of open surfaces are capped by their repair
         pial = outward(pials[side])

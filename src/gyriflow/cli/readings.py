@@ -61,8 +61,7 @@ def readings(
     keys = _keys(read, scans)
     results: list[Reading | None] = [_kept(key) for key in keys]
     missing = [number for number, result in enumerate(results) if result is None]
-    work = partial(_reading, read)
-    new = _on_all_cores(work, [scans[number] for number in missing])
+    new = _on_all_cores(read, [scans[number] for number in missing])
     for number, result in zip(missing, new, strict=True):
         results[number] = result
         key = keys[number]
@@ -148,13 +147,18 @@ def _kept_path(key: str) -> Path:
 
 
 def _on_all_cores(
-    work: Callable[[ScanFiles], Reading], scans: Sequence[ScanFiles]
+    read: Callable[..., Iterable[Any]],
+    scans: Sequence[ScanFiles],
 ) -> list[Reading]:
+    work = partial(_reading, read)
     cores = available_cores() if len(scans) >= MIN_IN_POOL else 1
     if cores < 2:
         return [work(scan) for scan in scans]
-    # threads of libraries do not stand a fork
-    with ProcessPoolExecutor(cores, mp_context=get_context("spawn")) as pool:
+    # threads of libraries do not stand a fork of this process; one that has only
+    # imported them does
+    context = get_context("forkserver" if sys.platform == "linux" else "spawn")
+    context.set_forkserver_preload([read.__module__])
+    with ProcessPoolExecutor(cores, mp_context=context) as pool:
         return list(pool.map(work, scans))
 
 

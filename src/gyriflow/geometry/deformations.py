@@ -4,8 +4,8 @@ with the same vertices."""
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # submodules load lazily, which keeps dry runs fast
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import map_coordinates
 
 from .triangles import Floats, TriangleMesh, freeze, transformed
 
@@ -100,7 +100,7 @@ def carry(deformation: Deformation, points: Floats) -> Floats:
     index = voxel_index(points, deformation.affine)
     moved = np.array(points, dtype=np.float64)
     for axis in range(3):
-        moved[:, axis] += map_coordinates(
+        moved[:, axis] += scipy.ndimage.map_coordinates(
             deformation.displacement[..., axis], index, order=1, mode="nearest"
         )
     return transform_points(moved, deformation.matrix)

@@ -235,7 +235,7 @@ def planned(monkeypatch):
     """The configurations of dry runs, whose plans are empty."""
     found = []
     monkeypatch.setattr(
-        checking, "plan", lambda path, *_, **__: found.append(read_keys(path)) or []
+        checking, "_plan", lambda path, *_, **__: found.append(read_keys(path)) or []
     )
     return found
 

@@ -131,7 +131,7 @@ def forecast(monkeypatch, tmp_path):
 
     def lines(jobs, cores=1, reason=REASON):
         reasoned = [(job, reason) for job in jobs]
-        monkeypatch.setattr(checking, "plan", lambda *_, **__: reasoned)
+        monkeypatch.setattr(checking, "_plan", lambda *_, **__: reasoned)
         study = resolve(load(STUDY))
         found = work_of(tmp_path / "x.yaml", tmp_path / "study", cores, [], study)
         return [line for line, _ in found]
