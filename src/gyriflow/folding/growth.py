@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.jacobians import chunks
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
 from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, area, signed_volume
 from ..settings.folding import FoldingParameters
@@ -256,5 +257,8 @@ def layered_inverse(
     across = (1 + dr)[..., None, None]
     inverse = (1 / along) * np.eye(3)
     difference = 1 / across[layered] - 1 / along[layered]
-    inverse[layered] += (difference * normals[..., None]) * normals[..., None, :]
+    rows = np.flatnonzero(layered)
+    for chunk in chunks(len(rows)):
+        across_all = difference[chunk] * normals[chunk, ..., None]
+        inverse[rows[chunk]] += across_all * normals[chunk, ..., None, :]
     return inverse

@@ -23,7 +23,7 @@ from ..geometry.triangles import (
 from ..settings.folding import FoldingParameters
 from ..settings.terms import CORTICAL_STEEPNESS
 from ..settings.varying import Maps, value_at
-from .nearest_faces import FaceTree
+from .nearest_faces import FaceTree, nearest_candidates
 
 WEIGHT_REACH = 3.0
 """Depth in cortical thicknesses beyond which the cortical weight, below 1e-8, is taken
@@ -132,18 +132,14 @@ class PialSearch:
         opposed walls, it is the normal of the vertex with the smallest coordinates. The
         order of points and candidates does not matter.
         """
-        offsets = self.surface.vertices[candidates] - points[:, None]
-        # k: point, c: candidate, i: axis
-        squares = np.einsum("kci,kci->kc", offsets, offsets)
-        first = squares.argmin(axis=1)[:, None]
-        chosen = np.take_along_axis(candidates, first, axis=1)
-        normals = self.normals[chosen[:, 0]]
+        vertices = self.surface.vertices
         # twice the tolerance, for squares, and some round-off
-        limits = np.take_along_axis(squares, first, axis=1) * (1 + 3 * TIE_TOL)
-        is_other = (squares <= limits) & (candidates != chosen)
-        may_tie = np.flatnonzero(is_other.any(axis=1))
-        if len(may_tie):
-            normals[may_tie] = self._tied_normals(offsets[may_tie], candidates[may_tie])
+        nearest, may_tie = nearest_candidates(points, candidates, vertices, 3 * TIE_TOL)
+        normals = self.normals[nearest]
+        tied = np.flatnonzero(may_tie)
+        if len(tied):
+            offsets = vertices[candidates[tied]] - points[tied, None]
+            normals[tied] = self._tied_normals(offsets, candidates[tied])
         return normals
 
     def _tied_normals(self, offsets: Floats, candidates: Ints) -> Floats:

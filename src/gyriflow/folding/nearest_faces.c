@@ -1,5 +1,6 @@
-// Distances of points to the nearest of many triangles, eight at a time, by a tree of boxes around them.
+// Nearest of a few vertices; distances to the nearest of many triangles, eight at a time, by a tree of boxes around them.
 
+#include <stdint.h>
 #define W 8
 #define DEPTH 64
 #define EACH for (int i = 0; i < 3; i++)
@@ -31,6 +32,24 @@ static inline double to_triangle(const double *p, const double *a, const double 
     double of_b = cc * pb - a_c * pc, of_c = aa * pc - a_c * pb, height = dot(ap, n);  // barycentric, times nn
     double to_side = smaller(to_segment(ap, ab), smaller(to_segment(ap, ac), to_segment(bp, bc)));
     return (nn > 0) & (of_b >= 0) & (of_c >= 0) & (of_b + of_c <= nn) ? height * height / nn : to_side;
+}
+
+// Sets the nearest of each point's candidates among the vertices, and whether the square of the distance of another one
+// is larger by at most this factor.
+void nearest_candidates(long count, long width, double factor, const int64_t *candidates, const double (*points)[3],
+                        const double (*vertices)[3], int64_t *nearest, int8_t *has_others) {
+    for (long k = 0; k < count; k++) {
+        const int64_t *candidate = candidates + k * width;
+        double least = 0, squares[width];
+        for (long c = 0; c < width; c++) {
+            double gap[3];
+            EACH gap[i] = vertices[candidate[c]][i] - points[k][i];
+            squares[c] = dot(gap, gap);
+            if (c == 0 || squares[c] < least) least = squares[c], nearest[k] = candidate[c];
+        }
+        has_others[k] = 0;
+        for (long c = 0; c < width; c++) has_others[k] |= squares[c] <= factor * least && candidate[c] != nearest[k];
+    }
 }
 
 // Lowers the `squared` distances of points to those of the nearest triangle, if that is nearer. Box 1 contains all

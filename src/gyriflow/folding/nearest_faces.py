@@ -1,4 +1,4 @@
-"""Distances of many points from a surface that moves in each step, in C."""
+"""Nearest places of a surface that moves in each step, for many points, in C."""
 
 from functools import cache
 from pathlib import Path
@@ -8,10 +8,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 
-from ..geometry.triangles import Floats, TriangleMesh, corners
+from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, corners
 from .compilation import compiled, pointer
 
 DECLARATION = """
+void nearest_candidates(long count, long width, double factor, void *candidates,
+                        void *points, void *vertices, void *nearest, void *has_others);
 void lower_distances(long count, long leaves, void *boxes, void *triangles,
                      void *points, void *squared);
 """
@@ -67,22 +69,42 @@ class FaceTree:
         points = np.ascontiguousarray(points)
         squared = at_most**2
         count = len(points)
-        arrays = [
-            (self._boxes, self._boxes.size),
-            (self._triangles, self._triangles.size),
-            (points, 3 * count),
-            (squared, count),
-        ]
-        pointers = []
-        for array, size in arrays:
-            pointers.append(
-                pointer(
-                    interface,
-                    array,
-                    np.float64,
-                    size,
-                    is_written=array is squared,
-                )
-            )
-        code.lower_distances(count, len(self._triangles), *pointers)
+        code.lower_distances(
+            count,
+            len(self._triangles),
+            pointer(interface, self._boxes, np.float64, self._boxes.size),
+            pointer(interface, self._triangles, np.float64, self._triangles.size),
+            pointer(interface, points, np.float64, 3 * count),
+            pointer(interface, squared, np.float64, count, is_written=True),
+        )
         return np.sqrt(squared)
+
+
+def nearest_candidates(
+    points: Floats,
+    candidates: Ints,
+    vertices: Floats,
+    tolerance: float,
+) -> tuple[Ints, Mask]:
+    """Return the nearest (k,) of the (k, c) candidates of (k, 3) points among (n, 3)
+    vertices, and whether another vertex is nearly as near.
+
+    Its squared distance is then larger by at most the relative `tolerance`.
+    """
+    interface, code = _library()
+    candidates = np.ascontiguousarray(candidates, dtype=np.int64)
+    points = np.ascontiguousarray(points)
+    count, width = candidates.shape
+    nearest = np.empty(count, dtype=np.int64)
+    has_others = np.empty(count, dtype=bool)
+    code.nearest_candidates(
+        count,
+        width,
+        1 + tolerance,
+        pointer(interface, candidates, np.int64, count * width),
+        pointer(interface, points, np.float64, 3 * count),
+        pointer(interface, vertices, np.float64, 3),
+        pointer(interface, nearest, np.int64, count, is_written=True),
+        pointer(interface, has_others, np.bool_, count, is_written=True),
+    )
+    return nearest, has_others

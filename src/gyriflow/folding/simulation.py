@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import SolverError
-from ..geometry.jacobians import EDGES, determinants
+from ..geometry.jacobians import EDGES, chunks, determinants
 from ..geometry.straightening import InnerSides
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, dots
@@ -252,11 +252,12 @@ class Folding:
         domain = self.domain
         depth = tissue.layers.depth[domain.corners].mean(axis=1)
         inside = domain.corners[depth <= thickness]
-        places = domain.nodes[inside]
         own_total = 0.0
-        for i, j in EDGES:
-            edges = places[:, i] - places[:, j]
-            own_total += np.sqrt(dots(edges, edges)).sum()
+        for chunk in chunks(len(inside)):
+            places = domain.nodes[inside[chunk].T]
+            for i, j in EDGES:
+                edges = places[i] - places[j]
+                own_total += np.sqrt(dots(edges, edges)).sum()
         own_count = len(EDGES) * len(inside)
         total, count = domain.comm.allreduce(np.array([own_total, own_count]))
         return float(thickness * count / total) if count else math.nan
