@@ -2,7 +2,7 @@
 curvature that a wave keeps.
 
     ./run python benchmarks/spectra.py [--surface NAME.surf.gii ...] \\
-        [--per-wavelength 8 7 6 5] [--evenness 0.1 0.001] [--last B5]
+        [--per-wavelength 8 6 5 4.5] [--evenness 0.1 0.001] [--last B5]
 
 The folds are radial waves of degree 8 on a sphere of 25 mm radius: 18.5 mm long, in the
 middle of B3; the power in B4 is of harmonics. `isotropic` waves run in all directions,

@@ -51,12 +51,15 @@ OPEN_AND_CLOSED = "open and closed hemispheres"
 5 to 7 % shorter."""
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
-VERTICES_PER_WAVELENGTH = 6.0
+VERTICES_PER_WAVELENGTH = 4.5
 """Edges per shortest wave on the surface that modes are computed on;
 `benchmarks/spectra.py` compares other numbers."""
-LONGEST_EDGE_MM = 1.8
+LONGEST_EDGE_MM = 1.5
 """Edges of that surface at most: longer ones do not follow the banks of sulci, whatever
 the waves."""
+DISPERSION = 1.0 / 256.0 - 1.0 / 576.0
+"""Eigenvalues by the mean mass matrix are too small by this times (λh²)², on even
+triangles with edges h: the next term of the series whose first one it cancels."""
 WORTHWHILE = 0.8
 """A coarser surface is made if it has at most this share of the vertices."""
 SERIES_TOL = 1e-8
@@ -221,20 +224,39 @@ def spectral_basis(
         LONGEST_EDGE_MM,
     )
     needed = math.ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
+    scale = 1.0
+    dispersion = 0.0
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
         copy = decimate(mesh, needed)
         places = interpolation(match_surface(mesh, copy), len(copy.vertices))
         stiffness, matrix = laplacian(copy, mass)
+        scale = first / first_eigenvalue(stiffness, matrix)
+        dispersion = DISPERSION * (_even_edge(copy) ** 4 - _even_edge(mesh) ** 4)
     number = stiffness.shape[0] // 2
-    if by_name and (count := count_below(stiffness, matrix, end)) <= number:
-        modes, reach = modes_below(stiffness, matrix, end, count), end
+    end_of_copy = end / scale / (1.0 + dispersion * end**2)
+    if by_name and (count := count_below(stiffness, matrix, end_of_copy)) <= number:
+        modes, reach = modes_below(stiffness, matrix, end_of_copy, count), end
     else:
         modes = lowest_modes(stiffness, matrix, number if by_name else int(choice))
-        reach = float(modes.eigenvalues[-1])
-    is_open = bool((edges(mesh)[1] == 1).any())
+        reach = -math.inf
+    # λ of the surface, whose λ/(1 + dispersion λ²) is that of the copy
+    scaled = scale * modes.eigenvalues
+    root = np.sqrt(1.0 - 4.0 * dispersion * scaled**2)
+    eigenvalues = 2.0 * scaled / (1.0 + root)
     return Basis(
-        modes.eigenvalues, modes.functions, places, energy, first, reach, is_open
+        eigenvalues,
+        modes.functions,
+        places,
+        energy,
+        first,
+        reach=max(reach, float(eigenvalues[-1])),
+        is_open=bool((edges(mesh)[1] == 1).any()),
     )
+
+
+def _even_edge(mesh: TriangleMesh) -> float:
+    """Return the edge in mm of as many equilateral triangles of the same area."""
+    return math.sqrt(area(mesh) / len(mesh.vertices) / math.sqrt(0.75))
 
 
 def spectrum(
