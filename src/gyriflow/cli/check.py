@@ -46,6 +46,7 @@ from ..study.loading import load
 from ..study.resolve import resolve
 from ..study.study import Study
 from .init import commented_scans
+from .inputs import check_other_files, doubts_about_files, input_facts
 from .readings import ScanFiles, collected_warnings, readings
 from .scans import ScanRow, scan_lines
 
@@ -77,9 +78,6 @@ def check_study(
     `name` stands for a temporary configuration; `age_sources` say where its ages come
     from, by brain.
     """
-    # takes half a second, which other commands need not wait for
-    from .inputs import check_other_files, input_facts
-
     with _read_study(path, directory) as study, collected_warnings() as logged:
         problems = list(_input_problems(study.config))
         further = list(check_other_files(study))
@@ -284,9 +282,6 @@ def _input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
     Unreadable files and labels of another scheme are problems; an unusual size for the
     week is a warning.
     """
-    # takes half a second, which other commands need not wait for
-    from .inputs import doubts_about_files
-
     checksums = known_checksums(used_atlases(config))
     scans = []
     for brain in config.brains:
@@ -297,10 +292,11 @@ def _input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
         sums = {path: checksums[path] for path in files if path in checksums}
         scans.append(ScanFiles(files, (brain, scheme, sums)))
     found = readings(doubts_about_files, scans)
+    available_mib = available_memory_mib()
     for brain, reading in zip(config.brains, found, strict=True):
         texts = [
             *reading.warnings,
-            *_memory_doubts(brain),
+            *_memory_doubts(brain, available_mib),
             *reading.values,
         ]
         for text in dict.fromkeys(texts):
@@ -309,16 +305,15 @@ def _input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
             yield brain.id, reading.error, True
 
 
-def _memory_doubts(brain: BrainConfig) -> list[str]:
+def _memory_doubts(brain: BrainConfig, available_mib: float) -> list[str]:
     if brain.labels is None:
         return []
-    memory = surface_memory_mib(brain.labels, brain.week)
-    available = available_memory_mib()
-    if memory <= max(available, MIN_SURFACE_MIB):
+    memory_mib = surface_memory_mib(brain.labels, brain.week)
+    if memory_mib <= max(available_mib, MIN_SURFACE_MIB):
         return []
     return [
-        f"needs about {_memory_text(memory)} of memory,"
-        f" {_memory_text(available)} are here: resample it to larger voxels"
+        f"needs about {_memory_text(memory_mib)} of memory,"
+        f" {_memory_text(available_mib)} are here: resample it to larger voxels"
     ]
 
 

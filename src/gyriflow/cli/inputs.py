@@ -10,23 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..anatomy.labels import (
-    MIN_CORTEX_OUTSIDE,
-    layout_of,
-    read_cerebrum,
-    scheme_contradictions,
-)
 from ..anatomy.plausible import (
     require_left_and_right,
     require_plausible_size,
     require_plausible_thickness,
     require_single_hemisphere,
-)
-from ..anatomy.pose import (
-    pose_of_hemisphere,
-    pose_of_pair,
-    pose_of_surface,
-    require_coordinates,
 )
 from ..errors import GyriflowError, InputError
 from ..formats import is_volume
@@ -153,6 +141,14 @@ def _check_labels(
     brain: BrainConfig,
     scheme: LabelScheme,
 ) -> Iterator[str]:
+    # takes half a second, which kept results need not wait for
+    from ..anatomy.labels import (
+        MIN_CORTEX_OUTSIDE,
+        layout_of,
+        read_cerebrum,
+        scheme_contradictions,
+    )
+
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
     whole = brain.side is None
@@ -183,6 +179,9 @@ def _check_surfaces(brain: BrainConfig) -> Iterator[str]:
         read_volume_map(brain.image, brain.affine_from)
     if brain.labels or not all(Path(path).is_file() for path in brain.files):
         return
+    # not for labels
+    from ..anatomy.pose import pose_of_hemisphere, pose_of_surface
+
     whites = {
         side: read_surface(path, side) for side, path in brain.white_files.items()
     }
@@ -225,7 +224,10 @@ def _check_pair(
     *,
     declared: bool,
 ) -> Iterator[str]:
-    left, right = outward(left), outward(right)
+    from ..anatomy.pose import pose_of_pair, require_coordinates
+
+    left = outward(left)
+    right = outward(right)
     yield from _check_size(brain, left, right)
     if brain.coordinates != "auto":
         left, right = (

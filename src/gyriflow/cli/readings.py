@@ -27,6 +27,8 @@ from ..version import version
 MIN_IN_POOL = 16
 """From so many scans on they are read by several processes, each of which takes two
 seconds to start."""
+PRELOADED = ("gyriflow.anatomy.labels", "gyriflow.io.volumes")
+"""Modules with which label volumes are read."""
 MAX_KEPT = 20_000
 """How many results are kept, the latest used."""
 
@@ -157,7 +159,7 @@ def _on_all_cores(
     # threads of libraries do not stand a fork of this process; one that has only
     # imported them does
     context = get_context("forkserver" if sys.platform == "linux" else "spawn")
-    context.set_forkserver_preload([read.__module__])
+    context.set_forkserver_preload([read.__module__, *PRELOADED])
     with ProcessPoolExecutor(cores, mp_context=context) as pool:
         return list(pool.map(work, scans))
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ..anatomy.labels import layout_of, require_labels, scheme_contradictions
 from ..errors import InputError
 from ..formats import (
     CIFTI_NAME,
@@ -29,7 +28,6 @@ from ..formats import (
 )
 from ..io.files import files_in, reading
 from ..io.made_files import is_own_data_set
-from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean, own_name
 from ..settings.terms import SIDES, Side
@@ -724,6 +722,9 @@ def _fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
     if not is_volume(file):
         _require_brain(Path(file))
         return
+    # imports that kept results need not wait for
+    from ..io.volumes import read_label_volume
+
     labels = read_label_volume(file, cropped=True).labels
     if not labels.any():
         raise InputError(
@@ -874,12 +875,17 @@ def _plain_id(name: str) -> str:
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:
     """Return the shipped schemes with all labels of a volume, each with a contradiction
     or ""."""
-    numbers = set(np.unique(labels).tolist()) - {0}
-    layout, causes = layout_of(labels), {}
+    # takes half a second, which kept results need not wait for
+    from ..anatomy.labels import layout_of, require_labels, scheme_contradictions
+
+    present = np.unique(labels)
+    numbers = set(present.tolist()) - {0}
+    layout = layout_of(labels)
+    causes = {}
     for name, scheme in SCHEMES.items():
         if numbers and numbers <= set(scheme.labels):
             try:
-                require_labels(labels, scheme)
+                require_labels(present, scheme)
                 causes[name] = next(scheme_contradictions(layout, scheme), "")
             except InputError as error:
                 causes[name] = error.problem

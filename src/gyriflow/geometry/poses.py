@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .alignment import motion
 from .triangles import Floats
 
 LPS_TO_RAS: Floats = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -103,6 +102,9 @@ def turned(
 ) -> Pose:
     """Return the pose of a file that a (3, 3) rotation brings to RAS+; the brain's
     volumes are in RAS+ already."""
+    # takes half a second to import, which reading surfaces need not wait for
+    from .alignment import motion
+
     whole = motion(rotation)
     world = whole @ CONVENTIONS[coordinates]
     return Pose(world, {"whole": whole}, by, warnings=warnings)

@@ -4,13 +4,11 @@ import re
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError
-from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
 from ..names import bids_label, bids_subject, folder_name, require_bids_names
 from ..quantities import VERTEX_MAPS
@@ -26,6 +24,9 @@ from .surfaces import (
     write_vertex_maps,
 )
 from .volumes import LabelVolume, write_label_volume
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 BIDS_VERSION = "1.10.0"
 STUDY_TABLES = ("participants", "metrics_wide", "metrics_long")
@@ -118,7 +119,7 @@ class ExportedBrain(NamedTuple):
 def export_bids(
     folder: AnyPath,
     brains: Sequence[ExportedBrain],
-    tables: Mapping[str, pd.DataFrame],
+    tables: Mapping[str, "pd.DataFrame"],
     version: str,
     columns: Mapping[str, tuple[str, str]],
 ) -> None:
@@ -131,6 +132,9 @@ def export_bids(
     of each in `metrics_wide`. InputError where two subjects, runs or brains would have
     one name.
     """
+    # takes a third of a second, which a dry run need not wait for
+    import pandas as pd
+
     folder = Path(folder)
     observed = [brain for brain in brains if brain.run == OBSERVED]
     require_bids_names(
@@ -352,6 +356,8 @@ def _template(
 
 
 def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
+    from ..geometry.matching import layer_labels
+
     start = brain.volume["labels"].read()
     mesh = transformed(read_surface(brain.volume["surface"]), back)
     (thickness,) = read_vertex_maps(brain.volume["thickness"]).values()
@@ -457,6 +463,8 @@ def _write_people(
         for name, text in brain.covariates.items():
             row[_column_of_input(name)] = text
         rows.append(row)
+    import pandas as pd
+
     people = pd.DataFrame(rows).sort_values(first[:2])
     most = people.groupby("participant_id").nunique(dropna=False).max()
     tables = {"participants": people.drop(columns="session_id")}
@@ -493,7 +501,7 @@ def _bids_unit(unit: str) -> str:
     return "arbitrary" if unit == "1" else re.sub(r"([cm]m)(\d)", r"\1^\2", unit)
 
 
-def _write_tsv(path: Path, table: pd.DataFrame) -> None:
+def _write_tsv(path: Path, table: "pd.DataFrame") -> None:
     with atomic_write(path) as temporary:
         table.to_csv(
             temporary,

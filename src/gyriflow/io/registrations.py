@@ -5,17 +5,19 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
 from ..geometry.triangles import Floats, TriangleMesh
 from .files import AnyPath, new_hdf5, reading_hdf5
+
+if TYPE_CHECKING:
+    import h5py
+    import pandas as pd
 
 REGISTER_AGAIN = "Register the brains, or match their surfaces, again."
 
@@ -48,7 +50,7 @@ def write_correspondence(
         file.attrs["report"] = json.dumps(dict(report))
 
 
-def _compress(file: h5py.File, name: str, values: NDArray) -> None:
+def _compress(file: "h5py.File", name: str, values: NDArray) -> None:
     file.create_dataset(name, data=values, compression="gzip", shuffle=True)
 
 
@@ -93,12 +95,12 @@ class WeeklyShapes:
     positions: Floats
     sizes: Mapping[str, Floats] = field(default_factory=dict)
     surfaces: Mapping[str, Sequence[Floats]] = field(default_factory=dict)
-    ages: pd.DataFrame | None = None
+    ages: "pd.DataFrame | None" = None
     stops: Sequence[float] = ()
     between: Sequence[float] = ()
     tets: NDArray[np.int64] | None = None
     made_from: str = ""
-    kept: pd.DataFrame | None = None
+    kept: "pd.DataFrame | None" = None
     placed: Mapping[float, Floats] = field(default_factory=dict)
 
     def index(self, week: float) -> int:
@@ -172,6 +174,8 @@ def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
         tables = {}
         for group in ("ages", "kept"):
             if group in file:
+                import pandas as pd
+
                 columns = {name: values[:] for name, values in file[group].items()}
                 tables[group] = pd.DataFrame(columns)
         positions = file["positions"][:].astype(np.float64)

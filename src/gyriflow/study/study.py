@@ -10,10 +10,11 @@ from functools import cached_property
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
+from ..io.exports import ExportedBrain, labels_file
 from ..io.yaml_files import read_keys
 from ..settings.root import Config
 from ..settings.terms import OBSERVED, SIDES, Side, min_norm_subjects
@@ -35,9 +36,6 @@ from .records import (
 )
 from .series import PATH
 from .tables import read_rows, write_changed, write_rows
-
-if TYPE_CHECKING:
-    from ..io.exports import ExportedBrain
 
 MAX_AGE_OFF_GW = 2.0
 """Difference between the stated week of an atlas' brain and its age by size up to which
@@ -356,16 +354,13 @@ class Study:
     # export
 
     @cached_property
-    def exported(self) -> list["ExportedBrain"]:
+    def exported(self) -> list[ExportedBrain]:
         """Each observed or simulated brain for the export."""
         return [
             self._exported(row, self.brains[row.id]) for row in self.measured.values()
         ]
 
-    def _exported(self, row: MeasuredBrain, brain: Brain) -> "ExportedBrain":
-        # exports take half a second to import, which a dry run need not wait for
-        from ..io.exports import ExportedBrain
-
+    def _exported(self, row: MeasuredBrain, brain: Brain) -> ExportedBrain:
         volume: dict[str, Any] = {}
         if brain.labels and row.run != OBSERVED:
             volume = {
@@ -417,8 +412,6 @@ class Study:
         exported = self._exported(last, start)
         labels = None
         if exported.volume:
-            from ..io.exports import labels_file
-
             labels = labels_file("results/export", exported, self.exported)
         used = self.atlases.get(atlas_brain.id)
         atlas_keys = {"name", "title", "licence", "reference"}
