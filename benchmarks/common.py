@@ -12,8 +12,12 @@ import numpy as np
 import pandas as pd
 
 from gyriflow.compare.accuracy import log_value
-from gyriflow.compare.placement import correlation, interpolate_measures
-from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison
+from gyriflow.compare.placement import correlation
+from gyriflow.compare.shapes import (
+    PreparedSurface,
+    interpolate_measures,
+    prepare_for_comparison,
+)
 from gyriflow.errors import GyriflowError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.yaml_files import write_yaml

@@ -1,25 +1,25 @@
-"""Prepare the surfaces with which all runs from a start brain are compared at a
-week."""
+"""Prepare what all runs from a start brain are compared with at a week."""
 
-from gyriflow.compare.shapes import prepare_for_comparison
+from gyriflow.compare.shapes import interpolate_measures, prepare_for_comparison
 from gyriflow.io.surfaces import read_surface, write_surface, write_vertex_maps
 from gyriflow.step import step
 
 files, output = snakemake.input, snakemake.output
+radius_mm = snakemake.params.curvature_radius_mm
 with step(snakemake.log[0]):
-    observed = read_surface(files.observed)
-    surfaces = {
-        "observed": observed,
-        "start": read_surface(files.start),
-        "adjacent": read_surface(files.adjacent),
+    surface = read_surface(files.observed)
+    observed = prepare_for_comparison(surface, surface, radius_mm)
+    write_surface(output.observed, observed.mesh)
+    maps = {
+        "mean_curvature": observed.mean_curvature,
+        "shape_index": observed.shape_index,
     }
-    for name, surface in surfaces.items():
-        prepared = prepare_for_comparison(
-            surface, observed, snakemake.params.curvature_radius_mm
+    write_vertex_maps(output.observed_maps, maps)
+    for name in ("start", "adjacent"):
+        baseline = prepare_for_comparison(
+            read_surface(files[name]),
+            surface,
+            radius_mm,
         )
-        write_surface(output[name], prepared.mesh)
-        maps = {
-            "mean_curvature": prepared.mean_curvature,
-            "shape_index": prepared.shape_index,
-        }
+        maps, _ = interpolate_measures(baseline, observed)
         write_vertex_maps(output[f"{name}_maps"], maps)

@@ -20,11 +20,18 @@ from gyriflow.step import step
 files, params, output = snakemake.input, snakemake.params, snakemake.output
 
 
-def _prepared(name, number):
-    """Read a surface that was prepared for comparison in a week."""
-    return PreparedSurface(
-        read_surface(files[name][number]),
-        **read_vertex_maps(files[f"{name}_maps"][number]),
+def _observed_brain(number):
+    """Read the observed brain of a week as it was prepared for comparison."""
+    maps = {
+        name: read_vertex_maps(files[f"{name}_maps"][number])
+        for name in ("observed", "start", "adjacent")
+    }
+    mesh = read_surface(files.observed[number])
+    return ObservedBrain(
+        params.observed[number],
+        read_surface(files.whole[number]),
+        PreparedSurface(mesh, **maps.pop("observed")),
+        baselines=maps,
     )
 
 
@@ -65,13 +72,9 @@ with step(snakemake.log[0]):
             week: models[week] | simple
             for week, simple in zip(models, _simple_models(), strict=True)
         }
-    observed = {}
-    for number, week in enumerate(params.weeks):
-        baselines = {name: _prepared(name, number) for name in ("start", "adjacent")}
-        surface = read_surface(files.whole[number])
-        observed[week] = ObservedBrain(
-            params.observed[number], surface, _prepared("observed", number), baselines
-        )
+    observed = {
+        week: _observed_brain(number) for number, week in enumerate(params.weeks)
+    }
     labels = {name: params[name] for name in ("run", "kind", "start_week")} | {
         "start": snakemake.wildcards.brain
     }

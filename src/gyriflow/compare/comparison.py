@@ -37,7 +37,6 @@ from .placement import (
     correlation,
     draw_units,
     gain_columns,
-    interpolate_measures,
     make_resampling,
     number_patches,
     with_interval,
@@ -46,6 +45,7 @@ from .shapes import (
     PreparedSurface,
     cortex_dice,
     curvature_differences,
+    interpolate_measures,
     prepare_for_comparison,
     scale_to_volume,
 )
@@ -74,15 +74,16 @@ class ObservedBrain:
     """An observed brain that predicted surfaces are compared with.
 
     `surface` is its closed pial surface in mm as it is, `prepared` the same prepared
-    for comparison. `baselines` are brains prepared for comparison with it, needed for
-    the intervals: `start`, the start brain scaled to its volume, which has no new
-    folds, and `adjacent`, the observed brain of the week before.
+    for comparison. `baselines` are `COMPARED_MAPS` of other brains, interpolated at the
+    (n,) vertices of `prepared`, which are needed for the intervals: of `start`, the
+    start brain scaled to its volume, which has no new folds, and of `adjacent`, the
+    observed brain of the week before.
     """
 
     id: str
     surface: TriangleMesh
     prepared: PreparedSurface
-    baselines: Mapping[str, PreparedSurface] = field(default_factory=dict)
+    baselines: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)
 
     @cached_property
     def resampling(self) -> Resampling:
@@ -111,8 +112,7 @@ class ObservedBrain:
         """The correlation of each baseline and map, and that in each bootstrap
         sample."""
         found = {}
-        for name, surface in self.baselines.items():
-            measures, _ = interpolate_measures(surface, self.prepared)
+        for name, measures in self.baselines.items():
             for measure, values in measures.items():
                 own = getattr(self.prepared, measure)
                 found[name, measure] = self.resampling.correlations(own, values)

@@ -31,7 +31,6 @@ from ..geometry.triangles import (
     vertex_normals,
 )
 from ..metrics.laplace_beltrami import laplacian, modes_below
-from ..quantities import COMPARED_MAPS
 from .shapes import PreparedSurface
 
 SYMMETRY_TOL_MM = 0.4
@@ -209,29 +208,6 @@ def correlation(
     ):
         return float("nan")
     return float(xy / np.sqrt(xx * yy))
-
-
-def interpolate_measures(
-    surface: PreparedSurface, observed: PreparedSurface
-) -> tuple[dict[str, Floats], float]:
-    """Interpolate the measures of a surface at the n vertices of the observed one, both
-    aligned.
-
-    Each vertex takes the value at the nearest point whose normal agrees. Returns (n,)
-    values by measure, and the share of the observed area for which there is such a
-    point.
-    """
-    match = match_surface(observed.mesh, surface.mesh)
-    values = {
-        measure: values_at(match, getattr(surface, measure))
-        for measure in COMPARED_MAPS
-    }
-    return values, float(
-        np.average(
-            match.agrees,
-            weights=observed.areas,
-        )
-    )
 
 
 def gain_columns(

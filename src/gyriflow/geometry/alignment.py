@@ -3,7 +3,7 @@ points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 import igl
 import numpy as np
@@ -147,6 +147,8 @@ def follow_planes(
     return rotation, shift
 
 
+# a surface may be the target of several in turn
+@lru_cache(maxsize=2)
 def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floats]]:
     """Return a function that finds the nearest points of a surface, and the normals
     there."""

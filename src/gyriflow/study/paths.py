@@ -155,13 +155,12 @@ _COMPARED_IN_WEEK = f"{STUDY}/validation/{{brain}}/{WEEK}"
 PREPARED = {
     "observed": f"{_COMPARED_IN_WEEK}/observed.surf.gii",
     "observed_maps": f"{_COMPARED_IN_WEEK}/observed.shape.gii",
-    "start": f"{_COMPARED_IN_WEEK}/start.surf.gii",
     "start_maps": f"{_COMPARED_IN_WEEK}/start.shape.gii",
-    "adjacent": f"{_COMPARED_IN_WEEK}/adjacent.surf.gii",
     "adjacent_maps": f"{_COMPARED_IN_WEEK}/adjacent.shape.gii",
 }
-"""Surfaces that all runs from a start brain are compared with in a week, prepared for
-comparison, with curvature."""
+"""The observed surface that all runs from a start brain are compared with in a week,
+prepared for comparison, with its curvature and those of the start brain and the brain
+of the week before, at its vertices."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
 ATLAS_BRAIN = f"{RUN}/surfaces/{WEEK}/atlas.pial.surf.gii"
 """The atlas' own brain for comparison with a prediction: aligned with it, with its

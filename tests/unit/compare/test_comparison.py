@@ -14,6 +14,7 @@ from gyriflow.compare.comparison import (
     roughness_mm,
     surface_distances,
 )
+from gyriflow.compare.shapes import interpolate_measures
 from gyriflow.geometry.matching import faces_that_cross
 from gyriflow.geometry.triangles import (
     TriangleMesh,
@@ -25,11 +26,15 @@ from gyriflow.geometry.triangles import (
 
 from .bumpy import PREPARED, RADIUS, REAL, bumpy, shaped
 
+OTHERS = {"start": bumpy(2), "adjacent": bumpy(1, height=0.7)}
 OBSERVED = ObservedBrain(
     "b",
     REAL,
     PREPARED,
-    {"start": shaped(bumpy(2)), "adjacent": shaped(bumpy(1, height=0.7))},
+    {
+        name: interpolate_measures(shaped(mesh), PREPARED)[0]
+        for name, mesh in OTHERS.items()
+    },
 )
 
 

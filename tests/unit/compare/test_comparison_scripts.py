@@ -50,11 +50,10 @@ def test_a_run_is_compared_with_the_observed_brain_of_each_week(tmp_path):
     brain before equal ones."""
     weeks = (22.0, 24.0)
     files = [f"{week}.gii" for week in weeks]
-    inputs = {"whole": files, "simulated": files}
+    inputs = {"whole": files, "simulated": files, "observed": files}
     folds = {"observed": 1, "start": -1, "adjacent": 1}
     for name in folds:
-        maps = [f"{name}-{week}.gii" for week in weeks]
-        inputs |= {name: files, f"{name}_maps": maps}
+        inputs[f"{name}_maps"] = [f"{name}-{week}.gii" for week in weeks]
     for week in weeks:
         surface = bumpy(int(week), 0.6)
         write_surface(tmp_path / f"{week}.gii", surface)
@@ -111,7 +110,7 @@ def test_surfaces_are_prepared_for_the_observed_brain_each_under_its_name(tmp_pa
         moved = transformed(surfaces[name], np.eye(4) if seed == 1 else pose)
         write_surface(tmp_path / f"{name}.gii", moved)
     inputs = {name: f"{name}.gii" for name in surfaces}
-    outputs = {name: f"prepared-{name}.gii" for name in surfaces}
+    outputs = {"observed": "prepared-observed.gii"}
     outputs |= {f"{name}_maps": f"maps-{name}.gii" for name in surfaces}
     params = {"curvature_radius_mm": 4.0}
     run_script("prepared_surfaces.py", tmp_path, inputs, outputs, params)

@@ -39,10 +39,10 @@ def body(scale=1.0, waves=1.0, subdivisions=3):
 def observed():
     """Return an observed brain with what was known before of it."""
     brain = comparison.observed_brain("b", body(), 2.0)
-    baselines = {
-        name: shapes.prepare_for_comparison(mesh, brain.surface, 2.0)
-        for name, mesh in (("start", body(0.8, 0.2)), ("adjacent", body(0.95, 0.8)))
-    }
+    baselines = {}
+    for name, mesh in (("start", body(0.8, 0.2)), ("adjacent", body(0.95, 0.8))):
+        prepared = shapes.prepare_for_comparison(mesh, brain.surface, 2.0)
+        baselines[name], _ = shapes.interpolate_measures(prepared, brain.prepared)
     return replace(brain, baselines=baselines)
 
 
@@ -82,7 +82,7 @@ def test_numbers_of_resamplings(recorded, observed):
                 0.8 - 0.1 * smooth_field(FAR[1][:3, :3]),
             ),
             "interval": placement.with_interval("r", np.linspace(0.1, 0.9, 41) ** 2),
-            "interpolated": placement.interpolate_measures(
+            "interpolated": shapes.interpolate_measures(
                 shapes.prepare_for_comparison(body(0.9, 0.5), observed.surface, 2.0),
                 observed.prepared,
             ),
