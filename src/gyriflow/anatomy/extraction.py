@@ -215,13 +215,30 @@ def without_holes(
     """Fill the holes of an (i, j, k) mask: what voxels outside, connected by a
     structure, do not reach. A dilation from the border takes three times as long.
     """
-    outside = np.pad(~mask, 1, constant_values=True)
-    number, _ = ndimage.label(outside, structure)
+    # an even number of voxels along each axis, with a margin outside
+    margins = [(2, 2 + size % 2) for size in mask.shape]
+    outside = np.pad(~mask, margins, constant_values=True)
+    inner = tuple(slice(2, 2 + size) for size in mask.shape)
+    if structure is not INSIDE:
+        number, _ = ndimage.label(outside, structure)
+        at_border = number[0, 0, 0]
+        return (number != at_border)[inner]
+
+    # blocks of eight voxels outside that reach the border, in half the time; then what
+    # touches these
+    blocks = outside
+    for axis in range(3):
+        along = np.moveaxis(blocks, axis, 0)
+        pairs = along[::2] & along[1::2]
+        blocks = np.moveaxis(pairs, 0, axis)
+    number, _ = ndimage.label(blocks)
     at_border = number[0, 0, 0]
-    is_filled = number != at_border
-    # without the padding
-    inner = slice(1, -1)
-    return is_filled[inner, inner, inner]
+    reached = number == at_border
+    is_reached = np.empty_like(outside)
+    for i, j, k in np.ndindex(2, 2, 2):
+        is_reached[i::2, j::2, k::2] = reached
+    holes = not_touching(outside & ~is_reached, is_reached)
+    return mask | holes[inner]
 
 
 def not_touching(
