@@ -168,7 +168,7 @@ def main() -> None:
         "--surface", type=Path, nargs="+", default=[], help="surfaces of hemispheres"
     )
     parser.add_argument(
-        "--per-wavelength", type=float, nargs="+", default=[10.0, 8.0, 7.0, 6.0, 5.0]
+        "--per-wavelength", type=float, nargs="+", default=[10.0, 8.0, 6.0, 5.0, 4.5]
     )
     parser.add_argument(
         "--evenness", type=float, nargs="+", default=[remeshing.EVENNESS, 0.001]

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.spatial import cKDTree
 from scipy.special import jv
 
 from ..errors import MeshError
@@ -217,6 +218,11 @@ def _quadrics(
     neighbours determine a quadric; and whether (n,) the ball holds a vertex of the
     boundary of an open surface.
     """
+    # neighbours follow each other, so that the balls of a chunk stay in the cache
+    order = cKDTree(mesh.vertices).indices
+    place = np.argsort(order)
+    mesh = TriangleMesh(mesh.vertices[order], place[mesh.faces])
+    radii_mm = radii_mm[order]
     (pairs, uses), size = edges(mesh), len(mesh.vertices)
     both = np.concatenate(
         [
@@ -243,7 +249,7 @@ def _quadrics(
     coefficients, fitted, one_sided = (
         np.concatenate(parts) for parts in zip(*fits, strict=True)
     )
-    return coefficients, fitted, one_sided
+    return coefficients[place], fitted[place], one_sided[place]
 
 
 def _balls(
