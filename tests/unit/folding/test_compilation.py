@@ -10,7 +10,7 @@ The tests of our C code under the address and undefined-behaviour sanitizers of 
         compilation.COMPILER_ARGUMENTS.extend(["-g", "-fsanitize=address,undefined"]),
         sys.exit(pytest.main(["-q", "-n", "0", "-m", "not slow", *sys.argv[1:]])),
     )' tests/mpi/linear_elements_cases.py tests/mpi/linear_solver_cases.py \
-        tests/unit/folding/test_compilation.py
+        tests/unit/folding/test_compilation.py tests/unit/folding/test_layers.py
 """
 
 from types import SimpleNamespace
