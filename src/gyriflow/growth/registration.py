@@ -17,7 +17,7 @@ from zlib import crc32
 import numpy as np
 import SimpleITK
 from numpy.typing import NDArray
-from picsl_greedy import Greedy3D
+from picsl_greedy import Greedy3D, GreedyFloat3D
 from scipy.ndimage import (
     affine_transform,
     binary_dilation,
@@ -30,7 +30,6 @@ from ..errors import InputError
 from ..geometry.alignment import angle_deg, motion
 from ..geometry.deformations import (
     Deformation,
-    carry,
     transform_points,
     voxel_index,
     voxel_size,
@@ -42,8 +41,9 @@ log = logging.getLogger(__name__)
 
 SMOOTHING_MM = 0.8
 """Standard deviation of the Gaussian that smooths both masks."""
-MARGIN_MM = 6.0
-"""Margin around the cerebrum."""
+MARGIN_VOXELS = 6.0
+MARGIN_MM = (4.5, 6.0)
+"""Margin around the cerebrum, and the least and the largest one."""
 CEREBRUM_BIT = 1
 CORTEX_BIT = 2
 PERTURBATION_VOXELS = 0.5
@@ -55,20 +55,21 @@ BRIGHT = 0.99
 WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
 AFFINE = "-a -dof 12 -m SSD -n 60x30"
 DEFORMABLE = "-m NCC 3x3x3 -wp 0"
-ITERATIONS = "60x40x15"
+ITERATIONS = "-n 60x40x15"
 """Rounds of the deformation at four times the voxel size, at twice, and at full
 size."""
-FINE_ITERATIONS = "60x40x8"
-"""The same for voxels below `FINE_MM`: the rounds at twice their size nearly
-suffice."""
+FINE_ITERATIONS = "-n 60x30x8 -noise 0.005"
+"""The same for voxels below `FINE_MM`: fewer rounds suffice. They are in single
+precision, whose rounding must be less than the noise that greedy adds to the
+channels."""
 FINE_MM = 1.0
 SMOOTHING_VOXELS = (2.5, 0.8)
 """SD of the smoothing of updates and of the deformation."""
 MAX_ROTATED_SHARE = 0.7
 """A rotated start is taken if its difference is below this share of that without
 rotation."""
-N_POINTS = 3000
-"""Number of points of the cerebrum at which starts are compared."""
+N_POINTS = 1500
+"""Least number of points of the cerebrum at which starts are compared."""
 _ANGLES = [
     (first, second, third)
     for first, second, third in product(
@@ -145,23 +146,32 @@ def channels(
         masks[CORTEX_BIT] = _mask(labels, cortex, "cortex")
     sizes = voxel_size(affine)
     voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
-    centres = transform_points(np.argwhere(masks[CEREBRUM_BIT]), affine)
-    low = centres.min(axis=0) - MARGIN_MM
-    high = centres.max(axis=0) + MARGIN_MM
+    inside = np.argwhere(masks[CEREBRUM_BIT])
+    centres = transform_points(inside, affine)
+    margin = np.clip(MARGIN_VOXELS * voxel, *MARGIN_MM)
+    low = centres.min(axis=0) - margin
+    high = centres.max(axis=0) + margin
     # start at a voxel's centre, so that a suitable grid is not resampled
     index = np.rint(transform_points(low, np.linalg.inv(affine)))
     low = transform_points(index, affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
     grid[:3, 3] = low
+    # the filter ends at four standard deviations
+    reach = np.ceil((margin + 4 * SMOOTHING_MM) / sizes).astype(int)
+    first = np.maximum(inside.min(axis=0) - reach, 0)
+    last = inside.max(axis=0) + reach
+    near = tuple(map(slice, first, last + 1))
+    near_affine = affine.copy()
+    near_affine[:3, 3] = transform_points(first, affine)
 
     tissue = np.zeros(shape, dtype=np.uint8)
     smoothed = {}
     for bit, mask in masks.items():
-        solid = mask.astype(np.float32)
-        tissue[_resample(solid, affine, grid, shape) > 0.5] |= bit
+        solid = mask[near].astype(np.float32)
+        tissue[_resample(solid, near_affine, grid, shape) > 0.5] |= bit
         smooth = gaussian_filter(solid, SMOOTHING_MM / sizes)
-        smoothed[bit] = _resample(smooth, affine, grid, shape)
+        smoothed[bit] = _resample(smooth, near_affine, grid, shape)
     intensity = None
     if image:
         intensity = _intensity(image, grid, shape, tissue & CEREBRUM_BIT > 0)
@@ -332,10 +342,11 @@ def register(
     is_fine = earlier.voxel_mm < FINE_MM
     iterations = FINE_ITERATIONS if is_fine else ITERATIONS
     deformable = (
-        f"{DEFORMABLE} -n {iterations} -s {update} {total} {common} -gm where"
+        f"{DEFORMABLE} {iterations} -s {update} {total} {common} -gm where"
         " -it found -o warp"
     )
-    greedy = Greedy3D()
+    # single precision takes a third less, but is not deterministic on tiny grids
+    greedy = GreedyFloat3D() if is_fine else Greedy3D()
     output = io.StringIO()
     try:
         greedy.execute(
@@ -408,14 +419,15 @@ def _find_start(
     every = max(1, len(index) // N_POINTS)
     index = index[::every]
     offsets = transform_points(index, earlier.affine) - first
+    at_points = {name: fixed[tuple(index.T)] for name, (fixed, _) in volumes.items()}
 
     def difference(turn: Floats) -> float:
         moved = second + scale * offsets @ turn.T
         places = voxel_index(moved, later.affine)
         means = []
-        for name, (fixed, moving) in volumes.items():
+        for name, (_, moving) in volumes.items():
             there = map_coordinates(moving, places, order=1)
-            squares = np.square(fixed[tuple(index.T)] - there)
+            squares = np.square(at_points[name] - there)
             means.append((WEIGHTS[name] * squares).mean())
         return float(np.sum(means))
 
@@ -447,30 +459,29 @@ def _measure_quality(
     later: Channels,
     deformation: Deformation,
 ) -> dict[str, float]:
-    """Measure the quality of a deformation between two brains from their unsmoothed
-    masks.
+    """Measure the quality of a deformation between two brains, on the earlier one's
+    grid, from their unsmoothed masks.
 
     dice_cerebrum and dice_cortex are the overlap 2|A∩B|/(|A| + |B|) of the masks of the
     earlier brain with those of the later brain carried back, NaN without a cortex. The
-    Jacobian determinant of the map in the earlier cerebrum, on the deformation's own
-    grid, is described by its minimum (least_determinant), the share of the volume where
-    it is ≤ 0 (folded_share), the standard deviation of its logarithm elsewhere
-    (log_growth_sd), and its mean, the ratio of volumes (volume_ratio). rim_mm and
-    inside_mm are 95 % quantiles of the displacement at the rim of the grid and in the
-    cerebrum; the rim should have less, since nothing is compared there.
+    Jacobian determinant of the map in the earlier cerebrum is described by its minimum
+    (least_determinant), the share of the volume where it is ≤ 0 (folded_share), the
+    standard deviation of its logarithm elsewhere (log_growth_sd), and its mean, the
+    ratio of volumes (volume_ratio). rim_mm and inside_mm are 95 % quantiles of the
+    displacement at the rim of the grid and in the cerebrum; the rim should have less,
+    since nothing is compared there.
     """
     index = np.indices(earlier.tissue.shape).reshape(3, -1).T
-    carried = carry(deformation, transform_points(index, earlier.affine))
-    places = voxel_index(carried, later.affine)
+    moved = transform_points(index, earlier.affine)
+    moved += deformation.displacement.reshape(-1, 3)
+    to_later = np.linalg.inv(later.affine) @ deformation.matrix
+    places = transform_points(moved, to_later).T
     dice_cortex = float("nan")
     if earlier.cortex is not None and later.cortex is not None:
         dice_cortex = _dice(earlier, later, CORTEX_BIT, places)
-    on_grid = voxel_index(_cerebrum_mm(earlier), deformation.affine)
+    inside = earlier.tissue & CEREBRUM_BIT > 0
+    growth = _volume_changes(deformation, inside)
     lengths = np.linalg.norm(deformation.displacement, axis=-1)
-    growth, inside_mm = (
-        map_coordinates(values, on_grid, order=1, mode="nearest")
-        for values in (_volume_changes(deformation), lengths)
-    )
     rim = np.ones(lengths.shape, dtype=bool)
     rim[1:-1, 1:-1, 1:-1] = False
     log_growth = np.log(growth[growth > 0])
@@ -482,16 +493,18 @@ def _measure_quality(
         "log_growth_sd": float(log_growth.std()),
         "volume_ratio": float(growth.mean()),
         "rim_mm": float(np.quantile(lengths[rim], 0.95)),
-        "inside_mm": float(np.quantile(inside_mm, 0.95)),
+        "inside_mm": float(np.quantile(lengths[inside], 0.95)),
     }
 
 
-def _volume_changes(deformation: Deformation) -> Floats:
-    """Return the (i, j, k) local change of volume on the map's grid (central
-    differences); ≤ 0 where it folds."""
-    displacement = deformation.displacement.astype(np.float64)
-    slopes = np.gradient(displacement, axis=(0, 1, 2))
-    by_index = np.stack(list(slopes), axis=-1)
+def _volume_changes(deformation: Deformation, inside: Mask) -> Floats:
+    """Return the (n,) local changes of volume at the points of the map's grid that are
+    `inside` (central differences); ≤ 0 where it folds."""
+    slopes = []
+    for axis in range(3):
+        slope = np.gradient(deformation.displacement, axis=axis)
+        slopes.append(slope[inside])
+    by_index = np.stack(slopes, axis=-1)
     voxel = deformation.affine[:3, :3]
     by_position = by_index @ np.linalg.inv(voxel)
     of_displacement = np.linalg.det(np.eye(3) + by_position)

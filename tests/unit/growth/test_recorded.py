@@ -224,10 +224,10 @@ def test_numbers_of_a_registration(recorded):
     image = (np.sin(np.arange(labels.size)).reshape(labels.shape), affine)
     first = registration.channels(labels, affine, **common, image=image)
     second = registration.channels(later, other, **common, voxel_mm=1.5)
-    ticks = [np.linspace(0.0, 2.0, 4)] * 3
+    ticks = [np.linspace(0.0, 2.0, length) for length in first.tissue.shape]
     u = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1) ** 2
-    matrix, grid = other @ np.linalg.inv(affine), affine @ scaling(10.0)
-    quality = registration._measure_quality(first, second, Deformation(matrix, u, grid))
+    bend = Deformation(other @ np.linalg.inv(affine), u, first.affine)
+    quality = registration._measure_quality(first, second, bend)
     recorded(
         {
             "first": first,

@@ -210,10 +210,11 @@ class Stopping:
 
 
 @pytest.mark.parametrize(
-    ("voxel_mm", "iterations"), [(0.8, "60x40x8"), (1.0, "60x40x15")]
+    ("voxel_mm", "iterations"), [(0.8, "60x30x8"), (1.0, "60x40x15")]
 )
 def test_voxels_below_a_millimetre_take_fewer_rounds(monkeypatch, voxel_mm, iterations):
-    monkeypatch.setattr(registration, "Greedy3D", Stopping)
+    for name in ("Greedy3D", "GreedyFloat3D"):
+        monkeypatch.setattr(registration, name, Stopping)
     affine = EARLIER.affine @ np.diag([*3 * [voxel_mm / EARLIER.voxel_mm], 1.0])
     brain = replace(EARLIER, affine=affine)
     with pytest.raises(InputError, match="stopped"):
