@@ -27,6 +27,10 @@ from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask, dil
 SAMPLES = 600
 DIRECTIONS = 400
 STARTS = 5
+# step and tolerance of the search with every third point; then with all, for planes
+# whose mirror distance is at most this multiple of the smallest one plus so many mm
+ROUGH_EVERY, ROUGH_SEARCH = 3, (0.1, 3e-3)
+FINE_SEARCH, REFINED_FACTOR, REFINED_MM = (0.02, 1e-4), 2.0, 0.3
 # larger leaves than usual: single points are searched, often far from the surface
 LEAF_SIZE = 64
 # starts that lead to the same plane but for this
@@ -56,6 +60,9 @@ MAX_SHIFT_MM = 5.0
 N_UPDATES = 4
 # tissue inside the cortex further from the mid-surface than this is on its own side
 SEED_MM = 6.0
+# distances from the surface between the hemispheres are found within this of the
+# mid-surface
+NEAR_MM = 8.0
 # lead of one side over the other where both reach a voxel about equally early, in
 # voxels; above the noise of the mid-surface, which would else decide a tie, and far
 # below a voxel
@@ -232,6 +239,7 @@ def _symmetry_planes(
     sample: Floats, tree: cKDTree
 ) -> list[tuple[Floats, float, float]]:
     centre = sample.mean(axis=0)
+    few = sample[::ROUGH_EVERY]
     # a Fibonacci lattice on the cap of directions around x
     index = np.arange(DIRECTIONS) + 0.5
     along = 1.0 - (1.0 - np.cos(np.radians(SEARCH_DEG))) * index / DIRECTIONS
@@ -250,7 +258,7 @@ def _symmetry_planes(
             _mirror_distance(
                 n,
                 float(n @ centre),
-                sample[::3],
+                few,
                 tree,
             )
             for n in directions
@@ -263,33 +271,48 @@ def _symmetry_planes(
         )
         if len(starts) < STARTS and is_new:
             starts.append(direction)
+    frames = [(start, np.linalg.svd(start[None])[2][1:], centre) for start in starts]
+    rough = [
+        _most_symmetric(np.zeros(3), *ROUGH_SEARCH, frame, few, tree)
+        for frame in frames
+    ]
+    least = min(asymmetry for _, asymmetry in rough)
     planes: list[tuple[Floats, float, float]] = []
-    for base in starts:
-        tangents = np.linalg.svd(base[None])[2][1:]
-        best = minimize(
-            lambda x, *frame: _mirror_distance(
-                *_plane_near(x, *frame),
-                sample,
-                tree,
-            ),
-            np.zeros(3),
-            args=(base, tangents, centre),
-            method="Nelder-Mead",
-            options={
-                "initial_simplex": np.vstack([np.zeros(3), 0.1 * np.eye(3)]),
-                "xatol": 1e-4,
-                "fatol": 1e-4,
-            },
-        )
-        normal, offset = _plane_near(best.x, base, tangents, centre)
+    for frame, (x, asymmetry) in zip(frames, rough, strict=True):
+        if asymmetry <= REFINED_FACTOR * least + REFINED_MM:
+            x, asymmetry = _most_symmetric(x, *FINE_SEARCH, frame, sample, tree)
+        normal, offset = _plane_near(x, *frame)
         is_new = all(
             np.abs(normal - other).max() > SAME_NORMAL
             or abs(offset - middle) > SAME_OFFSET_MM
             for other, middle, _ in planes
         )
         if is_new:
-            planes.append((normal, offset, float(best.fun)))
+            planes.append((normal, offset, asymmetry))
     return planes
+
+
+def _most_symmetric(
+    start: Floats,
+    step: float,
+    tolerance: float,
+    frame: tuple[Floats, Floats, Floats],
+    sample: Floats,
+    tree: cKDTree,
+) -> tuple[Floats, float]:
+    """Return the (3,) parameters of the plane of `_plane_near` with the smallest mirror
+    distance, and that, by Nelder-Mead."""
+    best = minimize(
+        lambda x: _mirror_distance(*_plane_near(x, *frame), sample, tree),
+        start,
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": np.vstack([start, start + step * np.eye(3)]),
+            "xatol": tolerance,
+            "fatol": tolerance,
+        },
+    )
+    return best.x, float(best.fun)
 
 
 def _plane_near(
@@ -428,7 +451,7 @@ def side_distance(
     right: Mask | None = None,
 ) -> NDArray[np.float32]:
     """Return each voxel's distance in mm from the surface between the hemispheres,
-    negative on the left.
+    negative on the left; further away than `NEAR_MM` only its sign counts.
 
     A voxel of an (i, j, k) mask belongs to the hemisphere whose flood reaches it first
     (watershed): through the `core`, the tissue inside the cortex, then the cortex by
@@ -454,17 +477,46 @@ def side_distance(
     lead = np.zeros(mask.shape, dtype=np.float32)
     height = fissure.height_above(transform_points(np.argwhere(mask), affine))
     lead[mask] = LEAD_VOXELS * size.min() * np.tanh(height / size.min())
+    floods = [watershed(order + sign * lead, seeds, mask=mask) for sign in (1, -1)]
+    near = _slices_between(mask, height, floods, fissure.plane.normal @ affine[:3, :3])
     distances = []
-    for sign, compare in ((1, np.less), (-1, np.less_equal)):
-        side = watershed(order + sign * lead, seeds, mask=mask)
+    for flood, compare in zip(floods, (np.less, np.less_equal), strict=True):
         to_left, to_right = (
-            ndimage.distance_transform_edt(side != part, sampling=size)
+            ndimage.distance_transform_edt(flood[near] != part, sampling=size)
             for part in (1, 2)
         )
         distances.append(_signed_distance(compare(to_right, to_left), size))
-    return ndimage.gaussian_filter(
-        np.mean(distances, axis=0, dtype=np.float32), SMOOTHING_VOXELS
-    )
+    # only the side counts elsewhere
+    margins = [
+        (part.start, length - part.stop)
+        for part, length in zip(near, mask.shape, strict=True)
+    ]
+    distance = np.pad(np.mean(distances, axis=0, dtype=np.float32), margins, "edge")
+    return ndimage.gaussian_filter(distance, SMOOTHING_VOXELS)
+
+
+def _slices_between(
+    mask: Mask,
+    height: Floats,
+    floods: list[NDArray[np.int8]],
+    normal: Floats,
+) -> tuple[slice, ...]:
+    """Return the part of a volume around the surface between the hemispheres: slices
+    along the axis that its `normal` in voxels is closest to.
+
+    All voxels of the mask beyond it are further than `NEAR_MM` from the mid-surface, by
+    their `height` (n,), and on its side.
+    """
+    is_right = height > 0
+    is_between = np.abs(height) < NEAR_MM
+    for flood in floods:
+        is_between |= (flood[mask] == 2) != is_right
+    axis = int(np.abs(normal).argmax())
+    places = np.nonzero(mask)[axis][is_between]
+    part = [slice(0, length) for length in mask.shape]
+    if len(places):
+        part[axis] = slice(int(places.min()), int(places.max()) + 1)
+    return tuple(part)
 
 
 def _signed_distance(mask: Mask, size: Floats) -> Floats:
