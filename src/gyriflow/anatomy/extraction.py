@@ -257,7 +257,11 @@ def not_touching(
     is_reached = np.ones(1, dtype=bool)
     while is_reached.any():
         is_reached = np.zeros(len(voxels), dtype=bool)
-        for stride in (1, mask.shape[2], mask[0].size):
+        for stride in (
+            1,
+            mask.shape[2],
+            mask[0].size,
+        ):
             is_reached |= is_touching[voxels - stride]
             is_reached |= is_touching[voxels + stride]
         is_touching[voxels[is_reached]] = True

@@ -271,7 +271,14 @@ def _symmetry_planes(
         )
         if len(starts) < STARTS and is_new:
             starts.append(direction)
-    frames = [(start, np.linalg.svd(start[None])[2][1:], centre) for start in starts]
+    frames = [
+        (
+            start,
+            np.linalg.svd(start[None])[2][1:],
+            centre,
+        )
+        for start in starts
+    ]
     rough = [
         _most_symmetric(np.zeros(3), *ROUGH_SEARCH, frame, few, tree)
         for frame in frames
@@ -303,7 +310,11 @@ def _most_symmetric(
     """Return the (3,) parameters of the plane of `_plane_near` with the smallest mirror
     distance, and that, by Nelder-Mead."""
     best = minimize(
-        lambda x: _mirror_distance(*_plane_near(x, *frame), sample, tree),
+        lambda x: _mirror_distance(
+            *_plane_near(x, *frame),
+            sample,
+            tree,
+        ),
         start,
         method="Nelder-Mead",
         options={
@@ -478,9 +489,18 @@ def side_distance(
     height = fissure.height_above(transform_points(np.argwhere(mask), affine))
     lead[mask] = LEAD_VOXELS * size.min() * np.tanh(height / size.min())
     floods = [watershed(order + sign * lead, seeds, mask=mask) for sign in (1, -1)]
-    near = _slices_between(mask, height, floods, fissure.plane.normal @ affine[:3, :3])
+    near = _slices_between(
+        mask,
+        height,
+        floods,
+        fissure.plane.normal @ affine[:3, :3],
+    )
     distances = []
-    for flood, compare in zip(floods, (np.less, np.less_equal), strict=True):
+    for flood, compare in zip(
+        floods,
+        (np.less, np.less_equal),
+        strict=True,
+    ):
         to_left, to_right = (
             ndimage.distance_transform_edt(flood[near] != part, sampling=size)
             for part in (1, 2)
@@ -491,7 +511,11 @@ def side_distance(
         (part.start, length - part.stop)
         for part, length in zip(near, mask.shape, strict=True)
     ]
-    distance = np.pad(np.mean(distances, axis=0, dtype=np.float32), margins, "edge")
+    distance = np.pad(
+        np.mean(distances, axis=0, dtype=np.float32),
+        margins,
+        "edge",
+    )
     return ndimage.gaussian_filter(distance, SMOOTHING_VOXELS)
 
 
@@ -515,7 +539,10 @@ def _slices_between(
     places = np.nonzero(mask)[axis][is_between]
     part = [slice(0, length) for length in mask.shape]
     if len(places):
-        part[axis] = slice(int(places.min()), int(places.max()) + 1)
+        part[axis] = slice(
+            int(places.min()),
+            int(places.max()) + 1,
+        )
     return tuple(part)
 
 

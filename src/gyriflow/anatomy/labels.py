@@ -377,7 +377,10 @@ def _outside_ventricles(around: AroundCerebrum) -> Mask:
         return fluid & (share <= ENCLOSED)
 
     # not beyond the volume
-    elsewhere = np.pad(~(hindbrain | around.cerebrum)[INNER], 1)
+    elsewhere = np.pad(
+        ~(hindbrain | around.cerebrum)[INNER],
+        1,
+    )
     # smoothing takes long: only around the hindbrain, as far as its parts go
     margin = 0
     is_cut = True
@@ -465,7 +468,10 @@ def _hits(
         shifts = list(product(*steps))
         forward = range(1, len(hits) - 1)
         for step, order in ((-1, forward), (1, forward[::-1])):
-            sees = np.zeros((len(shifts), *hits[0].shape), dtype=bool)
+            sees = np.zeros(
+                (len(shifts), *hits[0].shape),
+                dtype=bool,
+            )
             for place in order:
                 # the next slice hits tissue, or sees it
                 beyond = place + step
@@ -475,7 +481,10 @@ def _hits(
                     plane = hit[ray]
                     beside = _shifted(plane, shift)
                     sees[ray][INNER[1:]] = plane[beside]
-                hits[place] += sees.sum(axis=0, dtype=np.uint8)
+                hits[place] += sees.sum(
+                    axis=0,
+                    dtype=np.uint8,
+                )
     share[box] = count * clear / np.float32(N_RAYS)
     return share
 
@@ -575,7 +584,11 @@ def layout_of(
     rows = _ranks(labels, numbers).ravel()
     contact = np.zeros((n, n))
     # the margin touches only itself at the ends of lines
-    for stride in (1, labels.shape[2], labels[0].size):
+    for stride in (
+        1,
+        labels.shape[2],
+        labels[0].size,
+    ):
         voxels = np.flatnonzero(rows[stride:] != rows[:-stride])
         # a pair of labels as one number
         pairs = n * rows[voxels + stride].astype(int)
@@ -613,7 +626,10 @@ def _ranks(
     kind = np.min_scalar_type(len(numbers))
     if int(last) - int(first) > labels.size:
         return np.searchsorted(numbers, labels).astype(kind)
-    table = np.searchsorted(numbers, np.arange(first, last + 1))
+    table = np.searchsorted(
+        numbers,
+        np.arange(first, last + 1),
+    )
     return table.astype(kind)[labels - first]
 
 
@@ -708,7 +724,10 @@ def _wrong_places(
                 f" {share:.0%} of their neighbours are inside"
             )
     smallest = SMALL_SHARE * _tissue_voxels(layout, tissues)
-    is_other = ~cerebrum & ~np.isin(layout.labels, (HOLE, 0))
+    is_other = ~cerebrum & ~np.isin(
+        layout.labels,
+        (HOLE, 0),
+    )
     for number in layout.labels[is_other]:
         is_tissue = layout.labels == number
         share = _contact_share(layout, is_tissue, within_cortex)

@@ -155,7 +155,10 @@ def misplaced_cortex(
 
     at_ventricles = with_neighbours(fluid) & ~fluid & around.cerebrum
     is_cortex = at_ventricles & cortex & ~enclosed
-    share = is_cortex.sum() / max(int(at_ventricles.sum()), 1)
+    share = is_cortex.sum() / max(
+        int(at_ventricles.sum()),
+        1,
+    )
     if share > MAX_AT_VENTRICLES:
         found = (
             f"cortex lies at {100 * share:.0f} % of the ventricles' surface,"
@@ -190,7 +193,10 @@ def _bare_surface(around: AroundCerebrum) -> Iterator[str]:
     if is_bare.sum() <= n_max:
         return
     size = voxel_size(around.affine)
-    box = box_of(is_bare, int(MAX_TO_CORTEX_MM / size.min()) + 1)
+    box = box_of(
+        is_bare,
+        int(MAX_TO_CORTEX_MM / size.min()) + 1,
+    )
     is_bare[box] &= ~_is_near(
         around,
         around.cortex[box],

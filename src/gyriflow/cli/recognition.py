@@ -221,7 +221,10 @@ def recognise(
     table_files = [folder / path for path in paths if TABLE_NAME.fullmatch(path.name)]
     tables = ScanTables(table_files, notation)
     candidates = [*_hemispheres(paths), *_whole_surfaces(paths)]
-    candidates += _volumes(paths, [path for path in paths if (folder / path).is_dir()])
+    candidates += _volumes(
+        paths,
+        [path for path in paths if (folder / path).is_dir()],
+    )
     found: dict[str, list[FoundBrain]] = defaultdict(list)
     for brain in candidates:
         if fnmatch(str(brain.file), files or "*"):
@@ -231,7 +234,10 @@ def recognise(
     for path in paths:
         sessions_of[_label(path, "sub")] |= {_label(path, "ses")} - {None}
     if not found:
-        raise _no_brain(folder, {str(path): _rejection(path) for path in paths})
+        raise _no_brain(
+            folder,
+            {str(path): _rejection(path) for path in paths},
+        )
     selected = {
         "sub": {label.removeprefix("sub-") for label in participants or ()},
         "ses": {label.removeprefix("ses-") for label in sessions or ()},

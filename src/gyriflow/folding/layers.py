@@ -85,7 +85,10 @@ class PialSearch:
         near = (distance > 0) & self._within(distance, reach)
         if near.any():
             faces = FaceTree(self.surface)
-            distance[near] = faces.distance(points[near], distance[near])
+            distance[near] = faces.distance(
+                points[near],
+                distance[near],
+            )
         return distance
 
     def distance_and_normals(

@@ -157,7 +157,10 @@ class TwoLevelPreconditioner:
         coarse += coarse.T
         if self._settings.with_contributions:
             for part in self._tangent.parts:
-                rows = sparse.csr_matrix(part.getValuesCSR()[::-1], part.getSize())
+                rows = sparse.csr_matrix(
+                    part.getValuesCSR()[::-1],
+                    part.getSize(),
+                )
                 added = restriction @ (rows @ prolongation)
                 coarse += self._domain.sum_over_ranks(added.toarray())
         scale = np.trace(coarse) / len(coarse)

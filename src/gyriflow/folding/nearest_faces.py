@@ -40,7 +40,11 @@ class FaceTree:
         ends = np.array([0, len(order)])
         while np.diff(ends).max() > LEAF_SIZE:
             middles = (ends[:-1] + ends[1:]) // 2
-            ends = np.insert(ends, np.arange(1, len(ends)), middles)
+            ends = np.insert(
+                ends,
+                np.arange(1, len(ends)),
+                middles,
+            )
         # all leaves are full: the last of their triangles is there several times
         places = ends[:-1, None] + np.arange(LEAF_SIZE)
         places = np.minimum(places, ends[1:, None] - 1)
@@ -54,8 +58,14 @@ class FaceTree:
         levels = [boxes]
         while len(boxes) > 1:
             first, second = boxes[::2], boxes[1::2]
-            low = np.minimum(first[:, 0], second[:, 0])
-            high = np.maximum(first[:, 1], second[:, 1])
+            low = np.minimum(
+                first[:, 0],
+                second[:, 0],
+            )
+            high = np.maximum(
+                first[:, 1],
+                second[:, 1],
+            )
             boxes = np.stack([low, high], axis=1)
             levels.append(boxes)
         # the first box is number 1
@@ -72,8 +82,18 @@ class FaceTree:
         code.lower_distances(
             count,
             len(self._triangles),
-            pointer(interface, self._boxes, np.float64, self._boxes.size),
-            pointer(interface, self._triangles, np.float64, self._triangles.size),
+            pointer(
+                interface,
+                self._boxes,
+                np.float64,
+                self._boxes.size,
+            ),
+            pointer(
+                interface,
+                self._triangles,
+                np.float64,
+                self._triangles.size,
+            ),
             pointer(interface, points, np.float64, 3 * count),
             pointer(interface, squared, np.float64, count, is_written=True),
         )

@@ -89,7 +89,10 @@ def inverse_growth(
     logs, axes = _principal_logs(stretched.swapaxes(-1, -2) @ stretched)
     limited = np.clip(logs, -limit, limit)
     powers = power[others][:, None]
-    inverse[others] = from_principal(np.exp(-powers * limited), axes)
+    inverse[others] = from_principal(
+        np.exp(-powers * limited),
+        axes,
+    )
     is_limited = np.zeros(is_whole.shape, dtype=bool)
     is_limited[others] = np.abs(logs).max(axis=-1) > limit
     return inverse, is_limited

@@ -255,7 +255,10 @@ def element_maps(
     else:
         maps = (nodes[1:] - nodes[0])[None]
         if len(slopes) > 1:
-            maps = np.tile(maps, (len(slopes), 1, 1, 1))
+            maps = np.tile(
+                maps,
+                (len(slopes), 1, 1, 1),
+            )
     return np.ascontiguousarray(maps.swapaxes(2, 3))
 
 

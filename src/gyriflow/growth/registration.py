@@ -152,14 +152,22 @@ def channels(
     low = centres.min(axis=0) - margin
     high = centres.max(axis=0) + margin
     # start at a voxel's centre, so that a suitable grid is not resampled
-    index = np.rint(transform_points(low, np.linalg.inv(affine)))
+    index = np.rint(
+        transform_points(
+            low,
+            np.linalg.inv(affine),
+        )
+    )
     low = transform_points(index, affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
     grid[:3, 3] = low
     # the filter ends at four standard deviations
     reach = np.ceil((margin + 4 * SMOOTHING_MM) / sizes).astype(int)
-    first = np.maximum(inside.min(axis=0) - reach, 0)
+    first = np.maximum(
+        inside.min(axis=0) - reach,
+        0,
+    )
     last = inside.max(axis=0) + reach
     near = tuple(map(slice, first, last + 1))
     near_affine = affine.copy()
@@ -433,7 +441,12 @@ def _find_start(
 
     turn = min(START_ROTATIONS, key=difference)
     for step in REFINED_DEG:
-        angles = list(product((0, -step, step), repeat=3))
+        angles = list(
+            product(
+                (0, -step, step),
+                repeat=3,
+            )
+        )
         nearby = Rotation.from_euler("xyz", angles, degrees=True)
         turn = min(nearby.as_matrix() @ turn, key=difference)
     if difference(turn) >= MAX_ROTATED_SHARE * difference(np.eye(3)):

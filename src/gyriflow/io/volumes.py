@@ -125,7 +125,12 @@ def _without_empty_border(
         if not len(places):
             return values, affine
         first = max(int(places[0]) - 1, 0)
-        sides.append(slice(first, int(places[-1]) + 2))
+        sides.append(
+            slice(
+                first,
+                int(places[-1]) + 2,
+            )
+        )
     moved = affine.copy()
     moved[:3, 3] += moved[:3, :3] @ [side.start for side in sides]
     return values[tuple(sides)], moved

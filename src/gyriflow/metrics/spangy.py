@@ -275,7 +275,10 @@ def spectrum(
     """
     band = basis.band
     energy = basis.energy @ proxy
-    products = _products(basis, basis.places.T @ energy[:, None])
+    products = _products(
+        basis,
+        basis.places.T @ energy[:, None],
+    )
     coefficients = _by_inverse_root(basis, products)[:, 0]
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(

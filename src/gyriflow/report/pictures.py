@@ -215,7 +215,10 @@ def _in_views(
     for name in views:
         for row in dict.fromkeys(brain.row for brain in grid):
             for column in columns:
-                brain = places.get((row, column), GridBrain(row, column))
+                brain = places.get(
+                    (row, column),
+                    GridBrain(row, column),
+                )
                 heading, label = column_label(column), row
                 if is_wide:
                     label = f"{row}\n{name} view".strip()

@@ -269,7 +269,10 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)
     columns = max(
         1,
-        min(len(handles), int(figure.get_figwidth() / longest)),
+        min(
+            len(handles),
+            int(figure.get_figwidth() / longest),
+        ),
     )
     lines = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.15 * (lines - 1))

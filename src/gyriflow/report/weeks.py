@@ -135,7 +135,12 @@ def _run_lines(
     layers = []
     for run, colour in colours.items():
         style = {"color": colour, "marker": "o", "markersize": 2.5}
-        layers.append(Layer(rows[rows["run"] == run], style))
+        layers.append(
+            Layer(
+                rows[rows["run"] == run],
+                style,
+            )
+        )
     return layers
 
 
@@ -691,7 +696,12 @@ def displacement_figure(
     )
     layers = []
     for run, style in styles.items():
-        layers.append(Layer(rows[rows["run"] == run], style))
+        layers.append(
+            Layer(
+                rows[rows["run"] == run],
+                style,
+            )
+        )
     figure, panels = _weeks_chart(
         titles, layers, [*rows["from_week"], *rows["to_week"]], per_row=2
     )
