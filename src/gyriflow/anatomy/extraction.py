@@ -91,10 +91,7 @@ MIN_HANGING_MM3 = 15.0
 STALK_MM = 4.0
 
 
-def shifted_affine(
-    affine: Floats,
-    first: NDArray[np.int64],
-) -> Floats:
+def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
     """Return the affine of a volume that was cropped or padded to begin at voxel
     `first`."""
     moved = np.array(affine, dtype=float)
@@ -102,9 +99,7 @@ def shifted_affine(
     return moved
 
 
-def parts_in_boxes(
-    mask: Mask,
-) -> Iterator[tuple[tuple[slice, ...], Mask]]:
+def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
     """Yield for each connected part (faces, edges, corners) of a mask its box plus one
     voxel, and its mask there."""
     if not mask.any():
@@ -117,10 +112,7 @@ def parts_in_boxes(
         yield _moved(box, around), number[box] == index
 
 
-def _moved(
-    box: tuple[slice, ...],
-    around: tuple[slice, ...],
-) -> tuple[slice, ...]:
+def _moved(box: tuple[slice, ...], around: tuple[slice, ...]) -> tuple[slice, ...]:
     """Return the place in the whole volume of a box in a part `around` it."""
     sides = []
     for side, outer in zip(
@@ -134,10 +126,7 @@ def _moved(
     return tuple(sides)
 
 
-def _wider(
-    box: tuple[slice, ...],
-    margin: int,
-) -> tuple[slice, ...]:
+def _wider(box: tuple[slice, ...], margin: int) -> tuple[slice, ...]:
     sides = []
     for side in box:
         start = max(side.start - margin, 0)
@@ -208,10 +197,7 @@ def refine(
     return field, fine
 
 
-def without_holes(
-    mask: Mask,
-    structure: Mask = INSIDE,
-) -> Mask:
+def without_holes(mask: Mask, structure: Mask = INSIDE) -> Mask:
     """Fill the holes of an (i, j, k) mask: what voxels outside, connected by a
     structure, do not reach. A dilation from the border takes three times as long.
     """
@@ -241,10 +227,7 @@ def without_holes(
     return mask | holes[inner]
 
 
-def not_touching(
-    mask: Mask,
-    tissue: Mask,
-) -> Mask:
+def not_touching(mask: Mask, tissue: Mask) -> Mask:
     """Return the parts, connected by faces, of an (i, j, k) mask that do not touch a
     tissue. The mask has an empty margin of one voxel."""
     touching = mask & with_neighbours(tissue)
@@ -315,10 +298,7 @@ def make_simple(
     return unambiguous(field), dropped | handles_repaired
 
 
-def isosurface(
-    field: NDArray[np.float32],
-    affine: Floats,
-) -> TriangleMesh:
+def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
     """Return the outward surface in mm on which an (i, j, k) field is one half;
     MeshError if it encloses no volume."""
     vertices, faces, _, _ = marching_cubes(field, LEVEL, gradient_direction="ascent")
@@ -387,9 +367,7 @@ def _without_handles(
     }
 
 
-def unambiguous(
-    field: NDArray[np.float32],
-) -> NDArray[np.float32]:
+def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     """Adjust a field so that its isosurface connects inside voxels through faces only.
 
     Where inside and outside alternate around a square, or two opposite corners of a
@@ -438,11 +416,7 @@ def unambiguous(
     return np.where(ambiguous, separated, field).astype(np.float32)
 
 
-def dilated(
-    mask: Mask,
-    radius: float,
-    size: Floats | None = None,
-) -> Mask:
+def dilated(mask: Mask, radius: float, size: Floats | None = None) -> Mask:
     """Dilate an (i, j, k) mask by a ball; a distance transform takes thirty times as
     long.
 
@@ -482,9 +456,7 @@ def dilated(
     return unpacked.view(bool)
 
 
-def _shifts(
-    step: int,
-) -> list[tuple[slice, slice]]:
+def _shifts(step: int) -> list[tuple[slice, slice]]:
     """Return the slices along an axis whose voxels are shifted, and to which, by so
     many steps down and up."""
     if step == 0:
@@ -523,10 +495,7 @@ def with_neighbours(
     return grown
 
 
-def box_of(
-    mask: Mask,
-    margin: int = 0,
-) -> tuple[slice, ...]:
+def box_of(mask: Mask, margin: int = 0) -> tuple[slice, ...]:
     """Return the box around a mask that is not empty, wider by some voxels where the
     volume has them."""
     sides = []
@@ -726,10 +695,7 @@ def _connected(
     return reached
 
 
-def without_stalks(
-    mask: Mask,
-    affine: Floats,
-) -> tuple[Mask, list[dict[str, Any]]]:
+def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
     """Remove the parts of an (i, j, k) mask that hang by a stalk; return the mask and
     each part's volume and place.
 

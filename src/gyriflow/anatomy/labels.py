@@ -257,10 +257,7 @@ def _fill_from_nearest(
             return
 
 
-def require_labels(
-    labels: Labels,
-    scheme: LabelScheme,
-) -> None:
+def require_labels(labels: Labels, scheme: LabelScheme) -> None:
     """Raise InputError for labels that are not in the scheme, or if the cerebrum or a
     tissue of it is missing."""
     present = set(map(int, np.unique(labels))) - {0}
@@ -446,10 +443,7 @@ def _unlabelled_ventricles(around: AroundCerebrum) -> Mask:
     return filled[INNER]
 
 
-def _hits(
-    clear: Mask,
-    tissue: Mask,
-) -> NDArray[np.float32]:
+def _hits(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
     """Return the share of the 26 rays from each clear voxel that hit tissue, through
     clear voxels only; the outermost voxels are not clear."""
     share = np.zeros(clear.shape, dtype=np.float32)
@@ -489,10 +483,7 @@ def _hits(
     return share
 
 
-def _shifted(
-    plane: Mask,
-    shift: tuple[int, ...],
-) -> tuple[slice, ...]:
+def _shifted(plane: Mask, shift: tuple[int, ...]) -> tuple[slice, ...]:
     """Return the part of a plane next to its inner part."""
     sides = []
     for step, size in zip(shift, plane.shape, strict=True):
@@ -520,9 +511,7 @@ def _smoothed(
     return (smooth / np.maximum(weight, 1e-6))[inner]
 
 
-def _border_share(
-    mask: Mask,
-) -> float:
+def _border_share(mask: Mask) -> float:
     """Return the share of an (i, j, k) mask's surface at those borders of its volume
     that cut it off.
 
@@ -544,10 +533,7 @@ def _border_share(
     return cut_off / max(at_border + int(surface.sum()), 1)
 
 
-def _listed(
-    numbers: Iterable[int],
-    scheme: LabelScheme | None = None,
-) -> str:
+def _listed(numbers: Iterable[int], scheme: LabelScheme | None = None) -> str:
     names = [
         f"{number} {scheme.labels.get(number, '')}".strip() if scheme else str(number)
         for number in numbers
@@ -566,9 +552,7 @@ class Layout:
     count: NDArray[np.integer[Any]]
 
 
-def layout_of(
-    labels: Labels,
-) -> Layout:
+def layout_of(labels: Labels) -> Layout:
     """Return the contacts between the labels of an (i, j, k) volume; 0 is outside."""
     # most of the volume is air around the head
     is_labelled = labels != 0
@@ -602,9 +586,7 @@ def layout_of(
     )
 
 
-def _numbers_in(
-    labels: Labels,
-) -> Labels:
+def _numbers_in(labels: Labels) -> Labels:
     """Return the labels of a volume in order, as `np.unique`, which takes several times
     as long."""
     first = labels.min()
@@ -616,10 +598,7 @@ def _numbers_in(
     return present.astype(labels.dtype) + first
 
 
-def _ranks(
-    labels: Labels,
-    numbers: Labels,
-) -> NDArray[np.integer[Any]]:
+def _ranks(labels: Labels, numbers: Labels) -> NDArray[np.integer[Any]]:
     """Return the place of each voxel's label among all labels of a volume."""
     first = numbers[0]
     last = numbers[-1]
@@ -633,10 +612,7 @@ def _ranks(
     return table.astype(kind)[labels - first]
 
 
-def scheme_contradictions(
-    layout: Layout,
-    scheme: LabelScheme,
-) -> Iterator[str]:
+def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     """Yield the contradictions between the arrangement of labels and a scheme; none for
     a volume without cortex."""
     tissues = {}
@@ -664,10 +640,7 @@ def _with_numbers(
     return f"{name} ({', '.join(numbers)})"
 
 
-def _tissue_voxels(
-    layout: Layout,
-    tissues: Mapping[str, Mask],
-) -> int:
+def _tissue_voxels(layout: Layout, tissues: Mapping[str, Mask]) -> int:
     """Return the number of voxels of the cerebrum without ventricles, at least 1."""
     is_tissue = tissues["cerebrum"] & ~tissues["ventricles"]
     return max(
@@ -676,10 +649,7 @@ def _tissue_voxels(
     )
 
 
-def _wrong_shares(
-    layout: Layout,
-    tissues: Mapping[str, Mask],
-) -> Iterator[str]:
+def _wrong_shares(layout: Layout, tissues: Mapping[str, Mask]) -> Iterator[str]:
     """Yield tissues that would be too much or too little of the cerebrum or of its
     surface."""
     cerebrum = tissues["cerebrum"]

@@ -102,10 +102,7 @@ def around_cerebrum(
     )
 
 
-def _has_label(
-    labels: np.ndarray,
-    numbers: Sequence[int],
-) -> Mask:
+def _has_label(labels: np.ndarray, numbers: Sequence[int]) -> Mask:
     """Return where a volume has one of some labels, as `np.isin`, which takes several
     times as long."""
     lowest = labels.min(initial=0)
@@ -228,10 +225,7 @@ def _suspect(around: AroundCerebrum) -> str:
     return "is other tissue labelled as cortex there?"
 
 
-def _pieces_in_words(
-    mask: Mask,
-    affine: Floats,
-) -> str:
+def _pieces_in_words(mask: Mask, affine: Floats) -> str:
     """Return the volume of a mask's pieces of at least `MIN_PIECE_ML`, and the place of
     the largest; or ''."""
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
@@ -247,10 +241,7 @@ def _pieces_in_words(
     return f"{pieces_ml.sum():.2f} mL around {_place_in_words(largest, affine)}"
 
 
-def _place_in_words(
-    voxels: np.ndarray,
-    affine: Floats,
-) -> str:
+def _place_in_words(voxels: np.ndarray, affine: Floats) -> str:
     """Return the centre in mm of (n, 3) voxels."""
     place = transform_points(
         voxels.mean(axis=0, keepdims=True),

@@ -156,19 +156,13 @@ class FoundScans:
     unused: dict[str, str]
 
 
-def _labels(
-    file: Path,
-    entity: str,
-) -> list[str]:
+def _labels(file: Path, entity: str) -> list[str]:
     return sorted(
         {label for name, label in ENTITY.findall(file.as_posix()) if name == entity}
     )
 
 
-def _label(
-    file: Path,
-    entity: str,
-) -> str | None:
+def _label(file: Path, entity: str) -> str | None:
     # a path with several labels is refused
     return next(iter(_labels(file, entity)), None)
 
@@ -474,11 +468,7 @@ def _refuse_equal_weeks(brains: Sequence[FoundBrain]) -> None:
             )
 
 
-def _space(
-    file: Path,
-    *,
-    is_surface: bool,
-) -> str:
+def _space(file: Path, *, is_surface: bool) -> str:
     """Return the space of a file, "" for the subject's own; a subject's surface on a
     template's mesh is resampled."""
     if folders := [part for part in file.parts if TEMPLATE_FOLDER.fullmatch(part)]:
@@ -743,11 +733,7 @@ def _fits_of_file(files: Sequence[str]) -> Iterator[dict[str, str]]:
     yield scheme_fits(labels)
 
 
-def _require_brain(
-    path: Path,
-    *,
-    whole: bool = False,
-) -> None:
+def _require_brain(path: Path, *, whole: bool = False) -> None:
     # imports that label volumes need not wait for
     from ..anatomy.plausible import MIN_NARROWNESS, narrowness, require_one_brain
     from ..geometry.triangles import volume_ml
@@ -812,10 +798,7 @@ def _facts(
     return facts or ScanAge(None)
 
 
-def _age(
-    facts: ScanAge,
-    named: ScanAge,
-) -> ScanAge:
+def _age(facts: ScanAge, named: ScanAge) -> ScanAge:
     """Return the age that tables give, or else a name; None, with the cause, if they
     differ."""
     if facts.week is None:
@@ -826,20 +809,14 @@ def _age(
     return ScanAge(None, cause=f"found two ages, {found}; expected one")
 
 
-def _agree(
-    week: float,
-    named: float,
-) -> bool:
+def _agree(week: float, named: float) -> bool:
     difference = week - named
     # names may give whole weeks, completed or rounded
     is_rounded = named.is_integer() and -0.5 <= difference < 1.0
     return is_rounded or abs(difference) <= MAX_DIFFERENCE_WEEKS
 
 
-def _owners(
-    file: Path,
-    tables: ScanTables,
-) -> list[str]:
+def _owners(file: Path, tables: ScanTables) -> list[str]:
     """Return the subjects of tables whose ids are whole parts of a path without `sub-`:
     of the name or of a folder."""
     parts = re.split(r"[._]", file.name)
