@@ -253,7 +253,7 @@ class ElasticFit:
         self._solver = NewtonSolver(self._problem, SETTINGS, floor)
         # the pieces in the order of the solver
         self._cells = self._domain.vertex_of_node[self._domain.cells]
-        start_edges = self._edges()
+        start_edges = self._edges(np.arange(len(self._cells)))
         self._inverse_edges = np.linalg.inv(start_edges)
         self._cell_volumes = determinants(start_edges)
         n_cells = len(self._cells)
@@ -263,10 +263,10 @@ class ElasticFit:
             shape=(len(mesh.vertices), n_cells),
         )
 
-    def _edges(self) -> Floats:
-        """Return the (c, 3, 3) edges of the solver's elements from their first corners,
-        as columns."""
-        corners = self.positions_mm[self._cells]
+    def _edges(self, cells: Ints) -> Floats:
+        """Return the (c, 3, 3) edges of some of the solver's elements from their first
+        corners, as columns."""
+        corners = self.positions_mm[self._cells[cells]]
         return np.swapaxes(
             corners[:, 1:] - corners[:, :1],
             1,
@@ -599,11 +599,19 @@ class ElasticFit:
         before: Floats,
         after: Floats,
         least: float = 0.0,
+        near: Mask | None = None,
     ) -> Floats:
         """Return the (k, 3) places before, of elements that are inverted and faces that
-        cross on the straight way."""
-        inverted = inverted_on_the_way(before, after, self._tets, least)
-        places = [before[self._tets[inverted]].mean(axis=1)]
+        cross on the straight way.
+
+        With `near` (n,), elements without such a vertex are left out, and faces, if
+        none is on the boundary.
+        """
+        tets = self._tets if near is None else self._tets[near[self._tets].any(axis=1)]
+        inverted = inverted_on_the_way(before, after, tets, least)
+        places = [before[tets[inverted]].mean(axis=1)]
+        if near is not None and not near[self._used].any():
+            return places[0]
         facets = self._used[self._surface.faces]
         for part in PARTS_OF_WAY:
             crossing = self._crossing_faces((1 - part) * before + part * after)
@@ -782,8 +790,12 @@ class ElasticFit:
         opened = self._opened(places)
         if opened is places:
             return places
-        n_faults = len(self._faults_between(before, opened))
-        n_faults_before = len(self._faults_between(before, places))
+        has_moved = (opened != places).any(axis=1)
+        # faults elsewhere are the same
+        n_faults, n_faults_before = (
+            len(self._faults_between(before, after, near=has_moved))
+            for after in (opened, places)
+        )
         return places if n_faults > n_faults_before else opened
 
     def _flattening(self) -> Floats:
@@ -794,8 +806,7 @@ class ElasticFit:
         element that has lost volume, and more than these, is elastic as to the
         difference, while the body is without stress otherwise.
         """
-        edges = self._edges()
-        volumes = determinants(edges)
+        volumes = 6 * volumes_between(self.positions_mm, self._cells)
         stretches = np.tile(
             np.eye(3),
             (len(self._cells), 1, 1, 1),
@@ -811,7 +822,7 @@ class ElasticFit:
         near = np.flatnonzero(is_near)
         incidence = self._incidence[:, near]
         logs = log_stretch(
-            edges[near] @ self._inverse_edges[near],
+            self._edges(near) @ self._inverse_edges[near],
             left=True,
         )
         volumes_around = (self._incidence @ volumes)[:, None]

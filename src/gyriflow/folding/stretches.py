@@ -144,9 +144,51 @@ def log_stretch(
     """
     turned = F.swapaxes(-1, -2)
     squared = F @ turned if left else turned @ F
-    logs, axes = _principal_logs(squared)
-    limited = np.clip(logs, -limit, limit)
-    return from_principal(limited, axes)
+    logs = np.empty_like(squared)
+    for chunk in chunks(len(squared)):
+        logs[chunk] = _limited_logs(squared[chunk], limit)
+    return logs
+
+
+def _limited_logs(squared: Floats, limit: float) -> Floats:
+    """Return ½ ln C (c, 3, 3) of symmetric matrices, with eigenvalues up to a limit.
+
+    A polynomial in C through the values at its eigenvalues λ (Newton's form): the three
+    are known from the invariants (Smith 1961, 10.1145/355578.366316), without axes.
+    """
+    ones = np.eye(3)
+    C = squared.transpose(1, 2, 0)
+    mean = (C[0, 0] + C[1, 1] + C[2, 2]) / 3
+    B = C - mean * ones[:, :, None]
+    size = np.sqrt((B**2).sum(axis=(0, 1)) / 6)
+    size = np.maximum(size, 1e-9 * mean)
+    half_det = (B[0] * cofactors_of(B)[0]).sum(axis=0) / (2 * size**3)
+    angle = np.arccos(np.clip(half_det, -1.0, 1.0)) / 3
+    a = 2 * np.cos(angle)
+    c = 2 * np.cos(angle + 2 * np.pi / 3)
+    ends = [a, -a - c, c]
+    logs = []
+    for end in ends:
+        square = np.maximum(mean + size * end, MIN_SQUARED_STRETCH)
+        logs.append(
+            np.clip(
+                0.5 * np.log(square),
+                -limit,
+                limit,
+            )
+        )
+    # of (C - mean) / size
+    a, b, c = ends
+    gaps = [np.maximum(gap, 1e-6) for gap in (a - b, b - c, a - c)]
+    first = (logs[0] - logs[1]) / gaps[0]
+    second = (logs[1] - logs[2]) / gaps[1]
+    curve = (first - second) / gaps[2]
+    unit = B / size
+    near_a = unit - a * ones[:, :, None]
+    near_b = unit - b * ones[:, :, None]
+    products = np.einsum("ije,jke->ike", near_a, near_b)
+    found = logs[0] * ones[:, :, None] + first * near_a + curve * products
+    return found.transpose(2, 0, 1)
 
 
 def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:

@@ -7,7 +7,6 @@ linear program (Amenta, Bern and Eppstein 1999, J. Algorithms 30, 302-322).
 """
 
 import numpy as np
-from scipy.optimize import linprog
 
 from .tetrahedra import FACES, volumes_between
 from .triangles import Floats, Indices
@@ -20,6 +19,9 @@ that is inverted."""
 COST_PER_MM = 1e-3
 """Relative volume that a displacement of 1 mm has to gain: a vertex moves no further
 than that needs."""
+MAX_EXCHANGES, LIMIT_TOL = 100, 1e-9
+"""Largest number of exchanges of constraints in a linear program, and by how much its
+solution may be beyond one."""
 
 
 def open_flat_elements(
@@ -39,17 +41,22 @@ def open_flat_elements(
     """
     places = positions
     left_mm = longest_mm.copy()
+    # a vertex around which nothing has moved stays in the next round
+    may_move = np.ones(len(positions), dtype=bool)
+    ratios = volumes_between(places, tets) / start_volumes
     for _ in range(ROUNDS):
-        ratios = volumes_between(places, tets) / start_volumes
         flat = np.flatnonzero(ratios < least)
         flattest_first = flat[np.argsort(ratios[flat])]
         vertices = tets[flattest_first].ravel()
-        vertices = vertices[left_mm[vertices] > 0]
+        vertices = vertices[(left_mm[vertices] > 0) & may_move[vertices]]
         if not len(vertices):
             break
         if places is positions:
             places = positions.copy()
-        near = np.flatnonzero(np.isin(tets, vertices).any(axis=1))
+        is_near = np.zeros(len(positions), dtype=bool)
+        is_near[vertices] = True
+        near = np.flatnonzero(is_near[tets].any(axis=1))
+        before = places.copy()
         for vertex in dict.fromkeys(vertices.tolist()):
             around = near[(tets[near] == vertex).any(axis=1)]
             move = _best_move(
@@ -62,6 +69,12 @@ def open_flat_elements(
             )
             places[vertex] += move
             left_mm[vertex] -= np.abs(move).max()
+        has_moved = (places != before).any(axis=1)
+        touched = near[has_moved[tets[near]].any(axis=1)]
+        volumes = volumes_between(places, tets[touched])
+        ratios[touched] = volumes / start_volumes[touched]
+        may_move = np.zeros(len(positions), dtype=bool)
+        may_move[tets[touched]] = True
     return places
 
 
@@ -112,19 +125,57 @@ def _best_move(
         stay_positive[:, 3] = 0.0
         rows.append(stay_positive)
         limits.append(np.maximum(ratios - KEPT_RATIO, 0.0))
-    unbounded = (None, None)
-    found = linprog(
-        [0.0, 0.0, 0.0, -1.0, COST_PER_MM],
-        A_ub=np.vstack(rows),
-        b_ub=np.concatenate(limits),
-        bounds=[
-            unbounded,
-            unbounded,
-            unbounded,
-            (None, least),
-            (0.0, longest_mm),
-        ],
+    # the ratio is at most `least`, and the component between 0 and `longest_mm`
+    rows.append(np.eye(5)[[3, 4]])
+    limits.append(np.array([least, longest_mm]))
+    rows.append(-np.eye(5)[[4]])
+    limits.append(np.zeros(1))
+    A = np.vstack(rows)
+    # these are active without any constraint by elements: the vertex stays
+    active = np.array(
+        [
+            count,
+            count + 1,
+            count + 2,
+            len(A) - 3,
+            len(A) - 1,
+        ]
     )
-    # without a solution, by round-off, the vertex stays
-    has_solution = found.status == 0
-    return np.asarray(found.x[:3]) if has_solution else np.zeros(3)
+    found = _least_cost(
+        np.array([0.0, 0.0, 0.0, -1.0, COST_PER_MM]),
+        A,
+        np.concatenate(limits),
+        active,
+    )
+    return np.zeros(3) if found is None else found[:3]
+
+
+def _least_cost(
+    costs: Floats,
+    A: Floats,
+    limits: Floats,
+    active: Indices,
+) -> Floats | None:
+    """Return the (k,) unknowns x of least cost with A·x ≤ limits; None if round-off
+    prevents it.
+
+    The dual simplex method, from k `active` constraints that bound the cost: the one
+    that is violated most takes the place of one of these, until none is. For so few
+    unknowns general solvers take ten times as long.
+    """
+    for _ in range(MAX_EXCHANGES):
+        inverse = np.linalg.inv(A[active])
+        x = inverse @ limits[active]
+        excess = A @ x - limits
+        entering = int(excess.argmax())
+        if excess[entering] <= LIMIT_TOL:
+            return np.asarray(x)
+        multipliers = np.maximum(-costs @ inverse, 0.0)
+        shares = A[entering] @ inverse
+        can_leave = shares > LIMIT_TOL
+        if not can_leave.any():
+            return None
+        quotients = multipliers[can_leave] / shares[can_leave]
+        active = active.copy()
+        active[np.flatnonzero(can_leave)[quotients.argmin()]] = entering
+    return None
