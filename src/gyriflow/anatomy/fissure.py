@@ -4,6 +4,7 @@ touch), left and right sides."""
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import igl
 import numpy as np
@@ -27,14 +28,17 @@ from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask, dil
 SAMPLES = 600
 DIRECTIONS = 400
 STARTS = 5
-# step and tolerance of the search with every third point; then with all, for planes
-# whose mirror distance is at most this multiple of the smallest one plus so many mm
-ROUGH_EVERY, ROUGH_SEARCH = 3, (0.1, 3e-3)
+# step and tolerance of the search with every third point and about so many vertices;
+# then with all, for planes whose mirror distance is at most this multiple of the
+# smallest one plus so many mm
+ROUGH_EVERY, ROUGH_VERTICES, ROUGH_SEARCH = 3, 4000, (0.1, 3e-3)
 FINE_SEARCH, REFINED_FACTOR, REFINED_MM = (0.02, 1e-4), 2.0, 0.3
 # larger leaves than usual: single points are searched, often far from the surface
 LEAF_SIZE = 64
 # starts that lead to the same plane but for this
 SAME_NORMAL, SAME_OFFSET_MM = 1e-3, 0.05
+# the same after the rough search
+NEAR_NORMAL, NEAR_OFFSET_MM = 0.03, 0.5
 # the left-right axis is searched within this angle of the world's x axis
 SEARCH_DEG = 60.0
 # a plane x = const is accepted if its mirror distance is at most this factor of the
@@ -240,6 +244,8 @@ def _symmetry_planes(
 ) -> list[tuple[Floats, float, float]]:
     centre = sample.mean(axis=0)
     few = sample[::ROUGH_EVERY]
+    every = max(1, len(tree.data) // ROUGH_VERTICES)
+    sparse = cKDTree(tree.data[::every], leafsize=LEAF_SIZE)
     # a Fibonacci lattice on the cap of directions around x
     index = np.arange(DIRECTIONS) + 0.5
     along = 1.0 - (1.0 - np.cos(np.radians(SEARCH_DEG))) * index / DIRECTIONS
@@ -259,7 +265,7 @@ def _symmetry_planes(
                 n,
                 float(n @ centre),
                 few,
-                tree,
+                sparse,
             )
             for n in directions
         ]
@@ -279,24 +285,47 @@ def _symmetry_planes(
         )
         for start in starts
     ]
-    rough = [
-        _most_symmetric(np.zeros(3), *ROUGH_SEARCH, frame, few, tree)
-        for frame in frames
-    ]
-    least = min(asymmetry for _, asymmetry in rough)
-    planes: list[tuple[Floats, float, float]] = []
-    for frame, (x, asymmetry) in zip(frames, rough, strict=True):
-        if asymmetry <= REFINED_FACTOR * least + REFINED_MM:
-            x, asymmetry = _most_symmetric(x, *FINE_SEARCH, frame, sample, tree)
-        normal, offset = _plane_near(x, *frame)
-        is_new = all(
-            np.abs(normal - other).max() > SAME_NORMAL
-            or abs(offset - middle) > SAME_OFFSET_MM
-            for other, middle, _ in planes
+    rough: list[tuple[float, Floats, tuple[Floats, Floats, Floats]]] = []
+    for frame in frames:
+        x, _ = _most_symmetric(
+            np.zeros(3),
+            *ROUGH_SEARCH,
+            frame,
+            few,
+            sparse,
         )
-        if is_new:
-            planes.append((normal, offset, asymmetry))
+        # sparse vertices are further away
+        asymmetry = _mirror_distance(*_plane_near(x, *frame), few, tree)
+        rough.append((asymmetry, x, frame))
+    rough.sort(key=itemgetter(0))
+    largest = REFINED_FACTOR * rough[0][0] + REFINED_MM
+    planes: list[tuple[Floats, float, float]] = []
+    for asymmetry, x, frame in rough:
+        plane = _plane_near(x, *frame)
+        if _is_among(planes, *plane, NEAR_NORMAL, NEAR_OFFSET_MM):
+            continue
+        if asymmetry <= largest:
+            x, asymmetry = _most_symmetric(x, *FINE_SEARCH, frame, sample, tree)
+            plane = _plane_near(x, *frame)
+        if not _is_among(planes, *plane, SAME_NORMAL, SAME_OFFSET_MM):
+            planes.append((*plane, asymmetry))
     return planes
+
+
+def _is_among(
+    planes: list[tuple[Floats, float, float]],
+    normal: Floats,
+    offset: float,
+    max_turn: float,
+    max_shift_mm: float,
+) -> bool:
+    """Return whether a plane is one of some planes within a change of its normal and
+    offset."""
+    return any(
+        np.abs(normal - other).max() <= max_turn
+        and abs(offset - middle) <= max_shift_mm
+        for other, middle, _ in planes
+    )
 
 
 def _most_symmetric(
