@@ -264,43 +264,48 @@ def _balls(
             start,
             min(start + CHUNK, len(vertices)),
         )
-        reached = np.zeros(
-            (len(centres), len(vertices)),
-            dtype=bool,
+        middles = vertices[centres]
+        radii = radii_mm[centres, None]
+        # balls are found among the vertices of a box around them all
+        is_near = (vertices > (middles - radii).min(axis=0)) & (
+            vertices < (middles + radii).max(axis=0)
         )
-        found = []
+        near = np.flatnonzero(is_near.all(axis=1))
+        near_links = links[near][:, near]
+        degrees = np.diff(near_links.indptr)
+        width = len(near)
+        reached = np.zeros(len(centres) * width, dtype=bool)
+        last = np.zeros(len(reached), dtype=np.int32)
+        # a vertex of a ball has the place ball · width + column
+        place = np.arange(len(centres)) * width + np.searchsorted(near, centres)
+        reached[place] = True
+        found = [place]
         # at first each centre by itself, then the neighbours of what came last
-        ring = sparse.eye(
-            len(centres),
-            len(vertices),
-            k=start,
-            dtype=bool,
-            format="csr",
+        while len(place):
+            column = place % width
+            counts = degrees[column]
+            first = near_links.indptr[column] - np.cumsum(counts) + counts
+            link = np.repeat(first, counts) + np.arange(counts.sum())
+            place = np.repeat(place - column, counts) + near_links.indices[link]
+            place = place[~reached[place]]
+            # each once: the last of equal places remains
+            number = np.arange(len(place), dtype=np.int32)
+            last[place] = number
+            place = place[last[place] == number]
+            reached[place] = True
+            ball, column = np.divmod(place, width)
+            offset = vertices[near[column]] - middles[ball]
+            squared = np.einsum("ij,ij->i", offset, offset)
+            place = place[squared < radii[ball, 0] ** 2]
+            found.append(place)
+        ball, column = np.divmod(np.concatenate(found), width)
+        shape = (len(centres), len(vertices))
+        yield (
+            centres,
+            sparse.csr_matrix(
+                (np.ones(len(ball), dtype=bool), (ball, near[column])), shape=shape
+            ),
         )
-        while ring.nnz:
-            row = np.repeat(
-                np.arange(len(centres)),
-                np.diff(ring.indptr),
-            )
-            column = ring.indices
-            offset = vertices[column] - vertices[centres[row]]
-            is_new = ~reached[row, column] & (
-                np.einsum("ij,ij->i", offset, offset) < radii_mm[centres[row]] ** 2
-            )
-            row, column = row[is_new], column[is_new]
-            reached[row, column] = True
-            found.append((row, column))
-            ring = (
-                sparse.csr_matrix(
-                    (np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape
-                )
-                @ links
-            )
-        row, column = np.concatenate(found, axis=1)
-        ball = sparse.csr_matrix(
-            (np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape
-        )
-        yield centres, ball
 
 
 def _fit(

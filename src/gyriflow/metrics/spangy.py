@@ -156,7 +156,8 @@ def _sums(basis: Basis, coefficients: Floats) -> Floats:
     """Return the (m, c) sums of the functions with (k, c) coefficients, in the
     precision of the functions: a copy in another would be as large."""
     functions = basis.functions
-    return (functions @ coefficients.astype(functions.dtype)).astype(float)
+    # transposed, since BLAS is twice as fast with a wide matrix on the right
+    return (coefficients.astype(functions.dtype).T @ functions.T).T.astype(float)
 
 
 def _products(basis: Basis, values: Floats) -> Floats:
