@@ -6,6 +6,7 @@ There the nearest white matter changes from one bank to the other (Han et al. 20
 """
 
 import heapq
+import math
 from collections import defaultdict
 from collections.abc import Mapping
 from itertools import product
@@ -205,7 +206,9 @@ def _usual_thickness(
     places `PLACES_MM` apart.
     """
     every = max(1, len(surface) // N_DEPTHS)
-    tree, depth = cKDTree(surface[::every]), depth[::every]
+    # by depth, so that the median of some rows is that of their numbers
+    order = every * np.argsort(depth[::every])
+    tree, depth = cKDTree(surface[order]), depth[order]
     cell = tuple(np.rint(points / PLACES_MM).astype(np.int64).T)
     is_used = np.zeros(
         [axis.max() + 1 for axis in cell],
@@ -217,8 +220,13 @@ def _usual_thickness(
     for rows in tree.query_ball_point(
         PLACES_MM * np.argwhere(is_used),
         NEARBY_MM,
+        return_sorted=True,
     ):
-        median = np.median(depth[rows]) if rows else overall
+        median = overall
+        if rows:
+            middle = 0.5 * (len(rows) - 1)
+            below, above = rows[math.floor(middle)], rows[math.ceil(middle)]
+            median = 0.5 * (depth[below] + depth[above])
         medians.append(min(median, overall))
     thickness = np.zeros(is_used.shape)
     thickness[is_used] = medians
