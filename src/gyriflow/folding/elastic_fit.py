@@ -88,6 +88,9 @@ UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the
 first two where the shape is that of an observed brain), and the distance from these, as
 a multiple of them."""
+FARTHEST = 3.0
+"""Multiple of that distance beyond which nothing is smoothed: the share of the smoothed
+displacement would be 1e-4."""
 MAX_CHANGE_MM = 0.25
 """Largest change of a shape by smoothing around faults, as a root mean square on the
 boundary: shapes that would change more are followed."""
@@ -443,20 +446,25 @@ class ElasticFit:
 
         Elements that lose most of their volume count as faults in the first round only.
         """
-        sizes = vertex_sizes(before, self._pieces)
         displacement = after - before
         least = MIN_VOLUME_ON_WAY
+        faults = self._faults_between(before, after, least)
         for length in lengths_mm:
-            faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
-                return before + displacement, faults
-            near = _nearness(before, faults, length)[:, None]
-            integrals = sizes[:, None] * displacement
-            smooth = smooth_integrals(before, self._pieces, integrals, length)
-            displacement = displacement + near * (smooth - displacement)
-            least = 0.0
-        places = before + displacement
-        return places, self._faults_between(before, places)
+                break
+            nearness = _nearness(before, faults, length)
+            is_near = nearness > 0
+            # elsewhere nothing changes, and there are no faults
+            pieces = self._pieces[is_near[self._pieces].any(axis=1)]
+            integrals = vertex_sizes(before, pieces)[:, None] * displacement
+            smooth = smooth_integrals(before, pieces, integrals, length)
+            displacement += nearness[:, None] * (smooth - displacement)
+            faults = self._faults_between(
+                before,
+                before + displacement,
+                near=is_near,
+            )
+        return before + displacement, faults
 
     def way_from(self, before: Floats) -> list[tuple[float, Floats]]:
         """Return the shapes (n, 3) to pass on the way from an earlier shape to that of
@@ -852,9 +860,13 @@ def _nearness(
     length_mm: float,
 ) -> Floats:
     """Return how near (n, 3) places are to (k, 3) faults: 1 there, and falling off as a
-    Gaussian with `UNTANGLING_REACH` lengths."""
-    distance, _ = cKDTree(faults).query(places)
+    Gaussian with `UNTANGLING_REACH` lengths; 0 beyond `FARTHEST` of these reaches."""
     reach_mm = UNTANGLING_REACH * length_mm
+    # infinite beyond the bound
+    distance, _ = cKDTree(faults).query(
+        places,
+        distance_upper_bound=FARTHEST * reach_mm,
+    )
     return np.asarray(np.exp(-((distance / reach_mm) ** 2)))
 
 
