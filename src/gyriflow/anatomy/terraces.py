@@ -30,7 +30,9 @@ MAX_MOVE_VOXELS = 0.7
 # mm; number of rounds. In voxels², terraces of fine voxels, which are as long, would
 # stay, and coarse voxels would lose folds of 8 mm
 ROUGHNESS_MM2 = 2.048
-ROUNDS = 16
+# as near after ten rounds as after sixteen without over-relaxation
+ROUNDS = 10
+RELAXATION = 1.6
 # compensation of the lost height of folds: for the Gaussian in voxels², for the rounds
 # relative to the roughness weight
 GAUSSIAN_VOXELS2, ROUGHNESS_SHARE = 0.35, 0.14
@@ -52,9 +54,10 @@ def without_terraces(
     affine to mm.
 
     Among surfaces that leave each voxel's centre on its side, the least rough, ∫ |Δ²x|²
-    dA, is approximated by ADMM (Boyd et al. 2011, doi 10.1561/2200000016) with steps (1
-    + t² Δ⁴) x = z. Inverse diffusion restores the height of folds. Vertices that are
-    `fixed` (n,), or of faces that would cross others or degenerate, do not move.
+    dA, is approximated by over-relaxed ADMM (Boyd et al. 2011, section 3.4.3, doi
+    10.1561/2200000016) with steps (1 + t² Δ⁴) x = z. Inverse diffusion restores the
+    height of folds. Vertices that are `fixed` (n,), or of faces that would cross others
+    or degenerate, do not move.
     """
     size = float(np.cbrt(abs(np.linalg.det(voxels[:3, :3]))))
     mass, stiffness = vertex_areas(mesh), stiffness_matrix(mesh.vertices, mesh.faces)
@@ -91,6 +94,7 @@ def without_terraces(
     )
     allowed, error = start, np.zeros_like(start)
     for _ in range(ROUNDS - 1):
+        smooth = RELAXATION * smooth + (1.0 - RELAXATION) * allowed
         height = np.einsum("ij,ij->i", smooth + error - start, normals)
         allowed = start + np.clip(height, lowest, highest)[:, None] * normals
         error += smooth - allowed
