@@ -192,7 +192,10 @@ class _Springs:
         domain = self._domain
         diagonal = np.zeros((domain.n_owned, 3))
         diagonal[self._local] = self._weights
-        rows = np.arange(diagonal.size + 1, dtype=PETSc.IntType)
+        rows = np.arange(
+            diagonal.size + 1,
+            dtype=PETSc.IntType,
+        )
         first_node, _ = domain.space.dofmap.index_map.local_range
         columns = (rows[:-1] + 3 * first_node).astype(PETSc.IntType)
         size = (diagonal.size, 3 * len(domain.positions))
@@ -344,7 +347,10 @@ class ElasticFit:
         goal_volume = signed_volume(self._boundary_at(goal))
         ratio = max(goal_volume / volume, 1e-3)
         of_whole = abs(math.log(ratio))
-        norms = np.linalg.norm(strain, axis=(1, 2))
+        norms = np.linalg.norm(
+            strain,
+            axis=(1, 2),
+        )
         of_elements = float(np.quantile(norms, 0.9))
         mean_strain = max(of_whole, of_elements) / 3
         return max(1, math.ceil(mean_strain / STRAIN_PER_STEP))

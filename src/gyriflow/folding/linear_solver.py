@@ -146,7 +146,10 @@ class TwoLevelPreconditioner:
             self._domain.positions,
             self._part_of_vertex,
         )[self._vertex]
-        self._motions = PartMotions(self._part[own], arms[own])
+        self._motions = PartMotions(
+            self._part[own],
+            arms[own],
+        )
         modes = rigid_motions(arms)
         modes[matrix.fixed] = 0.0
         # Q, with one block in each row, and the transposed rows of this rank
@@ -193,7 +196,10 @@ def _inverse_blocks(blocks: Floats) -> Floats:
     of_a = np.cross(b, c)
     of_b = np.cross(c, a)
     of_c = np.cross(a, b)
-    cofactors = np.stack([of_a, of_b, of_c], axis=1)
+    cofactors = np.stack(
+        [of_a, of_b, of_c],
+        axis=1,
+    )
     determinants = np.einsum("ni,ni->n", a, of_a)
     # Sylvester's criterion
     leading_minors = [

@@ -47,7 +47,10 @@ class FaceTree:
             )
         # all leaves are full: the last of their triangles is there several times
         places = ends[:-1, None] + np.arange(LEAF_SIZE)
-        places = np.minimum(places, ends[1:, None] - 1)
+        places = np.minimum(
+            places,
+            ends[1:, None] - 1,
+        )
         by_leaf = triangles[order[places]]
         self._triangles = np.ascontiguousarray(np.moveaxis(by_leaf, 1, -1))
         corners_of_leaf = by_leaf.reshape(len(places), -1, 3)

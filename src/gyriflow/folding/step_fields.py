@@ -133,7 +133,10 @@ def _von_mises(stress: Floats) -> Floats:
     )
     isotropic = mean[:, None, None] * np.eye(3)
     deviator = stress - isotropic
-    norm = np.linalg.norm(deviator, axis=(1, 2))
+    norm = np.linalg.norm(
+        deviator,
+        axis=(1, 2),
+    )
     return np.sqrt(1.5) * norm
 
 
