@@ -199,7 +199,10 @@ def inverted_on_the_way(
             (last * last_cofactors).sum(axis=(0, 1)),
         ]
         values = np.stack(sums, axis=1) / 3
-        values -= least * np.maximum(values[:, :1], 0.0)
+        values -= least * np.maximum(
+            values[:, :1],
+            0.0,
+        )
         undecided = np.flatnonzero(values.min(axis=1) <= 0)
         for element in undecided:
             inverted[chunk.start + element] = _has_root(*values[element])

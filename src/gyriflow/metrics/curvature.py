@@ -183,7 +183,12 @@ def curvature_metrics(curvature: Curvature, areas: Floats) -> dict[str, float]:
         "gaussian_curvature_norm": np.sqrt(areas.sum() * (gaussian**2 @ areas)),
     }
     found = {name: float(value) / (4.0 * np.pi) for name, value in integrals.items()}
-    quantiles = np.quantile(mean, QUANTILES, weights=areas, method="inverted_cdf")
+    quantiles = np.quantile(
+        mean,
+        QUANTILES,
+        weights=areas,
+        method="inverted_cdf",
+    )
     for share, value in zip(QUANTILES, quantiles, strict=True):
         found[f"mean_curvature_q{round(100 * share):02d}"] = float(value)
     return found
@@ -221,7 +226,10 @@ def _quadrics(
     # neighbours follow each other, so that the balls of a chunk stay in the cache
     order = cKDTree(mesh.vertices).indices
     place = np.argsort(order)
-    mesh = TriangleMesh(mesh.vertices[order], place[mesh.faces])
+    mesh = TriangleMesh(
+        mesh.vertices[order],
+        place[mesh.faces],
+    )
     radii_mm = radii_mm[order]
     (pairs, uses), size = edges(mesh), len(mesh.vertices)
     both = np.concatenate(
@@ -241,7 +249,14 @@ def _quadrics(
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)
     fits = [
         (
-            *_fit(mesh.vertices, normals, areas, radii_mm, centres, balls),
+            *_fit(
+                mesh.vertices,
+                normals,
+                areas,
+                radii_mm,
+                centres,
+                balls,
+            ),
             balls @ boundary,
         )
         for centres, balls in _balls(mesh.vertices, radii_mm, links)

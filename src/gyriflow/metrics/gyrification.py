@@ -177,8 +177,14 @@ def _split_to_size(mesh: TriangleMesh, length_mm: float) -> TriangleMesh:
         )
         start, end, apex = long.transpose(1, 0, 2)
         middle = 0.5 * (start + end)
-        first = np.stack([start, middle, apex], axis=1)
-        second = np.stack([middle, end, apex], axis=1)
+        first = np.stack(
+            [start, middle, apex],
+            axis=1,
+        )
+        second = np.stack(
+            [middle, end, apex],
+            axis=1,
+        )
         remaining = np.concatenate([first, second])
     pieces = np.concatenate(parts)
     faces = np.arange(3 * len(pieces)).reshape(-1, 3)

@@ -61,7 +61,11 @@ def laplacian(
             "vertices without a face have no Laplacian", found=unused, expected=0
         )
     stiffness = stiffness_matrix(mesh.vertices, mesh.faces)
-    matrix = igl.massmatrix(mesh.vertices, mesh.faces, igl.MASSMATRIX_TYPE_FULL)
+    matrix = igl.massmatrix(
+        mesh.vertices,
+        mesh.faces,
+        igl.MASSMATRIX_TYPE_FULL,
+    )
     if mass == "mean":
         matrix = 0.5 * (matrix + sparse.diags(vertex_areas(mesh)))
     return sparse.csc_matrix(stiffness), sparse.csc_matrix(matrix)
@@ -154,7 +158,11 @@ def modes_below(
 
     # the eigenvalues of a surface are evenly spaced (Weyl's law)
     n_slices = max(1, round(count / MODES_PER_SLICE))
-    ends = np.linspace(-_spacing(mass), value, n_slices + 1)
+    ends = np.linspace(
+        -_spacing(mass),
+        value,
+        n_slices + 1,
+    )
     counts = [0]
     for end in ends[1:-1]:
         counts.append(
@@ -186,7 +194,11 @@ def modes_below(
             problem = (
                 f"the modes with λ from {low:g} to {high:g} mm⁻² could not be found"
             )
-            raise SolverError(problem, found=str(error), remedy=SLIVERS) from error
+            raise SolverError(
+                problem,
+                found=str(error),
+                remedy=SLIVERS,
+            ) from error
         eigenvalues[part] = modes.eigenvalues
         functions[order, part] = modes.functions
     return Modes(eigenvalues, functions)
@@ -207,7 +219,10 @@ def _modes_between(
     shift = 0.5 * (low + high)
     solve = _factorise(stiffness, mass, shift, "NATURAL").solve
     size = stiffness.shape[0]
-    max_vectors = min(5 * count + 20 * BLOCK, size - size % BLOCK)
+    max_vectors = min(
+        5 * count + 20 * BLOCK,
+        size - size % BLOCK,
+    )
     # in single precision: vectors that are orthogonal to the root of the rounding of
     # double precision have the same projected operator (Simon 1984, Linear Algebra
     # Appl. 61, 101-131)

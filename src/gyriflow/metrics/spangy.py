@@ -229,7 +229,10 @@ def spectral_basis(
     dispersion = 0.0
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
         copy = decimate(mesh, needed)
-        places = interpolation(match_surface(mesh, copy), len(copy.vertices))
+        places = interpolation(
+            match_surface(mesh, copy),
+            len(copy.vertices),
+        )
         stiffness, matrix = laplacian(copy, mass)
         scale = first / first_eigenvalue(stiffness, matrix)
         dispersion = DISPERSION * (_even_edge(copy) ** 4 - _even_edge(mesh) ** 4)
@@ -457,9 +460,18 @@ def _distances(a: _Profile, b: _Profile) -> list[tuple[str, float, str, str]]:
         else:
             flag = OPEN_AND_CLOSED if a.is_open != b.is_open else "ok"
             end = longest - last
-            octaves = np.linspace(end, longest, 4 * PARTS * last + 1)
+            octaves = np.linspace(
+                end,
+                longest,
+                4 * PARTS * last + 1,
+            )
             difference = _cumulative(a, octaves, end) - _cumulative(b, octaves, end)
-            value = float(np.trapezoid(np.abs(difference), octaves))
+            value = float(
+                np.trapezoid(
+                    np.abs(difference),
+                    octaves,
+                )
+            )
         name = "spectral_distance_B4"
         if last > FOLD_BANDS[0]:
             name += f"_to_B{last}"
