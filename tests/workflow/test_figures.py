@@ -224,7 +224,7 @@ def test_figures_are_drawn_of_these_files(study, figures, recorded):
             params = {
                 name: value
                 for name, value in figure.params.items()
-                if name not in ("modules", "code")
+                if name not in ("modules", "code", "command")
             }
             inputs = {
                 name: [files] if isinstance(files, str) else list(map(str, files))
