@@ -50,7 +50,7 @@ def test_the_preconditioner_is_that_of_the_present_tangent():
     for stiffness in (500.0, 1500.0):
         set_layers(problem, np.full(len(nothing), stiffness), nothing, nothing, up)
         preconditioner = TwoLevelPreconditioner(domain, tangent_at_rest(problem))
-        preconditioner._renew()
+        preconditioner.renew()
         preconditioner.apply(None, r, z)
         results.append(z.array.copy())
     soft, stiff = results
@@ -69,7 +69,7 @@ def test_rigid_motions_of_the_parts_are_solved_by_the_coarse_level():
     preconditioner = TwoLevelPreconditioner(
         problem.domain, tangent, CoarseSettings(max_parts=1)
     )
-    preconditioner._renew()
+    preconditioner.renew()
     force, moved = tangent.matrix.createVecs()
     force.array[:] = np.tile([1e-3, 0.0, 0.0], problem.domain.n_owned)
     preconditioner.apply(None, force, moved)

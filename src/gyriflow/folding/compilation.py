@@ -7,6 +7,7 @@ import platform
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -61,16 +62,16 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
         arguments = [argument for argument in arguments if argument != NATIVE]
     python = f"{sys.version_info.major}.{sys.version_info.minor}"
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    cache = base / "gyriflow" / f"forms-{kind}-{python}"
-    options = {"cffi_extra_compile_args": arguments, "cache_dir": str(cache)}
+    folder = base / "gyriflow" / f"forms-{kind}-{python}"
+    options = {"cffi_extra_compile_args": arguments, "cache_dir": str(folder)}
     with ExitStack() as stack:
         if comm.rank == 0:
-            cache.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
             lock_file(
-                stack.enter_context((cache / "lock").open("w")),
+                stack.enter_context((folder / "lock").open("w")),
                 wait=True,
             )
-            _remove_incomplete_entries(cache)
+            _remove_incomplete_entries(folder)
         comm.barrier()
         yield options
         comm.barrier()
@@ -95,6 +96,13 @@ def compiled(
             with TemporaryDirectory(dir=library.parent) as folder:
                 Path(interface.compile(tmpdir=folder)).rename(library)
     return interface, interface.dlopen(str(library))
+
+
+@cache
+def library_of(module: str, declarations: str) -> tuple[cffi.FFI, Any]:
+    """Return what `compiled` does for the C file beside a Python file, on this rank."""
+    code = Path(module).with_suffix(".c").read_text(encoding="utf-8")
+    return compiled(MPI.COMM_SELF, declarations, code)
 
 
 def pointer(

@@ -113,7 +113,7 @@ class TwoLevelPreconditioner:
         self._fixed = np.flatnonzero(tangent.elastic.matrix.fixed[self._own])
         self._made_at = -settings.lifetime
 
-    def _renew(self) -> None:
+    def renew(self) -> None:
         """Update the diagonal to the present tangent, and the coarse level after
         its lifetime."""
         inverses = _inverse_blocks(self._tangent.diagonal())
@@ -316,7 +316,7 @@ class LinearSolver:
             multilevel.setType("python")
             multilevel.setPythonContext(self._preconditioner)
             self._solution, self._right = tangent.matrix.createVecs()
-        self._preconditioner._renew()
+        self._preconditioner.renew()
         self._cg.setOperators(tangent.matrix)
         self._right.array_w[:] = residual.owned
         self._cg.solve(self._right, self._solution)

@@ -1,15 +1,10 @@
 """Nearest places of a surface that moves in each step, for many points, in C."""
 
-from functools import cache
-from pathlib import Path
-from typing import Any
-
 import numpy as np
-from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, corners
-from .compilation import compiled, pointer
+from .compilation import library_of, pointer
 
 DECLARATION = """
 void nearest_candidates(long count, long width, double factor, void *candidates,
@@ -19,15 +14,6 @@ void lower_distances(long count, long leaves, void *boxes, void *triangles,
 """
 LEAF_SIZE = 8
 """Number of triangles in the smallest boxes."""
-
-
-@cache
-def _library() -> tuple[Any, Any]:
-    return compiled(
-        MPI.COMM_SELF,
-        DECLARATION,
-        Path(__file__).with_suffix(".c").read_text(encoding="utf-8"),
-    )
 
 
 class FaceTree:
@@ -78,7 +64,7 @@ class FaceTree:
     def distance(self, points: Floats, at_most: Floats) -> Floats:
         """Return the distances (k,) of points (k, 3) from the surface, if they are not
         longer than known ones (k,)."""
-        interface, code = _library()
+        interface, code = library_of(__file__, DECLARATION)
         points = np.ascontiguousarray(points)
         squared = at_most**2
         count = len(points)
@@ -114,7 +100,7 @@ def nearest_candidates(
 
     Its squared distance is then larger by at most the relative `tolerance`.
     """
-    interface, code = _library()
+    interface, code = library_of(__file__, DECLARATION)
     candidates = np.ascontiguousarray(candidates, dtype=np.int64)
     points = np.ascontiguousarray(points)
     count, width = candidates.shape

@@ -5,18 +5,13 @@ A linear solve leaves at least a thousandth of its right-hand side, so that seve
 are enough.
 """
 
-from functools import cache
-from pathlib import Path
-from typing import Any
-
 import dolfinx
 import numpy as np
 from dolfinx.common import IndexMap
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints
-from .compilation import compiled, pointer
+from .compilation import library_of, pointer
 
 DECLARATION = """
 void to_single_blocks(long count, void *entries, void *values, void *blocks);
@@ -29,15 +24,6 @@ void multiply_blocks(long count, void *blocks, void *x, void *y);
 """
 
 
-@cache
-def _library() -> tuple[Any, Any]:
-    return compiled(
-        MPI.COMM_SELF,
-        DECLARATION,
-        Path(__file__).with_suffix(".c").read_text(encoding="utf-8"),
-    )
-
-
 def _call(
     function: str,
     count: int,
@@ -46,7 +32,7 @@ def _call(
 ) -> None:
     """Call a function with arrays, the type of each and the least number of its values;
     one of them is `written`."""
-    interface, code = _library()
+    interface, code = library_of(__file__, DECLARATION)
     pointers = []
     for array, dtype, size in arrays:
         pointers.append(

@@ -185,7 +185,7 @@ def _fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
     points_a = _some_points(mesh)
     points_b = _some_points(onto)
 
-    def _find_planes(rotation: Floats, shift: Floats) -> Planes:
+    def find_planes(rotation: Floats, shift: Floats) -> Planes:
         moved_a = points_a @ rotation.T + shift
         on_b, normals_b = nearest_of_b(moved_a)
         # points of b are moved back to the original place of a
@@ -200,7 +200,7 @@ def _fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         residuals.append(float(np.linalg.norm(distances)))
         return Planes(points, normals, distances)
 
-    def _is_converged(
+    def is_converged(
         points: Floats,
         turn: Floats,
         move: Floats,
@@ -217,9 +217,9 @@ def _fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
     rotation, shift = follow_planes(
         np.eye(3),
         points_b.mean(axis=0) - points_a.mean(axis=0),
-        _find_planes,
+        find_planes,
         MAX_ROUNDS,
-        _is_converged,
+        is_converged,
     )
     return motion(rotation, shift)
 
