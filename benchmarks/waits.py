@@ -1,15 +1,20 @@
-"""Compare what the steps of a study take with two checkouts, and their metrics.
+"""Compare what a command takes with two checkouts, step by step, and its metrics.
 
     git worktree add ../before 45cdf8ba
     ./run python benchmarks/waits.py CONFIG --before ../before --out FOLDER \\
-        [--command measure] [--stage STAGE] [--repeats 5]
+        [--command measure] [--stage STAGE] [--cores 1] [--repeats 5]
 
-CONFIG is a configuration, for example of one brain from labels. Both checkouts make its
-study at the same time, so that they have the same load, on one core each and in new
-folders in FOLDER, by `./run gyriflow COMMAND CONFIG --cores 1`, up to the STAGE or the
-file of this name if there is one. For each kind of step, and run: processor time as its
-steps have recorded it, with child processes (s; median, smallest and largest of the
-repeats), and the largest memory (MiB).
+CONFIG is a configuration, for example of one brain from labels; one in this checkout
+stands for that of each checkout. `--command` is `measure`, `run`, `check` or `init`,
+which needs the folder of the scans instead. Both checkouts run it in new folders in
+FOLDER, up to the STAGE or the file of this name if there is one: on one core each at
+the same time, so that they have the same load, and on several cores in turn.
+
+The first table has, for each kind of step and run, processor time as its steps have
+recorded it, with child processes (s; median, smallest and largest of the repeats), and
+the largest memory (MiB). Rows `whole` are of the command with all its processes, and
+`wall` their time by the clock. `check` and `init` have no steps; they are repeated at
+once, as `again`, with what they keep of the files that they have read.
 
 Of the metrics of measured brains the last table has the largest differences, relative
 to the value but for metrics that may be negative, and in units of the noise: one
@@ -20,9 +25,12 @@ stage before metrics has no tables. The last line is one JSON object.
 """
 
 import argparse
+import os
 import shutil
 import subprocess
+import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +44,8 @@ from gyriflow.quantities import METRICS
 from gyriflow.shipped import SHIPPED
 from gyriflow.step import read_usage
 
+READING = ("check", "init")
+COMMANDS = ("measure", "run", *READING)
 COMPARED = (
     "area_difference",
     "volume_difference",
@@ -50,22 +60,93 @@ N_DIFFERENCES = 10
 """Metrics in the table of differences, the largest in units of the noise first."""
 
 
-def make_studies(
-    folders: Mapping[Path, Path], command: str, config: Path, stages: Sequence[str]
-) -> None:
-    """Make a study with each checkout in its folder up to its stages, all at the same
-    time; CalledProcessError if a step fails."""
-    further = [f"--stage={stage}" for stage in stages]
-    processes = []
+@dataclass(frozen=True)
+class Command:
+    """A command for a configuration, or a folder of scans, with arguments of its
+    own."""
+
+    name: str
+    config: Path
+    cores: int
+    stages: Sequence[str]
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether it has no steps, and keeps what it has read."""
+        return self.name in READING
+
+    def arguments(self, checkout: Path, folder: Path) -> list[str]:
+        """Return the program and its arguments in a checkout, for a study in a
+        folder."""
+        config = self.config
+        if config.is_relative_to(ROOT):
+            config = checkout / config.relative_to(ROOT)
+        program = ["./run", "gyriflow", self.name, str(config)]
+        if self.name == "init":
+            return [*program, "--output", str(folder / "gyriflow.yaml"), "--force"]
+        stages = [f"--stage={stage}" for stage in self.stages]
+        return [*program, "-d", str(folder), "--cores", str(self.cores), *stages]
+
+
+def start(command: Command, checkout: Path, folder: Path) -> subprocess.Popen:
+    """Start a command of a checkout in a folder."""
+    environment = dict(os.environ)
+    if command.is_reading:
+        environment["XDG_CACHE_HOME"] = str(folder / "cache")
+    return subprocess.Popen(
+        command.arguments(checkout, folder),
+        cwd=checkout,
+        env=environment,
+        stdout=subprocess.DEVNULL if command.is_reading else None,
+    )
+
+
+def wait_for(process: subprocess.Popen) -> float:
+    """Wait for a process; return its processor time with that of its children (s);
+    CalledProcessError if it fails."""
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, process.args)
+    return usage.ru_utime + usage.ru_stime
+
+
+def take_times(
+    command: Command, folders: Mapping[Path, Path]
+) -> dict[Path, dict[str, float]]:
+    """Run a command with each checkout in its folder; return by checkout processor time
+    as `whole`, and time by the clock as `wall` if they run in turn."""
+    if command.cores == 1:
+        running = {
+            checkout: start(command, checkout, folder)
+            for checkout, folder in folders.items()
+        }
+        return {
+            checkout: {"whole": wait_for(process)}
+            for checkout, process in running.items()
+        }
+    times = {}
     for checkout, folder in folders.items():
+        started = time.monotonic()
+        cpu_s = wait_for(start(command, checkout, folder))
+        times[checkout] = {"whole": cpu_s, "wall": time.monotonic() - started}
+    return times
+
+
+def make_studies(
+    command: Command, folders: Mapping[Path, Path]
+) -> dict[Path, dict[str, float]]:
+    """Run a command with each checkout in its folder, made anew, and reading commands
+    once more; return the times by checkout and name."""
+    for folder in folders.values():
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        program = ["./run", "gyriflow", command, str(config), "-d", str(folder)]
-        program += ["--cores", "1", *further]
-        processes.append(subprocess.Popen(program, cwd=checkout))
-    for process in processes:
-        if process.wait():
-            raise subprocess.CalledProcessError(process.returncode, process.args)
+    times = take_times(command, folders)
+    if command.is_reading:
+        for checkout, again in take_times(command, folders).items():
+            for name, seconds in again.items():
+                times[checkout][f"{name}, again"] = seconds
+    return times
 
 
 def differences_of_runs(folders: Sequence[Path]) -> list[dict[str, Any]]:
@@ -81,9 +162,13 @@ def differences_of_runs(folders: Sequence[Path]) -> list[dict[str, Any]]:
 
 
 def steps_in(folder: Path) -> pd.DataFrame:
-    """Return what the steps of a study took: a row per kind of step and run with cpu_s
-    and memory_MiB."""
-    steps = pd.DataFrame(read_usage(folder)).groupby(["rule", "run"])
+    """Return what the steps of a study took: rule, run, cpu_s and memory_MiB of each
+    kind of step and run."""
+    used = pd.DataFrame(
+        read_usage(folder),
+        columns=["rule", "run", "cpu_s", "memory_MiB"],
+    )
+    steps = used.groupby(["rule", "run"], as_index=False)
     return steps.agg({"cpu_s": "sum", "memory_MiB": "max"})
 
 
@@ -124,28 +209,42 @@ def main() -> None:
     parser.add_argument("config", type=Path)
     parser.add_argument("--before", type=Path, metavar="CHECKOUT", required=True)
     parser.add_argument("--out", type=Path, metavar="FOLDER", required=True)
-    parser.add_argument("--command", default="measure", choices=["measure", "run"])
+    parser.add_argument("--command", default="measure", choices=COMMANDS)
     parser.add_argument("--stage", action="append", default=[])
+    parser.add_argument("--cores", type=int, default=1)
     parser.add_argument("--repeats", type=int, default=1)
     arguments = parser.parse_args()
-    config = arguments.config.resolve()
+    command = Command(
+        arguments.command,
+        arguments.config.resolve(),
+        arguments.cores,
+        arguments.stage,
+    )
     out = arguments.out.resolve()
     checkouts = {"before": arguments.before.resolve(), "now": ROOT}
     parts = []
     for repeat in range(arguments.repeats):
         folders = {name: out / f"{name}-{repeat}" for name in checkouts}
         studies = {checkouts[name]: folder for name, folder in folders.items()}
-        make_studies(studies, arguments.command, config, arguments.stage)
+        times = make_studies(command, studies)
         for name, folder in folders.items():
-            parts.append(steps_in(folder).assign(checkout=name))
+            whole = [
+                {"rule": kind, "run": "", "cpu_s": seconds}
+                for kind, seconds in times[checkouts[name]].items()
+            ]
+            steps = pd.concat([steps_in(folder), pd.DataFrame(whole)])
+            parts.append(steps.assign(checkout=name))
     rows = []
-    steps = pd.concat(parts).reset_index()
+    steps = pd.concat(parts)
     kinds = ["rule", "run", "checkout"]
     for (rule, run, name), taken in steps.groupby(kinds, sort=False):
         seconds = taken["cpu_s"]
-        row = {"step": rule, "run": run, "checkout": name, "cpu_s": seconds.median()}
+        row = {"step": rule, "run": run, "checkout": name, "s": seconds.median()}
         row |= {"smallest": seconds.min(), "largest": seconds.max()}
-        rows.append(row | {"memory_MiB": taken["memory_MiB"].max()})
+        memory = taken["memory_MiB"].dropna()
+        if len(memory):
+            row["memory_MiB"] = memory.max()
+        rows.append(row)
     firsts = [out / f"{name}-0" for name in checkouts]
     runs = differences_of_runs(firsts)
     if runs:
