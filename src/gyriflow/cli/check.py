@@ -442,4 +442,7 @@ def _fits(
 
 
 def _memory_text(mib: float) -> str:
-    return f"{mib / 1024:.1f} GB" if mib >= 100 else f"{mib:.0f} MB"
+    megabytes = mib * 1024**2 / 1e6
+    if megabytes < 100:
+        return f"{megabytes:.0f} MB"
+    return f"{megabytes / 1000:.1f} GB"

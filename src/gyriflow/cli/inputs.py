@@ -27,6 +27,7 @@ from ..geometry.triangles import (
     signed_volume,
     transformed,
 )
+from ..grouping import counted
 from ..io.downloads import require_checksums
 from ..io.surfaces import (
     read_hemispheres,
@@ -326,7 +327,7 @@ def _check_regions(regions: GivenRegions, affine_from: AffineSource) -> None:
             raise InputError(
                 "does not belong to its surface",
                 path=path,
-                found=f"{len(labels)} labels",
+                found=counted(len(labels), "label"),
                 expected=(
                     f"{len(surface.vertices)}, the number of vertices of {surface_path}"
                 ),

@@ -26,6 +26,7 @@ from ..formats import (
     is_volume,
     side_in_name,
 )
+from ..grouping import counted
 from ..io.files import files_in, reading
 from ..io.made_files import is_own_data_set
 from ..io.yaml_files import SCHEMES
@@ -313,7 +314,7 @@ def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
         "tissue label volumes (.nii.gz), or surfaces with left and right or pial in"
         " their names"
     )
-    lines = [f"{len(reasons)} files"]
+    lines = [counted(len(reasons), "file")]
     for file, reason in list(reasons.items())[:10]:
         lines.append(f"  {file}: {reason}")
     if len(reasons) > 10:
@@ -939,7 +940,9 @@ def recognise_brain(
             )
         )
     if white and len(white) != len(files):
-        problem = f"--white: found {len(white)} surfaces for {len(files)} pial ones"
+        problem = (
+            f"--white: found {counted(len(white), 'surface')} for {len(files)} pial"
+        )
         raise InputError(
             problem,
             expected="one for each: of the left and the right, or of the whole brain",

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from ..errors import SolverError
 from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh, radius_ratios
 from ..geometry.triangles import Floats
+from ..grouping import counted
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, write_frame
 from ..settings.folding import FoldingParameters
@@ -113,7 +114,8 @@ def run(
     _report_flat_elements(mesh, state.positions * MM_PER_M, reached)
     if diverged is not None:
         log.warning("the run diverges and ends at GW %.3f: %s", reached, diverged)
-    print_line(f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s")
+    n_steps = counted(len(state.rows), "step")
+    print_line(f"folded to GW {reached:g} in {n_steps}, {seconds:.0f} s")
 
 
 def _simulate(

@@ -22,6 +22,7 @@ from ..geometry.jacobians import determinants
 from ..geometry.paths import Path, path_through
 from ..geometry.tetrahedra import has_volume, volumes_between
 from ..geometry.triangles import Mask
+from ..grouping import counted
 from ..settings.folding import AXES, FoldingParameters
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
@@ -196,8 +197,8 @@ def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:
     n_held = max(row["held_elements"] for row in rows)
     if n_held:
         warnings.append(
-            f"up to GW {last['week']:g} at most {n_held} elements in a step grow less"
-            " than their path asks for, which would bend or invert them"
+            f"up to GW {last['week']:g} the path would bend or invert at most"
+            f" {counted(n_held, 'element')} in a step: growth there is less"
         )
     return warnings
 

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..geometry.matching import labels_at, match_surface
 from ..geometry.triangles import Floats, Indices, Ints, TriangleMesh
+from ..grouping import counted
 from ..settings.terms import NO_REGION
 
 log = logging.getLogger(__name__)
@@ -133,7 +134,7 @@ def regions_from_surface(
     if len(regions) != len(surface.vertices):
         raise InputError(
             "labels do not belong to their surface",
-            found=f"{len(regions)} labels",
+            found=counted(len(regions), "label"),
             expected=f"{len(surface.vertices)}, the number of its vertices",
         )
     match = match_surface(target, surface)

@@ -36,6 +36,7 @@ from ..geometry.deformations import (
 )
 from ..geometry.poses import LPS_TO_RAS
 from ..geometry.triangles import Floats, Indices, Mask
+from ..grouping import counted
 
 log = logging.getLogger(__name__)
 
@@ -236,9 +237,9 @@ def _require_whole(inside: Mask) -> None:
     cut = []
     for axis, name in enumerate("ijk"):
         for end, place in ((0, "0"), (-1, "last")):
-            count = np.count_nonzero(inside.take(end, axis=axis))
+            count = int(np.count_nonzero(inside.take(end, axis=axis)))
             if count > allowed:
-                cut.append(f"{count} voxels at {name} = {place}")
+                cut.append(f"{counted(count, 'voxel')} at {name} = {place}")
     if cut:
         raise InputError(
             "the edge of the volume cuts the cerebrum, so it cannot be registered",

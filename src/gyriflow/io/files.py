@@ -24,6 +24,7 @@ import numpy as np
 
 from ..errors import InputError, StorageError
 from ..formats import START_BYTES, foreign_format
+from ..grouping import counted
 from ..settings.base import absent_content, hint_for_missing
 
 if TYPE_CHECKING:
@@ -308,7 +309,7 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
             raise InputError(
                 "has a row that is longer than its heading",
                 path=path,
-                found=f"{len(cells)} cells in row {number}",
+                found=f"{counted(len(cells), 'cell')} in row {number}",
                 expected=f"{len(head)}, as in the heading",
             )
         row: dict[str, str] = {}

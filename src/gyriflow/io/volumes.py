@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..formats import VOLUME_SUFFIXES, format_of
 from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats
+from ..grouping import counted
 from ..settings.schemes import LabelScheme
 from ..settings.terms import AffineSource
 from ..units import ML_PER_MM3
@@ -535,7 +536,7 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
                 f" {MAX_LABEL_ERROR:g}",
                 path=path,
                 found=(
-                    f"{np.count_nonzero(broken)} voxels, for example"
+                    f"{counted(int(broken.sum()), 'voxel')}, for example"
                     f" {values[broken][0]:.4g}"
                 ),
                 remedy=(

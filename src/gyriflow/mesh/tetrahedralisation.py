@@ -27,6 +27,7 @@ from ..geometry.triangles import (
     order_along_curve,
     signed_volume,
 )
+from ..grouping import counted
 from ..settings.terms import Mesher
 from .improvement import improve_flat_elements
 from .meshers import run_mesher
@@ -188,20 +189,20 @@ def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
     volumes = signed_volumes(mesh)
     n_inverted = int((volumes <= 0).sum())
     if n_inverted:
-        faults.append(f"{n_inverted} inverted elements")
+        faults.append(counted(n_inverted, "inverted element"))
     boundary, _ = boundary_surface(mesh)
     _, n_faces = edges(boundary)
     n_open = int((n_faces != 2).sum())
     if n_open:
-        faults.append(f"{n_open} edges of its surface without two faces")
+        faults.append(f"{counted(n_open, 'edge')} of its surface without two faces")
     volume = volumes.sum()
     expected = signed_volume(surface)
     if abs(volume - expected) > OTHER_VOLUME * expected:
         faults.append(f"volume {volume:.0f} mm3 instead of {expected:.0f}")
-    n_parts = face_components(boundary).max() + 1
+    n_parts = int(face_components(boundary).max()) + 1
     expected_parts = face_components(surface).max() + 1
     if n_parts != expected_parts:
-        faults.append(f"{n_parts} parts instead of {expected_parts}")
+        faults.append(f"{counted(n_parts, 'part')} instead of {expected_parts}")
     euler = euler_number(boundary)
     expected_euler = euler_number(surface)
     if euler != expected_euler:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import InputError
+from ..grouping import counted
 from ..quantities import COMPARED_MAPS, VERTEX_MAPS, Shown, metrics_shown
 from ..settings.terms import SIDES
 from .labels import parameter_label, plain, with_unit
@@ -128,7 +129,7 @@ def nearest_figure(
     rows = rows.dropna(subset="distance")
     if rows.empty:
         raise InputError(
-            "no distance to an observed brain", found=f"{len(comparison)} rows"
+            "no distance to an observed brain", found=counted(len(comparison), "row")
         )
     trusted = (rows["resolution"] == "ok") & (rows["flag"] == "ok")
     rows = rows.assign(at=rows[varied], trusted=trusted)

@@ -136,9 +136,8 @@ class RunDisplay:
                 self.total = sum(jobs.values())
                 works = [_seconds(job.rule, job.wildcards) for job in session.jobs]
                 self.bar.update(self.task.id, total=sum(works) or self.total)
-                self.console.print(
-                    f"gyriflow: {self.total} steps to run; log: {self.details}"
-                )
+                n_steps = counted(self.total, "step")
+                self.console.print(f"gyriflow: {n_steps} to run; log: {self.details}")
                 self.bar.start()
             case "job_info":
                 wildcards = dict(event["wildcards"] or {})

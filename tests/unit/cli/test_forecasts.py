@@ -119,14 +119,14 @@ RATES = planned("simulate", [SHAPES], threads=2, run="rates", brain="a")
 def forecast(monkeypatch, tmp_path):
     """Return the lines on some jobs on a number of cores, whose times are `HOURS` and
     whose foldings need 20 and 30 GB."""
-    memory_gib = {"expected": 20, "rates": 30}
+    memory_mib = {"expected": 20e9 / 2**20, "rates": 30e9 / 2**20}
     monkeypatch.setattr(
         checking, "job_seconds", lambda _, rule, __: 3600 * HOURS.get(rule, 0)
     )
     monkeypatch.setattr(
         checking,
         "simulation_needs",
-        lambda folding, _: Needs(5 * 3600, 1024 * memory_gib[folding.run], 0),
+        lambda folding, _: Needs(5 * 3600, memory_mib[folding.run], 0),
     )
 
     def lines(jobs, cores=1, reason=REASON):
