@@ -23,7 +23,16 @@ from gyriflow.version import RELEASE
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
-GROUND = {"errors", "units", "quantities", "formats", "names", "splines", "grouping"}
+GROUND = {
+    "errors",
+    "units",
+    "quantities",
+    "formats",
+    "names",
+    "splines",
+    "grouping",
+    "memory",
+}
 PLAIN = GROUND | {"geometry", "settings"}
 """What every room may import: errors and messages, units, quantities, formats of files,
 plain geometry and settings."""
@@ -34,12 +43,13 @@ ARROWS = {
     "formats": set(),
     "names": {"errors"},
     "grouping": set(),
+    "memory": set(),
     "splines": set(),
     "code_hash": set(),
     "shipped": set(),
     "version": {"shipped"},
     "messages": {"errors"},
-    "step": {"errors", "messages"},
+    "step": {"errors", "memory", "messages"},
     # names of label schemes and atlases are names of shipped files
     "settings": GROUND | {"shipped"},
     "geometry": {"errors", "units"},

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import psutil
 
 from .errors import StorageError
+from .memory import collect_rarely
 from .messages import (
     INTERRUPTED,
     KILLED,
@@ -123,6 +124,7 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     `.snakemake/log`. The message of an error that names no file begins with the step's
     `inputs`.
     """
+    collect_rarely()
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
     handlers = [logging.FileHandler(log, mode="w"), MessageHandler(log)]
     logging.basicConfig(

@@ -16,6 +16,7 @@ from click.core import ParameterSource
 
 from ..errors import GyriflowError, InputError
 from ..grouping import counted, grouped
+from ..memory import collect_rarely
 from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED, shipped_atlases
 
@@ -248,6 +249,7 @@ def main() -> None:
       gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
       gyriflow predict LEFT RIGHT --week 22.4 --until 30 --atlas crl
     """
+    collect_rarely()
 
 
 @main.command()

@@ -39,6 +39,7 @@ from ..errors import GyriflowError, InputError, StorageError
 from ..io.files import read_json, write_json
 from ..io.locks import UNLOCKABLE, lock_file
 from ..io.yaml_files import read_keys
+from ..memory import collect_rarely
 from ..messages import Message, study_messages
 from ..settings.base import did_you_mean
 from ..shipped import DEMO, SHIPPED
@@ -734,6 +735,7 @@ if __name__ == "__main__":
     # same locks
     from gyriflow.running.launch import main
 
+    collect_rarely()
     try:
         sys.exit(main(sys.argv[1:]))
     except GyriflowError as error:
