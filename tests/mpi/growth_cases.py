@@ -114,7 +114,7 @@ def test_thickness_and_stiffness_of_a_step_are_those_of_its_middle(mesh, monkeyp
     part = 2.5 / 7
     # to the triangles, however far a node is from the nearest vertex
     search = PialSearch(mesh.vertices, zones.cortex_facets)
-    depth_mm = search.distance(mesh.vertices)[tissue.elements.vertices]
+    depth_mm, _ = search.nearest(mesh.vertices[tissue.elements.vertices])
     if mesh.order == 2:
         points = folding.problem.points
         depth_mm = depth_mm[tissue.elements.cells] @ points.interpolation.T

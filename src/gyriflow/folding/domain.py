@@ -51,9 +51,11 @@ def gather(
 ) -> Floats:
     """Return on every rank the (n, ...) values of all ranks; `order` (n,) has the index
     of each, rank by rank."""
-    received = np.empty((len(order), *values.shape[1:]))
-    sizes = comm.allgather(values.size)
-    comm.Allgatherv(np.ascontiguousarray(values), (received, sizes))
+    received = values
+    if comm.size > 1:
+        received = np.empty((len(order), *values.shape[1:]))
+        sizes = comm.allgather(values.size)
+        comm.Allgatherv(np.ascontiguousarray(values), (received, sizes))
     result = np.empty_like(received)
     result[order] = received
     return result

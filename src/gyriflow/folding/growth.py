@@ -228,7 +228,7 @@ def model_fields(
     growth in a step) and the normals (n, 3) of the pial surface at the nearest points.
     """
     pial = PialSearch(positions_mm, zones.cortex_facets)
-    distance_mm = pial.distance(positions_mm)
+    distance_mm, _ = pial.nearest(positions_mm)
     thickness_mm = value_at(growth.parameters.thickness_mm, week, {})
     weight = cortical_weight(distance_mm, thickness_mm)
     tissue = Tissue.at_vertices(positions_mm, zones, distance_mm, weight, {})

@@ -5,6 +5,8 @@ Every rank builds the same search structures from the same pial positions, so th
 fields do not depend on the number of ranks.
 """
 
+from functools import cached_property
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -26,8 +28,8 @@ from ..settings.varying import Maps, value_at
 from .nearest_faces import FaceTree, nearest_candidates
 
 WEIGHT_REACH = 3.0
-"""Depth in cortical thicknesses beyond which the cortical weight, below 1e-8, is taken
-as 0."""
+"""Depth in cortical thicknesses beyond which depth need not be exact, as the cortical
+weight is below 1e-8."""
 TIE_TOL = 1e-9
 """Relative difference below which two distances count as equal."""
 
@@ -61,35 +63,21 @@ class PialSearch:
         whole = TriangleMesh(positions, facets)
         self.surface, self.pial = used_part(whole)
         self.normals = vertex_normals(self.surface)
-        vertices = self.surface.vertices
-        self.tree = cKDTree(vertices)
         # to choose among equally near vertices
-        self._rank = coordinate_ranks(vertices)
+        self._rank = coordinate_ranks(self.surface.vertices)
 
-    def distance(
-        self,
-        points: Floats,
-        reach: float = np.inf,
-        to_vertex: Floats | None = None,
-    ) -> Floats:
-        """Return the distances of (k, 3) points to the pial triangles.
+    @cached_property
+    def _faces(self) -> FaceTree:
+        return FaceTree(self.surface)
 
-        To save time, a distance beyond `reach` may be the one to the nearest vertex,
-        which is not smaller. `to_vertex` are the distances to the nearest vertices, if
-        they have been computed before.
-        """
-        if to_vertex is None:
-            to_vertex, _ = self.tree.query(points)
-        distance = to_vertex.copy()
-        # a point at a vertex is on the surface, at exactly 0
-        near = (distance > 0) & self._within(distance, reach)
-        if near.any():
-            faces = FaceTree(self.surface)
-            distance[near] = faces.distance(
-                points[near],
-                distance[near],
-            )
-        return distance
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.surface.vertices)
+
+    def nearest(self, points: Floats) -> tuple[Floats, Ints]:
+        """Return the distances of (k, 3) points to the pial triangles, and their
+        nearest pial vertices."""
+        return self._faces.nearest(points)
 
     def distance_and_normals(
         self, points: Floats, reach: float
@@ -100,7 +88,7 @@ class PialSearch:
         Normals are linear in each triangle between those of its vertices. Beyond
         `reach` the nearest vertex may be taken for the nearest point.
         """
-        distance, vertex = self.tree.query(points)
+        distance, vertex = self._tree.query(points)
         normals = self.normals[vertex]
         near = self._within(distance, reach)
         if near.any():
@@ -184,5 +172,5 @@ class PialSearch:
         count = min(8, len(self.pial))
         # a list of ranks, so that also one neighbour is a column
         ranks = range(1, count + 1)
-        _, candidates = self.tree.query(points, k=ranks)
+        _, candidates = self._tree.query(points, k=ranks)
         return self.normals_from(points, candidates)

@@ -42,6 +42,12 @@ double assemble(long count, double bulk_to_shear, const int32_t (*cells)[4], con
                 G[a][i][l] = G_inverse[e][a][i];
             }
         }
+        // the blocks arrive while all else is computed
+        if (blocks) EACH(l, lanes) EACH(a, 4) for (int d = a; d < 4; d++) {
+            int32_t upper = places[first + l][a][d], mirrored = places[first + l][d][a];
+            const char *block = (const char *)blocks[upper >= 0 ? upper : mirrored];
+            __builtin_prefetch(block, 1), __builtin_prefetch(block + 64, 1);
+        }
         v six = cofactors(edge, normal);
         EACH(a, 3) EACH(j, 3)
             b[a + 1][j] = (normal[a][0] * G[0][j] + normal[a][1] * G[1][j] + normal[a][2] * G[2][j]) / six;

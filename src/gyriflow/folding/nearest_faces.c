@@ -1,8 +1,9 @@
-// Nearest of a few vertices; distances to the nearest of many triangles, eight at a time, by a tree of boxes around them.
+// Nearest of a few vertices; nearest of many triangles and vertices, eight at a time, by a tree of boxes around them.
 
 #include <stdint.h>
 #define W 8
 #define DEPTH 64
+#define ROUND_OFF (1 + 1e-12)
 #define EACH for (int i = 0; i < 3; i++)
 
 static inline double smaller(double a, double b) { return a < b ? a : b; }
@@ -52,34 +53,53 @@ void nearest_candidates(long count, long width, double factor, const int64_t *ca
     }
 }
 
-// Lowers the `squared` distances of points to those of the nearest triangle, if that is nearer. Box 1 contains all
-// triangles, 2 k and 2 k + 1 are the halves of box k, and the last `leaves` boxes contain eight triangles each.
-void lower_distances(long count, long leaves, const double (*boxes)[2][3], const double (*triangles)[3][3][W],
-                     const double (*points)[3], double *squared) {
+// Sets for each point the squared distance of the nearest triangle, and the nearest vertex: of equally near ones the
+// first. Box 1 contains all triangles, 2 k and 2 k + 1 are the halves of box k, and the last `leaves` boxes contain
+// eight triangles each, with `corners` among the vertices.
+void nearest_places(long count, long leaves, const double (*boxes)[2][3], const double (*triangles)[3][3][W],
+                    const int64_t (*corners)[3][W], const double (*vertices)[3], const double (*points)[3],
+                    double *squared, int64_t *nearest) {
+    int64_t vertex = corners[0][0][0];
     for (long k = 0; k < count; k++) {
+        // the last point is probably near, so that its vertex is a bound, but for round-off
+        double gap[3], to_face, to_vertex, reach, own = 0, far[DEPTH];
         const double *p = points[k];
-        double nearest = squared[k], far[DEPTH];
+        EACH gap[i] = vertices[vertex][i] - p[i];
+        to_face = to_vertex = ROUND_OFF * dot(gap, gap), reach = ROUND_OFF * to_vertex;
         long stack[DEPTH], top = 0, box = 1;
         while (box) {
             if (box < leaves) {
                 double first = to_box(p, boxes[2 * box]), second = to_box(p, boxes[2 * box + 1]);
                 long nearer = 2 * box + (second < first);
-                if (larger(first, second) < nearest) far[top] = larger(first, second), stack[top++] = nearer ^ 1;
-                if (smaller(first, second) < nearest) {
-                    box = nearer;
+                if (larger(first, second) <= reach) far[top] = larger(first, second), stack[top++] = nearer ^ 1;
+                if (smaller(first, second) <= reach) {
+                    own = smaller(first, second), box = nearer;
                     continue;
                 }
             } else {
-                double found[W];
-                for (int l = 0; l < W; l++) {
-                    double corner[3][3];
-                    for (int m = 0; m < 3; m++) EACH corner[m][i] = triangles[box - leaves][m][i][l];
-                    found[l] = to_triangle(p, corner[0], corner[1], corner[2]);
+                const double (*triangle)[3][W] = triangles[box - leaves];
+                double found[3][W], least = to_vertex;
+                for (int m = 0; m < 3; m++) for (int l = 0; l < W; l++) {
+                    double x = triangle[m][0][l] - p[0], y = triangle[m][1][l] - p[1], z = triangle[m][2][l] - p[2];
+                    found[m][l] = x * x + y * y + z * z;
                 }
-                for (int l = 0; l < W; l++) nearest = smaller(found[l], nearest);
+                for (int m = 0; m < 3; m++) for (int l = 0; l < W; l++) least = smaller(found[m][l], least);
+                for (int m = 0; m < 3; m++) for (int l = 0; l < W; l++) {
+                    int64_t corner = corners[box - leaves][m][l];
+                    if (found[m][l] == least && (least < to_vertex || corner < vertex)) vertex = corner, to_vertex = least;
+                }
+                to_face = smaller(to_face, to_vertex), reach = ROUND_OFF * to_vertex;
+                if (own < to_face) {
+                    for (int l = 0; l < W; l++) {
+                        double corner[3][3];
+                        for (int m = 0; m < 3; m++) EACH corner[m][i] = triangle[m][i][l];
+                        found[0][l] = to_triangle(p, corner[0], corner[1], corner[2]);
+                    }
+                    for (int l = 0; l < W; l++) to_face = smaller(found[0][l], to_face);
+                }
             }
-            for (box = 0; top && !box;) if (far[--top] < nearest) box = stack[top];
+            for (box = 0; top && !box;) if (far[--top] <= reach) own = far[top], box = stack[top];
         }
-        squared[k] = nearest;
+        squared[k] = to_face, nearest[k] = vertex;
     }
 }

@@ -9,8 +9,9 @@ from .compilation import library_of, pointer
 DECLARATION = """
 void nearest_candidates(long count, long width, double factor, void *candidates,
                         void *points, void *vertices, void *nearest, void *has_others);
-void lower_distances(long count, long leaves, void *boxes, void *triangles,
-                     void *points, void *squared);
+void nearest_places(long count, long leaves, void *boxes, void *triangles,
+                    void *corners, void *vertices, void *points, void *squared,
+                    void *nearest);
 """
 LEAF_SIZE = 8
 """Number of triangles in the smallest boxes."""
@@ -37,8 +38,12 @@ class FaceTree:
             places,
             ends[1:, None] - 1,
         )
-        by_leaf = triangles[order[places]]
+        faces = order[places]
+        by_leaf = triangles[faces]
         self._triangles = np.ascontiguousarray(np.moveaxis(by_leaf, 1, -1))
+        by_corner = surface.faces[faces].swapaxes(1, 2)
+        self._corners = np.ascontiguousarray(by_corner, dtype=np.int64)
+        self._vertices = np.ascontiguousarray(surface.vertices)
         corners_of_leaf = by_leaf.reshape(len(places), -1, 3)
         boxes = np.stack(
             [corners_of_leaf.min(axis=1), corners_of_leaf.max(axis=1)],
@@ -61,32 +66,35 @@ class FaceTree:
         levels.append(np.zeros((1, 2, 3)))
         self._boxes = np.concatenate(levels[::-1])
 
-    def distance(self, points: Floats, at_most: Floats) -> Floats:
-        """Return the distances (k,) of points (k, 3) from the surface, if they are not
-        longer than known ones (k,)."""
+    def nearest(self, points: Floats) -> tuple[Floats, Ints]:
+        """Return the distances (k,) of (k, 3) points from the surface, and the vertices
+        (k,) nearest to them: of equally near ones the first.
+
+        It is fastest where each point is near the one before.
+        """
         interface, code = library_of(__file__, DECLARATION)
         points = np.ascontiguousarray(points)
-        squared = at_most**2
         count = len(points)
-        code.lower_distances(
+        squared = np.empty(count)
+        vertices = np.empty(count, dtype=np.int64)
+        known = [
+            (self._boxes, np.float64),
+            (self._triangles, np.float64),
+            (self._corners, np.int64),
+            (self._vertices, np.float64),
+            (points, np.float64),
+        ]
+        pointers = []
+        for array, dtype in known:
+            pointers.append(pointer(interface, array, dtype, array.size))
+        code.nearest_places(
             count,
             len(self._triangles),
-            pointer(
-                interface,
-                self._boxes,
-                np.float64,
-                self._boxes.size,
-            ),
-            pointer(
-                interface,
-                self._triangles,
-                np.float64,
-                self._triangles.size,
-            ),
-            pointer(interface, points, np.float64, 3 * count),
+            *pointers,
             pointer(interface, squared, np.float64, count, is_written=True),
+            pointer(interface, vertices, np.int64, count, is_written=True),
         )
-        return np.sqrt(squared)
+        return np.sqrt(squared), vertices
 
 
 def nearest_candidates(

@@ -53,7 +53,7 @@ def layer_fields(
     """
     parameters = growth.parameters
     search = PialSearch(positions_mm, zones.cortex_facets)
-    distance = search.distance(positions_mm)
+    distance, _ = search.nearest(positions_mm)
     weight = cortical_weight(distance, value_at(parameters.thickness_mm, week, maps))
     growth_maps: dict[str, Floats] = {}
     if "growth" in names and log_growth is not None:

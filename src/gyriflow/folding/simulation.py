@@ -254,7 +254,7 @@ class Folding:
         inside = domain.corners[depth <= thickness]
         own_total = 0.0
         for chunk in chunks(len(inside)):
-            places = domain.nodes[inside[chunk].T]
+            places = np.take(domain.nodes, inside[chunk].T, axis=0)
             for i, j in EDGES:
                 edges = places[i] - places[j]
                 own_total += np.sqrt(dots(edges, edges)).sum()

@@ -19,7 +19,7 @@ from ..settings.folding import FoldingParameters
 from ..settings.varying import value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .growth import Floats, GrowthByRates, GrowthInputs, Size, StepStart, increments
-from .layers import WEIGHT_REACH, PialSearch, cortical_weight
+from .layers import PialSearch, cortical_weight
 
 JOINING_GW = 1.0
 """Time within which a brain that does not start on its curves joins them."""
@@ -148,7 +148,7 @@ def _free_growth(
     zones = inputs.zones
     thickness = value_at(p.thickness_mm, week, inputs.maps)
     search = PialSearch(positions_mm, zones.cortex_facets)
-    distance = search.distance(positions_mm, WEIGHT_REACH * np.max(thickness))
+    distance, _ = search.nearest(positions_mm)
     weight = cortical_weight(distance, thickness)
     volumes = volumes_between(positions_mm, inputs.pieces)
     volume_rates = []

@@ -3,9 +3,15 @@ six values."""
 
 import numpy as np
 
-from ..geometry.jacobians import chunks, cofactors_of, element_maps
+from ..geometry.jacobians import chunks, cofactors_of
 from ..geometry.triangles import Floats, Indices, Mask
+from .compilation import library_of, pointer
 
+DECLARATION = """
+void deformations(long count, long points, long nodes, void *cells, void *before,
+                  void *after, void *slopes, void *F);
+void inverses_and_strains(long count, void *F, void *inverse, void *strains);
+"""
 MIN_SQUARED_STRETCH = 1e-6
 """Squared principal stretches below this count as this: those of flat elements."""
 ROUND_OFF = 1e-12
@@ -48,23 +54,24 @@ def deformation_gradients(
     elements have a volume before. `slopes` (q, n, 3) are the gradients of the nodes'
     shape functions in the regular element, at the points.
     """
-    found = np.empty(
-        (
-            len(cells),
-            len(slopes),
-            3,
-            3,
-        )
+    shape = len(cells), len(slopes), 3, 3
+    found = np.empty(shape)
+    interface, code = library_of(__file__, DECLARATION)
+    arrays = []
+    for array, dtype in (
+        (cells, np.int32),
+        (before, np.float64),
+        (after, np.float64),
+        (slopes, np.float64),
+    ):
+        values = np.ascontiguousarray(array, dtype=dtype)
+        arrays.append(pointer(interface, values, dtype, values.size))
+    code.deformations(
+        *shape[:2],
+        cells.shape[1],
+        *arrays,
+        pointer(interface, found, np.float64, found.size, is_written=True),
     )
-    for chunk in chunks(len(cells)):
-        maps_before = element_maps(before, cells[chunk], slopes)
-        maps_after = element_maps(after, cells[chunk], slopes)
-        for point, first in enumerate(maps_before):
-            cofactors = cofactors_of(first)
-            volumes = (first * cofactors).sum(axis=(0, 1)) / 3
-            # a: axis of the regular element, i, j: axes in space, e: element
-            turned = np.einsum("aie,aje->ije", maps_after[point], cofactors)
-            found[chunk, point] = np.moveaxis(turned / volumes, 2, 0)
     return found
 
 
@@ -103,18 +110,16 @@ def _inverse_and_strain(F: Floats) -> tuple[Floats, Floats]:
 
     Singular ones, whose strain is large, have another one in place of their inverse.
     """
-    inverse = np.empty_like(F)
-    strains = np.empty(len(F))
-    for chunk in chunks(len(F)):
-        maps = np.ascontiguousarray(np.moveaxis(F[chunk], 0, 2))
-        cofactors = cofactors_of(maps)
-        volumes = (maps * cofactors).sum(axis=(0, 1)) / 3
-        turned = cofactors / np.where(volumes == 0, 1.0, volumes)
-        inverse[chunk] = turned.transpose(2, 1, 0)
-        # i, j, k: axes in space, e: element
-        squared = np.einsum("kie,kje->ije", maps, maps)
-        squared -= np.eye(3)[:, :, None]
-        strains[chunk] = np.sqrt((squared**2).sum(axis=(0, 1)))
+    count = len(F)
+    inverse = np.empty((count, 3, 3))
+    strains = np.empty(count)
+    interface, code = library_of(__file__, DECLARATION)
+    code.inverses_and_strains(
+        count,
+        pointer(interface, F, np.float64, 9 * count),
+        pointer(interface, inverse, np.float64, 9 * count, is_written=True),
+        pointer(interface, strains, np.float64, count, is_written=True),
+    )
     return inverse, strains
 
 

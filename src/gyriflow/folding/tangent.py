@@ -127,7 +127,8 @@ class ElasticMatrix:
         has_fixed_column = self.fixed[self.columns][:, None, :]
         is_fixed = has_fixed_row | has_fixed_column
         self._fixed_entries = np.flatnonzero(is_fixed)
-        self._fixed_diagonal = _diagonals(is_fixed)[self._diagonal]
+        node, component = np.nonzero(fixed)
+        self._fixed_diagonal = 9 * self._diagonal[node] + 4 * component
         # without the mirror images of blocks within a rank
         stored = np.flatnonzero((self.columns >= rows) | is_ghost)
         self._stored = stored.astype(np.int32)
@@ -143,8 +144,9 @@ class ElasticMatrix:
         self._add(u, self._blocks)
         self._blocks.scatter_reverse()
         values = self.values
-        values.reshape(-1)[self._fixed_entries] = 0.0
-        _diagonals(values)[self._diagonal] += self._fixed_diagonal
+        entries = values.reshape(-1)
+        entries[self._fixed_entries] = 0.0
+        entries[self._fixed_diagonal] = 1.0
         self.products.take(values, self._stored)
 
     def half(self) -> sparse.bsr_matrix:

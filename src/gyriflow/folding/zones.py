@@ -280,7 +280,7 @@ def _bridge_vertices(
     each once."""
     x = mesh.vertices[:, 0]
     is_between = (x > left_plane) & (x < right_plane)
-    depths = PialSearch(mesh.vertices, facets).distance(mesh.vertices)
+    depths, _ = PialSearch(mesh.vertices, facets).nearest(mesh.vertices)
     depth = depths[mesh.tets]
     # of several equally deep vertices, all must lie between the planes
     is_deepest = depth >= depth.max(axis=1, keepdims=True) - 1e-9

@@ -215,8 +215,11 @@ def _stiffness_of_tetrahedra(vertices: Floats, tets: Indices) -> sparse.csr_matr
         for edge, (i, j) in enumerate(EDGES):
             products = (gradients[i] * gradients[j]).sum(axis=0)
             between[edge, chunk] = products / (6 * volumes6)
-    ends = np.sort(tets[:, EDGES], axis=2)
-    rows, columns = ends.transpose(2, 1, 0).reshape(2, -1)
+    # integers of the matrix' own type: others are converted
+    nodes = tets.T.astype(np.int32)
+    first, second = nodes[np.transpose(EDGES)]
+    rows = np.minimum(first, second).ravel()
+    columns = np.maximum(first, second).ravel()
     size = (len(vertices), len(vertices))
     above = sparse.coo_matrix((between.ravel(), (rows, columns)), shape=size).tocsr()
     matrix = above + above.T

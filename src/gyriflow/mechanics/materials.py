@@ -155,9 +155,19 @@ def _in_c(value: Expr, names: dict[Expr, str]) -> str:
         "Sum": "({}+{})",
         "Product": "({}*{})",
         "Division": "({}/{})",
-        "Power": "pow({},{})",
         "Ln": "log({})",
     }
-    return forms[type(value).__name__].format(
-        *(_in_c(part, names) for part in value.ufl_operands)
-    )
+    parts = [_in_c(part, names) for part in value.ufl_operands]
+    kind = type(value).__name__
+    if kind == "Power":
+        base, exponent = parts
+        return _power_in_c(base, float(exponent))
+    return forms[kind].format(*parts)
+
+
+def _power_in_c(base: str, exponent: float) -> str:
+    """Return a power in C. Those below −1, of derivatives, are quotients: the compiler
+    then finds one power in all of them, and that takes longer than all else."""
+    if exponent < -1:
+        return f"({_power_in_c(base, exponent + 1)}/{base})"
+    return f"pow({base},{exponent:.15g})"

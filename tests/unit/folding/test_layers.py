@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ellipsoid import GAP_MM, RUN, brain_mesh
+from scipy.spatial import cKDTree
 from shapes import box_mesh, uneven_surface
 
 from gyriflow.folding.growth import GrowthByRates, StepStart
@@ -41,10 +42,11 @@ def test_the_tree_of_faces_finds_the_distances_of_an_exhaustive_search(n_faces):
     points = np.concatenate([around, whole.vertices, centres, 0.9 * centres])
     expected, _, _ = nearest_on(points, TriangleMesh(whole.vertices, faces))
     tree = FaceTree(surface)
-    unknown = np.full(len(points), np.inf)
-    np.testing.assert_allclose(tree.distance(points, unknown), expected, atol=1e-12)
-    shorter = expected / 2
-    assert tree.distance(points, shorter) == pytest.approx(shorter)
+    distance, nearest = tree.nearest(points)
+    np.testing.assert_allclose(distance, expected, atol=1e-12)
+    used = np.unique(surface.faces)
+    _, found = cKDTree(whole.vertices[used]).query(points)
+    np.testing.assert_array_equal(nearest, used[found])
 
 
 def test_the_layers_of_a_week_have_its_thickness_stiffness_and_growth():
@@ -87,13 +89,17 @@ def test_rates_that_change_with_the_weeks_are_those_of_the_middle_of_a_step():
     np.testing.assert_allclose(inverse[0, 0], expected, rtol=1e-12)
 
 
-def test_distance_is_to_the_triangles_not_to_the_vertices_within_reach():
+def test_distance_is_to_the_triangles_not_to_the_vertices():
     # one coarse cell: the middle of a wall is far from every vertex
     search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
     points = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, -3.0, 0.0]])
-    np.testing.assert_allclose(search.distance(points), [5.0, 1.0, 2.0], atol=1e-12)
-    assert search.distance(points[1:2], reach=1.5)[0] == pytest.approx(1.0)
-    assert search.distance(points[:1], reach=1.0)[0] == pytest.approx(5 * np.sqrt(3))
+    distance, nearest = search.nearest(points)
+    np.testing.assert_allclose(distance, [5.0, 1.0, 2.0], atol=1e-12)
+    # of equally near vertices the first, whatever the order of the points
+    _, reversed_nearest = search.nearest(points[::-1])
+    np.testing.assert_array_equal(reversed_nearest[::-1], nearest)
+    gaps = np.linalg.norm(points[:, None] - search.surface.vertices, axis=2)
+    np.testing.assert_array_equal(nearest, gaps.argmin(axis=1))
 
 
 @pytest.mark.parametrize(("order", "degree"), [(1, 1), (2, 3)])

@@ -75,7 +75,8 @@ def prepared(folder, maps=None, settings=None, **inputs):
 def weight_for(parameters, thickness_mm):
     """Return the cortical weight at the vertices of the mesh for a thickness."""
     zones = zones_of_run(MESH, parameters_from(parameters))
-    distance_mm = PialSearch(MESH.vertices, zones.cortex_facets).distance(MESH.vertices)
+    pial = PialSearch(MESH.vertices, zones.cortex_facets)
+    distance_mm, _ = pial.nearest(MESH.vertices)
     return cortical_weight(distance_mm, thickness_mm)
 
 
