@@ -233,6 +233,8 @@ def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
             aspect="equal",
         )
         axes.set_axis_off()
+        # its ticks would be measured to place the title
+        axes.yaxis.set_visible(False)
         title = f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm"
         axes.set_title(title, fontsize=6.5, pad=2)
         names = "PA" if plane == "sagittal" else "LR"
@@ -350,6 +352,8 @@ def _draw_views(
     for axes, name in zip(panels, names, strict=True):
         view = VIEWS[name]
         axes.set_axis_off()
+        # its ticks would be measured to place the title
+        axes.yaxis.set_visible(False)
         mesh, painted = restricted(
             brain.pial, colours, view.hemisphere, brain.fissure_x_mm
         )

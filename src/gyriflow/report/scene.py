@@ -1,19 +1,38 @@
 """One surface seen from one side: cameras, light and off-screen rendering."""
 
 from collections.abc import Mapping
-from contextlib import closing
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import pyvista as pv
+
+# without which VTK does not draw
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonCore import vtkLogger
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkLogger, vtkPoints, vtkUnsignedCharArray
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkRenderingCore import (
+    vtkActor,
+    vtkLight,
+    vtkPolyDataMapper,
+    vtkProperty,
+    vtkRenderer,
+    vtkRenderWindow,
+)
 
-from ..geometry.triangles import Floats, TriangleMesh, corners, submesh, vertex_normals
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    corners,
+    submesh,
+    vertex_normals,
+)
 from .style import NEUTRAL_COLOUR
 
 # without a display VTK warns about X before it renders off-screen
@@ -113,6 +132,9 @@ TISSUE = {"ambient": 0.16, "diffuse": 0.84, "specular": 0.1}
 MAP = {"ambient": 0.58, "diffuse": 0.42, "specular": 0.0}
 """Light on maps, whose colours show values: shading only hints at the shape."""
 
+_SHININESS, _SHINE_COLOUR = 15.0, "lightblue"
+"""Exponent and colour of highlights."""
+
 # lamps fixed to the camera, symmetric so that both hemispheres are shaded equally. The
 # strongest is above, so that shallow sulci of young brains are visible
 _LAMPS = (
@@ -129,15 +151,26 @@ def picture_axes(view: View) -> tuple[Floats, Floats]:
     return np.cross(up, view.towards), up
 
 
-def polydata(mesh: TriangleMesh) -> pv.PolyData:
+def polydata(mesh: TriangleMesh) -> vtkPolyData:
     """Return a surface for VTK."""
-    return pv.PolyData.from_regular_faces(
-        np.array(mesh.vertices),
-        np.array(
-            mesh.faces,
-            dtype=int,
-        ),
-    )
+    data = vtkPolyData()
+    data.SetPoints(_points(mesh.vertices))
+    data.SetPolys(_cells(mesh.faces))
+    return data
+
+
+def _points(positions: Floats) -> vtkPoints:
+    points = vtkPoints()
+    points.SetData(numpy_to_vtk(np.asarray(positions, dtype=float), deep=True))
+    return points
+
+
+def _cells(corners_of_cells: Ints) -> vtkCellArray:
+    """Return triangles or lines, by the numbers of their points."""
+    numbers = np.asarray(corners_of_cells, dtype=np.int64)
+    cells = vtkCellArray()
+    cells.SetData(numbers.shape[1], numpy_to_vtk(numbers.ravel(), deep=True))
+    return cells
 
 
 def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
@@ -232,64 +265,110 @@ def render(
         for half in half_extents_mm
     ]
     surface = polydata(mesh)
-    surface.point_data.active_normals = vertex_normals(mesh)
-    is_by_vertex = len(colours) == len(mesh.vertices)
-    attributes = surface.point_data if is_by_vertex else surface.cell_data
+    normals = vertex_normals(mesh)
+    surface.GetPointData().SetNormals(numpy_to_vtk(normals, deep=True))
     levels = np.clip(np.round(255 * np.asarray(colours)), 0, 255)
-    attributes["colour"] = levels.astype(np.uint8)
-    plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
-    with closing(plotter):
-        plotter.set_background("white")  # type: ignore[arg-type]
-        plotter.add_mesh(
-            surface,
-            scalars="colour",
-            rgb=True,
-            interpolation="phong",
-            specular_power=15,
-            culling="back",
-            **light,
-        )
-        # the inside of a surface that is open where the hemispheres were separated
-        plotter.add_mesh(
-            surface,
-            color=NEUTRAL_COLOUR,
-            ambient=0.6,
-            diffuse=0.4,
-            culling="front",
-        )
-        if lines is not None:
-            ends = pv.line_segments_from_points(lines.reshape(-1, 3))
-            plotter.add_mesh(
-                ends,
-                color="black",
-                line_width=0.005 * PIXELS_PER_INCH,
-                lighting=False,
-            )
-        for position, intensity in _LAMPS:
-            lamp = pv.Light(
-                position=position,
-                light_type="camera light",
-                intensity=intensity,
-            )
-            plotter.add_light(lamp)
-        middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-        distance = 4 * float(
-            np.linalg.norm(
-                np.ptp(
-                    mesh.vertices,
-                    axis=0,
-                )
+    is_by_vertex = len(colours) == len(mesh.vertices)
+    attributes = surface.GetPointData() if is_by_vertex else surface.GetCellData()
+    attributes.SetScalars(numpy_to_vtk(levels.astype(np.uint8), deep=True))
+    scene = vtkRenderer()
+    scene.SetBackground(1.0, 1.0, 1.0)
+    outside = _add_actor(scene, surface, **light)
+    outside.SetInterpolationToPhong()
+    outside.BackfaceCullingOn()
+    # the inside of a surface that is open where the hemispheres were separated
+    inside = _add_actor(scene, surface, NEUTRAL_COLOUR, ambient=0.6, diffuse=0.4)
+    inside.SetInterpolationToFlat()
+    inside.FrontfaceCullingOn()
+    if lines is not None:
+        segments = vtkPolyData()
+        segments.SetPoints(_points(lines.reshape(-1, 3)))
+        segments.SetLines(_cells(np.arange(2 * len(lines)).reshape(-1, 2)))
+        drawn = _add_actor(scene, segments, "black")
+        drawn.SetLineWidth(0.005 * PIXELS_PER_INCH)
+        drawn.LightingOff()
+    _add_lamps(scene)
+    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    distance = 4 * float(
+        np.linalg.norm(
+            np.ptp(
+                mesh.vertices,
+                axis=0,
             )
         )
-        place = middle + distance * np.array(view.towards)
-        plotter.camera_position = [
-            tuple(place),
-            tuple(middle),
-            view.up,
-        ]
-        plotter.camera.parallel_projection = True
-        plotter.camera.parallel_scale = half_extents_mm[1]
-        plotter.renderer.ResetCameraClippingRange()
-        # at twice the resolution of print, smoother edges would not be visible
-        plotter.disable_anti_aliasing()
-        return np.array(plotter.screenshot(return_img=True))[..., :3]
+    )
+    camera = scene.GetActiveCamera()
+    camera.SetPosition(*(middle + distance * np.array(view.towards)))
+    camera.SetFocalPoint(*middle)
+    camera.SetViewUp(*view.up)
+    camera.ParallelProjectionOn()
+    camera.SetParallelScale(half_extents_mm[1])
+    scene.ResetCameraClippingRange()
+    return _photograph(scene, *size)
+
+
+def _add_actor(
+    scene: vtkRenderer,
+    data: vtkPolyData,
+    colour: str = "",
+    *,
+    ambient: float = 0.0,
+    diffuse: float = 1.0,
+    specular: float = 0.0,
+) -> vtkProperty:
+    """Add a surface or lines to a scene, in its own colours or in one, and return its
+    look."""
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(data)
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    look = actor.GetProperty()
+    look.SetAmbient(ambient)
+    look.SetDiffuse(diffuse)
+    look.SetSpecular(specular)
+    look.SetSpecularPower(_SHININESS)
+    look.SetSpecularColor(*to_rgb(_SHINE_COLOUR))
+    if colour:
+        mapper.ScalarVisibilityOff()
+        look.SetColor(*to_rgb(colour))
+    scene.AddActor(actor)
+    return look
+
+
+def _add_lamps(scene: vtkRenderer) -> None:
+    scene.AutomaticLightCreationOff()
+    for position, intensity in _LAMPS:
+        lamp = vtkLight()
+        lamp.SetLightTypeToCameraLight()
+        lamp.SetFocalPoint(0.0, 0.0, 0.0)
+        lamp.SetPosition(*position)
+        lamp.SetIntensity(intensity)
+        scene.AddLight(lamp)
+
+
+@cache
+def _window() -> vtkRenderWindow:
+    """Return the window of all pictures, since OpenGL takes longer to start than to
+    draw one."""
+    window = vtkRenderWindow()
+    window.SetOffScreenRendering(True)
+    # at twice the resolution of print, smoother edges would not be visible
+    window.SetMultiSamples(0)
+    # macOS would show a window of the desktop
+    if hasattr(window, "SetConnectContextToNSView"):
+        window.SetConnectContextToNSView(False)
+    return window
+
+
+def _photograph(scene: vtkRenderer, width: int, height: int) -> Image:
+    """Return a picture (height, width, 3) of a scene."""
+    window = _window()
+    window.SetSize(width, height)
+    window.AddRenderer(scene)
+    window.Render()
+    pixels = vtkUnsignedCharArray()
+    window.GetPixelData(0, 0, width - 1, height - 1, 1, pixels, 0)
+    window.RemoveRenderer(scene)
+    # rows from the bottom up
+    rows = vtk_to_numpy(pixels).reshape(height, width, 3)
+    return np.array(rows[::-1])

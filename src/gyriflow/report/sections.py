@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
@@ -16,7 +15,6 @@ from ..geometry.alignment import align
 from ..geometry.triangles import Floats, Ints, TriangleMesh
 from .labels import week_label
 from .pictures import Grid
-from .scene import polydata
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
@@ -52,18 +50,21 @@ def draw_outline(
 ) -> None:
     """Draw the intersection of a surface with one of `PLANES` at a position in mm."""
     normal, right, up = PLANES[plane]
-    axis = np.eye(3)[normal]
-    cut = polydata(surface).slice(normal=axis, origin=axis * at)
-    segments = np.asarray(cut.points)[
-        cut.lines.reshape(
-            -1,
-            3,
-        )[:, 1:]
-    ][..., [right, up]]
+    heights = surface.vertices[:, normal] - at
+    is_above = heights > 0
+    # the plane meets two edges of a face that has vertices on both sides of it
+    n_above = is_above[surface.faces].sum(axis=1)
+    starts = surface.faces[n_above % 3 > 0]
+    ends = starts[:, [1, 2, 0]]
+    meets = is_above[starts] != is_above[ends]
+    first, second = starts[meets], ends[meets]
+    share = heights[first] / (heights[first] - heights[second])
+    begin, end = (surface.vertices[side][:, [right, up]] for side in (first, second))
+    points = begin + share[:, None] * (end - begin)
     style: dict[str, Any] = {"colors": colour, "linewidths": thickness}
     axes.add_collection(
         LineCollection(
-            list(segments),
+            list(points.reshape(-1, 2, 2)),
             capstyle="round",
             **style,
         )
@@ -74,9 +75,12 @@ def _coronal_section(
     positions: Floats,
     tets: Ints,
     fields: Mapping[str, Floats],
-) -> pv.PolyData:
+) -> Any:
     """Cut linear elements at the median y of their nodes: a polygon per element, with
     fields at its points."""
+    # takes half a second, which outlines need not wait for
+    import pyvista as pv
+
     body = pv.UnstructuredGrid(
         {pv.CellType.TETRA: np.asarray(tets)},
         positions,

@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkFiltersCore import vtkDecimatePro
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
@@ -23,6 +25,8 @@ BUDGET_BYTES = 12_000_000
 MAX_VERTICES = 8000
 """Vertices of a surface in the view; more would not be visible."""
 MIN_VERTICES = 500
+FEATURE_DEG = 45.0
+"""Angle between faces along an edge that is kept as long as possible, in degrees."""
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
 _DRAWN = [name for name, record in VERTEX_MAPS.items() if record.colours]
@@ -167,9 +171,17 @@ def _thin_out(
             dtype=np.int64,
         )
     share = 1 - vertices / len(mesh.vertices)
-    coarse = polydata(mesh).decimate_pro(share, preserve_topology=True)
-    _, vertices_kept = cKDTree(mesh.vertices).query(coarse.points)
-    return vertices_kept, np.asarray(coarse.regular_faces, dtype=np.int64)
+    collapse = vtkDecimatePro()
+    collapse.SetInputData(polydata(mesh))
+    collapse.SetTargetReduction(share)
+    collapse.PreserveTopologyOn()
+    collapse.SetFeatureAngle(FEATURE_DEG)
+    collapse.Update()
+    coarse = collapse.GetOutput()
+    points = vtk_to_numpy(coarse.GetPoints().GetData())
+    _, vertices_kept = cKDTree(mesh.vertices).query(points)
+    faces = vtk_to_numpy(coarse.GetPolys().GetConnectivityArray())
+    return vertices_kept, faces.astype(np.int64).reshape(-1, 3)
 
 
 def _frame(
