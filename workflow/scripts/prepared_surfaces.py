@@ -15,11 +15,10 @@ with step(snakemake.log[0]):
         "shape_index": observed.shape_index,
     }
     write_vertex_maps(output.observed_maps, maps)
-    for name in ("start", "adjacent"):
-        baseline = prepare_for_comparison(
-            read_surface(files[name]),
-            surface,
-            radius_mm,
-        )
+    # before the second week, both are the start brain
+    for path in {files.start, files.adjacent}:
+        baseline = prepare_for_comparison(read_surface(path), surface, radius_mm)
         maps, _ = interpolate_measures(baseline, observed)
-        write_vertex_maps(output[f"{name}_maps"], maps)
+        for name in ("start", "adjacent"):
+            if files[name] == path:
+                write_vertex_maps(output[f"{name}_maps"], maps)

@@ -7,11 +7,19 @@ from scipy.spatial import cKDTree
 from ..errors import InputError, MeshError
 from ..geometry.matching import layer_thickness
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
-from ..geometry.triangles import Floats, TriangleMesh
+from ..geometry.triangles import Floats, Ints, TriangleMesh
 from ..settings.terms import CORTICAL_STEEPNESS
 
 SAME_POINT_MM = 1e-3
 """Surfaces are written in single precision: vertices that are nearer are the same."""
+
+_CUT_EDGES = {
+    1: [([0, 0, 0], [1, 2, 3])],
+    2: [([0, 0, 1], [2, 3, 3]), ([0, 1, 1], [2, 3, 2])],
+    3: [([0, 1, 2], [3, 3, 3])],
+}
+"""The edges of a tetrahedron that a level cuts in the corners of a triangle, or of two,
+by the number of corners above, which come first."""
 
 
 def depth_of_weight(weight: Floats) -> Floats:
@@ -43,23 +51,43 @@ def simulated_thickness(
     `positions` (m, 3) are the present ones in mm. MeshError where no point is deeper
     than the cortex.
     """
-    # takes half a second, which observed brains need not wait for
-    import pyvista as pv
-
-    grid = pv.UnstructuredGrid(
-        {pv.CellType.TETRA: linear_pieces(start)}, np.asarray(positions, dtype=float)
-    )
-    grid.point_data["depth"] = depth
     # cut in its present shape: linear along the edges, so the points are those of the
     # start
-    border = grid.contour([1.0], scalars="depth").triangulate()
-    if not border.n_cells:
+    inner = _level_surface(linear_pieces(start), positions, depth, 1.0)
+    if not len(inner.faces):
         deepest = f"points at most {float(np.max(depth)):.3g} cortical thicknesses deep"
         raise MeshError("the brain has no core", found=deepest, expected="more than 1")
-    inner = TriangleMesh(
-        np.asarray(border.points, dtype=float), border.faces.reshape(-1, 4)[:, 1:]
-    )
     return layer_thickness(pial, inner)
+
+
+def _level_surface(
+    tets: Ints,
+    positions: Floats,
+    values: Floats,
+    level: float,
+) -> TriangleMesh:
+    """Return the surface on which (n,) values, linear in (m, 4) tetrahedra, have a
+    level.
+
+    Its triangles are those of the single tetrahedra, which share no vertices.
+    """
+    is_above = values > level
+    # corners above first
+    order = np.argsort(~is_above[tets], axis=1, kind="stable")
+    tets = np.take_along_axis(tets, order, axis=1)
+    n_above = is_above[tets].sum(axis=1)
+    starts, ends = [], []
+    for count, edges in _CUT_EDGES.items():
+        cut = tets[n_above == count]
+        for start, end in edges:
+            starts.append(cut[:, start])
+            ends.append(cut[:, end])
+    first, second = np.concatenate(starts), np.concatenate(ends)
+    share = (level - values[first]) / (values[second] - values[first])
+    vertices = positions[first] + share[..., None] * (
+        positions[second] - positions[first]
+    )
+    return TriangleMesh(vertices.reshape(-1, 3), np.arange(first.size).reshape(-1, 3))
 
 
 def at_part(
