@@ -8,10 +8,8 @@ change, a quadratic spline. Beyond its ends the rate is held.
 import logging
 
 import numpy as np
+import scipy  # submodules load lazily, which keeps steps without them fast
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
-from scipy.linalg import eigh
-from scipy.optimize import brentq
 
 log = logging.getLogger(__name__)
 type Floats = NDArray[np.float64]
@@ -39,7 +37,7 @@ def design(
     """Return the matrix (n, k) that gives a curve's values at weeks (n,) from its
     coefficients."""
     knots = _knots(first, last, intervals)
-    rates = BSpline(
+    rates = scipy.interpolate.BSpline(
         knots,
         np.eye(intervals + 2),
         2,
@@ -119,7 +117,7 @@ def strength(
     elif freedom >= highest - FREEDOM_TOL:
         exponent = weakest
     else:
-        exponent = brentq(
+        exponent = scipy.optimize.brentq(
             lambda x: _freedom(data_shares, x) - freedom, weakest, strongest
         )
     return float(unit * 10**exponent)
@@ -147,7 +145,7 @@ def _data_shares(normal: Floats, penalty: Floats) -> Floats:
     # directions that neither decides, of weeks that nearly coincide, count as decided
     # by data
     ridge = RIDGE * np.eye(len(both))
-    shares = eigh(
+    shares = scipy.linalg.eigh(
         scales * normal + ridge,
         scales * both + ridge,
         eigvals_only=True,

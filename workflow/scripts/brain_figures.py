@@ -1,8 +1,12 @@
 """Draw a measured brain: page and table row of quality control, maps and small
 pictures."""
 
-from gyriflow.anatomy.plausible import expected_volume_ml
-from gyriflow.anatomy.thickness import hides_area, is_inaccurate, posed_whites
+from gyriflow.anatomy.plausible import (
+    expected_volume_ml,
+    hides_area,
+    is_inaccurate,
+)
+from gyriflow.geometry.poses import posed_whites
 from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json

@@ -4,7 +4,7 @@ outputs, the function of that name in the report."""
 from importlib import import_module
 from inspect import signature
 
-import pandas as pd
+from matplotlib.figure import Figure
 
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh
@@ -15,7 +15,6 @@ from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.report.tables import html_table
 from gyriflow.settings.folding import parameters_from
 from gyriflow.step import step
 
@@ -120,7 +119,10 @@ with step(snakemake.log[0]):
         arguments = signature(functions[name]).parameters
         given = {key: value for key, value in found.items() if key in arguments}
         drawn = functions[name](**given)
-        if isinstance(drawn, pd.DataFrame):
-            write_html(written, html_table(drawn))
-        else:
+        if isinstance(drawn, Figure):
             write_figure(*written, drawn)
+        else:
+            # only here, as pictures need no tables, which take half a second to import
+            from gyriflow.report.tables import html_table
+
+            write_html(written, html_table(drawn))

@@ -5,8 +5,8 @@ from gyriflow.anatomy.thickness import (
     TYPICAL_THICKNESS_MM,
     TYPICAL_VOXEL_MM,
     filled_labels,
-    posed_whites,
 )
+from gyriflow.geometry.poses import posed_whites
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume

@@ -2,7 +2,7 @@
 with their cause."""
 
 from gyriflow.io.files import read_json, write_table
-from gyriflow.report.quality import quality_table
+from gyriflow.report.tables import quality_table
 from gyriflow.step import step
 
 params = snakemake.params

@@ -19,7 +19,7 @@ from gyriflow.io.files import (
 )
 from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.messages import reported_messages
-from gyriflow.report.page import methods_text
+from gyriflow.report.methods import methods_text
 from gyriflow.report.tables import html_table, resources
 from gyriflow.running.manifest import FOLDER, recorded_results
 from gyriflow.running.provenance import recorded_inputs, software, texts_in

@@ -34,7 +34,7 @@ from .labels import (
 )
 from .repair import RepairedSurface
 from .sulci import open_fused_sulci
-from .thickness import MIN_VOXELS, Cortex, cortex_of
+from .thickness import Cortex, cortex_of
 
 # the mid-plane agrees with the labels if this is the cosine between its normal and the
 # line from left to right: 45°
@@ -372,7 +372,7 @@ def _reason_not_to_open(
     """Return why labels do not show where sulci are fused; or ''."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
         return "the labels have no white matter"
-    if cortex.voxels_through < MIN_VOXELS:
+    if cortex.voxels_through < plausible.MIN_VOXELS:
         return (
             f"the cortex is {cortex.voxels_through:.1f} voxels thick, so roughness of"
             " the labels looks like two banks"

@@ -2,8 +2,9 @@
 and similarity of hemispheres."""
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,9 @@ WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)
 CUT_SHARES = ((21.0, 0.23), (23.0, 0.17), (27.0, 0.15), (31.0, 0.12), (36.0, 0.103))
 # a share above this multiple of it is doubtful: individuals vary more than atlases
 MAX_CUT_FACTOR = 2.0
+# voxels through a cortex, below which its thickness is inaccurate, and area over that
+# of a surface without hidden parts
+MIN_VOXELS, MIN_AREA_RATIO = 1.5, 0.95
 # range of a median cortical thickness, also of bodies other than brains
 THICKNESSES_MM = (0.1, 20.0)
 UNITS_MM = {
@@ -345,3 +349,20 @@ def facing_warnings(
         f"the medial walls do not face each other: they are shifted by {shift:.1f} mm."
         " Are both in one space?"
     ]
+
+
+def is_inaccurate(report: Mapping[str, Any]) -> bool:
+    """Return whether the cortex is too thin for its voxels, by the report of its
+    thickness."""
+    return report.get("voxels_through_cortex", MIN_VOXELS) < MIN_VOXELS
+
+
+def hides_area(report: Mapping[str, Any]) -> bool:
+    """Return whether a part of the pial surface is hidden in fused sulci, by the report
+    of its thickness.
+
+    It is not known where the thickness is inaccurate, as the complete surface is volume
+    over thickness.
+    """
+    ratio = report.get("area_ratio", MIN_AREA_RATIO)
+    return not is_inaccurate(report) and ratio < MIN_AREA_RATIO

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..geometry.deformations import transform_points, voxel_size
 from ..geometry.matching import layer_thickness, nearest_on, surface_mask
-from ..geometry.poses import Pose
+from ..geometry.poses import Pose, posed_whites
 from ..geometry.triangles import (
     TriangleMesh,
     area,
@@ -39,6 +39,7 @@ from .extraction import (
 )
 from .fissure import FISSURE_MM, cut_sides, nearer_left, sample
 from .labels import Cerebrum, Labels, read_cerebrum
+from .plausible import hides_area, is_inaccurate
 from .repair import make_sound, sound_pieces, surface_of_mask, taubin_smoothed
 
 log = logging.getLogger(__name__)
@@ -51,11 +52,9 @@ MAX_OUTSIDE_VOXELS = 1.5
 FISSURE_REACH_MM = 3.0
 # a layer thinner than this does not count
 MIN_LAYER_VOXELS = 1 / 3
-MIN_VOXELS = 1.5
 QUANTILES = (0.05, 0.95)
 # on the medial wall, which has no cortex, white and pial surfaces coincide
 MIN_MM = 0.3
-MIN_AREA_RATIO = 0.95
 HIDDEN = "a part of it is hidden in fused sulci: area and gyrification are lower bounds"
 # vertices of both borders at which the number of voxels through the cortex is measured
 N_SAMPLES = 8000
@@ -287,23 +286,6 @@ def thickness_from_labels(
     return thickness
 
 
-def is_inaccurate(report: Mapping[str, Any]) -> bool:
-    """Return whether the cortex is too thin for its voxels, by the report of its
-    thickness."""
-    return report.get("voxels_through_cortex", MIN_VOXELS) < MIN_VOXELS
-
-
-def hides_area(report: Mapping[str, Any]) -> bool:
-    """Return whether a part of the pial surface is hidden in fused sulci, by the report
-    of its thickness.
-
-    It is not known where the thickness is inaccurate, as the complete surface is volume
-    over thickness.
-    """
-    ratio = report.get("area_ratio", MIN_AREA_RATIO)
-    return not is_inaccurate(report) and ratio < MIN_AREA_RATIO
-
-
 def _summary(
     values: Floats,
     is_measured: Mask,
@@ -409,15 +391,6 @@ def require_inside(
             ),
             remedy=OWN_WHITE,
         )
-
-
-def posed_whites(
-    pose: Pose, whites: Mapping[str, TriangleMesh]
-) -> dict[str, TriangleMesh]:
-    """Return the white surfaces by side, in the pose of the pial surfaces."""
-    return {
-        side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()
-    }
 
 
 def white_from_labels(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .triangles import Floats
+from .triangles import Floats, TriangleMesh, transformed
 
 LPS_TO_RAS: Floats = np.diag([-1.0, -1.0, 1.0, 1.0])
 """Also the motion from RAS to LPS: it is its own inverse."""
@@ -108,3 +108,12 @@ def turned(
     whole = motion(rotation)
     world = whole @ CONVENTIONS[coordinates]
     return Pose(world, {"whole": whole}, by, warnings=warnings)
+
+
+def posed_whites(
+    pose: Pose, whites: Mapping[str, TriangleMesh]
+) -> dict[str, TriangleMesh]:
+    """Return the white surfaces by side, in the pose of the pial surfaces."""
+    return {
+        side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()
+    }

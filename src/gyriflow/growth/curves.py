@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import scipy  # submodules load lazily, which keeps steps without them fast
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import lsq_linear
 
 from .. import splines
 from ..errors import InputError
@@ -250,7 +249,7 @@ def _solve(
     lowest = np.zeros(design.shape[1])
     lowest[0] = -np.inf
     lowest[len(lowest) - n_levels :] = -np.inf
-    found = lsq_linear(
+    found = scipy.optimize.lsq_linear(
         rows,
         right,
         bounds=(lowest, np.inf),
@@ -295,7 +294,7 @@ def _log_and_rate(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
     first = curve.weeks[0]
     last = curve.weeks[-1]
     inside = np.clip(at, first, last)
-    log_curve = PchipInterpolator(curve.weeks, np.log(curve.values))
+    log_curve = scipy.interpolate.PchipInterpolator(curve.weeks, np.log(curve.values))
     rates = log_curve.derivative()(inside)
     logs = log_curve(inside) + rates * (at - inside)
     return logs, rates

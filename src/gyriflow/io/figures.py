@@ -5,11 +5,12 @@ from base64 import b64encode
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-
-from matplotlib.figure import Figure
-from PIL import Image
+from typing import TYPE_CHECKING
 
 from .files import AnyPath, atomic_write, write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WIDTHS = (1800, 1400, 1100, 800)
 """Widths in pixels that pictures are tried with, until all of them together fit."""
@@ -30,7 +31,7 @@ TABLE_LOOK = (
 def write_figure(
     png: AnyPath,
     pdf: AnyPath,
-    figure: Figure,
+    figure: "Figure",
 ) -> None:
     """Write a figure as pixels, `DPI` to the inch, and as vectors; pictures keep their
     pixels."""
@@ -70,6 +71,9 @@ def picture_addresses(
 def _data_address(path: AnyPath, width: int) -> tuple[str, float]:
     """Return a picture as a data address (WebP), at most so many pixels wide, and its
     width in print in inches."""
+    # only here, as tables are written without it
+    from PIL import Image
+
     with Image.open(path) as picture:
         image = picture.convert("RGB")
         width_in = float(picture.width / picture.info["dpi"][0])

@@ -73,7 +73,11 @@ def _level_surface(
     """
     is_above = values > level
     # corners above first
-    order = np.argsort(~is_above[tets], axis=1, kind="stable")
+    order = np.argsort(
+        ~is_above[tets],
+        axis=1,
+        kind="stable",
+    )
     tets = np.take_along_axis(tets, order, axis=1)
     n_above = is_above[tets].sum(axis=1)
     starts, ends = [], []
@@ -87,7 +91,10 @@ def _level_surface(
     vertices = positions[first] + share[..., None] * (
         positions[second] - positions[first]
     )
-    return TriangleMesh(vertices.reshape(-1, 3), np.arange(first.size).reshape(-1, 3))
+    return TriangleMesh(
+        vertices.reshape(-1, 3),
+        np.arange(first.size).reshape(-1, 3),
+    )
 
 
 def at_part(

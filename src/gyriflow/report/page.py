@@ -3,7 +3,7 @@ brain."""
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -19,7 +19,6 @@ from ..quantities import Shown, metrics_shown
 from ..settings.growth import GROWTH_MODELS
 from ..settings.terms import (
     ELEMENTS_NEEDED,
-    FUSED_AFTER_GW,
     LARGE_ELEMENT_ERROR,
     OBSERVED,
     SPREAD_UNKNOWN,
@@ -28,7 +27,7 @@ from ..settings.terms import (
     rounded_elements,
     run_names,
 )
-from .labels import atlas_label, cited_atlas, plain, week_label
+from .labels import cited_atlas, plain, week_label
 from .measures import (
     Tables,
     accuracy_sentence,
@@ -269,31 +268,6 @@ def report_page(
         has_view=bool(view["groups"]),
         surfaces=Markup(data),
     )
-
-
-def methods_text(template: str, **used: Any) -> str:
-    """Return the methods of a study as reStructuredText, with citations, from a
-    template.
-
-    The template gets `growth_sentence(run, number)`, the sentence of the run's growth
-    model, where `number` formats numbers; `fused_after_gw`; and `atlas_label`.
-    """
-
-    environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(template).render(
-        growth_sentence=_growth_sentence,
-        fused_after_gw=FUSED_AFTER_GW,
-        atlas_label=atlas_label,
-        **used,
-    )
-
-
-def _growth_sentence(
-    run: Mapping[str, Any],
-    number: Callable[[Any], str],
-) -> str:
-    model = run["parameters"]["growth"]["model"]
-    return GROWTH_MODELS[model].sentence(run, number)
 
 
 def caption_html(caption: str) -> Markup:

@@ -1,12 +1,10 @@
-"""Quality control before the solve: a page and a verdict for each brain, and the table
-of all brains of a study."""
+"""Quality control before the solve: a page and a verdict for each brain."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure, SubFigure
@@ -145,7 +143,10 @@ def quality_page(
         va="top",
         **bold,
     )
-    figure.supxlabel("\n".join([heading, *lines]), **left)
+    figure.supxlabel(
+        "\n".join([heading, *lines]),
+        **left,
+    )
     rows: Any = figure.subfigures(3, 1, height_ratios=ROWS_IN)
     planes, views, thickness = rows
     planes.suptitle(words, **left)
@@ -437,7 +438,7 @@ def quality_row(
     `labels` are subject, week, population, source, sides and page; `report` and
     `thickness` the contents of `surface.json` and `thickness.json`. `expected_ml` is
     the approximate volume of a cerebrum of the week; half of it is expected of a single
-    hemisphere. The last two are those of `anatomy.thickness.is_inaccurate` and
+    hemisphere. The last two are those of `anatomy.plausible.is_inaccurate` and
     `hides_area`.
     """
     area, sides = report["area_cm2"], str(labels["sides"]).split()
@@ -464,30 +465,3 @@ def quality_row(
         "cut_share": report.get("cut_share"),
         "usual_cut_share": report.get("usual_cut_share"),
     }
-
-
-def quality_table(
-    rows: Sequence[Mapping[str, Any]],
-    left_out: Sequence[Mapping[str, Any]],
-    order: Sequence[str],
-) -> pd.DataFrame:
-    """Return the rows of all brains, outputs of `quality_row`, in an order of their
-    ids, others last.
-
-    `left_out` are columns and cause of the brains without a surface.
-    """
-    refused = [
-        {
-            **row,
-            "verdict": "refused",
-            "warning_count": 0,
-        }
-        for row in left_out
-    ]
-    table = pd.DataFrame([*rows, *refused]).set_index(
-        "subject",
-        drop=False,
-    )
-    ids = [name for name in order if name in table.index]
-    ids += [name for name in table.index if name not in ids]
-    return table.loc[ids, [*table.columns.drop("page"), "page"]].reset_index(drop=True)

@@ -161,7 +161,12 @@ def polydata(mesh: TriangleMesh) -> vtkPolyData:
 
 def _points(positions: Floats) -> vtkPoints:
     points = vtkPoints()
-    points.SetData(numpy_to_vtk(np.asarray(positions, dtype=float), deep=True))
+    points.SetData(
+        numpy_to_vtk(
+            np.asarray(positions, dtype=float),
+            deep=True,
+        )
+    )
     return points
 
 
@@ -169,7 +174,10 @@ def _cells(corners_of_cells: Ints) -> vtkCellArray:
     """Return triangles or lines, by the numbers of their points."""
     numbers = np.asarray(corners_of_cells, dtype=np.int64)
     cells = vtkCellArray()
-    cells.SetData(numbers.shape[1], numpy_to_vtk(numbers.ravel(), deep=True))
+    cells.SetData(
+        numbers.shape[1],
+        numpy_to_vtk(numbers.ravel(), deep=True),
+    )
     return cells
 
 
@@ -267,10 +275,19 @@ def render(
     surface = polydata(mesh)
     normals = vertex_normals(mesh)
     surface.GetPointData().SetNormals(numpy_to_vtk(normals, deep=True))
-    levels = np.clip(np.round(255 * np.asarray(colours)), 0, 255)
+    levels = np.clip(
+        np.round(255 * np.asarray(colours)),
+        0,
+        255,
+    )
     is_by_vertex = len(colours) == len(mesh.vertices)
     attributes = surface.GetPointData() if is_by_vertex else surface.GetCellData()
-    attributes.SetScalars(numpy_to_vtk(levels.astype(np.uint8), deep=True))
+    attributes.SetScalars(
+        numpy_to_vtk(
+            levels.astype(np.uint8),
+            deep=True,
+        )
+    )
     scene = vtkRenderer()
     scene.SetBackground(1.0, 1.0, 1.0)
     outside = _add_actor(scene, surface, **light)
@@ -367,7 +384,15 @@ def _photograph(scene: vtkRenderer, width: int, height: int) -> Image:
     window.AddRenderer(scene)
     window.Render()
     pixels = vtkUnsignedCharArray()
-    window.GetPixelData(0, 0, width - 1, height - 1, 1, pixels, 0)
+    window.GetPixelData(
+        0,
+        0,
+        width - 1,
+        height - 1,
+        1,
+        pixels,
+        0,
+    )
     window.RemoveRenderer(scene)
     # rows from the bottom up
     rows = vtk_to_numpy(pixels).reshape(height, width, 3)

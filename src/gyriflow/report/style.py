@@ -6,11 +6,10 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
 from string import ascii_lowercase
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
@@ -19,6 +18,9 @@ from matplotlib.lines import Line2D
 
 from ..quantities import DISTINCT_COLOURS
 from ..settings.terms import OBSERVED, run_names
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SINGLE_COLUMN_IN = 3.5
 """Width of one column of a journal page, in inches."""
@@ -134,7 +136,7 @@ def wrap(text: str, letters: int) -> str:
     )
 
 
-def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
+def runs_by_name(table: "pd.DataFrame") -> "pd.DataFrame":
     """Return a table with columns run and subject, with simulations named by
     `run_names`."""
     pairs = list(

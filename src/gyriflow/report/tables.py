@@ -258,6 +258,33 @@ def mesh_quality(
     return table.rename_axis("measure")
 
 
+def quality_table(
+    rows: Sequence[Mapping[str, Any]],
+    left_out: Sequence[Mapping[str, Any]],
+    order: Sequence[str],
+) -> pd.DataFrame:
+    """Return the rows of all brains, outputs of `quality_row`, in an order of their
+    ids, others last.
+
+    `left_out` are columns and cause of the brains without a surface.
+    """
+    refused = [
+        {
+            **row,
+            "verdict": "refused",
+            "warning_count": 0,
+        }
+        for row in left_out
+    ]
+    table = pd.DataFrame([*rows, *refused]).set_index(
+        "subject",
+        drop=False,
+    )
+    ids = [name for name in order if name in table.index]
+    ids += [name for name in table.index if name not in ids]
+    return table.loc[ids, [*table.columns.drop("page"), "page"]].reset_index(drop=True)
+
+
 def html_table(table: pd.DataFrame) -> Markup:
     """Return the table as HTML.
 
@@ -276,7 +303,12 @@ def html_table(table: pd.DataFrame) -> Markup:
     ):
         cells = zip(flat, row, words, strict=True)
         rows.append([(_kind(*cell), cell[-1]) for cell in cells])
-    return Markup(_TABLE.render(heads=list(flat), rows=rows))
+    return Markup(
+        _TABLE.render(
+            heads=list(flat),
+            rows=rows,
+        )
+    )
 
 
 def _kind(

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from gyriflow.errors import InputError
 from gyriflow.folding.growth_models import BUILDERS
-from gyriflow.report.page import methods_text
+from gyriflow.report.methods import methods_text
 from gyriflow.settings.folding import GROWTH_RATES, FoldingSettings, parameters_from
 from gyriflow.settings.growth import GROWTH_MODELS, Growth, ModelName
 

@@ -15,11 +15,11 @@ from text_tables import frame
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.atlas_curves import CURVES, DIFFERENCES
 from gyriflow.report.measures import Tables
+from gyriflow.report.methods import methods_text
 from gyriflow.report.page import (
     brain_page,
     caption_html,
     hide_paths,
-    methods_text,
     page_figures,
     report_page,
     study_page,

@@ -19,9 +19,9 @@ from gyriflow.report.quality import (
     QualityBrain,
     quality_page,
     quality_row,
-    quality_table,
     tissue_groups,
 )
+from gyriflow.report.tables import quality_table
 
 LABELS = {
     "subject": "a",
