@@ -17,7 +17,8 @@ from ..errors import MeshError
 from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, transformed
 
-PAD_VOXELS = 6
+# as far as the Gaussian that smooths masks reaches
+PAD_VOXELS = 4
 # σ of the Gaussian that smooths a mask before its isosurface is extracted
 SMOOTHING_VOXELS = 1.0
 LEVEL = 0.5
@@ -517,7 +518,11 @@ def _patches(
 ) -> list[tuple[tuple[int, float], bool, tuple[slice, ...], Mask]]:
     """Return size and change of the field, whether it fills, box and mask of each patch
     that a closing or an opening changes, the smallest first."""
-    closed = ~dilated(~dilated(mask, radius), radius)
+    # outside the volume as well, which may be cropped closer than the radius
+    margin = int(radius)
+    inner = tuple(slice(margin, margin + length) for length in mask.shape)
+    grown = dilated(np.pad(mask, margin), radius)
+    closed = ~dilated(~grown, radius)[inner]
     opened = dilated(~dilated(~mask, radius), radius)
     patches = []
     for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):

@@ -120,8 +120,9 @@ def from_labels(
     )
     brain.report |= {"scheme": scheme.name, **cerebrum.report}
     brain.warn(cerebrum.warnings)
-    pose = _checked_pose(cerebrum, labels, affine, scheme, side, brain)
-    smooth, affine = extraction.smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
+    smooth = extraction.smooth_mask(cerebrum.mask)
+    pose = _checked_pose(cerebrum, smooth, labels, affine, scheme, side, brain)
+    affine = pose.world @ cerebrum.affine
     grid, removed_ml = affine, 0.0
     side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
     cortex = cortex_of(cerebrum, scheme)
@@ -177,14 +178,15 @@ def from_labels(
 
 def _checked_pose(
     cerebrum: Cerebrum,
+    field: NDArray[np.float32],
     labels: Labels,
     affine: Floats,
     scheme: LabelScheme,
     side: Side | None,
     brain: _Brain,
 ) -> Pose:
-    """Check the size, sides and shape of a cerebrum and return its pose; that of a
-    hemisphere is found from its surface later."""
+    """Check the size, sides and shape of a cerebrum, with its smoothed `field`, and
+    return its pose; that of a hemisphere is found from its surface later."""
     pose = None if side else posing.pose_of_labels(labels, affine, scheme)
     labelled = np.intersect1d(cerebrum.tissue, scheme.cortex or scheme.cerebrum)
     sides = [
@@ -222,7 +224,6 @@ def _checked_pose(
                     " and right."
                 ),
             )
-        field = extraction.smooth_mask(cerebrum.mask)
         # parts that are removed below because of their size do not count
         parts, _, _ = extraction.main_parts(field > LEVEL, cerebrum.smallest_part)
         surface = extraction.isosurface(extraction.smooth_mask(parts), cerebrum.affine)

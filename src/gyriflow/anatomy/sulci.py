@@ -98,16 +98,6 @@ def open_fused_sulci(
     )
     inside, solid = whole > LEVEL, solid > LEVEL
     cortex = inside & ~solid
-    is_right = (
-        None
-        if side_mm is None
-        else refine(
-            side_mm[part],
-            affine,
-            every * factor,
-        )[0]
-        > 0
-    )
     nearest = ndimage.distance_transform_edt(
         ~solid,
         sampling=size,
@@ -138,7 +128,13 @@ def open_fused_sulci(
     distance = np.zeros(cortex.shape, dtype=np.float32)
     for axis in range(3):
         _mark_sheet(
-            distance, bank, nearest, axis, MIN_BANK_DISTANCE * thickness, size, is_right
+            distance,
+            bank,
+            nearest,
+            axis,
+            MIN_BANK_DISTANCE * thickness,
+            size,
+            None if side_mm is None else side_mm[part],
         )
     # the depth of a sheet is measured on coarse voxels, in an eighth of the time
     below = ndimage.distance_transform_edt(
@@ -267,25 +263,36 @@ def _mark_sheet(
     axis: int,
     min_mm: NDArray[np.floating],
     size: Floats,
-    is_right: Mask | None,
+    side_mm: NDArray[np.float32] | None,
 ) -> None:
     """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along
     an axis have different banks.
 
     Only distances above `min_mm`, and voxels that the plane half-way between the banks
-    passes, are set.
+    passes, are set. Both banks are on one side, by the signs of `side_mm` in voxels
+    that may be an integer multiple as large.
     """
     step = np.eye(3, dtype=int)[axis]
     first = np.argwhere(cortex & np.roll(cortex, -1, axis))
     banks = [nearest[(slice(None), *voxels.T)].T for voxels in (first, first + step)]
     offset = (banks[1] - banks[0]) * size
     length = np.linalg.norm(offset, axis=1)
-    differ = length > min_mm[tuple(first.T)]
-    if is_right is not None:
-        sides = [is_right[tuple(bank.T)] for bank in banks]
-        differ &= sides[0] == sides[1]
+    differ = np.flatnonzero(length > min_mm[tuple(first.T)])
+    if side_mm is not None:
+        factor = distance.shape[0] / side_mm.shape[0]
+        sides = []
+        for bank in banks:
+            places = (bank[differ].T + 0.5) / factor - 0.5
+            heights = ndimage.map_coordinates(
+                side_mm,
+                places,
+                order=1,
+                mode="nearest",
+            )
+            sides.append(heights > 0)
+        differ = differ[sides[0] == sides[1]]
     first, offset, length = first[differ], offset[differ], length[differ]
-    middle = (0.5 * (banks[0] + banks[1]) * size)[differ]
+    middle = 0.5 * (banks[0] + banks[1])[differ] * size
     normal = offset / length[:, None]
     reach = 0.5 * (np.abs(normal) * size).sum(axis=1)
     for voxels in (first, first + step):

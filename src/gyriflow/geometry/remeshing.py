@@ -33,11 +33,12 @@ def self_intersecting_faces(mesh: TriangleMesh, among: Mask | None = None) -> Ma
         )
     places = corners(mesh)
     centres = places.mean(axis=1)
-    radius = np.linalg.norm(places - centres[:, None], axis=2).max()
+    radius = np.linalg.norm(places - centres[:, None], axis=2).max(axis=1)
+    reach = radius + radius[among].max()
     distance, _ = cKDTree(centres[among]).query(
-        centres, distance_upper_bound=2.0 * radius
+        centres, distance_upper_bound=reach.max()
     )
-    near = np.isfinite(distance)
+    near = distance <= reach
     crossing = np.zeros(len(near), dtype=bool)
     crossing[near] = self_intersecting_faces(submesh(mesh, near)[0])
     return crossing

@@ -76,8 +76,22 @@ def corners(mesh: TriangleMesh) -> Floats:
 
 def area_vectors(mesh: TriangleMesh) -> Floats:
     """Return the (m, 3) face normals with the face areas (mm²) as lengths."""
-    a, b, c = corners(mesh).transpose(1, 0, 2)
-    return 0.5 * np.cross(b - a, c - a)
+    # by coordinates, in a third of the time of np.cross
+    x, y, z = _edge_vectors(mesh, 1)
+    u, v, w = _edge_vectors(mesh, 2)
+    normals = [
+        y * w - z * v,
+        z * u - x * w,
+        x * v - y * u,
+    ]
+    return 0.5 * np.stack(normals, axis=1)
+
+
+def _edge_vectors(mesh: TriangleMesh, corner: int) -> list[Floats]:
+    """Return the x, y and z of the edges from the first corner of each face to
+    another one."""
+    start, end = mesh.faces[:, 0], mesh.faces[:, corner]
+    return [values[end] - values[start] for values in mesh.vertices.T]
 
 
 def face_areas(mesh: TriangleMesh) -> Floats:
@@ -172,14 +186,16 @@ def face_normals(mesh: TriangleMesh) -> Floats:
 
 def _sums_at_vertices(mesh: TriangleMesh, face_values: Floats) -> Floats:
     """Return per vertex the sum of (m,) or (m, k) values over its faces."""
-    n_faces = len(mesh.faces)
     vertex = mesh.faces.ravel()
-    face = np.repeat(np.arange(n_faces), 3)
-    is_corner = scipy.sparse.csr_matrix(
-        (np.ones(3 * n_faces), (vertex, face)),
-        shape=(len(mesh.vertices), n_faces),
-    )
-    return np.asarray(is_corner @ face_values)
+    sums = [
+        np.bincount(
+            vertex,
+            np.repeat(values, 3),
+            minlength=len(mesh.vertices),
+        )
+        for values in np.atleast_2d(face_values.T)
+    ]
+    return np.stack(sums, axis=-1).reshape(-1, *face_values.shape[1:])
 
 
 def vertex_normals(mesh: TriangleMesh) -> Floats:
@@ -236,29 +252,35 @@ def is_closed(mesh: TriangleMesh) -> bool:
     directions."""
     if not len(mesh.faces):
         return False
-    _, uses = edges(mesh)
-    directed = _half_edges(mesh)
-    keys = directed @ [len(mesh.vertices), 1]
-    # many distinct numbers are sorted faster than np.unique finds them by their hashes
-    has_repeated = (np.diff(np.sort(keys)) == 0).any()
-    return not has_repeated and bool((uses == 2).all())
+    start, end = _half_edges(mesh).T
+    count = len(mesh.vertices)
+    is_forward, is_backward = start < end, start > end
+    # one number per edge
+    forward = np.sort((start * count + end)[is_forward])
+    backward = np.sort((end * count + start)[is_backward])
+    has_repeated = (np.diff(forward) == 0).any()
+    is_degenerate = (start == end).any()
+    return not (has_repeated or is_degenerate) and np.array_equal(forward, backward)
 
 
 def euler_number(mesh: TriangleMesh) -> int:
     """Return vertices − edges + faces, counting used vertices only: 2 for each closed
     surface without handles."""
     pairs, _ = edges(mesh)
-    return len(np.unique(mesh.faces)) - len(pairs) + len(mesh.faces)
+    is_used = np.bincount(mesh.faces.ravel()) > 0
+    return int(is_used.sum()) - len(pairs) + len(mesh.faces)
 
 
 def face_components(mesh: TriangleMesh) -> Ints:
     """Return the (m,) number of the connected component of each face, the largest area
     first (0)."""
-    links = _half_edges(mesh)
+    # two edges of a face connect it
+    links = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     of_vertex = connected(links, len(mesh.vertices))
-    first_corner = mesh.faces[:, 0]
-    _, component = np.unique(of_vertex[first_corner], return_inverse=True)
+    component = of_vertex[mesh.faces[:, 0]]
     areas = np.bincount(component, weights=face_areas(mesh))
+    # vertices without a face come last
+    areas[np.bincount(component) == 0] = -1.0
     largest_first = np.argsort(-areas, kind="stable")
     rank = np.argsort(largest_first)
     return rank[component]
