@@ -14,6 +14,7 @@ from scipy.special import ndtr
 from skimage.measure import marching_cubes
 
 from ..errors import MeshError
+from ..geometry.boxes import Box, box_of, widened
 from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, transformed
 
@@ -100,7 +101,7 @@ def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
     return moved
 
 
-def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
+def parts_in_boxes(mask: Mask) -> Iterator[tuple[Box, Mask]]:
     """Yield for each connected part (faces, edges, corners) of a mask its box plus one
     voxel, and its mask there."""
     if not mask.any():
@@ -109,11 +110,11 @@ def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
     number, _ = ndimage.label(mask[around], OUTSIDE)
     boxes = ndimage.find_objects(number)
     for index, tight in enumerate(boxes, start=1):
-        box = _wider(tight, 1)
+        box = widened(tight, 1)
         yield _moved(box, around), number[box] == index
 
 
-def _moved(box: tuple[slice, ...], around: tuple[slice, ...]) -> tuple[slice, ...]:
+def _moved(box: Box, around: Box) -> Box:
     """Return the place in the whole volume of a box in a part `around` it."""
     sides = []
     for side, outer in zip(
@@ -124,14 +125,6 @@ def _moved(box: tuple[slice, ...], around: tuple[slice, ...]) -> tuple[slice, ..
         first = outer.start
         stop = min(side.stop + first, outer.stop)
         sides.append(slice(side.start + first, stop))
-    return tuple(sides)
-
-
-def _wider(box: tuple[slice, ...], margin: int) -> tuple[slice, ...]:
-    sides = []
-    for side in box:
-        start = max(side.start - margin, 0)
-        sides.append(slice(start, side.stop + margin))
     return tuple(sides)
 
 
@@ -496,26 +489,11 @@ def with_neighbours(
     return grown
 
 
-def box_of(mask: Mask, margin: int = 0) -> tuple[slice, ...]:
-    """Return the box around a mask that is not empty, wider by some voxels where the
-    volume has them."""
-    sides = []
-    for others in ((1, 2), (0, 2), (0, 1)):
-        places = np.flatnonzero(mask.any(axis=others))
-        sides.append(
-            slice(
-                int(places[0]),
-                int(places[-1]) + 1,
-            )
-        )
-    return _wider(tuple(sides), margin)
-
-
 def _patches(
     mask: Mask,
     field: NDArray[np.float32],
     radius: float,
-) -> list[tuple[tuple[int, float], bool, tuple[slice, ...], Mask]]:
+) -> list[tuple[tuple[int, float], bool, Box, Mask]]:
     """Return size and change of the field, whether it fills, box and mask of each patch
     that a closing or an opening changes, the smallest first."""
     # outside the volume as well, which may be cropped closer than the radius
@@ -536,7 +514,7 @@ def _patches(
 
 def _apply(
     mask: Mask,
-    box: tuple[slice, ...],
+    box: Box,
     content: Mask,
     closed_by: Mask,
 ) -> int:
@@ -548,7 +526,7 @@ def _apply(
     defines them.
     """
     for margin in MARGINS:
-        wide = _wider(box, margin)
+        wide = widened(box, margin)
         inner = tuple(
             slice(a.start - b.start, a.stop - b.start)
             for a, b in zip(box, wide, strict=True)
@@ -721,7 +699,7 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     for part, tight in enumerate(ndimage.find_objects(number)):
         if large[part]:
             continue
-        box = _wider(
+        box = widened(
             tight,
             int(reach / size.min()) + 2,
         )

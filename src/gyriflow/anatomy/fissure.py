@@ -19,6 +19,7 @@ from skimage.segmentation import watershed
 from ..errors import InputError
 from ..geometry import triangles
 from ..geometry.alignment import motion
+from ..geometry.boxes import Box
 from ..geometry.deformations import transform_points, voxel_index, voxel_size
 from ..geometry.matching import nearest_on
 from ..geometry.triangles import Ints, TriangleMesh
@@ -553,7 +554,7 @@ def _slices_between(
     height: Floats,
     floods: list[NDArray[np.int8]],
     normal: Floats,
-) -> tuple[slice, ...]:
+) -> Box:
     """Return the part of a volume around the surface between the hemispheres: slices
     along the axis that its `normal` in voxels is closest to.
 

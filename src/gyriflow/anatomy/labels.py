@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import InputError
+from ..geometry.boxes import Box, box_of
 from ..geometry.deformations import voxel_size
 from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
@@ -195,7 +196,7 @@ def read_cerebrum(
         name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()
     }
     report["border_share"] = _border_share(main)
-    box = extraction.box_of(main)
+    box = box_of(main)
     first = np.array([side.start for side in box]) - extraction.PAD_VOXELS
     cropped = np.pad(main[box], extraction.PAD_VOXELS)
     labelled = np.pad(tissue[box], extraction.PAD_VOXELS)
@@ -383,7 +384,7 @@ def _outside_ventricles(around: AroundCerebrum) -> Mask:
     is_cut = True
     while is_cut:
         margin += 8
-        box = extraction.box_of(fluid & near_hindbrain, margin)
+        box = box_of(fluid & near_hindbrain, margin)
         share = _smoothed(hits, clear, RAY_SMOOTHING, box)
         out = fluid[box] & (share <= ENCLOSED)
         is_cut = bool(out.sum() > out[INNER].sum())
@@ -411,7 +412,7 @@ def _unlabelled_ventricles(around: AroundCerebrum) -> Mask:
     # volumes in a far larger unit are reported elsewhere
     if around.fluid.any() or 2 * margin > max(around.shape):
         return filled[INNER]
-    box = extraction.box_of(cerebrum)
+    box = box_of(cerebrum)
     tissue = np.pad(cerebrum[box], margin)
 
     # the cerebrum without its openings
@@ -449,7 +450,7 @@ def _hits(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
     share = np.zeros(clear.shape, dtype=np.float32)
     if not clear.any():
         return share
-    box = extraction.box_of(clear, 1)
+    box = box_of(clear, 1)
     clear = clear[box]
     tissue = tissue[box]
     count = np.zeros(clear.shape, dtype=np.uint8)
@@ -483,7 +484,7 @@ def _hits(clear: Mask, tissue: Mask) -> NDArray[np.float32]:
     return share
 
 
-def _shifted(plane: Mask, shift: tuple[int, ...]) -> tuple[slice, ...]:
+def _shifted(plane: Mask, shift: tuple[int, ...]) -> Box:
     """Return the part of a plane next to its inner part."""
     sides = []
     for step, size in zip(shift, plane.shape, strict=True):
@@ -495,7 +496,7 @@ def _smoothed(
     share: NDArray[np.float32],
     clear: Mask,
     smoothing_voxels: float,
-    box: tuple[slice, ...],
+    box: Box,
 ) -> NDArray[np.float32]:
     """Return, in a box, values of clear voxels smoothed over these voxels."""
     reach = int(GAUSSIAN_REACH * smoothing_voxels) + 1
@@ -557,7 +558,7 @@ def layout_of(labels: Labels) -> Layout:
     # most of the volume is air around the head
     is_labelled = labels != 0
     if is_labelled.any():
-        box = extraction.box_of(is_labelled)
+        box = box_of(is_labelled)
         labels, is_labelled = labels[box], is_labelled[box]
     labels = np.pad(labels, 1)
     is_labelled = np.pad(is_labelled, 1)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..geometry.boxes import box_of
 from ..geometry.deformations import transform_points, voxel_size
 from ..settings.schemes import LabelScheme
 from ..units import ML_PER_MM3
@@ -14,7 +15,6 @@ from .extraction import (
     OUTSIDE,
     Floats,
     Mask,
-    box_of,
     dilated,
     not_touching,
     shifted_affine,

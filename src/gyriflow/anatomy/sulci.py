@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from ..geometry.boxes import Box
 from ..geometry.deformations import transform_points, voxel_size
 from ..units import ML_PER_MM3
 from .extraction import (
@@ -168,9 +169,7 @@ def open_fused_sulci(
     )
 
 
-def _around_brain(
-    field: NDArray[np.float32], every: int
-) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+def _around_brain(field: NDArray[np.float32], every: int) -> tuple[Box, Box]:
     """Return the slices of a field around a brain, and those of voxels `every` times
     larger."""
     large = [

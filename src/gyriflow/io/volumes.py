@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..formats import VOLUME_SUFFIXES, format_of
+from ..geometry.boxes import box_of
 from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats
 from ..grouping import counted
@@ -120,21 +121,12 @@ def _without_empty_border(
     """Return a volume cut to its values other than zero and one voxel around them, and
     its affine."""
     is_filled = values != 0
-    sides = []
-    for others in ((1, 2), (0, 2), (0, 1)):
-        places = np.flatnonzero(is_filled.any(axis=others))
-        if not len(places):
-            return values, affine
-        first = max(int(places[0]) - 1, 0)
-        sides.append(
-            slice(
-                first,
-                int(places[-1]) + 2,
-            )
-        )
+    if not is_filled.any():
+        return values, affine
+    box = box_of(is_filled, 1)
     moved = affine.copy()
-    moved[:3, 3] += moved[:3, :3] @ [side.start for side in sides]
-    return values[tuple(sides)], moved
+    moved[:3, 3] += moved[:3, :3] @ [side.start for side in box]
+    return values[box], moved
 
 
 class VolumeHeader(NamedTuple):
