@@ -29,10 +29,10 @@ from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask, dil
 SAMPLES = 600
 DIRECTIONS = 400
 STARTS = 5
-# step and tolerance of the search with every third point, of which every third scores
-# the directions to start from, and about so many vertices; then with all, for planes
-# whose mirror distance is at most this multiple of the smallest one plus so many mm
-ROUGH_EVERY, START_EVERY, ROUGH_VERTICES, ROUGH_SEARCH = 3, 3, 4000, (0.1, 3e-3)
+# step and tolerance of the search with every third point and about so many vertices;
+# then with all, for planes whose mirror distance is at most this multiple of the
+# smallest one plus so many mm
+ROUGH_EVERY, ROUGH_VERTICES, ROUGH_SEARCH = 3, 4000, (0.1, 3e-3)
 FINE_SEARCH, REFINED_FACTOR, REFINED_MM = (0.02, 1e-4), 2.0, 0.3
 # larger leaves than usual: single points are searched, often far from the surface
 LEAF_SIZE = 64
@@ -265,7 +265,7 @@ def _symmetry_planes(
             _mirror_distance(
                 n,
                 float(n @ centre),
-                few[::START_EVERY],
+                few,
                 sparse,
             )
             for n in directions
