@@ -18,8 +18,7 @@ from ..geometry.boxes import Box, box_of, widened
 from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, transformed
 
-# as far as the Gaussian that smooths masks reaches
-PAD_VOXELS = 4
+PAD_VOXELS = 6
 # σ of the Gaussian that smooths a mask before its isosurface is extracted
 SMOOTHING_VOXELS = 1.0
 LEVEL = 0.5
