@@ -1,5 +1,5 @@
-"""Surfaces prepared for comparison: scaled to the observed brain's volume, remeshed,
-aligned, with their curvature."""
+"""Surfaces prepared for comparison: scaled to the observed brain's volume, with even
+triangles, aligned, with their curvature."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 from ..errors import InputError
 from ..geometry.alignment import align
 from ..geometry.matching import match_surface, surface_mask, values_at
-from ..geometry.remeshing import remesh
+from ..geometry.remeshing import made_even
 from ..geometry.triangles import (
     Floats,
     Ints,
@@ -24,7 +24,7 @@ from ..quantities import COMPARED_MAPS
 from ..settings.terms import CURVATURE_RADIUS_MM
 
 EDGE_MM = 1.0
-"""Edge length after remeshing."""
+"""Edge length of even triangles."""
 MAX_CURVATURE_PER_MM = 1.0
 """Limit of mean curvature, which is clipped: larger values come from single sharp
 edges."""
@@ -65,11 +65,11 @@ def prepare_for_comparison(
     observed: TriangleMesh,
     radius_mm: float = CURVATURE_RADIUS_MM,
 ) -> PreparedSurface:
-    """Scale a closed surface to the observed brain's volume, remesh it, align it
-    rigidly and fit its curvature.
+    """Scale a closed surface to the observed brain's volume, make its triangles even,
+    align it rigidly and fit its curvature.
 
-    The observed brain itself (`mesh is observed`) is only remeshed. `radius_mm` is that
-    of `metrics.curvature`. InputError where a surface encloses no volume.
+    The observed brain itself (`mesh is observed`) is not scaled. `radius_mm` is that of
+    `metrics.curvature`. InputError where a surface encloses no volume.
     """
     volumes = [signed_volume(surface) for surface in (mesh, observed)]
     if min(volumes) <= 0:
@@ -79,9 +79,10 @@ def prepare_for_comparison(
             expected="closed surfaces with outward faces",
         )
     if mesh is observed:
-        even = remesh(observed, EDGE_MM)
+        even = made_even(observed, EDGE_MM)
     else:
-        even = align(remesh(scale_to_volume(mesh, observed), EDGE_MM), observed)
+        scaled = scale_to_volume(mesh, observed)
+        even = align(made_even(scaled, EDGE_MM), observed)
     fitted = curvature(even, radius_mm=radius_mm)
     return PreparedSurface(even, fitted.mean, fitted.shape_index)
 

@@ -7,15 +7,18 @@ from facts import Facts
 from shapes import sphere, uneven
 
 from gyriflow.compare.shapes import (
+    EDGE_MM,
     PreparedSurface,
     cortex_dice,
     curvature_differences,
     prepare_for_comparison,
 )
 from gyriflow.errors import InputError
+from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     flipped,
+    mean_edge_length,
 )
 
 from .bumpy import RADIUS, REAL, SMOOTH
@@ -24,6 +27,16 @@ from .bumpy import RADIUS, REAL, SMOOTH
 def test_surfaces_without_a_volume_are_refused():
     with pytest.raises(InputError, check=Facts("-7437", "7437", "mm³")):
         prepare_for_comparison(flipped(REAL), REAL)
+
+
+def test_even_triangles_stay_and_others_are_remeshed():
+    even = remesh(sphere(RADIUS), EDGE_MM)
+    assert prepare_for_comparison(even, even).mesh is even
+    # the edges of one that grows to four times the volume are too long
+    grown = TriangleMesh(1.6 * even.vertices, even.faces)
+    prepared = prepare_for_comparison(even, grown).mesh
+    assert len(prepared.vertices) > 2 * len(even.vertices)
+    assert mean_edge_length(prepared) == pytest.approx(EDGE_MM, rel=0.05)
 
 
 def test_differences_of_curvature_are_weighted_by_area():
