@@ -26,13 +26,13 @@ SECONDS_PER_ELEMENT_AND_STEP = {1: 4.3e-6, 2: 14e-6}
 """By element order; fitted to runs of 130 k to 500 k linear and 27 k to 45 k quadratic
 elements and 28 to 126 steps, within a factor of 1.6. A quadratic element counts as the
 eight linear elements with the same nodes."""
-SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 16e-6, 2: 18e-6}
-"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599 k
-(11e-6), and of 200 k to the deep folds of 36 GW on a busy machine (28e-6), quadratic
+SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 8e-6, 2: 18e-6}
+"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k (7e-6) and
+497 k elements (6e-6) to 30 GW, where later folds touch less than at 36 GW; quadratic
 ones a guess."""
-SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.2e-4
-"""For a mesh to follow the brains of its series: targets, or an atlas' path; by 107 k
-to 130 k elements to 32 GW."""
+SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 7e-5
+"""For a mesh to follow the brains of its series: targets, or an atlas' path; by 130 k
+elements to 29 GW and 497 k to 30 GW."""
 DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
 """Week from which opened sulci are so deep that to follow a brain for a week takes so
 many times as long."""
@@ -41,9 +41,9 @@ FUSED_SHARE = {"pial": 0.53, "series": 0.5, "prediction": 0.2}
 `open_sulci: false`, over that with opened sulci."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 1.2e-4
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
-MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
+MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 2.7e-4, "tetgen": 5.4e-5}
 """By mesher; of elements of the mesh, linear or quadratic."""
-SECONDS_PER_ML = {"register": 0.13, "pial": 0.17}
+SECONDS_PER_ML = {"register": 0.088, "pial": 0.13}
 """By stage, for each mL of the (later) brain, whose labels are registered or surfaced
 voxel by voxel; 22 to 38 GW."""
 SECONDS_PER_VERTEX, SECONDS_PER_VERTEX_AND_MODE = 1.4e-4, 8.3e-7
