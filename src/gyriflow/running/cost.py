@@ -27,8 +27,8 @@ SECONDS_PER_ELEMENT_AND_STEP = {1: 4.3e-6, 2: 14e-6}
 elements and 28 to 126 steps, within a factor of 1.6. A quadratic element counts as the
 eight linear elements with the same nodes."""
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 8e-6, 2: 18e-6}
-"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k (7e-6) and
-497 k elements (6e-6) to 30 GW, where later folds touch less than at 36 GW; quadratic
+"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k (7e-6)
+and 497 k elements (6e-6) to 30 GW, where fewer folds touch than at 36 GW; quadratic
 ones a guess."""
 SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 7e-5
 """For a mesh to follow the brains of its series: targets, or an atlas' path; by 130 k
